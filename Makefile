@@ -1,0 +1,51 @@
+# `make help` lists the targets. Everything is installed into .venv and written to out.
+
+RUN     := .venv/bin/mitsuba-diffraction
+PYTHON3 := .venv/bin/python
+# the scenes' own patch is the same recipe; relative to the scene
+RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
+
+.DEFAULT_GOAL := setup
+.PHONY: setup demo test bench figures lint clean help
+MAKEFLAGS += --no-print-directory
+
+setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
+	@:
+
+# stamps: done again only when what they depend on has changed
+.venv/packages: pyproject.toml .ci/setup
+	@.ci/setup packages
+
+.venv/libraries: .venv/packages
+	@.ci/setup libraries
+
+demo: setup  ## tabulate a snake scale, render three scenes with it, the snake in two lights
+	@mkdir -p out
+	@$(RUN) precompute precompute/elaphe_like.toml -o out/elaphe_like.exr
+	@$(RENDER) scenes/plate.xml -s 64 -o out/plate.exr
+	@$(RENDER) scenes/sphere.xml -s 32 -o out/sphere.exr
+	@$(RENDER) scenes/snake.xml -s 32 -D sun_azimuth=120 -o out/snake.exr
+	@$(RENDER) scenes/snake.xml -s 32 -D sun_azimuth=60 -o out/snake_other_light.exr
+	@echo "Compare out/snake.png and out/snake_other_light.png: the colours move with the sun."
+
+test: setup  ## run the tests
+	@$(PYTHON3) -m pytest -n 2
+
+bench: setup  ## time tables and evaluation
+	@$(RUN) bench
+
+# a measured patch beside the look-alikes: make figures MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"
+figures: setup  ## make the pictures in docs/images
+	@$(PYTHON3) -m mitsuba_diffraction.figures -o docs/images $(if $(MEASURED),--measured $(MEASURED))
+
+lint: setup  ## check style and types
+	@$(PYTHON3) -m ruff check
+	@$(PYTHON3) -m ruff format --check
+	@$(PYTHON3) -m mypy
+
+clean:  ## remove .venv, out and all caches
+	@rm -rf .venv out build dist precompute/tables .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+help:
+	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile | expand -t 16

@@ -1,0 +1,58 @@
+"""mitsuba_diffraction: iridescence of measured surfaces as a BSDF for Mitsuba 3.
+
+Contents
+--------
+HeightField        a patch of surface, heights in µm
+gratings           ideal gratings, look-alikes of snake scales, optical discs
+DiffractionTable   precomputed diffraction orders of a patch
+reference          the BRDF straight from its integral, in double precision
+bsdf_dict          a dictionary for `mi.load_dict` from arrays
+DiffractionError   what every bad input raises, in one line
+
+Importing the package registers the BSDF plugin `diffraction` in the current variant of Mitsuba and
+in every variant that is set later.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+from .llvm import select_llvm
+
+select_llvm()  # before Dr.Jit picks a library by itself: some would end the process
+
+import mitsuba as mi  # noqa: E402
+
+from . import gratings, reference  # noqa: E402
+from .dictionary import bsdf_dict  # noqa: E402
+from .errors import DiffractionError, DiffractionWarning  # noqa: E402
+from .heightfield import HeightField  # noqa: E402
+from .tables import DiffractionTable  # noqa: E402
+
+__version__ = "0.1.0"
+__all__ = [
+    "DiffractionError",
+    "DiffractionTable",
+    "DiffractionWarning",
+    "HeightField",
+    "bsdf_dict",
+    "gratings",
+    "reference",
+]
+
+
+def _register(old: str | None, new: str | None) -> None:
+    """Define the plugin for the variant just set: its base class is another in each."""
+    name = f"{__name__}.bsdf"
+    if new is None:
+        return
+    if name in sys.modules:
+        importlib.reload(sys.modules[name])
+    else:
+        importlib.import_module(name)
+
+
+mi.detail.add_variant_callback(_register)
+if mi.variant() is not None:
+    _register(None, mi.variant())

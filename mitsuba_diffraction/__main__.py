@@ -1,0 +1,8 @@
+"""`python -m mitsuba_diffraction` is the command `mitsuba-diffraction`."""
+
+import sys
+
+from .cli import main
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,13 @@
+"""Measurements of speed and memory, one file each; `mitsuba-diffraction bench` prints them.
+
+Contents
+--------
+plan         how much is measured: in full, or quickly
+machine      what the figures depend on besides the code
+figures      rows with goals, as text and as plain data
+timing       rounds through all contenders, so that a machine's moods hit all alike
+build        tables, each built in a process of its own, whose memory is measured
+contenders   BSDFs to compare, the bare gathers and the source documents' look-up among them
+evaluation   `eval`, `sample` and `pdf` of all of them
+rendering    whole pictures
+"""

@@ -1,0 +1,151 @@
+"""What `eval` is compared with: other BSDFs, other settings, and the bare gathers."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from .. import gratings
+from ..errors import DiffractionWarning
+from ..plugin.lookup import DeviceTable
+from ..tables.table import DiffractionTable
+from .documents import TermImages
+from .plan import PIXEL, SEED, Plan
+
+ALUMINIUM = "roughconductor, Al"
+DEFAULT = "diffraction, the defaults"
+DEFAULT_AL = "diffraction, Al"
+DOCUMENTS = "documents: Taylor, 37 terms, 3×3, an image a term"
+TAYLOR = "the same series, all terms of a bin together"
+
+
+@dataclass(frozen=True)
+class Tables:
+    """The tables of one patch that the contenders look up, as files."""
+
+    folder: Path
+    paths: dict[str, Path] = field(default_factory=dict)
+
+    def bsdf(self, name: str, **parameters: Any) -> Any:
+        """The plugin with one of the tables, in the current variant."""
+        with warnings.catch_warnings():
+            # the patch is there to be looked up, no matter how far the model holds for it
+            warnings.simplefilter("ignore", DiffractionWarning)
+            return mi.load_dict(
+                {"type": "diffraction", "table": str(self.paths[name]), **parameters}
+            )
+
+
+def build_tables(plan: Plan, folder: Path, progress: Callable[[int, int, str], None]) -> Tables:
+    """Build and save them."""
+    patch = gratings.elaphe_like(plan.pixels * PIXEL, plan.pixels)
+    settings: dict[str, dict[str, Any]] = {
+        "default": {},
+        "1e-2": {"tolerance": 1e-2},
+        "1e-4": {"tolerance": 1e-4},
+        "patch": {"coherence": "patch"},
+        # no tolerance could be met by this
+        "documents": {
+            "coherence": "patch", "basis": "taylor", "terms": 37, "taps": 3, "tolerance": 0.999,
+        },
+    }  # fmt: skip
+    tables = Tables(folder)
+    for n, (name, arguments) in enumerate(settings.items()):
+        progress(n, len(settings), "building tables")
+        tables.paths[name] = folder / f"{name}.exr"
+        DiffractionTable.build(patch, **arguments).save(tables.paths[name])
+    progress(len(settings), len(settings), "building tables")
+    return tables
+
+
+def bsdf_makers(tables: Tables) -> dict[str, Callable[[], Any]]:
+    """Functions that make the contenders, by name, in the current variant."""
+
+    def rough(material: str) -> Callable[[], Any]:
+        return lambda: mi.load_dict({"type": "roughconductor", "material": material})
+
+    def ours(table: str, **parameters: Any) -> Callable[[], Any]:
+        return lambda: tables.bsdf(table, **parameters)
+
+    def documents() -> Any:
+        bsdf = tables.bsdf("documents")
+        bsdf._light._device = TermImages(bsdf.table)
+        return bsdf
+
+    return {
+        ALUMINIUM: rough("Al"),
+        "roughconductor, none": rough("none"),
+        DEFAULT: ours("default"),
+        DEFAULT_AL: ours("default", material="Al"),
+        "diffraction, none": ours("default", material="none"),
+        "diffraction, tolerance 1e-2": ours("1e-2"),
+        "diffraction, tolerance 1e-4": ours("1e-4"),
+        "diffraction, patch": ours("patch"),
+        DOCUMENTS: documents,
+        TAYLOR: ours("documents"),
+    }
+
+
+def is_slow(name: str) -> bool:
+    """Whether fewer calls do, for the sake of the user's time."""
+    return name in (DOCUMENTS, TAYLOR)
+
+
+@dataclass(frozen=True)
+class Queries:
+    """Random questions to a BSDF, evaluated and in memory."""
+
+    si: Any
+    wo: Any
+    sample1: Any
+    sample2: Any
+
+    @classmethod
+    def random(cls, lanes: int) -> Queries:
+        """Directions uniform over the hemisphere, wavelengths as Mitsuba draws them."""
+        random = mi.PCG32(size=lanes, initstate=SEED)
+
+        def hemisphere() -> Any:
+            pair = mi.Point2f(random.next_float32(), random.next_float32())
+            return mi.warp.square_to_uniform_hemisphere(pair)
+
+        si = dr.zeros(mi.SurfaceInteraction3f, lanes)
+        si.wi = hemisphere()
+        wo = hemisphere()
+        si.wavelengths = mi.sample_rgb_spectrum(mi.sample_shifted(random.next_float32()))[0]
+        sample1 = random.next_float32()
+        sample2 = mi.Point2f(random.next_float32(), random.next_float32())
+        dr.eval(si, wo, sample1, sample2)
+        return cls(si, wo, sample1, sample2)
+
+
+def bare_gathers(device: DeviceTable, queries: Queries) -> Callable[[], Any]:
+    """All packets that `eval` reads for these queries, added up: the floor beneath any look-up.
+
+    Where they are is found out beforehand.
+    """
+    si, total = queries.si, queries.si.wi + queries.wo
+    firsts = []
+    for n in range(len(si.wavelengths)):
+        k = 2e3 * dr.pi / si.wavelengths[n]
+        firsts.append(device.first_bin(k * total.x, k * total.y, k * total.z))
+    dr.eval(firsts)
+
+    def body(n: Any, firsts: list[Any], total: Any) -> tuple[Any, list[Any], Any]:
+        for row in range(device.grid.taps[1]):
+            for column in range(device.grid.taps[0]):
+                for packet in device.read(firsts[0] + row * device.columns + column):
+                    total += dr.sum(packet, axis=0)
+        return n + 1, [*firsts[1:], firsts[0]], total
+
+    def call() -> Any:
+        state = (mi.UInt32(0), firsts, mi.Float(0.0))
+        return dr.while_loop(state, lambda n, *_: n < len(firsts), body)[2]
+
+    return call

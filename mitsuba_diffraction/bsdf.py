@@ -1,0 +1,284 @@
+"""The Mitsuba BSDF plugin `diffraction`: measured surfaces that diffract.
+
+.. list: parameters (defaults in brackets, ∂ differentiable)
+
+heightfield : string
+    Height field: image (PNG, BMP, TIFF, EXR), array (NPY), AFM file, recipe (TOML), or table.
+table : string
+    A table made by `mitsuba-diffraction precompute` instead.
+data : mi.TensorXf
+    Heights in µm instead, shape (ny, nx); dictionaries only (see `bsdf_dict`).
+pixel_size : float or string [from the file]
+    Distance between heights in µm: one number, "dx, dy", or "auto".
+max_height : float or string [from the file]
+    Height of white in an integer image, µm, or "auto".
+coherence_width : float [65]
+    4σ of the Gaussian amplitude window, µm.
+coherence : string [ensemble]
+    `ensemble`: what a pixel sees that covers many coherence areas; `patch`: one window's speckle.
+basis : string [auto]
+    `chebyshev` or `taylor`: the series in κ.
+tolerance : float [1e-3]
+    Relative error of ⟨|P|²⟩, met or refused.
+terms : integer [from the tolerance]
+    Length of the series.
+material, eta, k : string, spectra
+    A conductor, as in `roughconductor`; material "none" reflects everything.
+int_ior, ext_ior : float or string [1.5, 1.000277]
+    A dielectric, the default (1.5: shed snake skin).
+orientation : float or texture ∂ [0]
+    Degrees that the patch's x axis is turned by from the first tangent; or a texture (raw, in a
+    float format) or mesh attribute of three channels, the first two of which are (cos, sin) of that
+    angle. Tangents follow UV coordinates: on a mesh without them they are arbitrary, and turn from
+    triangle to triangle. A BSDF cannot see that; `info MESH` and `render` warn.
+height_scale : float ∂ [1]
+    Multiplies the heights, up to 1.5 × max(1, value given).
+energy_conserving : bool [true]
+    Divides by max(1, a(ωi), a(ωo)), where a bounds the directional albedo for R = 1 from above at
+    all wavelengths: reciprocal, never brighter than white. `false` is raw Kirchhoff, which gains
+    energy at grazing angles (1.3 at 80°, more beyond), for checks. The bound takes a few seconds
+    the first time, and is kept in the cache.
+shadowing : string [none]
+    `vcavity`: the surface shadows itself like long V-shaped grooves (Torrance and Sparrow 1967).
+layering : string [transmission]
+    How the nested BSDF shares the light. `transmission`: it gets and returns T(ωi) T(ωo), with
+    T = 1 − R of the flat interface. `thesis`: (1 − w) f_diffraction + (1 − F + w) f_nested, F at
+    the half vector, as in the thesis of 2014 that the method comes from; for comparisons with
+    its pictures only, since it gains energy.
+diffuse_weight : float [0]
+    That w.
+wavelength : float [550]
+    nm, in mono variants; the others have their own.
+(nested) : BSDF
+    What lies beneath a dielectric and receives the light that is not reflected, e.g. pigment.
+
+The model is scalar Kirchhoff diffraction (Beckmann and Spizzichino 1963; Stam 1999) under a
+Gaussian coherence window, looked up in a table of the patch's diffraction orders:
+
+    f = R (1 + ωi·ωo)² / (λ² A w² cosθi cosθo) · ⟨|P|²⟩
+
+XML and the same in Python:
+
+    <bsdf type="diffraction">
+        <string name="heightfield" value="elaphe.png"/>
+        <float name="pixel_size" value="0.0488"/>
+        <float name="max_height" value="0.375"/>
+    </bsdf>
+
+    mi.load_dict({"type": "diffraction", "heightfield": "elaphe.png", "pixel_size": 0.0488,
+                  "max_height": 0.375})
+"""
+
+from __future__ import annotations
+
+import functools
+import operator
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.llvm import require_loaded_llvm
+from mitsuba_diffraction.plugin.energy import EnergyBound
+from mitsuba_diffraction.plugin.light import variant_light
+from mitsuba_diffraction.plugin.parameters import read_parameters
+from mitsuba_diffraction.plugin.sampling import COSINE
+from mitsuba_diffraction.plugin.shadowing import vcavity
+
+
+class Diffraction(mi.BSDF):
+    """Scalar Kirchhoff diffraction of a measured height field."""
+
+    def __init__(self, props: mi.Properties) -> None:
+        require_loaded_llvm()
+        super().__init__(props)
+        parameters = read_parameters(props)
+        self.table = parameters.table
+        self.surface = parameters.reflectance
+        self.nested = parameters.nested
+        self.height_scale = mi.Float(parameters.height_scale)
+        self.orientation = parameters.orientation
+        self.layering = parameters.layering
+        self._vcavity = parameters.vcavity
+        self._light = variant_light(self.table, parameters.wavelength)
+        self._energy = EnergyBound(self.table) if parameters.energy_conserving else None
+        self._area_factor = 4.0 * dr.pi * self.table.sigma**2  # 4π²σ⁴ over the window's area πσ²
+        front = mi.BSDFFlags.FrontSide
+        glossy = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.Anisotropic | front
+        components = [glossy]
+        if self.nested is not None:
+            components += [self.nested.flags(n) for n in range(self.nested.component_count())]
+        self.m_components = components  # at once: what it gives back is a copy
+        self.m_flags = functools.reduce(operator.or_, components)
+        self.parameters_changed([])
+
+    # ------------------------------------------------------------------ Mitsuba's interface
+
+    def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        """f·cosθo per wavelength."""
+        active = self._above(si, wo, active)
+        value = mi.Spectrum(0.0)
+        if ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0):
+            value = mi.depolarizer(self._diffraction(si, wo, active))
+        if self.nested is not None:
+            value *= self.layering.above
+            beneath = self.layering.beneath(si, wo, active)
+            value += mi.Spectrum(beneath) * self.nested.eval(ctx, si, wo, active)
+        return dr.select(active, value, 0.0)
+
+    def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        """Density of `sample` per solid angle."""
+        active = self._above(si, wo, active)
+        density = self._density(si, wo, active)
+        if self.nested is not None:
+            beneath = self.nested.pdf(ctx, si, wo, active)
+            density = dr.lerp(beneath, density, self._glossy_share(si, active))
+        return dr.select(active, density, 0.0)
+
+    def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
+        """`eval` and `pdf` at once."""
+        return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+
+    def sample(
+        self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True
+    ) -> tuple[Any, Any]:
+        """A direction, and f·cosθo over its density."""
+        active = mi.Mask(active) & (mi.Frame3f.cos_theta(si.wi) > 0.0)
+        result = dr.zeros(mi.BSDFSample3f)
+        result.eta = 1.0
+        result.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
+        glossy = active
+        if self.nested is not None:
+            share = self._glossy_share(si, active)
+            glossy = active & (sample1 < share)
+            remaining = (sample1 - share) / (1.0 - share)
+            result, _ = self.nested.sample(ctx, si, remaining, sample2, active & (sample1 >= share))
+            result.sampled_component += 1
+            sample1 = dr.select(glossy, sample1 / share, sample1)
+            result.eta = dr.select(glossy, 1.0, result.eta)
+            result.sampled_type = dr.select(
+                glossy, mi.UInt32(+mi.BSDFFlags.GlossyReflection), result.sampled_type
+            )
+            result.sampled_component = dr.select(glossy, 0, result.sampled_component)
+        drawn = self._draw(si, sample1, sample2, active)
+        result.wo = dr.select(glossy, drawn, result.wo)
+        value, density = self.eval_pdf(ctx, si, result.wo, active)
+        active &= density > 0.0
+        result.pdf = dr.select(active, density, 0.0)
+        return result, dr.select(active, value / dr.select(active, density, 1.0), 0.0)
+
+    def traverse(self, callback: Any) -> None:
+        """Expose what may change between renderings without another table."""
+        differentiable = mi.ParamFlags.Differentiable
+        callback.put("height_scale", self.height_scale, differentiable)
+        self.orientation.traverse(callback)
+        self.surface.traverse(callback)
+        if self.nested is not None:
+            callback.put("nested", self.nested, differentiable)
+
+    def parameters_changed(self, keys: Any) -> None:
+        """Check what changed, and keep it out of the kernels' code."""
+        largest = dr.slice(dr.max(dr.detach(self.height_scale)))
+        if not 0.0 < largest <= self.table.height_scale_max:
+            raise DiffractionError(
+                f"height_scale={largest:g} is outside what the table serves, above 0 and up to "
+                f"{self.table.height_scale_max:g}; load the plugin anew with that height_scale"
+            )
+        if self._energy is not None:
+            self._energy.update(largest)
+        dr.make_opaque(self.height_scale)
+        self.orientation.update()
+        self.surface.update()
+
+    def to_string(self) -> str:
+        """All parameters, for people."""
+        nested = "" if self.nested is None else f"  nested = {self.nested},\n"
+        return (
+            "Diffraction[\n"
+            f"  table = {self.table},\n"
+            f"  coherence_width = {self.table.coherence_width:g} µm,\n"
+            f"  tolerance = {self.table.tolerance:g},\n"
+            f"  surface = {self.surface},\n"
+            f"  height_scale = {dr.slice(self.height_scale):g},\n"
+            f"  energy_conserving = {'false' if self._energy is None else 'true'},\n"
+            f"  orientation = {self.orientation},\n"
+            f"  shadowing = {'vcavity' if self._vcavity else 'none'},\n"
+            f"  layering = {self.layering},\n"
+            f"{nested}]"
+        )
+
+    # ------------------------------------------------------------------ the model
+
+    def _above(self, si: Any, wo: Any, active: Any) -> Any:
+        cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
+        return mi.Mask(active) & (cos_i > 0.0) & (cos_o > 0.0)
+
+    def _diffraction(self, si: Any, wo: Any, active: Any) -> Any:
+        """R (1 + ωi·ωo)² / (λ² A w² cosθi) · ⟨|P|²⟩, that is f·cosθo, for R = 1."""
+        total = si.wi + wo
+        rotation = self.orientation.rotation(si, active)
+        uv = _in_patch(total, rotation)
+        w = dr.select(active, total.z, 1.0)
+        # (1 + ωi·ωo) from the sum's length: accurate for opposite grazing directions too
+        one_plus_dot = 0.5 * dr.squared_norm(total)
+        cos_i = dr.select(active, mi.Frame3f.cos_theta(si.wi), 1.0)
+        outside = self._area_factor * dr.square(one_plus_dot / w) / cos_i
+        power = self._light.power(uv, w * self.height_scale, si)
+        if self._energy is not None:
+            incident, outgoing = _in_patch(si.wi, rotation), _in_patch(wo, rotation)
+            outside /= self._energy.divisor(incident, cos_i, outgoing, w - cos_i)
+        if self._vcavity:
+            outside *= vcavity(cos_i, w - cos_i, one_plus_dot)
+        cos_half = dr.safe_sqrt(0.5 * one_plus_dot)
+        reflectance = self.surface.reflectance(cos_half, si, active)
+        return dr.select(active, outside * reflectance * power, 0.0)
+
+    def _density(self, si: Any, wo: Any, active: Any) -> Any:
+        """Density of `_draw`: that of the orders, and a little cosine."""
+        uv = _in_patch(si.wi + wo, self.orientation.rotation(si, active))
+        cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
+        orders = self._light.density(uv, cos_i, cos_o, dr.detach(self.height_scale), si)
+        return dr.lerp(orders, mi.warp.square_to_cosine_hemisphere_pdf(wo), COSINE)
+
+    def _draw(self, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
+        """A direction, possibly below the surface (then it has no density and no value)."""
+        uv = self._light.draw(
+            mi.Frame3f.cos_theta(si.wi),
+            dr.detach(self.height_scale),
+            dr.maximum((sample1 - COSINE) * (1.0 / (1.0 - COSINE)), 0.0),
+            sample2,
+            si,
+        )
+        rotation = self.orientation.rotation(si, active)
+        tangential = _from_patch(uv, rotation) - mi.Vector2f(si.wi.x, si.wi.y)
+        height = 1.0 - dr.squared_norm(tangential)
+        ordered = mi.Vector3f(
+            tangential.x, tangential.y, dr.select(height > 0.0, dr.safe_sqrt(height), -1.0)
+        )
+        return dr.select(sample1 < COSINE, mi.warp.square_to_cosine_hemisphere(sample2), ordered)
+
+    def _glossy_share(self, si: Any, active: Any) -> Any:
+        """Share of the samples for diffraction where something lies beneath: by reflected power."""
+        reflectance = self.surface.reflectance(mi.Frame3f.cos_theta(si.wi), si, active)
+        mean = dr.mean(mi.unpolarized_spectrum(reflectance))
+        # What lies beneath is taken to return half of what it gets
+        return dr.clip(mean / (0.5 + 0.5 * mean), 0.1, 0.9)
+
+
+def _in_patch(direction: Any, rotation: tuple[Any, Any]) -> Any:
+    """A vector's tangential part, turned from the shading frame to the patch's."""
+    cos, sin = rotation
+    return mi.Vector2f(
+        dr.fma(cos, direction.x, sin * direction.y),
+        dr.fma(cos, direction.y, -sin * direction.x),
+    )
+
+
+def _from_patch(q: Any, rotation: tuple[Any, Any]) -> Any:
+    """The inverse of `_in_patch`."""
+    cos, sin = rotation
+    return mi.Vector2f(dr.fma(cos, q.x, -sin * q.y), dr.fma(cos, q.y, sin * q.x))
+
+
+mi.register_bsdf("diffraction", Diffraction)

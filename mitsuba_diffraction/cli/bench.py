@@ -1,0 +1,108 @@
+"""`mitsuba-diffraction bench`: speed and memory, side by side in one run."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .arguments import path_ending_in
+from .console import say_warning
+from .output import check_writable
+from .progress import Bar
+from .report import plain
+
+if TYPE_CHECKING:
+    from ..benchmarks.figures import Section
+    from ..benchmarks.plan import Plan
+
+PARTS = ("build", "eval", "sample", "render")
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the sub-command."""
+    parser = subparsers.add_parser(
+        "bench",
+        help="measure speed and memory",
+        description=(
+            "Measure what tables cost to build, and what evaluation costs beside Mitsuba's "
+            "roughconductor and other baselines, all in one run: compare its ratios, and its "
+            "times only on an idle machine."
+        ),
+    )
+    parser.add_argument("--quick", action="store_true", help="fewer, smaller and shorter runs")
+    parser.add_argument(
+        "--json", metavar="FILE", type=path_ending_in(".json"),
+        help="write every single measurement as well",
+    )  # fmt: skip
+    parser.add_argument("--only", choices=PARTS, help="measure only this")
+    parser.set_defaults(run=run, parser=parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure and print, and return the exit code; a missed goal is no failure."""
+    if args.json is not None:
+        check_writable(args.json)
+    from tqdm import tqdm
+
+    from ..benchmarks import plan
+    from ..benchmarks.machine import describe_machine
+    from ..files.atomic import atomic_path
+
+    chosen = plan.QUICK if args.quick else plan.FULL
+    parts = (args.only,) if args.only else PARTS
+    machine = describe_machine()
+    print("; ".join(f"{name} {value}" for name, value in machine.items()), flush=True)
+    if machine["load"] > 0.5 * machine["cores"]:
+        say_warning("the machine is busy: trust the ratios, not the times")
+    sections = []
+    with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder, Bar(args) as bar:
+        for section in _sections(parts, chosen, Path(folder), bar):
+            tqdm.write("\n".join(["", *section.lines()]))  # above the progress bar
+            sys.stdout.flush()
+            sections.append(section)
+    goals = [goal for section in sections for goal in section.goals]
+    if goals:
+        print(f"\n{sum(goal.met for goal in goals)} of {len(goals)} goals met")
+    if args.json is not None:
+        data = {
+            "machine": machine,
+            "plan": asdict(chosen),
+            "sections": [section.plain() for section in sections],
+        }
+        with atomic_path(args.json) as path:
+            path.write_text(json.dumps(plain(data), indent=1, ensure_ascii=False), encoding="utf-8")
+    return 0
+
+
+def _sections(parts: tuple[str, ...], plan: Plan, folder: Path, bar: Bar) -> Iterator[Section]:
+    """Everything that is asked for, one after the other."""
+    if "build" in parts:
+        from ..benchmarks.build import measure_builds
+
+        yield measure_builds(plan, folder, bar)
+    if set(parts) <= {"build"}:
+        return
+    import drjit as dr
+
+    from ..benchmarks.contenders import build_tables
+    from ..benchmarks.evaluation import measure_eval, measure_sampling
+    from ..benchmarks.rendering import measure_rendering
+    from .scenes import set_variant
+
+    tables = build_tables(plan, folder, bar)
+    for backend in ("llvm", "cuda"):
+        if not dr.has_backend(getattr(dr.JitBackend, backend.upper())):
+            continue
+        set_variant(f"{backend}_ad_spectral")
+        if "eval" in parts:
+            yield measure_eval(plan, tables, bar)
+        if "sample" in parts:
+            yield from measure_sampling(plan, tables, bar)
+        if "render" in parts:
+            yield measure_rendering(plan, tables, bar)

@@ -1,0 +1,140 @@
+"""`mitsuba-diffraction info`: what is in a file."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+from .arguments import path_ending_in
+from .heights_options import add_heights_options, load_options, was_given
+from .progress import Bar
+from .report import lines_of, plain
+
+_EXR = b"\x76\x2f\x31\x01"
+_MESHES = (".ply", ".obj", ".serialized")
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the sub-command."""
+    parser = subparsers.add_parser(
+        "info",
+        help="describe a table, a height field, a recipe or a mesh",
+        description=(
+            "Describe a table, a file of heights, a recipe, or a mesh (PLY, OBJ, serialized) and "
+            "whether its tangents suit a measured patch."
+        ),
+    )
+    parser.add_argument("file", metavar="FILE", type=Path, help="what to describe")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of text")
+    parser.add_argument(
+        "--albedo", metavar="OUT", type=path_ending_in(".png", ".pdf", ".svg"),
+        help="of a table: plot its raw directional albedo against angle and azimuth",
+    )  # fmt: skip
+    add_heights_options(parser)
+    parser.set_defaults(run=run, parser=parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the description, and return the exit code."""
+    data = {"file": str(args.file), **_describe(args.file, args)}
+    if args.albedo is not None:
+        if data["kind"] != "table":
+            args.parser.error(f"argument --albedo: '{args.file}' is a {data['kind']}, not a table")
+        _plot_albedo(args.file, args.albedo)
+        data["albedo plot"] = str(args.albedo)
+    if args.json:
+        print(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
+    else:
+        print("\n".join(lines_of(data)))
+    return 0
+
+
+def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
+    from ..files.heights import is_recipe
+    from ..files.raw import existing_file
+
+    existing_file(file)
+    if is_recipe(file):
+        return _recipe(file, args)
+    if file.suffix.lower() in _MESHES:
+        _refuse_heights_options(args, "a mesh")
+        return _mesh(file)
+    if _is_table(file):
+        _refuse_heights_options(args, "a table")
+        return _table(file)
+    return _heights(file, args)
+
+
+def _is_table(file: Path) -> bool:
+    """Whether the file is an EXR with a table's attribute, of any version, damaged or not."""
+    from ..files.table_exr import read_document
+
+    with file.open("rb") as stream:
+        if stream.read(4) != _EXR:
+            return False
+    return read_document(file) is not None
+
+
+def _refuse_heights_options(args: argparse.Namespace, what: str) -> None:
+    given = was_given(args)
+    if given:
+        args.parser.error(f"argument {given[0]}: '{args.file}' is {what}, not heights")
+
+
+def _table(file: Path) -> dict[str, Any]:
+    from ..tables import DiffractionTable
+
+    return {"kind": "table", **DiffractionTable.load(file).summary()}
+
+
+def _plot_albedo(file: Path, output: Path) -> None:
+    from ..figures.albedo import albedo_figure
+    from ..files.atomic import atomic_path
+    from ..tables import DiffractionTable
+
+    with atomic_path(output) as temporary:
+        albedo_figure(DiffractionTable.load(file)).savefig(temporary, dpi=100)
+
+
+def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
+    from ..files.heights import load_heights
+
+    field = load_heights(file, load_options(args))
+    return {"kind": "height field", **field.summary(), "warnings": field.validity()}
+
+
+def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
+    from ..files.recipes import Recipe
+
+    recipe = Recipe.load(file)
+    table = recipe.table_arguments()
+    with Bar(args) as bar:
+        bar(0, 0, "making heights")
+        fields = recipe.fields(load_options(args))
+    asked = {name: table[name] for name in ("wavelength_range",) if name in table}
+    warnings = [line for field in fields for line in field.validity(**asked)]
+    return {
+        "kind": "recipe",
+        **({"generator": recipe.generator} if recipe.generator else {}),
+        "options": recipe.options.given(),
+        "table": table,
+        "output": str(recipe.output),
+        "output exists": recipe.output.is_file(),
+        "patches": [field.summary() for field in fields],
+        "warnings": list(dict.fromkeys(warnings)),
+    }
+
+
+def _mesh(file: Path) -> dict[str, Any]:
+    import mitsuba as mi
+
+    from ..meshes.tangents import check_tangents, load_mesh
+    from .mitsuba_text import warnings_as_ours
+
+    if mi.variant() is None:
+        mi.set_variant("scalar_rgb")  # any reads meshes; this one needs neither GPU nor LLVM
+    with warnings_as_ours():
+        report = check_tangents(*load_mesh(file))
+    return {"kind": "mesh", **report.summary()}

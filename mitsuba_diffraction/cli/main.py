@@ -1,0 +1,128 @@
+"""Parser of the command line, and the boundary at which every error becomes one line.
+
+A sub-command is a module with `add_parser(subparsers)`, which sets the defaults `run` and `parser`,
+and `run(args) -> int`, the exit code. Modules import what they need (Mitsuba above all) in `run`,
+so that `--help` and `--version` answer at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import signal
+import sys
+import threading
+import traceback
+from collections.abc import Iterator, Sequence
+
+from .. import __version__
+from ..errors import DiffractionError
+from . import bench, brdf_map, info, precompute, render
+from .console import PROGRAM, say, say_error, warnings_in_one_line
+
+COMMANDS = (precompute, info, render, brdf_map, bench)
+
+FAILED = 1
+INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+TERMINATED = 143  # 128 + SIGTERM
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code: 0 done, 1 failed, 2 usage, 130 Ctrl-C."""
+    try:
+        args = build_parser().parse_args(argv)
+    except SystemExit as stop:  # argparse: --help, --version and usage errors
+        return _code_of(stop)
+    with warnings_in_one_line(), _terminated_cleanly():
+        return _run(args)
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The parser with all sub-commands."""
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM,
+        description="Diffraction of measured height fields, for Mitsuba 3.",
+    )
+    _add_common(parser)
+    parser.set_defaults(debug=False, progress=None)
+    parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
+    subparsers = parser.add_subparsers(
+        title="commands", metavar="COMMAND", dest="command", required=True
+    )
+    for command in COMMANDS:
+        command.add_parser(subparsers)
+    for subparser in subparsers.choices.values():
+        _add_common(subparser.add_argument_group("general"))
+    return parser
+
+
+def _add_common(group: argparse._ActionsContainer) -> None:
+    """Options that may stand before or after the name of the sub-command.
+
+    They are without defaults: those of the sub-command would override what stands before it.
+    """
+    group.add_argument(
+        "--debug",
+        action="store_true",
+        default=argparse.SUPPRESS,
+        help="show the traceback of an error",
+    )
+    group.add_argument(
+        "--progress",
+        action=argparse.BooleanOptionalAction,
+        default=argparse.SUPPRESS,
+        help="show progress bars, or never; by default if stderr is a terminal",
+    )
+
+
+def _run(args: argparse.Namespace) -> int:
+    try:
+        code: int = args.run(args)
+        sys.stdout.flush()
+        return code
+    except SystemExit as stop:  # args.parser.error of a sub-command
+        return _code_of(stop)
+    except DiffractionError as error:
+        return _fail(error, str(error), args.debug)
+    except KeyboardInterrupt:
+        say("interrupted; nothing half-written was left behind")
+        return INTERRUPTED
+    except BrokenPipeError:
+        # whoever read our output has enough; Python must not try to flush the rest at exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    except MemoryError as error:
+        return _fail(error, "out of memory; use a smaller input or free some", args.debug)
+    except OSError as error:
+        where = f" '{error.filename}'" if error.filename else ""
+        return _fail(error, f"{error.strerror or error}{where}", args.debug)
+    except Exception as error:
+        text = f"unexpected {type(error).__name__}: {error}"
+        if not args.debug:
+            text += "; run it again with --debug for the traceback, and please report it"
+        return _fail(error, text, args.debug)
+
+
+def _fail(error: Exception, text: str, debug: bool) -> int:
+    if debug:
+        traceback.print_exception(error)
+    say_error(text)
+    return FAILED
+
+
+def _code_of(stop: SystemExit) -> int:
+    return stop.code if isinstance(stop.code, int) else FAILED
+
+
+@contextlib.contextmanager
+def _terminated_cleanly() -> Iterator[None]:
+    """Inside, SIGTERM unwinds like Ctrl-C, so that no temporary file is left behind."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread may set handlers
+        return
+    before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

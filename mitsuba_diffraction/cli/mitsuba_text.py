@@ -1,0 +1,100 @@
+"""What Mitsuba says, errors and warnings, as the lines of this command line.
+
+Mitsuba 3.9 throws RuntimeError (ImportError for variants) with a text such as
+
+    [parser.cpp:1718] At a.xml (line 8, col 25): failed to instantiate bsdf plugin of type "x": ...
+
+in which nested causes are separated by line ends and an exception of a Python plugin is a whole
+traceback; warnings go to a logger of its own.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Iterator
+
+from .console import one_line, saying_once
+
+_SOURCE_LINE = re.compile(r"\[[\w./]+\.(?:cpp|h|py):\d+\]\s*")
+_LOADING = re.compile(
+    r"(?:While loading|Error while loading|At) (?P<file>.+?) \((?P<line>line \d+), col \d+\): "
+)
+_INSTANTIATE = re.compile(r'failed to instantiate (?P<kind>\w+) plugin of type "(?P<type>[^"]+)": ')
+_NOT_FOUND = re.compile(r'\[PluginManager\] Plugin "[^"]+" not found!')
+_TRACEBACK = re.compile(r"Traceback \(most recent call last\):\n(?:[ \t].*\n)*(?:[\w.]+: )?")
+_UNREAD = re.compile(
+    r'Found \d+ unreferenced (?:property|properties) in (\w+) plugin of type "([^"]+)":'
+)
+_PLUGIN = re.compile(r"\[[A-Z]\w+\] ")
+
+# date, time, level, then the class, or the line of Python and its function
+_STAMP = re.compile(r"^[\d-]+ [\d:]+ [A-Z]+\s+(?:\[[^]]*\]\s+)?(?:(?:<module>|\w+\(\)): )?")
+# Mitsuba catches SIGINT while it renders, says so, and then lets Python have it.
+_INTERRUPTED = "Received interrupt signal"
+
+
+def plain_text(error: BaseException) -> str:
+    """The text of one of Mitsuba's exceptions as one line: where in the scene, and what is wrong.
+
+    The places in Mitsuba's own sources, the tracebacks of Python plugins and repeated
+    "while loading" are left out.
+    """
+    text = _TRACEBACK.sub("", _SOURCE_LINE.sub("", str(error)))
+    places = [(m["file"], m["line"]) for m in _LOADING.finditer(text)]
+    text = _LOADING.sub("", text)
+    # "no plugin of this kind" is the cause, not a consequence of failing to make one
+    text = re.sub(
+        _INSTANTIATE.pattern + _NOT_FOUND.pattern,
+        lambda m: f"there is no {m['kind']} plugin {m['type']!r}; check the name",
+        text,
+    )
+    text = _UNREAD.sub(lambda m: f"{m[1]} {m[2]!r} has no such parameter:", text)
+    text = re.sub(r"\n\s*- ", " ", text)  # lists
+    text = _INSTANTIATE.sub(lambda m: f"{m['kind']} {m['type']!r}: ", text)
+    text = one_line(_PLUGIN.sub("", text)).rstrip(" .!")
+    if places:
+        file, line = places[-1]
+        text = f"'{file}', {line}: {text}"
+    return text
+
+
+@contextlib.contextmanager
+def warnings_as_ours() -> Iterator[None]:
+    """Inside, Mitsuba's warnings are printed like this program's, each once.
+
+    A variant must be set.
+    """
+    import mitsuba as mi
+
+    say = saying_once()
+
+    class Lines(mi.Appender):
+        def append(self, level: object, text: str) -> None:
+            line = _without_stamp(text)
+            if not line.startswith(_INTERRUPTED):  # whoever pressed Ctrl-C knows
+                say(line)
+
+        def log_progress(self, *_: object) -> None:
+            pass  # scalar variants draw bars of their own
+
+    logger = mi.logger()
+    before = [logger.appender(n) for n in range(logger.appender_count())]
+    level = logger.log_level()
+    logger.clear_appenders()
+    logger.add_appender(Lines())
+    logger.set_log_level(mi.LogLevel.Warn)
+    try:
+        yield
+    finally:
+        logger.clear_appenders()
+        for appender in before:
+            logger.add_appender(appender)
+        logger.set_log_level(level)
+
+
+def _without_stamp(text: str) -> str:
+    """A line of Mitsuba's log without date, level and class."""
+    return re.sub(
+        r"^[\d-]+ [\d:]+ [A-Z]+\s+(?:\[[^]]*\]\s+)?(?:(?:<module>|\w+\(\)): )?", "", text.strip()
+    )

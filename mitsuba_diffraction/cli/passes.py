@@ -1,0 +1,137 @@
+"""Rendering in passes, so that there is progress to show and Ctrl-C keeps what is done."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import FrameType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DiffractionError
+from .mitsuba_text import plain_text
+
+# Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
+# wavefronts exhaust the memory. Fixed, so that a seed gives the same picture on every machine.
+_SAMPLES = {"llvm": 2**21, "cuda": 2**24}
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came of a rendering: a `mi.Bitmap`, its samples per pixel, whether Ctrl-C ended it."""
+
+    bitmap: Any
+    spp: int
+    interrupted: bool
+
+
+class Stop:
+    """Inside, Ctrl-C only sets `asked`; Ctrl-C again gives up as usual."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._before: Any = None
+
+    def __enter__(self) -> Self:
+        ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN  # a job in the background
+        if threading.current_thread() is threading.main_thread() and not ignored:
+            self._before = signal.signal(signal.SIGINT, self._ask)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._before is not None:
+            signal.signal(signal.SIGINT, self._before)
+
+    def _ask(self, number: int, frame: FrameType | None) -> None:
+        if self.asked:
+            raise KeyboardInterrupt
+        self.asked = True
+
+
+def samples_per_pass(spp: int, pixels: int, variant: str) -> int:
+    """How many of `spp` samples per pixel to take at once.
+
+    Passes of one size share one kernel, so a divisor of `spp` is taken if one is large enough.
+    """
+    most = max(1, _SAMPLES.get(variant.split("_")[0], 0) // pixels)
+    if spp <= most:
+        return spp
+    for size in range(most, max(1, most // 2) - 1, -1):
+        if spp % size == 0:
+            return size
+    return most
+
+
+def render_passes(
+    scene: Any,
+    sensor: Any,
+    *,
+    spp: int,
+    seed: int,
+    variant: str,
+    stop: Stop,
+    progress: Callable[[int, int, str], None],
+) -> Result:
+    """Render `spp` samples per pixel as the average over passes, exactly as one pass would.
+
+    The films' raw storage, filter-weighted sums of radiance beside the sums of the weights, is
+    added up in double precision and put back into the film, which then divides and converts to
+    its own format. Averages of finished pictures would differ where pixels share samples.
+
+    Parameters
+    ----------
+    scene, sensor : of the variant that is set.
+    spp : samples per pixel; stratified samplers round it up, and the result says to what.
+    seed : whole number from 0; each pass gets its own, derived from it.
+    variant : name of the variant.
+    stop : asked, it ends the rendering after the current pass.
+    progress : called as progress(samples done, samples in all, what is being done).
+
+    Raises
+    ------
+    DiffractionError
+        If Mitsuba refuses or fails to render.
+    """
+    import mitsuba as mi
+
+    integrator, film, sampler = scene.integrator(), sensor.film(), sensor.sampler()
+    if integrator is None:
+        raise DiffractionError("the scene has no integrator; add <integrator type='path'/>")
+    # Light tracing splats finished estimates without weights: an average needs them.
+    splats = isinstance(integrator, mi.AdjointIntegrator)
+    pixels = int(np.prod(film.crop_size()))
+    size = samples_per_pass(spp, pixels, variant)
+    seeds = np.random.SeedSequence(seed)
+    total: NDArray[np.float64] | float = 0.0
+    done = 0
+    progress(0, spp, "compiling")
+    try:
+        while done < spp and not stop.asked:
+            (sequence,) = seeds.spawn(1)
+            integrator.render(
+                scene,
+                sensor,
+                seed=int(sequence.generate_state(1)[0]),
+                spp=min(size, spp - done),
+                develop=False,
+            )
+            if stop.asked and variant.startswith("scalar"):
+                break  # Mitsuba left this pass unfinished; a JIT variant never does
+            taken = int(sampler.sample_count())
+            raw = np.array(film.develop(raw=True), dtype=np.float64)
+            total = total + raw * (taken if splats else 1)
+            done += taken
+            progress(min(done, spp), spp, "rendering")
+        if splats:
+            total = total / done
+        film.prepare(integrator.aov_names())
+        storage: Any = mi.TensorXf(np.asarray(total, dtype=np.float32))
+        offset: Any = mi.ScalarPoint2i(film.crop_offset())
+        film.put_block(mi.ImageBlock(storage, offset))
+        return Result(film.bitmap(), done, stop.asked)
+    except RuntimeError as error:
+        raise DiffractionError(f"cannot render: {plain_text(error)}") from error

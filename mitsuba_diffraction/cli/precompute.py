@@ -1,0 +1,181 @@
+"""`mitsuba-diffraction precompute`: from heights to a table."""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import time
+import warnings
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..errors import DiffractionError, DiffractionWarning
+from .arguments import number_between, path_ending_in, whole_number
+from .heights_options import add_heights_options, load_options
+from .output import check_writable, same_file
+from .progress import Bar
+
+if TYPE_CHECKING:
+    from ..heightfield import HeightField
+    from ..tables import DiffractionTable
+
+# Written out so that --help need not load NumPy and SciPy; a test holds them against the library.
+COHERENCES = ("ensemble", "patch")
+BASES = ("auto", "chebyshev", "taylor")
+
+_TABLE_NAMES = (
+    "coherence_width", "coherence", "basis", "tolerance", "terms", "taps", "wavelength_range",
+    "height_scale_max",
+)  # fmt: skip
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the sub-command."""
+    parser = subparsers.add_parser(
+        "precompute",
+        help="build the table of a height field",
+        description=(
+            "Build a table of diffraction orders from measured or made heights, and measure its "
+            "error. What a recipe says is overridden by options."
+        ),
+    )
+    parser.add_argument(
+        "sources", metavar="SOURCE", nargs="+", type=Path,
+        help="image, array, text, AFM file or recipe (.toml); several patches of one surface make "
+        "one table of their mean powers, several recipes make a table each",
+    )  # fmt: skip
+    parser.add_argument(
+        "-o", "--output", metavar="OUT", type=path_ending_in(".exr"),
+        help="the table; default: where the recipe says, or SOURCE's name with .exr in the "
+        "current folder",
+    )  # fmt: skip
+    add_heights_options(parser)
+    group = parser.add_argument_group("the table")
+    group.add_argument(
+        "--coherence-width", metavar="W", type=float,
+        help="µm, 4σ of the amplitude window; default: 65",
+    )  # fmt: skip
+    group.add_argument(
+        "--coherence", choices=COHERENCES,
+        help="average over window positions, or one window on the patch; default: ensemble",
+    )  # fmt: skip
+    group.add_argument(
+        "--basis", choices=BASES, help="series in κ; default: auto, the cheaper that suffices"
+    )
+    group.add_argument(
+        "--tolerance", metavar="E", type=float, help="relative error that is met; default: 1e-3"
+    )
+    group.add_argument(
+        "--terms", metavar="N", type=whole_number(1),
+        help="terms of the series; default: as many as the tolerance takes",
+    )  # fmt: skip
+    group.add_argument(
+        "--taps", metavar="N", type=whole_number(1),
+        help="orders read in each direction; default: as many as the tolerance takes",
+    )  # fmt: skip
+    group.add_argument(
+        "--wavelength-range", metavar=("MIN", "MAX"), nargs=2, type=float,
+        help="nm; default: 360 830",
+    )  # fmt: skip
+    group.add_argument(
+        "--height-scale-max", metavar="S", type=number_between(1e-6, 1e6),
+        help="largest height_scale that the table serves; default: 1.5",
+    )  # fmt: skip
+    parser.set_defaults(run=run, parser=parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Build one table, or those of several recipes, and return the exit code."""
+    from ..files.heights import is_recipe
+
+    recipes = [source for source in args.sources if is_recipe(source)]
+    if not recipes:
+        _precompute(args.sources, args)
+        return 0
+    if len(recipes) < len(args.sources):
+        args.parser.error("argument SOURCE: recipes and other files cannot be mixed")
+    if len(recipes) > 1 and args.output is not None:
+        args.parser.error("argument -o/--output: one name, but there are several recipes")
+    for recipe in recipes:
+        _precompute([recipe], args)
+    return 0
+
+
+def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> None:
+    """One table, of a recipe or of one or several files."""
+    from ..files.heights import is_recipe, load_heights
+    from ..files.recipes import Recipe
+    from ..tables import DiffractionTable
+
+    start = time.perf_counter()
+    options = load_options(args)
+    table_options = {
+        name: getattr(args, name) for name in _TABLE_NAMES if getattr(args, name) is not None
+    }
+    recipe = Recipe.load(sources[0]) if is_recipe(sources[0]) else None
+    inputs = list(sources)
+    if recipe is not None:
+        table_options = recipe.table_arguments() | table_options
+        inputs += recipe.sources
+    elif len(sources) > 1 and args.output is None:
+        args.parser.error("argument -o/--output: name the one table of these files")
+    by_recipe = recipe is not None and args.output is None
+    output = args.output or (recipe.output if recipe else Path(f"{sources[0].stem}.exr"))
+    for file in inputs:
+        if same_file(file, output):
+            raise DiffractionError(
+                f"the table would overwrite its own source '{file}'; name another with -o"
+            )
+    check_writable(output, make_folder=by_recipe)
+    with Bar(args) as bar:
+        bar(0, 0, "making heights" if recipe and recipe.generator else "reading heights")
+        if recipe is not None:
+            fields = recipe.fields(options)
+        else:
+            fields = [load_heights(source, options) for source in sources]
+        table = DiffractionTable.build(
+            fields[0] if len(fields) == 1 else fields, progress=bar, **table_options
+        )
+        if by_recipe:
+            output.parent.mkdir(parents=True, exist_ok=True)
+        table.save(output)
+    for line in table.source.get("warnings", ()):
+        warnings.warn(line, DiffractionWarning, stacklevel=1)
+    print(f"{', '.join(map(str, sources))} -> {output}")
+    for label, text in _report(fields, table, output, time.perf_counter() - start):
+        print(f"  {label:<6} {text}")
+
+
+def _report(
+    fields: Sequence[HeightField], table: DiffractionTable, output: Path, seconds: float
+) -> Iterator[tuple[str, str]]:
+    """What was made of what, how good it is, and what it cost."""
+    for field in fields:
+        (ny, nx), (dx, dy), (lx, ly) = field.shape, field.pixel_size, field.extent
+        patch = (
+            f"{field.name}: {nx} x {ny} pixels of {dx:.4g} x {dy:.4g} µm, "
+            f"{lx:.4g} x {ly:.4g} µm; range {field.range:.4g} µm, "
+            f"RMS height {field.rms_height:.4g} µm, RMS slope {field.rms_slope:.3g}"
+        )
+        yield "patch", patch
+        for line in field.history:
+            yield "", line
+    if "variation" in table.source:
+        yield "", f"orders vary by {table.source['variation']:.2g} of their mean between patches"
+    intervals, ny, nx, _, terms = table.coefficients.shape
+    size = (
+        f"{nx} x {ny} orders, {terms} terms in {intervals} intervals of κ, "
+        f"{' x '.join(map(str, table.grid.taps))} taps; "
+        f"{table.expansion.basis} {table.expansion.kind}, {table.coefficients.dtype}, "
+        f"{table.nbytes / 1e6:.3g} MB in memory, {output.stat().st_size / 1e6:.3g} MB on disk"
+    )
+    yield "table", size
+    error = (
+        f"measured {table.error['near']:.2g} near order 0, {table.error['far']:.2g} in all "
+        f"other orders; tolerance {table.tolerance:g}"
+    )
+    yield "error", error
+    # kibibytes on Linux; of the whole process, which is what has to fit
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    yield "cost", f"{seconds:.1f} s, {peak / 1e9:.2g} GB of memory at most"

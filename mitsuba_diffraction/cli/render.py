@@ -1,0 +1,131 @@
+"""`mitsuba-diffraction render`: from an XML scene to a picture."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+from ..errors import DiffractionError
+from .arguments import definition, number_between, path_ending_in, whole_number
+from .console import say, say_warning
+from .output import check_writable
+from .progress import Bar
+
+_INTERRUPTED = 130
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the sub-command."""
+    parser = subparsers.add_parser(
+        "render",
+        help="render a Mitsuba scene",
+        description=(
+            "Render an XML scene to a linear EXR and a PNG beside it. Ctrl-C stops after the "
+            "current pass and keeps the picture so far."
+        ),
+    )
+    parser.add_argument("scene", metavar="SCENE", type=Path, help="Mitsuba XML file")
+    parser.add_argument(
+        "-o", "--output", metavar="OUT", type=path_ending_in(".exr", ".png"),
+        help="EXR, with a PNG beside it, or only a PNG; default: the scene's name with .exr in "
+        "the current folder",
+    )  # fmt: skip
+    parser.add_argument(
+        "-m", "--mode", metavar="VARIANT",
+        help="Mitsuba variant; default: cuda_ad_spectral with a GPU, else llvm_ad_spectral",
+    )  # fmt: skip
+    parser.add_argument(
+        "-s", "--spp", metavar="N", type=whole_number(1),
+        help="samples per pixel; default: the scene's",
+    )  # fmt: skip
+    parser.add_argument(
+        "--seed", metavar="N", type=whole_number(0), default=0,
+        help="of the random numbers; default: 0",
+    )  # fmt: skip
+    parser.add_argument(
+        "-D", "--define", metavar="KEY=VALUE", type=definition, action="append", default=[],
+        dest="parameters", help="set a parameter of the scene; may be given several times",
+    )  # fmt: skip
+    parser.add_argument(
+        "--sensor", metavar="N", type=whole_number(0), default=0,
+        help="which sensor, counted from 0; default: 0",
+    )  # fmt: skip
+    parser.add_argument(
+        "--exposure", metavar="EV", type=number_between(-100, 100), default=0.0,
+        help="of the PNG, in stops: +1 doubles the light; default: 0",
+    )  # fmt: skip
+    parser.set_defaults(run=run, parser=parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Render, and return the exit code."""
+    parameters = dict(args.parameters)
+    if len(parameters) < len(args.parameters):
+        twice = next(k for k in parameters if [n for n, _ in args.parameters].count(k) > 1)
+        args.parser.error(f"argument -D: {twice!r} is set more than once")
+    output = args.output or Path(args.scene.with_suffix(".exr").name)
+    only_png = output.suffix.lower() == ".png"
+    png = output if only_png else output.with_suffix(".png")
+    for path in dict.fromkeys((output, png)):
+        check_writable(path)
+
+    from .mitsuba_text import warnings_as_ours
+    from .passes import Stop, render_passes
+    from .pictures import colours_of, count_bad, write_exr, write_png
+    from .scenes import load_scene, sensor_of, set_variant
+
+    start = time.perf_counter()
+    variant = set_variant(args.mode)
+    with warnings_as_ours():
+        with Bar(args, unit=" spp", delay=0) as bar:
+            spp = args.spp or 0
+            bar(0, spp, "loading")
+            scene = load_scene(args.scene, parameters)
+            sensor = sensor_of(scene, args.sensor)
+            spp = spp or int(sensor.sampler().sample_count())
+            if only_png and not _shows_colours(scene, sensor):
+                raise DiffractionError(
+                    f"the film of '{args.scene}' holds no colours that a PNG could show; "
+                    f"name an EXR: -o {output.with_suffix('.exr')}"
+                )
+            with Stop() as stop:
+                result = render_passes(
+                    scene, sensor, spp=spp, seed=args.seed, variant=variant, stop=stop,
+                    progress=bar,
+                )  # fmt: skip
+        if result.spp == 0:
+            raise KeyboardInterrupt  # before the first pass: there is no picture
+        bad = count_bad(result.bitmap)
+        if bad:
+            say_warning(f"{bad} pixels are not finite (NaN or infinite); they are black in a PNG")
+        written = []
+        if not only_png:
+            origin = {"scene": str(args.scene), "variant": variant, "seed": args.seed}
+            write_exr(result.bitmap, output, {**origin, "spp": result.spp})
+            written.append(output)
+        colours = colours_of(result.bitmap)
+        if colours is None:
+            say_warning("the film holds no colours that a PNG could show; only the EXR was written")
+        else:
+            write_png(colours, png, args.exposure)
+            written.append(png)
+    width, height = result.bitmap.size()
+    samples = "1 sample" if result.spp == 1 else f"{result.spp} samples"
+    print(
+        f"{' and '.join(map(str, written))}: {width} x {height} pixels, {samples} per pixel, "
+        f"{time.perf_counter() - start:.1f} s, {variant}"
+    )
+    if result.interrupted:
+        say(f"interrupted; the picture has {result.spp} of {spp} samples per pixel")
+        return _INTERRUPTED
+    return 0
+
+
+def _shows_colours(scene: object, sensor: object) -> bool:
+    """Whether the film will hold something for a PNG, asked before the work is done."""
+    from .pictures import colours_of
+
+    film = sensor.film()  # type: ignore[attr-defined]
+    film.prepare(scene.integrator().aov_names())  # type: ignore[attr-defined]
+    return colours_of(film.bitmap()) is not None

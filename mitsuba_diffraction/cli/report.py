@@ -1,0 +1,84 @@
+"""Nested plain data (what `summary()` methods return) as text for people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from numbers import Real
+from typing import Any
+
+# Keys of height-field summaries, which are in µm throughout, and suffixes of keys that say so.
+_UNITS = {"pixel_size": "µm", "extent": "µm", "range": "µm", "rms_height": "µm"}
+_SUFFIXES = {"_um": "µm", "_nm": "nm", "_mb": "MB", "_s": "s", "_deg": "°"}
+_INDENT = "  "
+
+
+def lines_of(data: Mapping[str, Any], depth: int = 0) -> Iterator[str]:
+    """One line per value: keys in words, aligned; nested mappings indented below their key."""
+    rows = [(*_label(key), value) for key, value in data.items()]
+    width = max((len(label) for label, _, value in rows if not _nested(value)), default=0)
+    margin = _INDENT * depth
+    for label, unit, value in rows:
+        if isinstance(value, Mapping) and value:
+            yield f"{margin}{label}:"
+            yield from lines_of(value, depth + 1)
+        elif _nested(value):
+            yield f"{margin}{label}:"
+            for item in value:
+                yield from _item_lines(item, depth + 1)
+        else:
+            joint = " to " if label.endswith("range") else " x "
+            yield f"{margin}{label + ':':<{width + 1}} {_text(value, joint)} {unit}".rstrip()
+
+
+def plain(value: Any) -> Any:
+    """The same data for JSON, which has neither NaN nor infinity: they become null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if hasattr(value, "item"):  # a NumPy scalar
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    return str(value)
+
+
+def _label(key: str) -> tuple[str, str]:
+    unit = _UNITS.get(key, "")
+    for suffix, its_unit in _SUFFIXES.items():
+        if not unit and key.endswith(suffix):
+            key, unit = key.removesuffix(suffix), its_unit
+    return " ".join(key.replace("_", " ").split()), unit
+
+
+def _nested(value: Any) -> bool:
+    """Whether a value needs lines of its own: mappings, and lists of texts or mappings."""
+    if isinstance(value, (list, tuple)):
+        return any(isinstance(item, (str, Mapping, list, tuple)) for item in value)
+    return isinstance(value, Mapping) and bool(value)
+
+
+def _item_lines(item: Any, depth: int) -> Iterator[str]:
+    margin = _INDENT * depth
+    if not isinstance(item, Mapping):
+        yield f"{margin}- {_text(item)}"
+        return
+    mark = "- "
+    for line in lines_of(item, depth):
+        yield margin + mark + line.removeprefix(margin)
+        mark = "  "
+
+
+def _text(value: Any, joint: str = " x ") -> str:
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, (list, tuple, Mapping)):
+        return joint.join(_text(item) for item in value) if value else "none"
+    if isinstance(value, Real) and not isinstance(value, int):
+        return f"{float(value):.4g}"
+    return " ".join(str(value).split())

@@ -1,0 +1,1 @@
+"""Figures of the documentation; each module is a function and a program."""

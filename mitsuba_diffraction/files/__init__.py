@@ -1,0 +1,1 @@
+"""Everything that touches the disk: height-field loaders, recipes, tables, the cache."""

@@ -1,0 +1,146 @@
+"""From any file that holds heights to a HeightField: which reader, which units, which treatment."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import DiffractionError
+from ..heightfield import HeightField
+from ..levelling import clip_outliers, level_lines, level_plane, plane_of
+from ..missing import fill_missing
+from ..periodic import periodic_smooth, periodic_taper
+from .afm import read_instrument
+from .arrays import read_npy
+from .images import is_park_tiff, read_exr, read_image
+from .options import LoadOptions
+from .raw import RawHeights, existing_file
+from .text import read_text
+
+# What files begin with. Content decides before the suffix does, so a misnamed file still loads.
+_MAGIC = (
+    (b"\x89PNG\r\n\x1a\n", "image"),
+    (b"II*\0", "tiff"),
+    (b"MM\0*", "tiff"),
+    (b"\x76\x2f\x31\x01", "exr"),
+    (b"\x93NUMPY", "npy"),
+)
+_SUFFIX = {
+    ".png": "image", ".bmp": "image", ".tif": "image", ".tiff": "image", ".exr": "exr",
+    ".npy": "npy", ".txt": "text", ".csv": "text", ".tsv": "text", ".xyz": "text",
+    ".toml": "recipe",
+}  # fmt: skip
+
+# A file that states its pixel size wins over a parameter by no more than printing rounds it.
+_SAME_SIZE = 1e-3
+
+
+def load_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightField:
+    """Read and treat a height field; parameters and errors as in `HeightField.load`."""
+    file = existing_file(path)
+    if _kind(file) == "recipe":
+        from .recipes import Recipe  # recipes load height fields
+
+        return Recipe.load(file).field(options)
+    raw, measured = _read(file, options.channel)
+    field = _settle(raw, file, options)
+    if measured and options.level in (None, "none"):
+        field = _noting_tilt(field)
+    return treat(field, options)
+
+
+def is_recipe(path: str | os.PathLike[str]) -> bool:
+    """Whether a path names a recipe: by its suffix, .toml."""
+    return Path(path).suffix.lower() == ".toml"
+
+
+def _kind(file: Path) -> str:
+    with file.open("rb") as stream:
+        head = stream.read(8)
+    for magic, kind in _MAGIC:
+        if head.startswith(magic):
+            return ("instrument" if is_park_tiff(file) else "image") if kind == "tiff" else kind
+    if is_recipe(file):
+        return "recipe"
+    return _SUFFIX.get(file.suffix.lower(), "instrument")
+
+
+def _read(file: Path, channel: str | int | None) -> tuple[RawHeights, bool]:
+    """Heights of a file, and whether an instrument wrote it."""
+    kind = _kind(file)
+    if kind == "instrument":
+        return read_instrument(file, channel), True
+    if kind == "exr":
+        return read_exr(file, None if channel is None else str(channel)), False
+    if channel is not None:
+        raise DiffractionError(
+            f"{str(file)!r} has no channels to choose from; leave channel {channel!r} out"
+        )
+    reader = {"image": read_image, "npy": read_npy, "text": read_text}[kind]
+    return reader(file), False
+
+
+def _settle(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
+    """Combine what the file says with what the user says, and refuse gaps and contradictions."""
+    shown = repr(str(file))
+    max_height, pixel_size = options.max_height, options.pixel_size
+    values = raw.values
+    if raw.relative:
+        if max_height is None:
+            raise DiffractionError(
+                f"{shown} is an image of grey levels; max_height, the height of white in µm, is "
+                "missing: give it as max_height (--max-height)"
+            )
+        values = values * np.float64(max_height)
+    elif max_height is not None:
+        raise DiffractionError(
+            f"{shown} holds heights in µm; max_height {max_height:g} contradicts it: leave it out"
+        )
+    if pixel_size is None:
+        pixel_size = raw.pixel_size
+    elif raw.pixel_size is not None and not np.allclose(
+        pixel_size, raw.pixel_size, rtol=_SAME_SIZE, atol=0
+    ):
+        raise DiffractionError(
+            f"{shown} states pixels of {raw.pixel_size[0]:.6g} x {raw.pixel_size[1]:.6g} µm; "
+            f"pixel_size {pixel_size[0]:g}, {pixel_size[1]:g} contradicts it: leave it out"
+        )
+    if pixel_size is None:
+        raise DiffractionError(
+            f"{shown} does not say how large a pixel is; give pixel_size (--pixel-size) in µm"
+        )
+    heights = np.ascontiguousarray(values, dtype=np.float64)
+    method = None if options.fill == "none" else options.fill
+    heights, note = fill_missing(heights, method, shown)
+    if heights.base is None and heights is not raw.values:
+        heights.setflags(write=False)  # ours alone: HeightField need not copy it
+    history = (*raw.notes, note) if note else raw.notes
+    return HeightField(heights, pixel_size, name=file.name, history=history)
+
+
+def treat(field: HeightField, options: LoadOptions) -> HeightField:
+    """Level, clip and make periodic, in this order: dust stands out from a level surface only."""
+    if options.level == "plane":
+        field, _ = level_plane(field)
+    elif options.level == "lines":
+        field, _ = level_lines(field)
+    if options.clip is not None:
+        field, _ = clip_outliers(field, options.clip)
+    if options.periodic == "smooth":
+        field, _ = periodic_smooth(field)
+    elif options.periodic == "taper":
+        field, _ = periodic_taper(field)
+    return field
+
+
+def _noting_tilt(field: HeightField) -> HeightField:
+    """Say in the history how tilted a scan is that was not levelled: seams repeat the tilt."""
+    slope_x, slope_y = plane_of(field)
+    rise = math.hypot(slope_x * field.extent[0], slope_y * field.extent[1])
+    line = f"not levelled: the best plane rises {rise:.3g} µm across the patch"
+    return HeightField(
+        field.heights, field.pixel_size, name=field.name, history=(*field.history, line)
+    )

@@ -1,0 +1,93 @@
+"""Lengths that users give, as numbers or as the strings of XML files and command lines, in µm."""
+
+from __future__ import annotations
+
+import math
+import numbers
+import re
+from collections.abc import Iterable
+
+import numpy as np
+
+from .errors import DiffractionError
+
+# A pixel below the size of an atom or a height above 10 mm is a mistake of units, not a sample.
+SHORTEST_PIXEL = 1e-5
+LONGEST_PIXEL = 1e3
+LONGEST_HEIGHT = 1e4
+
+PixelSize = float | str | Iterable[float]
+Height = float | str
+
+
+def pixel_size_of(value: PixelSize | None, where: str = "pixel_size") -> tuple[float, float] | None:
+    """Pixel size (dx, dy) in µm from a number, a pair, "0.05", "0.05, 0.1", or "auto".
+
+    `None` and "auto" give `None`: the file has to know. `where` names the parameter in errors.
+    """
+    if _is_auto(value):
+        return None
+    expected = (
+        f"{where}: expected one length or a pair (dx, dy) in µm, each from {SHORTEST_PIXEL:g} "
+        f"to {LONGEST_PIXEL:g}, or 'auto'"
+    )
+    numbers_ = _numbers_of(value)
+    if numbers_ is None or len(numbers_) not in (1, 2):
+        raise DiffractionError(f"{expected}; got {_quote(value)}")
+    for number in numbers_:
+        if not SHORTEST_PIXEL <= number <= LONGEST_PIXEL:  # also refuses NaN
+            raise DiffractionError(f"{expected}; got {_quote(value)}")
+    return numbers_[0], numbers_[-1]
+
+
+def height_of(value: Height | None, where: str = "max_height") -> float | None:
+    """Height in µm, above 0, from a number or a numeric string; `None` and "auto" give `None`."""
+    if _is_auto(value):
+        return None
+    numbers_ = _numbers_of(value)
+    if numbers_ is None or len(numbers_) != 1 or not 0 < numbers_[0] <= LONGEST_HEIGHT:
+        raise DiffractionError(
+            f"{where}: expected a height in µm above 0, at most {LONGEST_HEIGHT:g}, or 'auto'; "
+            f"got {_quote(value)}"
+        )
+    return numbers_[0]
+
+
+def _is_auto(value: object) -> bool:
+    return value is None or (isinstance(value, str) and value.strip().lower() == "auto")
+
+
+def _numbers_of(value: object) -> tuple[float, ...] | None:
+    """Plain floats of a number, a numeric string or a short sequence; `None` if it is neither."""
+    parts: list[object]
+    if isinstance(value, str):
+        parts = [part for part in re.split(r"[,\s]+", value.strip()) if part]
+    elif isinstance(value, (bool, np.bool_)):
+        return None
+    elif isinstance(value, numbers.Real):
+        parts = [value]
+    elif isinstance(value, np.ndarray):
+        parts = list(value.ravel()[:3])
+    elif isinstance(value, (tuple, list)):
+        parts = list(value[:3])
+    else:
+        return None
+    result = []
+    for part in parts:
+        if isinstance(part, (bool, np.bool_)) or not isinstance(part, (str, numbers.Real)):
+            return None
+        if isinstance(part, str) and isinstance(value, (tuple, list)):
+            return None
+        try:
+            number = float(part)
+        except (ValueError, OverflowError):
+            return None
+        if not math.isfinite(number):
+            return None
+        result.append(number)
+    return tuple(result)
+
+
+def _quote(value: object) -> str:
+    text = repr(value).replace("\n", " ")
+    return text if len(text) <= 80 else text[:77] + "..."

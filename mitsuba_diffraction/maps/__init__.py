@@ -1,0 +1,24 @@
+"""BRDF maps: pictures of the hemisphere of view directions for one direction to the light.
+
+Contents
+--------
+brdf_map   evaluate a BSDF over the hemisphere
+check_map  refuse what it would refuse, before any work
+BrdfMap    what that gives: colours and spectra
+Light      a direction to the light
+Bands      wavelengths to sum over
+draw       a map into Matplotlib axes
+save_png   a map as a picture with axes
+save_exr   a map as linear numbers
+"""
+
+from __future__ import annotations
+
+from .bands import Bands
+from .evaluate import brdf_map, check_map
+from .files import save_exr, save_png
+from .light import Light
+from .picture import draw
+from .result import BrdfMap
+
+__all__ = ["Bands", "BrdfMap", "Light", "brdf_map", "check_map", "draw", "save_exr", "save_png"]

@@ -1,0 +1,127 @@
+"""Maps as pictures with axes (Matplotlib, without its global state)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+
+from .result import BrdfMap
+
+#: Polar angles of the thin circles, degrees; the horizon, 90, is drawn stronger.
+_CIRCLES = (30, 60)
+# One wavelength is shown in false colours over this many powers of ten.
+_DECADES = 6.0
+_DPI = 100
+# Around the axes, inches: left, right, bottom, top.
+_MARGINS = (0.85, 0.35, 1.25, 0.75)
+_COLOUR_BAR = 1.0
+_SMALLEST_AXES = 4.8
+_TEXT, _SUN = "#303030", "#e0c060"
+# What is this close to the mirror direction stays free of marks.
+_LOBE = 0.1
+
+
+def draw(
+    axes: Axes, brdf_map: BrdfMap, exposure: float | None = None, *, marks: bool = True
+) -> AxesImage:
+    """Draw a map into axes: what a display shows at f × 2^exposure, or false colours.
+
+    Parameters
+    ----------
+    axes : their limits and aspect are set, too.
+    brdf_map : the map.
+    exposure : stops; by default `brdf_map.exposure()`. Not for a single wavelength.
+    marks : circles of equal angle, the mirror direction (+), and the light (a ring with a dot).
+
+    Returns
+    -------
+    The image in the axes, for a colour bar.
+    """
+    common: dict[str, Any] = {
+        "extent": (-1, 1, -1, 1),
+        "origin": "lower",
+        "interpolation": "nearest",
+    }
+    if brdf_map.xyz is None:
+        values = np.ma.masked_less(brdf_map.luminance, np.finfo(np.float32).tiny)
+        largest = float(values.max()) if values.count() else 1.0
+        norm = LogNorm(largest * 10**-_DECADES, largest, clip=True)
+        shown = axes.imshow(values, norm=norm, cmap="inferno", **common)
+        axes.patch.set_visible(False)
+    else:
+        stops = brdf_map.exposure() if exposure is None else exposure
+        shown = axes.imshow(brdf_map.srgb(stops), **common)
+    ticks = (-1.0, -0.5, 0.0, 0.5, 1.0)
+    axes.set(xlim=(-1.02, 1.02), ylim=(-1.02, 1.02), aspect="equal", xticks=ticks, yticks=ticks)
+    if marks:
+        _draw_marks(axes, brdf_map)
+    return shown
+
+
+def figure(brdf_map: BrdfMap, exposure: float | None, *, title: str, notes: str) -> Figure:
+    """A figure around one map, its pixels one to one unless they are few or many.
+
+    Parameters
+    ----------
+    title : what was mapped.
+    notes : what else there is to say about it, e.g. material and coherence.
+    """
+    single = brdf_map.xyz is None
+    stops = brdf_map.exposure() if exposure is None else exposure
+    # the axes reach 2 % beyond the map on each side
+    side = max(brdf_map.resolution * 1.02 / _DPI, _SMALLEST_AXES)
+    left, right, bottom, top = _MARGINS
+    right += _COLOUR_BAR if single else 0.0
+    width, height = left + side + right, bottom + side + top
+    result = Figure(figsize=(width, height), dpi=_DPI, facecolor="white")
+    axes = result.add_axes((left / width, bottom / height, side / width, side / height))
+    image = draw(axes, brdf_map, stops)
+    quantity = "f cos θₒ" if brdf_map.cosine else "f"
+    axes.set_xlabel("x = sin θₒ cos φₒ")
+    axes.set_ylabel("y = sin θₒ sin φₒ")
+    axes.set_title(f"{title}\nlight at {brdf_map.light}", fontsize=11)
+    if single:
+        place = ((left + side + 0.2) / width, bottom / height, 0.18 / width, side / height)
+        result.colorbar(image, cax=result.add_axes(place), label=f"{quantity}  [1/sr]")
+        lines = [f"{brdf_map.bands}; {quantity} in 1/sr"]
+    else:
+        how = " (automatic)" if exposure is None else ""
+        lines = [
+            f"{brdf_map.bands}, illuminant {brdf_map.illuminant}",
+            f"white is {quantity} = {2.0**-stops:.3g} /sr: exposure {signed(stops)} stops{how}",
+        ]
+    lines.append(notes)
+    lines.append("+ mirror direction   ☉ light   circles: θₒ = 30°, 60°, 90°")
+    result.text(
+        left / width, 0.08 / height, "\n".join(lines), fontsize=8, color=_TEXT, va="bottom",
+        linespacing=1.3,
+    )  # fmt: skip
+    return result
+
+
+def _draw_marks(axes: Axes, brdf_map: BrdfMap) -> None:
+    turn = np.linspace(0.0, 2.0 * np.pi, 361)
+    for angle in _CIRCLES:
+        radius = np.sin(np.radians(angle))
+        axes.plot(radius * np.cos(turn), radius * np.sin(turn), color="#909090", lw=0.5, alpha=0.45)
+    axes.plot(np.cos(turn), np.sin(turn), color=_TEXT, lw=0.8)
+    (x, y, _), light = brdf_map.light.mirror, brdf_map.light.direction
+    # a cross with an open middle, so that the lobe itself stays in sight
+    for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
+        axes.plot(
+            [x + 0.035 * dx, x + 0.075 * dx], [y + 0.035 * dy, y + 0.075 * dy],
+            color="#c0c0c0", lw=0.9, clip_on=False,
+        )  # fmt: skip
+    axes.plot(*light[:2], "o", ms=7, mfc="none", mec=_SUN, mew=0.9)
+    if np.hypot(x - light[0], y - light[1]) > _LOBE:
+        axes.plot(*light[:2], "o", ms=1.6, color=_SUN)
+
+
+def signed(stops: float) -> str:
+    """An exposure with its sign, a true minus."""
+    return f"{stops:+g}".replace("-", "−")

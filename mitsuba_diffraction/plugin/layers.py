@@ -1,0 +1,62 @@
+"""How much light reaches what lies beneath the diffracting surface (Dr.Jit)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import mitsuba as mi
+
+from .reflectance import Reflectance
+
+LAYERINGS = ("transmission", "thesis")
+
+
+@dataclass(frozen=True)
+class Transmission:
+    """f = f_diffraction + T(ωi) T(ωo) f_nested, T = 1 − R(cosθ) of the flat interface.
+
+    A white pair reflects no more than it gets: what f_diffraction sends back is about R(cosθi).
+    """
+
+    surface: Reflectance
+    above = 1.0
+
+    def beneath(self, si: Any, wo: Any, active: Any) -> Any:
+        """Factor of the nested BSDF."""
+        inwards = 1.0 - self.surface.reflectance(mi.Frame3f.cos_theta(si.wi), si, active)
+        outwards = 1.0 - self.surface.reflectance(mi.Frame3f.cos_theta(wo), si, active)
+        return inwards * outwards
+
+    def __str__(self) -> str:
+        return "transmission"
+
+
+@dataclass(frozen=True)
+class Blend:
+    """f = (1 − w) f_diffraction + (1 − α + w) f_nested, α = min(|F|, 1): not physical.
+
+    The texture blending of the thesis of 2014 that first rendered these patches in real time, for
+    comparisons with its pictures: F is the reflectance at the half vector, w (`diffuse_weight`) a
+    constant for which it gives no value. A white pair gains energy, towards grazing angles most.
+    """
+
+    surface: Reflectance
+    weight: float
+
+    @property
+    def above(self) -> float:
+        """Factor of the diffraction."""
+        return 1.0 - self.weight
+
+    def beneath(self, si: Any, wo: Any, active: Any) -> Any:
+        """Factor of the nested BSDF."""
+        half = si.wi + wo
+        cos_half = mi.Float(0.5) * (half.x**2 + half.y**2 + half.z**2) ** 0.5
+        return 1.0 - self.surface.reflectance(cos_half, si, active) + self.weight
+
+    def __str__(self) -> str:
+        return f"thesis[diffuse_weight = {self.weight:g}]"
+
+
+Layering = Transmission | Blend

@@ -1,0 +1,241 @@
+"""The plugin's parameters: read from Mitsuba's Properties, checked, in one plain record."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Collection
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+
+from ..errors import DiffractionError
+from ..files.options import LoadOptions
+from ..tables.table import DiffractionTable
+from .layers import LAYERINGS, Blend, Layering, Transmission
+from .orientation import Constant, Orientation, Textured
+from .reflectance import Conductor, Dielectric, Perfect, Reflectance
+from .shadowing import SHADOWINGS
+from .sources import table_of_file, table_of_tensor
+
+SOURCES = ("heightfield", "table", "data")
+READING = tuple(field.name for field in fields(LoadOptions))
+TABLE_PARAMETERS = ("coherence_width", "coherence", "basis", "tolerance", "terms")
+#: Of mono variants, nm.
+DEFAULT_WAVELENGTH = 550.0
+NAMES = (
+    *SOURCES,
+    *READING,
+    *TABLE_PARAMETERS,
+    "material",
+    "eta",
+    "k",
+    "int_ior",
+    "ext_ior",
+    "orientation",
+    "height_scale",
+    "wavelength",
+    "energy_conserving",
+    "shadowing",
+    "layering",
+    "diffuse_weight",
+)
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """What the BSDF needs, checked.
+
+    Attributes
+    ----------
+    table : the diffraction table.
+    reflectance : the surface's own reflectance.
+    orientation : from the first tangent to the patch's x axis.
+    height_scale : factor on all heights.
+    energy_conserving : whether to divide by a bound of the albedo.
+    vcavity : whether the surface shadows itself like V-shaped grooves.
+    layering : how diffraction and the nested BSDF share the light.
+    wavelength : nm, that of mono variants.
+    nested : the BSDF beneath, or None.
+    """
+
+    table: DiffractionTable
+    reflectance: Reflectance
+    orientation: Orientation
+    height_scale: float
+    energy_conserving: bool
+    vcavity: bool
+    layering: Layering
+    wavelength: float
+    nested: Any | None
+
+
+def read_parameters(props: Any) -> Parameters:
+    """Check everything, and get the table: loaded, from the cache, or built.
+
+    Raises
+    ------
+    DiffractionError
+        With the parameter, its value and the choices.
+    """
+    beneath = {name: value for name, value in props.objects() if isinstance(value, mi.BSDF)}
+    if len(beneath) > 1:
+        raise DiffractionError(
+            f"{len(beneath)} nested BSDFs ({', '.join(beneath)}); at most one can lie beneath"
+        )
+    nested = next(iter(beneath.values()), None)
+    _refuse_unknown(props, beneath)
+    height_scale = _number(props, "height_scale", 1.0)
+    if not 0.0 < height_scale <= 1e3:
+        raise DiffractionError(f"height_scale={height_scale:g} must be above 0 and at most 1000")
+    reflectance = _reflectance(props)
+    if nested is not None and isinstance(reflectance, Perfect | Conductor):
+        raise DiffractionError(
+            f"a nested BSDF lies beneath a surface that lets no light through (material="
+            f"'{reflectance}'); give int_ior instead, or remove the nested BSDF"
+        )
+    table = _table(props, height_scale)
+    return Parameters(
+        table=table,
+        reflectance=reflectance,
+        orientation=_orientation(props),
+        height_scale=height_scale,
+        energy_conserving=_flag(props, "energy_conserving", True),
+        vcavity=_choice(props, "shadowing", SHADOWINGS) == "vcavity",
+        layering=_layering(props, reflectance, nested is not None),
+        wavelength=_wavelength(props, table),
+        nested=nested,
+    )
+
+
+def _table(props: Any, height_scale: float) -> DiffractionTable:
+    given = [name for name in SOURCES if name in props]
+    if len(given) != 1:
+        raise DiffractionError(
+            f"give exactly one of {', '.join(SOURCES)}; got {' and '.join(given) or 'none'}"
+        )
+    asked = {name: props.get(name) for name in TABLE_PARAMETERS if name in props}
+    for name in ("coherence_width", "tolerance"):
+        if name in asked:
+            asked[name] = _number(props, name, 0.0)
+    if "terms" in asked and not isinstance(asked["terms"], int):
+        raise DiffractionError(f"terms={asked['terms']!r} must be a whole number")
+    options = LoadOptions.of(**{name: props.get(name) for name in READING if name in props})
+    value = props.get(given[0])
+    if given[0] == "data":
+        return table_of_tensor(value, options, asked, height_scale)
+    if not isinstance(value, str):
+        raise DiffractionError(f"{given[0]}={value!r} must be the name of a file")
+    path = Path(str(mi.file_resolver().resolve(value)))
+    return table_of_file(path, given[0] == "table", options, asked, height_scale)
+
+
+def _wavelength(props: Any, table: DiffractionTable) -> float:
+    """The wavelength of mono variants in nm: a scene for all variants may give it in all."""
+    wavelength = _number(props, "wavelength", DEFAULT_WAVELENGTH)
+    shortest, longest = table.wavelength_range
+    if not shortest <= wavelength <= longest:
+        raise DiffractionError(
+            f"wavelength={wavelength:g} nm is outside the table's {shortest:g} to {longest:g} nm"
+        )
+    return wavelength
+
+
+def _reflectance(props: Any) -> Reflectance:
+    conductor = [n for n in ("material", "eta", "k") if n in props]
+    dielectric = [n for n in ("int_ior", "ext_ior") if n in props]
+    if conductor and dielectric:
+        raise DiffractionError(
+            f"{conductor[0]} makes a conductor and {dielectric[0]} a dielectric; give one of them"
+        )
+    if "material" in conductor and len(conductor) > 1:
+        raise DiffractionError("material and eta, k both say what the conductor is; give one")
+    if "material" in conductor:
+        material = str(props.get("material"))
+        if material == "none":
+            return Perfect()
+        return Conductor.of_material(material, _number(props, "wavelength", DEFAULT_WAVELENGTH))
+    if conductor:
+        if len(conductor) == 1:
+            raise DiffractionError(f"{conductor[0]} alone is no conductor; give both eta and k")
+        return Conductor(
+            props.get_unbounded_texture("eta"), props.get_unbounded_texture("k"), "eta, k"
+        )
+    iors = {name: _index(props, name) for name in dielectric}
+    return Dielectric(iors.get("int_ior", 1.5), iors.get("ext_ior", 1.000277))
+
+
+def _index(props: Any, name: str) -> float | str:
+    value = props.get(name)
+    if isinstance(value, str):
+        return value
+    if not (isinstance(value, int | float) and math.isfinite(value) and value >= 1.0):
+        raise DiffractionError(
+            f"{name}={value} must be a refractive index of at least 1, or a name"
+        )
+    return float(value)
+
+
+def _refuse_unknown(props: Any, objects: Collection[str]) -> None:
+    for name in props.keys():  # noqa: SIM118 - Properties is no mapping
+        if name in NAMES or name in objects or name == "id":
+            continue
+        near = difflib.get_close_matches(name, NAMES, 1)
+        hint = f"did you mean {near[0]}? " if near else ""
+        raise DiffractionError(f"unknown parameter '{name}'; {hint}Allowed: {', '.join(NAMES)}")
+
+
+def _orientation(props: Any) -> Orientation:
+    objects = dict(props.objects())
+    if "orientation" in objects:
+        texture = objects["orientation"]
+        if not isinstance(texture, mi.Texture):
+            raise DiffractionError(
+                f"orientation={type(texture).__name__} must be degrees, or a raw texture or mesh "
+                "attribute whose first two channels are (cos, sin)"
+            )
+        return Textured(texture)
+    return Constant(_number(props, "orientation", 0.0))
+
+
+def _layering(props: Any, reflectance: Reflectance, nested: bool) -> Layering:
+    if _choice(props, "layering", LAYERINGS) == "transmission":
+        if "diffuse_weight" in props:
+            raise DiffractionError("diffuse_weight belongs to layering='thesis'; leave it out")
+        return Transmission(reflectance)
+    if not nested:
+        raise DiffractionError("layering='thesis' blends with a nested BSDF, but there is none")
+    weight = _number(props, "diffuse_weight", 0.0)
+    if not 0.0 <= weight <= 1.0:
+        raise DiffractionError(f"diffuse_weight={weight:g} must lie between 0 and 1")
+    return Blend(reflectance, weight)
+
+
+def _choice(props: Any, name: str, choices: tuple[str, ...]) -> str:
+    """One of some words; the first is the default."""
+    value = props.get(name, choices[0])
+    if value not in choices:
+        raise DiffractionError(f"{name}={value!r} is unknown; choose one of {', '.join(choices)}")
+    return str(value)
+
+
+def _flag(props: Any, name: str, default: bool) -> bool:
+    value = props.get(name, default)
+    if not isinstance(value, bool):
+        raise DiffractionError(f"{name}={value!r} must be true or false")
+    return value
+
+
+def _number(props: Any, name: str, default: float) -> float:
+    if name not in props:
+        return default
+    value = props.get(name)
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise DiffractionError(f"{name}={value!r} must be a number") from None
+    if not math.isfinite(number):
+        raise DiffractionError(f"{name}={value} must be a finite number")
+    return number

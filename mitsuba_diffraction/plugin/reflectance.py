@@ -1,0 +1,127 @@
+"""Power reflectance of the surface itself: dielectric, conductor, or a perfect mirror (Dr.Jit)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ..errors import DiffractionError
+
+
+class Perfect:
+    """R = 1 at every angle, `material="none"`."""
+
+    def reflectance(self, cos_theta: Any, si: Any, active: Any) -> Any:
+        """R for the cosine (mi.Float) of the angle to the half vector, mi.UnpolarizedSpectrum."""
+        return mi.UnpolarizedSpectrum(1.0)
+
+    def traverse(self, callback: Any) -> None:
+        """Nothing to expose."""
+
+    def update(self) -> None:
+        """Nothing to keep up to date."""
+
+    def __str__(self) -> str:
+        return "none"
+
+
+class Dielectric:
+    """Fresnel reflectance of an interface between two dielectrics, unpolarised."""
+
+    def __init__(self, int_ior: float | str, ext_ior: float | str) -> None:
+        probe = _load("dielectric", int_ior=int_ior, ext_ior=ext_ior)
+        self.eta = mi.Float(mi.traverse(probe)["eta"])
+        dr.make_opaque(self.eta)
+
+    def reflectance(self, cos_theta: Any, si: Any, active: Any) -> Any:
+        """R for the cosine of the angle to the half vector, the same at every wavelength."""
+        return mi.UnpolarizedSpectrum(mi.fresnel(cos_theta, self.eta)[0])
+
+    def traverse(self, callback: Any) -> None:
+        """Expose the relative index of refraction."""
+        callback.put("eta", self.eta, mi.ParamFlags.Differentiable)
+
+    def update(self) -> None:
+        """Keep the index a variable, so that a new value needs no new kernel."""
+        dr.make_opaque(self.eta)
+
+    def __str__(self) -> str:
+        return f"dielectric[eta = {dr.slice(self.eta):.5g}]"
+
+
+class Conductor:
+    """Fresnel reflectance of a conductor, eta and k as textures over wavelength."""
+
+    def __init__(self, eta: Any, k: Any, name: str) -> None:
+        self.eta, self.k, self.name = eta, k, name
+
+    @classmethod
+    def of_material(cls, material: str, wavelength: float) -> Conductor:
+        """Mitsuba's tabulated conductors, by the names that `roughconductor` takes.
+
+        wavelength : nm, where mono variants take the index; Mitsuba's is a mean over the spectrum.
+        """
+        objects = _textures(_load("conductor", material=material))
+        if mi.is_monochromatic:
+            objects = {name: _at(material, name, wavelength) for name in ("eta", "k")}
+        return cls(objects["eta"], objects["k"], material)
+
+    def reflectance(self, cos_theta: Any, si: Any, active: Any) -> Any:
+        """R for the cosine of the angle to the half vector, at si.wavelengths."""
+        eta, k = self.eta.eval(si, active), self.k.eval(si, active)
+        return mi.UnpolarizedSpectrum(
+            [
+                mi.fresnel_conductor(cos_theta, mi.Complex2f(e, x))
+                for e, x in zip(eta, k, strict=True)
+            ]
+        )
+
+    def traverse(self, callback: Any) -> None:
+        """Expose both spectra."""
+        callback.put("eta", self.eta, mi.ParamFlags.Differentiable)
+        callback.put("k", self.k, mi.ParamFlags.Differentiable)
+
+    def update(self) -> None:
+        """The textures look after themselves."""
+
+    def __str__(self) -> str:
+        return f"conductor[{self.name}]"
+
+
+Reflectance = Perfect | Dielectric | Conductor
+
+
+def _load(plugin: str, **parameters: Any) -> Any:
+    """One of Mitsuba's own BSDFs, which know the names of materials."""
+    try:
+        return mi.load_dict({"type": plugin, **parameters})
+    except Exception as error:  # Mitsuba throws RuntimeError, over several lines
+        given = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
+        reason = " ".join(str(error).split())
+        raise DiffractionError(
+            f"{given} is no material that Mitsuba knows ({reason[:200]}); give a number, a name "
+            "from Mitsuba's table of materials, or eta and k"
+        ) from error
+
+
+def _at(material: str, name: str, wavelength: float) -> Any:
+    """Part of a material's index at one wavelength, as a texture."""
+    file = str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd"))
+    nodes, values = np.loadtxt(file).T
+    return mi.load_dict({"type": "uniform", "value": float(np.interp(wavelength, nodes, values))})
+
+
+def _textures(bsdf: Any) -> dict[str, Any]:
+    """The textures that a BSDF shows to `traverse`, by name."""
+    found: dict[str, Any] = {}
+
+    class Collector(mi.TraversalCallback):
+        def put(self, name: str, value: Any, *rest: Any) -> None:
+            if isinstance(value, mi.Texture):
+                found[name] = value
+
+    bsdf.traverse(Collector())
+    return found

@@ -1,0 +1,161 @@
+"""From what a scene names (an image, a recipe, a table, an array) to a table, built only once."""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+
+from .. import gratings
+from ..errors import DiffractionError, DiffractionWarning
+from ..files.cache import cached_table, loaded_table
+from ..files.heights import load_heights
+from ..files.options import LoadOptions
+from ..files.raw import existing_file
+from ..files.recipes import Recipe
+from ..files.table_exr import read_document
+from ..heightfield import HeightField
+from ..tables.table import DiffractionTable
+
+#: A table serves heights scaled by up to this times max(1, height_scale).
+HEIGHT_SCALE_ROOM = 1.5
+#: Mitsuba samples its spectral variants' wavelengths from here on, nm.
+SHORTEST_WAVELENGTH = 360.0
+
+
+def table_of_file(
+    path: Path,
+    must_be_table: bool,
+    options: LoadOptions,
+    asked: Mapping[str, Any],
+    height_scale: float,
+) -> DiffractionTable:
+    """The table that a file is or makes: a table, a recipe, or a height field of any format.
+
+    Parameters
+    ----------
+    path : the file.
+    must_be_table : refuse anything but a table.
+    options : how to read heights.
+    asked : parameters of `DiffractionTable.build` that the scene sets.
+    height_scale : the largest factor on the heights that is asked for.
+    """
+    if must_be_table or (path.suffix.lower() == ".exr" and _is_table(path)):
+        table = loaded_table(path)
+        _check_agreement(path, table, options, asked)
+        if height_scale > table.height_scale_max:
+            raise DiffractionError(
+                f"height_scale={height_scale:g} is beyond the table's "
+                f"{table.height_scale_max:g}; give the height field instead of the table"
+            )
+    elif path.suffix.lower() == ".toml":
+        recipe = Recipe.load(path)
+        table = _built(
+            _recipe_digest(recipe, options),
+            lambda: recipe.fields(options),
+            {**recipe.table_arguments(), **asked},
+            height_scale,
+        )
+    else:
+        table = _built(
+            _file_digest(path, options),
+            lambda: [load_heights(path, options)],
+            asked,
+            height_scale,
+        )
+    _warn(table)
+    return table
+
+
+def table_of_tensor(
+    data: Any, options: LoadOptions, asked: Mapping[str, Any], height_scale: float
+) -> DiffractionTable:
+    """The table of heights (ny, nx) in µm, given as an array."""
+    if options.max_height is not None:
+        raise DiffractionError("max_height is for images; the heights in data are in µm already")
+    if options.pixel_size is None:
+        raise DiffractionError("data needs pixel_size, the distance between its heights in µm")
+    values = np.array(data, np.float64)
+    if values.ndim == 3 and values.shape[2] == 1:
+        values = values[..., 0]
+    heights = HeightField(values, options.pixel_size, name="data")
+    table = _built(heights.digest(), lambda: [heights], asked, height_scale)
+    _warn(table)
+    return table
+
+
+def _built(
+    digest: str,
+    load: Callable[[], list[HeightField]],
+    asked: Mapping[str, Any],
+    height_scale: float,
+) -> DiffractionTable:
+    arguments = {**asked, "height_scale_max": HEIGHT_SCALE_ROOM * max(1.0, height_scale)}
+
+    def build() -> DiffractionTable:
+        heights = load()
+        mi.Log(mi.LogLevel.Info, f"diffraction: building the table of {heights[0].name}")
+        return DiffractionTable.build(heights, **arguments)
+
+    return cached_table(digest, arguments, build)
+
+
+def _warn(table: DiffractionTable) -> None:
+    for line in table.source.get("warnings", ()):
+        warnings.warn(line, DiffractionWarning, stacklevel=2)
+
+
+def _is_table(path: Path) -> bool:
+    return read_document(path) is not None
+
+
+def _file_digest(path: Path, options: LoadOptions) -> str:
+    content = hashlib.sha256(repr(options).encode())
+    content.update(existing_file(path).read_bytes())
+    return content.hexdigest()
+
+
+def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
+    """Changes when the recipe's heights may: its own text, its sources, or the generators."""
+    content = hashlib.sha256(repr((recipe.options, recipe.generator, options)).encode())
+    content.update(repr([sorted(arguments.items()) for arguments in recipe.arguments]).encode())
+    for source in recipe.sources:
+        content.update(existing_file(source).read_bytes())
+    if recipe.generator is not None:
+        for file in sorted(Path(gratings.__file__).parent.glob("*.py")):
+            content.update(file.read_bytes())
+    return content.hexdigest()
+
+
+def _check_agreement(
+    path: Path, table: DiffractionTable, options: LoadOptions, asked: Mapping[str, Any]
+) -> None:
+    """A table fixes its own parameters: those given beside it must agree with it."""
+    own = {
+        "coherence_width": table.coherence_width,
+        "coherence": table.coherence,
+        "basis": table.expansion.basis,
+        "tolerance": table.tolerance,
+        "terms": table.expansion.terms,
+    }
+    for name, value in asked.items():
+        if value != own[name] and not (name == "basis" and value == "auto"):
+            raise DiffractionError(
+                f"{name}={value} contradicts the table '{path}', which has {name}={own[name]}; "
+                "leave it out, or build another table with 'mitsuba-diffraction precompute'"
+            )
+    for name, value in options.given().items():
+        raise DiffractionError(
+            f"{name}={value} is for height fields, but '{path}' is a table and has its own; "
+            f"leave {name} out, or say 'auto'"
+        )
+    if table.wavelength_range[0] > SHORTEST_WAVELENGTH:
+        raise DiffractionError(
+            f"the table '{path}' starts at {table.wavelength_range[0]:g} nm, but Mitsuba renders "
+            f"from {SHORTEST_WAVELENGTH:g} nm on; build it with '--wavelength-range 360 830'"
+        )

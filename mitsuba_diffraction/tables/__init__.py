@@ -1,0 +1,5 @@
+"""Precomputed series of diffraction orders: what the renderer looks up instead of transforming."""
+
+from .table import DiffractionTable
+
+__all__ = ["DiffractionTable"]

@@ -1,0 +1,101 @@
+"""What cannot be built: parameters out of range, patches that do not fit, series that fail."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import DiffractionError
+from ..heightfield import HeightField
+from .choose import taylor_rounding, taylor_truncation
+from .error import Grid
+from .expansion import BASES, Expansion
+from .table import refuse
+from .window import MAX_TAPS
+
+#: Largest table, bytes: beyond it no renderer would want it.
+MAX_BYTES = 4 << 30
+
+
+def check_parameters(
+    basis: str,
+    tolerance: float,
+    terms: int | None,
+    wavelength_range: tuple[float, float],
+    height_scale_max: float,
+    taps: int | None,
+) -> None:
+    """Refuse parameters that make no sense on their own."""
+    if basis not in (*BASES, "auto"):
+        raise DiffractionError(
+            f"basis='{basis}' is unknown; choose one of {', '.join((*BASES, 'auto'))}"
+        )
+    if not 1e-6 <= tolerance < 1.0:
+        raise DiffractionError(
+            f"tolerance={tolerance} must lie between 1e-6 (single precision) and 1 (1e-3 is usual)"
+        )
+    for name, value, most in (("terms", terms, 400), ("taps", taps, MAX_TAPS)):
+        if value is not None and not 1 <= value <= most:
+            raise DiffractionError(f"{name}={value} must be a whole number from 1 to {most}")
+    low, high = wavelength_range
+    if not (10.0 <= low < high <= 1e5):
+        raise DiffractionError(
+            f"wavelength_range=({low:g}, {high:g}) must be two rising wavelengths in nm, "
+            "between 10 and 100000"
+        )
+    if not 0.0 < height_scale_max <= 1e3:
+        raise DiffractionError(
+            f"height_scale_max={height_scale_max:g} must be a positive factor, at most 1000"
+        )
+
+
+def check_patches(patches: Sequence[HeightField], coherence: str, basis: str) -> None:
+    """Refuse patches whose powers cannot be averaged."""
+    if not patches:
+        raise refuse("there is no height field; give at least one")
+    if len(patches) == 1:
+        return
+    if coherence != "ensemble" or basis == "taylor":
+        given = "basis='taylor'" if basis == "taylor" else f"coherence='{coherence}'"
+        raise refuse(
+            f"{len(patches)} patches have their powers averaged, which {given} cannot; use "
+            "coherence='ensemble' and basis='chebyshev', or one patch"
+        )
+    for patch in patches[1:]:
+        if not np.allclose(patch.extent, patches[0].extent, rtol=1e-6):
+            raise refuse(
+                f"'{patch.name}' is {patch.extent[0]:.6g} × {patch.extent[1]:.6g} µm, but "
+                f"'{patches[0].name}' is {patches[0].extent[0]:.6g} × {patches[0].extent[1]:.6g} "
+                "µm; crop them to one size"
+            )
+
+
+def check_taylor(heights: HeightField, expansion: Expansion, tolerance: float) -> None:
+    """Refuse a Taylor series that single precision does not survive, or that is cut too short."""
+    rounding = taylor_rounding(heights, expansion.kappa_max, expansion.terms)
+    if rounding > tolerance:
+        raise refuse(
+            f"basis='taylor' cannot reach tolerance={tolerance:g} for heights of "
+            f"{heights.range:.3g} µm: its terms cancel, with a predicted error of {rounding:.2g} "
+            "in single precision; use basis='chebyshev'"
+        )
+    truncation = taylor_truncation(heights, expansion.kappa_max, expansion.terms)
+    if truncation > 100.0 * tolerance:  # a bound: anything closer is left to the measurement
+        raise refuse(
+            f"terms={expansion.terms} of basis='taylor' leave a predicted error of up to "
+            f"{truncation:.2g}, more than tolerance={tolerance:g}; leave terms out, raise it, or "
+            "use basis='chebyshev'"
+        )
+
+
+def check_size(grid: Grid, expansion: Expansion) -> None:
+    components = 1 if expansion.kind == "power" else 2
+    bins = (2 * grid.last[0] + 1) * (2 * grid.last[1] + 1)
+    size = 4 * bins * components * expansion.terms * expansion.intervals
+    if size > MAX_BYTES:
+        raise refuse(
+            f"it would take {size / 1e9:.1f} GB ({bins:.3g} orders of {expansion.intervals}×"
+            f"{expansion.terms} terms); use a smaller or shallower patch, a larger tolerance, or "
+            "a longer shortest wavelength"
+        )

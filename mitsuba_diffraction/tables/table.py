@@ -1,0 +1,213 @@
+"""A table: everything needed to evaluate one patch's diffraction without a Fourier transform."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import DiffractionError
+from ..geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
+from ..heightfield import HeightField
+from .error import Grid, Progress
+from .expansion import Expansion
+from .lookup import window_sum
+
+#: Raised whenever what the coefficients mean changes; tables of another version are refused.
+FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DiffractionTable:
+    """Series coefficients of one patch's (or several patches') diffraction orders.
+
+    Make one with `build` or `load`. All lengths in µm, wavelengths in nm.
+
+    Attributes
+    ----------
+    coefficients : (intervals, ny, nx, components, terms) float32 or float16; one component for a
+        power, two (real, imaginary) for an amplitude; divided by `scale` before use. Bin (0, 0)
+        is in the middle of (ny, nx), and zero.
+    order_0 : (intervals, components, terms) float32, the coefficients of that bin, not scaled.
+    scale : what the coefficients were multiplied with, to suit half floats.
+    expansion : which series in κ.
+    grid : bins, window and taps.
+    spacing : (dqx, dqy), rad/µm between bins.
+    coherence_width, coherence, tolerance, wavelength_range, height_scale_max : as asked for.
+    error : the measured error (see `tables.error`): near, far, and where.
+    source : the heights: name, digest, size, statistics, history.
+    """
+
+    coefficients: NDArray[np.floating]
+    order_0: NDArray[np.float32]
+    scale: float
+    expansion: Expansion
+    grid: Grid
+    spacing: tuple[float, float]
+    coherence_width: float
+    coherence: str
+    tolerance: float
+    wavelength_range: tuple[float, float]
+    height_scale_max: float
+    error: Mapping[str, float]
+    source: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def build(
+        cls,
+        heights: HeightField | Sequence[HeightField],
+        *,
+        coherence_width: float = 65.0,
+        coherence: str = "ensemble",
+        basis: str = "auto",
+        tolerance: float = 1e-3,
+        terms: int | None = None,
+        wavelength_range: tuple[float, float] = (360.0, 830.0),
+        height_scale_max: float = 1.5,
+        taps: int | None = None,
+        progress: Progress | None = None,
+    ) -> DiffractionTable:
+        """Tabulate a height field to a tolerance, and measure that it is met.
+
+        Parameters
+        ----------
+        heights : the patch, which tiles the plane; or several of one size, whose powers are
+            averaged (`ensemble` only).
+        coherence_width : 4σ of the Gaussian amplitude window, µm.
+        coherence : "ensemble" (window power averaged over its position) or "patch" (one window).
+        basis : "chebyshev", "taylor" or "auto" (the cheaper that meets the tolerance).
+        tolerance : relative error of ⟨|P|²⟩ at the worst κ, as `tables.error` measures it.
+        terms : coefficients of a series; by default as many as the tolerance takes.
+        wavelength_range : nm; the shortest sets how far the table reaches.
+        height_scale_max : largest factor on the heights that the table serves.
+        taps : bins read in each direction; by default as many as the tolerance takes.
+        progress : called as progress(done, total, text) while it works.
+
+        Raises
+        ------
+        DiffractionError
+            If a parameter is out of range, or the tolerance cannot be met: the text names the
+            error to expect and what would meet it.
+        """
+        from .build import build_table  # the builder makes instances of this class
+
+        return build_table(
+            heights,
+            coherence_width=coherence_width,
+            coherence=coherence,
+            basis=basis,
+            tolerance=tolerance,
+            terms=terms,
+            wavelength_range=wavelength_range,
+            height_scale_max=height_scale_max,
+            taps=taps,
+            progress=progress,
+        )
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> DiffractionTable:
+        """Read a table that `save` wrote.
+
+        Raises
+        ------
+        DiffractionError
+            If the file is missing, no table, damaged, or of another format version.
+        """
+        from ..files.table_exr import load_table
+
+        return load_table(path)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write an EXR file: named float channels and one JSON attribute with all the rest.
+
+        Raises
+        ------
+        DiffractionError
+            If it cannot be written; nothing half-written is left.
+        """
+        from ..files.table_exr import save_table
+
+        save_table(self, path)
+
+    @property
+    def sigma(self) -> float:
+        """σ of the amplitude window, µm."""
+        return sigma_of(self.coherence_width)
+
+    @property
+    def reach(self) -> float:
+        """Largest spatial frequency k·|(u, v)| that light can probe, rad/µm."""
+        return reach_of(self.wavelength_range)
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the coefficients in memory."""
+        return self.coefficients.nbytes
+
+    def covers(self, qx: ArrayLike, qy: ArrayLike, kappa: ArrayLike) -> NDArray[np.bool_]:
+        """Whether a look-up lies inside the table (to rounding in single precision)."""
+        slack = 1.0 + 1e-6
+        inside = np.hypot(qx, qy) <= self.reach * slack
+        return inside & (np.asarray(kappa) <= self.expansion.kappa_max * slack)
+
+    def window_sum(self, qx: ArrayLike, qy: ArrayLike, kappa: ArrayLike) -> NDArray[np.float64]:
+        """⟨|P|²⟩ / 4π²σ⁴ at spatial frequencies (rad/µm) and κ (rad/µm); see `tables.lookup`."""
+        return window_sum(self, qx, qy, kappa)
+
+    def brdf(
+        self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, *, height_scale: float = 1.0
+    ) -> NDArray[np.float64]:
+        """The BRDF for R = 1 from the table, 1/sr: the twin of `reference.brdf`, same shapes."""
+        k = wavenumber(wavelength)
+        u, v, w = diffraction_coordinates(wi, wo)
+        above = (np.asarray(wi)[..., 2] > 0) & (np.asarray(wo)[..., 2] > 0)
+        u, v, w = (np.where(above, c, 0.0) for c in (u, v, w))
+        power = 4 * np.pi**2 * self.sigma**4 * self.window_sum(k * u, k * v, k * w * height_scale)
+        return kirchhoff_factor(wi, wo, wavelength, self.sigma) * power
+
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers and strings for people and for JSON."""
+        intervals, ny, nx, components, terms = self.coefficients.shape
+        return {
+            "basis": self.expansion.basis,
+            "stores": self.expansion.kind,
+            "coherence": self.coherence,
+            "coherence_width_um": self.coherence_width,
+            "wavelength_range_nm": list(self.wavelength_range),
+            "height_scale_max": self.height_scale_max,
+            "tolerance": self.tolerance,
+            "measured_error": {
+                "glossy (within 3/σ of order 0)": self.error["near"],
+                "colours (all other orders)": self.error["far"],
+            },
+            "terms": terms,
+            "intervals_of_kappa": intervals,
+            "taps": list(self.grid.taps),
+            "orders": [nx, ny],
+            "components": components,
+            "precision": str(self.coefficients.dtype),
+            "memory_mb": round(self.nbytes / 1e6, 2),
+            "source": dict(self.source),
+        }
+
+    def __repr__(self) -> str:
+        intervals, ny, nx, _, terms = self.coefficients.shape
+        return (
+            f"DiffractionTable({self.expansion.basis} {self.expansion.kind}, {self.coherence}, "
+            f"{nx}×{ny} orders, {intervals}×{terms} terms, {self.coefficients.dtype}, "
+            f"{self.nbytes / 1e6:.1f} MB)"
+        )
+
+
+def reach_of(wavelength_range: tuple[float, float]) -> float:
+    """2k at the shortest wavelength, rad/µm: |(u, v)| is at most 2."""
+    return float(2.0 * wavenumber(wavelength_range[0]))
+
+
+def refuse(text: str) -> DiffractionError:
+    """An error about a table that cannot be built."""
+    return DiffractionError(f"cannot build the table: {text}")

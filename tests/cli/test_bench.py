@@ -1,0 +1,80 @@
+"""`bench`: what it prints and writes; never how fast anything is."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from mitsuba_diffraction.benchmarks import plan
+from mitsuba_diffraction.benchmarks.figures import Goal, Row, Section
+from mitsuba_diffraction.benchmarks.plan import Plan
+from mitsuba_diffraction.benchmarks.timing import ratio, rounds_of
+
+# 96 pixels are 4.7 µm, 1/14 of the coherence window: wide taps, but no time to speak of
+TINY = Plan(
+    pixels=96,
+    more_pixels=(80,),
+    other_tables=False,
+    lanes=64,
+    slow_lanes=32,
+    rounds=2,
+    resolution=4,
+    spp=1,
+)
+
+
+@pytest.fixture(autouse=True)
+def tiny(monkeypatch):
+    monkeypatch.setattr(plan, "QUICK", TINY)
+
+
+def test_everything_is_measured_and_written(run, tmp_path):
+    file = tmp_path / "bench.json"
+    ran = run("bench", "--quick", "--json", file)
+    assert ran.code == 0, ran.err
+    for part in ("processor", "llvm 1", "build:", "eval:", "sample:", "pdf:", "render:", "gathers"):
+        assert part in ran.out
+    data = json.loads(file.read_text(encoding="utf-8"))
+    assert data["machine"]["cores"] >= 1
+    build, evaluation = data["sections"][:2]
+    for row in build["rows"]:
+        assert row["peak_bytes"] > row["imported_bytes"] > 0
+        assert max(row["table"]["measured_error"].values()) <= row["table"]["tolerance"]
+    for row in evaluation["rows"]:
+        assert len(row["ns"]) == TINY.rounds
+        assert min(row["ns"]) > 0
+    goals = {goal["goal"] for row in evaluation["rows"] for goal in row["goals"]}
+    assert goals == {"at most 8× roughconductor", "at least 30× the defaults"}
+
+
+def test_a_part_alone(run):
+    ran = run("bench", "--quick", "--only", "build")
+    assert ran.code == 0, ran.err
+    assert "96² pixels" in ran.out
+    assert "eval" not in ran.out
+
+
+def test_an_unwritable_file_is_refused_before_measuring(run, tmp_path):
+    ran = run("bench", "--quick", "--json", tmp_path / "missing" / "bench.json")
+    assert "missing" in ran.failed_in_one_line()
+
+
+def test_every_round_goes_through_all_calls():
+    order = []
+    calls = {name: lambda name=name: order.append(name) or float(len(order)) for name in "abc"}
+    seconds = rounds_of(calls, 3, lambda done, total: None)
+    assert order == list("abc") * (len(order) // 3)
+    assert [len(taken) for taken in seconds.values()] == [3, 3, 3]
+
+
+def test_ratios_do_not_mind_a_slow_round():
+    # the machine was ten times slower in the second round, for both
+    assert ratio([2.0, 20.0, 2.0], [1.0, 10.0, 1.0]) == 2.0
+
+
+def test_a_missed_goal_is_said():
+    rows = [Row("a", {"s": 5.0}, [Goal("at most 4 s", False)]), Row("b", {"s": None})]
+    lines = list(Section("title", ["s"], rows).lines())
+    assert lines[2].split() == ["a", "5.00", "at", "most", "4", "s:", "MISSED"]
+    assert lines[3].strip() == "b"

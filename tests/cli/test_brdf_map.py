@@ -1,0 +1,156 @@
+"""`brdf-map`: heights or a table in, an EXR and a picture out, or one line."""
+
+from __future__ import annotations
+
+import json
+import os
+
+import numpy as np
+import OpenEXR
+import pytest
+from PIL import Image
+
+from mitsuba_diffraction.cli import brdf_map
+from mitsuba_diffraction.colour import ILLUMINANTS
+from mitsuba_diffraction.maps.files import ATTRIBUTE
+
+# A map of the grating of `heights` that takes half a second.
+QUICK = ["--pixel-size", "0.08", "--coherence-width", "6", "--resolution", "32", "--step", "47"]
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch, working_variant):
+    """An empty folder that is the current one, and a variant that works."""
+    if working_variant != "llvm_ad_spectral":
+        pytest.skip("the variant is set by name elsewhere")
+    folder = tmp_path / "here"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def channels_of(file):
+    """Channels of an EXR by name, and its description."""
+    exr = OpenEXR.File(str(file), separate_channels=True)
+    return {n: c.pixels for n, c in exr.channels().items()}, json.loads(exr.header()[ATTRIBUTE])
+
+
+def test_choices_are_the_library_s():
+    assert brdf_map.ILLUMINANTS == ILLUMINANTS
+
+
+def test_an_exr_and_a_picture_are_written_and_named(run, heights, here):
+    ran = run("brdf-map", heights, *QUICK)
+    assert ran.code == 0, ran.err
+    assert sorted(os.listdir(here)) == ["grating-map.exr", "grating-map.png"]
+    for part in ("grating-map.exr and grating-map.png: 32 x 32 pixels", "360–830 nm", " stops, "):
+        assert part in ran.out
+    channels, document = channels_of("grating-map.exr")
+    assert set(channels) == set("RGBA")
+    assert channels["G"].shape == (32, 32)
+    assert document["source"] == str(heights)
+    with Image.open("grating-map.png") as image:
+        assert image.size[0] > 400  # room for axes
+
+
+def test_a_png_comes_alone(run, heights, here):
+    assert run("brdf-map", heights, *QUICK, "-o", "a.png").code == 0
+    assert os.listdir(here) == ["a.png"]
+
+
+def test_options_reach_the_map(run, heights):
+    ran = run(
+        "brdf-map", heights, *QUICK, "-o", "a.exr", "--theta", "30", "--phi", "90", "--samples",
+        "2", "--cosine", "--spectral", "--illuminant", "E", "--wavelength-range", "400", "700",
+        "--step", "100", "--exposure", "1.5", "--height-scale", "0.5", "--orientation", "90",
+    )  # fmt: skip
+    assert ran.code == 0, ran.err
+    assert "exposure +1.5 stops" in ran.out
+    channels, document = channels_of("a.exr")
+    assert set(channels) == {*"RGBA", "T.450nm", "T.550nm", "T.650nm"}
+    expected = {
+        "quantity": "f cosθo", "theta": 30.0, "phi": 90.0, "samples": 2, "illuminant": "E",
+        "wavelength_range": [400.0, 700.0], "step": 100.0,
+    }  # fmt: skip
+    assert {key: document[key] for key in expected} == expected
+    assert document["surface"] == (
+        "R = 1; ensemble, coherence width 6 µm; heights × 0.5; turned by 90°"
+    )
+
+
+def test_one_wavelength_is_one_channel_and_a_picture_in_false_colours(run, heights):
+    ran = run("brdf-map", heights, *QUICK[:-2], "-o", "a.exr", "--wavelength", "550")
+    assert ran.code == 0, ran.err
+    assert set(channels_of("a.exr")[0]) == {"Y", "A"}
+    assert "550 nm" in ran.out
+    assert "exposure" not in ran.out
+
+
+def test_tables_and_heights_give_the_same_map(run, heights):
+    assert run("precompute", heights, *QUICK[:4], "-o", "table.exr").code == 0
+    assert run("brdf-map", heights, *QUICK, "-o", "a.exr").code == 0
+    assert run("brdf-map", "table.exr", *QUICK[4:], "-o", "b.exr").code == 0
+    a, b = (channels_of(name)[0]["G"] for name in ("a.exr", "b.exr"))
+    np.testing.assert_allclose(a, b, rtol=1e-6)
+
+
+def test_materials_reflect_less(run, heights):
+    greens = []
+    for n, option in enumerate(
+        (["--material", "none"], ["--material", "Al"], ["--int-ior", "1.5"])
+    ):
+        assert run("brdf-map", heights, *QUICK, "-o", f"{n}.exr", *option).code == 0
+        greens.append(float(channels_of(f"{n}.exr")[0]["G"].sum()))
+    # at normal incidence: Al 0.9, n = 1.5 0.04
+    assert greens[1] / greens[0] == pytest.approx(0.91, abs=0.03)
+    assert greens[2] / greens[0] == pytest.approx(0.04, abs=0.003)
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        (["--theta", "90"], "theta=90 must be at least 0 and below 90"),
+        (["--phi", "1e9"], "phi=1e+09 must be from -360 to 360"),
+        (["--step", "500"], "step=500 nm does not fit"),
+        (["--wavelength-range", "700", "400"], "700 to 400 nm is none"),
+        (["--wavelength-range", "300", "400"], "table's shortest wavelength, 360 nm"),
+        (["--resolution", "99999"], "resolution=99999 must be"),
+        (["--samples", "0"], "samples=0 must be"),
+        (["--coherence-width", "-1"], "coherence_width=-1"),
+        (["-o", "missing/a.exr"], "cannot write 'missing/a.exr'"),
+        (["-m", "scalar_rgb"], "variant 'scalar_rgb'"),
+        (["--material", "Unobtainium"], "Unobtainium"),
+        (["--fill", "hope"], "fill"),
+    ],
+)
+def test_what_does_not_fit_is_one_line(run, heights, here, options, text):
+    line = run("brdf-map", heights, *QUICK, *options).failed_in_one_line()
+    assert text in line
+    assert os.listdir(here) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        (["--wavelength", "500"], "--wavelength: not allowed with argument --step"),
+        (["-o", "a.png", "--spectral"], "--spectral: bands need an EXR"),
+        (["-o", "a.jpg"], "expected a name ending in .exr or .png"),
+        (["--material", "Al", "--int-ior", "1.5"], "--int-ior: not allowed with"),
+        (["--illuminant", "A"], "--illuminant: invalid choice: 'A'"),
+    ],
+)
+def test_contradictions_are_usage_errors(run, heights, here, options, text):
+    ran = run("brdf-map", heights, *QUICK, *options)
+    assert ran.code == 2
+    assert text in ran.err
+    assert os.listdir(here) == []
+
+
+def test_the_source_is_not_overwritten(run, heights):
+    assert run("precompute", heights, *QUICK[:4], "-o", "table.exr").code == 0
+    line = run("brdf-map", "table.exr", "-o", "table.exr").failed_in_one_line()
+    assert "would overwrite its own source" in line
+
+
+def test_a_missing_source_is_named(run):
+    assert "nothing.png" in run("brdf-map", "nothing.png").failed_in_one_line()

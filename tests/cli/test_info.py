@@ -1,0 +1,147 @@
+"""`info`: what is in a file, for people and as JSON."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionTable, HeightField
+
+
+@pytest.fixture
+def table(heights, tmp_path):
+    field = HeightField.load(heights, pixel_size=0.08)
+    file = tmp_path / "table.exr"
+    DiffractionTable.build(field, coherence_width=6.0).save(file)
+    return file
+
+
+def test_a_height_field_is_described(run, heights):
+    ran = run("info", heights, "--pixel-size", "0.08")
+    assert ran.code == 0
+    for part in ("height field", "75 x 75", "6 x 6 µm", "rms slope", "history", "warnings"):
+        assert part in ran.out
+
+
+def test_json_has_the_numbers(run, heights):
+    data = json.loads(run("info", heights, "--pixel-size", "0.08", "--json").out)
+    assert data["kind"] == "height field"
+    assert data["shape"] == [75, 75]
+    assert data["extent"] == pytest.approx([6.0, 6.0])
+    # a sine's amplitude over √2, over two whole periods
+    assert data["rms_height"] == pytest.approx(0.02 / np.sqrt(2), rel=1e-6)
+    assert data["warnings"] == []
+
+
+def test_treatments_are_listed(run, heights):
+    options = ("--pixel-size", "0.08", "--level", "plane", "--periodic", "smooth", "--json")
+    history = json.loads(run("info", heights, *options).out)["history"]
+    assert len(history) == 2
+
+
+def test_doubts_about_the_model_are_listed(run, heights):
+    data = json.loads(run("info", heights, "--pixel-size", "0.001", "--json").out)
+    assert any("RMS slope" in line for line in data["warnings"])
+
+
+def test_a_table_is_described_with_its_measured_error(run, table):
+    data = json.loads(run("info", table, "--json").out)
+    assert data["kind"] == "table"
+    assert max(data["measured_error"].values()) <= data["tolerance"]
+    assert data["source"]["name"] == "grating.npy"
+    assert "measured error" in run("info", table).out
+
+
+def test_a_recipe_is_described(run, heights):
+    recipe = heights.with_name("a.toml")
+    recipe.write_text('source = "grating.npy"\npixel_size = 0.08\ntolerance = 1e-4\n')
+    data = json.loads(run("info", recipe, "--json").out)
+    assert data["kind"] == "recipe"
+    assert data["table"] == {"tolerance": 1e-4}
+    assert data["output exists"] is False
+    assert data["patches"][0]["shape"] == [75, 75]
+
+
+@pytest.mark.parametrize("content", [None, b"", b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n", b"ab"])
+def test_files_that_are_nothing_are_one_line(run, tmp_path, content):
+    file = tmp_path / "what.exr"
+    if content is not None:
+        file.write_bytes(content)
+    assert str(file) in run("info", file).failed_in_one_line()
+
+
+def test_a_truncated_table_is_one_line(run, table):
+    table.write_bytes(table.read_bytes()[:-1000])
+    assert f"cannot read '{table}' as EXR" in run("info", table).failed_in_one_line()
+
+
+def test_a_table_of_another_format_version_is_one_line(run, table, monkeypatch):
+    monkeypatch.setattr("mitsuba_diffraction.files.table_exr.FORMAT_VERSION", 99)
+    assert "format version 1" in run("info", table).failed_in_one_line()
+
+
+def test_an_exr_that_is_no_table_is_heights(run, tmp_path):
+    import OpenEXR
+
+    file = tmp_path / "heights.exr"
+    OpenEXR.File({}, {"Y": np.zeros((4, 4), np.float32)}).write(str(file))
+    assert "height field" in run("info", file, "--pixel-size", "1").out
+
+
+def test_options_for_heights_do_not_fit_a_table(run, table):
+    ran = run("info", table, "--pixel-size", "0.08")
+    assert ran.code == 2
+    assert "--pixel-size" in ran.err
+
+
+MESH = """ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+{uv}element face 2
+property list uchar int vertex_indices
+end_header
+0 0 0{a}
+1 0 0{b}
+1 1 0{c}
+0 1 0{d}
+3 0 1 2
+3 0 2 3
+"""
+
+
+@pytest.mark.parametrize("has_uv", [True, False])
+def test_a_mesh_is_judged_by_its_tangents(run, tmp_path, has_uv):
+    file = tmp_path / "quad.ply"
+    uv = "property float u\nproperty float v\n" if has_uv else ""
+    corners = (" 0 0", " 1 0", " 1 1", " 0 1") if has_uv else ("",) * 4
+    file.write_text(MESH.format(uv=uv, **dict(zip("abcd", corners, strict=True))))
+    data = json.loads(run("info", file, "--json").out)
+    assert data["kind"] == "mesh"
+    assert data["triangles"] == 2
+    assert data["usable"] is has_uv
+
+
+@pytest.mark.parametrize("content", [b"", b"ply", b"no mesh at all"])
+def test_a_file_that_is_no_mesh_is_one_line(run, tmp_path, content):
+    file = tmp_path / "a.ply"
+    file.write_bytes(content)
+    assert str(file) in run("info", file).failed_in_one_line()
+
+
+def test_the_albedo_is_plotted(run, table, tmp_path):
+    picture = tmp_path / "albedo.png"
+    ran = run("info", table, "--albedo", picture)
+    assert ran.code == 0
+    assert str(picture) in ran.out
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_only_a_table_has_an_albedo(run, heights, tmp_path):
+    ran = run("info", heights, "--pixel-size", "0.08", "--albedo", tmp_path / "albedo.png")
+    assert ran.code == 2
+    assert "not a table" in ran.err

@@ -1,0 +1,149 @@
+"""The boundary: whatever happens becomes one line and an exit code."""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import sys
+import warnings
+
+import pytest
+
+from mitsuba_diffraction.cli.main import build_parser
+from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
+
+
+@pytest.fixture
+def command(monkeypatch, heights):
+    """Make `info` do something else, and return its arguments."""
+
+    def replace(action):
+        monkeypatch.setattr("mitsuba_diffraction.cli.info._describe", lambda *_: action())
+        return ["info", heights]
+
+    return replace
+
+
+def raising(error):
+    def action():
+        raise error
+
+    return action
+
+
+def test_help_names_every_command(run):
+    ran = run("--help")
+    assert ran.code == 0
+    for name in ("precompute", "info", "render"):
+        assert name in ran.out
+
+
+@pytest.mark.parametrize("name", ["precompute", "info", "render"])
+def test_every_command_has_help(run, name):
+    ran = run(name, "--help")
+    assert ran.code == 0
+    assert "--debug" in ran.out
+
+
+def test_version_is_printed(run):
+    ran = run("--version")
+    assert ran.code == 0
+    assert ran.out.startswith("mitsuba-diffraction ")
+
+
+def test_the_parser_loads_no_command_s_machinery():
+    code = (
+        "import sys, mitsuba_diffraction; before = set(sys.modules)\n"
+        "from mitsuba_diffraction.cli.main import build_parser; build_parser()\n"
+        "assert not {'mitsuba', 'tqdm', 'OpenEXR', 'scipy'} & (set(sys.modules) - before)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [[], ["rendr"], ["info"], ["info", "a", "b"], ["--nonsense"], ["info", "a", "--nonsense"]],
+)
+def test_usage_errors_exit_with_2_and_show_the_usage(run, arguments):
+    ran = run(*arguments)
+    assert ran.code == 2
+    assert ran.err.startswith("usage: mitsuba-diffraction")
+    assert "error:" in ran.err
+
+
+def test_a_library_error_is_one_line(run, command):
+    ran = run(*command(raising(DiffractionError("bad\n  input 'x'"))))
+    assert ran.failed_in_one_line() == "mitsuba-diffraction: error: bad input 'x'"
+
+
+def test_debug_shows_the_traceback(run, command):
+    ran = run(*command(raising(DiffractionError("bad input"))), "--debug")
+    assert ran.code == 1
+    assert "Traceback" in ran.err
+    assert ran.err.splitlines()[-1] == "mitsuba-diffraction: error: bad input"
+
+
+def test_debug_may_stand_before_the_command(run, command):
+    assert "Traceback" in run("--debug", *command(raising(DiffractionError("bad")))).err
+
+
+def test_an_unforeseen_error_says_how_to_see_more(run, command):
+    line = run(*command(raising(ZeroDivisionError("of\nall things")))).failed_in_one_line()
+    assert "unexpected ZeroDivisionError: of all things" in line
+    assert "--debug" in line
+
+
+@pytest.mark.parametrize("error", [MemoryError(), OSError(28, "No space left on device", "f.npy")])
+def test_the_machine_s_limits_are_one_line(run, command, error):
+    line = run(*command(raising(error))).failed_in_one_line()
+    assert "unexpected" not in line
+    assert ("out of memory" in line) or ("No space left on device 'f.npy'" in line)
+
+
+def test_ctrl_c_exits_with_130(run, command):
+    ran = run(*command(raising(KeyboardInterrupt())))
+    assert ran.code == 130
+    assert ran.err.splitlines() == [
+        "mitsuba-diffraction: interrupted; nothing half-written was left behind"
+    ]
+
+
+def test_a_warning_is_one_line_and_said_once(run, command):
+    def action():
+        for _ in range(2):
+            warnings.warn("steep\n  slopes", DiffractionWarning, stacklevel=1)
+        warnings.warn("coarse pixels", DiffractionWarning, stacklevel=1)
+        return {}
+
+    ran = run(*command(action))
+    assert ran.code == 0
+    assert ran.err.splitlines() == [
+        "mitsuba-diffraction: warning: steep slopes",
+        "mitsuba-diffraction: warning: coarse pixels",
+    ]
+
+
+def test_a_closed_pipe_is_no_traceback(heights):
+    words = [sys.executable, "-m", "mitsuba_diffraction", "info", str(heights)]
+    command = shlex.join([*words, "--pixel-size", "0.1", "--json"])
+    ran = subprocess.run(
+        ["bash", "-c", f"{command} | true"], capture_output=True, text=True, timeout=60
+    )
+    assert ran.stderr == ""
+
+
+def test_a_termination_is_an_exit_code(child, heights):
+    prelude = (
+        "import mitsuba_diffraction.cli.info as info\n"
+        "info._describe = lambda *_: os.kill(os.getpid(), signal.SIGTERM)"
+    )
+    assert child(["info", heights], prelude).code == 143
+
+
+@pytest.mark.parametrize("name", ["precompute", "info", "render"])
+def test_general_options_have_defaults_and_may_stand_anywhere(name):
+    parser = build_parser()
+    args = parser.parse_args([name, "a"])
+    assert (args.debug, args.progress) == (False, None)
+    for arguments in (["--no-progress", name, "a"], [name, "a", "--no-progress"]):
+        assert parser.parse_args(arguments).progress is False

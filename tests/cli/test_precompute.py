@@ -1,0 +1,256 @@
+"""`precompute`: heights in, a table out, or one line and nothing left behind."""
+
+from __future__ import annotations
+
+import os
+import shutil
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionTable
+from mitsuba_diffraction.cli import precompute
+from mitsuba_diffraction.cli.progress import Bar
+from mitsuba_diffraction.reference import COHERENCES
+from mitsuba_diffraction.tables.expansion import BASES
+
+# A table of 6 µm heights with these takes a tenth of a second.
+QUICK = ["--pixel-size", "0.08", "--coherence-width", "6"]
+
+
+@pytest.fixture
+def recipe(heights):
+    """A recipe in the folder of the heights; its output folder does not exist yet."""
+    file = heights.parent / "grating.toml"
+    file.write_text(
+        'source = "grating.npy"\npixel_size = 0.08\ncoherence_width = 6\n'
+        'tolerance = 1e-3\noutput = "tables/grating.exr"\n'
+    )
+    return file
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty folder that is the current one."""
+    folder = tmp_path / "here"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def test_choices_are_the_library_s():
+    assert set(precompute.COHERENCES) == set(COHERENCES)
+    assert set(precompute.BASES) == {"auto", *BASES}
+
+
+def test_options_reach_the_table(run, heights, here):
+    ran = run(
+        "precompute", heights, "-o", "out.exr", *QUICK, "--tolerance", "1e-4",
+        "--wavelength-range", "400", "700", "--coherence", "patch", "--height-scale-max", "2",
+    )  # fmt: skip
+    assert ran.code == 0
+    table = DiffractionTable.load("out.exr")
+    assert table.coherence_width == 6
+    assert table.tolerance == 1e-4
+    assert table.wavelength_range == (400, 700)
+    assert table.coherence == "patch"
+    assert table.height_scale_max == 2
+
+
+def test_the_report_says_size_terms_taps_error_and_cost(run, heights, here):
+    ran = run("precompute", heights, *QUICK)
+    assert ran.code == 0
+    for part in ("75 x 75 pixels", "orders", "terms", "taps", "near order 0", "tolerance 0.001",
+                 " s, ", "GB of memory"):  # fmt: skip
+        assert part in ran.out
+
+
+def test_the_table_goes_to_the_current_folder(run, heights, here):
+    assert run("precompute", heights, *QUICK).code == 0
+    assert os.listdir(here) == ["grating.exr"]
+
+
+def test_a_recipe_says_where_its_table_goes(run, recipe, here):
+    assert run("precompute", recipe).code == 0
+    assert os.listdir(here) == []
+    table = DiffractionTable.load(recipe.parent / "tables" / "grating.exr")
+    assert table.coherence_width == 6
+
+
+def test_options_override_a_recipe(run, recipe, here):
+    assert run("precompute", recipe, "--coherence-width", "5", "-o", "a.exr").code == 0
+    assert DiffractionTable.load("a.exr").coherence_width == 5
+
+
+def test_several_recipes_make_several_tables(run, recipe, here):
+    other = recipe.with_name("other.toml")
+    other.write_text(recipe.read_text().replace("tables/grating", "tables/other"))
+    assert run("precompute", recipe, other).code == 0
+    assert sorted(os.listdir(recipe.parent / "tables")) == ["grating.exr", "other.exr"]
+
+
+def test_a_warning_of_the_heights_is_said_once(run, heights, here):
+    ran = run("precompute", heights, "--pixel-size", "0.2", "--coherence-width", "12")
+    assert ran.code == 0
+    (line,) = [line for line in ran.err.splitlines() if "coarser than a quarter" in line]
+    assert line.startswith("mitsuba-diffraction: warning: ")
+
+
+def test_progress_is_shown_where_asked_for(run, heights, here, monkeypatch):
+    monkeypatch.setattr(Bar.__init__, "__defaults__", (" steps", 0))
+    assert "transforming" in run("precompute", heights, *QUICK, "--progress").err
+    assert run("precompute", heights, *QUICK).err == ""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--coherence", "nonsense"],
+        ["--basis", "fourier"],
+        ["--terms", "0"],
+        ["--terms", "many"],
+        ["--tolerance", "small"],
+        ["--wavelength-range", "400"],
+        ["-o", "table.png"],
+        ["--levels", "plane"],
+    ],
+)
+def test_unusable_options_are_usage_errors(run, heights, here, arguments):
+    ran = run("precompute", heights, *QUICK, *arguments)
+    assert ran.code == 2
+    assert arguments[-1] in ran.err or "2 arguments" in ran.err
+    assert os.listdir(here) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--pixel-size", "0"], "'0'"),
+        (["--pixel-size=-0.1"], "'-0.1'"),
+        (["--pixel-size", "nan"], "'nan'"),
+        (["--max-height", "0.3"], "contradicts"),
+        (["--level", "tilt"], "'tilt'"),
+        (["--tolerance=-1"], "tolerance"),
+        (["--tolerance", "nan"], "tolerance"),
+        (["--coherence-width", "0"], "coherence_width"),
+        (["--coherence-width", "inf"], "coherence_width"),
+        (["--wavelength-range", "700", "400"], "wavelength"),
+        (["--basis", "taylor", "--tolerance", "1e-12"], "tolerance"),
+        (["--channel", "Height"], "channel"),
+    ],
+)
+def test_values_that_do_not_fit_are_one_line(run, heights, here, arguments, said):
+    ran = run("precompute", heights, *QUICK, *arguments)
+    assert said in ran.failed_in_one_line()
+    assert os.listdir(here) == []
+
+
+def test_an_image_without_its_lengths_is_one_line(run, here):
+    from PIL import Image
+
+    Image.fromarray(np.arange(256, dtype=np.uint8).reshape(16, 16)).save("a.png")
+    line = run("precompute", "a.png", "--pixel-size", "0.1").failed_in_one_line()
+    assert "--max-height" in line
+    line = run("precompute", "a.png", "--max-height", "0.1").failed_in_one_line()
+    assert "--pixel-size" in line
+
+
+@pytest.mark.parametrize("content", [None, b"", b"\x93NUMPY\x01\x00", b"no heights at all"])
+def test_files_that_hold_no_heights_are_one_line(run, here, content):
+    if content is not None:
+        (here / "a.npy").write_bytes(content)
+    line = run("precompute", "a.npy", *QUICK, "-o", "b.exr").failed_in_one_line()
+    assert "'a.npy'" in line
+    assert "b.exr" not in os.listdir(here)
+
+
+def test_a_folder_is_no_source(run, here):
+    assert "is a folder" in run("precompute", here).failed_in_one_line()
+
+
+def test_the_source_is_never_overwritten(run, heights, here):
+    import OpenEXR
+
+    field = {"Y": np.load(heights).astype(np.float32)}
+    OpenEXR.File({}, field).write("heights.exr")
+    before = (here / "heights.exr").read_bytes()
+    line = run("precompute", "heights.exr", *QUICK).failed_in_one_line()
+    assert "overwrite its own source" in line
+    assert (here / "heights.exr").read_bytes() == before
+
+
+@pytest.mark.parametrize("output", ["nowhere/table.exr", "/proc/table.exr", "folder.exr"])
+def test_an_output_that_cannot_be_written_is_refused_before_the_work(
+    run, heights, here, output, monkeypatch
+):
+    (here / "folder.exr").mkdir()
+    monkeypatch.setattr(DiffractionTable, "build", lambda *_, **__: pytest.fail("built"))
+    assert (
+        f"cannot write '{output}'"
+        in run("precompute", heights, *QUICK, "-o", output).failed_in_one_line()
+    )
+
+
+def test_one_output_for_several_recipes_is_a_usage_error(run, recipe, here):
+    assert run("precompute", recipe, recipe, "-o", "a.exr").code == 2
+
+
+def test_recipes_and_files_do_not_mix(run, recipe, heights, here):
+    ran = run("precompute", recipe, heights)
+    assert ran.code == 2
+    assert "cannot be mixed" in ran.err
+
+
+def test_several_files_make_one_table_of_their_mean_power(run, heights, here):
+    other = heights.with_name("other.npy")
+    np.save(other, 0.5 * np.load(heights))
+    ran = run("precompute", heights, other, *QUICK, "-o", "mean.exr")
+    assert ran.code == 0
+    assert "between patches" in ran.out
+    patches = DiffractionTable.load("mean.exr").source["patches"]
+    assert [patch["name"] for patch in patches] == ["grating.npy", "other.npy"]
+
+
+def test_several_files_need_the_name_of_their_table(run, heights, here):
+    ran = run("precompute", heights, heights, *QUICK)
+    assert ran.code == 2
+    assert "--output" in ran.err
+
+
+def test_a_full_disk_is_one_line_and_leaves_nothing(child, heights, tmp_path):
+    ran = child(["precompute", heights, *QUICK, "-o", "out.exr"], limit=500)
+    assert "cannot write 'out.exr'" in ran.failed_in_one_line()
+    assert os.listdir(tmp_path) == ["in"]
+
+
+@pytest.mark.parametrize("before", [False, True])
+@pytest.mark.parametrize(
+    "interrupted",
+    [
+        "import mitsuba_diffraction.cli.progress as p\n"
+        "p.Bar.__call__ = lambda *_: os.kill(os.getpid(), signal.SIGINT)",
+        "import OpenEXR\n"
+        "def write(self, path):\n"
+        "    open(path, 'wb').write(b'half of it')\n"
+        "    os.kill(os.getpid(), signal.SIGINT)\n"
+        "OpenEXR.File = type('File', (), {'__init__': lambda *_: None, 'write': write})",
+    ],
+    ids=["building", "writing"],
+)
+def test_ctrl_c_leaves_the_folder_as_it_was(child, heights, tmp_path, interrupted, before):
+    if before:
+        (tmp_path / "out.exr").write_bytes(b"an older table")
+    ran = child(["precompute", heights, *QUICK, "-o", "out.exr"], interrupted)
+    assert ran.code == 130
+    assert ran.err == "mitsuba-diffraction: interrupted; nothing half-written was left behind\n"
+    assert sorted(os.listdir(tmp_path)) == ["in", *(["out.exr"] if before else [])]
+    if before:
+        assert (tmp_path / "out.exr").read_bytes() == b"an older table"
+
+
+def test_an_instrument_file_needs_no_option(run, shared_afm, here):
+    shutil.copy(shared_afm / "nanoscope-10um.di", here)
+    ran = run("precompute", "nanoscope-10um.di")
+    assert ran.code == 0
+    assert "channel 'ZSensor'" in ran.out
+    assert os.path.exists("nanoscope-10um.exr")

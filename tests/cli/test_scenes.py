@@ -1,0 +1,58 @@
+"""What `render` finds out about a scene after loading it."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionWarning
+from mitsuba_diffraction.cli.scenes import load_scene
+
+BSDF = (
+    '<bsdf type="diffraction"><string name="heightfield" value="grating.npy"/>'
+    '<float name="pixel_size" value="0.08"/><float name="coherence_width" value="4"/>'
+    '<boolean name="energy_conserving" value="false"/></bsdf>'
+)
+TWOSIDED = f'<bsdf type="twosided">{BSDF}</bsdf>'
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+
+
+@pytest.fixture
+def scene_of(tmp_path, monkeypatch):
+    monkeypatch.setenv("MITSUBA_DIFFRACTION_CACHE", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    np.save("grating.npy", np.tile(0.01 * np.sin(np.pi * np.arange(60) / 30), (60, 1)))
+
+    def write(mesh: str, bsdf: str):
+        (tmp_path / "mesh.obj").write_text(mesh)
+        file = tmp_path / "scene.xml"
+        file.write_text(
+            '<scene version="3.0.0"><shape type="obj" id="hide">'
+            f'<string name="filename" value="mesh.obj"/>{bsdf}</shape></scene>'
+        )
+        return file
+
+    return write
+
+
+@pytest.mark.usefixtures("variant")
+@pytest.mark.parametrize("bsdf", [BSDF, TWOSIDED])
+def test_a_mesh_without_texture_coordinates_is_named(scene_of, bsdf):
+    with pytest.warns(DiffractionWarning, match="no texture coordinates on hide"):
+        load_scene(scene_of(TRIANGLE + "f 1 2 3\n", bsdf), {})
+
+
+@pytest.mark.usefixtures("variant")
+@pytest.mark.parametrize(
+    ("mesh", "bsdf"),
+    [
+        (TRIANGLE + "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n", BSDF),
+        (TRIANGLE + "f 1 2 3\n", '<bsdf type="diffuse"/>'),
+    ],
+)
+def test_no_other_mesh_is(scene_of, mesh, bsdf):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", DiffractionWarning)
+        load_scene(scene_of(mesh, bsdf), {})

@@ -1,0 +1,80 @@
+"""Fixtures that every test may use."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import mitsuba_diffraction  # noqa: F401 - first of all: it chooses the LLVM that Dr.Jit loads
+from mitsuba_diffraction.files.cache import VARIABLE
+
+ROOT = Path(__file__).resolve().parent.parent
+
+#: The variants that the plugin supports; the second needs a GPU.
+VARIANTS = ("llvm_ad_spectral", "cuda_ad_spectral")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The cache of tables, for this session alone: tests never touch the user's."""
+    folder = tmp_path_factory.mktemp("cache")
+    before = os.environ.get(VARIABLE)
+    os.environ[VARIABLE] = str(folder)
+    yield folder
+    if before is None:
+        del os.environ[VARIABLE]
+    else:
+        os.environ[VARIABLE] = before
+
+
+@pytest.fixture(scope="session")
+def shared_afm() -> Path:
+    """Folder of measured patches kept outside the project; tests that need it skip without it."""
+    folder = ROOT.parent / "shared" / "afm"
+    if not folder.is_dir():
+        pytest.skip(f"measured patches are not here: {folder}")
+    return folder
+
+
+def obstacle(variant: str) -> str | None:
+    """Why a variant does not run on this machine, or None if it does."""
+    import drjit as dr
+    import mitsuba as mi
+
+    if variant not in mi.variants():
+        return f"this Mitsuba has no variant {variant}"
+    backend = dr.JitBackend.CUDA if variant.startswith("cuda") else dr.JitBackend.LLVM
+    return None if dr.has_backend(backend) else f"{variant}: Dr.Jit finds no device for it"
+
+
+@pytest.fixture(scope="session", params=VARIANTS)
+def working_variant(request: pytest.FixtureRequest) -> str:
+    """Name of a variant of the plugin that runs on this machine."""
+    name: str = request.param
+    if reason := obstacle(name):
+        pytest.skip(reason)
+    return name
+
+
+@pytest.fixture
+def variant(working_variant: str) -> str:
+    """Every working variant in turn, set: another test may have set another."""
+    import mitsuba as mi
+
+    mi.set_variant(working_variant)
+    return working_variant
+
+
+@pytest.fixture
+def some_variant() -> str:
+    """The first working variant, set: for what does not depend on which it is."""
+    import mitsuba as mi
+
+    name = next((name for name in VARIANTS if obstacle(name) is None), None)
+    if name is None:
+        pytest.skip(f"none of {', '.join(VARIANTS)} runs on this machine")
+    mi.set_variant(name)
+    return name

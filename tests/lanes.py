@@ -1,0 +1,60 @@
+"""Between NumPy arrays and the lanes of a Mitsuba variant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike, NDArray
+
+
+def vectors(directions: ArrayLike) -> Any:
+    """mi.Vector3f of directions (n, 3)."""
+    columns = np.atleast_2d(np.asarray(directions, np.float32)).T
+    return mi.Vector3f(*(mi.Float(np.ascontiguousarray(c)) for c in columns))
+
+
+def interaction(wi: ArrayLike, wavelengths: ArrayLike) -> Any:
+    """Surface interactions in a frame of their own, for wi (n, 3) and nm: (n, 4), (n,) or one."""
+    directions = np.atleast_2d(np.asarray(wi, np.float32))
+    n = len(directions)
+    si = dr.zeros(mi.SurfaceInteraction3f, n)
+    si.wi = vectors(directions)
+    lam = np.asarray(wavelengths, np.float32)
+    lam = np.broadcast_to(lam if lam.ndim == 2 else lam.reshape(-1, 1), (n, 4))
+    si.wavelengths = mi.Spectrum(*(mi.Float(np.ascontiguousarray(c)) for c in lam.T))
+    si.sh_frame = mi.Frame3f(mi.Normal3f(0, 0, 1))
+    return si
+
+
+def spectra(value: Any) -> NDArray[np.float64]:
+    """Values (n, 4) of a mi.Spectrum."""
+    return np.array(value, np.float64).T
+
+
+def evaluated(bsdf: Any, wi: ArrayLike, wo: ArrayLike, wavelengths: ArrayLike) -> NDArray[Any]:
+    """bsdf.eval, f·cosθo, shape (n, 4)."""
+    outgoing = np.atleast_2d(np.asarray(wo, np.float32))
+    incident = np.broadcast_to(np.asarray(wi, np.float32), outgoing.shape)
+    si = interaction(incident, wavelengths)
+    return spectra(bsdf.eval(mi.BSDFContext(), si, vectors(outgoing)))
+
+
+def brdf_values(bsdf: Any, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike) -> NDArray[Any]:
+    """f of one wavelength a pair, (n,): taken from the four in turn, so that all are looked at."""
+    values = evaluated(bsdf, wi, wo, wavelength)
+    n = np.arange(len(values))
+    return values[n, n % 4] / np.asarray(wo, float)[:, 2]
+
+
+def refusal(load: Callable[[], object]) -> str:
+    """What a plugin that cannot be loaded says: one line, ours, after Mitsuba's own."""
+    with pytest.raises(RuntimeError) as caught:
+        load()
+    *_, last = str(caught.value).splitlines()
+    assert last.startswith("DiffractionError: "), last
+    return last.removeprefix("DiffractionError: ")

@@ -1,0 +1,174 @@
+"""Energy conservation: white furnaces, reciprocity, and what stays raw."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md  # before Mitsuba: it chooses Dr.Jit's LLVM
+from tests.optics import polar
+
+import mitsuba as mi  # isort: skip
+import drjit as dr  # isort: skip
+
+# the surfaces are steep on purpose
+pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+
+ANGLES = (0.0, 20.0, 40.0, 55.0, 65.0, 75.0, 80.0, 84.0, 87.0, 89.0)
+AZIMUTHS = (0.0, 37.0, 90.0, 180.0)
+SAMPLES = 1 << 13
+
+
+@pytest.fixture(autouse=True)
+def _variant(variant, tmp_path_factory, monkeypatch):
+    # its own cache, shared by the tests of this run only
+    monkeypatch.setenv("MITSUBA_DIFFRACTION_CACHE", str(tmp_path_factory.getbasetemp() / "cache"))
+
+
+def sinusoid() -> md.HeightField:
+    """1.6 µm period, 0.3 µm deep: orders up to ±4, strong Rayleigh spikes."""
+    x = np.arange(64) * (1.6 / 64)
+    return md.HeightField(np.tile(0.15 * np.cos(2 * np.pi * x / 1.6), (8, 1)), (0.025, 0.05))
+
+
+def sawtooth() -> md.HeightField:
+    """2.5 µm period, 0.25 µm deep."""
+    return md.HeightField(np.tile(np.arange(100) * 0.0025, (8, 1)), (0.025, 0.05))
+
+
+def rough() -> md.HeightField:
+    """20 µm of isotropic noise, 60 nm rms, correlated over about 1.5 µm."""
+    rng = np.random.default_rng(4)
+    frequency = np.hypot(*np.meshgrid(np.fft.fftfreq(160, 0.125), np.fft.fftfreq(160, 0.125)))
+    spectrum = np.fft.fft2(rng.standard_normal((160, 160))) * np.exp(-((frequency / 0.3) ** 2))
+    heights = np.fft.ifft2(spectrum).real
+    return md.HeightField(0.06 * heights / heights.std(), 0.125)
+
+
+SURFACES = {
+    "sinusoid": (sinusoid, {}),
+    "sawtooth": (sawtooth, {}),
+    "rough": (rough, {"coherence_width": 20.0}),
+}
+
+
+def bsdf(name: str, **parameters):
+    field, own = SURFACES[name]
+    return mi.load_dict(md.bsdf_dict(field(), **own, **{"material": "none", **parameters}))
+
+
+def furnace(surface, angles=ANGLES, azimuths=AZIMUTHS) -> tuple[np.ndarray, np.ndarray]:
+    """Albedo (4, directions) at four wavelengths for each direction, and its standard error."""
+    directions = np.array([polar(theta, phi) for theta in angles for phi in azimuths])
+    count = len(directions)
+    si = dr.zeros(mi.SurfaceInteraction3f, count * SAMPLES)
+    si.wi = mi.Vector3f(np.repeat(directions, SAMPLES, axis=0).astype(np.float32).T)
+    wavelengths = np.random.default_rng(0).uniform(360.0, 830.0, (4, count))
+    si.wavelengths = mi.Spectrum(np.repeat(wavelengths, SAMPLES, axis=1).astype(np.float32))
+    rng = mi.PCG32(count * SAMPLES)
+    sample1, sample2 = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+    weights = np.array(surface.sample(mi.BSDFContext(), si, sample1, sample2)[1])
+    weights = weights.reshape(4, count, SAMPLES)
+    return weights.mean(axis=2), weights.std(axis=2) / np.sqrt(SAMPLES)
+
+
+def assert_at_most_white(surface) -> None:
+    mean, error = furnace(surface)
+    # four standard errors, for 160 trials a surface; 1e-3 for the table's own tolerance
+    excess = mean - (1.0 + 4.0 * error + 1e-3)
+    assert np.all(excess <= 0.0), f"albedo up to {mean.max()}, {excess.max()} too much"
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_white_furnace_of_the_diffraction_alone(name):
+    assert_at_most_white(bsdf(name))
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_white_furnace_over_a_white_base(name):
+    white = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 1.0}}
+    field, own = SURFACES[name]
+    assert_at_most_white(mi.load_dict(md.bsdf_dict(field(), **own, beneath=white)))
+
+
+def test_the_raw_model_gains_energy():
+    # the sinusoid at 75°, λ such that an order leaves at the horizon: well above white
+    surface = bsdf("sinusoid", energy_conserving=False)
+    assert furnace(surface, [75.0] * 8, [0.0])[0].max() > 1.2
+
+
+def test_white_furnace_of_the_measured_patch(shared_afm):
+    patch = md.HeightField.load(
+        shared_afm / "elaphe-65um.png", pixel_size=65 / 1332, max_height=0.375
+    )
+    assert_at_most_white(mi.load_dict(md.bsdf_dict(patch, material="none")))
+
+
+@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize("shadowing", ["none", "vcavity"])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_reciprocity(name, shadowing, seed):
+    surface = bsdf(name, shadowing=shadowing, orientation=20.0)
+    n = 4096
+    rng = np.random.default_rng(seed)
+    z, azimuth = rng.uniform(0.01, 1.0, (2, n)), rng.uniform(0.0, 2.0 * np.pi, (2, n))
+    sine = np.sqrt(1.0 - z**2)
+    wi, wo = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), z], axis=1)
+    si = dr.zeros(mi.SurfaceInteraction3f, n)
+    si.wavelengths = mi.Spectrum(400.0, 500.0, 600.0, 700.0)
+    values = []
+    for one, other in ((wi, wo), (wo, wi)):
+        si.wi = mi.Vector3f(one.astype(np.float32))
+        value = surface.eval(mi.BSDFContext(), si, mi.Vector3f(other.astype(np.float32)))
+        values.append(np.array(value) / other[2])
+    # single precision; differences of up to 1e-4 of the largest come from cancelling in ωi + ωo
+    assert values[0] == pytest.approx(values[1], rel=1e-3, abs=1e-4 * values[0].max())
+
+
+def test_only_the_values_change_not_the_samples():
+    conserving, raw = bsdf("sinusoid"), bsdf("sinusoid", energy_conserving=False)
+    si = dr.zeros(mi.SurfaceInteraction3f, 1000)
+    si.wi = mi.Vector3f(polar(60.0, 10.0))
+    si.wavelengths = mi.Spectrum(400.0, 500.0, 600.0, 700.0)
+    rng = mi.PCG32(1000)
+    numbers = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+    context = mi.BSDFContext()
+    one, other = (b.sample(context, si, *numbers)[0] for b in (conserving, raw))
+    assert np.array_equal(np.array(one.wo), np.array(other.wo))
+    assert np.array_equal(np.array(one.pdf), np.array(other.pdf))
+    assert np.all(
+        np.array(conserving.eval(context, si, one.wo)) <= np.array(raw.eval(context, si, one.wo))
+    )
+
+
+def test_the_bound_follows_height_scale():
+    surface = bsdf("sinusoid")
+    parameters = mi.traverse(surface)
+    parameters["height_scale"] = 1.3
+    parameters.update()
+    assert_at_most_white(surface)
+
+
+def test_kernels_twin_agrees_with_numpy():
+    from mitsuba_diffraction.files.bound_cache import cached_bound
+    from mitsuba_diffraction.plugin.energy import EnergyBound
+
+    table = bsdf("sinusoid").table
+    bound = EnergyBound(table)
+    bound.update(1.0)
+    rng = np.random.default_rng(0)
+    z, azimuth = rng.uniform(0.002, 1.0, 2000), rng.uniform(-np.pi, np.pi, 2000)
+    sine = np.sqrt(1.0 - z**2)
+    directions = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), z], axis=1)
+    x, y, cosine = (mi.Float(c.astype(np.float32)) for c in directions.T)
+    ours = bound.divisor(mi.Vector2f(x, y), cosine, mi.Vector2f(0.0, 0.0), mi.Float(1.0))
+    theirs = cached_bound(table, 1.0)
+    at_normal = theirs([[0.0, 0.0, 1.0]])[0]
+    expected = np.maximum(np.maximum(theirs(directions), at_normal), 1.0)
+    # single precision in acos, amplified where the bound is steep
+    assert np.array(ours) == pytest.approx(expected, rel=2e-3)
+
+
+def test_only_booleans_are_accepted():
+    with pytest.raises((md.DiffractionError, RuntimeError), match="energy_conserving"):
+        bsdf("sinusoid", energy_conserving="yes")

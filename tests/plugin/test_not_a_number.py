@@ -1,0 +1,58 @@
+"""Directions that are no numbers, as degenerate triangles make them: NaN, never a wild read."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+# In a child: a read outside the table may end the process, where memory happens to end.
+PROGRAM = """
+import numpy as np, drjit as dr, warnings
+warnings.simplefilter("ignore")
+import mitsuba_diffraction as md, mitsuba as mi
+mi.set_variant("llvm_ad_spectral")
+heights = np.random.default_rng(0).uniform(0.0, 0.2, (300, 300))
+field = md.HeightField(heights, 0.08)
+bsdf = mi.load_dict(md.bsdf_dict(field, material="none", coherence_width=24.0))
+wrong = mi.Float(np.full(1000, float("VALUE"), np.float32))
+right = dr.opaque(mi.Float, 0.5, 1000)
+si = dr.zeros(mi.SurfaceInteraction3f, 1000)
+si.wavelengths = mi.Spectrum(550.0)
+for n in range(3):
+    for side in ("wi", "wo"):
+        directions = {}
+        for name in ("wi", "wo"):
+            parts = [right, right, dr.sqrt(right)]
+            if name == side:
+                parts[n] = wrong
+            directions[name] = mi.Vector3f(*parts)
+        si.wi = directions["wi"]
+        value, density = bsdf.eval_pdf(mi.BSDFContext(), si, directions["wo"])
+        drawn, weight = bsdf.sample(mi.BSDFContext(), si, right, mi.Point2f(right, right))
+        dr.eval(value, density, drawn, weight)
+dr.sync_thread()
+print("alive")
+"""
+
+
+@pytest.mark.usefixtures("variant")
+def test_an_index_is_always_in_its_range():
+    from mitsuba_diffraction.plugin.lookup import index_between
+
+    values = mi.Float([np.nan, np.inf, -np.inf, 2.0, -1.0, 1e30])
+    dr.make_opaque(values)
+    np.testing.assert_array_equal(index_between(values, 0.0, 3.0), [0, 3, 0, 2, 0, 3])
+
+
+@pytest.mark.parametrize("value", ["nan", "1e30"])
+def test_directions_that_are_no_numbers_do_not_end_the_process(value):
+    program = PROGRAM.replace("VALUE", value)
+    ran = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120
+    )
+    assert (ran.returncode, ran.stdout.strip()) == (0, "alive"), ran.stderr

@@ -1,0 +1,253 @@
+"""The plugin's parameters: what they default to, and that every misfit is one clear line."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction.plugin.parameters import TABLE_PARAMETERS
+from tests.lanes import evaluated, refusal
+from tests.optics import polar, rough_patch
+
+#: 2.56 × 2.4 µm and gentle, so that nothing warns of it.
+PATCH = rough_patch((30, 32), (0.08, 0.08), 0.03)
+SMALL = {"coherence_width": 2.4}
+
+
+def load(field=PATCH, **parameters):
+    """The plugin with these parameters."""
+    return mi.load_dict(md.bsdf_dict(field, **(SMALL | parameters)))
+
+
+@pytest.fixture
+def png(tmp_path):
+    """An 8-bit image of heights, which knows neither its pixel size nor its height."""
+    from PIL import Image
+
+    levels = np.round(PATCH.heights / PATCH.range * 255).astype(np.uint8)
+    Image.fromarray(levels[::-1]).save(tmp_path / "patch.png")  # the top row is the largest y
+    return tmp_path / "patch.png"
+
+
+@pytest.fixture
+def table_file(tmp_path):
+    """A table on disk."""
+    file = tmp_path / "table.exr"
+    md.DiffractionTable.build(PATCH, **SMALL).save(file)
+    return file
+
+
+def loads(**parameters):
+    """The plugin from exactly these."""
+    return lambda: mi.load_dict({"type": "diffraction", **parameters})
+
+
+# ------------------------------------------------------------------------ sources of heights
+
+
+def test_an_image_an_array_a_recipe_and_a_table_are_one_surface(some_variant, png, table_file):
+    lengths = {"pixel_size": 0.08, "max_height": PATCH.range}
+    np.save(png.parent / "patch.npy", PATCH.heights)
+    recipe = png.parent / "patch.toml"
+    recipe.write_text(
+        'source = "patch.npy"\npixel_size = 0.08\ncoherence_width = 2.4\noutput = "patch.exr"\n'
+    )
+    surfaces = {
+        "image": loads(heightfield=str(png), **lengths, **SMALL)(),
+        "strings": loads(
+            heightfield=str(png), pixel_size="0.08", max_height=repr(PATCH.range), **SMALL
+        )(),
+        "npy": loads(heightfield=str(png.parent / "patch.npy"), pixel_size="0.08", **SMALL)(),
+        "recipe": loads(heightfield=str(recipe))(),
+        "recipe, auto": loads(heightfield=str(recipe), pixel_size="auto", max_height="auto")(),
+        "table": loads(table=str(table_file))(),
+        "table as heightfield": loads(heightfield=str(table_file), pixel_size="auto")(),
+        "data": load(),
+    }
+    wo = [polar(25, phi) for phi in range(0, 360, 30)]
+    values = {name: evaluated(bsdf, polar(10), wo, 500.0) for name, bsdf in surfaces.items()}
+    for name, value in values.items():
+        # 8 bits of 0.03 µm are steps of 1e-4 µm, 0.03 rad of phase: some per cent of dim orders
+        tolerance = 0.1 if name in ("image", "strings") else 1e-5
+        assert value == pytest.approx(values["data"], rel=tolerance, abs=0.01 * value.max()), name
+
+
+def test_files_are_found_by_mitsuba_s_resolver(some_variant, table_file):
+    mi.file_resolver().append(str(table_file.parent))
+    try:
+        assert "Diffraction[" in str(loads(table="table.exr")())
+    finally:
+        resolver = mi.file_resolver()
+        kept = [p for p in (str(x) for x in resolver) if p != str(table_file.parent)]
+        resolver.clear()
+        for path in kept:
+            resolver.append(path)
+
+
+def test_single_precision_heights_of_a_tensor_are_precise_enough(some_variant):
+    # 3 µm with float32's rounding of 1e-7 of it: 6e-6 rad
+    lifted = md.HeightField(PATCH.heights + 3.0, PATCH.pixel_size)
+    wo = [polar(25, phi) for phi in range(0, 360, 30)]
+    before, after = (evaluated(load(f), polar(10), wo, 500.0) for f in (PATCH, lifted))
+    assert after == pytest.approx(before, rel=1e-3, abs=1e-4 * before.max())
+
+
+@pytest.mark.parametrize("kind", ["(ny, nx)", "(ny, nx, 1)"])
+def test_tensors_may_have_a_channel(some_variant, kind):
+    data = PATCH.heights if kind == "(ny, nx)" else PATCH.heights[..., None]
+    bsdf = loads(data=mi.TensorXf(data.astype(np.float32)), pixel_size=0.08, **SMALL)()
+    assert bsdf.table.source["shape"] == [30, 32]
+
+
+# ------------------------------------------------------------------------ warnings
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_each_cause_for_concern_is_one_warning(some_variant, times):
+    coarse = md.HeightField(PATCH.heights, 0.15, name="coarse")  # pixels above λ/4, and 4.5 µm
+    for _ in range(times):  # from the cache too
+        with pytest.warns(md.DiffractionWarning) as caught:
+            load(coarse, coherence_width=10.0)
+        lines = [str(w.message) for w in caught]
+        assert len(lines) == 2
+        assert sum("smaller than the coherence width of 10 µm" in line for line in lines) == 1
+        assert all("\n" not in line for line in lines)
+
+
+# ------------------------------------------------------------------------ refusals
+
+
+REFUSED = [
+    ({"foo": 1.0}, "unknown parameter 'foo'; Allowed: heightfield, table, data, pixel_size"),
+    ({"coherence_widht": 60.0}, "unknown parameter 'coherence_widht'; did you mean coherence_wi"),
+    ({"coherence": "full"}, "coherence='full' is unknown; choose one of ensemble, patch"),
+    ({"basis": "fourier"}, "basis='fourier' is unknown; choose one of taylor, chebyshev, auto"),
+    ({"coherence_width": 0.0}, "coherence_width=0.0 must be a positive number of µm"),
+    ({"coherence_width": -3.0}, "coherence_width=-3.0 must be a positive number of µm"),
+    ({"coherence_width": "wide"}, "coherence_width='wide' must be a number"),
+    ({"tolerance": 0.0}, "tolerance=0.0 must lie between 1e-6"),
+    ({"tolerance": 2.0}, "tolerance=2.0 must lie between 1e-6"),
+    ({"tolerance": "fine"}, "tolerance='fine' must be a number"),
+    ({"terms": 0}, "terms=0 must be a whole number from 1 to 400"),
+    ({"terms": 8.5}, "terms=8.5 must be a whole number"),
+    ({"terms": "eight"}, "terms='eight' must be a whole number"),
+    ({"basis": "taylor", "terms": 3}, "terms=3 of basis='taylor' leave an error of"),
+    ({"height_scale": 0.0}, "height_scale=0 must be above 0 and at most 1000"),
+    ({"height_scale": -1.0}, "height_scale=-1 must be above 0"),
+    ({"height_scale": float("nan")}, "height_scale=nan must be a finite number"),
+    ({"height_scale": float("inf")}, "height_scale=inf must be a finite number"),
+    ({"orientation": float("nan")}, "orientation=nan must be a finite number"),
+    ({"orientation": "left"}, "orientation='left' must be a number"),
+    ({"energy_conserving": "maybe"}, "energy_conserving='maybe' must be true or false"),
+    ({"int_ior": 0.5}, "int_ior=0.5 must be a refractive index of at least 1, or a name"),
+    ({"int_ior": float("nan")}, "int_ior=nan must be a refractive index of at least 1"),
+    ({"int_ior": "custard"}, "int_ior='custard'"),
+    ({"material": "Unobtainium"}, "material='Unobtainium'"),
+    ({"material": "Al", "int_ior": 1.5}, "material makes a conductor and int_ior a dielectric"),
+    ({"material": "Al", "eta": 1.0, "k": 2.0}, "material and eta, k both say what the conductor"),
+    ({"eta": 1.0}, "eta alone is no conductor; give both eta and k"),
+    ({"k": 1.0}, "k alone is no conductor; give both eta and k"),
+    ({"max_height": 0.3}, "max_height is for images; the heights in data are in µm already"),
+    ({"pixel_size": 0.0}, "pixel_size: expected one length or a pair (dx, dy) in µm"),
+    ({"pixel_size": "0.1, -0.1"}, "pixel_size: expected one length or a pair"),
+    ({"pixel_size": float("nan")}, "pixel_size: expected one length or a pair"),
+    ({"heightfield": "a.png"}, "give exactly one of heightfield, table, data; got heightfield an"),
+    ({"table": "a.exr"}, "give exactly one of heightfield, table, data; got table and data"),
+]
+
+
+@pytest.mark.parametrize(("parameters", "message"), REFUSED, ids=[str(p) for p, _ in REFUSED])
+def test_parameters_that_do_not_fit_are_one_clear_line(some_variant, parameters, message):
+    assert message in refusal(lambda: load(**parameters))
+
+
+def test_a_source_is_needed(some_variant):
+    text = refusal(loads())
+    assert text == "give exactly one of heightfield, table, data; got none"
+    assert "data needs pixel_size" in refusal(loads(data=mi.TensorXf(np.zeros((4, 4), "f4"))))
+    assert "heightfield=1.0 must be the name of a file" in refusal(loads(heightfield=1.0))
+
+
+@pytest.mark.parametrize(
+    ("heights", "message"),
+    [
+        (np.zeros(4), "data: heights"),
+        (np.zeros((4, 4, 3)), "data: heights"),
+        (np.zeros((1, 1)), "data: 1 x 1 pixels are no patch of surface; at least 2 x 2"),
+        (np.full((4, 4), np.nan), "data: no height is a finite number; the patch is empty"),
+    ],
+    ids=["a line", "three channels", "one pixel", "all NaN"],
+)
+def test_tensors_that_are_no_height_field(some_variant, heights, message):
+    data = mi.TensorXf(heights.astype(np.float32))
+    assert message in refusal(loads(data=data, pixel_size=0.1))
+
+
+def test_files_that_are_not_there_or_not_heights(some_variant, tmp_path):
+    for name in ("no.png", "no.exr", "no.npy", "no.toml"):
+        text = refusal(loads(heightfield=str(tmp_path / name), pixel_size=0.1))
+        assert str(tmp_path / name) in text
+    (tmp_path / "empty.png").write_bytes(b"")
+    assert "empty.png" in refusal(loads(heightfield=str(tmp_path / "empty.png"), pixel_size=0.1))
+    assert str(tmp_path) in refusal(loads(heightfield=str(tmp_path)))
+    assert "no such file" in refusal(loads(table=str(tmp_path / "no.exr")))
+
+
+def test_an_image_needs_its_lengths(some_variant, png):
+    assert "pixel_size" in refusal(loads(heightfield=str(png), max_height=0.1))
+    assert "max_height" in refusal(loads(heightfield=str(png), pixel_size=0.1))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ({"coherence_width": 3.0}, "coherence_width=3.0 contradicts the table"),
+        ({"coherence": "patch"}, "coherence=patch contradicts the table"),
+        ({"basis": "taylor"}, "basis=taylor contradicts the table"),
+        ({"tolerance": 1e-4}, "tolerance=0.0001 contradicts the table"),
+        ({"terms": 20}, "terms=20 contradicts the table"),
+        ({"pixel_size": 0.1}, "pixel_size=(0.1, 0.1) is for height fields, but"),
+        ({"max_height": 0.1}, "max_height=0.1 is for height fields, but"),
+        ({"height_scale": 1.6}, "height_scale=1.6 is beyond the table's 1.5"),
+    ],
+)
+def test_what_contradicts_a_table_is_refused(some_variant, table_file, parameters, message):
+    text = refusal(loads(table=str(table_file), **parameters))
+    assert message in text
+    (name,) = parameters
+    if name in TABLE_PARAMETERS:
+        assert text.endswith(
+            "leave it out, or build another table with 'mitsuba-diffraction precompute'"
+        )
+
+
+def test_what_agrees_with_a_table_is_fine(some_variant, table_file):
+    loads(
+        table=str(table_file),
+        coherence_width=2.4,
+        coherence="ensemble",
+        basis="auto",
+        tolerance=1e-3,
+        height_scale=1.5,
+        pixel_size="auto",
+    )()
+
+
+def test_a_table_for_fewer_wavelengths_than_mitsuba_s_is_refused(some_variant, tmp_path):
+    file = tmp_path / "table.exr"
+    md.DiffractionTable.build(PATCH, wavelength_range=(450.0, 700.0), **SMALL).save(file)
+    text = refusal(loads(table=str(file)))
+    assert "starts at 450 nm, but Mitsuba renders from 360 nm on" in text
+
+
+def test_two_nested_bsdfs_are_one_too_many(some_variant):
+    text = refusal(lambda: load(a={"type": "diffuse"}, b={"type": "diffuse"}))
+    assert text.startswith("2 nested BSDFs (a, b); at most one can lie beneath")
+
+
+def test_nothing_lies_beneath_a_conductor(some_variant):
+    for material in ("none", "Al"):
+        text = refusal(lambda m=material: load(material=m, beneath={"type": "diffuse"}))
+        assert "lies beneath a surface that lets no light through" in text

@@ -1,0 +1,109 @@
+"""The surface's own reflectance: Fresnel's, once, at the half vector."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from tests.lanes import evaluated, interaction, spectra
+from tests.optics import as_single, polar, uniform_directions
+
+FLAT = md.HeightField(np.zeros((30, 30)), 0.08)
+WIDTH = 2.4
+
+
+def load(field=FLAT, **parameters):
+    """A mirror with these parameters."""
+    return mi.load_dict(md.bsdf_dict(field, coherence_width=WIDTH, **parameters))
+
+
+def ratios(wi, wo, wavelengths, **parameters):
+    """How much less than with R = 1 is reflected, (n, 4)."""
+    perfect, real = (
+        evaluated(load(**p), wi, wo, wavelengths) for p in ({"material": "none"}, parameters)
+    )
+    return real / perfect
+
+
+def half_angle_cosines(wi, wo):
+    """cosθ between ωi and the half vector."""
+    half = wi + wo
+    return np.sum(wi * half, axis=-1) / np.linalg.norm(half, axis=-1)
+
+
+def dielectric(cos_theta, eta):
+    """Unpolarised power reflectance (Born and Wolf 1999, section 1.5.2, eq. 21)."""
+    cos_t = np.sqrt(1 - (1 - cos_theta**2) / eta**2)
+    perpendicular = (cos_theta - eta * cos_t) / (cos_theta + eta * cos_t)
+    parallel = (eta * cos_theta - cos_t) / (eta * cos_theta + cos_t)
+    return 0.5 * (perpendicular**2 + parallel**2)
+
+
+def conductor(cos_theta, eta, k):
+    """The same for a complex index η + ik."""
+    index = eta + 1j * k
+    cos_t = np.sqrt(1 - (1 - cos_theta**2) / index**2)
+    perpendicular = (cos_theta - index * cos_t) / (cos_theta + index * cos_t)
+    parallel = (index * cos_theta - cos_t) / (index * cos_theta + cos_t)
+    return 0.5 * (np.abs(perpendicular) ** 2 + np.abs(parallel) ** 2)
+
+
+@pytest.fixture
+def pairs():
+    """Direction pairs within reach of a mirror's lobe, at all angles."""
+    rng = np.random.default_rng(2)
+    wi = uniform_directions(60, rng, lowest=0.15)
+    wo = wi * [-1, -1, 1] + rng.normal(0, 0.05, (60, 3))
+    wo = as_single(wo / np.linalg.norm(wo, axis=1, keepdims=True))
+    good = wo[:, 2] > 0.05
+    return wi[good], wo[good]
+
+
+def test_the_default_is_a_dielectric_like_shed_skin(variant, pairs):
+    eta = 1.5 / 1.000277
+    expected = dielectric(half_angle_cosines(*pairs), eta)
+    # Fresnel's formulas in single precision
+    assert ratios(*pairs, 550.0)[:, 0] == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "eta"),
+    [
+        ({"int_ior": 1.33}, 1.33 / 1.000277),
+        ({"int_ior": 1.7, "ext_ior": 1.2}, 1.7 / 1.2),
+        ({"int_ior": "diamond", "ext_ior": "vacuum"}, 2.419),
+        ({"ext_ior": 1.0}, 1.5),
+    ],
+)
+def test_dielectrics(some_variant, pairs, parameters, eta):
+    expected = dielectric(half_angle_cosines(*pairs), eta)
+    assert ratios(*pairs, 550.0, **parameters)[:, 0] == pytest.approx(expected, rel=1e-5)
+
+
+def test_a_conductor_by_its_indices(variant, pairs):
+    expected = conductor(half_angle_cosines(*pairs), 0.9, 6.0)
+    assert ratios(*pairs, 550.0, eta=0.9, k=6.0)[:, 2] == pytest.approx(expected, rel=1e-5)
+
+
+def test_a_conductor_by_its_name_is_mitsuba_s(variant):
+    wavelengths = [400.0, 480.0, 560.0, 700.0]
+    wi = [polar(t) for t in (0, 40, 75)]
+    wo = [polar(t, 180) for t in (0, 40, 75)]
+    ours = ratios(wi, wo, np.tile(wavelengths, (3, 1)), material="Au")
+    smooth = mi.load_dict({"type": "conductor", "material": "Au"})
+    si = interaction(wi, np.tile(wavelengths, (3, 1)))
+    _, theirs = smooth.sample(mi.BSDFContext(), si, 0.5, mi.Point2f(0.5))
+    assert ours == pytest.approx(spectra(theirs), rel=1e-4)  # the half vector, in single precision
+    assert ours[0, 0] < 0.5 < ours[0, 3]  # gold is yellow
+
+
+def test_reflectance_is_applied_once(some_variant):
+    # normal incidence on 1.5/1: ((1.5 − 1)/(1.5 + 1))² = 0.04, not its square
+    ratio = ratios(polar(0), [polar(0)], 550.0, int_ior=1.5, ext_ior=1.0)
+    assert ratio[0, 0] == pytest.approx(0.04, rel=1e-5)
+
+
+def test_an_index_of_one_reflects_nothing(some_variant):
+    assert ratios(polar(30), [polar(30, 180)], 550.0, int_ior=1.0, ext_ior=1.0)[0, 0] < 1e-6

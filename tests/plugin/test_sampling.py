@@ -1,0 +1,152 @@
+"""Sampling: the density is that of the samples, and the estimates are unbiased."""
+
+from __future__ import annotations
+
+import functools
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from scipy import stats
+
+import mitsuba_diffraction as md
+from tests.lanes import interaction, spectra, vectors
+from tests.optics import polar, rough_patch
+
+pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
+
+#: nm; so far apart that dispersion sends each elsewhere.
+WAVELENGTHS = [400.0, 480.0, 560.0, 700.0]
+SURFACES = {
+    "rough": {"field": rough_patch((64, 60), (0.085, 0.085), 0.12), "coherence_width": 5.0},
+    "deep": {"field": rough_patch((64, 60), (0.085, 0.085), 0.8), "coherence_width": 5.0},
+    "coherent": {
+        "field": rough_patch((64, 60), (0.085, 0.085), 0.12),
+        "coherence_width": 5.0,
+        "coherence": "patch",
+    },
+    "grating": {
+        "field": md.gratings.blazed(2.0, 0.15, periods=3, pixels_per_period=24),
+        "coherence_width": 6.0,
+        "height_scale": 1.2,
+        "orientation": 25.0,
+    },
+    "taylor": {
+        "field": rough_patch((64, 60), (0.085, 0.085), 0.12),
+        "coherence_width": 5.0,
+        "basis": "taylor",
+    },
+    "mirror": {"field": md.HeightField(np.zeros((60, 60)), 0.085), "coherence_width": 5.0},
+    "pigmented": {
+        "field": rough_patch((64, 60), (0.085, 0.085), 0.12),
+        "coherence_width": 5.0,
+        "int_ior": 1.5,
+        "pigment": {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.4}},
+    },
+}
+ANGLES = (0.0, 35.0, 70.0)
+
+
+def load(name):
+    """The plugin with that surface."""
+    arguments = dict(SURFACES[name])
+    field = arguments.pop("field")
+    if "int_ior" not in arguments:
+        arguments["material"] = "none"
+    return mi.load_dict(md.bsdf_dict(field, **arguments))
+
+
+def drawn(bsdf, theta, numbers):
+    """Samples for light from θ: directions (n, 3), densities (n,), weights (n, 4)."""
+    u = np.minimum(numbers.astype(np.float32), np.float32(1 - 2**-24)).T
+    u1, u2, u3 = (mi.Float(np.ascontiguousarray(column)) for column in u)
+    si = interaction(np.tile(polar(theta, 40.0), (len(numbers), 1)), [WAVELENGTHS])
+    sample, weight = bsdf.sample(mi.BSDFContext(), si, u1, mi.Point2f(u2, u3))
+    return np.array(sample.wo, float).T, np.array(sample.pdf, float), spectra(weight)
+
+
+@functools.cache
+def hemisphere(rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """Midpoints (rows·2rows, 3) of a grid over (θ, φ), and the solid angles (rows, 1) of cells."""
+    theta = (np.arange(rows) + 0.5) * np.pi / 2 / rows
+    phi = (np.arange(2 * rows) + 0.5) * np.pi / rows
+    edges = np.cos(np.arange(rows + 1) * np.pi / 2 / rows)
+    x, y, z = (
+        np.broadcast_to(a, (rows, 2 * rows))
+        for a in (
+            np.outer(np.sin(theta), np.cos(phi)),
+            np.outer(np.sin(theta), np.sin(phi)),
+            np.cos(theta)[:, None],
+        )
+    )
+    directions = np.stack([x, y, z], axis=-1).reshape(-1, 3).astype(np.float32)
+    return directions, (edges[:-1] - edges[1:])[:, None] * np.pi / rows
+
+
+def on_grid(bsdf, theta, rows):
+    """eval (rows, 2rows, 4) and pdf (rows, 2rows), both times the solid angles of the cells."""
+    directions, cells = hemisphere(rows)
+    si = interaction(np.tile(polar(theta, 40.0), (len(directions), 1)), [WAVELENGTHS])
+    value, density = bsdf.eval_pdf(mi.BSDFContext(), si, vectors(directions))
+    shape = (rows, 2 * rows)
+    return (
+        spectra(value).reshape(*shape, 4) * cells[..., None],
+        np.array(density, float).reshape(shape) * cells,
+    )
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_estimates_are_unbiased_and_densities_those_of_the_samples(variant, name):
+    bsdf = load(name)
+    log_n, rows = 17, 768  # cells of 2 mrad, a tenth of a lobe: next to no error of the grid
+    independent = np.random.default_rng(1).random((2**log_n, 3))
+    even = stats.qmc.Sobol(3, rng=2).random_base2(log_n)
+    for theta in ANGLES:
+        value, density = on_grid(bsdf, theta, rows)
+
+        # ∫ f cosθo dω at each wavelength, within three standard errors of independent samples
+        albedo = value.sum(axis=(0, 1))
+        _, _, weights = drawn(bsdf, theta, even)
+        standard_error = weights.std(axis=0) / np.sqrt(len(weights))
+        assert np.all(np.abs(weights.mean(axis=0) - albedo) < 3 * standard_error)
+
+        # the density integrates to the share of samples above the surface
+        _, pdf, _ = drawn(bsdf, theta, even)
+        # even samples and the grid's sum are both good to about 1e-4
+        assert np.mean(pdf > 0) == pytest.approx(density.sum(), abs=3e-4)
+
+        # and is theirs: χ² over 16 × 32 cells
+        wo, pdf, _ = drawn(bsdf, theta, independent)
+        wo = wo[pdf > 0]
+        row = np.minimum((np.arccos(wo[:, 2]) * 2 / np.pi * 16).astype(int), 15)
+        column = (np.arctan2(wo[:, 1], wo[:, 0]) / (2 * np.pi) % 1.0 * 32).astype(int) % 32
+        observed = np.bincount(row * 32 + column, minlength=512)
+        blocks = density.reshape(16, rows // 16, 32, rows // 16).sum(axis=(1, 3)).ravel()
+        expected = blocks * len(independent)
+        few = expected < 20
+        observed, expected = (np.append(a[~few], a[few].sum()) for a in (observed, expected))
+        statistic = np.sum((observed - expected) ** 2 / np.maximum(expected, 1.0))
+        # one in a thousand by chance; the numbers drawn are always the same
+        assert stats.chi2.sf(statistic, len(observed) - 1) > 1e-3
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_sample_agrees_with_eval_and_pdf(variant, name):
+    bsdf = load(name)
+    context = mi.BSDFContext()
+    for theta in ANGLES:
+        n = 4096
+        wo, pdf, weights = drawn(bsdf, theta, np.random.default_rng(3).random((n, 3)))
+        si = interaction(np.tile(polar(theta, 40.0), (n, 1)), [WAVELENGTHS])
+        directions = vectors(wo)
+        value = spectra(bsdf.eval(context, si, directions))
+        density = np.array(bsdf.pdf(context, si, directions))
+        both = bsdf.eval_pdf(context, si, directions)
+        assert np.array_equal(spectra(both[0]), value)
+        assert np.array_equal(np.array(both[1]), density)
+        kept = pdf > 0
+        assert np.all(weights[~kept] == 0)
+        assert np.linalg.norm(wo[kept], axis=1) == pytest.approx(1.0, abs=1e-6)  # single precision
+        # the same expressions, fused differently in another kernel
+        assert pdf[kept] == pytest.approx(density[kept], rel=1e-4)
+        assert (weights * pdf[:, None])[kept] == pytest.approx(value[kept], rel=1e-3, abs=1e-6)

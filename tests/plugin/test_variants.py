@@ -1,0 +1,260 @@
+"""Every variant of Mitsuba that this machine runs: the same light, in its own numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import DiffractionTable
+from mitsuba_diffraction.tables.colour_table import ColourTable
+from tests.optics import Array, as_single, rough_patch, uniform_directions
+
+WIDTH = 8.0  # µm
+HEIGHTS = rough_patch((90, 100), (0.085, 0.09), 0.2, 0.9)
+N = 24
+
+
+def runs(name: str) -> bool:
+    """Whether the machine runs a variant."""
+    if name.startswith("cuda"):
+        return bool(dr.has_backend(dr.JitBackend.CUDA))
+    return name.startswith("scalar") or bool(dr.has_backend(dr.JitBackend.LLVM))
+
+
+ALL = [name for name in mi.variants() if name.startswith(("scalar", "llvm", "cuda"))]
+
+
+@pytest.fixture(params=ALL)
+def name(request: pytest.FixtureRequest) -> str:
+    """A variant, set."""
+    if not runs(request.param):
+        pytest.skip(f"{request.param}: Dr.Jit finds no device for it")
+    mi.set_variant(request.param)
+    return str(request.param)
+
+
+def load(**parameters: Any) -> Any:
+    raw = {"energy_conserving": False, "coherence_width": WIDTH}
+    return mi.load_dict(md.bsdf_dict(HEIGHTS, **(raw | parameters)))
+
+
+def pairs(seed: int = 3) -> tuple[Array, Array, Array]:
+    """Incident and outgoing directions (N, 3), half of them near the mirror, and samples (N, 3)."""
+    rng = np.random.default_rng(seed)
+    wi, wo = uniform_directions(N, rng, 0.3), uniform_directions(N, rng, 0.3)
+    near = slice(0, N // 2)
+    wo[near, :2] = -wi[near, :2] + rng.normal(0.0, 0.03, (N // 2, 2))
+    wo[near, 2] = np.sqrt(np.maximum(1.0 - (wo[near, :2] ** 2).sum(axis=1), 0.01))
+    return wi, as_single(wo / np.linalg.norm(wo, axis=1)[:, None]), rng.random((N, 3))
+
+
+def interaction(wi: Array, wavelengths: Array) -> Any:
+    """At one direction (3,) in scalar variants, at (n, 3) of them elsewhere."""
+    si = dr.zeros(mi.SurfaceInteraction3f, 1 if wi.ndim == 1 else len(wi))
+    si.wi = mi.Vector3f(*wi.T.tolist()) if wi.ndim == 1 else mi.Vector3f(wi.T)
+    si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
+    if mi.is_spectral:
+        si.wavelengths = mi.UnpolarizedSpectrum(wavelengths.T)
+    return si
+
+
+def evaluate(bsdf: Any, wi: Array, wo: Array, samples: Array, wavelengths: Array) -> list[Array]:
+    """Value (n, channels), pdf, value again, pdf again; then sampled wo, pdf, weight."""
+    context = mi.BSDFContext()
+
+    def once(si: Any, wo: Any, one: Any, two: Any) -> list[Array]:
+        together = bsdf.eval_pdf(context, si, wo)
+        sample, weight = bsdf.sample(context, si, one, two)
+        parts = [
+            mi.unpolarized_spectrum(bsdf.eval(context, si, wo)),
+            bsdf.pdf(context, si, wo),
+            mi.unpolarized_spectrum(together[0]),
+            together[1],
+            sample.wo,
+            sample.pdf,
+            mi.unpolarized_spectrum(weight),
+        ]
+        return [np.array(part, float).T for part in parts]
+
+    if dr.is_jit_v(mi.Float):
+        si = interaction(wi, wavelengths)
+        two = mi.Point2f(samples[:, 1:].T)
+        return once(si, mi.Vector3f(wo.T), mi.Float(samples[:, 0]), two)
+    rows = [
+        once(
+            interaction(wi[n], wavelengths[n]),
+            mi.Vector3f(wo[n].tolist()),
+            float(samples[n, 0]),
+            mi.Point2f(samples[n, 1:].tolist()),
+        )
+        for n in range(len(wi))
+    ]
+    return [np.array(column) for column in zip(*rows, strict=True)]
+
+
+def expected(wi: Array, wo: Array, wavelengths: Array) -> Array:
+    """f·cosθo (N, channels) in the current variant's numbers, without Mitsuba."""
+    table = DiffractionTable.build(HEIGHTS, coherence_width=WIDTH)
+    if mi.is_rgb:
+        u, v, w = (wi + wo).T
+        colours = ColourTable.build(table).colour(u, v, w)
+        outside = ((1.0 + (wi * wo).sum(axis=1)) / w) ** 2 / wi[:, 2]
+        return 4.0 * np.pi * table.sigma**2 * outside[:, None] * colours
+    columns = [table.brdf(wi, wo, lam) * wo[:, 2] for lam in wavelengths.T]
+    return np.stack(columns if mi.is_spectral else columns[:1], axis=1)
+
+
+def wavelengths() -> Array:
+    if not mi.is_spectral:
+        return np.full((N, 4), 600.0)
+    return as_single(np.random.default_rng(4).uniform(400.0, 700.0, (N, 4)))
+
+
+def test_values_are_those_of_the_table(name: str) -> None:
+    wi, wo, samples = pairs()
+    lam = wavelengths()
+    value = evaluate(load(material="none", wavelength=600.0), wi, wo, samples, lam)[0]
+    truth = expected(wi, wo, lam)
+    # single precision: a phase of some hundred radians across the window has an error of 1e-4
+    assert value == pytest.approx(truth, rel=2e-3, abs=2e-5 * np.abs(truth).max())
+
+
+@pytest.mark.parametrize("kind", ["dielectric", "conductor", "nested"])
+def test_value_density_and_sample_agree(name: str, kind: str) -> None:
+    parameters = {
+        "dielectric": {},
+        "conductor": {"material": "Au"},
+        "nested": {"nested": {"type": "diffuse", "reflectance": 0.5}},
+    }[kind]
+    bsdf = load(wavelength=600.0, orientation=25.0, **parameters)
+    wi, wo, samples = pairs()
+    lam = wavelengths()
+    value, pdf, again, pdf_again, drawn, drawn_pdf, weight = evaluate(bsdf, wi, wo, samples, lam)
+    assert again == pytest.approx(value, rel=1e-5)
+    assert pdf_again == pytest.approx(pdf, rel=1e-5)
+    assert np.all(pdf > 0.0)
+    valid = drawn_pdf > 0.0
+    assert valid.sum() > N // 2
+    wi, drawn, samples, lam = wi[valid], drawn[valid], samples[valid], lam[valid]
+    value, pdf, *_ = evaluate(bsdf, wi, drawn, samples, lam)
+    assert drawn_pdf[valid] == pytest.approx(pdf, rel=1e-3)
+    assert weight[valid] * pdf[:, None] == pytest.approx(
+        value, rel=2e-3, abs=1e-5 * np.abs(value).max()
+    )
+
+
+def test_one_wavelength_is_the_spectrum_there() -> None:
+    if not runs("llvm_ad_mono"):
+        pytest.skip("llvm_ad_mono: Dr.Jit finds no device for it")
+    wi, wo, samples = pairs()
+    found = []
+    for name in ("llvm_ad_mono", "llvm_ad_spectral"):
+        mi.set_variant(name)
+        bsdf = load(material="Au", wavelength=600.0)
+        found.append(evaluate(bsdf, wi, wo, samples, np.full((N, 4), 600.0))[0])
+    mono, spectral = found
+    # gold's index is interpolated in double and in single precision
+    assert mono == pytest.approx(spectral[:, :1], rel=1e-4, abs=1e-6 * spectral.max())
+
+
+def test_polarised_light_is_depolarised(name: str) -> None:
+    if not mi.is_polarized:
+        pytest.skip(f"{name} knows no polarisation")
+    wi, wo, _ = pairs()
+    bsdf, lam = load(material="Al"), wavelengths()
+    scalar = not dr.is_jit_v(mi.Float)
+    si = interaction(wi[0], lam[0]) if scalar else interaction(wi, lam)
+    out = mi.Vector3f(wo[0].tolist()) if scalar else mi.Vector3f(wo.T)
+    mueller = np.array(bsdf.eval(mi.BSDFContext(), si, out))
+    assert np.mean(mueller[0, 0] > 0.0) > 0.9  # some pairs are beyond the patch's Nyquist limit
+    mueller[0, 0] = 0.0
+    assert np.all(mueller == 0.0)
+
+
+def test_a_wavelength_outside_the_table_is_refused(name: str) -> None:
+    with pytest.raises(RuntimeError, match="wavelength=900 nm is outside the table's 360 to 830"):
+        load(wavelength=900.0)
+
+
+def picture(spp: int) -> Array:
+    """A diffracting plate under one lamp, (8, 8, 3)."""
+    scene = {
+        "type": "scene",
+        "integrator": {"type": "direct"},
+        "sensor": {
+            "type": "perspective",
+            "fov": 30,
+            "to_world": mi.ScalarTransform4f().look_at(
+                origin=[0.6, 0, 3], target=[0, 0, 0], up=[0, 1, 0]
+            ),
+            "film": {"type": "hdrfilm", "width": 8, "height": 8, "pixel_format": "rgb"},
+        },
+        "lamp": {
+            "type": "directional",
+            "direction": [-0.15, 0.35, -0.9],
+            "irradiance": {"type": "rgb", "value": 1.0},
+        },
+        "plate": {
+            "type": "rectangle",
+            "bsdf": md.bsdf_dict(HEIGHTS, coherence_width=WIDTH, material="none"),
+        },
+    }
+    image = np.array(mi.render(mi.load_dict(scene), spp=spp), float)
+    return np.broadcast_to(image, (8, 8, 3))
+
+
+@pytest.fixture(scope="module")
+def spectral_picture() -> Array:
+    mi.set_variant("llvm_ad_spectral" if runs("llvm_ad_spectral") else "scalar_spectral")
+    return picture(2048)
+
+
+def test_a_small_scene_has_the_colours_of_the_spectral_one(
+    spectral_picture: Array, name: str
+) -> None:
+    mi.set_variant(name)
+    found = picture(32 if name.startswith("scalar") else 1024)
+    assert np.all(np.isfinite(found))
+    if name.endswith(("mono", "mono_polarized")):
+        assert found.mean() == pytest.approx(spectral_picture[..., 1].mean(), rel=0.5)
+        return
+    # twice the noise: four random wavelengths a ray, and lobes smaller than pixels
+    tolerance = 0.2 if name.startswith("scalar") else 0.04
+    assert found.mean(axis=(0, 1)) == pytest.approx(
+        spectral_picture.mean(axis=(0, 1)), rel=tolerance, abs=tolerance * spectral_picture.mean()
+    )
+
+
+@pytest.mark.parametrize("theta", [0.0, 50.0])
+def test_rgb_samples_integrate_what_the_density_says(theta: float) -> None:
+    if not runs("llvm_ad_rgb"):
+        pytest.skip("llvm_ad_rgb: Dr.Jit finds no device for it")
+    mi.set_variant("llvm_ad_rgb")
+    bsdf, count = load(material="none"), 1 << 17
+    angle = np.radians(theta)
+    si = interaction(np.tile([np.sin(angle), 0.0, np.cos(angle)], (count, 1)), np.zeros(0))
+    rng = mi.PCG32(count)
+    one, two = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+    sample, weight = bsdf.sample(mi.BSDFContext(), si, one, two)
+    uniform = mi.warp.square_to_uniform_hemisphere(two)
+    pdf = np.array(bsdf.pdf(mi.BSDFContext(), si, uniform)) * 2.0 * np.pi
+    value = np.array(bsdf.eval(mi.BSDFContext(), si, uniform)).T * 2.0 * np.pi
+    drawn, weight = np.array(sample.wo).T, np.array(weight).T
+    valid = np.array(sample.pdf) > 0.0
+
+    def agree(a: Array, b: Array) -> None:
+        error = np.hypot(a.std(axis=0), b.std(axis=0)) / np.sqrt(count)
+        assert np.all(np.abs(a.mean(axis=0) - b.mean(axis=0)) < 4.0 * error)  # 1 in 16 000 each
+
+    # in quarters of the hemisphere: how many samples fall there, and what light they find
+    for quarter in range(4):
+        side = np.arctan2(drawn[:, 1], drawn[:, 0]) // (np.pi / 2) + 2 == quarter
+        of_uniform = np.array(uniform).T
+        mine = np.arctan2(of_uniform[:, 1], of_uniform[:, 0]) // (np.pi / 2) + 2 == quarter
+        agree((side & valid).astype(float), pdf * mine)
+        agree(weight * side[:, None], value * mine[:, None])

@@ -1,0 +1,263 @@
+"""The reference: against sums over pixels, closed forms of gratings, and what any mirror does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import jv
+
+from mitsuba_diffraction import HeightField, gratings, reference
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.geometry import kirchhoff_factor, sigma_of, wavenumber
+from mitsuba_diffraction.reference import screen_power
+from tests.optics import polar, riemann_power, rough_patch, uniform_directions
+
+FLAT = HeightField(np.zeros((32, 32)), 0.08)
+#: Odd and even numbers of pixels, not square, nor are the pixels; 1.95 × 1.8 µm.
+SMALL = rough_patch((12, 15), (0.13, 0.15), 0.3)
+#: Well below 1/2 of the patch, so that several lobes overlap; σ in µm.
+SIGMA = 0.45
+
+
+def order_power(field: HeightField, frequency: tuple[float, float], kappa: float) -> float:
+    """|a|² of the order at a frequency, through a window so wide that its lobes do not overlap."""
+    screen = np.exp(1j * kappa * field.heights)
+    sigma = 3.0 * max(field.extent)  # neighbours weigh exp(−(3·2π)²) at most
+    power = screen_power(screen, field.pixel_size, *frequency, sigma, "ensemble")
+    return power / (4 * np.pi**2 * sigma**4)
+
+
+# ------------------------------------------------------------------------ the integral itself
+
+
+@pytest.mark.parametrize("coherence", reference.COHERENCES)
+@pytest.mark.parametrize("kappa", [0.0, 7.0, 31.0])
+def test_the_power_is_that_of_a_sum_over_pixels_of_the_plane(coherence, kappa):
+    screen = np.exp(1j * kappa * SMALL.heights)
+    # The sum repeats with 2π/dx = 48 rad/µm: up to 5 from 0 no other period's lobe is in reach
+    for alpha, beta in [(0.0, 0.0), (3.1, -2.2), (-4.0, 1.3), (2.2, 4.9)]:
+        exact = riemann_power(SMALL, alpha, beta, kappa, SIGMA, coherence)
+        computed = screen_power(screen, SMALL.pixel_size, alpha, beta, SIGMA, coherence)
+        # rounding of sums of 1e4 terms, relative to the largest that any direction gets
+        assert abs(computed - exact) < 1e-12 * 4 * np.pi**2 * SIGMA**4
+
+
+@pytest.mark.parametrize("coherence", reference.COHERENCES)
+def test_the_brdf_is_the_factor_times_that_power(coherence):
+    wi, wo = polar(20, 30), polar(35, 160)
+    k = float(wavenumber(600.0))
+    u, v, w = wi + wo
+    power = riemann_power(SMALL, k * u, k * v, k * w, SIGMA, coherence)
+    expected = float(kirchhoff_factor(wi, wo, 600.0, SIGMA)) * power
+    value = reference.brdf(SMALL, wi, wo, 600.0, coherence_width=4 * SIGMA, coherence=coherence)
+    assert value.shape == (1,)
+    assert value[0] == pytest.approx(expected, rel=1e-9)  # rounding, of a small part of all power
+
+
+def test_an_ensemble_is_the_mean_of_patches_under_windows_anywhere():
+    # the same patch cut anew at random places puts its centre, and so its window, there
+    rng = np.random.default_rng(3)
+    wi, wo = polar(15, 200), polar(30, 30)
+    arguments = {"coherence_width": 4 * SIGMA, "coherence": "patch"}
+    values = [
+        reference.brdf(
+            HeightField(np.roll(SMALL.heights, shift, (0, 1)), SMALL.pixel_size),
+            wi,
+            wo,
+            550.0,
+            **arguments,
+        )[0]
+        for shift in zip(rng.integers(0, 12, 400), rng.integers(0, 15, 400), strict=True)
+    ]
+    ensemble = reference.brdf(SMALL, wi, wo, 550.0, coherence_width=4 * SIGMA)[0]
+    # three standard errors of a mean of 400
+    assert abs(np.mean(values) - ensemble) < 3 * np.std(values) / 20
+
+
+@pytest.mark.parametrize("kappa", [0.3, 10.0, 50.0])
+def test_the_powers_of_all_orders_add_up_to_one(kappa):
+    ny, nx = SMALL.shape
+    lx, ly = SMALL.extent
+    total = sum(
+        order_power(SMALL, (2 * np.pi * jx / lx, 2 * np.pi * jy / ly), kappa)
+        for jx in range(-(nx // 2), (nx - 1) // 2 + 1)
+        for jy in range(-(ny // 2), (ny - 1) // 2 + 1)
+    )
+    assert total == pytest.approx(1.0, abs=1e-12)  # Parseval; rounding
+
+
+def test_nothing_is_known_beyond_the_pixels_nyquist_frequency():
+    screen = np.exp(10j * SMALL.heights)
+    nyquist = np.pi / SMALL.pixel_size[0]
+    inside, spilled, far = (
+        screen_power(screen, SMALL.pixel_size, nyquist + n / SIGMA, 0.0, SIGMA, "ensemble")
+        for n in (-1.0, 1.0, 9.0)
+    )
+    assert inside > spilled > 0.0
+    assert far == 0.0
+
+
+def test_many_tiles_are_one():
+    tiled = HeightField(np.tile(SMALL.heights, (2, 3)), SMALL.pixel_size)
+    wi, wo, lam = polar(10, 80), polar(25, 250), 450.0
+    once = reference.brdf(SMALL, wi, wo, lam, coherence_width=2.0)
+    several = reference.brdf(tiled, wi, wo, lam, coherence_width=2.0)
+    assert several == pytest.approx(once, rel=1e-9)  # rounding
+
+
+def test_heights_may_have_any_zero():
+    lifted = HeightField(SMALL.heights + 5.0, SMALL.pixel_size)
+    wi, wo, lam = polar(10, 80), polar(25, 250), 450.0
+    for coherence in reference.COHERENCES:
+        before = reference.brdf(SMALL, wi, wo, lam, coherence_width=2.0, coherence=coherence)
+        after = reference.brdf(lifted, wi, wo, lam, coherence_width=2.0, coherence=coherence)
+        assert after == pytest.approx(before, rel=1e-9)  # phases of 130 rad lose two digits
+
+
+# ------------------------------------------------------------------------ gratings
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+@pytest.mark.parametrize("kappa", [1.0, 12.0, 35.0])
+def test_a_sinusoid_s_orders_are_bessel_functions(axis, kappa):
+    # 33 samples, odd; the κh₀ of at most 3.5 leaves nothing beyond its Nyquist frequency
+    field = gratings.sinusoidal(2.0, 0.2, periods=1, pixels_per_period=33, rows=4, axis=axis)
+    for m in range(-6, 7):
+        q = 2 * np.pi * m / 2.0
+        power = order_power(field, (q, 0.0) if axis == "x" else (0.0, q), kappa)
+        # aliases J_{33−6}(3.5) are 1e-22: only rounding is left, far below the asked 1e-6
+        assert power == pytest.approx(jv(m, kappa * 0.1) ** 2, abs=1e-13)
+
+
+@pytest.mark.parametrize("kappa", [1.0, 12.0, 35.0])
+def test_a_lamellar_grating_s_orders(kappa):
+    depth, n = 0.15, 120
+    field = gratings.lamellar(2.0, depth, periods=1, pixels_per_period=n, rows=2)
+    phase = kappa * depth
+    for m in range(-7, 8):
+        power = order_power(field, (np.pi * m, 0.0), kappa)
+        if m == 0:
+            sampled = continuous = np.cos(phase / 2) ** 2
+        elif m % 2:
+            sampled = 4 * np.sin(phase / 2) ** 2 / (n * np.sin(np.pi * m / n)) ** 2
+            continuous = 4 * np.sin(phase / 2) ** 2 / (np.pi * m) ** 2
+        else:
+            sampled = continuous = 0.0
+        assert power == pytest.approx(sampled, abs=1e-13)  # exact: rounding, well below 1e-6
+        # 120 pixels a period are off by (πm/n)²/3 of 4/(πm)², 9.3e-5 at every order
+        assert power == pytest.approx(continuous, abs=1e-4)
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+@pytest.mark.parametrize(("direction", "sign"), [("descending", 1), ("ascending", -1)])
+def test_a_blazed_grating_s_orders(axis, direction, sign):
+    depth, n = 0.3, 128
+    field = gratings.blazed(
+        2.5, depth, periods=1, pixels_per_period=n, rows=2, axis=axis, direction=direction
+    )
+    for kappa in (4.0, 2 * np.pi / depth, 33.0):
+        for m in range(-4, 5):
+            q = 2 * np.pi * m / 2.5
+            power = order_power(field, (q, 0.0) if axis == "x" else (0.0, q), kappa)
+            expected = np.sinc(m - sign * kappa * depth / (2 * np.pi)) ** 2
+            # steps of depth/n: (π(m − κd/2π)/n)²/3 of sinc², at most 1/(3n²) = 2e-5 in all
+            assert power == pytest.approx(expected, abs=1e-4)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_facet_that_descends_towards_an_axis_reflects_towards_it(axis):
+    # one wavelength of path at normal incidence: all light leaves in order +1
+    lam, period = 0.5, 2.0
+    angle = np.degrees(np.arcsin(lam / period))
+    depth = lam / (1 + np.cos(np.radians(angle)))
+    field = gratings.blazed(period, depth, axis="xy"[axis], periods=8)
+    towards, away = polar(angle, 90.0 * axis), polar(angle, 90.0 * axis + 180.0)
+    for coherence in reference.COHERENCES:
+        lit, dark = reference.brdf(
+            field, polar(0), [towards, away], 500.0, coherence_width=16.0, coherence=coherence
+        )
+        # sinc² of 0 against sinc² of 2: nothing but what sampling with 64 pixels leaves
+        assert lit > 1e4 * dark
+
+
+def test_peaks_obey_the_grating_equation():
+    period, lam, theta_i = 1.5, 0.55, 25.0
+    field = gratings.sinusoidal(period, 0.1, periods=20, pixels_per_period=16, rows=2)
+    for m in (-1, 1, 2):
+        expected = m * lam / period - np.sin(np.radians(theta_i))
+        sines = expected + np.linspace(-0.02, 0.02, 41)
+        wo = np.stack([sines, np.zeros_like(sines), np.sqrt(1 - sines**2)], axis=1)
+        f = reference.brdf(field, polar(theta_i), wo, 550.0, coherence_width=30.0)
+        peak = sines[(f * wo[:, 2]).argmax()]
+        # steps of 1e-3; the slope of the obliquity factor under a lobe of width 0.008 moves less
+        assert abs(peak - expected) < 1.5e-3
+
+
+# ------------------------------------------------------------------------ mirrors and symmetries
+
+
+def mirror_albedo(theta: float, lam: float = 550.0, width: float = 65.0) -> float:
+    """∫ f cosθo dωo = ∫ f du dv of a flat mirror, by the rectangle rule over its lobe."""
+    wi = polar(theta, 20.0)
+    step = 0.25 / (float(wavenumber(lam)) * sigma_of(width))  # 1/4 of 1/(kσ): exact for Gaussians
+    u, v = np.meshgrid(*2 * [step * np.arange(-24, 25)])
+    tangential = np.stack([u.ravel(), v.ravel()], axis=1) - wi[:2]
+    z2 = 1 - np.sum(tangential**2, axis=1)
+    wo = np.concatenate([tangential[z2 > 0], np.sqrt(z2[z2 > 0])[:, None]], axis=1)
+    return float(reference.brdf(FLAT, wi, wo, lam, coherence_width=width).sum() * step**2)
+
+
+@pytest.mark.parametrize("theta", [0.0, 30.0, 45.0, 60.0])
+def test_a_flat_mirror_s_albedo_is_one(theta):
+    # what the window's own width changes, design section 7
+    assert mirror_albedo(theta) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_flat_mirror_s_albedo_is_nearly_one_at_grazing_incidence():
+    assert mirror_albedo(75.0) == pytest.approx(1.0, abs=3e-3)  # likewise
+
+
+@pytest.mark.parametrize("coherence", reference.COHERENCES)
+def test_swapping_directions_changes_nothing(coherence):
+    rng = np.random.default_rng(5)
+    wi, wo = uniform_directions(20, rng), uniform_directions(20, rng)
+    lam = rng.uniform(380, 780, 20)
+    there = reference.brdf(SMALL, wi, wo, lam, coherence_width=2.0, coherence=coherence)
+    back = reference.brdf(SMALL, wo, wi, lam, coherence_width=2.0, coherence=coherence)
+    # only wi + wo enters, but for the order of multiplication: a few units in the last place
+    assert there == pytest.approx(back, rel=1e-15)
+
+
+@pytest.mark.parametrize("coherence", reference.COHERENCES)
+def test_nothing_is_reflected_below_the_surface(coherence):
+    up, down = polar(30, 10), polar(120, 10)
+    values = reference.brdf(SMALL, [up, down, down], [down, up, down], 500.0, coherence=coherence)
+    assert np.array_equal(values, np.zeros(3))
+
+
+def test_arguments_broadcast():
+    wo = uniform_directions(5, np.random.default_rng(0))
+    assert reference.brdf(SMALL, polar(0), wo, 500.0).shape == (5,)
+    assert reference.brdf(SMALL, wo, polar(0), np.full(5, 500.0)).shape == (5,)
+    assert reference.brdf(SMALL, polar(0), polar(3), [400.0, 500.0]).shape == (2,)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"coherence": "none"}, "coherence='none' is unknown; choose one of ensemble, patch"),
+        ({"coherence_width": 0.0}, "coherence_width=0.0 must be a positive number of µm"),
+        ({"coherence_width": -1.0}, "coherence_width=-1.0 must be a positive"),
+        ({"coherence_width": np.nan}, "coherence_width=nan must be a positive"),
+        ({"coherence_width": np.inf}, "coherence_width=inf must be a positive"),
+        ({"wavelength": 0.0}, "wavelength must be positive, in nm"),
+        ({"wavelength": np.nan}, "wavelength must be positive, in nm"),
+        ({"wi": [0.0, 1.0]}, r"wi has shape \(2,\)"),
+        ({"wi": np.zeros((2, 3)), "wo": np.zeros((3, 3))}, "do not broadcast to one length"),
+    ],
+)
+def test_bad_arguments_are_refused_in_one_line(arguments, message):
+    given = {"wi": polar(0), "wo": polar(0), "wavelength": 500.0} | arguments
+    with pytest.raises(DiffractionError, match=message) as caught:
+        reference.brdf(SMALL, **given)
+    assert "\n" not in str(caught.value)
