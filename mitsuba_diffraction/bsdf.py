@@ -83,7 +83,7 @@ from mitsuba_diffraction.llvm import require_loaded_llvm
 from mitsuba_diffraction.plugin.energy import EnergyBound
 from mitsuba_diffraction.plugin.light import variant_light
 from mitsuba_diffraction.plugin.parameters import read_parameters
-from mitsuba_diffraction.plugin.sampling import COSINE
+from mitsuba_diffraction.plugin.sampling import COSINE, fold, unfolded
 from mitsuba_diffraction.plugin.shadowing import vcavity
 
 
@@ -236,9 +236,15 @@ class Diffraction(mi.BSDF):
 
     def _density(self, si: Any, wo: Any, active: Any) -> Any:
         """Density of `_draw`: that of the orders, and a little cosine."""
-        uv = _in_patch(si.wi + wo, self.orientation.rotation(si, active))
-        cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
-        orders = self._light.density(uv, cos_i, cos_o, dr.detach(self.height_scale), si)
+        rotation = self.orientation.rotation(si, active)
+        orders = self._light.density(
+            _in_patch(si.wi + wo, rotation),
+            _in_patch(mi.Vector2f(si.wi.x, si.wi.y) + unfolded(wo), rotation),
+            mi.Frame3f.cos_theta(si.wi),
+            mi.Frame3f.cos_theta(wo),
+            dr.detach(self.height_scale),
+            si,
+        )
         return dr.lerp(orders, mi.warp.square_to_cosine_hemisphere_pdf(wo), COSINE)
 
     def _draw(self, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
@@ -251,11 +257,7 @@ class Diffraction(mi.BSDF):
             si,
         )
         rotation = self.orientation.rotation(si, active)
-        tangential = _from_patch(uv, rotation) - mi.Vector2f(si.wi.x, si.wi.y)
-        height = 1.0 - dr.squared_norm(tangential)
-        ordered = mi.Vector3f(
-            tangential.x, tangential.y, dr.select(height > 0.0, dr.safe_sqrt(height), -1.0)
-        )
+        ordered = fold(_from_patch(uv, rotation) - mi.Vector2f(si.wi.x, si.wi.y))
         return dr.select(sample1 < COSINE, mi.warp.square_to_cosine_hemisphere(sample2), ordered)
 
     def _glossy_share(self, si: Any, active: Any) -> Any:

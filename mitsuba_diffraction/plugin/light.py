@@ -50,12 +50,20 @@ class Wavelengths:
             _each(of_wavelength, wavelengths, dr.grad_enabled(uv, scaled_w))
         )
 
-    def density(self, uv: Any, cos_i: Any, cos_o: Any, height_scale: Any, si: Any) -> Any:
-        """Density of `draw` as one of ωo per solid angle: the mean of all wavelengths'."""
+    def density(
+        self, uv: Any, folded: Any, cos_i: Any, cos_o: Any, height_scale: Any, si: Any
+    ) -> Any:
+        """Density per solid angle of an ωo that `draw` gives with its uv, or with `folded`.
+
+        folded : the ωi + ωo beyond the horizon which `sampling.fold` makes the same ωo of.
+        """
 
         def of_wavelength(wavelength: Any) -> Any:
             k = dr.rcp(wavelength) * (2e3 * dr.pi)
-            return self._sampler.density(k * uv.x, k * uv.y, k, cos_i, cos_o, height_scale)
+            strategy = self._sampler.strategy(k, cos_i, height_scale)
+            direct = self._sampler.density(k * uv.x, k * uv.y, *strategy)
+            beyond = self._sampler.density(k * folded.x, k * folded.y, *strategy)
+            return dr.fma(direct, cos_o, 0.5 * beyond) * dr.square(k)
 
         wavelengths = self._wavelengths(si)
         densities = _each(of_wavelength, wavelengths, dr.grad_enabled(uv, cos_i, cos_o))

@@ -19,7 +19,7 @@ from ..tables.colour_table import ColourTable
 from ..tables.table import DiffractionTable
 from .lookup import index_between, read, upload
 from .rgb_lookup import ColourLookup
-from .sampling import BELOW_ONE, LEAST_SHARE, invert
+from .sampling import BELOW_ONE, invert, order_0_share
 
 _lights: weakref.WeakKeyDictionary[DiffractionTable, dict[str, Colours]] = (
     weakref.WeakKeyDictionary()
@@ -48,9 +48,17 @@ class Colours:
         """See `Wavelengths.power`; the wavelengths are summed."""
         return self._lookup.colour(uv, scaled_w)
 
-    def density(self, uv: Any, cos_i: Any, cos_o: Any, height_scale: Any, si: Any) -> Any:
-        """Density of `draw` as one of ωo per solid angle."""
-        share, band = self._share(cos_i, height_scale)
+    def density(
+        self, uv: Any, folded: Any, cos_i: Any, cos_o: Any, height_scale: Any, si: Any
+    ) -> Any:
+        """See `Wavelengths.density`."""
+        strategy = self._strategy(cos_i, height_scale)
+        return dr.fma(
+            self._density(uv, *strategy), cos_o, 0.5 * self._density(folded, *strategy)
+        )
+
+    def _density(self, uv: Any, share: Any, band: Any) -> Any:
+        """Density of `draw` per du dv."""
         squared_radius = dr.squared_norm(uv)
         glossy = mi.Float(0.0)
         for sharpness in self._sharpness:
@@ -68,11 +76,11 @@ class Colours:
         # A cell is step·2π/count wide in ln r and φ, and r² d(ln r) dφ = du dv
         area = squared_radius * (self._coordinates.step * 2.0 * dr.pi)
         cell = dr.select(inside, cell * mi.Float(count) / dr.select(inside, area, 1.0), 0.0)
-        return dr.lerp(cell, glossy, share) * cos_o
+        return dr.lerp(cell, glossy, share)
 
     def draw(self, cos_i: Any, height_scale: Any, sample1: Any, sample2: Any, si: Any) -> Any:
         """The tangential part of an ωi + ωo in the patch's frame."""
-        share, band = self._share(cos_i, height_scale)
+        share, band = self._strategy(cos_i, height_scale)
         lobe = dr.clip(sample1 / share * len(self._sharpness), 0, len(self._sharpness) - 1)
         lobe = mi.UInt32(lobe)
         sample2 = dr.minimum(sample2, BELOW_ONE)
@@ -94,14 +102,14 @@ class Colours:
             sample1 < share, mi.Vector2f(glossy), mi.Vector2f(radius * cos, radius * sin)
         )
 
-    def _share(self, cos_i: Any, height_scale: Any) -> tuple[Any, Any]:
+    def _strategy(self, cos_i: Any, height_scale: Any) -> tuple[Any, Any]:
         """Share of the samples that order 0 gets, and the band of the other orders."""
         bands = BANDS / (BANDED * self._z_max)
         band = mi.UInt32(index_between(height_scale * (cos_i + 0.5) * bands, 0.0, BANDS - 1.0))
         position = 2.0 * height_scale * cos_i * ((self._zs - 1) / self._z_max)
         z = index_between(position, 0.0, self._zs - 1.0)
         brightness = read(mi.Float, self._order_0, mi.UInt32(z + 0.5))
-        share = dr.clip(brightness, LEAST_SHARE, 1.0 - LEAST_SHARE)
+        share = order_0_share(brightness, cos_i)
         return dr.select(read(mi.Float, self._occupied, band) > 0.0, share, 1.0), band
 
     def _ring(self, ring: Any) -> tuple[Any, Any]:

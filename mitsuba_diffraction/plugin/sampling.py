@@ -7,6 +7,10 @@ For one wavelength the density of ωo per solid angle is
 with p₀ the power of order 0 towards the mirror direction and P as in `tables.proposals`. Dispersion
 is dealt with by drawing for one wavelength and using the mean of all wavelengths' densities. A
 little of the cosine density bounds the weights where the tables promise no light.
+
+Near the horizon that density vanishes with cosθo while the raw BRDF times cosθo does not, so that
+weights would have no bound. Meanwhile frequencies just beyond the horizon belong to no direction.
+`fold` turns these into directions near the horizon, with the Jacobian ½ instead of cosθo.
 """
 
 from __future__ import annotations
@@ -51,7 +55,7 @@ class OrderSampler:
         self._occupied = upload(mi.Float, found.occupied.astype("float32"))
         self._bands_per_kappa = BANDS / (BANDED * table.expansion.kappa_max)
 
-    def order_0_share(self, k: Any, cos_i: Any, height_scale: Any) -> tuple[Any, Any]:
+    def strategy(self, k: Any, cos_i: Any, height_scale: Any) -> tuple[Any, Any]:
         """Share of the samples that order 0 gets, and the band of the other orders."""
         band = mi.UInt32(
             index_between(
@@ -59,12 +63,12 @@ class OrderSampler:
             )
         )
         power = self._device.order_0(2.0 * k * height_scale * cos_i)
-        share = dr.clip(power, LEAST_SHARE, 1.0 - LEAST_SHARE)
-        return dr.select(read(mi.Float, self._occupied, band) > 0.0, share, 1.0), band
+        return dr.select(
+            read(mi.Float, self._occupied, band) > 0.0, order_0_share(power, cos_i), 1.0
+        ), band
 
-    def density(self, qx: Any, qy: Any, k: Any, cos_i: Any, cos_o: Any, height_scale: Any) -> Any:
-        """Density per solid angle of drawing the frequency (qx, qy) for wavenumber k."""
-        share, band = self.order_0_share(k, cos_i, height_scale)
+    def density(self, qx: Any, qy: Any, share: Any, band: Any) -> Any:
+        """Density of drawing the frequency (qx, qy), per (rad/µm)²."""
         variance = self._sigma**2
         glossy = variance / dr.pi * dr.exp(-variance * (dr.square(qx) + dr.square(qy)))
         x = (qx - self._origin[0]) * (1.0 / self._cell)
@@ -75,11 +79,11 @@ class OrderSampler:
             self._column_sums, (band * self._rows + row) * (self._columns + 1) + column
         )
         cell = dr.select(inside, cell * (1.0 / self._cell**2), 0.0)
-        return dr.lerp(cell, glossy, share) * dr.square(k) * cos_o
+        return dr.lerp(cell, glossy, share)
 
     def draw(self, k: Any, cos_i: Any, height_scale: Any, sample1: Any, sample2: Any) -> Any:
         """A frequency (mi.Vector2f, rad/µm) for wavenumber k from three uniform numbers."""
-        share, band = self.order_0_share(k, cos_i, height_scale)
+        share, band = self.strategy(k, cos_i, height_scale)
         sample2 = dr.minimum(sample2, BELOW_ONE)
         glossy = mi.warp.square_to_std_normal(sample2) * (1.0 / (self._sigma * dr.sqrt(2.0)))
         start = band * (self._rows + 1)
@@ -92,6 +96,40 @@ class OrderSampler:
 
     def _difference(self, sums: Any, index: Any) -> Any:
         return read(mi.Float, sums, index + 1) - read(mi.Float, sums, index)
+
+
+def order_0_share(power: Any, cos_i: Any) -> Any:
+    """Share of the samples for order 0, from its share of the power towards the mirror direction.
+
+    Other directions see a larger κ, towards the normal (1 + cosθi)/(2 cosθi) times as large, and
+    the orders of a gentle surface grow with its square. But not all light goes there: the square
+    root of that growth is between the two, and it is the share of least variance.
+    """
+    others = (1.0 - power) * (1.0 + cos_i)
+    share = power * dr.rcp(dr.fma(0.5 * dr.rcp(dr.maximum(cos_i, 1e-4)), others, power))
+    return dr.clip(share, LEAST_SHARE, 1.0 - LEAST_SHARE)
+
+
+def fold(tangential: Any) -> Any:
+    """A unit vector from its tangential part; one from beyond the horizon is laid near it.
+
+    Beyond the horizon, ρ² = |tangential|² > 1, the direction has the same azimuth and
+    cosθ = ρ² − 1, so that dω = dcosθ dφ = 2 ρ dρ dφ. From ρ² = 2 on there is none: z is −1.
+    """
+    squared = dr.squared_norm(tangential)
+    beyond = squared > 1.0
+    cos = dr.select(beyond, squared - 1.0, dr.safe_sqrt(1.0 - squared))
+    scale = dr.select(beyond, dr.safe_sqrt(1.0 - dr.square(cos)) * dr.rsqrt(squared), 1.0)
+    return mi.Vector3f(
+        tangential.x * scale, tangential.y * scale, dr.select(squared < 2.0, cos, -1.0)
+    )
+
+
+def unfolded(direction: Any) -> Any:
+    """The tangential part beyond the horizon that `fold` makes this direction of."""
+    sin_squared = dr.maximum(1.0 - dr.square(direction.z), _SMALLEST)
+    scale = dr.sqrt((1.0 + direction.z) * dr.rcp(sin_squared))
+    return mi.Vector2f(direction.x * scale, direction.y * scale)
 
 
 def invert(sums: Any, start: Any, count: Any, most: int, sample: Any) -> tuple[Any, Any]:
