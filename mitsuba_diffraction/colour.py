@@ -65,6 +65,33 @@ def encode_srgb(linear: ArrayLike) -> NDArray[np.float64]:
     return np.asarray(colour.cctf_encoding(np.clip(linear, 0.0, 1.0), function="sRGB"))
 
 
+def delta_e(
+    reference: ArrayLike, other: ArrayLike, *, exposure: float | None = None
+) -> NDArray[np.float64]:
+    """ΔE2000 between what a display shows of two pictures; NaN where there is next to no light.
+
+    Parameters
+    ----------
+    reference, other : linear sRGB, shape (..., 3).
+    exposure : factor on both; by default the one that makes the reference's 95th percentile of
+        Y white. Then both are clipped to what the display shows; pixels of the reference with Y
+        of at most 0.01 do not count.
+    """
+    import colour
+
+    first, second = (np.asarray(image, np.float64) for image in (reference, other))
+    to_xyz = np.linalg.inv(linear_srgb(np.eye(3)))
+    luminance = first @ to_xyz[:, 1]
+    if exposure is None:
+        white = np.percentile(luminance, 95.0)
+        exposure = 1.0 / white if white > 0.0 else 1.0
+    lab = [
+        colour.XYZ_to_Lab(np.clip(exposure * image, 0.0, 1.0) @ to_xyz) for image in (first, second)
+    ]
+    difference = np.asarray(colour.delta_E(*lab, method="CIE 2000"))
+    return np.where(exposure * luminance > 0.01, difference, np.nan)
+
+
 @functools.cache
 def _responses(illuminant: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Wavelengths (n,) in nm and responses (n, 3) in 1/nm."""

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.colour import ILLUMINANTS, encode_srgb, linear_srgb, response
+from mitsuba_diffraction.colour import (
+    ILLUMINANTS,
+    delta_e,
+    encode_srgb,
+    linear_srgb,
+    response,
+)
 
 EVERY_NM = np.arange(360.0, 831.0)
 
@@ -50,3 +56,28 @@ def test_the_transfer_curve_is_that_of_srgb():
 def test_an_unknown_illuminant_is_refused():
     with pytest.raises(DiffractionError, match=r"illuminant='A' is unknown; choose one of D65, E"):
         response(500.0, "A")
+
+
+def test_the_difference_of_greys_is_that_of_their_lightness():
+    # ΔE2000 without chroma: ΔL'/S_L (Sharma, Wu and Dalal 2005, eqs. 8 and 15); L* as in CIE 15
+    y = np.array([0.3, 0.4])
+    lightness = 116.0 * np.cbrt(y) - 16.0
+    off = (lightness.mean() - 50.0) ** 2
+    expected = np.diff(lightness)[0] / (1.0 + 0.015 * off / np.sqrt(20.0 + off))
+    found = delta_e([[y[0]] * 3], [[y[1]] * 3], exposure=1.0)
+    assert found[0] == pytest.approx(expected, rel=2e-3)  # sRGB's published matrix has four digits
+
+
+def test_what_is_dark_or_clipped_does_not_count():
+    reference = np.array([[0.001] * 3, [1.0] * 3, [5.0, 5.0, 5.0]])
+    other = np.array([[0.009] * 3, [1.0] * 3, [9.0, 7.0, 8.0]])
+    found = delta_e(reference, other, exposure=1.0)
+    assert np.isnan(found[0])
+    np.testing.assert_allclose(found[1:], 0.0, atol=1e-9)
+
+
+def test_the_exposure_shows_the_95th_percentile_as_white():
+    reference = np.linspace(0.0, 200.0, 101)[:, None] * np.ones(3)
+    assert np.nanmax(delta_e(reference, 1.02 * reference)) > 0.2
+    # above the percentile both are white
+    np.testing.assert_allclose(delta_e(reference, 1.02 * reference)[-5:], 0.0, atol=1e-9)

@@ -53,9 +53,7 @@ class Colours:
     ) -> Any:
         """See `Wavelengths.density`."""
         strategy = self._strategy(cos_i, height_scale)
-        return dr.fma(
-            self._density(uv, *strategy), cos_o, 0.5 * self._density(folded, *strategy)
-        )
+        return dr.fma(self._density(uv, *strategy), cos_o, 0.5 * self._density(folded, *strategy))
 
     def _density(self, uv: Any, share: Any, band: Any) -> Any:
         """Density of `draw` per du dv."""

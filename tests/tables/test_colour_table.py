@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionTable, DiffractionWarning, HeightField, gratings
-from mitsuba_diffraction.colour import linear_srgb, response
+from mitsuba_diffraction.colour import delta_e, linear_srgb, response
 from mitsuba_diffraction.files.cache import cached_colours
 from mitsuba_diffraction.files.colour_npz import load_colours, save_colours
 from mitsuba_diffraction.tables import colour_table
@@ -91,8 +91,6 @@ def test_spectral_colours_stay_outside_the_displays_gamut() -> None:
 
 
 def test_the_map_of_a_patch_has_the_spectral_colours() -> None:
-    import colour
-
     table = DiffractionTable.build(rough_patch((48, 48), (0.25, 0.25), 0.3), coherence_width=WIDTH)
     x = np.linspace(-0.97, 0.97, 41)
     x, y = (a.ravel() for a in np.meshgrid(x, x))
@@ -101,14 +99,9 @@ def test_the_map_of_a_patch_has_the_spectral_colours() -> None:
     w = 1.0 + cos_o  # light from the normal
     factor = ((1.0 + cos_o) / w) ** 2 / cos_o
     truth, found = integral(table, x, y, w), ColourTable.build(table).colour(x, y, w)
-    to_xyz = np.linalg.inv(linear_srgb(np.eye(3)))
-    exposure = 1.0 / np.percentile(factor * (truth @ to_xyz)[:, 1], 95)
-    lit = exposure * factor * (truth @ to_xyz)[:, 1] > 0.01
-    lab = [
-        colour.XYZ_to_Lab(np.clip(exposure * factor[:, None] * rgb, 0.0, 1.0) @ to_xyz)[lit]
-        for rgb in (truth, found)
-    ]
-    difference = colour.delta_E(*lab, method="CIE 2000")
+    difference = delta_e(factor[:, None] * truth, factor[:, None] * found)
+    difference = difference[np.isfinite(difference)]
+    assert difference.size > 400
     assert difference.mean() <= 1.0
     assert np.percentile(difference, 99) <= 3.0
 
