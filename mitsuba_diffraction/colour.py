@@ -85,10 +85,8 @@ def delta_e(
     if exposure is None:
         white = np.percentile(luminance, 95.0)
         exposure = 1.0 / white if white > 0.0 else 1.0
-    lab = [
-        colour.XYZ_to_Lab(np.clip(exposure * image, 0.0, 1.0) @ to_xyz) for image in (first, second)
-    ]
-    difference = np.asarray(colour.delta_E(*lab, method="CIE 2000"))
+    lab = [colour.XYZ_to_Lab(np.clip(exposure * a, 0.0, 1.0) @ to_xyz) for a in (first, second)]
+    difference = np.asarray(colour.delta_E(lab[0], lab[1], method="CIE 2000"))
     return np.where(exposure * luminance > 0.01, difference, np.nan)
 
 

@@ -13,7 +13,7 @@ import mitsuba as mi
 
 from .. import gratings
 from ..errors import DiffractionWarning
-from ..plugin.lookup import DeviceTable
+from ..plugin.lookup import DeviceTable, device_table
 from ..tables.table import DiffractionTable
 from .documents import TermImages
 from .plan import PIXEL, SEED, Plan
@@ -125,11 +125,13 @@ class Queries:
         return cls(si, wo, sample1, sample2)
 
 
-def bare_gathers(device: DeviceTable, queries: Queries) -> Callable[[], Any]:
+def bare_gathers(table: DiffractionTable, queries: Queries) -> Callable[[], Any]:
     """All packets that `eval` reads for these queries, added up: the floor beneath any look-up.
 
     Where they are is found out beforehand.
     """
+    device = device_table(table)
+    assert isinstance(device, DeviceTable)  # only scalar variants have another
     si, total = queries.si, queries.si.wi + queries.wo
     firsts = []
     for n in range(len(si.wavelengths)):

@@ -9,7 +9,6 @@ from typing import Any
 
 import mitsuba as mi
 
-from ..plugin.lookup import device_table
 from .contenders import (
     ALUMINIUM,
     DEFAULT,
@@ -44,7 +43,7 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
         lanes[name] = len(asked.sample1)
         calls[name] = partial(bsdf.eval, context, asked.si, asked.wo)
         if name == DEFAULT:
-            calls[FLOOR] = bare_gathers(device_table(bsdf.table), queries[False])
+            calls[FLOOR] = bare_gathers(bsdf.table, queries[False])
             lanes[FLOOR] = lanes[name]
     times = _nanoseconds(plan, calls, lanes, "eval", progress)
     to_rough = ratio(times[DEFAULT], times[ALUMINIUM])

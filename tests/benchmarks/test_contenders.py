@@ -18,7 +18,6 @@ from mitsuba_diffraction.benchmarks.contenders import (
 )
 from mitsuba_diffraction.benchmarks.plan import Plan
 from mitsuba_diffraction.geometry import wavenumber
-from mitsuba_diffraction.plugin.lookup import device_table
 from mitsuba_diffraction.tables.window import base_bin, first_tap
 
 
@@ -60,7 +59,7 @@ def test_bare_gathers_read_what_a_look_up_reads(makers, queries):
             for i in range(table.grid.taps[0]):
                 bins = table.coefficients[interval, row + j, column + i].astype(float)
                 expected += bins.sum(axis=(1, 2))
-    gathered = np.array(bare_gathers(device_table(table), queries)())
+    gathered = np.array(bare_gathers(table, queries)())
     off = np.abs(gathered - expected) > 1e-5 * np.abs(expected).max()
     # in single precision a few of the 4 × 500 look-ups fall into the neighbouring bin
     assert off.mean() < 0.01
