@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,9 @@ from .window import base_bin, first_tap
 
 if TYPE_CHECKING:
     from .table import DiffractionTable
+
+#: A bin's weight by its distance in bins, element by element.
+Kernel = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 _CHUNK = 1 << 14  # look-ups at a time: (chunk × terms) floats stay in cache
 
@@ -49,41 +53,69 @@ def _window_sum(
     qy: NDArray[np.float64],
     kappa: NDArray[np.float64],
 ) -> NDArray[np.float64]:
+    grid = table.grid
+    kernels = (_gaussian(grid.exponents[0]), _gaussian(grid.exponents[1]))
+    summed = weighted_sum(table, qx, qy, kappa, kernels, grid.taps)
+    result = np.sum(summed**2, axis=1) if grid.coherent else np.maximum(summed[:, 0], 0.0)
+    return np.where(table.covers(qx, qy, kappa), result, np.nan)
+
+
+def weighted_sum(
+    table: DiffractionTable,
+    qx: NDArray[np.float64],
+    qy: NDArray[np.float64],
+    kappa: NDArray[np.float64],
+    kernels: tuple[Kernel, Kernel],
+    taps: tuple[int, int],
+) -> NDArray[np.float64]:
+    """Σ_j of the series at κ times kernel_x(x − j_x)·kernel_y(y − j_y), with x = qx/dqx in bins.
+
+    Only the `taps` bins nearest to (x, y) are read, besides order 0, which is never left out.
+
+    Parameters
+    ----------
+    qx, qy, kappa : (n,), rad/µm, within what the table covers.
+    kernels : weight of a bin by its distance in bins, along x and y.
+    taps : bins to read along x and y; at most as many as the table was built for.
+
+    Returns
+    -------
+    (n, components): for `patch` the real and imaginary part of an amplitude, for `ensemble` a power
+    (components 1), also where the table stores amplitudes: these are squared first.
+    """
     grid, expansion = table.grid, table.expansion
     interval = expansion.interval(kappa)
     weights = expansion.weights(kappa)
     scaled = weights / table.scale
     x, y = qx / table.spacing[0], qy / table.spacing[1]
-    column, weight_x = _taps(x, grid.last[0], grid.taps[0], grid.exponents[0])
-    row, weight_y = _taps(y, grid.last[1], grid.taps[1], grid.exponents[1])
+    column, weight_x = _taps(x, grid.last[0], taps[0], kernels[0])
+    row, weight_y = _taps(y, grid.last[1], taps[1], kernels[1])
     incoherent_amplitudes = expansion.kind == "amplitude" and not grid.coherent
+
+    def squared(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.sum(values**2, axis=1, keepdims=True) if incoherent_amplitudes else values
 
     centre = np.einsum("npt,nt->np", table.order_0[interval].astype(float), weights)
     centre[:, 0] += expansion.specular(interval)
-    total = np.zeros_like(centre)
-    for j in range(grid.taps[1]):
-        for i in range(grid.taps[0]):
+    total = squared(centre) * (kernels[0](x) * kernels[1](y))[:, None]
+    for j in range(taps[1]):
+        for i in range(taps[0]):
             packet = table.coefficients[interval, row + j, column + i].astype(float)
-            value = np.einsum("npt,nt->np", packet, scaled)
-            if incoherent_amplitudes:
-                value = np.sum(value**2, axis=1, keepdims=True)
+            value = squared(np.einsum("npt,nt->np", packet, scaled))
             total += (weight_x[:, i] * weight_y[:, j])[:, None] * value
-    lobe = np.exp(-grid.exponents[0] * x * x - grid.exponents[1] * y * y)
-    if grid.coherent:
-        result = np.sum((total + centre * lobe[:, None]) ** 2, axis=1)
-    elif incoherent_amplitudes:
-        result = total[:, 0] + lobe * np.sum(centre**2, axis=1)
-    else:
-        result = np.maximum(total[:, 0] + lobe * centre[:, 0], 0.0)
-    return np.where(table.covers(qx, qy, kappa), result, np.nan)
+    return total
+
+
+def _gaussian(exponent: float) -> Kernel:
+    return lambda distance: np.exp(-exponent * distance**2)
 
 
 def _taps(
-    position: NDArray[np.float64], last: int, taps: int, exponent: float
+    position: NDArray[np.float64], last: int, taps: int, kernel: Kernel
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Array index of the first tap (n,), and the weights of all (n, taps)."""
     first = base_bin(position, taps) + first_tap(taps)
     distance = position[:, None] - (first[:, None] + np.arange(taps))
     # Frequencies beyond the bins see the zeros at the margin, which is as wide as the taps
     index = np.clip(first.astype(np.int64) + last, 0, 2 * last + 1 - taps)
-    return index, np.exp(-exponent * distance**2)
+    return index, kernel(distance)
