@@ -23,6 +23,7 @@ from scipy import ndimage, sparse
 from ..colour import linear_srgb, response
 from .expansion import Expansion
 from .polar import RESOLVED_RADIUS, PolarGrid
+from .powers import order_0_power, power_expansion, powers_of
 from .table import DiffractionTable
 from .window import base_bin, first_tap
 
@@ -41,14 +42,6 @@ def lobe_of(table: DiffractionTable) -> float:
     """
     width = 0.44 / (2 * math.pi * math.sqrt(2.0) * table.sigma)
     return 0.5 * width if table.grid.coherent else width
-
-
-def kind_of(table: DiffractionTable) -> str:
-    """How all orders but order 0 fade as κ → 0, by the kind of series that does the same.
-
-    A power fades as κ²; in a coherent sum an amplitude beats with order 0's, and fades as κ.
-    """
-    return "amplitude" if table.grid.coherent else "power"
 
 
 def wavelength_weights(step: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -76,7 +69,7 @@ def order_0_colour(
     """RGB of order 0 alone at these radii (n,) and z (m,), shape (n, m, 3), 1/µm²."""
     lam, weights = wavelength_weights(0.5 * lobe_of(table) / 2.0)
     kappa = np.minimum(2 * np.pi * z[:, None] / lam, table.expansion.kappa_max)
-    power = _order_0_power(table, kappa)
+    power = order_0_power(table, kappa)
     lobe = np.exp(-((table.sigma * 2 * np.pi * radii[:, None] / lam) ** 2))
     return np.einsum("nl,ml,lc->nmc", lobe, power, weights / lam[:, None] ** 2, optimize=True)
 
@@ -187,9 +180,9 @@ class _Source:
         self.expansion = table.expansion
         coefficients = table.coefficients
         if table.expansion.kind == "amplitude":
-            self.expansion = _power_expansion(table)
+            self.expansion = power_expansion(table)
         if table.expansion.kind == "amplitude" and not table.grid.coherent:
-            powers = _powers(coefficients.astype(np.float32), table.expansion, self.expansion)
+            powers = powers_of(coefficients.astype(np.float32), table.expansion, self.expansion)
             self._scale = table.scale**2
             self._bins = _flat(powers[:, :, :, None])
         else:
@@ -306,40 +299,3 @@ def _cubic(offset: NDArray[np.float64]) -> NDArray[np.float64]:
         ],
         axis=1,
     )
-
-
-def _power_expansion(table: DiffractionTable) -> Expansion:
-    """A series of the power for a table of amplitudes: the power oscillates twice as fast."""
-    amplitude = table.expansion
-    intervals = max(1, math.ceil(amplitude.kappa_max * amplitude.half_range / 4.0))
-    return Expansion(
-        "chebyshev", kind_of(table), 12, intervals, amplitude.kappa_max, amplitude.half_range
-    )
-
-
-def _powers(
-    coefficients: NDArray[np.float32], old: Expansion, new: Expansion
-) -> NDArray[np.float32]:
-    """Series of |a_j|², (intervals, ny, nx, terms), from one of a_j; order 0 is zero in both."""
-    ny, nx = coefficients.shape[1:3]
-    result = np.empty((new.intervals, ny, nx, new.terms), np.float32)
-    for interval in range(new.intervals):
-        values = np.empty((ny, nx, new.terms), np.float32)
-        for n, kappa in enumerate(new.nodes(interval)):
-            parts = coefficients[int(old.interval(kappa))] @ old.weights(kappa).astype(np.float32)
-            values[..., n] = (parts**2).sum(axis=2)
-        result[interval] = values @ new.fit(interval).astype(np.float32)
-    return result
-
-
-def _order_0_power(table: DiffractionTable, kappa: NDArray[np.float64]) -> NDArray[np.float64]:
-    """|a_0(κ)|², the shape of κ."""
-    expansion = table.expansion
-    interval = expansion.interval(kappa)
-    series = np.einsum(
-        "...pt,...t->...p", table.order_0[interval].astype(float), expansion.weights(kappa)
-    )
-    series[..., 0] += expansion.specular(interval)
-    if expansion.kind == "power":
-        return np.asarray(np.maximum(series[..., 0], 0.0))
-    return np.asarray(np.sum(series**2, axis=-1))

@@ -23,9 +23,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionWarning
-from .colour_build import VISIBLE, OtherOrders, kind_of, lobe_of, order_0_colour
+from .colour_build import VISIBLE, OtherOrders, lobe_of, order_0_colour
 from .expansion import Expansion
 from .polar import PolarGrid
+from .powers import kind_of
 from .table import DiffractionTable
 
 #: Raised whenever the same diffraction table would make another colour table.

@@ -1,0 +1,152 @@
+// `spectral`: a loop over wavelengths through the table of powers, lit by the light's own spectrum.
+//
+// Light along (u, v) probes the orders q on the ray k (u, v). With F(k) the light's response times
+// an order's power at κ = k z, what is wanted is ∫ Σ_j exp(−σ²|k (u, v) − q_j|²) F_j(k) dk.
+// Far from the specular direction lobes are narrow in k, and the loop steps from order to order along
+// the ray: ∫ = exp(−σ² q⊥²) √π/(σr) · mean of F_j over the lobe, q⊥ the order's distance from the ray,
+// and two points at one standard deviation give that mean to third order. Close to the specular
+// direction lobes are wide, and the loop steps in k.
+
+uniform sampler2D orders;        // TEXELS texels an order: terms of its series in κ
+uniform sampler2D order_zero;    // the same of order 0, per interval
+uniform sampler2D responses;     // linear sRGB / 2π over k, one row per light
+uniform ivec2 last_order;        // orders run from −last to last
+uniform vec2 spacing;            // of orders, rad/µm
+uniform float sigma;
+uniform float interval_length;
+uniform int intervals;
+uniform float inverse_scale;
+
+const float REACH = 2.6;         // of the window, in 1/σ: erfc(2.6) = 2e-4 is left out
+const float WIDEST_LOBE = 0.25;  // rad/µm, 12 nm in the green
+const float NARROW_LOBE = 0.08;  // rad/µm, 4 nm in the green
+const float LARGEST_STEP = 0.15; // rad/µm, for the eye's curves
+
+int interval_of(float kappa)
+{
+    return int(clamp(floor(kappa / interval_length), 0.0, float(intervals - 1)));
+}
+
+void series(float kappa, int interval, out vec4 weights[TEXELS])
+{
+    float offset = kappa / interval_length - float(interval);
+    float t = clamp(2.0 * offset - 1.0, -1.0, 1.0);
+    float a = interval == 0 ? offset * offset : 1.0;  // powers fade as κ²
+    float b = a * t;
+    for (int n = 0; n < TEXELS; ++n) {
+        float c = 2.0 * t * b - a;
+        float d = 2.0 * t * c - b;
+        weights[n] = vec4(a, b, c, d);
+        a = 2.0 * t * d - c;
+        b = 2.0 * t * a - d;
+    }
+}
+
+int first_texel(int interval, ivec2 order)
+{
+    ivec2 size = 2 * last_order + 1;
+    ivec2 place = order + last_order;
+    return ((interval * size.y + place.y) * size.x + place.x) * TEXELS;
+}
+
+vec3 response(float k, int light)
+{
+    float last = float(textureSize(responses, 0).x - 1);
+    float x = (k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x) * last + 0.5;
+    return texelFetch(responses, ivec2(int(clamp(x, 0.0, last)), light), 0).rgb;  // 0 at both ends
+}
+
+vec3 from_order_to_order(vec2 uv, float r, float z, float cos_half, int light)
+{
+    vec2 rate = uv / spacing;  // orders per rad/µm along either axis
+    bool steep = abs(rate.y) > abs(rate.x);
+    // along the axis that is crossed faster, and across
+    vec2 rates = steep ? rate.yx : rate;
+    vec2 steps = steep ? spacing.yx : spacing;
+    vec2 direction = (steep ? uv.yx : uv) / r;
+    ivec2 last = steep ? last_order.yx : last_order;
+
+    float reach = REACH / (sigma * steps.y * abs(direction.x));      // orders, across
+    float shift = direction.y * steps.y / r;                         // of k per order across
+    float margin = reach * abs(shift);
+    vec2 ends = rates.x * vec2(wavenumbers.x - margin, wavenumbers.y + margin);
+    int first = max(int(ceil(min(ends.x, ends.y))), -last.x);
+    int end = min(int(floor(max(ends.x, ends.y))), last.x);
+    float falloff = sigma * steps.y * direction.x;
+
+    // narrow lobes need no mean
+    float deviation = sqrt(0.5) / (sigma * r);
+    int points = deviation > NARROW_LOBE ? 2 : 1;
+    float aside = points == 2 ? deviation : 0.0;
+
+    vec3 sum = vec3(0.0);
+    vec4 weights[TEXELS];
+    for (int point = 0; point < points; ++point) {
+        for (int n = first; n <= end; ++n) {
+            float k_n = float(n) / rates.x;
+            float centre = k_n * rates.y;
+            float k_point = k_n + (point == 0 ? aside : -aside);
+            // κ of the tap on the ray: those on either side differ by the same, one way and the other
+            int interval = interval_of(k_n * z);
+            series(k_point * z, interval, weights);
+            int low = max(int(ceil(centre - reach)), -last.y);
+            int high = min(int(floor(centre + reach)), last.y);
+            for (int m = low; m <= high; ++m) {
+                float across = float(m) - centre;
+                int texel = first_texel(interval, steep ? ivec2(m, n) : ivec2(n, m));
+                float power = 0.0;
+                for (int i = 0; i < TEXELS; ++i) power += dot(entry(orders, texel + i), weights[i]);
+                float apart = falloff * across;
+                float k = k_point + across * shift;
+                sum += exp(-apart * apart) * power * reflectance_at(cos_half, k) * response(k, light);
+            }
+        }
+    }
+    return sum * (inverse_scale * sqrt(PI) / (sigma * r * float(points)));
+}
+
+vec3 from_wavelength_to_wavelength(vec2 uv, float r, float z, float cos_half, int light)
+{
+    float deviation = sqrt(0.5) / (sigma * max(r, 1e-6));
+    int count = int(ceil((wavenumbers.y - wavenumbers.x) / min(LARGEST_STEP, 1.5 * deviation)));
+    float delta = (wavenumbers.y - wavenumbers.x) / float(count);
+    vec2 reach = REACH / (sigma * spacing);
+    vec2 falloff = sigma * spacing;
+    vec3 sum = vec3(0.0);
+    vec4 weights[TEXELS];
+    for (int n = 0; n < count; ++n) {
+        float k = wavenumbers.x + (float(n) + 0.5) * delta;
+        int interval = interval_of(k * z);
+        series(k * z, interval, weights);
+        vec2 place = k * uv / spacing;
+        ivec2 low = max(ivec2(ceil(place - reach)), -last_order);
+        ivec2 high = min(ivec2(floor(place + reach)), last_order);
+        float power = 0.0;
+        for (int y = low.y; y <= high.y; ++y) {
+            for (int x = low.x; x <= high.x; ++x) {
+                vec2 apart = falloff * (vec2(x, y) - place);
+                int texel = first_texel(interval, ivec2(x, y));
+                float value = 0.0;
+                for (int i = 0; i < TEXELS; ++i) value += dot(entry(orders, texel + i), weights[i]);
+                power += exp(-dot(apart, apart)) * value;
+            }
+        }
+        power *= inverse_scale;
+        float specular = interval == 0 ? 1.0 : 0.0;
+        for (int i = 0; i < TEXELS; ++i)
+            specular += dot(entry(order_zero, interval * TEXELS + i), weights[i]);
+        float apart = sigma * k * r;
+        power += exp(-apart * apart) * specular;
+        sum += power * reflectance_at(cos_half, k) * response(k, light);
+    }
+    return sum * delta;
+}
+
+// R ⟨|P|²⟩ / (4π²σ⁴ λ²) over the light's wavelengths, linear sRGB, 1/µm².
+vec3 diffracted(vec2 uv, float z, float cos_half, int light)
+{
+    float r = length(uv);
+    if (r * sigma * WIDEST_LOBE > sqrt(0.5))
+        return from_order_to_order(uv, r, z, cos_half, light);
+    return from_wavelength_to_wavelength(uv, r, z, cos_half, light);
+}
