@@ -57,23 +57,42 @@ def bsdf(name: str, **parameters):
     return mi.load_dict(md.bsdf_dict(field(), **own, **{"material": "none", **parameters}))
 
 
-def furnace(surface, angles=ANGLES, azimuths=AZIMUTHS) -> tuple[np.ndarray, np.ndarray]:
+def white_pair(name: str, **parameters):
+    """A dielectric over a white base."""
+    white = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 1.0}}
+    field, own = SURFACES[name]
+    return mi.load_dict(md.bsdf_dict(field(), **own, beneath=white, **parameters))
+
+
+def furnace(surface, angles=ANGLES, azimuths=AZIMUTHS, seed=0) -> tuple[np.ndarray, np.ndarray]:
     """Albedo (4, directions) at four wavelengths for each direction, and its standard error."""
     directions = np.array([polar(theta, phi) for theta in angles for phi in azimuths])
+    return furnace_in(surface, directions, seed)
+
+
+def furnace_in(surface, directions: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """The same for directions (n, 3)."""
     count = len(directions)
     si = dr.zeros(mi.SurfaceInteraction3f, count * SAMPLES)
     si.wi = mi.Vector3f(np.repeat(directions, SAMPLES, axis=0).astype(np.float32).T)
-    wavelengths = np.random.default_rng(0).uniform(360.0, 830.0, (4, count))
+    wavelengths = np.random.default_rng(seed).uniform(360.0, 830.0, (4, count))
     si.wavelengths = mi.Spectrum(np.repeat(wavelengths, SAMPLES, axis=1).astype(np.float32))
-    rng = mi.PCG32(count * SAMPLES)
+    rng = mi.PCG32(count * SAMPLES, seed)
     sample1, sample2 = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
     weights = np.array(surface.sample(mi.BSDFContext(), si, sample1, sample2)[1])
     weights = weights.reshape(4, count, SAMPLES)
     return weights.mean(axis=2), weights.std(axis=2) / np.sqrt(SAMPLES)
 
 
-def assert_at_most_white(surface) -> None:
-    mean, error = furnace(surface)
+def assert_at_most_white(surface, seed: int | None = None) -> None:
+    """At fixed directions, or with a seed at random ones."""
+    if seed is None:
+        mean, error = furnace(surface)
+    else:
+        rng = np.random.default_rng(seed)
+        theta, phi = rng.uniform(0.0, 89.5, 40), rng.uniform(0.0, 360.0, 40)
+        directions = np.array([polar(t, p) for t, p in zip(theta, phi, strict=True)])
+        mean, error = furnace_in(surface, directions, seed)
     # four standard errors, for 160 trials a surface; 1e-3 for the table's own tolerance
     excess = mean - (1.0 + 4.0 * error + 1e-3)
     assert np.all(excess <= 0.0), f"albedo up to {mean.max()}, {excess.max()} too much"
@@ -86,9 +105,27 @@ def test_white_furnace_of_the_diffraction_alone(name):
 
 @pytest.mark.parametrize("name", SURFACES)
 def test_white_furnace_over_a_white_base(name):
-    white = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 1.0}}
-    field, own = SURFACES[name]
-    assert_at_most_white(mi.load_dict(md.bsdf_dict(field(), **own, beneath=white)))
+    assert_at_most_white(white_pair(name))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("base", [False, True])
+@pytest.mark.parametrize("name", SURFACES)
+def test_white_furnace_at_random_directions(name, base, seed):
+    surface = white_pair(name, orientation=10.0 * seed) if base else bsdf(name)
+    assert_at_most_white(surface, seed)
+
+
+@pytest.mark.parametrize("base", [False, True])
+@pytest.mark.parametrize("name", ["sinusoid", "rough"])
+def test_white_furnace_in_its_own_shade(name, base):
+    load = white_pair if base else bsdf
+    assert_at_most_white(load(name, shadowing="vcavity"))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_reciprocity_of_a_surface_and_its_base(seed):
+    assert_reciprocal(white_pair("rough", orientation=20.0), seed)
 
 
 def test_the_raw_model_gains_energy():
@@ -108,7 +145,10 @@ def test_white_furnace_of_the_measured_patch(shared_afm):
 @pytest.mark.parametrize("shadowing", ["none", "vcavity"])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_reciprocity(name, shadowing, seed):
-    surface = bsdf(name, shadowing=shadowing, orientation=20.0)
+    assert_reciprocal(bsdf(name, shadowing=shadowing, orientation=20.0), seed)
+
+
+def assert_reciprocal(surface, seed: int) -> None:
     n = 4096
     rng = np.random.default_rng(seed)
     z, azimuth = rng.uniform(0.01, 1.0, (2, n)), rng.uniform(0.0, 2.0 * np.pi, (2, n))
