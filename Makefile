@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test bench figures lint clean help
+.PHONY: setup demo test bench figures evaluation lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -37,6 +37,9 @@ bench: setup  ## time tables and evaluation
 # a measured patch beside the look-alikes: make figures MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"
 figures: setup  ## make the pictures in docs/images
 	@$(PYTHON3) -m mitsuba_diffraction.figures -o docs/images $(if $(MEASURED),--measured $(MEASURED))
+
+evaluation: setup  ## make docs/evaluation.md: ridges, grating equation, fitted periods
+	@$(PYTHON3) -m mitsuba_diffraction.figures.evaluation -o docs/evaluation.md $(if $(MEASURED),--measured $(MEASURED))
 
 lint: setup  ## check style and types
 	@$(PYTHON3) -m ruff check

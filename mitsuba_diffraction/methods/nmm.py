@@ -39,7 +39,8 @@ class OrdersOnly(Method):
     ∫exp(−σ²(k·u − 2πn/d)²)dλ = λₙ²/(2√π·σ·|u|), the width in wavelength of the lobe that a perfect
     grating puts there; it is right where the lobe of one order does not reach the next.
 
-    Between orders, and wherever the surface is not periodic, light is missed.
+    Between orders, and wherever the surface is not periodic, light is missed: `brdf` and `relative`
+    are those of `flss` within half a step of a λₙ and around the mirror direction, and 0 elsewhere.
 
     Parameters
     ----------
@@ -73,8 +74,11 @@ class OrdersOnly(Method):
         self._step = float(np.diff(full.wavelengths).max())
 
     def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
-        """S as `flss` has it: at one wavelength the two are the same."""
-        return self.full.window_sum(wi, wo, wavelength)
+        """S as `flss` has it, at wavelengths that are taken, and 0 at others."""
+        taken = self._takes(wi, wo, wavelength)
+        result = np.zeros(len(wi))
+        result[taken] = self.full.window_sum(wi[taken], wo[taken], wavelength[taken])
+        return result
 
     def special(self, wi: Array, wo: Array) -> tuple[NDArray[np.bool_], float]:
         """White within ε of the mirror direction."""
@@ -94,6 +98,17 @@ class OrdersOnly(Method):
                 reached = (low <= wavelength) & (wavelength <= high)
                 wavelength = np.where(reached, wavelength, high)
                 yield wavelength, np.where(reached, self._width(wavelength, frequency), 0.0)
+
+    def _takes(self, wi: Array, wo: Array, wavelength: Array) -> NDArray[np.bool_]:
+        """Whether a λₙ is within half a step, or the pair is close to the mirror direction."""
+        u, v, _ = diffraction_coordinates(wi, wo)
+        taken = np.hypot(u, v) < self.specular
+        for period, frequency in zip(self.periods, (u, v), strict=True):
+            if period is not None:
+                path = 1e3 * period * np.abs(frequency)
+                nearest = np.maximum(np.round(path / wavelength), 1.0)
+                taken |= np.abs(path / nearest - wavelength) <= 0.5 * self._step
+        return taken
 
     def _width(self, wavelength: Array, frequency: Array) -> Array:
         """Δλ in nm."""

@@ -103,10 +103,10 @@ def _first_peak(axis: str, correlation: NDArray[np.float64], pixel: float) -> Pe
     half = r.size // 2
     valley = 1.0
     best = Period(axis, np.nan, 0.0)
-    for lag in range(1, half + 1):
+    for lag in range(1, half + 1):  # two periods of an odd number of pixels peak at half a lag more
         valley = min(valley, r[lag])
         before, after = r[lag - 1], r[(lag + 1) % r.size]
-        if not (r[lag] > before and r[lag] >= after):
+        if not (r[lag] > before and r[lag] >= after - 1e-12):
             continue
         rise = float(min(r[lag] - max(valley, 0.0), 1.0))
         if rise > best.confidence:

@@ -1,0 +1,233 @@
+"""`mitsuba-diffraction evaluate`: a monochromatic beam against the grating equation."""
+
+from __future__ import annotations
+
+import argparse
+import time
+import warnings
+from pathlib import Path
+from typing import Any
+
+from ..errors import DiffractionError, DiffractionWarning
+from .arguments import path_ending_in, whole_number
+from .heights_options import add_heights_options
+from .output import check_writable, same_file
+from .patch import load_patch
+from .precompute import COHERENCES
+from .progress import Bar
+
+# Written out so that --help need not load NumPy; a test holds them against the library.
+METHODS = ("default", "flss", "nmm", "pq", "pq-sinc", "rainbow")
+
+_WINDOWS = 32
+# Single windows are fitted at about so many wavelengths: the period needs no more.
+_FEW = 20
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the sub-command."""
+    parser = subparsers.add_parser(
+        "evaluate",
+        help="compare the angles of maxima with the grating equation",
+        description=(
+            "Put a patch under a monochromatic beam, follow the brightest viewing angle through "
+            "the spectrum, and fit the period of the grating equation to it. Writes a picture, and "
+            "the numbers as CSV (the ridge) and NPZ (everything) beside it."
+        ),
+    )
+    parser.add_argument(
+        "source", metavar="SOURCE", type=Path, help="heights of any format, or a recipe (.toml)"
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="OUT", type=path_ending_in(".png"),
+        help="picture; default: SOURCE's name with -evaluation.png in the current folder",
+    )  # fmt: skip
+    _add_beam_options(parser.add_argument_group("the beam"))
+    group = parser.add_argument_group("the model")
+    group.add_argument("--method", choices=METHODS, default="default", help="default: default")
+    group.add_argument(
+        "--coherence-width", metavar="W", type=float, help="µm, 4σ of the window; default: 65"
+    )
+    group.add_argument(
+        "--coherence", choices=COHERENCES,
+        help="default: ensemble for the default method, patch for those of the documents",
+    )  # fmt: skip
+    group.add_argument("--tolerance", metavar="E", type=float, help="of the tables; default: 1e-3")
+    group.add_argument("--terms", metavar="N", type=whole_number(1), help="of Taylor series")
+    group.add_argument(
+        "--windows", metavar="N", type=whole_number(0), default=_WINDOWS,
+        help="window positions whose own periods are fitted, for the spread; 0 leaves them out; "
+        f"default: {_WINDOWS}",
+    )  # fmt: skip
+    add_heights_options(parser)
+    parser.set_defaults(run=run, parser=parser)
+
+
+def _add_beam_options(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--theta", metavar="DEG", type=float, default=75.0,
+        help="angle of the light from the normal; default: 75",
+    )  # fmt: skip
+    group.add_argument(
+        "--phi", metavar="DEG", type=float, default=0.0,
+        help="azimuth of the light, from the patch's x axis towards y; default: 0",
+    )  # fmt: skip
+    group.add_argument(
+        "--wavelength-range", metavar=("LOW", "HIGH"), nargs=2, type=float, default=(380.0, 780.0),
+        help="nm; default: 380 780",
+    )  # fmt: skip
+    group.add_argument("--step", metavar="NM", type=float, default=5.0, help="default: 5")
+    group.add_argument(
+        "--angles", metavar=("LOW", "HIGH"), nargs=2, type=float,
+        help="viewing angles, degrees, positive on the light's side; default: from the mirror "
+        "direction to 80",
+    )  # fmt: skip
+    group.add_argument("--angle-step", metavar="DEG", type=float, default=0.1, help="default: 0.1")
+    group.add_argument(
+        "--order", metavar="M", type=int, default=1, help="order that is followed; default: 1"
+    )
+    group.add_argument(
+        "--period", metavar="D", type=float,
+        help="µm, for the grating equation and methods that need one; default: fitted",
+    )  # fmt: skip
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure, fit, draw, and return the exit code."""
+    import numpy as np
+
+    from ..evaluation import Beam, fit_period, measure, ridge_of
+    from ..evaluation.beam import check_axes
+    from ..evaluation.files import save_csv, save_npz
+    from ..evaluation.plot import figure
+    from ..files.atomic import atomic_path
+    from ..methods import make
+    from ..methods.full_spectrum import trapezoid_rule
+    from ..methods.period import check_period
+
+    start = time.perf_counter()
+    output = args.output or Path(f"{args.source.stem}-evaluation.png")
+    written = [output.with_suffix(suffix) for suffix in (".png", ".csv", ".npz")]
+    for path in written:
+        if same_file(path, args.source):
+            raise DiffractionError(
+                f"the evaluation would overwrite its own source '{path}'; name another with -o"
+            )
+        check_writable(path)
+    beam = Beam(args.theta, args.phi)
+    if args.period is not None:
+        check_period(args.period)
+    wavelengths = trapezoid_rule(tuple(args.wavelength_range), args.step)[0]
+    angles = viewing_angles(args.angles, args.angle_step, args.theta, args.order)
+    check_axes(wavelengths, angles)
+    patch, settings = load_patch(args)
+    settings |= {"wavelength_range": tuple(args.wavelength_range), "step": args.step}
+    with Bar(args) as bar, warnings.catch_warnings():
+        warnings.simplefilter("ignore", DiffractionWarning)
+        method = make(args.method, patch, period=args.period, progress=bar, **settings)
+        response = measure(
+            method.brdf, beam, wavelengths, angles, sigma=method.sigma, label=args.method,
+            progress=bar,
+        )  # fmt: skip
+        ridge = ridge_of(response, args.order)
+        fit = fit_period(ridge)
+        lines, more = _windows(args, patch, settings, beam, wavelengths, angles, bar)
+    period = fit.period if args.period is None else args.period
+    report = [_fitted(fit), *lines]
+    with atomic_path(written[0]) as path:
+        figure(
+            response, ridge, fit, period, order=args.order, title=patch.name,
+            notes="\n".join(f"{name}: {text}" for name, text in report),
+        ).savefig(path, format="png")  # fmt: skip
+    save_csv(written[1], response, ridge, period, args.order)
+    more |= {"fitted_period": fit.period, "residual": fit.residual, "coherence_width":
+             settings.get("coherence_width", 65.0), "source": str(args.source)}  # fmt: skip
+    save_npz(written[2], response, ridge, period, args.order, more)
+    print(
+        f"{', '.join(map(str, written))}: {patch.name}, method {args.method}, light at "
+        f"{args.theta:g}°, {wavelengths.size} wavelengths, {angles.size} angles, "
+        f"{time.perf_counter() - start:.1f} s"
+    )
+    if args.period is not None:
+        expected = beam.grating_angles(wavelengths, period, args.order)
+        apart = np.abs(ridge.angles - expected)
+        if np.isfinite(apart).any():
+            report.insert(1, ("given", f"{1e3 * period:.6g} nm, the ridge is within "
+                                       f"{np.nanmax(apart):.2g}° of it"))  # fmt: skip
+    for name, text in report:
+        print(f"  {name:<9} {text}")
+    return 0
+
+
+def viewing_angles(limits: Any, step: float, theta: float, order: int) -> Any:
+    """Viewing angles in degrees, (A,); by default from the mirror direction to the horizon's side.
+
+    Raises
+    ------
+    DiffractionError
+        If the range is empty or the step does not fit it.
+    """
+    import numpy as np
+
+    low, high = limits or ((-theta, 80.0) if order > 0 else (-80.0, -theta))
+    if not -90.0 < low < high < 90.0:
+        raise DiffractionError(
+            f"angles={low:g} to {high:g} degrees are none; give the lower first, both within -90 "
+            "and 90, e.g. -75 60"
+        )
+    if not 1e-3 <= step <= high - low:
+        raise DiffractionError(
+            f"angle-step={step:g} does not fit {low:g} to {high:g} degrees; it must be from 0.001 "
+            f"to {high - low:g}"
+        )
+    return np.linspace(low, high, round((high - low) / step) + 1)
+
+
+def _windows(
+    args: argparse.Namespace, patch: Any, settings: dict[str, Any], beam: Any, wavelengths: Any,
+    angles: Any, bar: Bar,
+) -> tuple[list[tuple[str, str]], dict[str, Any]]:  # fmt: skip
+    """What single windows show, and the documents' procedure: lines, and entries of the NPZ."""
+    if args.windows == 0:
+        return [], {}
+    from ..evaluation import documents_fit, window_fits
+    from ..methods import make
+
+    few = wavelengths[:: max(1, wavelengths.size // _FEW)]
+    # the look-up in the package's own series: a single window's amplitudes
+    single = {**settings, "coherence": "patch"}
+    table = make("default", patch, progress=bar, **single).table  # type: ignore[attr-defined]
+    lines: list[tuple[str, str]] = []
+    more: dict[str, Any] = {}
+    try:
+        found = window_fits(
+            table, beam, few, angles, count=args.windows, order=args.order, progress=bar
+        )
+    except DiffractionError as error:
+        lines.append(("windows", str(error)))
+    else:
+        periods = 1e3 * found.periods
+        more |= {"window_periods": found.periods, "window_places": found.places}
+        lines.append(
+            ("windows", f"{periods.size} of {args.windows} window positions: "
+             f"{1e3 * found.mean:.5g} ± {1e3 * found.spread:.2g} nm, {periods.min():.5g} to "
+             f"{periods.max():.5g} nm")
+        )  # fmt: skip
+    try:
+        as_documents = documents_fit(table, beam, wavelengths, angles, args.order)
+    except DiffractionError as error:
+        lines.append(("documents", f"their procedure finds none ({error})"))
+    else:
+        more["documents_period"] = as_documents.period
+        lines.append(
+            ("documents", f"{1e3 * as_documents.period:.5g} nm by their procedure (phase without "
+             "w, one window, on the corner)")
+        )  # fmt: skip
+    return lines, more
+
+
+def _fitted(fit: Any) -> tuple[str, str]:
+    return "fitted", (
+        f"{1e3 * fit.period:.6g} nm, residual {fit.residual:.2g}° RMS, {fit.largest:.2g}° at most, "
+        f"{fit.points} of {fit.wavelengths} wavelengths"
+    )

@@ -1,0 +1,84 @@
+"""Responses as pictures: wavelength along x, viewing angle along y (Matplotlib)."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+from .beam import Response
+from .ridge import Fit, Ridge
+
+#: The picture spans this many powers of ten below its brightest point.
+DECADES = 5.0
+# The source documents' colours: yellow is bright, green is dark; ridge red, grating equation blue.
+_MAP, _RIDGE, _GRATING = "viridis", "#e02020", "#3040ff"
+_DASHES = (0, (4, 3))
+
+
+def draw(
+    axes: Axes,
+    response: Response,
+    ridge: Ridge | None,
+    period: float | None,
+    order: int = 1,
+    *,
+    largest: float | None = None,
+) -> ScalarMappable:
+    """Draw a response, its ridge if there is one, and the grating equation for a period in µm.
+
+    Parameters
+    ----------
+    largest : 1/sr, brightest colour; by default the response's own maximum.
+
+    Returns
+    -------
+    What a colour bar needs.
+    """
+    largest = float(response.values.max()) if largest is None else largest
+    if not largest > 0.0:
+        largest = 1.0
+    norm = LogNorm(largest * 10**-DECADES, largest, clip=True)
+    shown = axes.pcolormesh(
+        response.wavelengths, response.angles, np.maximum(response.values.T, 1e-300),
+        norm=norm, cmap=_MAP, shading="nearest", rasterized=True,
+    )  # fmt: skip
+    if ridge is not None:
+        axes.plot(response.wavelengths, ridge.angles, color=_RIDGE, lw=1.8, label="ridge of maxima")
+    if period is not None:
+        expected = response.beam.grating_angles(response.wavelengths, period, order)
+        label = f"grating equation, {1e3 * period:.4g} nm"
+        axes.plot(
+            response.wavelengths, expected, color=_GRATING, lw=1.3, ls=(0, (4, 3)), label=label
+        )
+    if ridge is not None or period is not None:
+        axes.legend(fontsize=7, loc="lower right", framealpha=0.85)
+    axes.set_xlim(response.wavelengths[0], response.wavelengths[-1])
+    axes.set_ylim(response.angles[0], response.angles[-1])
+    return shown
+
+
+def figure(
+    response: Response, ridge: Ridge | None, fit: Fit | None, period: float | None, *,
+    order: int, title: str, notes: str,
+) -> Figure:  # fmt: skip
+    """One response with axes, units, both curves, and below them how far they are apart."""
+    result = Figure(figsize=(7.4, 7.2), dpi=110, layout="constrained")
+    FigureCanvasAgg(result)
+    upper, lower = result.subplots(2, 1, height_ratios=(4, 1), sharex=True)
+    shown = draw(upper, response, ridge, period, order)
+    result.colorbar(shown, ax=upper, label="angle-resolved scatter f·cos θₒ  [1/sr]")
+    upper.set_ylabel("viewing angle θₒ  [degrees, positive towards the light]")
+    upper.set_title(
+        f"{title}\nlight at θᵢ = {response.beam.theta:g}°; method {response.label}", fontsize=10
+    )
+    if ridge is not None and period is not None:
+        expected = response.beam.grating_angles(response.wavelengths, period, order)
+        lower.plot(response.wavelengths, ridge.angles - expected, color=_RIDGE, lw=1.2)
+    lower.axhline(0.0, color=_GRATING, lw=0.8, ls=_DASHES)
+    lower.set(xlabel="wavelength  [nm]", ylabel="ridge less grating\nequation  [degrees]")
+    result.supxlabel(notes, fontsize=8, x=0.02, ha="left")
+    return result

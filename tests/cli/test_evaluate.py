@@ -1,0 +1,92 @@
+"""`evaluate`: heights in, a picture and numbers out, or one line."""
+
+from __future__ import annotations
+
+import csv
+import os
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from mitsuba_diffraction.cli import evaluate
+from mitsuba_diffraction.methods import NAMES
+
+QUICK = [
+    "--pixel-size", "0.08", "--coherence-width", "12", "--step", "40", "--angle-step", "0.5",
+    "--windows", "2",
+]  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    folder = tmp_path / "here"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def test_choices_are_the_library_s():
+    assert evaluate.METHODS == NAMES
+
+
+def test_picture_and_numbers_are_written_and_the_period_is_found(run, heights, here):
+    ran = run("evaluate", heights, *QUICK)
+    assert ran.code == 0, ran.err
+    assert sorted(os.listdir(here)) == [f"grating-evaluation.{s}" for s in ("csv", "npz", "png")]
+    for part in ("fitted", "residual", "2 of 2 window positions", "by their procedure"):
+        assert part in ran.out
+    with np.load("grating-evaluation.npz") as saved:
+        assert saved["scatter"].shape == (saved["wavelengths"].size, saved["angles"].size)
+        # the grating of `heights` has a period of 3 µm; a window of 4 periods moves its maxima
+        assert float(saved["fitted_period"]) == pytest.approx(3.0, rel=0.02)
+    with open("grating-evaluation.csv", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(r["wavelength_nm"]) for r in rows] == list(np.arange(380.0, 781.0, 40.0))
+    assert abs(float(rows[3]["difference_deg"])) < 0.5
+    with Image.open("grating-evaluation.png") as image:
+        assert image.size[0] > 500
+
+
+@pytest.mark.parametrize("method", ["flss", "nmm", "pq", "pq-sinc", "rainbow"])
+def test_every_method_can_be_evaluated(run, heights, method):
+    ran = run("evaluate", heights, *QUICK[:-1], "0", "--method", method, "-o", "a.png")
+    assert ran.code == 0, ran.err
+    assert f"method {method}" in ran.out
+
+
+def test_a_given_period_is_compared_with(run, heights):
+    ran = run("evaluate", heights, *QUICK, "--period", "3", "-o", "a.png")
+    assert ran.code == 0, ran.err
+    assert "given     3000 nm, the ridge is within 0." in ran.out
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        (["--theta", "95"], "theta=95 must be"),
+        (["--step", "900"], "step=900 nm does not fit"),
+        (["--angles", "20", "10"], "angles=20 to 10 degrees are none"),
+        (["--angle-step", "0"], "angle-step=0 does not fit"),
+        (["--period", "0"], "period=0.0 must be"),
+        (["--order", "0"], "order=0 is the mirror's"),
+        (["--order", "-1"], "too few"),
+        (["-o", "missing/a.png"], "cannot write"),
+    ],
+)
+def test_what_does_not_fit_is_one_line(run, heights, here, options, text):
+    assert text in run("evaluate", heights, *QUICK, *options).failed_in_one_line()
+    assert os.listdir(here) == []
+
+
+def test_a_patch_without_period_is_refused_by_methods_that_need_one(run, tmp_path):
+    noise = np.random.default_rng(1).normal(0.0, 0.02, (64, 64))
+    np.save(tmp_path / "noise.npy", noise)
+    line = run("evaluate", tmp_path / "noise.npy", *QUICK, "--method", "nmm").failed_in_one_line()
+    assert "needs a period" in line
+    assert "confidence" in line
+
+
+def test_a_table_is_refused(run, heights):
+    assert run("precompute", heights, *QUICK[:4], "-o", "t.exr").code == 0
+    assert "is a table; this needs the heights" in run("evaluate", "t.exr").failed_in_one_line()
