@@ -100,7 +100,7 @@ class Diffraction(mi.BSDF):
         self.height_scale = mi.Float(parameters.height_scale)
         self.orientation = parameters.orientation
         self.layering = parameters.layering
-        self._vcavity = parameters.vcavity
+        self.vcavity = parameters.vcavity
         self._light = variant_light(self.table, parameters.wavelength)
         self._energy = EnergyBound(self.table) if parameters.energy_conserving else None
         self._area_factor = 4.0 * dr.pi * self.table.sigma**2  # 4π²σ⁴ over the window's area πσ²
@@ -191,6 +191,11 @@ class Diffraction(mi.BSDF):
         self.orientation.update()
         self.surface.update()
 
+    @property
+    def energy_conserving(self) -> bool:
+        """Whether it divides by a bound of its albedo."""
+        return self._energy is not None
+
     def to_string(self) -> str:
         """All parameters, for people."""
         nested = "" if self.nested is None else f"  nested = {self.nested},\n"
@@ -203,7 +208,7 @@ class Diffraction(mi.BSDF):
             f"  height_scale = {dr.slice(self.height_scale):g},\n"
             f"  energy_conserving = {'false' if self._energy is None else 'true'},\n"
             f"  orientation = {self.orientation},\n"
-            f"  shadowing = {'vcavity' if self._vcavity else 'none'},\n"
+            f"  shadowing = {'vcavity' if self.vcavity else 'none'},\n"
             f"  layering = {self.layering},\n"
             f"{nested}]"
         )
@@ -228,7 +233,7 @@ class Diffraction(mi.BSDF):
         if self._energy is not None:
             incident, outgoing = _in_patch(si.wi, rotation), _in_patch(wo, rotation)
             outside /= self._energy.divisor(incident, cos_i, outgoing, w - cos_i)
-        if self._vcavity:
+        if self.vcavity:
             outside *= vcavity(cos_i, w - cos_i, one_plus_dot)
         cos_half = dr.safe_sqrt(0.5 * one_plus_dot)
         reflectance = self.surface.reflectance(cos_half, si, active)

@@ -49,6 +49,18 @@ def response(wavelength: ArrayLike, illuminant: str = "D65") -> NDArray[np.float
     return np.stack([np.interp(lam, nodes, v, left=0.0, right=0.0) for v in values.T], axis=-1)
 
 
+def daylight(wavelength: ArrayLike) -> NDArray[np.float64]:
+    """D65 of luminance 1 as renderers count: scaled so that ∫ S ȳ dλ = ∫ ȳ dλ, shape of λ (nm)."""
+    import colour
+
+    observer, light = colour.MSDS_CMFS[_OBSERVER], colour.SDS_ILLUMINANTS["D65"]
+    power = np.interp(observer.wavelengths, light.wavelengths, light.values)
+    luminous = observer.values[:, 1]
+    scale = luminous.sum() / (power @ luminous)
+    lam = np.asarray(wavelength, np.float64)
+    return np.asarray(scale * np.interp(lam, observer.wavelengths, power))
+
+
 def linear_srgb(xyz: NDArray[np.floating], illuminant: str = "D65") -> NDArray[np.floating]:
     """Linear sRGB of X, Y, Z, shape (..., 3), in the precision of the input; white is (1, 1, 1).
 

@@ -7,10 +7,11 @@ import time
 from pathlib import Path
 
 from ..errors import DiffractionError
-from .arguments import definition, number_between, path_ending_in, whole_number
+from .arguments import number_between, path_ending_in, whole_number
 from .console import say, say_warning
 from .output import check_writable
 from .progress import Bar
+from .scene_options import add_scene_options, scene_parameters
 
 _INTERRUPTED = 130
 
@@ -25,15 +26,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
             "current pass and keeps the picture so far."
         ),
     )
-    parser.add_argument("scene", metavar="SCENE", type=Path, help="Mitsuba XML file")
+    add_scene_options(parser)
     parser.add_argument(
         "-o", "--output", metavar="OUT", type=path_ending_in(".exr", ".png"),
         help="EXR, with a PNG beside it, or only a PNG; default: the scene's name with .exr in "
         "the current folder",
-    )  # fmt: skip
-    parser.add_argument(
-        "-m", "--mode", metavar="VARIANT",
-        help="Mitsuba variant; default: cuda_ad_spectral with a GPU, else llvm_ad_spectral",
     )  # fmt: skip
     parser.add_argument(
         "-s", "--spp", metavar="N", type=whole_number(1),
@@ -44,14 +41,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="of the random numbers; default: 0",
     )  # fmt: skip
     parser.add_argument(
-        "-D", "--define", metavar="KEY=VALUE", type=definition, action="append", default=[],
-        dest="parameters", help="set a parameter of the scene; may be given several times",
-    )  # fmt: skip
-    parser.add_argument(
-        "--sensor", metavar="N", type=whole_number(0), default=0,
-        help="which sensor, counted from 0; default: 0",
-    )  # fmt: skip
-    parser.add_argument(
         "--exposure", metavar="EV", type=number_between(-100, 100), default=0.0,
         help="of the PNG, in stops: +1 doubles the light; default: 0",
     )  # fmt: skip
@@ -60,10 +49,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Render, and return the exit code."""
-    parameters = dict(args.parameters)
-    if len(parameters) < len(args.parameters):
-        twice = next(k for k in parameters if [n for n, _ in args.parameters].count(k) > 1)
-        args.parser.error(f"argument -D: {twice!r} is set more than once")
+    parameters = scene_parameters(args)
     output = args.output or Path(args.scene.with_suffix(".exr").name)
     only_png = output.suffix.lower() == ".png"
     png = output if only_png else output.with_suffix(".png")

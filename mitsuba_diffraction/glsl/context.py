@@ -150,6 +150,7 @@ class Bindings:
 
     def __init__(self, context: Any, parts: Packed) -> None:
         self.uniforms = dict(parts.uniforms)
+        self.definitions = dict(parts.definitions)
         self.textures = {texture.name: upload(context, texture) for texture in parts.textures}
 
     def use(self, program: Any, first_unit: int = 0) -> int:

@@ -1,0 +1,215 @@
+"""`mitsuba-diffraction compare`: the realtime picture of a scene against the path-traced one."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import DiffractionError
+from ..glsl.source import METHODS
+from .arguments import whole_number
+from .output import check_writable
+from .progress import Bar
+from .scene_options import add_scene_options, scene_parameters
+
+_INTERRUPTED = 130
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the sub-command."""
+    parser = subparsers.add_parser(
+        "compare",
+        help="compare the realtime picture of a scene with the path-traced one",
+        description=(
+            "Render a scene by shaders and by path tracing, aligned to the pixel, and measure the "
+            "difference where both see the same lit surface. Lights with an extent are replaced "
+            "by points and directions in both: the sun of a sky by its direction. A second "
+            "path-traced picture, of the scene as it is, shows what realtime leaves out."
+        ),
+    )
+    add_scene_options(parser)
+    parser.add_argument(
+        "-o", "--output", metavar="FOLDER", type=Path,
+        help="for pictures (EXR), sheets (PNG) and compare.json; default: the scene's name with "
+        "_compare in the current folder",
+    )  # fmt: skip
+    parser.add_argument(
+        "--method", choices=(*METHODS, "all"), default="lut", help="of the shaders; default: lut"
+    )
+    parser.add_argument(
+        "-s", "--spp", metavar="N", type=whole_number(2), default=1024,
+        help="samples per pixel of the path-traced direct light; default: 1024",
+    )  # fmt: skip
+    parser.add_argument(
+        "--full-spp", metavar="N", type=whole_number(0), default=64,
+        help="samples per pixel of full transport; 0 leaves it out; default: 64",
+    )  # fmt: skip
+    parser.add_argument(
+        "--supersampling", metavar="N", type=whole_number(1), default=8,
+        help="the shaders' samples along either side of a pixel; default: 8",
+    )  # fmt: skip
+    parser.add_argument(
+        "--seed", metavar="N", type=whole_number(0), default=0,
+        help="of the random numbers; default: 0",
+    )  # fmt: skip
+    parser.set_defaults(run=run, parser=parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compare, and return the exit code."""
+    parameters = scene_parameters(args)
+    folder = args.output or Path(f"{args.scene.stem}_compare")
+    if folder.exists() and not folder.is_dir():
+        raise DiffractionError(f"-o {folder}: it is a file; name a folder")
+    check_writable(folder / "compare.json", make_folder=True)
+    methods = METHODS if args.method == "all" else (args.method,)
+
+    from ..comparison.measures import as_json, difference, exposure_of, regions
+    from ..comparison.sheet import write_sheet
+    from ..comparison.truth import box_sensor, seen, with_lights
+    from ..glsl.renderer import Renderer
+    from .mitsuba_text import warnings_as_ours
+    from .passes import Stop
+    from .scenes import load_scene, sensor_of, set_variant
+
+    start = time.perf_counter()
+    variant = set_variant(args.mode)
+    with warnings_as_ours(), Bar(args, unit=" spp", delay=0) as bar:
+        bar(0, args.spp, "loading")
+        scene = load_scene(args.scene, parameters)
+        sensor_of(scene, args.sensor)
+        renderer = Renderer(scene, sensor=args.sensor)
+        lights = renderer.lights
+        if not lights:
+            raise DiffractionError(
+                f"'{args.scene}' has no light with a direction or place to compare under; add a "
+                "directional or point emitter, or a sky with a sun"
+            )
+        renderer.sky = np.zeros(3)
+        direct = with_lights(scene, renderer.camera, lights)
+        sees = seen(direct, lights)
+        with Stop() as stop:
+            halves = [
+                _traced(direct, direct.sensors()[0], args.spp // 2, seed, variant, stop, bar)
+                for seed in (2 * args.seed, 2 * args.seed + 1)
+            ]
+            full = None
+            if args.full_spp:
+                sensor = box_sensor(renderer.camera)
+                full = _traced(scene, sensor, args.full_spp, args.seed, variant, stop, bar)
+        reference = 0.5 * (halves[0] + halves[1])
+        exposure = exposure_of(reference)
+        exact, diffracting = _by_shape(direct, renderer)
+        _make_folder(folder)
+        _write(reference, folder / "direct.exr", args, variant, args.spp)
+        if full is not None:
+            _write(full, folder / "full.exr", args, variant, args.full_spp)
+        table: dict[str, Any] = {}
+        areas: dict[str, Any] = {}
+        for n, method in enumerate(methods):
+            bar(n, len(methods), f"drawing with {method}")
+            drawn = renderer.render(method, supersampling=args.supersampling)
+            areas = regions(sees, exact, diffracting, drawn[..., 3])
+            other = drawn[..., :3]
+            errors = {
+                name: difference(reference, other, mask, exposure) for name, mask in areas.items()
+            }
+            seconds = renderer.frame_time(method, frames=3)
+            _write(other, folder / f"{method}.exr", args, variant, args.supersampling**2)
+            write_sheet(
+                folder / f"{method}.png", reference, other, full, method=method,
+                found=errors["both"], compared=areas["both"], exposure=exposure,
+            )  # fmt: skip
+            table[method] = {
+                "frame_ms": 1e3 * seconds,
+                "texture_bytes": renderer.texture_bytes(method),
+                **errors,
+            }
+    noise = difference(halves[0], halves[1], areas["both"], exposure)
+    document = {
+        "scene": str(args.scene), "parameters": parameters, "variant": variant,
+        "driver": renderer.driver, "size": list(renderer.camera.size), "spp": args.spp,
+        "supersampling": args.supersampling, "exposure": exposure,
+        "lights": [light.name for light in lights], "not_shown": list(renderer.scene.omissions),
+        # two halves of the samples differ by twice what their mean is off
+        "noise_delta_e_mean": 0.5 * noise.delta_e_mean,
+        "full_transport": None
+        if full is None
+        else difference(full, reference, np.ones(full.shape[:2], bool), exposure),
+        "methods": table,
+    }  # fmt: skip
+    from ..files.atomic import atomic_path
+
+    with atomic_path(folder / "compare.json") as path:
+        path.write_text(as_json(document), encoding="utf-8")
+    print("\n".join(lines_of(document)))
+    print(f"{folder}: pictures, sheets and compare.json, {time.perf_counter() - start:.0f} s")
+    return 0
+
+
+def lines_of(document: dict[str, Any]) -> list[str]:
+    """The methods' table as Markdown, and what it was measured with."""
+    first = next(iter(document["methods"].values()))["both"]
+    width, height = document["size"]
+    lines = [
+        "| method | ΔE2000 mean | 99 % | FLIP | relative RMSE | frame, ms | textures, MB |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for method, entry in document["methods"].items():
+        found = entry["both"]
+        lines.append(
+            f"| `{method}` | {found.delta_e_mean:.2f} | {found.delta_e_percentiles['99']:.1f} "
+            f"| {found.flip:.3f} | {found.relative_rmse:.3f} | {entry['frame_ms']:.3g} "
+            f"| {entry['texture_bytes'] / 1e6:.1f} |"
+        )
+    return [
+        *lines,
+        "",
+        f"{100 * first.share:.0f} % of {width} × {height} pixels compared, {document['driver']}; "
+        f"noise of the path-traced picture: ΔE2000 {document['noise_delta_e_mean']:.2f}",
+    ]
+
+
+def _traced(scene: Any, sensor: Any, spp: int, seed: int, variant: str, stop: Any, bar: Bar) -> Any:
+    """A path-traced picture (height, width, 3); half a picture is no use here."""
+    from .passes import render_passes
+
+    result = render_passes(
+        scene, sensor, spp=spp, seed=seed, variant=variant, stop=stop, progress=bar
+    )
+    if result.interrupted:
+        raise KeyboardInterrupt
+    return np.array(result.bitmap, np.float32)[..., :3]
+
+
+def _by_shape(scene: Any, renderer: Any) -> tuple[Any, Any]:
+    """Of each shape of a scene: whether all of its material is shown, whether it diffracts."""
+    known = {surface.shape.ptr: surface for surface in renderer.scene.surfaces}
+    found = [known.get(shape.ptr) for shape in scene.shapes()]
+    return (
+        np.array([s is not None and s.exact for s in found]),
+        np.array([s is not None and s.material.bsdf is not None for s in found]),
+    )
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DiffractionError(
+            f"cannot make the folder '{folder}': {error.strerror}; choose another with -o"
+        ) from error
+
+
+def _write(image: Any, path: Path, args: argparse.Namespace, variant: str, samples: int) -> None:
+    import mitsuba as mi
+
+    from .pictures import write_exr
+
+    origin: dict[str, str | int] = {"scene": str(args.scene), "variant": variant, "spp": samples}
+    bitmap = mi.Bitmap(np.ascontiguousarray(image, np.float32), mi.Bitmap.PixelFormat.RGB)
+    write_exr(bitmap, path, origin)

@@ -1,0 +1,146 @@
+"""Triangles of Mitsuba's shapes, with the tangents that Mitsuba shades them with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_RINGS, _SEGMENTS = 192, 384  # of a sphere: 3e-5 of its radius away from it
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """Vertices in world space, three after another making a triangle.
+
+    Attributes
+    ----------
+    positions, normals, tangents : (n, 3); tangents are ∂p/∂u, of any length.
+    texcoords : (n, 2).
+    vertices : (n,) index of each in the mesh that it comes from, or None.
+    faces : (n / 3,) likewise of each triangle.
+    """
+
+    positions: Array
+    normals: Array
+    tangents: Array
+    texcoords: Array
+    vertices: NDArray[np.int64] | None = None
+
+
+def triangles_of(shape: Any) -> Triangles | None:
+    """A shape's triangles, or None for a kind that cannot be shown."""
+    maker = _ANALYTIC.get(shape.class_name())
+    if maker is not None:
+        return _placed(maker(), _matrix(shape), flipped="flip_normals = 1" in str(shape))
+    return _of_mesh(shape) if shape.is_mesh() else None
+
+
+def _matrix(shape: Any) -> Array:
+    import mitsuba as mi
+
+    matrix = np.array(mi.traverse(shape)["to_world"].matrix, np.float64)
+    return matrix.reshape(4, 4)
+
+
+def _placed(local: Triangles, to_world: Array, flipped: bool) -> Triangles:
+    linear = to_world[:3, :3]
+    normals = local.normals @ np.linalg.inv(linear)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return Triangles(
+        positions=local.positions @ linear.T + to_world[:3, 3],
+        normals=-normals if flipped else normals,
+        tangents=local.tangents @ linear.T,
+        texcoords=local.texcoords,
+    )
+
+
+def _of_mesh(shape: Any) -> Triangles:
+    """Mitsuba shades a triangle with one tangent, that of its texture coordinates."""
+    faces = np.array(shape.faces_buffer(), np.int64).reshape(-1, 3)
+    corners = faces.ravel()
+    positions = np.array(shape.vertex_positions_buffer(), np.float64).reshape(-1, 3)[corners]
+    corner = positions.reshape(-1, 3, 3)
+    edges = corner[:, 1:] - corner[:, :1]
+    flat = np.cross(edges[:, 0], edges[:, 1])
+    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+    normals = np.repeat(flat, 3, axis=0)
+    if shape.has_vertex_normals():
+        normals = np.array(shape.vertex_normals_buffer(), np.float64).reshape(-1, 3)[corners]
+    tangents = _across(flat)
+    texcoords = np.zeros((len(corners), 2))
+    if shape.has_vertex_texcoords():
+        texcoords = np.array(shape.vertex_texcoords_buffer(), np.float64).reshape(-1, 2)[corners]
+        uv = texcoords.reshape(-1, 3, 2)
+        duv = uv[:, 1:] - uv[:, :1]
+        determinant = duv[:, 0, 0] * duv[:, 1, 1] - duv[:, 0, 1] * duv[:, 1, 0]
+        along = duv[:, 1, 1:] * edges[:, 0] - duv[:, 0, 1:] * edges[:, 1]
+        known = determinant != 0.0
+        tangents[known] = along[known] / determinant[known, None]
+    return Triangles(positions, normals, np.repeat(tangents, 3, axis=0), texcoords, corners)
+
+
+def _across(normals: Array) -> Array:
+    """Mitsuba's tangent where there are no texture coordinates (Duff et al. 2017)."""
+    x, y, z = normals.T
+    sign = np.where(z < 0.0, -1.0, 1.0)
+    a = -1.0 / (sign + z)
+    return np.stack([1.0 + sign * x * x * a, sign * x * y * a, -sign * x], axis=1)
+
+
+def _rectangle() -> Triangles:
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]], float)
+    return Triangles(
+        positions=np.pad(corners, [(0, 0), (0, 1)]),
+        normals=np.tile([0.0, 0.0, 1.0], (6, 1)),
+        tangents=np.tile([2.0, 0.0, 0.0], (6, 1)),
+        texcoords=0.5 * (corners + 1.0),
+    )
+
+
+def _grid(rows: int, columns: int, point: Callable[[Array, Array], tuple[Array, ...]]) -> Triangles:
+    """Triangles of a parametrisation (u, v) ↦ position, normal, tangent."""
+    s, t = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))
+    position, normal, tangent = point(s.ravel(), t.ravel())
+    n = np.arange((rows + 1) * (columns + 1)).reshape(rows + 1, columns + 1)
+    a, b, c, d = n[:-1, :-1], n[:-1, 1:], n[1:, 1:], n[1:, :-1]
+    index = np.stack([a, b, c, a, c, d], axis=-1).ravel()
+    uv = np.stack([s.ravel(), t.ravel()], axis=1)
+    return Triangles(position[index], normal[index], tangent[index], uv[index])
+
+
+def _sphere() -> Triangles:
+    def point(u: Array, v: Array) -> tuple[Array, ...]:
+        phi, theta = 2 * np.pi * u, np.pi * v
+        p = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], 1)
+        return p, p, np.stack([-np.sin(phi), np.cos(phi), 0.0 * phi], axis=1)
+
+    return _grid(_RINGS, _SEGMENTS, point)
+
+
+def _disk() -> Triangles:
+    def point(u: Array, v: Array) -> tuple[Array, ...]:
+        # Mitsuba's u is the radius, v the azimuth
+        phi = 2 * np.pi * v
+        radial = np.stack([np.cos(phi), np.sin(phi), 0.0 * phi], axis=1)
+        return u[:, None] * radial, np.tile([0.0, 0.0, 1.0], (len(u), 1)), radial
+
+    return _grid(_SEGMENTS, 8, point)
+
+
+def _cylinder() -> Triangles:
+    def point(u: Array, v: Array) -> tuple[Array, ...]:
+        phi = 2 * np.pi * u
+        p = np.stack([np.cos(phi), np.sin(phi), v], axis=1)
+        normal = np.stack([np.cos(phi), np.sin(phi), 0.0 * phi], axis=1)
+        return p, normal, np.stack([-np.sin(phi), np.cos(phi), 0.0 * phi], axis=1)
+
+    return _grid(8, _SEGMENTS, point)
+
+
+_ANALYTIC = {"Rectangle": _rectangle, "Sphere": _sphere, "Disk": _disk, "Cylinder": _cylinder}
