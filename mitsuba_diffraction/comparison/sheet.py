@@ -1,4 +1,4 @@
-"""A picture of a comparison: path-traced, realtime, where they differ, and what realtime leaves out."""
+"""A picture of a comparison: path-traced, realtime, where they differ, what realtime leaves out."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ def write_sheet(
     from matplotlib.figure import Figure
 
     height, width = reference.shape[:2]
-    figure = Figure(figsize=(11.0, 0.9 + 11.0 * height / width), layout="constrained", dpi=100)
+    figure = Figure(figsize=(10.0, 0.7 + 9.4 * height / width), layout="constrained", dpi=100)
     FigureCanvasAgg(figure)
     axes = figure.subplots(2, 2)
     pictures = [(axes[0, 0], reference, "path-traced, direct light"), (axes[0, 1], other, method)]
     if full is not None:
-        pictures.append((axes[1, 1], full, "path-traced, all light: sky, shadows' light, glow"))
+        pictures.append((axes[1, 1], full, "path-traced, all light of the scene"))
     for axis, image, title in pictures:
         axis.imshow(encode_srgb(exposure * np.asarray(image, float)))
         axis.set_title(title)
@@ -61,13 +61,12 @@ def write_sheet(
         alpha=np.where(compared, 1.0, 0.25),
     )  # fmt: skip
     axes[1, 0].set_title(
-        f"difference: mean {found.delta_e_mean:.2f}, "
-        f"99 %: {found.delta_e_percentiles['99']:.1f} (pale: not compared)"
+        f"difference, mean {found.delta_e_mean:.2f}, 99 % {found.delta_e_percentiles['99']:.1f}\n"
+        "(pale where shadows, edges and materials differ)",
+        fontsize="medium",
     )
     figure.colorbar(shown, ax=axes[1, 0], label="ΔE2000", extend="max", shrink=0.8)
     for axis in axes.ravel():
         axis.set_axis_off()
     with atomic_path(path) as temporary:
-        kind = path.suffix.lower().lstrip(".")
-        options = {"pil_kwargs": {"quality": 90}} if kind in ("jpg", "jpeg") else {}
-        figure.savefig(temporary, format=kind, **options)
+        figure.savefig(temporary, format=path.suffix.lower().lstrip("."))

@@ -29,20 +29,20 @@ def gl() -> Iterator[Any]:
 
 @pytest.fixture(scope="session")
 def patch() -> HeightField:
-    """16 µm of a rough, asymmetric surface, 0.4 µm deep."""
+    """8 µm of a rough, asymmetric surface, 0.16 µm deep."""
     rng = np.random.default_rng(3)
     noise = np.fft.fft2(rng.normal(size=(96, 96)))
-    q = 2 * np.pi * np.fft.fftfreq(96, 16 / 96)
-    smooth = np.exp(-0.09 * (4 * q**2 + q[:, None] ** 2))
+    q = 2 * np.pi * np.fft.fftfreq(96, 8 / 96)
+    smooth = np.exp(-0.05 * (4 * q**2 + q[:, None] ** 2))
     heights = np.fft.ifft2(noise * smooth).real
     heights += 0.5 * heights**2 / heights.std()
-    return HeightField((heights - heights.min()) * (0.4 / np.ptp(heights)), 16 / 96, name="rough")
+    return HeightField((heights - heights.min()) * (0.16 / np.ptp(heights)), 8 / 96, name="rough")
 
 
 @pytest.fixture(scope="session")
 def table(patch: HeightField) -> DiffractionTable:
     """Its table of powers, for a window a little narrower than the patch."""
-    return DiffractionTable.build(patch, coherence_width=13.0)
+    return DiffractionTable.build(patch, coherence_width=6.5)
 
 
 def probed(gl: Any, method: str, packed: Packed, places: NDArray[Any]) -> NDArray[np.float64]:

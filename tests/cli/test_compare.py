@@ -1,0 +1,96 @@
+"""`compare`: pictures, a sheet and numbers, or one line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import OpenEXR
+import pytest
+
+from mitsuba_diffraction import DiffractionTable, gratings
+
+SCENE = """<scene version="3.5.0">
+  <sensor type="perspective"><float name="fov" value="30"/>
+    <transform name="to_world"><lookat origin="0,-3,4" target="0,0,0" up="0,0,1"/></transform>
+    <film type="hdrfilm">
+      <integer name="width" value="40"/><integer name="height" value="32"/>
+    </film>
+  </sensor>
+  <integrator type="path"/>
+  <shape type="rectangle" id="plate">
+    <bsdf type="diffraction">
+      <string name="table" value="grating.exr"/>
+      <bsdf type="diffuse"><spectrum name="reflectance" value="0.2"/></bsdf>
+    </bsdf>
+  </shape>
+  <emitter type="directional"><vector name="direction" value="0.15, -0.5, -1"/></emitter>
+</scene>
+"""
+
+
+@pytest.fixture
+def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    pytest.importorskip("moderngl")
+    pytest.importorskip("flip_evaluator")
+    monkeypatch.chdir(tmp_path)
+    grating = gratings.sinusoidal(period=1.6, depth=0.05, periods=8)
+    DiffractionTable.build(grating, coherence_width=6).save(tmp_path / "grating.exr")
+    file = tmp_path / "plate.xml"
+    file.write_text(SCENE)
+    return file
+
+
+def test_pictures_a_sheet_and_numbers_are_written(run, scene, some_variant, gl_works):
+    ran = run("compare", scene, "--method", "all", "-s", 64, "--full-spp", 2, "--supersampling", 2)
+    assert ran.code == 0, ran
+    folder = Path("plate_compare")
+    document = json.loads((folder / "compare.json").read_text())
+    assert set(document["methods"]) == {"lut", "spectral"}
+    for method, entry in document["methods"].items():
+        assert f"| `{method}` |" in ran.out
+        assert OpenEXR.File(str(folder / f"{method}.exr")).channels()["RGB"].pixels.shape[:2] == (
+            32,
+            40,
+        )
+        assert (folder / f"{method}.png").stat().st_size > 10_000
+        both = entry["both"]
+        assert both["pixels"] > 200
+        # 64 samples of four wavelengths are noisy: their own noise, and a little
+        assert both["delta_e_mean"] < 2.5 * document["noise_delta_e_mean"] + 0.5
+        assert both["flip"] < 0.2
+        assert entry["frame_ms"] > 0.0
+    assert document["driver"]
+    assert (folder / "direct.exr").exists()
+    assert (folder / "full.exr").exists()
+
+
+def test_a_scene_without_a_light_to_compare_under_is_refused(run, scene, some_variant, gl_works):
+    light = SCENE[SCENE.index("  <emitter") : SCENE.index("</scene>")]
+    scene.write_text(SCENE.replace(light, '  <emitter type="constant"/>\n'))
+    line = run("compare", scene).failed_in_one_line()
+    assert "no light with a direction or place" in line
+    assert not Path("plate_compare").exists()
+
+
+def test_a_file_in_the_folders_place_is_refused_before_any_work(run, scene):
+    Path("taken").write_text("")
+    assert (
+        "it is a file; name a folder" in run("compare", scene, "-o", "taken").failed_in_one_line()
+    )
+
+
+def test_an_unwritable_folder_is_refused_before_any_work(run, scene):
+    line = run("compare", scene, "-o", "/proc/none/here").failed_in_one_line()
+    assert "cannot write" in line
+
+
+@pytest.fixture
+def gl_works():
+    from mitsuba_diffraction import DiffractionError
+    from mitsuba_diffraction.glsl.context import headless_context
+
+    try:
+        headless_context().release()
+    except DiffractionError as error:
+        pytest.skip(str(error))
