@@ -5,6 +5,7 @@ Contents
 HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
+glsl               the realtime renderer
 reference          the BRDF straight from its integral, in double precision
 bsdf_dict          a dictionary for `mi.load_dict` from arrays
 DiffractionError   what every bad input raises, in one line
@@ -24,7 +25,7 @@ select_llvm()  # before Dr.Jit picks a library by itself: some would end the pro
 
 import mitsuba as mi  # noqa: E402
 
-from . import gratings, reference  # noqa: E402
+from . import glsl, gratings, reference  # noqa: E402
 from .dictionary import bsdf_dict  # noqa: E402
 from .errors import DiffractionError, DiffractionWarning  # noqa: E402
 from .heightfield import HeightField  # noqa: E402
@@ -37,6 +38,7 @@ __all__ = [
     "DiffractionWarning",
     "HeightField",
     "bsdf_dict",
+    "glsl",
     "gratings",
     "reference",
 ]
