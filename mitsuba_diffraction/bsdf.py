@@ -81,6 +81,7 @@ import mitsuba as mi
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.llvm import require_loaded_llvm
 from mitsuba_diffraction.plugin.energy import EnergyBound
+from mitsuba_diffraction.plugin.frozen import arrays_within, marks
 from mitsuba_diffraction.plugin.light import variant_light
 from mitsuba_diffraction.plugin.parameters import read_parameters
 from mitsuba_diffraction.plugin.sampling import COSINE, fold, unfolded
@@ -190,6 +191,8 @@ class Diffraction(mi.BSDF):
         dr.make_opaque(self.height_scale)
         self.orientation.update()
         self.surface.update()
+        held = arrays_within(self._light, self._energy, self.orientation, self.surface)
+        self._for_freezing = held + marks(self.table, self._vcavity, str(self.layering))
 
     @property
     def energy_conserving(self) -> bool:

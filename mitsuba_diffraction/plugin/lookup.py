@@ -263,18 +263,15 @@ def _pad(coefficients: NDArray[np.floating], terms: int) -> NDArray[np.floating]
 
 
 def upload(kind: Any, values: NDArray[np.generic]) -> Any:
-    """A Dr.Jit array that starts at a cache line: on the CPU, Dr.Jit may keep NumPy's memory.
+    """A Dr.Jit array in memory of Dr.Jit's own, which starts at a cache line.
 
-    Scalar variants have no such arrays: there it stays NumPy's.
+    On the CPU an array made from NumPy's may go on using NumPy's memory: aligned by chance, and
+    mistaken for other arrays when a function recorded by `dr.freeze` runs again. Scalar variants
+    have no such arrays: there it stays NumPy's.
     """
     if not dr.is_jit_v(mi.Float):
         return values.ravel()
-    line = 64
-    buffer = np.empty(values.nbytes + line, np.uint8)
-    start = -buffer.ctypes.data % line
-    aligned = buffer[start : start + values.nbytes].view(values.dtype)
-    aligned[:] = values.ravel()
-    array = kind(aligned)
+    array = kind(values.ravel()) * dr.opaque(kind, 1)
     dr.eval(array)
     return array
 

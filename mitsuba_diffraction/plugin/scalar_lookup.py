@@ -6,6 +6,7 @@ one number would take thirty times as long. What is summed is said there.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -19,7 +20,8 @@ class ScalarTable:
     """The look-ups of `plugin.lookup.DeviceTable` for plain numbers."""
 
     def __init__(self, table: DiffractionTable) -> None:
-        self._table = table
+        # A copy: whoever keeps this by its table must not keep that table alive
+        self._table = dataclasses.replace(table)
 
     def window_sum(self, qx: float, qy: float, kappa: float) -> float:
         """Σ over orders under the window; NaN outside the table."""

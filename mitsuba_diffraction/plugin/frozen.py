@@ -1,0 +1,62 @@
+"""What `dr.freeze` must know of a BSDF: the arrays that its kernels read, and their constants.
+
+A frozen function refuses arrays that it was not told of. Of a plugin written in Python, Dr.Jit sees
+the attributes: arrays, lists of them and Mitsuba's own objects, but not what plain Python objects
+hold. It records anew when their number or their types are others, but not when plain numbers are,
+which are part of the recorded kernels: given another patch, it would go on with this one's.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from ..tables.table import DiffractionTable
+
+_OURS = __name__.rpartition(".")[0]
+
+
+def arrays_within(*holders: Any) -> list[Any]:
+    """All Dr.Jit arrays and Mitsuba objects that objects of this folder hold, each once.
+
+    They are the very objects, so that what Dr.Jit assigns to them the kernels see.
+    """
+    found: dict[int, Any] = {}
+    for holder in holders:
+        for value in _walk(holder, set()):
+            found.setdefault(id(value), value)
+    return list(found.values())
+
+
+def marks(table: DiffractionTable, *constants: object) -> list[Any]:
+    """Zeros whose types tell apart the kernels of one table and these constants from others'.
+
+    Types, because Dr.Jit compares those, and stops comparing values once they have changed.
+    """
+    described = repr(
+        (table.expansion, table.grid, table.spacing, table.scale, table.sigma, table.reach)
+    )
+    checksum = zlib.crc32(repr(constants).encode(), zlib.crc32(described.encode()))
+    checksum = zlib.crc32(table.order_0.tobytes(), checksum)
+    kinds = (
+        mi.Bool, mi.Int32, mi.UInt32, mi.Int64, mi.UInt64, mi.Float16, mi.Float32, mi.Float64,
+    )  # fmt: skip
+    return [kinds[checksum >> shift & 7](0) for shift in range(0, 33, 3)]
+
+
+def _walk(value: Any, seen: set[int]) -> Iterator[Any]:
+    if id(value) in seen:
+        return
+    seen.add(id(value))
+    if dr.is_array_v(value) or isinstance(value, mi.Object):
+        yield value
+    elif isinstance(value, list | tuple):
+        for item in value:
+            yield from _walk(item, seen)
+    elif type(value).__module__.startswith(_OURS):
+        for item in vars(value).values():
+            yield from _walk(item, seen)
