@@ -192,7 +192,7 @@ class Diffraction(mi.BSDF):
         self.orientation.update()
         self.surface.update()
         held = arrays_within(self._light, self._energy, self.orientation, self.surface)
-        self._for_freezing = held + marks(self.table, self._vcavity, str(self.layering))
+        self._for_freezing = held + marks(self.table, self.vcavity, str(self.layering))
 
     @property
     def energy_conserving(self) -> bool:
