@@ -41,6 +41,10 @@ class Tables:
                 {"type": "diffraction", "table": str(self.paths[name]), **parameters}
             )
 
+    def load(self, name: str) -> DiffractionTable:
+        """One of the tables."""
+        return DiffractionTable.load(self.paths[name])
+
 
 def build_tables(plan: Plan, folder: Path, progress: Callable[[int, int, str], None]) -> Tables:
     """Build and save them."""
@@ -118,7 +122,8 @@ class Queries:
         si = dr.zeros(mi.SurfaceInteraction3f, lanes)
         si.wi = hemisphere()
         wo = hemisphere()
-        si.wavelengths = mi.sample_rgb_spectrum(mi.sample_shifted(random.next_float32()))[0]
+        if mi.is_spectral:
+            si.wavelengths = mi.sample_rgb_spectrum(mi.sample_shifted(random.next_float32()))[0]
         sample1 = random.next_float32()
         sample2 = mi.Point2f(random.next_float32(), random.next_float32())
         dr.eval(si, wo, sample1, sample2)

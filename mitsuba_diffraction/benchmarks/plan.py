@@ -22,7 +22,9 @@ class Plan:
     lanes : calls at once.
     slow_lanes : likewise, for the documents' configuration.
     rounds : timed calls of each contender.
-    resolution, spp : of the rendered picture.
+    resolution, spp : of the rendered pictures.
+    reference_spp : of pictures that are to have converged.
+    map_resolution : directions of view along each axis, to compare colours at.
     """
 
     pixels: int = 1332
@@ -33,6 +35,8 @@ class Plan:
     rounds: int = 15
     resolution: int = 256
     spp: int = 16
+    reference_spp: int = 2048
+    map_resolution: int = 256
 
 
 FULL = Plan()
@@ -44,4 +48,6 @@ QUICK = Plan(
     rounds=5,
     resolution=128,
     spp=4,
+    reference_spp=256,
+    map_resolution=96,
 )

@@ -1,4 +1,4 @@
-"""A whole picture: the same scene with diffraction and with `roughconductor`."""
+"""Whole pictures: the same scenes with diffraction and with `roughconductor`."""
 
 from __future__ import annotations
 
@@ -6,22 +6,25 @@ import statistics
 import time
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from .contenders import ALUMINIUM, DEFAULT, DEFAULT_AL, Tables, bsdf_makers
-from .figures import Row, Section
+from .figures import Goal, Row, Section
 from .plan import Plan
+from .scenes import share_of, skin_of, snake_scene
 from .timing import ratio, rounds_of
 
+Progress = Callable[[int, int, str], None]
+
 _COLUMNS = ("ms", "ns/sample", "× roughconductor")
+_SKIN, _ROUGH = "the skin diffracts, pigment beneath", "the skin is roughconductor, Al"
 
 
-def measure_rendering(
-    plan: Plan, tables: Tables, progress: Callable[[int, int, str], None]
-) -> Section:
+def measure_rendering(plan: Plan, tables: Tables, progress: Progress) -> Section:
     """Time to render a ball under a lamp and a sky, most of the picture, with each BSDF."""
     makers = bsdf_makers(tables)
     scenes = {name: _scene(plan, makers[name]()) for name in (ALUMINIUM, DEFAULT, DEFAULT_AL)}
@@ -36,6 +39,34 @@ def measure_rendering(
     title = (
         f"render: {mi.variant()}, a ball under a lamp and an even sky, {plan.resolution}² pixels, "
         f"{plan.spp} samples per pixel, path integrator; medians of {plan.rounds} rounds"
+    )
+    return Section(title, _COLUMNS, rows)
+
+
+def measure_snake(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> Section:
+    """Time to render the snake's scene as it is, and with `roughconductor` for its skin."""
+    size = {"resx": str(2 * plan.resolution), "resy": str(5 * plan.resolution // 4)}
+    made = {name: snake_scene(scenes, tables, **size) for name in (_SKIN, _ROUGH)}
+    rough = mi.load_dict({"type": "twosided", "b": {"type": "roughconductor", "material": "Al"}})
+    skin_of(made[_ROUGH]).set_bsdf(rough)
+    covered = share_of(made[_SKIN], skin_of(made[_SKIN]))
+    calls = {name: partial(_seconds, scene, plan) for name, scene in made.items()}
+    rounds = max(3, plan.rounds // 2)
+    seconds = rounds_of(calls, rounds, lambda done, total: progress(done, total, "snake"))
+    rows = []
+    samples = int(size["resx"]) * int(size["resy"]) * plan.spp
+    for name, taken in seconds.items():
+        median = statistics.median(taken)
+        to_rough = ratio(taken, seconds[_ROUGH])
+        values = (1e3 * median, 1e9 * median / samples, to_rough)
+        goals = [Goal("at most 2.5×", to_rough <= 2.5)] if name == _SKIN else []
+        rows.append(
+            Row(name, dict(zip(_COLUMNS, values, strict=True)), goals, {"seconds": taken})
+        )
+    title = (
+        f"snake: {mi.variant()}, scenes/snake.xml, {size['resx']} × {size['resy']} pixels, "
+        f"{100 * covered:.0f} % of them snake, {plan.spp} samples per pixel; medians of {rounds} "
+        "rounds"
     )
     return Section(title, _COLUMNS, rows)
 
