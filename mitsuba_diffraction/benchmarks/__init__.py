@@ -9,5 +9,8 @@ timing       rounds through all contenders, so that a machine's moods hit all al
 build        tables, each built in a process of its own, whose memory is measured
 contenders   BSDFs to compare, the bare gathers and the source documents' look-up among them
 evaluation   `eval`, `sample` and `pdf` of all of them
-rendering    whole pictures
+rendering    whole pictures, the snake's among them
+variance     noise of the sampling, beside that of the cosine
+colours      RGB variants beside spectral ones
+scenes       what is rendered
 """

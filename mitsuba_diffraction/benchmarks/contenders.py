@@ -13,6 +13,7 @@ import mitsuba as mi
 
 from .. import gratings
 from ..errors import DiffractionWarning
+from ..heightfield import HeightField
 from ..plugin.lookup import DeviceTable, device_table
 from ..tables.table import DiffractionTable
 from .documents import TermImages
@@ -30,6 +31,7 @@ class Tables:
     """The tables of one patch that the contenders look up, as files."""
 
     folder: Path
+    patch: str
     paths: dict[str, Path] = field(default_factory=dict)
 
     def bsdf(self, name: str, **parameters: Any) -> Any:
@@ -46,9 +48,15 @@ class Tables:
         return DiffractionTable.load(self.paths[name])
 
 
-def build_tables(plan: Plan, folder: Path, progress: Callable[[int, int, str], None]) -> Tables:
-    """Build and save them."""
-    patch = gratings.elaphe_like(plan.pixels * PIXEL, plan.pixels)
+def build_tables(
+    plan: Plan,
+    folder: Path,
+    progress: Callable[[int, int, str], None],
+    patch: HeightField | None = None,
+) -> Tables:
+    """Build and save them, of `elaphe_like` if no patch is given."""
+    if patch is None:
+        patch = gratings.elaphe_like(plan.pixels * PIXEL, plan.pixels)
     settings: dict[str, dict[str, Any]] = {
         "default": {},
         "1e-2": {"tolerance": 1e-2},
@@ -59,7 +67,7 @@ def build_tables(plan: Plan, folder: Path, progress: Callable[[int, int, str], N
             "coherence": "patch", "basis": "taylor", "terms": 37, "taps": 3, "tolerance": 0.999,
         },
     }  # fmt: skip
-    tables = Tables(folder)
+    tables = Tables(folder, f"{patch.name}, {patch.heights.shape[1]} × {patch.heights.shape[0]}")
     for n, (name, arguments) in enumerate(settings.items()):
         progress(n, len(settings), "building tables")
         tables.paths[name] = folder / f"{name}.exr"

@@ -52,7 +52,7 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
         DEFAULT: [Goal("at most 8× roughconductor", to_rough <= 8.0)],
         DOCUMENTS: [Goal("at least 30× the defaults", to_documents >= 30.0)],
     }
-    return _section(f"eval: {_conditions(plan)}", times, lanes, goals)
+    return _section(f"eval: {_conditions(plan, tables)}", times, lanes, goals)
 
 
 def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Section]:
@@ -73,7 +73,7 @@ def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Sec
             else:
                 calls[name] = partial(bsdf.pdf, context, queries.si, queries.wo)
         times = _nanoseconds(plan, calls, lanes, what, progress)
-        sections.append(_section(f"{what}: {_conditions(plan)}", times, lanes, {}))
+        sections.append(_section(f"{what}: {_conditions(plan, tables)}", times, lanes, {}))
     return sections
 
 
@@ -93,10 +93,10 @@ def _nanoseconds(
     return {name: [1e9 * s / lanes[name] for s in taken] for name, taken in seconds.items()}
 
 
-def _conditions(plan: Plan) -> str:
+def _conditions(plan: Plan, tables: Tables) -> str:
     return (
         f"{mi.variant()}, {plan.lanes} random pairs of directions, {_wavelengths()} wavelengths a "
-        f"call, elaphe_like of {plan.pixels}² pixels; kernels alone, medians of {plan.rounds} "
+        f"call, {tables.patch} pixels; kernels alone, medians of {plan.rounds} "
         "rounds through all rows, ratios within a round"
     )
 

@@ -60,9 +60,7 @@ def measure_snake(plan: Plan, tables: Tables, scenes: Path, progress: Progress) 
         to_rough = ratio(taken, seconds[_ROUGH])
         values = (1e3 * median, 1e9 * median / samples, to_rough)
         goals = [Goal("at most 2.5×", to_rough <= 2.5)] if name == _SKIN else []
-        rows.append(
-            Row(name, dict(zip(_COLUMNS, values, strict=True)), goals, {"seconds": taken})
-        )
+        rows.append(Row(name, dict(zip(_COLUMNS, values, strict=True)), goals, {"seconds": taken}))
     title = (
         f"snake: {mi.variant()}, scenes/snake.xml, {size['resx']} × {size['resy']} pixels, "
         f"{100 * covered:.0f} % of them snake, {plan.spp} samples per pixel; medians of {rounds} "

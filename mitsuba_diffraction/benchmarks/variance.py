@@ -15,7 +15,7 @@ from ..maps.light import Light
 from .contenders import Tables
 from .figures import Goal, Row, Section
 from .plan import SEED, Plan
-from .scenes import furnace, pixels_of, snake
+from .scenes import furnace, pixels_of, snake, window
 
 Progress = Callable[[int, int, str], None]
 
@@ -74,10 +74,9 @@ def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progr
     def bsdf() -> Any:
         return tables.bsdf("default", material="none")
 
-    mesh = scenes / "meshes" / "elaphe.ply"
     cases: dict[str, Callable[[Any], Any]] = {
         "white furnace": lambda b: furnace(b, size // 2),
-        "snake under a window": lambda b: snake(b, mesh, size // 2, size // 3),
+        "snake under a window": lambda b: snake(b, scenes, size // 2, size // 3, window()),
     }
     rows = []
     for n, (name, make) in enumerate(cases.items()):

@@ -11,8 +11,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..errors import DiffractionError
 from .arguments import path_ending_in
 from .console import say_warning
+from .heights_options import add_heights_options, load_options, was_given
 from .output import check_writable
 from .progress import Bar
 from .report import plain
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from ..benchmarks.figures import Section
     from ..benchmarks.plan import Plan
 
-PARTS = ("build", "eval", "sample", "render")
+PARTS = ("build", "eval", "sample", "render", "snake", "noise", "efficiency", "colours")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -41,6 +43,18 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="write every single measurement as well",
     )  # fmt: skip
     parser.add_argument("--only", choices=PARTS, help="measure only this")
+    parser.add_argument(
+        "--scenes", metavar="FOLDER", type=Path, default=Path("scenes"),
+        help="where the project's scenes are, for its snake; default: scenes",
+    )  # fmt: skip
+    parser.add_argument(
+        "heights",
+        metavar="HEIGHTS",
+        type=Path,
+        nargs="?",
+        help="patch to evaluate, from any file of heights; default: gratings.elaphe_like",
+    )
+    add_heights_options(parser)
     parser.set_defaults(run=run, parser=parser)
 
 
@@ -48,6 +62,11 @@ def run(args: argparse.Namespace) -> int:
     """Measure and print, and return the exit code; a missed goal is no failure."""
     if args.json is not None:
         check_writable(args.json)
+    if args.heights is None and was_given(args):
+        args.parser.error(f"{was_given(args)[0]} needs a file of heights")
+    parts = (args.only,) if args.only else PARTS
+    if not {"snake", "efficiency", "colours"}.isdisjoint(parts):
+        _check_scenes(args.scenes)
     from tqdm import tqdm
 
     from ..benchmarks import plan
@@ -55,14 +74,13 @@ def run(args: argparse.Namespace) -> int:
     from ..files.atomic import atomic_path
 
     chosen = plan.QUICK if args.quick else plan.FULL
-    parts = (args.only,) if args.only else PARTS
     machine = describe_machine()
     print("; ".join(f"{name} {value}" for name, value in machine.items()), flush=True)
     if machine["load"] > 0.5 * machine["cores"]:
         say_warning("the machine is busy: trust the ratios, not the times")
     sections = []
     with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder, Bar(args) as bar:
-        for section in _sections(parts, chosen, Path(folder), bar):
+        for section in _sections(parts, chosen, Path(folder), bar, args):
             tqdm.write("\n".join(["", *section.lines()]))  # above the progress bar
             sys.stdout.flush()
             sections.append(section)
@@ -80,7 +98,19 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _sections(parts: tuple[str, ...], plan: Plan, folder: Path, bar: Bar) -> Iterator[Section]:
+def _check_scenes(folder: Path) -> None:
+    """Before anything is measured."""
+    if not (folder / "snake.xml").is_file():
+        raise DiffractionError(
+            f"'{folder / 'snake.xml'}' does not exist; name the folder of the project's scenes "
+            "with --scenes, or measure a part without them: --only build, eval, sample, render "
+            "or noise"
+        )
+
+
+def _sections(
+    parts: tuple[str, ...], plan: Plan, folder: Path, bar: Bar, args: argparse.Namespace
+) -> Iterator[Section]:
     """Everything that is asked for, one after the other."""
     if "build" in parts:
         from ..benchmarks.build import measure_builds
@@ -90,12 +120,18 @@ def _sections(parts: tuple[str, ...], plan: Plan, folder: Path, bar: Bar) -> Ite
         return
     import drjit as dr
 
+    from ..benchmarks.colours import measure_colours
     from ..benchmarks.contenders import build_tables
     from ..benchmarks.evaluation import measure_eval, measure_sampling
-    from ..benchmarks.rendering import measure_rendering
+    from ..benchmarks.rendering import measure_rendering, measure_snake
+    from ..benchmarks.variance import measure_efficiency, measure_noise
+    from ..files.heights import load_heights
     from .scenes import set_variant
 
-    tables = build_tables(plan, folder, bar)
+    patch = None
+    if args.heights is not None:
+        patch = load_heights(args.heights, load_options(args))
+    tables = build_tables(plan, folder, bar, patch)
     for backend in ("llvm", "cuda"):
         if not dr.has_backend(getattr(dr.JitBackend, backend.upper())):
             continue
@@ -106,3 +142,11 @@ def _sections(parts: tuple[str, ...], plan: Plan, folder: Path, bar: Bar) -> Ite
             yield from measure_sampling(plan, tables, bar)
         if "render" in parts:
             yield measure_rendering(plan, tables, bar)
+        if "snake" in parts:
+            yield measure_snake(plan, tables, args.scenes, bar)
+        if "noise" in parts:
+            yield measure_noise(plan, tables, bar)
+        if "efficiency" in parts:
+            yield measure_efficiency(plan, tables, args.scenes, bar)
+        if "colours" in parts:
+            yield from measure_colours(plan, tables, args.scenes, backend, bar)

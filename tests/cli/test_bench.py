@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
+import numpy as np
 import pytest
 
-from mitsuba_diffraction.benchmarks import plan
+from mitsuba_diffraction.benchmarks import colours, plan
 from mitsuba_diffraction.benchmarks.figures import Goal, Row, Section
 from mitsuba_diffraction.benchmarks.plan import Plan
 from mitsuba_diffraction.benchmarks.timing import ratio, rounds_of
+from tests.optics import rough_patch
 
 # 96 pixels are 4.7 µm, 1/14 of the coherence window: wide taps, but no time to speak of
 TINY = Plan(
@@ -19,21 +22,26 @@ TINY = Plan(
     lanes=64,
     slow_lanes=32,
     rounds=2,
-    resolution=4,
+    resolution=12,
     spp=1,
+    reference_spp=2,
+    map_resolution=8,
 )
+SCENES = Path(__file__).parents[2] / "scenes"
 
 
 @pytest.fixture(autouse=True)
 def tiny(monkeypatch):
     monkeypatch.setattr(plan, "QUICK", TINY)
+    monkeypatch.setattr(colours, "MATERIALS", {"none": colours.MATERIALS["none"]})
 
 
 def test_everything_is_measured_and_written(run, tmp_path):
     file = tmp_path / "bench.json"
-    ran = run("bench", "--quick", "--json", file)
+    ran = run("bench", "--quick", "--json", file, "--scenes", SCENES)
     assert ran.code == 0, ran.err
-    for part in ("processor", "llvm 1", "build:", "eval:", "sample:", "pdf:", "render:", "gathers"):
+    parts = ("build", "eval", "sample", "pdf", "render", "snake", "noise", "efficiency", "colours")
+    for part in ("processor", "llvm 1", "gathers", *(f"{part}:" for part in parts)):
         assert part in ran.out
     data = json.loads(file.read_text(encoding="utf-8"))
     assert data["machine"]["cores"] >= 1
@@ -53,6 +61,25 @@ def test_a_part_alone(run):
     assert ran.code == 0, ran.err
     assert "96² pixels" in ran.out
     assert "eval" not in ran.out
+
+
+def test_a_patch_of_one_s_own(run, tmp_path):
+    file = tmp_path / "mine.npy"
+    np.save(file, rough_patch((40, 48), (0.1, 0.1), 0.2).heights)
+    ran = run("bench", file, "--pixel-size", "0.1", "--quick", "--only", "noise")
+    assert ran.code == 0, ran.err
+    assert "75°" in ran.out
+
+
+def test_options_without_a_patch_are_refused(run):
+    ran = run("bench", "--quick", "--pixel-size", "0.1")
+    assert ran.code == 2
+    assert "--pixel-size needs a file of heights" in ran.err
+
+
+def test_missing_scenes_are_named(run, tmp_path):
+    ran = run("bench", "--quick", "--only", "snake", "--scenes", tmp_path)
+    assert "--scenes" in ran.failed_in_one_line()
 
 
 def test_an_unwritable_file_is_refused_before_measuring(run, tmp_path):
