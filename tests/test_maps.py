@@ -288,7 +288,7 @@ def test_a_measured_rough_surface_keeps_what_its_roughness_says_in_the_mirror_di
 def test_exposure_shows_what_lies_around_the_mirror_direction():
     result = brdf_map(plugin(GRATING), 20.0, step=20, resolution=128)
     stops = result.exposure()
-    shown = np.sort((result.luminance * 2.0**stops)[result._away_from_mirror()].astype(float))
+    shown = np.sort((result.luminance * 2.0**stops)[result.away_from_mirror()].astype(float))
     below_white = shown[shown < 1.0].sum() / shown.sum()
     assert below_white >= 0.45  # rounded to a tenth of a stop
     assert (result.luminance * 2.0**stops > 8.6).mean() <= 1e-3

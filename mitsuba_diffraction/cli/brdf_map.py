@@ -10,6 +10,7 @@ from typing import Any
 from ..errors import DiffractionError
 from .arguments import number_between, path_ending_in, whole_number
 from .heights_options import add_heights_options, load_options, was_given
+from .method_map import add_method_options, refuse_contradictions, run_method
 from .output import check_writable, same_file
 from .precompute import BASES, COHERENCES
 from .progress import Bar
@@ -52,6 +53,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )  # fmt: skip
     _add_map_options(parser.add_argument_group("the map"))
     _add_surface_options(parser.add_argument_group("the surface"))
+    add_method_options(parser.add_argument_group("methods of the source documents"))
     add_heights_options(parser)
     parser.set_defaults(run=run, parser=parser)
 
@@ -137,6 +139,8 @@ def run(args: argparse.Namespace) -> int:
             )
         check_writable(path)
     load_options(args)  # what does not fit is said before Mitsuba is loaded
+    if args.method is not None:
+        return run_method(args, _map_arguments(args), written)
 
     from ..maps import Bands, Light, brdf_map, check_map, save_exr, save_png
     from .mitsuba_text import warnings_as_ours
@@ -182,6 +186,7 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
             args.parser.error("argument --wavelength: not allowed with argument --spectral")
     if args.material is not None and args.int_ior is not None:
         args.parser.error("argument --int-ior: not allowed with argument --material")
+    refuse_contradictions(args)
 
 
 def _map_arguments(args: argparse.Namespace) -> dict[str, Any]:

@@ -11,13 +11,11 @@ from typing import Any
 from ..errors import DiffractionError, DiffractionWarning
 from .arguments import path_ending_in, whole_number
 from .heights_options import add_heights_options
+from .method_map import METHODS
 from .output import check_writable, same_file
 from .patch import load_patch
 from .precompute import COHERENCES
 from .progress import Bar
-
-# Written out so that --help need not load NumPy; a test holds them against the library.
-METHODS = ("default", "flss", "nmm", "pq", "pq-sinc", "rainbow")
 
 _WINDOWS = 32
 # Single windows are fitted at about so many wavelengths: the period needs no more.

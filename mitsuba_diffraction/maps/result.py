@@ -91,7 +91,7 @@ class BrdfMap:
         """
         y = self.luminance.astype(np.float64)
         brightest = np.sort(y, axis=None)[-1 - int(_CLIPPED * y.size)]
-        for values in (y[self._away_from_mirror()], y.ravel()):
+        for values in (y[self.away_from_mirror()], y.ravel()):
             ordered = np.sort(values[values > 0.0])
             total = np.cumsum(ordered)
             if total.size and total[-1] > _WORTH_SHOWING * y.sum():
@@ -110,7 +110,8 @@ class BrdfMap:
         colours = encode_srgb(self.linear / covered * 2.0**exposure)
         return np.concatenate([colours, self.coverage[..., None]], axis=-1)
 
-    def _away_from_mirror(self) -> NDArray[np.bool_]:
+    def away_from_mirror(self) -> NDArray[np.bool_]:
+        """Pixels (n, n) outside the lobe around the mirror direction."""
         n = self.resolution
         centres = (np.arange(n) + 0.5) * (2.0 / n) - 1.0
         x, y, _ = self.light.mirror
