@@ -96,6 +96,7 @@ class Diffraction(mi.BSDF):
         super().__init__(props)
         parameters = read_parameters(props)
         self.table = parameters.table
+        self.heights = parameters.heights
         self.surface = parameters.reflectance
         self.nested = parameters.nested
         self.height_scale = mi.Float(parameters.height_scale)

@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import DiffractionError
 from ..glsl.source import METHODS
 from .arguments import whole_number
+from .console import say_warning
 from .output import check_writable
 from .progress import Bar
 from .scene_options import add_scene_options, scene_parameters
@@ -112,7 +113,13 @@ def run(args: argparse.Namespace) -> int:
         areas: dict[str, Any] = {}
         for n, method in enumerate(methods):
             bar(n, len(methods), f"drawing with {method}")
-            drawn = renderer.render(method, supersampling=args.supersampling)
+            try:
+                drawn = renderer.render(method, supersampling=args.supersampling)
+            except DiffractionError as error:
+                if args.method != "all":
+                    raise
+                say_warning(f"left out: {error}")  # it does not suit this surface
+                continue
             areas = regions(sees, exact, diffracting, drawn[..., 3])
             other = drawn[..., :3]
             errors = {

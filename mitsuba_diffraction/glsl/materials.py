@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..colour import linear_srgb, response
 from ..tables.table import DiffractionTable
 from .packing import pack_conductor
-from .textures import Packed, Texture, as_half
+from .textures import Packed, Texture, Uniform, as_half
 
 Array = NDArray[np.float64]
 #: Wavelengths (n,) in nm, and values (n,).
@@ -88,32 +88,30 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
 
 
 def pack_surface(material: Material) -> Packed:
-    """Uniforms and pictures of a material, all but its tables."""
-    uniforms: dict[str, Any] = {
+    """A material, all but its tables and the bound of its albedo."""
+    uniforms: dict[str, Uniform] = {
         "two_sided": material.two_sided,
-        "diffracting": material.bsdf is not None,
-        "colour_mapped": material.pigment.picture is not None,
-        "axis_mapped": material.axis.picture is not None,
         "colour_uv": tuple(material.pigment.to_uv.T.ravel().tolist()),
         "axis_uv": tuple(material.axis.to_uv.T.ravel().tolist()),
     }
-    textures = [
-        Texture(name, as_half(_four(picture)), smooth=True)
-        for name, picture in (
-            ("colour_map", material.pigment.picture),
-            ("axis_map", material.axis.picture),
-        )
-        if picture is not None
-    ]
-    packed = Packed(tuple(textures), uniforms)
-    if material.bsdf is None:
-        return packed
+    definitions: dict[str, str] = {}
+    textures = []
+    for name, picture in (("colour", material.pigment.picture), ("axis", material.axis.picture)):
+        if picture is not None:
+            textures.append(Texture(f"{name}_map", as_half(_four(picture)), smooth=True))
+            definitions[f"{name.upper()}_MAPPED"] = ""
+    packed = Packed(tuple(textures), uniforms, definitions)
     bsdf = material.bsdf
-    layered = bsdf.layering
-    extra = getattr(layered, "weight", None)
-    uniforms["above"] = float(layered.above)
-    uniforms["beneath_extra"] = -1.0 if extra is None else float(extra)
-    uniforms["vcavity"] = bool(bsdf.vcavity)
+    if bsdf is None or bsdf.nested is not None:
+        definitions["PIGMENTED"] = ""
+    if bsdf is None:
+        return packed
+    definitions["DIFFRACTING"] = ""
+    if bsdf.vcavity:
+        definitions["VCAVITY"] = ""
+    if hasattr(bsdf.layering, "weight"):
+        definitions["THESIS"] = ""
+        uniforms["diffuse_weight"] = float(bsdf.layering.weight)
     return packed | _reflectance(bsdf.surface)
 
 
@@ -126,12 +124,10 @@ def _reflectance(surface: Any) -> Packed:
     kind = type(surface).__name__
     if kind == "Dielectric":
         eta = float(np.array(surface.eta).ravel()[0])
-        return Packed(uniforms={"surface_kind": 1, "eta": eta})
+        return Packed(uniforms={"eta": eta}, definitions={"SURFACE_KIND": "1"})
     if kind == "Conductor":
-        return Packed(uniforms={"surface_kind": 2}) | pack_conductor(
-            *_spectra(surface.eta, surface.k)
-        )
-    return Packed(uniforms={"surface_kind": 0})
+        return pack_conductor(*_spectra(surface.eta, surface.k))
+    return Packed()
 
 
 def _spectra(eta: Any, k: Any) -> tuple[Array, Array, Array]:

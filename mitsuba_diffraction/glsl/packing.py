@@ -96,17 +96,23 @@ def pack_bounds(bounds: Sequence[AlbedoBound] | None) -> Packed:
 
     bounds : None where the BSDF does not conserve energy.
     """
+    if bounds is None:
+        return Packed()
     definitions = {
+        "ENERGY_CONSERVING": "",
+        "BOUND_PAGES": str(len(bounds)),
         "BOUND_POLAR": str(POLAR),
         "BOUND_AZIMUTHAL": str(AZIMUTHAL),
         "BOUND_SHARE": repr(float(SHARE)),
         "BOUND_LAST_COSINE": repr(math.cos(LAST_ANGLE)),
     }
-    if bounds is None:
-        return Packed((), {"energy_conserving": False}, definitions)
-    values = np.concatenate([np.maximum(b.values, np.float32(1.0)).ravel() for b in bounds])
-    uniforms = {"energy_conserving": True, "bound_page": 0.0, "bound_pages": len(bounds)}
-    return Packed((listed("bounds", values[:, None]),), uniforms, definitions)
+    values = np.maximum(np.stack([b.values for b in bounds]), np.float32(1.0))
+    corners = [values[:, :-1, :-1], values[:, :-1, 1:], values[:, 1:, :-1], values[:, 1:, 1:]]
+    return Packed(
+        (listed("bounds", np.stack(corners, axis=-1).reshape(-1, 4)),),
+        {"bound_page": 0.0},
+        definitions,
+    )
 
 
 def pack_responses(lights: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Packed:
@@ -163,7 +169,9 @@ def pack_conductor(
     fine = np.arange(360.0, 830.5, 1.0)
     weights = linear_srgb(response(fine))
     rows[-1, :, :3] = over(fine).T @ (weights / weights.sum(axis=0))
-    return Packed((Texture("reflectances", rows),), {"wavenumbers": WAVENUMBERS})
+    return Packed(
+        (Texture("reflectances", rows),), {"wavenumbers": WAVENUMBERS}, {"SURFACE_KIND": "2"}
+    )
 
 
 def conductor_reflectance(

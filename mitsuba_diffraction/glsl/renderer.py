@@ -15,6 +15,7 @@ from ..files.bound_cache import cached_bound
 from ..files.cache import cached_colours
 from .camera import Camera
 from .context import Bindings, check_version, compile_program, headless_context, set_uniforms
+from .documents import DOCUMENTED, make_documented, pack_method
 from .lights import Light
 from .materials import Material, height_scale, pack_surface
 from .packing import pack_bounds, pack_colours, pack_powers, pack_responses
@@ -153,7 +154,8 @@ class Renderer:
             "light_place": places,
             "light_colour": colours,
             "sky": tuple(float(x) for x in self.sky),
-            "display": exposure is not None,
+            "skies": int(np.any(self.sky != 0.0)),
+            "displays": int(exposure is not None),
             "exposure": 1.0 if exposure is None else exposure,
         }
         for surface, own, part in zip(
@@ -290,6 +292,9 @@ def method_tables(method: str, material: Material) -> Packed:
         return pack_colours(cached_colours(material.table))
     if method == "spectral":
         return pack_powers(material.table)
+    if method in DOCUMENTED:
+        heights = material.bsdf.heights()
+        return pack_method(make_documented(method, heights, material.table))
     raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
 
 

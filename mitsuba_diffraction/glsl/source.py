@@ -13,7 +13,9 @@ from .textures import PAGE
 Dialect = Literal["desktop", "web"]
 
 #: Methods of the fragment stage.
-METHODS = ("lut", "spectral")
+METHODS = ("lut", "spectral", "flss", "nmm", "pq")
+
+_TAYLOR = ("flss", "nmm", "pq")
 
 #: Lights at once.
 LIGHTS = 4
@@ -48,7 +50,7 @@ def fragment_source(
     Parameters
     ----------
     method : one of `METHODS`.
-    definitions : what the tables' textures ask for (`Packed.definitions`).
+    definitions : what the surface and the tables ask for (`Packed.definitions`).
     dialect : "desktop" is GLSL 3.30 core, "web" GLSL ES 3.00.
     main : the file with the main function.
 
@@ -69,7 +71,11 @@ def fragment_parts(
     """The names and texts that `fragment_source` joins."""
     if method not in METHODS:
         raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
-    constants = {"PAGE": str(PAGE), "LIGHTS": str(LIGHTS), **definitions}
+    constants = {"PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1), "LIGHTS": str(LIGHTS)}
+    constants |= {"SURFACE_KIND": "0", **definitions}
     lines = [f"#define {name} {value}\n" for name, value in constants.items()]
     parts = [("preamble", _PREAMBLES[dialect] + "".join(lines))]
-    return parts + [(name, _file(name)) for name in ("library.glsl", f"{method}.glsl", main)]
+    shared = (
+        ("library.glsl", "taylor.glsl") if method in ("flss", "nmm", "pq") else ("library.glsl",)
+    )
+    return parts + [(name, _file(name)) for name in (*shared, f"{method}.glsl", main)]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 
 #: Texels in a row of a list: every OpenGL 3.3 and nearly every WebGL 2 has textures this wide.
-PAGE = 4096
+PAGE = 1 << 12
 
 #: Half floats are used where they change a sum of coefficients by less than this share of it.
 HALF_ERROR = 2e-4

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -13,12 +13,13 @@ import mitsuba as mi
 
 from ..errors import DiffractionError
 from ..files.options import LoadOptions
+from ..heightfield import HeightField
 from ..tables.table import DiffractionTable
 from .layers import LAYERINGS, Blend, Layering, Transmission
 from .orientation import Constant, Orientation, Textured
 from .reflectance import Conductor, Dielectric, Perfect, Reflectance
 from .shadowing import SHADOWINGS
-from .sources import table_of_file, table_of_tensor
+from .sources import heights_of_file, heights_of_tensor, table_of_file, table_of_heights
 
 SOURCES = ("heightfield", "table", "data")
 READING = tuple(field.name for field in fields(LoadOptions))
@@ -51,6 +52,7 @@ class Parameters:
     Attributes
     ----------
     table : the diffraction table.
+    heights : reads the heights that it was made of.
     reflectance : the surface's own reflectance.
     orientation : from the first tangent to the patch's x axis.
     height_scale : factor on all heights.
@@ -62,6 +64,7 @@ class Parameters:
     """
 
     table: DiffractionTable
+    heights: Callable[[], HeightField]
     reflectance: Reflectance
     orientation: Orientation
     height_scale: float
@@ -96,9 +99,10 @@ def read_parameters(props: Any) -> Parameters:
             f"a nested BSDF lies beneath a surface that lets no light through (material="
             f"'{reflectance}'); give int_ior instead, or remove the nested BSDF"
         )
-    table = _table(props, height_scale)
+    table, heights = _table(props, height_scale)
     return Parameters(
         table=table,
+        heights=heights,
         reflectance=reflectance,
         orientation=_orientation(props),
         height_scale=height_scale,
@@ -110,7 +114,7 @@ def read_parameters(props: Any) -> Parameters:
     )
 
 
-def _table(props: Any, height_scale: float) -> DiffractionTable:
+def _table(props: Any, height_scale: float) -> tuple[DiffractionTable, Callable[[], HeightField]]:
     given = [name for name in SOURCES if name in props]
     if len(given) != 1:
         raise DiffractionError(
@@ -125,11 +129,13 @@ def _table(props: Any, height_scale: float) -> DiffractionTable:
     options = LoadOptions.of(**{name: props.get(name) for name in READING if name in props})
     value = props.get(given[0])
     if given[0] == "data":
-        return table_of_tensor(value, options, asked, height_scale)
+        heights = heights_of_tensor(value, options)
+        return table_of_heights(heights, asked, height_scale), lambda: heights
     if not isinstance(value, str):
         raise DiffractionError(f"{given[0]}={value!r} must be the name of a file")
     path = Path(str(mi.file_resolver().resolve(value)))
-    return table_of_file(path, given[0] == "table", options, asked, height_scale)
+    table = table_of_file(path, given[0] == "table", options, asked, height_scale)
+    return table, lambda: heights_of_file(path, given[0] == "table", options)
 
 
 def _wavelength(props: Any, table: DiffractionTable) -> float:

@@ -72,10 +72,26 @@ def table_of_file(
     return table
 
 
-def table_of_tensor(
-    data: Any, options: LoadOptions, asked: Mapping[str, Any], height_scale: float
-) -> DiffractionTable:
-    """The table of heights (ny, nx) in µm, given as an array."""
+def heights_of_file(path: Path, is_table: bool, options: LoadOptions) -> HeightField:
+    """The heights that a scene names; the first of a recipe's several.
+
+    Raises
+    ------
+    DiffractionError
+        If it names a table, which does not hold them.
+    """
+    if is_table or (path.suffix.lower() == ".exr" and _is_table(path)):
+        raise DiffractionError(
+            f"'{path}' is a table and does not hold the heights that it was made of; give the "
+            "scene the height field instead"
+        )
+    if path.suffix.lower() == ".toml":
+        return Recipe.load(path).fields(options)[0]
+    return load_heights(path, options)
+
+
+def heights_of_tensor(data: Any, options: LoadOptions) -> HeightField:
+    """Heights (ny, nx) in µm, given as an array."""
     if options.max_height is not None:
         raise DiffractionError("max_height is for images; the heights in data are in µm already")
     if options.pixel_size is None:
@@ -83,7 +99,13 @@ def table_of_tensor(
     values = np.array(data, np.float64)
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[..., 0]
-    heights = HeightField(values, options.pixel_size, name="data")
+    return HeightField(values, options.pixel_size, name="data")
+
+
+def table_of_heights(
+    heights: HeightField, asked: Mapping[str, Any], height_scale: float
+) -> DiffractionTable:
+    """The table of a height field."""
     table = _built(heights.digest(), lambda: [heights], asked, height_scale)
     _warn(table)
     return table

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
 from mitsuba_diffraction.glsl.context import Bindings, compile_program, headless_context
-from mitsuba_diffraction.glsl.packing import pack_bounds
 from mitsuba_diffraction.glsl.textures import Packed, Texture
 
 
@@ -48,8 +47,9 @@ def table(patch: HeightField) -> DiffractionTable:
 def probed(gl: Any, method: str, packed: Packed, places: NDArray[Any]) -> NDArray[np.float64]:
     """A method's colours (n, 3) at places (n, 4): u, v, z and the cosine at the half vector."""
     picture = np.ascontiguousarray(places[None], np.float32)
-    parts = packed | pack_bounds(None)
-    parts |= Packed((Texture("places", picture),), {"light_colour": np.ones((4, 3), np.float32)})
+    parts = packed | Packed(
+        (Texture("places", picture),), {"light_colour": np.ones((4, 3), np.float32)}
+    )
     program = compile_program(gl, method, parts.definitions, vertex="whole.vert", main="probe.frag")
     bindings = Bindings(gl, parts)
     target = gl.texture((len(places), 1), 4, dtype="f4")

@@ -2,24 +2,27 @@
 
 const float PI = 3.14159265358979;
 
-// Number i of a list, which lies in rows of PAGE texels.
+// Number i of a list, which lies in rows of PAGE = 2^PAGE_BITS texels.
 vec4 entry(sampler2D list, int i)
 {
-    return texelFetch(list, ivec2(i & (PAGE - 1), i / PAGE), 0);
+    return texelFetch(list, ivec2(i & (PAGE - 1), i >> PAGE_BITS), 0);
 }
 
 uniform vec3 light_colour[LIGHTS];  // irradiance, or intensity of a point light, linear sRGB
 
 // ---------------------------------------------------------------- reflectance
 
-const int PERFECT = 0;
-const int DIELECTRIC = 1;
-const int CONDUCTOR = 2;
+// Kinds and parts that a surface lacks are left out by the preprocessor: software rasterisers go
+// through both sides of a branch, whatever a uniform says. Loops they skip.
+#define PERFECT 0
+#define DIELECTRIC 1
+#define CONDUCTOR 2
 
-uniform int surface_kind;
-uniform float eta;               // of a dielectric, inside over outside
-uniform sampler2D reflectances;  // of a conductor: columns over cosθ, rows over k, colours in the last
-uniform vec2 wavenumbers;        // first and last row, rad/µm
+uniform vec2 wavenumbers;        // ends of what the eye sees, rad/µm
+
+#if SURFACE_KIND == DIELECTRIC
+
+uniform float eta;               // inside over outside
 
 // Unpolarised power reflectance of an interface between dielectrics (Fresnel).
 float fresnel(float cos_i)
@@ -32,6 +35,16 @@ float fresnel(float cos_i)
     return 0.5 * (s * s + p * p);
 }
 
+// R in linear sRGB, under daylight.
+vec3 reflectance(float cos_i) { return vec3(fresnel(cos_i)); }
+
+// R at one wavenumber.
+float reflectance_at(float cos_i, float k) { return fresnel(cos_i); }
+
+#elif SURFACE_KIND == CONDUCTOR
+
+uniform sampler2D reflectances;  // columns over cosθ, rows over k, colours in the last
+
 vec4 conductor_row(float cos_i, int row)
 {
     float last = float(textureSize(reflectances, 0).x - 1);
@@ -42,30 +55,27 @@ vec4 conductor_row(float cos_i, int row)
     return mix(left, right, x - lower);
 }
 
-// R in linear sRGB, under daylight.
 vec3 reflectance(float cos_i)
 {
-    if (surface_kind == DIELECTRIC) return vec3(fresnel(cos_i));
-    if (surface_kind == CONDUCTOR)
-        return conductor_row(cos_i, textureSize(reflectances, 0).y - 1).rgb;
-    return vec3(1.0);
+    return conductor_row(cos_i, textureSize(reflectances, 0).y - 1).rgb;
 }
 
-// R at one wavenumber.
 float reflectance_at(float cos_i, float k)
 {
-    if (surface_kind == DIELECTRIC) return fresnel(cos_i);
-    if (surface_kind == CONDUCTOR) {
-        float last = float(textureSize(reflectances, 0).y - 2);
-        float y = clamp((k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x), 0.0, 1.0) * last;
-        return conductor_row(cos_i, int(y + 0.5)).r;
-    }
-    return 1.0;
+    float last = float(textureSize(reflectances, 0).y - 2);
+    float y = clamp((k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x), 0.0, 1.0) * last;
+    return conductor_row(cos_i, int(y + 0.5)).r;
 }
 
-// ---------------------------------------------------------------- shadowing and energy
+#else
 
-uniform bool vcavity;
+vec3 reflectance(float cos_i) { return vec3(1.0); }
+
+float reflectance_at(float cos_i, float k) { return 1.0; }
+
+#endif
+
+// ---------------------------------------------------------------- shadowing and energy
 
 // Long V-shaped grooves, edges level: min(1, 2(n·h)(n·ωi)/(ωo·h), 2(n·h)(n·ωo)/(ωo·h))
 // (Torrance and Sparrow 1967).
@@ -74,20 +84,18 @@ float groove_shadow(float cos_i, float cos_o, float one_plus_dot)
     return min(1.0, 2.0 * (cos_i + cos_o) * min(cos_i, cos_o) / max(one_plus_dot, 1e-30));
 }
 
-uniform bool energy_conserving;
-uniform sampler2D bounds;   // of the albedo, pages of (BOUND_POLAR + 1) × (BOUND_AZIMUTHAL + 1)
+#ifdef ENERGY_CONSERVING
+
+uniform sampler2D bounds;   // of the albedo at the corners of BOUND_POLAR × BOUND_AZIMUTHAL cells
 uniform float bound_page;   // between pages, which are for different height scales
-uniform int bound_pages;
 
 float bound_on_page(int page, vec2 cell)
 {
-    ivec2 lower = ivec2(clamp(floor(cell), vec2(0.0), vec2(BOUND_POLAR - 1, BOUND_AZIMUTHAL - 1)));
-    vec2 t = clamp(cell - vec2(lower), 0.0, 1.0);
-    int stride = BOUND_AZIMUTHAL + 1;
-    int index = (page * (BOUND_POLAR + 1) + lower.x) * stride + lower.y;
-    float low = mix(entry(bounds, index).r, entry(bounds, index + 1).r, t.y);
-    float high = mix(entry(bounds, index + stride).r, entry(bounds, index + stride + 1).r, t.y);
-    return mix(low, high, t.x);
+    vec2 lower = clamp(floor(cell), vec2(0.0), vec2(BOUND_POLAR - 1, BOUND_AZIMUTHAL - 1));
+    vec2 t = clamp(cell - lower, 0.0, 1.0);
+    vec4 corner = entry(bounds, (page * BOUND_POLAR + int(lower.x)) * BOUND_AZIMUTHAL + int(lower.y));
+    vec2 along = mix(corner.xz, corner.yw, t.y);
+    return mix(along.x, along.y, t.x);
 }
 
 // max(1, a) of a direction, given its tangential part in the patch's frame.
@@ -98,14 +106,19 @@ float albedo_bound(vec2 tangential, float cosine)
     if (turn < 0.0) turn += 1.0;
     vec2 cell = vec2((1.0 - sqrt(max(remaining, 0.0))) * (float(BOUND_POLAR) / BOUND_SHARE),
                      turn * float(BOUND_AZIMUTHAL));
-    int page = int(clamp(floor(bound_page), 0.0, float(bound_pages - 1)));
-    float bound = bound_on_page(page, cell);
-    if (page + 1 < bound_pages)
-        bound = mix(bound, bound_on_page(page + 1, cell), clamp(bound_page - float(page), 0.0, 1.0));
+#if BOUND_PAGES > 1
+    int page = int(clamp(floor(bound_page), 0.0, float(BOUND_PAGES - 2)));
+    float bound = mix(bound_on_page(page, cell), bound_on_page(page + 1, cell),
+                      clamp(bound_page - float(page), 0.0, 1.0));
+#else
+    float bound = bound_on_page(0, cell);
+#endif
     // towards the horizon the albedo grows with 1/cos²θ
     float beyond = max(BOUND_LAST_COSINE / max(cosine, 1e-6), 1.0);
     return bound * beyond * beyond;
 }
+
+#endif
 
 // ---------------------------------------------------------------- display
 

@@ -62,18 +62,23 @@ vec3 other_orders(vec2 uv, float squared_radius, float z)
     return sum * (fade * inverse_scale);
 }
 
+// The glossy reflection, bright within a degree or so: a loop of one step, so that rasterisers in
+// software skip it elsewhere.
 vec3 order_0(float radius, float z)
 {
-    vec2 position = vec2(radius, z) * glossy_steps;
     vec2 last = vec2(glossy_size) - 1.0;
-    if (position.x >= last.x) return vec3(0.0);
-    vec2 lower = min(floor(position), last - 1.0);
-    vec2 t = clamp(position - lower, 0.0, 1.0);
-    int index = int(lower.x) * glossy_size.y + int(lower.y);
-    vec3 near = mix(entry(glossy, index).rgb, entry(glossy, index + 1).rgb, t.y);
-    index += glossy_size.y;
-    vec3 far = mix(entry(glossy, index).rgb, entry(glossy, index + 1).rgb, t.y);
-    return mix(near, far, t.x);
+    vec2 position = vec2(radius, z) * glossy_steps;
+    vec3 colour = vec3(0.0);
+    for (int n = 0; n < (position.x < last.x ? 1 : 0); ++n) {
+        vec2 lower = min(floor(position), last - 1.0);
+        vec2 t = clamp(position - lower, 0.0, 1.0);
+        int index = int(lower.x) * glossy_size.y + int(lower.y);
+        vec3 inner = mix(entry(glossy, index).rgb, entry(glossy, index + 1).rgb, t.y);
+        index += glossy_size.y;
+        vec3 outer = mix(entry(glossy, index).rgb, entry(glossy, index + 1).rgb, t.y);
+        colour = mix(inner, outer, t.x);
+    }
+    return colour;
 }
 
 // R ⟨|P|²⟩ / (4π²σ⁴ λ²) over the light's wavelengths, linear sRGB, 1/µm².

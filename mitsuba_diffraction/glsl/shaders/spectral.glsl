@@ -4,8 +4,9 @@
 // an order's power at κ = k z, what is wanted is ∫ Σ_j exp(−σ²|k (u, v) − q_j|²) F_j(k) dk.
 // Far from the specular direction lobes are narrow in k, and the loop steps from order to order along
 // the ray: ∫ = exp(−σ² q⊥²) √π/(σr) · mean of F_j over the lobe, q⊥ the order's distance from the ray,
-// and two points at one standard deviation give that mean to third order. Close to the specular
-// direction lobes are wide, and the loop steps in k.
+// and two points at one standard deviation give that mean to third order; the orders across the ray
+// at one step share their mean wavelength. Close to the specular direction lobes are wide, and the
+// loop steps in k.
 
 uniform sampler2D orders;        // TEXELS texels an order: terms of its series in κ
 uniform sampler2D order_zero;    // the same of order 0, per interval
@@ -19,7 +20,6 @@ uniform float inverse_scale;
 
 const float REACH = 2.6;         // of the window, in 1/σ: erfc(2.6) = 2e-4 is left out
 const float WIDEST_LOBE = 0.25;  // rad/µm, 12 nm in the green
-const float NARROW_LOBE = 0.08;  // rad/µm, 4 nm in the green
 const float LARGEST_STEP = 0.15; // rad/µm, for the eye's curves
 
 int interval_of(float kappa)
@@ -74,35 +74,40 @@ vec3 from_order_to_order(vec2 uv, float r, float z, float cos_half, int light)
     int end = min(int(floor(max(ends.x, ends.y))), last.x);
     float falloff = sigma * steps.y * direction.x;
 
-    // narrow lobes need no mean
     float deviation = sqrt(0.5) / (sigma * r);
-    int points = deviation > NARROW_LOBE ? 2 : 1;
-    float aside = points == 2 ? deviation : 0.0;
 
     vec3 sum = vec3(0.0);
-    vec4 weights[TEXELS];
-    for (int point = 0; point < points; ++point) {
-        for (int n = first; n <= end; ++n) {
-            float k_n = float(n) / rates.x;
-            float centre = k_n * rates.y;
-            float k_point = k_n + (point == 0 ? aside : -aside);
-            // κ of the tap on the ray: those on either side differ by the same, one way and the other
-            int interval = interval_of(k_n * z);
-            series(k_point * z, interval, weights);
-            int low = max(int(ceil(centre - reach)), -last.y);
-            int high = min(int(floor(centre + reach)), last.y);
-            for (int m = low; m <= high; ++m) {
-                float across = float(m) - centre;
-                int texel = first_texel(interval, steep ? ivec2(m, n) : ivec2(n, m));
-                float power = 0.0;
-                for (int i = 0; i < TEXELS; ++i) power += dot(entry(orders, texel + i), weights[i]);
-                float apart = falloff * across;
-                float k = k_point + across * shift;
-                sum += exp(-apart * apart) * power * reflectance_at(cos_half, k) * response(k, light);
+    vec4 weights_low[TEXELS];
+    vec4 weights_high[TEXELS];
+    for (int n = first; n <= end; ++n) {
+        float k = float(n) / rates.x;
+        float centre = k * rates.y;
+        int interval = interval_of(k * z);
+        series((k - deviation) * z, interval, weights_low);
+        series((k + deviation) * z, interval, weights_high);
+        int low = max(int(ceil(centre - reach)), -last.y);
+        int high = min(int(floor(centre + reach)), last.y);
+        vec2 power = vec2(0.0);
+        vec2 moment = vec2(0.0);  // the orders' mean place across the ray
+        for (int m = low; m <= high; ++m) {
+            int texel = first_texel(interval, steep ? ivec2(m, n) : ivec2(n, m));
+            vec2 value = vec2(0.0);
+            for (int i = 0; i < TEXELS; ++i) {
+                vec4 terms = entry(orders, texel + i);
+                value += vec2(dot(terms, weights_low[i]), dot(terms, weights_high[i]));
             }
+            float across = float(m) - centre;
+            float apart = falloff * across;
+            value *= exp(-apart * apart);
+            power += value;
+            moment += value * across;
         }
+        vec2 mean = clamp(moment / max(power, 1e-20), -reach, reach);
+        vec2 at = k + mean * shift + vec2(-deviation, deviation);
+        sum += power.x * reflectance_at(cos_half, at.x) * response(at.x, light)
+             + power.y * reflectance_at(cos_half, at.y) * response(at.y, light);
     }
-    return sum * (inverse_scale * sqrt(PI) / (sigma * r * float(points)));
+    return sum * (0.5 * inverse_scale * sqrt(PI) / (sigma * r));
 }
 
 vec3 from_wavelength_to_wavelength(vec2 uv, float r, float z, float cos_half, int light)

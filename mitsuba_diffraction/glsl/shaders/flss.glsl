@@ -1,0 +1,6 @@
+// `flss`: the source documents' uniform sampling of the whole spectrum (methods/full_spectrum.py).
+
+vec3 diffracted(vec2 uv, float z, float cos_half, int light)
+{
+    return over_spectrum(uv, z, cos_half, light);
+}

@@ -1,0 +1,7 @@
+// `pq`: the source documents' repeated patch (methods/pq.py, linear interpolation); REPEATED makes
+// the window of taylor.glsl that of whole copies.
+
+vec3 diffracted(vec2 uv, float z, float cos_half, int light)
+{
+    return over_spectrum(uv, z, cos_half, light);
+}
