@@ -1,0 +1,140 @@
+"""The model beside rigorous solutions, and the measures of how far apart they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .cases import PROFILES, Grating, order_sines
+from .model import order_efficiencies
+from .solutions import KEY, Solutions, shipped
+
+#: Orders that leave closer to the surface than this are not counted: the model has no limit there.
+GRAZING = 75.0  # degrees
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Solutions of one material (what has converged) and the model's efficiency of each row."""
+
+    material: str
+    solutions: Solutions
+    model: NDArray[np.float64]
+
+    @cached_property
+    def rigorous(self) -> NDArray[np.float64]:
+        """Efficiency for unpolarised light, (n,)."""
+        return self.solutions.mean
+
+    @cached_property
+    def sine(self) -> NDArray[np.float64]:
+        """sinθo of each row, (n,)."""
+        rows = self.solutions.rows
+        step = rows["wavelength"].astype(float) / 1000 / rows["period"].astype(float)
+        return rows["order"] * step - np.sin(np.radians(rows["theta"].astype(float)))
+
+    @cached_property
+    def counted(self) -> NDArray[np.bool_]:
+        """Rows that do not leave along the surface (`GRAZING`), (n,)."""
+        return np.abs(self.sine) <= np.sin(np.radians(GRAZING))
+
+    def select(self, keep: NDArray[np.bool_]) -> Comparison:
+        """Some of the rows."""
+        part = Solutions(self.solutions.rows[keep], self.solutions.about)
+        return Comparison(self.material, part, self.model[keep])
+
+    def where(self, **values: Any) -> Comparison:
+        """The rows with these values, such as profile="lamellar" or theta=30.0."""
+        rows = self.solutions.rows
+        keep = np.ones(len(rows), bool)
+        for name, value in values.items():
+            wanted: Any = PROFILES.index(value) if name == "profile" else np.float32(value)
+            keep &= rows[name] == wanted
+        return self.select(keep)
+
+    def deviation(self, *, colours: bool = False) -> float:
+        """Σ|η − η_rigorous| / Σ η_rigorous over the counted rows; NaN if there are none.
+
+        The measure of the project's other accuracy figures. With `colours` order 0 is left out,
+        which would hide the others where it is much the strongest.
+        """
+        keep = self.counted & (self.solutions.rows["order"] != 0) if colours else self.counted
+        total = float(self.rigorous[keep].sum())
+        return float(np.abs(self.model - self.rigorous)[keep].sum()) / total if total else np.nan
+
+    def largest_relative(self, orders: int = 2) -> float:
+        """Largest |η/η_rigorous − 1| among the counted rows with |m| up to `orders`."""
+        keep = self.counted & (np.abs(self.solutions.rows["order"]) <= orders)
+        return float(np.max(np.abs(self.model[keep] / self.rigorous[keep] - 1)))
+
+    def gain(self) -> float:
+        """Σ η / Σ η_rigorous over all rows: how much light the model makes or loses altogether."""
+        return float(self.model.sum() / self.rigorous.sum())
+
+
+def compare(material: str, solutions: Solutions | None = None) -> Comparison:
+    """Evaluate the model for what has converged, by default of the solutions that are shipped.
+
+    Raises
+    ------
+    DiffractionError
+        If there are no solutions for this material.
+    """
+    trusted = (solutions or shipped(material)).trusted()
+    rows = trusted.rows
+    model = np.full(len(rows), np.nan)
+    unique, inverse = np.unique(rows[KEY], return_inverse=True)
+    starts = np.argsort(inverse.ravel(), kind="stable")
+    ends = np.cumsum(np.bincount(inverse.ravel()))
+    for key, members in zip(unique, np.split(starts, ends[:-1]), strict=True):
+        profile, period, depth, theta, wavelength = (_decimal(value) for value in key)
+        grating = Grating(PROFILES[int(profile)], period, depth)
+        orders, _ = order_sines(period, wavelength, theta)
+        efficiencies = order_efficiencies(grating, material, theta, wavelength)
+        model[members] = efficiencies[np.searchsorted(orders, rows["order"][members])]
+    return Comparison(material, trusted, model)
+
+
+def gratings_of(comparison: Comparison, profile: str) -> list[Grating]:
+    """The gratings of a profile that were solved, gentlest slope first."""
+    rows = comparison.solutions.rows
+    rows = rows[rows["profile"] == PROFILES.index(profile)]
+    pairs = {(_decimal(p), _decimal(d)) for p, d in zip(rows["period"], rows["depth"], strict=True)}
+    return sorted(
+        (Grating(profile, period, depth) for period, depth in pairs),
+        key=lambda grating: (grating.depth / grating.period, grating.period),
+    )
+
+
+def angles_of(comparison: Comparison) -> list[float]:
+    """Angles of incidence among the rows, ascending, degrees."""
+    return [float(theta) for theta in np.unique(comparison.solutions.rows["theta"])]
+
+
+def table_of(
+    comparison: Comparison,
+    gratings: Sequence[Grating],
+    angles: Sequence[float],
+    measure: Callable[[Comparison], float],
+) -> NDArray[np.float64]:
+    """A measure for each grating and angle, (gratings, angles); NaN where nothing was solved."""
+    result = np.full((len(gratings), len(angles)), np.nan)
+    for row, grating in enumerate(gratings):
+        of_grating = comparison.where(
+            profile=grating.profile, period=grating.period, depth=grating.depth
+        )
+        for column, theta in enumerate(angles):
+            part = of_grating.where(theta=theta)
+            if len(part.model):
+                result[row, column] = measure(part)
+    return result
+
+
+def _decimal(value: np.floating) -> float:
+    """A number as it was written before it was stored in single precision."""
+    return float(f"{float(value):.6g}")
