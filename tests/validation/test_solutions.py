@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.validation import coupled_wave, integral
+from mitsuba_diffraction.validation import coupled_wave, integral, solve
+from mitsuba_diffraction.validation.__main__ import main
 from mitsuba_diffraction.validation.cases import (
     FEW_WAVELENGTHS,
     MATERIALS,
@@ -127,6 +128,31 @@ def test_coupled_waves_give_the_shipped_solutions_again():
         # the resolution from which the stored change is counted; that is stored in half floats
         change = np.abs(again.orders[polarisation][0] - stored[polarisation])
         assert change == pytest.approx(stored[f"{polarisation}_change"], rel=2e-3, abs=1e-7)
+
+
+@gratinglab
+def test_the_command_solves_and_saves(tmp_path, monkeypatch, capsys):
+    few = [
+        Scan(Grating("sinusoidal", 1.1, depth), "perfect", 30.0, (610.0,)) for depth in (0.1, 0.2)
+    ]
+    monkeypatch.setattr(solve, "scans", lambda material: few)
+    assert main(["solve", "perfect", "-j", "1", "-o", str(tmp_path)]) == 0
+    assert "perfect_integral.npz" in capsys.readouterr().out
+    found = load(tmp_path / "perfect_integral.npz")
+    assert "gratinglab" in found.about["solver"]
+    stored = np.concatenate([rows_of(shipped("perfect"), scan) for scan in few])
+    for name in ("order", "te", "tm"):
+        # the same mesh; another BLAS rounds otherwise
+        assert found.rows[name] == pytest.approx(stored[name], abs=1e-6)
+
+
+def test_a_solver_that_is_missing_is_named(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(integral, "available", lambda: False)
+    assert main(["solve", "perfect", "-o", str(tmp_path)]) == 1
+    error = capsys.readouterr().err
+    assert "'.[validation]'" in error
+    assert error.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_was_saved_is_loaded(tmp_path):
