@@ -188,7 +188,7 @@ class Diffraction(mi.BSDF):
                 f"{self.table.height_scale_max:g}; load the plugin anew with that height_scale"
             )
         if self._energy is not None:
-            self._energy.update(largest)
+            self._energy.update(largest, dr.grad_enabled(self.height_scale))
         dr.make_opaque(self.height_scale)
         self.orientation.update()
         self.surface.update()
@@ -236,7 +236,7 @@ class Diffraction(mi.BSDF):
         power = self._light.power(uv, w * self.height_scale, si)
         if self._energy is not None:
             incident, outgoing = _in_patch(si.wi, rotation), _in_patch(wo, rotation)
-            outside /= self._energy.divisor(incident, cos_i, outgoing, w - cos_i)
+            outside /= self._energy.divisor(incident, cos_i, outgoing, w - cos_i, self.height_scale)
         if self.vcavity:
             outside *= vcavity(cos_i, w - cos_i, one_plus_dot)
         cos_half = dr.safe_sqrt(0.5 * one_plus_dot)

@@ -7,6 +7,7 @@ import json
 import math
 import threading
 import weakref
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -21,12 +22,17 @@ from .atomic import atomic_path
 from .cache import cache_folder
 
 #: Raised whenever the computation of a bound changes.
-VERSION = 1
+VERSION = 2
 #: The oldest files go beyond this number.
 MOST_FILES = 512
 
-#: Bounds are computed for height scales 2^(n/steps): this phase (rad) changes between neighbours.
-_PHASE = 0.3
+#: Bounds are computed for height scales n/steps: this phase (rad) changes at most in between. The
+#: power of an order bends by a fiftieth then, and by less at grazing angles, where there is most
+#: to bound.
+_PHASE = 0.8
+_FEWEST_STEPS = 4
+#: As good as no heights at all.
+_FLAT = 1e-3
 
 _SETTINGS = (
     VERSION, POLAR, AZIMUTHAL, LAST_ANGLE, MARGIN, LEAST_SPIKE, RINGS, STEPS, SMOOTHING, STRONG,
@@ -39,28 +45,61 @@ _known: weakref.WeakKeyDictionary[DiffractionTable, dict[float, AlbedoBound]] = 
 _lock = threading.Lock()
 
 
-def cached_bound(table: DiffractionTable, height_scale: float) -> AlbedoBound:
-    """The bound of a table's albedo at a height scale.
+@dataclass(frozen=True)
+class BoundsAround:
+    """Bounds at two height scales; in between, their linear interpolation is the bound.
 
-    Scales lie between those of a fine geometric grid, which holds 1; a bound is interpolated
-    between its two neighbours there, so that an optimisation of the heights stays continuous and
-    needs few of them.
+    Attributes
+    ----------
+    scales : (lower, upper) height scale; equal where one is enough.
+    bounds : of each.
+    """
+
+    scales: tuple[float, float]
+    bounds: tuple[AlbedoBound, AlbedoBound]
+
+    def share(self, height_scale: float) -> float:
+        """Weight of the upper bound, 0 … 1."""
+        low, high = self.scales
+        return min(max((height_scale - low) / (high - low), 0.0), 1.0) if high > low else 0.0
+
+
+def bounds_around(
+    table: DiffractionTable, height_scale: float, *, interval: bool = False
+) -> BoundsAround:
+    """The bounds of a table's albedo at the two nodes around a height scale.
+
+    The nodes lie evenly, 1 among them, so close that an order's power bends little in between. An
+    optimisation of the heights thus sees a continuous bound with derivatives, and waits for a new
+    one only where it enters an interval that nobody has been in before.
+
+    interval : two nodes even if the scale is at one, for derivatives.
     """
     phase = 2.0 * table.reach * table.expansion.half_range
-    steps = max(8, math.ceil(math.log(2.0) * phase / _PHASE))
-    position = steps * math.log2(height_scale)
-    lower = math.floor(position + 1e-6)
-    share = position - lower
-    low = _at(table, 2.0 ** (lower / steps))
-    if share < 1e-5:
-        return low
+    steps = max(_FEWEST_STEPS, math.ceil(phase / _PHASE))
     # Beyond the table's own limit nothing can be looked up, so the last interval is shorter
-    upper = min(2.0 ** ((lower + 1) / steps), table.height_scale_max)
-    span = steps * math.log2(upper) - lower
-    high = _at(table, upper)
-    share = min(share / span, 1.0) if span > 0.0 else 0.0
-    values = low.values * np.float32(1.0 - share) + high.values * np.float32(share)
-    return AlbedoBound(values)
+    most = max(table.height_scale_max, _FLAT)
+
+    def node(n: int) -> float:
+        return min(max(n / steps, _FLAT), most)
+
+    position = height_scale * steps  # of a scale in single precision
+    lower = min(math.floor(position + 1e-4), math.ceil(most * steps - 1e-4) - 1)
+    at_node = abs(position - lower) < 1e-4
+    low = node(lower)
+    if at_node and not interval:
+        bound = _at(table, low)
+        return BoundsAround((low, low), (bound, bound))
+    high = node(lower + 1)
+    return BoundsAround((low, high), (_at(table, low), _at(table, high)))
+
+
+def cached_bound(table: DiffractionTable, height_scale: float) -> AlbedoBound:
+    """The bound of a table's albedo at a height scale, from memory, from disk, or computed."""
+    around = bounds_around(table, height_scale)
+    low, high = (bound.values for bound in around.bounds)
+    share = np.float32(around.share(height_scale))
+    return AlbedoBound(low * (1 - share) + high * share)
 
 
 def _at(table: DiffractionTable, height_scale: float) -> AlbedoBound:

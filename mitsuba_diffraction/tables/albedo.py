@@ -62,6 +62,10 @@ class AlbedoModel:
         spacing = longest * 0.5 * math.pi / RINGS
         self.atoms: Atoms = atoms_of(table, height_scale, SMOOTHING * spacing)
         self._nodes, self._weights = _directions()
+        self._length = np.hypot(*self.atoms.frequency.T)
+        self._azimuth = np.arctan2(*self.atoms.frequency.T[::-1])
+        self._near: dict[float, _NearHorizon] = {}
+        self._turned: tuple[NDArray[np.floating], Array] | None = None
 
     def albedo(self, theta: float, phi: ArrayLike, wavelength: float) -> NDArray[np.floating]:
         """a(ωi; λ) for one polar angle (rad), azimuths (rad, shape (n,)) and a wavelength (nm)."""
@@ -140,10 +144,9 @@ class AlbedoModel:
         sin_i, cos_i = math.sin(theta), math.cos(theta)
         horizon = self._horizon(k, cos_i, shift + atoms.uncertainty / k if shift > 0.0 else 0.0)
         power = atoms.strong(k * (cos_i + np.arange(_COSINES + 1) / _COSINES))
-        length = np.hypot(*atoms.frequency.T) / k
-        azimuth = np.arctan2(atoms.frequency[:, 1], atoms.frequency[:, 0])
+        length = self._length / k
         # ωo's tangential part is q/k − ωi's; along = (q/k)·ωi
-        along = (sin_i * length * np.cos(phi[:, None] - azimuth)).astype(np.float32)
+        along = (sin_i * length).astype(np.float32) * self._cosines(phi)
         index = (length**2 + sin_i**2).astype(np.float32) - np.float32(2.0) * along
         index *= np.float32(1.0 / horizon.step)
         index = np.clip(index, 0.0, len(horizon.mean) - 1.0).astype(np.int32)
@@ -158,6 +161,28 @@ class AlbedoModel:
             np.maximum(result, spike, out=result, where=spike > LEAST_SPIKE)
         return result.sum(axis=1)
 
+    def _cosines(self, phi: NDArray[np.floating]) -> Array:
+        """cos of the azimuth between ωi and each strong order; kept, as φ is mostly the same."""
+        kept = self._turned
+        if kept is None or kept[0] is not phi:
+            kept = phi, np.cos(phi[:, None] - self._azimuth).astype(np.float32)
+            self._turned = kept
+        return kept[1]
+
+    def _near_horizon(self, k: float) -> _NearHorizon:
+        """What does not depend on ωi there, once a wavelength."""
+        if k not in self._near:
+            width = 1.0 / (self.spread * k)
+            edge = 1.0 - 2.0 * _LOBE * width
+            deepest = math.sqrt(1.0 - max(edge - _LOBE * width, 0.0) ** 2)
+            nodes = (np.arange(_HORIZON_NODES) + 0.5) * (deepest / _HORIZON_NODES)
+            sines = np.sqrt(1.0 - nodes**2)
+            places = np.linspace(edge, 1.0 + _LOBE * width, 96)
+            lobes = np.exp(-(((sines - places[:, None]) / width) ** 2))
+            lobes *= deepest / _HORIZON_NODES / (math.sqrt(math.pi) * width)
+            self._near[k] = _NearHorizon(places, nodes, sines, lobes)
+        return self._near[k]
+
     def _horizon(self, k: float, cos_i: float, shift: float) -> _Horizon:
         width = 1.0 / (self.spread * k)  # of a lobe, in direction cosines
         most = (1.0 + _LOBE * width + shift) ** 2
@@ -169,16 +194,10 @@ class AlbedoModel:
         with np.errstate(divide="ignore"):
             mean = 1.0 / (cos_o * (cos_i + cos_o) ** 2 * cos_i)
         # Within a lobe of the horizon: the mean over the lobe, in cosθo (see `glossy`)
-        edge = 1.0 - 2.0 * _LOBE * width
-        deepest = math.sqrt(1.0 - max(edge - _LOBE * width, 0.0) ** 2)
-        nodes = (np.arange(_HORIZON_NODES) + 0.5) * (deepest / _HORIZON_NODES)
-        sines = np.sqrt(1.0 - nodes**2)
-        places = np.linspace(edge, radius[-1], 96)
-        lobes = np.exp(-(((sines - places[:, None]) / width) ** 2))
-        lobes *= deepest / _HORIZON_NODES / (math.sqrt(math.pi) * width)
-        near = radius > edge
-        averaged = lobes @ (1.0 / (sines * (cos_i + nodes) ** 2 * cos_i))
-        mean[near] = np.interp(radius[near], places, averaged)
+        near = self._near_horizon(k)
+        averaged = near.lobes @ (1.0 / (near.sines * (cos_i + near.cosines) ** 2 * cos_i))
+        inside = radius > near.places[0]
+        mean[inside] = np.interp(radius[inside], near.places, averaged)
         spike = mean
         if shift > 0.0:
             reach = math.ceil(2.0 * shift / step)
@@ -192,6 +211,23 @@ class AlbedoModel:
             cosine=np.rint(cos_o * _COSINES).astype(np.int32),
             low=math.sqrt(2.0 * _SPIKE * width),
         )
+
+
+@dataclass(frozen=True)
+class _NearHorizon:
+    """Quadrature over lobes that reach the horizon.
+
+    Attributes
+    ----------
+    places : (n,) distances of lobes' centres from the normal, in direction cosines.
+    cosines, sines : (m,) cosθo and sinθo of the nodes.
+    lobes : (n, m) weight of each node in each lobe.
+    """
+
+    places: NDArray[np.floating]
+    cosines: NDArray[np.floating]
+    sines: NDArray[np.floating]
+    lobes: NDArray[np.floating]
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from .table import DiffractionTable
 from .window import tap_matrix
@@ -17,6 +18,7 @@ STRONG, MOST_STRONG = 2e-3, 96
 PER_PERIOD = 16
 FEWEST_KAPPAS, MOST_KAPPAS = 16, 160
 
+_FADED = 12.0  # exp(−12) = 6e-6 of a Gaussian's peak is nothing
 #: Bins closer than this (in 1/σ) are joined: together they are hardly wider than one lobe.
 _JOINED = 1.0
 
@@ -90,7 +92,7 @@ def atoms_of(table: DiffractionTable, height_scale: float, smoothing: float) -> 
             power[len(power) // 2, power.shape[1] // 2] += central[n]
             central[n] = 0.0
         np.maximum(strongest, power, out=strongest)
-        density[n] = splats[1].T @ power @ splats[0]
+        density[n] = (splats[0] @ (splats[1] @ power).T).T
         kept.append(power if power.nbytes * count < 400e6 else None)
     chosen = _choose(strongest) if not all_smooth else np.zeros((0, 2), int)
     rows, columns = chosen.T
@@ -100,7 +102,8 @@ def atoms_of(table: DiffractionTable, height_scale: float, smoothing: float) -> 
             held = kept[n]
             power = held if held is not None else powers_at(float(kappa))[0]
             powers[n] = power[rows, columns]
-            density[n] -= (splats[1][rows].T * powers[n]) @ splats[0][columns]
+            chosen_splats = splats[1][:, rows].multiply(powers[n]) @ splats[0][:, columns].T
+            density[n] -= chosen_splats.toarray()
     np.maximum(density, 0.0, out=density)
     frequency = np.stack([axes[0].frequency[columns], axes[1].frequency[rows]], axis=1)
     return Atoms(
@@ -181,10 +184,12 @@ class _Powers:
 
 def _splat(
     frequency: NDArray[np.floating], grid: NDArray[np.floating], deviation: float
-) -> NDArray[np.float32]:
-    """Gaussian weights from frequencies to a grid, (frequencies, grid), of integral 1."""
-    exponent = ((frequency[:, None] - grid) / deviation) ** 2
-    return (np.exp(-0.5 * exponent) / (math.sqrt(2.0 * math.pi) * deviation)).astype(np.float32)
+) -> sparse.csr_array:
+    """Gaussian weights from frequencies to a grid, (grid, frequencies), of integral 1."""
+    exponent = 0.5 * ((frequency - grid[:, None]) / deviation) ** 2
+    weights = np.exp(-exponent) / (math.sqrt(2.0 * math.pi) * deviation)
+    weights[exponent > _FADED] = 0.0
+    return sparse.csr_array(weights.astype(np.float32))
 
 
 def _choose(strongest: NDArray[np.float32]) -> NDArray[np.int64]:

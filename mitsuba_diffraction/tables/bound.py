@@ -78,6 +78,8 @@ def albedo_bound(table: DiffractionTable, height_scale: float = 1.0) -> AlbedoBo
     model = AlbedoModel(table, height_scale)
     coarse, fine = _wavelengths(table, height_scale)
     azimuths = np.arange(AZIMUTHAL) * (2.0 * np.pi / AZIMUTHAL)
+    parts = AZIMUTHAL * _INSIDE[1]
+    inside = (np.arange(parts) + 0.5) * (2.0 * np.pi / parts)
 
     def smooth(theta: float) -> NDArray[np.float32]:
         return np.stack([model.weak(theta, azimuths, wavelength) for wavelength in coarse])
@@ -89,7 +91,9 @@ def albedo_bound(table: DiffractionTable, height_scale: float = 1.0) -> AlbedoBo
         angles = np.linspace(edges[0], edges[-1], 5)
         glossy = [max(model.glossy(angle, wavelength) for angle in angles) for wavelength in coarse]
         around += np.array(glossy, np.float32)[:, None]
-        return (_interpolated(around, _FINE) + _strong(model, edges, fine)).max(axis=0)
+        total = _strong(model, edges, inside, fine)
+        total += _interpolated(around, _FINE)
+        return total.max(axis=0)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         weak = list(pool.map(smooth, polar_angle(np.arange(POLAR + 1))))
@@ -118,11 +122,13 @@ def _interpolated(values: NDArray[np.float32], parts: int) -> NDArray[np.float32
 
 
 def _strong(
-    model: AlbedoModel, edges: NDArray[np.float64], wavelengths: NDArray[np.float64]
+    model: AlbedoModel,
+    edges: NDArray[np.float64],
+    azimuths: NDArray[np.floating],
+    wavelengths: NDArray[np.float64],
 ) -> NDArray[np.float32]:
     """Bound (wavelengths, AZIMUTHAL) of the strong orders' sum over each cell of a row."""
-    parts = AZIMUTHAL * _INSIDE[1]
-    azimuths = (np.arange(parts) + 0.5) * (2.0 * np.pi / parts)
+    parts = len(azimuths)
     result = np.zeros((len(wavelengths), parts), np.float32)
     half_step = 0.5 * math.log(wavelengths[1] / wavelengths[0])
     for low, high in itertools.pairwise(edges):

@@ -201,7 +201,9 @@ def test_kernels_twin_agrees_with_numpy():
     sine = np.sqrt(1.0 - z**2)
     directions = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), z], axis=1)
     x, y, cosine = (mi.Float(c.astype(np.float32)) for c in directions.T)
-    ours = bound.divisor(mi.Vector2f(x, y), cosine, mi.Vector2f(0.0, 0.0), mi.Float(1.0))
+    ours = bound.divisor(
+        mi.Vector2f(x, y), cosine, mi.Vector2f(0.0, 0.0), mi.Float(1.0), mi.Float(1.0)
+    )
     theirs = cached_bound(table, 1.0)
     at_normal = theirs([[0.0, 0.0, 1.0]])[0]
     expected = np.maximum(np.maximum(theirs(directions), at_normal), 1.0)

@@ -1,0 +1,172 @@
+"""Derivatives with respect to what a scene may change, and that changing it needs no new kernel."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from tests.lanes import interaction, spectra, vectors
+from tests.optics import Array, uniform_directions
+
+# a steep grating bends light further than the model likes; that is not the point here
+pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+
+GRATING = md.gratings.sinusoidal(1.6, 0.25, periods=3, pixels_per_period=20)
+WAVELENGTHS = [[420.0, 500.0, 580.0, 680.0]]
+PIGMENT = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.4}}
+#: Parameter, what makes it appear, where to take the derivative, and half the step of differences.
+PARAMETERS = {
+    "height_scale": ({"material": "none"}, 0.9, 2e-3),
+    "orientation": ({"material": "none"}, 20.0, 0.05),
+    "eta": ({"int_ior": 1.5}, 1.6, 1e-3),
+    "eta.value": ({"eta": 0.9, "k": 6.0}, 0.9, 1e-3),
+    "k.value": ({"eta": 0.9, "k": 6.0}, 6.0, 1e-2),
+    "nested.reflectance.value": ({"pigment": PIGMENT}, 0.4, 1e-2),
+}
+
+
+def load(**parameters: Any) -> dict[str, Any]:
+    return md.bsdf_dict(GRATING, coherence_width=5.0, tolerance=1e-4, **parameters)
+
+
+def lit_directions() -> tuple[Array, Array]:
+    """Pairs up to the horizon, where the energy's bound matters, half of them within an order."""
+    rng = np.random.default_rng(5)
+    wi, wo = uniform_directions(400, rng, 0.05), uniform_directions(400, rng, 0.05)
+    orders = rng.integers(-2, 3, 400) * 0.55 / 1.6
+    wo[:200, :2] = -wi[:200, :2] + rng.normal(0, 0.05, (200, 2))
+    wo[:200, 0] += orders[:200]
+    z2 = 1.0 - np.sum(wo[:, :2] ** 2, axis=1)
+    good = z2 > 0.01
+    wo[:, 2] = np.sqrt(np.maximum(z2, 0.0))
+    return wi[good], wo[good]
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_derivatives_of_values_are_those_of_differences(variant, name):
+    own, at, step = PARAMETERS[name]
+    wi, wo = lit_directions()
+    si, outgoing, context = interaction(wi, WAVELENGTHS), vectors(wo), mi.BSDFContext()
+    bsdf = mi.load_dict(load(**own))
+    parameters = mi.traverse(bsdf)
+
+    def values(value: float, differentiable: bool = False) -> Any:
+        parameters[name] = type(parameters[name])(value)
+        if differentiable:
+            dr.enable_grad(parameters[name])
+        parameters.update()
+        return bsdf.eval(context, si, outgoing)
+
+    value = values(at, differentiable=True)
+    dr.forward(parameters[name])
+    derivative = spectra(dr.grad(value))
+    differences = (spectra(values(at + step)) - spectra(values(at - step))) / (2.0 * step)
+    assert np.abs(differences).max() > 0.0
+    # the bound is bilinear in the angles and linear between its nodes in the scale: where the
+    # differences straddle one of its kinks, they see another slope; all others agree to 1e-3
+    error = np.abs(derivative - differences)
+    assert error.sum() < 1e-2 * np.abs(differences).sum()
+    assert np.mean(error < 5e-3 * np.abs(differences).max()) > 0.99
+
+
+def scene(bsdf: dict[str, Any], broad: bool = False) -> Any:
+    """A plate under a distant lamp or a broad one, seen from a way off."""
+    light = {"type": "directional", "direction": [0.35, 0.2, -1.0], "irradiance": 1.0}
+    if broad:
+        lamp = {"type": "area", "radiance": {"type": "rgb", "value": 10.0}}
+        light = {"type": "sphere", "center": [-2, -1, 5], "radius": 0.7, "emitter": lamp}
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "prb", "max_depth": 2},
+            "sensor": {
+                "type": "perspective",
+                "fov": 30,
+                "to_world": mi.ScalarTransform4f().look_at(
+                    origin=[0.8, 0.2, 3.0], target=[0, 0, 0], up=[0, 1, 0]
+                ),
+                "film": {
+                    "type": "hdrfilm",
+                    "width": 6,
+                    "height": 6,
+                    "rfilter": {"type": "box"},
+                    "pixel_format": "rgb",
+                },
+            },
+            "light": light,
+            "plate": {"type": "rectangle", "bsdf": bsdf},
+        }
+    )
+
+
+RENDERED = ("height_scale", "orientation", "eta", "nested.reflectance.value")
+
+
+@pytest.mark.parametrize(
+    ("name", "broad"),
+    [("llvm_ad_spectral", False), ("llvm_ad_rgb", False), ("llvm_ad_rgb", True),
+     ("cuda_ad_spectral", False)],
+)  # fmt: skip
+def test_derivatives_of_pictures_are_those_of_differences(name, broad):
+    backend = dr.JitBackend.CUDA if name.startswith("cuda") else dr.JitBackend.LLVM
+    if not dr.has_backend(backend):
+        pytest.skip(f"{name}: Dr.Jit finds no device for it")
+    mi.set_variant(name)
+    loaded = scene(load(int_ior=1.5, pigment=PIGMENT), broad)
+    parameters = mi.traverse(loaded)
+    at = {"height_scale": 0.9, "orientation": 20.0, "eta": 1.5, "nested.reflectance.value": 0.4}
+    steps = {
+        "height_scale": 0.01,
+        "orientation": 1.0,
+        "eta": 0.01,
+        "nested.reflectance.value": 0.02,
+    }
+    keys = {k: f"plate.bsdf.{k}" for k in at}
+    # a sum in which every pixel has a weight of its own: what moves within the picture counts
+    weights = mi.TensorXf(np.random.default_rng(3).random((6, 6, 1), np.float32))
+
+    def weighted(values: dict[str, float], differentiable: bool = False) -> Any:
+        for key, value in values.items():
+            parameters[keys[key]] = type(parameters[keys[key]])(value)
+            if differentiable:
+                dr.enable_grad(parameters[keys[key]])
+        parameters.update()
+        image = mi.render(loaded, parameters, spp=1 << 13, seed=1)
+        return dr.sum(image * weights, axis=None)
+
+    dr.backward(weighted(at, differentiable=True))
+    derivatives = {k: float(np.array(dr.grad(parameters[keys[k]])).ravel()[0]) for k in at}
+    for key, step in steps.items():
+        ends = [
+            float(np.array(weighted(at | {key: at[key] + s})).ravel()[0]) for s in (step, -step)
+        ]
+        difference = (ends[0] - ends[1]) / (2.0 * step)
+        # the derivative is taken with random numbers of its own: places in the pixels, wavelengths,
+        # points of a broad lamp
+        assert derivatives[key] == pytest.approx(difference, rel=0.05), key
+
+
+@pytest.mark.parametrize("key", [*RENDERED])
+def test_changing_a_parameter_compiles_no_kernel(variant, key):
+    loaded = scene(load(int_ior=1.5, pigment=PIGMENT))
+    parameters = mi.traverse(loaded)
+    name = next(k for k in dict(parameters) if k == f"plate.bsdf.{key}")
+    value = float(np.array(parameters[name]).ravel()[0]) or 10.0
+    compiled = []
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        for factor in (1.0, 0.97, 0.94, 0.83):
+            parameters[name] = type(parameters[name])(value * factor)
+            dr.enable_grad(parameters[name])
+            parameters.update()
+            dr.backward(dr.mean(mi.render(loaded, parameters, spp=4), axis=None))
+            dr.eval(dr.grad(parameters[name]))
+            kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
+            compiled.append(sum(not k["cache_hit"] for k in kernels))
+    # Mitsuba's own spectra start as literals: their second value may need another kernel
+    allowed = 2 if key.startswith("nested") else 1
+    assert not any(compiled[allowed:]), compiled
