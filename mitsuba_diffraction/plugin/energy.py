@@ -56,7 +56,7 @@ class EnergyBound:
         """
         share = None
         if dr.grad_enabled(height_scale):
-            share = dr.clip((height_scale - self._low) * self._slope, 0.0, 1.0)
+            share = (height_scale - self._low) * self._slope
         return dr.maximum(self._bound(incident, cos_i, share), self._bound(outgoing, cos_o, share))
 
     def _read(self, index: Any, share: Any | None) -> Any:
