@@ -39,6 +39,10 @@ class Camera:
         """The same camera elsewhere."""
         return replace(self, to_world=to_world)
 
+    def resized(self, width: int, height: int) -> Camera:
+        """The same camera with a picture of another size."""
+        return replace(self, size=(width, height))
+
     def view_projection(self, low: Array, high: Array) -> Array:
         """From world space to OpenGL's clip space, for a scene between two corners.
 

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError, DiffractionWarning
 from ..files.bound_cache import cached_bound
 from ..files.cache import cached_colours
+from ..geometry import sigma_of
 from .camera import Camera
 from .context import Bindings, check_version, compile_program, headless_context, set_uniforms
 from .documents import DOCUMENTED, make_documented, pack_method
 from .lights import Light
 from .materials import Material, height_scale, pack_surface
-from .packing import pack_bounds, pack_colours, pack_powers, pack_responses
+from .packing import area_factor, pack_bounds, pack_colours, pack_powers, pack_responses
 from .scene import VERTEX, RealtimeScene, load, read_scene
 from .source import LIGHTS, METHODS
 from .textures import Packed, Uniform
@@ -84,8 +85,8 @@ class Renderer:
         """
         width, height = size or self.camera.size
         n = supersampling
-        target = self._target(width * n, height * n)
-        self.draw(target.frame, method, self._sized(width, height))
+        target = self.target(width * n, height * n)
+        self.draw(target.frame, method, self.camera.resized(width, height))
         fine = np.frombuffer(target.frame.read(components=4, dtype="f4"), np.float32)
         target.release()
         fine = fine.reshape(height, n, width, n, 4)[::-1, ::-1]
@@ -96,9 +97,9 @@ class Renderer:
     ) -> float:
         """Seconds a frame takes, the fastest of some, one sample a pixel; compiled beforehand."""
         width, height = size or self.camera.size
-        target = self._target(width, height)
-        camera = self._sized(width, height)
-        self.draw(target.frame, method, self._sized(1, 1))
+        target = self.target(width, height)
+        camera = self.camera.resized(width, height)
+        self.draw(target.frame, method, self.camera.resized(1, 1))
         self.context.finish()
         times = []
         for _ in range(frames):
@@ -121,6 +122,7 @@ class Renderer:
         *,
         exposure: float | None = None,
         scale: float | None = None,
+        coherence_width: float | None = None,
     ) -> None:
         """Draw into a framebuffer.
 
@@ -131,6 +133,7 @@ class Renderer:
         camera : the scene's by default.
         exposure : factor on the light, for display as sRGB; None leaves it linear.
         scale : height scale of all patches, instead of their own.
+        coherence_width : µm, instead of their own; not for `lut` and `pq`, whose tables hold it.
         """
         moderngl = _moderngl()
         camera = camera or self.camera
@@ -169,6 +172,8 @@ class Renderer:
             if surface.material.bsdf is not None:
                 factor = scale if scale is not None else height_scale(surface.material)
                 set_uniforms(program, {"height_scale": factor})
+                if coherence_width is not None:
+                    set_uniforms(program, _window(part.tables, coherence_width))
             array.render(moderngl.TRIANGLES)
 
     def release(self) -> None:
@@ -195,9 +200,6 @@ class Renderer:
             self._methods[method] = _Prepared(self, method)
         return self._methods[method]
 
-    def _sized(self, width: int, height: int) -> Camera:
-        return Camera(self.camera.to_world, self.camera.fov, (width, height), self.camera.offset)
-
     def _use_responses(self, program: Any, unit: int) -> None:
         """The lights' spectra, uploaded anew when other lights are set."""
         if "responses" not in program:
@@ -212,12 +214,18 @@ class Renderer:
             self._lit_by = lit_by
         self._responses.use(program, unit)
 
-    def _target(self, width: int, height: int) -> _Target:
-        return _Target(self.context, width, height)
+    def target(self, width: int, height: int) -> Target:
+        """A framebuffer to draw into, to be released."""
+        return Target(self.context, width, height)
 
 
-class _Target:
-    """A picture in single precision, with depth."""
+class Target:
+    """A picture in single precision, with depth.
+
+    Attributes
+    ----------
+    frame : the framebuffer.
+    """
 
     def __init__(self, context: Any, width: int, height: int) -> None:
         largest = context.info["GL_MAX_TEXTURE_SIZE"]
@@ -231,6 +239,7 @@ class _Target:
         self.frame = context.framebuffer([self.colour], self.depth)
 
     def release(self) -> None:
+        """Free it."""
         for thing in (self.frame, self.colour, self.depth):
             thing.release()
 
@@ -296,6 +305,17 @@ def method_tables(method: str, material: Material) -> Packed:
         heights = material.bsdf.heights()
         return pack_method(make_documented(method, heights, material.table))
     raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
+
+
+def _window(tables: Bindings, coherence_width: float) -> dict[str, Uniform]:
+    """Uniforms of another coherence window."""
+    sigma = sigma_of(coherence_width)
+    factor = area_factor(sigma)
+    exponents, own = tables.uniforms.get("exponents"), tables.uniforms["area_factor"]
+    found: dict[str, Uniform] = {"sigma": sigma, "area_factor": factor}
+    if isinstance(exponents, tuple) and isinstance(own, float):
+        found["exponents"] = tuple(float(e) * factor / own for e in exponents)  # both ∝ σ²
+    return found
 
 
 def _vertex_array(context: Any, program: Any, buffer: Any) -> Any:

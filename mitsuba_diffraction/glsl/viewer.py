@@ -1,0 +1,352 @@
+"""A window on a scene of Mitsuba (extra `view`): orbit, pan, zoom, drag the light, compare."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import moderngl_window
+import numpy as np
+from imgui_bundle import imgui
+from moderngl_window.integrations.imgui_bundle import ModernglWindowRenderer
+from PIL import Image
+
+from ..colour import encode_srgb
+from ..comparison.progressive import Progressive
+from ..errors import DiffractionError
+from ..files.atomic import atomic_path
+from .context import check_version
+from .documents import DOCUMENTED
+from .navigation import Orbit, dragged
+from .renderer import Renderer
+from .source import METHODS
+
+HELP = (
+    "left button: turn   right: drag the light\n"
+    "middle, or shift and left: move   wheel: nearer\n"
+    "S: screenshot   P: path-trace this view   R: reset   Esc: close"
+)
+
+_TURN = 0.006  # rad per pixel
+_FRAMES = 30  # that the readout averages over
+
+
+class Viewer(moderngl_window.WindowConfig):
+    """The window. What it shows is set on a subclass: see `show`."""
+
+    gl_version = (3, 3)
+    title = "mitsuba-diffraction"
+    aspect_ratio = None
+    vsync = False
+    log_level = 30  # warnings
+
+    mitsuba_scene: Any = None
+    sensor = 0
+    method = "lut"
+    stops = 0.0
+    folder = Path()
+    frames = 0  # to close after; 0 is never
+    spp = 64
+
+    def __init__(self, **arguments: Any) -> None:
+        super().__init__(**arguments)
+        check_version(self.ctx)
+        imgui.create_context()
+        imgui.get_io().set_ini_filename("")  # leave no file behind
+        self.panel = ModernglWindowRenderer(self.wnd)
+        self.times: deque[float] = deque(maxlen=_FRAMES)
+        self.drawn = 0
+        self.message = ""
+        self.renderer: Renderer | None = None
+        self.tracing: Progressive | None = None
+        self._loading: Iterator[str] | None = self._load()
+
+    # ---------------------------------------------------------------- loading
+
+    def _load(self) -> Iterator[str]:
+        """Everything slow, in steps between which the window can be closed."""
+        yield "reading the scene ..."
+        self.renderer = Renderer(self.mitsuba_scene, sensor=self.sensor, context=self.ctx)
+        yield f"tables of method {self.method} ..."
+        self.renderer.texture_bytes(self.method)
+        self._start()
+
+    def _start(self) -> None:
+        renderer = self._ready
+        scene = renderer.scene
+        self.orbit = Orbit.of(scene.camera, 0.5 * (scene.low + scene.high))
+        first = scene.diffracting[0].material
+        self.scale = float(np.array(first.bsdf.height_scale).ravel()[0])
+        self.largest_scale = float(first.table.height_scale_max)
+        self.own_width = self.width = float(first.table.coherence_width)
+        renderer.lights = list(scene.lighting.lights)
+
+    @property
+    def _ready(self) -> Renderer:
+        assert self.renderer is not None
+        return self.renderer
+
+    # ---------------------------------------------------------------- frames
+
+    def on_render(self, now: float, since: float) -> None:
+        """Draw one frame, or do one step of loading."""
+        if self._loading is not None:
+            try:
+                self._panel_of(next(self._loading))
+            except StopIteration:
+                self._loading = None
+            return
+        if self.tracing is not None:
+            self._trace()
+        start = time.perf_counter()
+        self._draw(self.wnd.fbo)
+        self.ctx.finish()
+        self.times.append(time.perf_counter() - start)
+        self._panel()
+        self.drawn += 1
+        if self.frames and self.drawn >= self.frames:
+            self.wnd.close()
+
+    def _draw(self, frame: Any) -> None:
+        renderer = self._ready
+        camera = renderer.camera.moved(self.orbit.to_world)
+        width, height = frame.size
+        renderer.draw(
+            frame,
+            self.method,
+            camera.resized(width, height),
+            exposure=2.0**self.stops,
+            scale=self.scale,
+            coherence_width=None if self._baked else self.width,
+        )
+
+    @property
+    def _baked(self) -> bool:
+        """Whether the method's table holds the window itself."""
+        return self.method in ("lut", "pq")
+
+    @property
+    def frame_ms(self) -> float:
+        """Mean of the last frames."""
+        return 1e3 * float(np.mean(self.times)) if self.times else 0.0
+
+    def _panel_of(self, text: str) -> None:
+        """The panel with one line alone."""
+        self.wnd.fbo.clear(0.02, 0.02, 0.02)
+        imgui.new_frame()
+        imgui.begin("mitsuba-diffraction")
+        imgui.text(text)
+        imgui.end()
+        self._show_panel()
+
+    def _panel(self) -> None:
+        imgui.new_frame()
+        imgui.set_next_window_pos((10, 10), imgui.Cond_.first_use_ever)
+        imgui.begin("mitsuba-diffraction", flags=imgui.WindowFlags_.always_auto_resize)
+        imgui.text(f"{self.frame_ms:.1f} ms a frame, {self._ready.driver}")
+        changed, index = imgui.combo("method", METHODS.index(self.method), list(METHODS))
+        if changed:
+            self.choose(METHODS[index])
+        _, self.stops = imgui.slider_float("exposure, stops", self.stops, -8.0, 8.0)
+        _, self.scale = imgui.slider_float("height scale", self.scale, 0.05, self.largest_scale)
+        if not self._baked:
+            widest = 4.0 * self.own_width
+            _, self.width = imgui.slider_float("coherence, µm", self.width, self.own_width, widest)
+        imgui.text(HELP)
+        imgui.text(self.message)
+        imgui.end()
+        self._show_panel()
+
+    def _show_panel(self) -> None:
+        imgui.render()
+        self.wnd.use()
+        self.panel.render(imgui.get_draw_data())
+
+    # ---------------------------------------------------------------- what it can do
+
+    def choose(self, method: str) -> None:
+        """Draw with another method, if it suits the surface."""
+        try:
+            self._ready.texture_bytes(method)
+        except DiffractionError as error:
+            self.message = str(error)
+            return
+        self.method, self.message = method, ""
+        self.times.clear()
+        if method in DOCUMENTED:
+            self.message = "a method of the source documents: slow, for comparison"
+
+    def screenshot(self) -> Path:
+        """Write what is seen, without the panel, as PNG; the next free name."""
+        target = self._ready.target(*self.wnd.fbo.size)
+        try:
+            self._draw(target.frame)
+            found = np.frombuffer(target.frame.read(components=3, dtype="f4"), np.float32)
+        finally:
+            target.release()
+        width, height = self.wnd.fbo.size
+        path = self._free("view", ".png")
+        _write_png(found.reshape(height, width, 3)[::-1], path)
+        self.message = f"written: {path}"
+        return path
+
+    def start_tracing(self) -> None:
+        """Send this view to the path tracer, which works between frames."""
+        renderer = self._ready
+        width, height = self.wnd.fbo.size
+        camera = renderer.camera.moved(self.orbit.to_world).resized(width, height)
+        self.tracing = Progressive(self.mitsuba_scene, camera, renderer.lights, self.spp)
+        self.message = "path tracing ..."
+
+    def _trace(self) -> None:
+        tracing = self.tracing
+        assert tracing is not None
+        tracing.advance()
+        self.message = f"path tracing: {tracing.done} of {tracing.spp} samples"
+        if tracing.finished:
+            self.tracing = None
+            path = self._free("view_path", ".png")
+            _write_png(encode_srgb(tracing.image * 2.0**self.stops), path)
+            self.message = f"written: {path} (direct light, {tracing.spp} samples)"
+
+    def _free(self, stem: str, suffix: str) -> Path:
+        number = 0
+        while (path := self.folder / f"{stem}_{number:03d}{suffix}").exists():
+            number += 1
+        return path
+
+    # ---------------------------------------------------------------- events
+
+    def on_mouse_drag_event(self, x: int, y: int, dx: int, dy: int) -> None:
+        """Turn, move, or drag the light."""
+        self.panel.mouse_drag_event(x, y, dx, dy)
+        if self._loading is not None or imgui.get_io().want_capture_mouse:
+            return
+        buttons = self.wnd.mouse_states
+        if buttons.right:
+            renderer = self._ready
+            for n, light in enumerate(renderer.lights[:1]):
+                renderer.lights[n] = dragged(light, self.orbit, _TURN * dx, -_TURN * dy)
+        elif buttons.middle or (buttons.left and self.wnd.modifiers.shift):
+            height = self.wnd.size[1]
+            self.orbit = self.orbit.panned(-dx / height, dy / height)
+        elif buttons.left:
+            self.orbit = self.orbit.turned(_TURN * dx, _TURN * dy)
+
+    def on_mouse_scroll_event(self, x_offset: float, y_offset: float) -> None:
+        """Nearer or farther."""
+        self.panel.mouse_scroll_event(x_offset, y_offset)
+        if self._loading is None and not imgui.get_io().want_capture_mouse:
+            self.orbit = self.orbit.zoomed(0.9**y_offset)
+
+    def on_key_event(self, key: Any, action: Any, modifiers: Any) -> None:
+        """S, P and R."""
+        self.panel.key_event(key, action, modifiers)
+        keys = self.wnd.keys
+        if self._loading is not None or action != keys.ACTION_PRESS:
+            return
+        try:
+            if key == keys.S:
+                self.screenshot()
+            elif key == keys.P and self.tracing is None:
+                self.start_tracing()
+            elif key == keys.R:
+                self._start()
+        except DiffractionError as error:
+            self.message = str(error)  # a full disk need not close the window
+
+    def on_mouse_position_event(self, x: int, y: int, dx: int, dy: int) -> None:
+        """For the panel."""
+        self.panel.mouse_position_event(x, y, dx, dy)
+
+    def on_mouse_press_event(self, x: int, y: int, button: int) -> None:
+        """For the panel."""
+        self.panel.mouse_press_event(x, y, button)
+
+    def on_mouse_release_event(self, x: int, y: int, button: int) -> None:
+        """For the panel."""
+        self.panel.mouse_release_event(x, y, button)
+
+    def on_unicode_char_entered(self, char: str) -> None:
+        """For the panel."""
+        self.panel.unicode_char_entered(char)
+
+    def on_resize(self, width: int, height: int) -> None:
+        """For the panel."""
+        if hasattr(self, "panel"):
+            self.panel.resize(width, height)
+
+    def on_close(self) -> None:
+        """Free the graphics card's memory, also of what was half loaded."""
+        self._loading = None
+        if self.renderer is not None:
+            self.renderer.release()
+            self.renderer = None
+
+
+def show(
+    scene: Any,
+    *,
+    sensor: int = 0,
+    method: str = "lut",
+    stops: float = 0.0,
+    size: tuple[int, int] = (1280, 800),
+    folder: Path = Path(),
+    frames: int = 0,
+    window: str = "pyglet",
+) -> tuple[int, float]:
+    """Open a window on a scene and wait until it is closed.
+
+    Parameters
+    ----------
+    scene : `mi.Scene` of the variant that is set.
+    sensor : index of the camera to start at.
+    method, stops : to start with; exposure in stops.
+    size : of the window, pixels.
+    folder : for screenshots.
+    frames : close after so many; 0 waits for the user.
+    window : kind of window, as moderngl-window names it; "headless" needs no display.
+
+    Returns
+    -------
+    frames drawn, and the mean of the last ones in ms.
+
+    Raises
+    ------
+    DiffractionError
+        If no window can be opened, or as `Renderer`.
+    """
+    settings = {
+        "mitsuba_scene": scene, "sensor": sensor, "method": method, "stops": stops,
+        "folder": folder, "frames": frames, "window_size": size,
+    }  # fmt: skip
+    kind = type("SceneViewer", (Viewer,), settings)
+    arguments = ["--window", window]
+    if window == "headless":
+        arguments += ["--backend", "egl"]
+    viewer = _opened(kind, arguments)
+    moderngl_window.run_window_config_instance(viewer)
+    return viewer.drawn, viewer.frame_ms
+
+
+def _opened(kind: type[Viewer], arguments: list[str]) -> Viewer:
+    try:
+        viewer: Viewer = moderngl_window.create_window_config_instance(kind, args=arguments)
+    except DiffractionError:
+        raise
+    except Exception as error:  # every kind of window has exceptions of its own
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise DiffractionError(
+            f"no window could be opened ({reason}); a display and OpenGL 3.3 are needed: over ssh "
+            "use ssh -X, or render pictures with 'compare'"
+        ) from error
+    return viewer
+
+
+def _write_png(shown: Any, path: Path) -> None:
+    eight_bits = (np.clip(shown, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    with atomic_path(path) as temporary:
+        Image.fromarray(eight_bits).save(temporary)
