@@ -17,8 +17,8 @@ from ..errors import DiffractionError
 from .cases import Grating, Scan, index_of, order_sines
 from .solutions import Efficiencies
 
-#: Points on the boundary, at least: at first and finally.
-POINTS = (200, 400)
+#: Points on the boundary that a solution begins with, at least.
+POINTS = 200
 #: Corners get a graded mesh (Kress), of the order that gratinglab recommends.
 _GRADING = 4
 #: gratinglab asks for six points a wavelength, in the material too, where the mesh is coarsest.
@@ -92,12 +92,12 @@ def _problem(grating: Grating, coating: str | None) -> Any:
     return Problem(period=1000 * grating.period, profile=profile, coating=coating)
 
 
-def resolutions(scan: Scan) -> tuple[int, int]:
-    """Points on the boundary at first and finally.
+def resolutions(scan: Scan) -> tuple[int, int, int]:
+    """Points on the boundary: at first, then, and where that is not enough.
 
     The first is as many as the shortest wavelength on either side of the boundary takes, at least
-    `POINTS[0]`; the second is twice as many, or 1.4 times where that would be above 800, since the
-    time grows with the third power.
+    `POINTS`; the second is twice as many, or 1.4 times where that would be above 800, since the
+    time grows with the third power; the third twice as many again.
     """
     arc = scan.grating.period + 2 * scan.grating.depth
     perfect = scan.material == "perfect"
@@ -107,8 +107,9 @@ def resolutions(scan: Scan) -> tuple[int, int]:
     ]
     # a graded mesh is twice as coarse in the middle of a side
     graded = 1 if scan.grating.profile == "sinusoidal" else 2
-    first = max(POINTS[0], int(np.ceil(_POINTS_PER_WAVELENGTH * graded * arc / min(in_material))))
-    return first, 2 * first if 2 * first <= 800 else int(np.ceil(1.4 * first))
+    first = max(POINTS, int(np.ceil(_POINTS_PER_WAVELENGTH * graded * arc / min(in_material))))
+    second = 2 * first if 2 * first <= 800 else int(np.ceil(1.4 * first))
+    return first, second, 2 * second
 
 
 @contextmanager

@@ -94,9 +94,10 @@ def solutions(comparisons: dict[str, Comparison]) -> str:
 Sinusoidal, lamellar (half high) and blazed gratings; periods {joined(PERIODS)} µm, depths 0.05 to
 0.4 µm, light from 0° to 75°, on blazed ones from both sides, both polarisations; solver:
 {shipped("perfect").about["solver"]}. Each was solved on two meshes, the second twice as fine (1.4
-times where light in the metal is short). *Change* is what that did to an efficiency (absolute),
-*energy missed* by how much all orders and the absorption fail to add up to 1. A solution with an
-order that changed by more than {CONVERGED:g} is left out.
+times where light in the metal is short), and on a third, twice as fine again, where the second had
+changed an order by more than {CONVERGED:g}. *Change* is what the last step did to an efficiency
+(absolute), *energy missed* by how much all orders and the absorption fail to add up to 1. A
+solution with an order that still changed by more than {CONVERGED:g} is left out.
 
 {table(header, rows)}
 

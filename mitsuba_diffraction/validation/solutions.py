@@ -40,7 +40,7 @@ ROW = np.dtype(
 )
 
 #: A grating at one angle and wavelength is left out if the last doubling changed one of its orders
-#: by more than this (absolute); what is then left of the error is a fraction of it.
+#: by more than this (absolute). The next doubling changes it by about a sixth of that.
 CONVERGED = 5e-3
 
 #: What one solution is: rows that have these in common.

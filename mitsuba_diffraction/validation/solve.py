@@ -1,13 +1,15 @@
-"""Making the solutions: every scan at two resolutions, on all processors."""
+"""Making the solutions: every scan at two resolutions or more, on all processors."""
 
 from __future__ import annotations
 
 import contextlib
 import datetime
 import functools
+import itertools
 import multiprocessing
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from types import ModuleType
 from typing import Any
 
@@ -81,11 +83,30 @@ def solve_material(
 
 
 def solve_scan(
-    scan: Scan, resolutions: tuple[Any, Any] | None = None, *, solver: str = "integral"
+    scan: Scan, resolutions: Sequence[Any] | None = None, *, solver: str = "integral"
 ) -> NDArray[np.void]:
-    """Rows of one scan; their change is that between two resolutions, by default the solver's."""
+    """Rows of one scan.
+
+    It is solved at the first two resolutions, by default the solver's own; wavelengths that have
+    not converged between these (`solutions.CONVERGED`) at the next ones, as far as there are any.
+    """
     method = SOLVERS[solver]
-    first, final = resolutions or method.resolutions(scan)
+    levels = list(resolutions or method.resolutions(scan))
+    found = _solve_twice(scan, method, levels[0], levels[1])
+    for coarse, fine in itertools.pairwise(levels[1:]):
+        open_ones = np.unique(found.rows["wavelength"][~found.converged])
+        if not len(open_ones):
+            break
+        part = replace(scan, wavelengths=tuple(float(w) for w in open_ones))
+        better = _solve_twice(part, method, coarse, fine)
+        rows = found.rows.copy()
+        rows[np.isin(rows["wavelength"], open_ones)] = better.rows
+        found = Solutions(rows, {})
+    return found.rows
+
+
+def _solve_twice(scan: Scan, method: ModuleType, first: Any, final: Any) -> Solutions:
+    """A scan at the `final` resolution, with the change from the `first` one."""
     coarse, fine = method.solve(scan, first), method.solve(scan, final)
     rows = []
     for n, wavelength in enumerate(scan.wavelengths):
@@ -100,7 +121,7 @@ def solve_scan(
             part[f"{polarisation}_change"] = np.abs(final_values - coarse.orders[polarisation][n])
             part[f"{polarisation}_balance"] = fine.balance[polarisation][n]
         rows.append(part)
-    return np.concatenate(rows)
+    return Solutions(np.concatenate(rows), {})
 
 
 @contextlib.contextmanager
