@@ -262,6 +262,34 @@ def test_a_variant_without_wavelengths_is_refused():
         brdf_map(mi.load_dict({"type": "diffuse"}))
 
 
+def test_an_rgb_variant_maps_the_colours_of_the_whole_spectrum(some_variant):
+    field, width = rough_patch((20, 24), (0.2, 0.2), 0.2), 4.0
+    asked = {"theta": 25.0, "phi": 60.0, "resolution": 16, "samples": 3}
+    spectral = brdf_map(plugin(field, coherence_width=width), step=2.0, **asked)
+    mi.set_variant(some_variant.replace("spectral", "rgb"))
+    found = brdf_map(plugin(field, coherence_width=width), **asked)
+    mi.set_variant(some_variant)
+    assert found.xyz.shape == spectral.xyz.shape
+    # what the colour table is built for (tables.colour_table): under 1 ΔE of brightest colours
+    assert np.abs(found.xyz - spectral.xyz).sum() < 0.01 * spectral.xyz.sum()
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        {"wavelength": 550.0},
+        {"wavelength_range": (400, 700)},
+        {"spectral": True},
+        {"illuminant": "E"},
+    ],
+)
+def test_an_rgb_variant_has_no_other_light(some_variant, asked):
+    mi.set_variant(some_variant.replace("spectral", "rgb"))
+    with pytest.raises(DiffractionError, match="only the colours of the whole spectrum in dayl"):
+        brdf_map(mi.load_dict({"type": "diffuse"}), resolution=8, **asked)
+    mi.set_variant(some_variant)
+
+
 @pytest.mark.usefixtures("variant")
 def test_a_measured_rough_surface_keeps_what_its_roughness_says_in_the_mirror_direction(shared_afm):
     pytest.importorskip("SurfaceTopography", reason="instrument files need the extra afm")

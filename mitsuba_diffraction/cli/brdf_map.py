@@ -49,7 +49,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )  # fmt: skip
     parser.add_argument(
         "-m", "--mode", metavar="VARIANT",
-        help="Mitsuba variant; default: cuda_ad_spectral with a GPU, else llvm_ad_spectral",
+        help="Mitsuba variant, spectral or RGB; default: cuda_ad_spectral with a GPU, else "
+        "llvm_ad_spectral",
     )  # fmt: skip
     _add_map_options(parser.add_argument_group("the map"))
     _add_surface_options(parser.add_argument_group("the surface"))

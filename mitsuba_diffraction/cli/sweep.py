@@ -167,13 +167,16 @@ def _compiled(
 
     variant = set_variant(None)
     tables = {k: settings[k] for k in ("coherence_width", "tolerance") if k in settings}
+    resolution = 2 * args.resolution  # below it Python's share shows
     found = time_compiled(
-        patch, light, resolution=args.resolution, samples=args.samples, step=args.step,
+        patch, light, resolution=resolution, samples=args.samples, step=args.step,
         progress=bar, **tables,
     )  # fmt: skip
     return [
-        f"both compiled ({variant}), 360–830 nm in steps of {args.step:g} nm: default "
-        f"{found.default:.3g} s, flss {found.flss:.3g} s: default {found.ratio:.3g}× as fast"
+        f"compiled ({variant} and RGB), {resolution} x {resolution} pixels, 360–830 nm in steps of "
+        f"{args.step:g} nm:",
+        f"  flss {found.flss:.3g} s; default {found.spectral:.3g} s, {found.ratio:.3g}× as fast; "
+        f"default, colours {found.colours:.3g} s, {found.colour_ratio:.3g}× as fast",
     ]
 
 

@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..colour import check_illuminant, response
+from ..colour import LONGEST, SHORTEST, check_illuminant, linear_srgb, response
 from ..errors import DiffractionError
 from ..geometry import wavenumber
 from ..llvm import require_loaded_llvm
@@ -49,9 +49,12 @@ def brdf_map(
     rule over bands of `step`; the samples of a pixel take turns within the bands, which refines the
     rule as many times, so that orders do not fall apart into beads.
 
+    In an RGB variant the BSDF's own colours are mapped, those of the whole spectrum in daylight:
+    one look-up a direction, through the table that such variants render with.
+
     Parameters
     ----------
-    bsdf : a Mitsuba BSDF of a spectral variant, `diffraction` or any other without textures.
+    bsdf : a Mitsuba BSDF of the variant that is set, `diffraction` or any other without textures.
     theta, phi : direction to the light, degrees; see `Light`.
     wavelength_range : nm.
     step : widest band, nm.
@@ -66,15 +69,24 @@ def brdf_map(
     Raises
     ------
     DiffractionError
-        If a parameter is out of range, or the variant is not spectral.
+        If a parameter is out of range, or the variant is neither spectral nor RGB, or scalar; or if
+        an RGB variant is asked for anything but the whole spectrum in daylight.
     """
     light = Light(theta, phi)
     bands = Bands.of(wavelength_range, step, wavelength)
     check_illuminant(illuminant)
     check_map(bands, resolution, samples, spectral)
-    if not mi.is_spectral or mi.is_polarized or "scalar" in mi.variant():
+    if not (mi.is_spectral or mi.is_rgb) or mi.is_polarized or "scalar" in mi.variant():
         raise DiffractionError(
-            f"variant '{mi.variant()}' cannot make a map; use llvm_ad_spectral or cuda_ad_spectral"
+            f"variant '{mi.variant()}' cannot make a map; use llvm_ad_spectral, llvm_ad_rgb, "
+            "cuda_ad_spectral or cuda_ad_rgb"
+        )
+    if mi.is_rgb and (
+        (bands.low, bands.high) != (SHORTEST, LONGEST) or spectral or illuminant != "D65"
+    ):
+        raise DiffractionError(
+            f"variant '{mi.variant()}' knows only the colours of the whole spectrum in daylight; "
+            "leave wavelengths, bands and illuminant out, or use llvm_ad_spectral"
         )
     require_loaded_llvm()
     table = getattr(bsdf, "table", None)
@@ -87,8 +99,15 @@ def brdf_map(
     narrowest = 0.5 if table is None else 1 / (2**0.5 * table.sigma * float(wavenumber(bands.low)))
     if samples is None:
         samples = hemisphere.samples_for(resolution, narrowest)
-    sums = _Sums(bands, illuminant, cosine, colours=not bands.is_single, spectral=spectral)
+    sums: _Sums | _Colours
+    if mi.is_rgb:
+        sums = _Colours(cosine)
+    else:
+        sums = _Sums(bands, illuminant, cosine, colours=not bands.is_single, spectral=spectral)
     coverage, values = _over_pixels(bsdf, light, resolution, samples, sums, progress)
+    if mi.is_rgb:
+        to_xyz = np.linalg.inv(linear_srgb(np.eye(3)))
+        values = np.moveaxis(np.moveaxis(values, 0, -1) @ to_xyz, -1, 0).astype(np.float32)
     return BrdfMap(
         light=light,
         bands=bands,
@@ -161,12 +180,34 @@ class _Sums:
             dr.eval(totals[:3])
 
 
+class _Colours:
+    """Linear sRGB of RGB variants, with the interface of `_Sums`."""
+
+    count = 3
+    keeps_bands = False
+
+    def __init__(self, cosine: bool) -> None:
+        self.cosine = cosine
+        self._context = mi.BSDFContext()
+
+    def add(
+        self, totals: list[Any], bsdf: Any, si: Any, wo: Any, active: Any, offset: float
+    ) -> None:
+        """Add one sample of each pixel; `offset` is for wavelengths, of which there are none."""
+        f = bsdf.eval(self._context, si, wo, active)
+        if not self.cosine:
+            f *= dr.rcp(wo.z)
+        for n in range(3):
+            totals[n] += f[n]
+        dr.eval(totals)
+
+
 def _over_pixels(
     bsdf: Any,
     light: Light,
     resolution: int,
     samples: int,
-    sums: _Sums,
+    sums: _Sums | _Colours,
     progress: Progress | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Means over all pixels: coverage (n, n) and sums (count, n, n)."""

@@ -14,6 +14,8 @@ from .result import BrdfMap
 
 #: Polar angles of the thin circles, degrees; the horizon, 90, is drawn stronger.
 _CIRCLES = (30, 60)
+#: What the marks of `draw` mean.
+LEGEND = "+ mirror direction   ☉ light   circles: θₒ = 30°, 60°, 90°"
 # One wavelength is shown in false colours over this many powers of ten.
 _DECADES = 6.0
 _DPI = 100
@@ -96,7 +98,7 @@ def figure(brdf_map: BrdfMap, exposure: float | None, *, title: str, notes: str)
             f"white is {quantity} = {2.0**-stops:.3g} /sr: exposure {signed(stops)} stops{how}",
         ]
     lines.append(notes)
-    lines.append("+ mirror direction   ☉ light   circles: θₒ = 30°, 60°, 90°")
+    lines.append(LEGEND)
     result.text(
         left / width, 0.08 / height, "\n".join(lines), fontsize=8, color=_TEXT, va="bottom",
         linespacing=1.3,

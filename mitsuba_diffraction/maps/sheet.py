@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from .picture import draw, signed
+from .picture import LEGEND, draw, signed
 from .result import BrdfMap
 
 _DPI = 100
@@ -35,12 +35,12 @@ def contact_sheet(
     columns = min(len(maps), _MOST_COLUMNS)
     rows = math.ceil(len(maps) / columns)
     side = max(1.02 * max(m.resolution for m in maps) / _DPI, _SMALLEST_SIDE)
-    width, height = (side + 0.2) * columns + 0.6, (side + 0.55) * rows + 1.0
+    width, height = (side + 0.2) * columns + 0.6, (side + 0.55) * rows + 0.8
     figure = Figure(figsize=(width, height), dpi=_DPI, facecolor="white")
     FigureCanvasAgg(figure)
     for n, (one, name) in enumerate(zip(maps, titles, strict=True)):
         row, column = divmod(n, columns)
-        left, bottom = 0.6 + (side + 0.2) * column, 0.5 + (side + 0.55) * (rows - 1 - row)
+        left, bottom = 0.6 + (side + 0.2) * column, 0.65 + (side + 0.55) * (rows - 1 - row)
         axes = figure.add_axes((left / width, bottom / height, side / width, side / height))
         stops = one.exposure() if exposure is None else exposure
         draw(axes, one, stops)
@@ -54,4 +54,5 @@ def contact_sheet(
             axes.set_ylabel("y = sin θₒ sin φₒ", fontsize=7, labelpad=0)
     how = "" if exposure is None else f"; all at {signed(exposure)} stops"
     figure.suptitle(f"{title}{how}", fontsize=10, y=1.0 - 0.12 / height, va="top")
+    figure.text(0.1 / width, 0.08 / height, LEGEND, fontsize=7, color="#303030")
     return figure

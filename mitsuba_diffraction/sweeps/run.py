@@ -126,13 +126,19 @@ def sweep(
     made = _made(kind, chosen, heights, light, method, progress, settings)
     done: list[tuple[Any, BrdfMap, float]] = []
     for value, (one, where, step) in zip(chosen, made, strict=True):
-        start = time.perf_counter()
-        found = method_map(
+        found, seconds = timed_map(
             one, where, step=step, resolution=resolution, samples=samples, gain=gain,
             progress=progress,
         )  # fmt: skip
-        done.append((value, found, time.perf_counter() - start))
-    return _compared(kind, chosen, done)
+        done.append((value, found, seconds))
+    return _all_compared(kind, chosen, done)
+
+
+def timed_map(method: Method, light: Light, **arguments: Any) -> tuple[BrdfMap, float]:
+    """A map (arguments as in `maps.method_map`) and the seconds that it took."""
+    start = time.perf_counter()
+    found = method_map(method, light, **arguments)
+    return found, time.perf_counter() - start
 
 
 def _made(
@@ -199,7 +205,7 @@ def truncated(table: DiffractionTable, terms: int) -> DiffractionTable:
     )
 
 
-def _compared(
+def _all_compared(
     kind: str, values: Sequence[Any], done: Sequence[tuple[Any, BrdfMap, float]]
 ) -> Sweep:
     wanted = SWEEPS[kind].reference
@@ -213,10 +219,15 @@ def _compared(
     base = None if reference is None else done[reference][1]
     steps = []
     for value, found, seconds in done:
-        numbers = (np.nan,) * 4 if base is None else _distance(base, found)
-        steps.append(Step(value, label_of(kind, value), found, seconds, *numbers))
+        steps.append(compared(value, label_of(kind, value), base, found, seconds))
     label = None if reference is None else steps[reference].label
     return Sweep(kind, tuple(steps), label)
+
+
+def compared(value: Any, label: str, base: BrdfMap | None, found: BrdfMap, seconds: float) -> Step:
+    """A step, compared with the map `base` if there is one."""
+    numbers = (np.nan,) * 4 if base is None else _distance(base, found)
+    return Step(value, label, found, seconds, *numbers)
 
 
 def label_of(kind: str, value: Any) -> str:

@@ -47,8 +47,8 @@ def test_a_sweep_over_methods_states_how_much_faster_the_default_is(run, heights
     assert ran.code == 0, ran.err
     for name in NAMES:
         assert f"\n  {name} " in ran.out
-    assert "both compiled" in ran.out
-    assert "× as fast" in ran.out
+    assert "compiled" in ran.out
+    assert ran.out.count("× as fast") == 2
 
 
 @pytest.mark.parametrize("method", NAMES)

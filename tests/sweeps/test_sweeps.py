@@ -99,8 +99,9 @@ def test_a_contact_sheet_has_a_map_for_every_value(grating):
 
 def test_compiled_flss_and_default_are_timed_side_by_side(grating, some_variant):
     found = time_compiled(grating, Light(20.0), resolution=16, samples=1, coherence_width=20.0)
-    assert found.default > 0.0
-    assert found.ratio == found.flss / found.default
+    assert found.spectral > 0.0
+    assert found.ratio == found.flss / found.spectral
+    assert found.colour_ratio == found.flss / found.colours
 
 
 @pytest.mark.parametrize(
