@@ -27,7 +27,7 @@ from . import markers
 
 #: What each method leaves out.
 APPROXIMATES = {
-    "default": "nothing but its tolerance: orders' powers in κ as short Chebyshev series",
+    "default": "only its tolerance: short Chebyshev series in κ, summed 5 nm apart",
     "flss": "the spectrum by samples 5 nm apart; Taylor series, which shallow surfaces allow",
     "nmm": "the spectrum by the wavelengths that one period sends to the eye, all of one weight; "
     "white around the mirror direction",
