@@ -36,8 +36,10 @@ height_scale : float ∂ [1]
 energy_conserving : bool [true]
     Divides by max(1, a(ωi), a(ωo)), where a bounds the directional albedo for R = 1 from above at
     all wavelengths: reciprocal, never brighter than white. `false` is raw Kirchhoff, which gains
-    energy at grazing angles (1.3 at 80°, more beyond), for checks. The bound takes a few seconds
-    the first time, and is kept in the cache.
+    energy at grazing angles (1.3 at 80°, more beyond), for checks. The bound takes a second or
+    more the first time, and is kept in the cache. It follows height_scale, interpolated between
+    bounds at a few scales: an optimisation waits where it enters such an interval for the first
+    time. For its derivative, enable that of height_scale before parameters.update().
 shadowing : string [none]
     `vcavity`: the surface shadows itself like long V-shaped grooves (Torrance and Sparrow 1967).
 layering : string [transmission]
