@@ -3,10 +3,10 @@
 Mitsuba's own adapter leaves the wavelengths 0 and builds the BSDF anew in every call; ours sets the
 wavelengths and builds it once. Its `SphericalDomain`, uniform in (cosθ, φ), does not suit orders
 either: near the normal a step of 0.01 in cosθ is 8°, across many of them. So the histogram here
-lies over the disc of direction cosines, where every order is the same Gaussian, 1/(kσ) wide,
-wherever it stands, and where pdf/cosθo has no peak at the horizon.
+lies over Lambert's equal-area disc of the hemisphere, x and y over √(1 + cosθ), where orders are
+about equally wide, 1/(√2 kσ), and the density is finite up to the horizon.
 
-How fine the quadrature must be follows from that width: √½/(kσ) is 45 mrad for the 5 µm windows
+How fine the quadrature must be follows from that width: it is 25 mrad and more for the 5 µm windows
 below, which a grid over the whole disc resolves, but 3 mrad at 65 µm. There the histogram covers a
 square of 0.2 around one order instead, with the steps of 0.3 mrad that this takes; samples that
 fall elsewhere do not count. The grid is turned against the patch's axes: the density is a sum over
@@ -117,11 +117,13 @@ RESOLUTION = 64
 SAMPLES = 1 << 21
 
 
-class DirectionCosines:
-    """Square of side 2·half around `centre` on the disc of direction cosines, turned by 20°."""
+class EqualAreas:
+    """Square of side 2·half around a direction on Lambert's disc, turned by 20°; dω = 2 dx dy."""
 
-    def __init__(self, centre: tuple[float, float] = (0.0, 0.0), half: float = 1.0) -> None:
-        self._centre, self._half = centre, half
+    def __init__(self, direction: tuple[float, float] = (0.0, 0.0), half: float = 1.0) -> None:
+        x, y = direction
+        shrink = 1.0 / math.sqrt(1.0 + math.sqrt(1.0 - x * x - y * y))
+        self._centre, self._half = (x * shrink, y * shrink), half
         self._cos, self._sin = math.cos(math.radians(20.0)), math.sin(math.radians(20.0))
 
     def bounds(self) -> Any:
@@ -134,11 +136,13 @@ class DirectionCosines:
         """The direction; where there is none, one below the surface."""
         x = self._cos * p.x - self._sin * p.y + self._centre[0]
         y = self._sin * p.x + self._cos * p.y + self._centre[1]
-        z2 = 1.0 - x * x - y * y
-        return mi.Vector3f(x, y, dr.select(z2 > 0.0, dr.safe_sqrt(z2), -1.0))
+        z = 1.0 - x * x - y * y
+        grow = dr.safe_sqrt(1.0 + z)
+        return mi.Vector3f(x * grow, y * grow, dr.select(z > 0.0, z, -1.0))
 
     def map_backward(self, wo: Any) -> Any:
-        x, y = wo.x - self._centre[0], wo.y - self._centre[1]
+        shrink = dr.rsqrt(1.0 + dr.maximum(wo.z, 0.0))
+        x, y = wo.x * shrink - self._centre[0], wo.y * shrink - self._centre[1]
         return mi.Point2f(self._cos * x + self._sin * y, self._cos * y - self._sin * x)
 
     def contains(self, wo: Any) -> Any:
@@ -157,11 +161,11 @@ def chi_square(bsdf: Any, case: Case, *, pdf_at: tuple[float, ...] | None = None
         return si
 
     sampled, asked = lanes(case.wavelengths), lanes(pdf_at or case.wavelengths)
-    domain, subdivisions = DirectionCosines(), 24
+    domain, subdivisions = EqualAreas(), 24
     if case.order is not None:
         k = 2e3 * math.pi / case.wavelengths[0]
         x, y = (float(q / k - w) for q, w in zip(case.order, wi[:2], strict=True))
-        domain = DirectionCosines((x, y), 0.1)
+        domain = EqualAreas((x, y), 0.1)
         subdivisions = 12
 
     def sample(numbers: Any) -> tuple[Any, Any]:
@@ -172,9 +176,8 @@ def chi_square(bsdf: Any, case: Case, *, pdf_at: tuple[float, ...] | None = None
         return dr.select(counts, found.wo, middle), dr.select(counts, mi.Float(1.0), 0.0)
 
     def density(wo: Any) -> Any:
-        """Per area of the disc: dω = dx dy / cosθo."""
-        above = wo.z > 0.0
-        return dr.select(above, bsdf.pdf(context, asked, wo) / dr.select(above, wo.z, 1.0), 0.0)
+        """Per area of the disc."""
+        return 2.0 * bsdf.pdf(context, asked, wo)
 
     return mi.chi2.ChiSquareTest(
         domain=domain,
