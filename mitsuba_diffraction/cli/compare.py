@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import time
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from .progress import Bar
 from .scene_options import add_scene_options, scene_parameters
 
 #: Samples along either side of a pixel for the slow methods, whose own errors are far larger.
-_FEWER = 3
+_FEWER = 2
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -53,7 +54,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )  # fmt: skip
     parser.add_argument(
         "--supersampling", metavar="N", type=whole_number(1), default=8,
-        help="the shaders' samples along either side of a pixel (at most 3 of flss, nmm and pq); "
+        help="the shaders' samples along either side of a pixel (at most 2 of flss, nmm and pq); "
         "default: 8",
     )  # fmt: skip
     parser.add_argument(
@@ -138,6 +139,7 @@ def run(args: argparse.Namespace) -> int:
             table[method] = {
                 "supersampling": samples,
                 "frame_ms": 1e3 * seconds,
+                "fragment_ns": 1e9 * renderer.fragment_time(method),
                 "texture_bytes": renderer.texture_bytes(method),
                 **errors,
             }
@@ -168,14 +170,16 @@ def lines_of(document: dict[str, Any]) -> list[str]:
     first = next(iter(document["methods"].values()))["diffracting"]
     width, height = document["size"]
     lines = [
-        "| method | ΔE2000 mean | 99 % | FLIP | relative RMSE | frame, ms | textures, MB |",
-        "|---|---|---|---|---|---|---|",
+        "| method | ΔE2000 mean | 99 % | FLIP | relative RMSE | frame, ms | fragment, ns "
+        "| textures, MB |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for method, entry in document["methods"].items():
         found = entry["diffracting"]
         lines.append(
             f"| `{method}` | {found.delta_e_mean:.2f} | {found.delta_e_percentiles['99']:.1f} "
-            f"| {found.flip:.3f} | {found.relative_rmse:.3f} | {entry['frame_ms']:.3g} "
+            f"| {found.flip:.3f} | {found.relative_rmse:.3f} | {_plain(entry['frame_ms'])} "
+            f"| {_plain(entry['fragment_ns'])} "
             f"| {entry['texture_bytes'] / 1e6:.1f} |"
         )
     return [
@@ -185,6 +189,12 @@ def lines_of(document: dict[str, Any]) -> list[str]:
         f"in both; {document['driver']}; noise of the path-traced picture: "
         f"ΔE2000 {document['noise_delta_e_mean']:.2f}",
     ]
+
+
+def _plain(value: float) -> str:
+    """Three digits, never with an exponent."""
+    digits = 2 - math.floor(math.log10(value)) if value > 0.0 else 0
+    return f"{round(value, digits):.{max(digits, 0)}f}"
 
 
 def _traced(scene: Any, sensor: Any, spp: int, seed: int, variant: str, stop: Any, bar: Bar) -> Any:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..colour import linear_srgb, response
 from ..errors import DiffractionError
+from ..fresnel import reflectance
 from ..tables.bound import AZIMUTHAL, LAST_ANGLE, POLAR, SHARE, AlbedoBound
 from ..tables.colour_build import VISIBLE
 from ..tables.colour_table import ColourTable
@@ -158,11 +159,8 @@ def pack_conductor(
     lam = 2e3 * np.pi / waves
 
     def over(at: NDArray[np.float64]) -> NDArray[np.float64]:
-        return conductor_reflectance(
-            cosines,
-            np.interp(at, wavelengths, eta)[:, None],
-            np.interp(at, wavelengths, k)[:, None],
-        )
+        index = np.interp(at, wavelengths, eta) + 1j * np.interp(at, wavelengths, k)
+        return reflectance(cosines, index[:, None])
 
     rows = np.zeros((_WAVELENGTHS + 1, _ANGLES, 4), np.float32)
     rows[:-1, :, 0] = over(lam)
@@ -172,17 +170,3 @@ def pack_conductor(
     return Packed(
         (Texture("reflectances", rows),), {"wavenumbers": WAVENUMBERS}, {"SURFACE_KIND": "2"}
     )
-
-
-def conductor_reflectance(
-    cosines: NDArray[np.float64], eta: NDArray[np.float64], k: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Unpolarised power reflectance of a conductor, for cosines of the angle of incidence.
-
-    Fresnel's amplitudes with the complex index η + ik (Born and Wolf, section 14.2), broadcast.
-    """
-    index = eta + 1j * k
-    cos_t = np.sqrt(1.0 - (1.0 - cosines**2) / index**2)
-    s = (cosines - index * cos_t) / (cosines + index * cos_t)
-    p = (index * cosines - cos_t) / (index * cosines + cos_t)
-    return np.asarray(0.5 * (np.abs(s) ** 2 + np.abs(p) ** 2))

@@ -22,7 +22,7 @@ from .materials import Material, height_scale, pack_surface
 from .packing import area_factor, pack_bounds, pack_colours, pack_powers, pack_responses
 from .scene import VERTEX, RealtimeScene, load, read_scene
 from .source import LIGHTS, METHODS
-from .textures import Packed, Uniform
+from .textures import Packed, Texture, Uniform
 
 Image = NDArray[np.float32]
 
@@ -109,6 +109,45 @@ class Renderer:
             times.append(time.perf_counter() - start)
         target.release()
         return min(times)
+
+    def fragment_time(self, method: str) -> float:
+        """Seconds that a method's own function takes a fragment, the surface's shading apart.
+
+        Looked up are the colours of a plane lit and seen from changing directions; the fastest of
+        some pictures, each of them large enough for a hundredth of a second.
+        """
+        prepared = self._prepared(method)
+        part = next(p for p, s in zip(prepared.parts, self.scene.surfaces, strict=True)
+                    if s.material.bsdf is not None)  # fmt: skip
+        definitions = part.tables.definitions
+        program = compile_program(
+            self.context, method, definitions, vertex="whole.vert", main="probe.frag"
+        )
+        array = self.context.vertex_array(program, [])
+        side = 32
+        found: list[float] = []
+        while len(found) < 3:
+            u, v = np.meshgrid(*2 * [np.linspace(-0.7, 0.7, side)])
+            places = np.stack([u, v, 1.8 - 0.5 * u, np.ones_like(u)], axis=-1).astype(np.float32)
+            given = Bindings(self.context, Packed((Texture("places", places),)))
+            target = self.target(side, side)
+            target.frame.use()
+            unit = given.use(program, part.tables.use(program))
+            self._use_responses(program, unit)
+            set_uniforms(program, {"light_colour": np.ones((LIGHTS, 3), np.float32)})
+            start = time.perf_counter()
+            array.render(vertices=3)
+            self.context.finish()
+            seconds = time.perf_counter() - start
+            if seconds > 0.01 or side >= 1024:
+                found.append(seconds / side**2)
+            else:
+                side *= 2
+            given.release()
+            target.release()
+        array.release()
+        program.release()
+        return min(found)
 
     def texture_bytes(self, method: str) -> int:
         """Memory of a method's own textures."""

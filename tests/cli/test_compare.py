@@ -60,6 +60,7 @@ def test_pictures_a_sheet_and_numbers_are_written(run, scene, some_variant, gl_w
         assert both["delta_e_mean"] < 2.5 * document["noise_delta_e_mean"] + 0.5
         assert both["flip"] < 0.2
         assert entry["frame_ms"] > 0.0
+        assert entry["fragment_ns"] > 0.0
     assert document["driver"]
     assert (folder / "direct.exr").exists()
     assert (folder / "full.exr").exists()

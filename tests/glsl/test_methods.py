@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.colour import linear_srgb, response
+from mitsuba_diffraction.fresnel import reflectance
 from mitsuba_diffraction.glsl.context import compile_program, compiler_words
 from mitsuba_diffraction.glsl.documents import pack_method
 from mitsuba_diffraction.glsl.packing import (
     WAVENUMBERS,
-    conductor_reflectance,
     pack_bounds,
     pack_colours,
     pack_conductor,
@@ -152,16 +152,6 @@ def test_a_coherent_sum_is_refused_by_spectral(patch: HeightField) -> None:
         pack_powers(table)
 
 
-def test_conductors_reflect_as_mitsubas_do(some_variant: str) -> None:
-    import mitsuba as mi
-
-    rng = np.random.default_rng(5)
-    cosines, eta, k = rng.uniform(0.05, 1, 200), rng.uniform(0.1, 4, 200), rng.uniform(0, 7, 200)
-    expected = mi.fresnel_conductor(mi.Float(cosines), mi.Complex2f(mi.Float(eta), mi.Float(k)))
-    # single precision there
-    np.testing.assert_allclose(conductor_reflectance(cosines, eta, k), expected, atol=2e-6)
-
-
 def test_a_conductors_colour_multiplies_the_light(gl: Any, table: DiffractionTable) -> None:
     lam = np.array([360.0, 500.0, 520.0, 830.0])
     eta, k = np.array([1.5, 1.4, 0.3, 0.2]), np.array([1.9, 1.8, 2.5, 5.0])  # like gold
@@ -171,9 +161,8 @@ def test_a_conductors_colour_multiplies_the_light(gl: Any, table: DiffractionTab
     found = probed(gl, "spectral", packed, at)
 
     fine = np.arange(376.0, 744.0, 0.25) + 0.125
-    reflected = conductor_reflectance(
-        at[:, 3], np.interp(fine, lam, eta)[:, None], np.interp(fine, lam, k)[:, None]
-    )
+    index = np.interp(fine, lam, eta) + 1j * np.interp(fine, lam, k)
+    reflected = reflectance(at[:, 3], index[:, None])
     exact = np.array(
         [summed(table, at[n : n + 1], lambda _, n=n: reflected[:, n])[0] for n in range(60)]
     )
