@@ -171,7 +171,7 @@ class Renderer:
         method : one of `source.METHODS`.
         camera : the scene's by default.
         exposure : factor on the light, for display as sRGB; None leaves it linear.
-        scale : height scale of all patches, instead of their own.
+        scale : height scale of all patches, instead of their own; see `bound_for`.
         coherence_width : µm, instead of their own; not for `lut` and `pq`, whose tables hold it.
         """
         moderngl = _moderngl()
@@ -214,6 +214,13 @@ class Renderer:
                 if coherence_width is not None:
                     set_uniforms(program, _window(part.tables, coherence_width))
             array.render(moderngl.TRIANGLES)
+
+    def bound_for(self, scale: float) -> None:
+        """Take the albedo's bound for another height scale: a second or so, where it is new."""
+        for surface, own in zip(self.scene.surfaces, self._surfaces, strict=True):
+            if "bounds" in own.textures:
+                packed = pack_bounds([cached_bound(surface.material.table, scale)])
+                own.textures["bounds"].write(packed.textures[0].data.tobytes())
 
     def release(self) -> None:
         """Free what lies in the graphics card's memory."""

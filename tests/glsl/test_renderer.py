@@ -16,6 +16,7 @@ from mitsuba_diffraction.comparison.measures import regions
 from mitsuba_diffraction.comparison.truth import seen, with_lights
 from mitsuba_diffraction.glsl.context import check_version, headless_context
 from mitsuba_diffraction.glsl.renderer import Renderer
+from mitsuba_diffraction.tables.bound import AZIMUTHAL, POLAR, AlbedoBound
 
 mi = pytest.importorskip("mitsuba")
 
@@ -142,6 +143,37 @@ def test_pictures_agree_with_path_traced_ones(renderer: Any) -> None:
             # where light is concentrated, 2048 samples of it still scatter by 2 %
             bias = drawn[one, :3].sum() / reference[one].sum()
             assert bias == pytest.approx(1.0, abs=0.06)
+
+
+def test_another_height_scale_has_its_own_bound(
+    gl: Any, some_variant: str, table_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = {
+        "type": "scene",
+        "sensor": sensor(24, 16),
+        "plate": {"type": "rectangle", "bsdf": {"type": "diffraction", "table": str(table_file)}},
+        "sun": {"type": "directional", "direction": [0.0, -1.0, -0.8]},
+    }
+    made = Renderer(mi.load_dict(scene), context=gl)
+    # the real ones take seconds; light is divided by them
+    shape = (POLAR + 1, AZIMUTHAL + 1)
+    bounds = {
+        1.1: AlbedoBound(np.ones(shape, np.float32)),
+        1.4: AlbedoBound(np.full(shape, 4.0, np.float32)),
+    }
+    monkeypatch.setattr(
+        "mitsuba_diffraction.glsl.renderer.cached_bound", lambda table, scale: bounds[scale]
+    )
+    frame = made.target(24, 16)
+    pictures = []
+    for scale in bounds:
+        made.bound_for(scale)
+        made.draw(frame.frame, "lut")
+        pictures.append(np.frombuffer(frame.frame.read(components=3, dtype="f4"), np.float32))
+    assert pictures[0].max() > 0.0
+    np.testing.assert_allclose(pictures[0], 4.0 * pictures[1], rtol=1e-5)
+    for thing in (frame, made):
+        thing.release()
 
 
 def test_all_that_is_not_shown_is_named_in_one_warning(
