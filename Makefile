@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test bench figures evaluation methods validation lint clean help
+.PHONY: setup demo test bench figures evaluation methods sweeps validation lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -40,6 +40,9 @@ figures: setup  ## make the pictures in docs/images
 
 evaluation: setup  ## make docs/evaluation.md: ridges, grating equation, fitted periods
 	@$(PYTHON3) -m mitsuba_diffraction.figures.evaluation -o docs/evaluation.md $(if $(MEASURED),--measured $(MEASURED))
+
+sweeps: setup  ## make docs/sweeps.md: contact sheets of BRDF maps
+	@$(PYTHON3) -m mitsuba_diffraction.figures.sweeps -o docs/sweeps.md $(if $(MEASURED),--measured $(MEASURED))
 
 methods: setup  ## measure the methods, and put the table into the README
 	@$(PYTHON3) -m mitsuba_diffraction.figures.methods -o README.md $(if $(MEASURED),--measured $(MEASURED))

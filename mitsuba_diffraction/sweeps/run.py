@@ -43,7 +43,7 @@ class _Kind:
 
 SWEEPS: dict[str, _Kind] = {
     "wavelength-step": _Kind(" nm", (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0), "smallest"),
-    "coherence-width": _Kind(" µm", (10.0, 20.0, 40.0, 65.0, 100.0), "largest"),
+    "coherence-width": _Kind(" µm", (30.0, 45.0, 65.0, 100.0), "largest"),
     "terms": _Kind(" terms", (2, 4, 6, 8, 10, 12, 15, 18), "largest"),
     "light-angle": _Kind("°", (0.0, 15.0, 30.0, 45.0, 60.0, 75.0), None),
     "method": _Kind("", NAMES, "flss"),
