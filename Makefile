@@ -19,6 +19,9 @@ setup: .venv/packages .venv/libraries  ## create .venv with the package, and an 
 .venv/libraries: .venv/packages
 	@.ci/setup libraries
 
+.venv/browser: .venv/packages
+	@.ci/setup browser
+
 demo: setup  ## tabulate a snake scale, render three scenes with it, the snake in two lights
 	@mkdir -p out
 	@$(RUN) precompute precompute/elaphe_like.toml -o out/elaphe_like.exr
@@ -28,7 +31,7 @@ demo: setup  ## tabulate a snake scale, render three scenes with it, the snake i
 	@$(RENDER) scenes/snake.xml -s 32 -D sun_azimuth=60 -o out/snake_other_light.exr
 	@echo "Compare out/snake.png and out/snake_other_light.png: the colours move with the sun."
 
-test: setup  ## run the tests
+test: setup .venv/browser  ## run the tests
 	@$(PYTHON3) -m pytest -n 2
 
 bench: setup  ## time tables and evaluation

@@ -6,6 +6,7 @@ HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
 glsl               the realtime renderer
+web                pages that show a scene in a browser or a notebook
 reference          the BRDF straight from its integral, in double precision
 bsdf_dict          a dictionary for `mi.load_dict` from arrays
 DiffractionError   what every bad input raises, in one line
@@ -25,7 +26,7 @@ select_llvm()  # before Dr.Jit picks a library by itself: some would end the pro
 
 import mitsuba as mi  # noqa: E402
 
-from . import glsl, gratings, reference  # noqa: E402
+from . import glsl, gratings, reference, web  # noqa: E402
 from .dictionary import bsdf_dict  # noqa: E402
 from .errors import DiffractionError, DiffractionWarning  # noqa: E402
 from .heightfield import HeightField  # noqa: E402
@@ -41,6 +42,7 @@ __all__ = [
     "glsl",
     "gratings",
     "reference",
+    "web",
 ]
 
 

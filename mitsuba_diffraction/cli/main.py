@@ -18,10 +18,23 @@ from collections.abc import Iterator, Sequence
 
 from .. import __version__
 from ..errors import DiffractionError
-from . import bench, brdf_map, compare, evaluate, info, precompute, render, sweep, view
+from . import (
+    bench,
+    brdf_map,
+    compare,
+    evaluate,
+    export_viewer,
+    info,
+    precompute,
+    render,
+    sweep,
+    view,
+)
 from .console import PROGRAM, say, say_error, warnings_in_one_line
 
-COMMANDS = (precompute, info, render, brdf_map, evaluate, sweep, compare, view, bench)
+COMMANDS = (
+    precompute, info, render, brdf_map, evaluate, sweep, compare, view, export_viewer, bench
+)  # fmt: skip
 
 FAILED = 1
 INTERRUPTED = 130  # 128 + SIGINT, as shells report it

@@ -68,8 +68,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 # how far the model holds is not the question here
                 warnings.simplefilter("ignore", DiffractionWarning)
                 result = sweep(kind, patch, _LIGHT, resolution=args.resolution)
-            if result.reference is not None:
-                parts[kind] = numbers(result)
+            parts[kind] = numbers(result)
             best = next((s for s in result.steps if s.label == result.reference), None)
             sheet = contact_sheet(
                 [step.map for step in result.steps],

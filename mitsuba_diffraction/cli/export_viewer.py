@@ -1,0 +1,67 @@
+"""`mitsuba-diffraction export-viewer`: a scene as a page for a browser."""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+from ..web.tables import WEB_METHODS
+from .arguments import path_ending_in
+from .console import say_warning
+from .output import check_writable
+from .progress import Bar
+from .scene_options import add_scene_options, scene_parameters
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the sub-command."""
+    parser = subparsers.add_parser(
+        "export-viewer",
+        help="write a page that shows a scene in a browser, without a server",
+        description=(
+            "Write one self-contained page of HTML, of at most 25 MB, that draws a scene with "
+            "WebGL 2: orbit, pan, zoom, and drag the light. Tables are rounded to as many digits "
+            "as fit; the ΔE2000 that this makes is printed and stands on the page."
+        ),
+    )
+    add_scene_options(parser)
+    parser.add_argument(
+        "output", metavar="OUT", type=path_ending_in(".html"), help="the page to write"
+    )
+    parser.add_argument(
+        "--method", choices=(*WEB_METHODS, "all"), default="all",
+        help="that the page offers; all leaves out what does not fit; default: all",
+    )  # fmt: skip
+    parser.set_defaults(run=run, parser=parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Export, and return the exit code."""
+    parameters = scene_parameters(args)
+    check_writable(args.output)
+
+    from ..web import export_viewer
+    from .mitsuba_text import warnings_as_ours
+    from .scenes import load_scene, sensor_of, set_variant
+
+    start = time.perf_counter()
+    set_variant(args.mode)
+    with warnings_as_ours(), Bar(args, delay=0) as bar:
+        bar(0, 0, "loading")
+        scene = load_scene(args.scene, parameters)
+        sensor_of(scene, args.sensor)
+        page = export_viewer(
+            scene, args.output, title=args.scene.stem, sensor=args.sensor, progress=bar,
+            methods=WEB_METHODS if args.method == "all" else (args.method,),
+        )  # fmt: skip
+    if page.omissions:
+        say_warning(f"the page does not show: {'; '.join(dict.fromkeys(page.omissions))}")
+    for method, reason in page.left_out.items():
+        say_warning(f"the page goes without {method}: {reason}")
+    losses = "; ".join(
+        f"{method} ΔE2000 {mean:.2f} (99 % below {most:.2f})"
+        for method, (mean, most) in page.loss.items()
+    )
+    size = args.output.stat().st_size / 1e6
+    print(f"{args.output}: {size:.1f} MB, {time.perf_counter() - start:.1f} s; rounding: {losses}")
+    return 0

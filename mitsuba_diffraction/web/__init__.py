@@ -1,0 +1,13 @@
+"""Pages that show a scene in a browser, without a server.
+
+Contents
+--------
+export_viewer   writes a page
+Viewer          the same page in a cell of a notebook
+"""
+
+from __future__ import annotations
+
+from .export import Viewer, export_viewer
+
+__all__ = ["Viewer", "export_viewer"]

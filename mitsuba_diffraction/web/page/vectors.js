@@ -1,0 +1,29 @@
+// Vectors are arrays of three; matrices arrays of four rows, for column vectors.
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const plus = (a, b, f = 1) => [a[0] + f * b[0], a[1] + f * b[1], a[2] + f * b[2]];
+const minus = (a, b) => plus(a, b, -1);
+const times = (a, f) => [a[0] * f, a[1] * f, a[2] * f];
+const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+const norm = (a) => Math.sqrt(dot(a, a));
+const unit = (a) => times(a, 1 / Math.max(norm(a), 1e-30));
+const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
+
+// Rodrigues' rotation of a vector around a unit axis.
+function rotated(v, axis, angle) {
+  const c = Math.cos(angle), s = Math.sin(angle);
+  return plus(plus(times(v, c), cross(axis, v), s), axis, dot(axis, v) * (1 - c));
+}
+
+const product = (a, b) => a.map((row) => [0, 1, 2, 3].map((j) => row.reduce((t, x, k) => t + x * b[k][j], 0)));
+
+// Inverse of a matrix whose last row is 0, 0, 0, 1.
+function inverse(m) {
+  const columns = [0, 1, 2].map((j) => [m[0][j], m[1][j], m[2][j]]);
+  const place = [m[0][3], m[1][3], m[2][3]];
+  const determinant = dot(columns[0], cross(columns[1], columns[2]));
+  const rows = [0, 1, 2].map((i) => times(cross(columns[(i + 1) % 3], columns[(i + 2) % 3]), 1 / determinant));
+  return [...rows.map((row) => [...row, -dot(row, place)]), [0, 0, 0, 1]];
+}
+
+const columnMajor = (m) => new Float32Array([0, 1, 2, 3].flatMap((j) => m.map((row) => row[j])));

@@ -1,0 +1,76 @@
+"""`export-viewer` from the outside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mitsuba_diffraction.cli import main
+
+SCENE = """<scene version="3.0.0">
+    <sensor type="perspective"/>
+    <shape type="rectangle">
+        {bsdf}
+    </shape>
+    <emitter type="directional"><vector name="direction" value="0.2, 0, -1"/></emitter>
+</scene>"""
+SKIN = """<bsdf type="diffraction">
+    <string name="heightfield" value="grating.toml"/>
+    <float name="coherence_width" value="4"/>
+    <boolean name="energy_conserving" value="false"/>
+</bsdf>"""
+GRATING = 'generator = "sinusoidal"\n[arguments]\nperiod = 1.6\ndepth = 0.06\nperiods = 3\n'
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    (tmp_path / "grating.toml").write_text(GRATING)
+    file = tmp_path / "plate.xml"
+    file.write_text(SCENE.format(bsdf=SKIN))
+    return file
+
+
+def test_a_page_is_written_and_its_loss_is_named(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], some_variant: str
+) -> None:
+    out = tmp_path / "plate.html"
+    assert main(["export-viewer", str(scene), str(out), "--method", "lut"]) == 0
+    text = out.read_text(encoding="utf-8")
+    assert text.startswith("<!DOCTYPE html>")
+    assert "http://" not in text
+    assert "https://" not in text
+    said = capsys.readouterr().out
+    assert f"{out}: " in said
+    assert "lut ΔE2000" in said
+    assert "spectral" not in said
+
+
+@pytest.mark.parametrize(
+    ("out", "words"),
+    [("missing/a.html", "cannot write"), ("folder.html", "it is a folder")],
+)
+def test_unwritable_pages_are_refused_in_one_line(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], out: str, words: str
+) -> None:
+    (tmp_path / "folder.html").mkdir()
+    assert main(["export-viewer", str(scene), str(tmp_path / out)]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert words in line
+
+
+def test_other_endings_are_usage_errors(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export-viewer", str(scene), "page.pdf"]) == 2
+    assert ".html" in capsys.readouterr().err
+
+
+def test_a_scene_without_diffraction_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], some_variant: str
+) -> None:
+    file = tmp_path / "dull.xml"
+    file.write_text(SCENE.format(bsdf='<bsdf type="diffuse"/>'))
+    out = tmp_path / "dull.html"
+    assert main(["export-viewer", str(file), str(out)]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "nothing in the scene diffracts" in line
+    assert not out.exists()
