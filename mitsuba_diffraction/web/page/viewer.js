@@ -47,7 +47,7 @@ class Viewer {
     this.canvas.width = width;
     this.canvas.height = height;
     this.drawing.resize(width, height);
-    this.sample = undefined;
+    this.sample = this.shownSample = undefined;
     this.count = 0;
     this.touch();
   }
