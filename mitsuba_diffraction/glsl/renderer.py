@@ -124,6 +124,7 @@ class Renderer:
             self.context, method, definitions, vertex="whole.vert", main="probe.frag"
         )
         array = self.context.vertex_array(program, [])
+        self.context.enable_only(_moderngl().NOTHING)  # no depth test
         side = 32
         found: list[float] = []
         while len(found) < 3:

@@ -61,6 +61,9 @@ def test_pictures_a_sheet_and_numbers_are_written(run, scene, some_variant, gl_w
         assert both["flip"] < 0.2
         assert entry["frame_ms"] > 0.0
         assert entry["fragment_ns"] > 0.0
+    # a loop over some hundred orders against twenty texels
+    times = {name: entry["fragment_ns"] for name, entry in document["methods"].items()}
+    assert times["spectral"] > 4.0 * times["lut"]
     assert document["driver"]
     assert (folder / "direct.exr").exists()
     assert (folder / "full.exr").exists()
