@@ -34,8 +34,11 @@ demo: setup  ## tabulate a snake scale, render three scenes with it, the snake i
 test: setup .venv/browser  ## run the tests
 	@$(PYTHON3) -m pytest -n 2
 
-bench: setup  ## time tables and evaluation
-	@$(RUN) bench
+# with a patch of your own: make bench MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"
+bench: setup  ## measure speed and noise, and put the figures into README.md
+	@mkdir -p out
+	@$(RUN) bench $(MEASURED) --json out/bench.json
+	@$(PYTHON3) -m mitsuba_diffraction.figures.speed out/bench.json -o README.md
 
 # a measured patch beside the look-alikes: make figures MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"
 figures: setup  ## make the pictures in docs/images
