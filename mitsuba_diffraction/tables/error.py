@@ -32,6 +32,8 @@ NEAR = 3.0
 #: A part that vanishes at some κ is compared with this share of its largest value.
 FLOOR = 1e-3
 
+#: Units of 1/σ from a bin within which its lobe is looked at: 1/e⁴ of its power at the edge.
+_WITHIN = 2.0
 _SEED = 20140113
 _TOGETHER = 10  # κ whose series are summed at once: widening half floats takes longer than the sum
 
@@ -82,7 +84,9 @@ class ErrorMeter:
         for axis in (0, 1):
             outer = min(int(grid.reach[axis]), spectrum.last[axis])
             bins = np.arange(-outer, outer + 1)
-            positions = bins + rng.uniform(-0.5, 0.5, len(bins))
+            # Bins of a short period are far apart: half-way between them there is no light at all
+            most = min(0.5, _WITHIN / grid.steps[axis])
+            positions = bins + rng.uniform(-most, most, len(bins))
             exponent, last = grid.exponents[axis], grid.last[axis]
             wide = tap_matrix(
                 positions, -spectrum.last[axis], spectrum.shape[1 - axis], exponent, None
