@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test bench figures evaluation methods sweeps validation lint clean help
+.PHONY: setup demo test bench figures evaluation methods sweeps validation realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -55,6 +55,10 @@ methods: setup  ## measure the methods, and put the table into the README
 
 validation: setup  ## compare the model with rigorous solutions: docs/validation.md
 	@$(PYTHON3) -m mitsuba_diffraction.validation report -o docs
+
+realtime: setup  ## compare the shaders with the path tracer, and put sheet and table into README.md
+	@$(RUN) compare scenes/snake.xml --method all -s 768 --full-spp 48 -o out/compare
+	@$(PYTHON3) -m mitsuba_diffraction.figures.realtime out/compare -o README.md
 
 lint: setup  ## check style and types
 	@$(PYTHON3) -m ruff check

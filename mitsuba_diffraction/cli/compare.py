@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import math
+import json
 import time
 from pathlib import Path
 from typing import Any
@@ -75,6 +75,7 @@ def run(args: argparse.Namespace) -> int:
 
     from ..comparison.measures import as_json, difference, exposure_of, regions
     from ..comparison.sheet import write_sheet
+    from ..comparison.table import markdown
     from ..comparison.truth import box_sensor, seen, with_lights
     from ..glsl.renderer import Renderer
     from .mitsuba_text import warnings_as_ours
@@ -158,43 +159,12 @@ def run(args: argparse.Namespace) -> int:
     }  # fmt: skip
     from ..files.atomic import atomic_path
 
+    text = as_json(document)
     with atomic_path(folder / "compare.json") as path:
-        path.write_text(as_json(document), encoding="utf-8")
-    print("\n".join(lines_of(document)))
+        path.write_text(text, encoding="utf-8")
+    print(markdown(json.loads(text)))
     print(f"{folder}: pictures, sheets and compare.json, {time.perf_counter() - start:.0f} s")
     return 0
-
-
-def lines_of(document: dict[str, Any]) -> list[str]:
-    """The methods' table as Markdown, and what it was measured with."""
-    first = next(iter(document["methods"].values()))["diffracting"]
-    width, height = document["size"]
-    lines = [
-        "| method | ΔE2000 mean | 99 % | FLIP | relative RMSE | frame, ms | fragment, ns "
-        "| textures, MB |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    for method, entry in document["methods"].items():
-        found = entry["diffracting"]
-        lines.append(
-            f"| `{method}` | {found.delta_e_mean:.2f} | {found.delta_e_percentiles['99']:.1f} "
-            f"| {found.flip:.3f} | {found.relative_rmse:.3f} | {_plain(entry['frame_ms'])} "
-            f"| {_plain(entry['fragment_ns'])} "
-            f"| {entry['texture_bytes'] / 1e6:.1f} |"
-        )
-    return [
-        *lines,
-        "",
-        f"{100 * first.share:.0f} % of {width} × {height} pixels, those that diffract and are lit "
-        f"in both; {document['driver']}; noise of the path-traced picture: "
-        f"ΔE2000 {document['noise_delta_e_mean']:.2f}",
-    ]
-
-
-def _plain(value: float) -> str:
-    """Three digits, never with an exponent."""
-    digits = 2 - math.floor(math.log10(value)) if value > 0.0 else 0
-    return f"{round(value, digits):.{max(digits, 0)}f}"
 
 
 def _traced(scene: Any, sensor: Any, spp: int, seed: int, variant: str, stop: Any, bar: Bar) -> Any:

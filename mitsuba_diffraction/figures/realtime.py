@@ -1,0 +1,64 @@
+"""The README's sheet and table of the shaders, from what `compare` measured.
+
+mitsuba-diffraction compare scenes/snake.xml --method all -o out/compare
+python -m mitsuba_diffraction.figures.realtime out/compare -o README.md
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from PIL import Image
+
+from ..comparison.table import markdown
+from ..errors import DiffractionError
+from ..files.atomic import atomic_path
+from . import markers
+
+#: Beside the README; the sheet that it shows is that of the default method.
+SHEET = Path("docs", "images", "realtime.jpg")
+
+_METHOD, _WIDTH, _QUALITY = "lut", 1600, 88
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Replace both, and return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m mitsuba_diffraction.figures.realtime")
+    parser.add_argument("compared", metavar="FOLDER", type=Path, help="written by compare")
+    parser.add_argument("-o", "--output", metavar="FILE", type=Path, default=Path("README.md"))
+    args = parser.parse_args(argv)
+    try:
+        text = _table(args.compared / "compare.json")
+        _write_sheet(args.compared / f"{_METHOD}.png", args.output.parent / SHEET)
+        markers.update(args.output, {"realtime": text})
+    except DiffractionError as error:
+        print(f"realtime: error: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _table(file: Path) -> str:
+    try:
+        return markdown(json.loads(file.read_text(encoding="utf-8")))
+    except (OSError, ValueError, KeyError, TypeError, StopIteration) as error:
+        raise DiffractionError(
+            f"'{file}' is not what compare writes ({error}); run compare --method all"
+        ) from error
+
+
+def _write_sheet(source: Path, target: Path) -> None:
+    try:
+        with Image.open(source) as image, atomic_path(target) as path:
+            size = (_WIDTH, round(_WIDTH * image.height / image.width))
+            small = image.convert("RGB").resize(size, Image.Resampling.LANCZOS)
+            small.save(path, format="JPEG", quality=_QUALITY, subsampling=0)
+    except OSError as error:
+        raise DiffractionError(f"cannot make '{target}' of '{source}': {error}") from error
+
+
+if __name__ == "__main__":
+    sys.exit(main())
