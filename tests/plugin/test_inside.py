@@ -304,14 +304,15 @@ def test_scenes_loaded_many_times_do_not_grow_memory(variant):
     # large enough to be seen: 2 MB of coefficients and as much again of proposals
     fields = [rough_patch((300, 300), (0.1, 0.1), 0.1 + 0.01 * n, seed=n) for n in range(5)]
     size = 0.0
-    for n in range(24):
+    for n in range(44):
         loaded = scene(plate(diffraction(fields[n % 5], coherence_width=25.0)), size=4)
         rendered(loaded, 4)
         size = max(size, loaded.shapes()[0].bsdf().table.nbytes / 1e6)
         del loaded
         gc.collect()
-        if n == 13:  # all tables built, all kernels compiled, all pools of memory filled
+        if n == 17:  # all tables built, all kernels compiled, all pools of memory filled
             before = resident()
     assert size > 1.0  # or the test would say little
-    # 10 leaked tables would be 10 times that; the allocator's own moods are a few megabytes
-    assert resident() - before < 5.0 * size
+    # 26 leaked tables would be 26 times that, without their proposals and copies; the allocator
+    # alone is seen to keep 8 MB in a process that has run many other tests
+    assert resident() - before < 10.0 * size
