@@ -128,6 +128,9 @@ def _key(table: DiffractionTable, height_scale: float) -> str:
     content = hashlib.sha256(described.encode())
     content.update(np.ascontiguousarray(table.order_0).tobytes())
     content.update(np.ascontiguousarray(table.coefficients).data)
+    if table.coarse is not None:
+        content.update(repr((table.radius, table.coarse.expansion, table.coarse.grid)).encode())
+        content.update(np.ascontiguousarray(table.coarse.coefficients).data)
     return content.hexdigest()[:32]
 
 

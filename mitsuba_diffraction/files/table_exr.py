@@ -3,6 +3,7 @@
 A pixel is a bin; bin (0, 0), order 0, is in the middle, x runs along the rows, and the first row
 holds the lowest frequency along y. The channel `power.I.T` holds term T of interval I of a power,
 `re.I.T` and `im.I.T` those of an amplitude. Order 0 itself is in the attribute, in full precision.
+The cells around a table of a restricted domain are a second part of the file.
 """
 
 from __future__ import annotations
@@ -46,25 +47,18 @@ def save_table(table: DiffractionTable, path: str | os.PathLike[str]) -> None:
     """Write a table; see `DiffractionTable.save`."""
     if Path(path).suffix.lower() != ".exr":
         raise DiffractionError(f"cannot write '{path}': a table's file name must end with .exr")
-    document = {
-        "version": FORMAT_VERSION,
-        **{name: getattr(table, name) for name in _PLAIN},
-        "expansion": dataclasses.asdict(table.expansion),
-        "grid": dataclasses.asdict(table.grid),
-        "order_0": table.order_0.astype(float).tolist(),
-    }
-    header = {
-        "compression": OpenEXR.ZIP_COMPRESSION,
-        "type": OpenEXR.scanlineimage,
-        ATTRIBUTE: json.dumps(document, default=_plain),
-    }
-    channels = {
-        name: np.ascontiguousarray(table.coefficients[index])
-        for name, index in _channels(table.expansion)
-    }
+    document = {"version": FORMAT_VERSION, **_document(table)}
+    _, rows, columns, _, _ = table.coefficients.shape
+    # Parts of a file must agree on it
+    corners = np.array([[0, 0], [columns - 1, rows - 1]], np.int32)
+    shared = {"displayWindow": (corners[0], corners[1])}
+    text = json.dumps(document, default=_plain)
+    parts = [_part(table, "orders", {**shared, ATTRIBUTE: text})]
+    if table.coarse is not None:
+        parts.append(_part(table.coarse, "coarse", shared))
     with atomic_path(path) as temporary:
         try:
-            OpenEXR.File(header, channels).write(str(temporary))
+            OpenEXR.File(parts).write(str(temporary))
         except RuntimeError as error:  # what OpenEXR makes of a full disk
             raise OSError(None, f"OpenEXR: {' '.join(str(error).split())}") from error
 
@@ -84,19 +78,10 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
             f"{FORMAT_VERSION}; build it again with 'mitsuba-diffraction precompute'"
         )
     try:
-        expansion = Expansion(**document["expansion"])
-        grid = Grid(**{k: _tuple(v) for k, v in dict(document["grid"]).items()})
-        order_0 = np.array(document["order_0"], np.float32)
-        plain = {name: _tuple(document[name]) for name in _PLAIN}
-        coefficients = _read_coefficients(path, expansion, grid)
-        expected = (expansion.intervals, coefficients.shape[3], expansion.terms)
-        if expansion.basis not in BASES or expansion.kind not in KINDS:
-            raise ValueError(f"basis {expansion.basis!r} of {expansion.kind!r}")
-        if order_0.shape != expected:
-            raise ValueError(f"order_0 of shape {order_0.shape}, expected {expected}")
-        return DiffractionTable(
-            coefficients=coefficients, order_0=order_0, expansion=expansion, grid=grid, **plain
-        )
+        table = _table(path, document, 0)
+        if "coarse" in document:
+            table = dataclasses.replace(table, coarse=_table(path, document["coarse"], 1))
+        return table
     except DiffractionError:
         raise
     except (KeyError, TypeError, ValueError) as error:
@@ -104,6 +89,58 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
             f"'{path}' is a damaged table ({' '.join(str(error).split())}); build it again with "
             "'mitsuba-diffraction precompute'"
         ) from error
+
+
+def _document(table: DiffractionTable) -> dict[str, Any]:
+    """Everything but the coefficients; what a table need not have is left out where it has not."""
+    grid = dataclasses.asdict(table.grid)
+    document = {
+        **{name: getattr(table, name) for name in _PLAIN},
+        "expansion": dataclasses.asdict(table.expansion),
+        "grid": {name: value for name, value in grid.items() if value is not None},
+        "order_0": table.order_0.astype(float).tolist(),
+    }
+    if table.crop is not None:
+        document["crop"] = table.crop
+    if table.coarse is not None:
+        document["coarse"] = _document(table.coarse)
+    return document
+
+
+def _part(table: DiffractionTable, name: str, attributes: dict[str, Any]) -> OpenEXR.Part:
+    header = {
+        "name": name,
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        **attributes,
+    }
+    channels = {
+        name: np.ascontiguousarray(table.coefficients[index])
+        for name, index in _channels(table.expansion)
+    }
+    return OpenEXR.Part(header, channels)
+
+
+def _table(path: str | os.PathLike[str], document: dict[str, Any], part: int) -> DiffractionTable:
+    """What `_document` describes, with the coefficients of a part of the file."""
+    expansion = Expansion(**document["expansion"])
+    grid = Grid(**{k: _tuple(v) for k, v in dict(document["grid"]).items()})
+    order_0 = np.array(document["order_0"], np.float32)
+    plain = {name: _tuple(document[name]) for name in _PLAIN}
+    coefficients = _read_coefficients(path, expansion, grid, part)
+    expected = (expansion.intervals, coefficients.shape[3], expansion.terms)
+    if expansion.basis not in BASES or expansion.kind not in KINDS:
+        raise ValueError(f"basis {expansion.basis!r} of {expansion.kind!r}")
+    if order_0.shape != expected:
+        raise ValueError(f"order_0 of shape {order_0.shape}, expected {expected}")
+    return DiffractionTable(
+        coefficients=coefficients,
+        order_0=order_0,
+        expansion=expansion,
+        grid=grid,
+        crop=document.get("crop"),
+        **plain,
+    )
 
 
 def read_document(path: str | os.PathLike[str]) -> dict[str, Any] | None:
@@ -129,10 +166,10 @@ def read_document(path: str | os.PathLike[str]) -> dict[str, Any] | None:
 
 
 def _read_coefficients(
-    path: str | os.PathLike[str], expansion: Expansion, grid: Grid
+    path: str | os.PathLike[str], expansion: Expansion, grid: Grid, part: int
 ) -> NDArray[np.floating]:
     """Coefficients (intervals, ny, nx, components, terms), in the precision of the file."""
-    channels = _read(path, lambda file: file.channels(), separate_channels=True)
+    channels = _read(path, lambda file: file.channels(part), separate_channels=True)
     shape = (2 * grid.last[1] + 1, 2 * grid.last[0] + 1)
     components = len(_COMPONENTS[expansion.kind])
     result: NDArray[np.floating] | None = None

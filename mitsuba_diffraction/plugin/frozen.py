@@ -38,8 +38,10 @@ def marks(table: DiffractionTable, *constants: object) -> list[Any]:
     Types, because Dr.Jit compares those, and stops comparing values once they have changed.
     """
     described = repr(
-        (table.expansion, table.grid, table.spacing, table.scale, table.sigma, table.reach)
+        (table.expansion, table.grid, table.spacing, table.scale, table.sigma, table.radius)
     )
+    if table.coarse is not None:
+        constants += (table.coarse.expansion, table.coarse.grid, table.coarse.spacing)
     checksum = zlib.crc32(repr(constants).encode(), zlib.crc32(described.encode()))
     checksum = zlib.crc32(table.order_0.tobytes(), checksum)
     kinds = (

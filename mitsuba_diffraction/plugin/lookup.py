@@ -18,6 +18,7 @@ from ..errors import DiffractionError
 from ..tables.expansion import Expansion
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
+from .restricted import RestrictedTable
 from .scalar_lookup import ScalarTable
 
 #: Largest number of floats that one packet load fetches.
@@ -27,9 +28,9 @@ _UNROLLED_TAPS = 36
 #: Dr.Jit's indices are 32 bits wide.
 _MOST_PACKETS = 2**31
 
-_uploaded: weakref.WeakKeyDictionary[DiffractionTable, dict[str, DeviceTable | ScalarTable]] = (
-    weakref.WeakKeyDictionary()
-)
+_uploaded: weakref.WeakKeyDictionary[
+    DiffractionTable, dict[str, DeviceTable | ScalarTable | RestrictedTable]
+] = weakref.WeakKeyDictionary()
 
 
 class DeviceTable:
@@ -37,7 +38,7 @@ class DeviceTable:
 
     def __init__(self, table: DiffractionTable) -> None:
         self.expansion, self.grid = table.expansion, table.grid
-        self.spacing, self.reach = table.spacing, table.reach
+        self.spacing, self.reach = table.spacing, table.radius
         self.components = table.coefficients.shape[3]
         self.terms = _padded(table.expansion.terms)
         self.half = table.coefficients.dtype == np.float16
@@ -71,9 +72,8 @@ class DeviceTable:
         first, weight_x, weight_y = self._place(x, y, interval)
         weights_x = [weight_x(n) for n in range(grid.taps[0])]
 
-        lobe = dr.exp2(
-            dr.fma(_log2(grid.exponents[0]), dr.square(x), _log2(grid.exponents[1]) * dr.square(y))
-        )
+        lobe_x, lobe_y = grid.order_0_exponents
+        lobe = dr.exp2(dr.fma(_log2(lobe_x), dr.square(x), _log2(lobe_y) * dr.square(y)))
         centre = self._centre(interval, weights)
 
         if self.components == 2 and not grid.coherent:
@@ -217,12 +217,16 @@ def series_weights(
     return weights
 
 
-def device_table(table: DiffractionTable) -> DeviceTable | ScalarTable:
+def device_table(table: DiffractionTable) -> DeviceTable | ScalarTable | RestrictedTable:
     """The table in the current variant's memory, uploaded once for all BSDFs that share it."""
     variants = _uploaded.setdefault(table, {})
     if mi.variant() not in variants:
-        kind = DeviceTable if dr.is_jit_v(mi.Float) else ScalarTable
-        variants[mi.variant()] = kind(table)
+        kind: Any = DeviceTable if dr.is_jit_v(mi.Float) else ScalarTable
+        device = kind(table)
+        if table.coarse is not None:
+            coarse = kind(table.coarse)
+            device = RestrictedTable(device, coarse, table.radius, table.expansion.kappa_max)
+        variants[mi.variant()] = device
     return variants[mi.variant()]
 
 

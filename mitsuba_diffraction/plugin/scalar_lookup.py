@@ -38,7 +38,8 @@ class ScalarTable:
         ]
         values = bins.astype(np.float32) @ (weights / np.float32(table.scale))
         centre = self._centre(interval, weights)
-        lobe = math.exp(-grid.exponents[0] * x * x - grid.exponents[1] * y * y)
+        lobe_x, lobe_y = grid.order_0_exponents
+        lobe = math.exp(-lobe_x * x * x - lobe_y * y * y)
         if expansion.kind == "amplitude" and not grid.coherent:
             power = (values * values).sum(axis=2)
             return float(weights_y @ power @ weights_x + lobe * (centre @ centre))

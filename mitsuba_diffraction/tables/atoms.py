@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .coarse import cell_powers
 from .table import DiffractionTable
 from .window import tap_matrix
 
@@ -21,6 +22,7 @@ FEWEST_KAPPAS, MOST_KAPPAS = 16, 160
 _FADED = 12.0  # exp(−12) = 6e-6 of a Gaussian's peak is nothing
 #: Bins closer than this (in 1/σ) are joined: together they are hardly wider than one lobe.
 _JOINED = 1.0
+_PARTS = 8  # a side of a cell that the edge of a table's domain crosses
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,8 @@ def atoms_of(table: DiffractionTable, height_scale: float, smoothing: float) -> 
     kappa_max = table.reach * height_scale
     periods = kappa_max * expansion.half_range / math.pi
     count = int(np.clip(math.ceil(PER_PERIOD * periods), FEWEST_KAPPAS, MOST_KAPPAS)) + 1
-    kappas = np.linspace(0.0, min(kappa_max, expansion.kappa_max), count)
+    longest = expansion if table.coarse is None else table.coarse.expansion
+    kappas = np.linspace(0.0, min(kappa_max, longest.kappa_max), count)
     own = 1.0 / (math.sqrt(2.0) * table.sigma)  # standard deviation of one lobe
     all_smooth = own >= smoothing
     smoothing = max(smoothing, own)
@@ -86,13 +89,20 @@ def atoms_of(table: DiffractionTable, height_scale: float, smoothing: float) -> 
     strongest = np.zeros((len(axes[1].frequency), len(axes[0].frequency)), np.float32)
     kept = []
     powers_at = _Powers(table, axes)
+    beyond = None if table.coarse is None else _Beyond(table, axes, grid, smoothing)
     for n, kappa in enumerate(kappas):
         power, central[n] = powers_at(float(kappa))
+        around: NDArray[np.float32] | float = 0.0
+        if beyond is not None:
+            around, order_0 = beyond(float(kappa))
+            power *= beyond.inside
+            if kappa > expansion.kappa_max:
+                power[...], central[n] = 0.0, order_0
         if all_smooth:  # order 0 then is as wide as any other
             power[len(power) // 2, power.shape[1] // 2] += central[n]
             central[n] = 0.0
         np.maximum(strongest, power, out=strongest)
-        density[n] = (splats[0] @ (splats[1] @ power).T).T
+        density[n] = (splats[0] @ (splats[1] @ power).T).T + around
         kept.append(power if power.nbytes * count < 400e6 else None)
     chosen = _choose(strongest) if not all_smooth else np.zeros((0, 2), int)
     rows, columns = chosen.T
@@ -101,6 +111,8 @@ def atoms_of(table: DiffractionTable, height_scale: float, smoothing: float) -> 
         for n, kappa in enumerate(kappas):
             held = kept[n]
             power = held if held is not None else powers_at(float(kappa))[0]
+            if beyond is not None:  # the chosen ones are within its domain
+                power = power * np.float32(kappa <= expansion.kappa_max)
             powers[n] = power[rows, columns]
             chosen_splats = splats[1][:, rows].multiply(powers[n]) @ splats[0][:, columns].T
             density[n] -= chosen_splats.toarray()
@@ -180,6 +192,48 @@ class _Powers:
         if len(axes[1].frequency) < ny:
             power = axes[1].matrix @ power
         return power, order_0
+
+
+class _Beyond:
+    """What the coarse cells around a table of a restricted domain add to the density."""
+
+    def __init__(
+        self,
+        table: DiffractionTable,
+        axes: list[_Axis],
+        grid: NDArray[np.floating],
+        smoothing: float,
+    ) -> None:
+        assert table.coarse is not None
+        self._coarse, self._kappa_max = table.coarse, table.expansion.kappa_max
+        nothing = np.zeros(self._coarse.coefficients.shape[1:3], np.float32)
+        _, middles = cell_powers(self._coarse, nothing)
+        self._splats = [_splat(middle, grid, smoothing) for middle in middles]
+        # Which orders the table itself has, and the share of each cell that it has not
+        x, y = (axis.frequency for axis in axes)
+        self.inside = (np.hypot(x, y[:, None]) <= table.radius).astype(np.float32)
+        within = (np.arange(_PARTS) + 0.5) / _PARTS - 0.5
+        x, y = (
+            (middle[:, None] + width * within).ravel()
+            for middle, width in zip(middles, self._coarse.spacing, strict=True)
+        )
+        outside = np.hypot(x, y[:, None]) > table.radius
+        shape = (len(middles[1]), _PARTS, len(middles[0]), _PARTS)
+        self._outside = outside.reshape(shape).mean(axis=(1, 3)).astype(np.float32)
+
+    def __call__(self, kappa: float) -> tuple[NDArray[np.float32], float]:
+        """Density (ny, nx), and the power of order 0."""
+        coarse = self._coarse
+        interval = int(coarse.expansion.interval(kappa))
+        weights = coarse.expansion.weights(kappa)
+        scaled = (weights / coarse.scale).astype(np.float32)
+        series = coarse.coefficients[interval, :, :, 0].astype(np.float32) @ scaled
+        power, _ = cell_powers(coarse, series)
+        if kappa <= self._kappa_max:
+            power = power * self._outside
+        order_0 = float(coarse.order_0[interval, 0] @ weights + coarse.expansion.specular(interval))
+        density = (self._splats[0] @ (self._splats[1] @ power).T).T
+        return density.astype(np.float32), max(order_0, 0.0)
 
 
 def _splat(

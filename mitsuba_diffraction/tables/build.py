@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from ..geometry import sigma_of
 from ..heightfield import HeightField
 from ..reference import check_coherence
-from .checks import check_parameters, check_patches, check_size, check_taylor
+from .checks import check_parameters, check_patches, check_size, check_taylor, restricted
 from .choose import MAX_INTERVALS, chebyshev_expansion, taylor_expansion, too_many_intervals
+from .coarse import coarse_table
 from .describe import describe
 from .error import FLOOR, ErrorMeter, Grid, Parts, Progress, alternate, worst
 from .expansion import Expansion
@@ -46,6 +47,8 @@ def build_table(
     wavelength_range: tuple[float, float],
     height_scale_max: float,
     taps: int | None,
+    crop: float | None,
+    kappa_max: float | None,
     progress: Progress | None,
 ) -> DiffractionTable:
     """See `DiffractionTable.build`."""
@@ -60,7 +63,8 @@ def build_table(
     steps = (sigma * spacing[0], sigma * spacing[1])
     coherent = coherence == "patch"
     reach = reach_of(wavelength_range)
-    kappa_max = reach * height_scale_max
+    crop, kappa_max = restricted(crop, kappa_max, reach, reach * height_scale_max)
+    whole = crop == reach and kappa_max == reach * height_scale_max
     choose = taylor_expansion if basis == "taylor" else chebyshev_expansion
     expansion = choose(deepest, coherence, kappa_max, tolerance * SERIES_SHARE, terms)
     chosen_taps = (taps, taps) if taps else taps_for(steps, tolerance * TAPS_SHARE, coherent)
@@ -71,7 +75,7 @@ def build_table(
 
     half = expansion.basis == "chebyshev" and tolerance >= HALF_FROM
     for _ in range(_ATTEMPTS):
-        grid = _grid(spacing, steps, reach, chosen_taps, coherent, patches)
+        grid = _grid(spacing, steps, crop, chosen_taps, coherent, patches)
         coefficients, order_0, scale, meter, error, parts = _attempt(
             patches, grid, expansion, half, tolerance, tell
         )
@@ -90,6 +94,16 @@ def build_table(
                 height_scale_max=float(height_scale_max),
                 error=error,
                 source=describe(patches, coherence_width, wavelength_range, chosen_taps),
+                crop=None if crop == reach else crop,
+                coarse=None
+                if whole
+                else coarse_table(
+                    patches,
+                    coherence_width=coherence_width,
+                    wavelength_range=wavelength_range,
+                    height_scale_max=height_scale_max,
+                    progress=tell,
+                ),
             )
         del coefficients
         if _taps_error(meter, error, parts) > TAPS_SHARE * tolerance:

@@ -74,6 +74,7 @@ class ColourTable:
     @classmethod
     def build(cls, table: DiffractionTable) -> ColourTable:
         """Sum a diffraction table over wavelengths."""
+        table.require_whole("colours for RGB variants are summed from")
         z_max = 2.0 * table.height_scale_max
         grid = PolarGrid.of(lobe_of(table), STEP, SHARE)
         orders = OtherOrders(table)

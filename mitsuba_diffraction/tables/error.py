@@ -16,7 +16,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -51,6 +51,7 @@ class Grid:
     reach : radius in bins (x, y) that light can reach.
     taps : (x, y) bins read by a look-up.
     coherent : amplitudes are added (`patch`) instead of powers.
+    order_0_steps : bin spacing in units of order 0's own 1/σ, where that differs (`coarse`).
     """
 
     last: tuple[int, int]
@@ -58,12 +59,21 @@ class Grid:
     reach: tuple[float, float]
     taps: tuple[int, int]
     coherent: bool
+    # Not part of repr, by which files in the cache are found
+    order_0_steps: tuple[float, float] | None = field(default=None, repr=False)
 
     @property
     def exponents(self) -> tuple[float, float]:
         """Of exp(−exponent·Δ²), the weight of a bin Δ bins away."""
         half = 0.5 if self.coherent else 1.0
         return half * self.steps[0] ** 2, half * self.steps[1] ** 2
+
+    @property
+    def order_0_exponents(self) -> tuple[float, float]:
+        """The same for order 0."""
+        if self.order_0_steps is None:
+            return self.exponents
+        return self.order_0_steps[0] ** 2, self.order_0_steps[1] ** 2
 
 
 class ErrorMeter:

@@ -34,7 +34,8 @@ def window_sum(
     Returns
     -------
     Array of that shape; NaN where the table holds nothing (beyond κ_max, or beyond the reach of
-    its shortest wavelength): a table never extrapolates.
+    its shortest wavelength): a table never extrapolates. One of a restricted domain has its coarse
+    part there.
     """
     qx, qy, kappa = np.broadcast_arrays(
         np.asarray(qx, float), np.asarray(qy, float), np.asarray(kappa, float)
@@ -57,7 +58,12 @@ def _window_sum(
     kernels = (_gaussian(grid.exponents[0]), _gaussian(grid.exponents[1]))
     summed = weighted_sum(table, qx, qy, kappa, kernels, grid.taps)
     result = np.sum(summed**2, axis=1) if grid.coherent else np.maximum(summed[:, 0], 0.0)
-    return np.where(table.covers(qx, qy, kappa), result, np.nan)
+    outside = ~table.covers(qx, qy, kappa)
+    if table.coarse is None:
+        result[outside] = np.nan
+    elif outside.any():
+        result[outside] = _window_sum(table.coarse, qx[outside], qy[outside], kappa[outside])
+    return result
 
 
 def weighted_sum(
@@ -97,7 +103,11 @@ def weighted_sum(
 
     centre = np.einsum("npt,nt->np", table.order_0[interval].astype(float), weights)
     centre[:, 0] += expansion.specular(interval)
-    total = squared(centre) * (kernels[0](x) * kernels[1](y))[:, None]
+    if grid.order_0_steps is not None:
+        lobe = [_gaussian(exponent) for exponent in grid.order_0_exponents]
+    else:
+        lobe = list(kernels)
+    total = squared(centre) * (lobe[0](x) * lobe[1](y))[:, None]
     for j in range(taps[1]):
         for i in range(taps[0]):
             packet = table.coefficients[interval, row + j, column + i].astype(float)

@@ -67,6 +67,7 @@ def power_series(
     order_0 : (intervals, terms) of order 0, less 1 in the first interval.
     scale, expansion
     """
+    table.require_whole("a list of powers is made of")
     old = table.expansion
     if old.kind == "power":
         order_0 = table.order_0[:, 0].astype(np.float64)

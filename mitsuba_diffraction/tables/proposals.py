@@ -53,7 +53,7 @@ class Proposals:
 def proposals(table: DiffractionTable) -> Proposals:
     """Tabulate the densities of all bands."""
     edge = [
-        min(table.reach, n * spacing) + 2.0 / table.sigma
+        min(table.radius, n * spacing) + 2.0 / table.sigma
         for n, spacing in zip(table.grid.last, table.spacing, strict=True)
     ]
     cell = max(CELL / table.sigma, 2.0 * max(edge) / MOST_CELLS)

@@ -40,6 +40,8 @@ class DiffractionTable:
     coherence_width, coherence, tolerance, wavelength_range, height_scale_max : as asked for.
     error : the measured error (see `tables.error`): near, far, and where.
     source : the heights: name, digest, size, statistics, history.
+    crop : where the orders end, rad/µm from order 0, if before what light can probe.
+    coarse : what a table of a restricted domain has beyond `crop` and its κ_max (`tables.coarse`).
     """
 
     coefficients: NDArray[np.floating]
@@ -55,6 +57,8 @@ class DiffractionTable:
     height_scale_max: float
     error: Mapping[str, float]
     source: Mapping[str, Any] = field(default_factory=dict)
+    crop: float | None = None
+    coarse: DiffractionTable | None = None
 
     @classmethod
     def build(
@@ -69,6 +73,8 @@ class DiffractionTable:
         wavelength_range: tuple[float, float] = (360.0, 830.0),
         height_scale_max: float = 1.5,
         taps: int | None = None,
+        crop: float | None = None,
+        kappa_max: float | None = None,
         progress: Progress | None = None,
     ) -> DiffractionTable:
         """Tabulate a height field to a tolerance, and measure that it is met.
@@ -85,6 +91,10 @@ class DiffractionTable:
         wavelength_range : nm; the shortest sets how far the table reaches.
         height_scale_max : largest factor on the heights that the table serves.
         taps : bins read in each direction; by default as many as the tolerance takes.
+        crop : largest spatial frequency k·|(u, v)| that is tabulated, rad/µm; by default all that
+            light of the shortest wavelength can probe.
+        kappa_max : largest k·w·height_scale that is, rad/µm; by default likewise. Beyond either, a
+            table of coarse cells answers, which is right on average (`tables.coarse`).
         progress : called as progress(done, total, text) while it works.
 
         Raises
@@ -105,6 +115,8 @@ class DiffractionTable:
             wavelength_range=wavelength_range,
             height_scale_max=height_scale_max,
             taps=taps,
+            crop=crop,
+            kappa_max=kappa_max,
             progress=progress,
         )
 
@@ -144,14 +156,34 @@ class DiffractionTable:
         return reach_of(self.wavelength_range)
 
     @property
+    def radius(self) -> float:
+        """Largest spatial frequency at which the table has the orders, rad/µm."""
+        return self.reach if self.crop is None else min(self.crop, self.reach)
+
+    @property
     def nbytes(self) -> int:
         """Size of the coefficients in memory."""
-        return self.coefficients.nbytes
+        return self.coefficients.nbytes + (0 if self.coarse is None else self.coarse.nbytes)
+
+    def require_whole(self, what: str) -> None:
+        """Refuse a table of a restricted domain, for what reads orders on its own.
+
+        Raises
+        ------
+        DiffractionError
+            Naming `what` needs all of them.
+        """
+        if self.coarse is not None:
+            raise DiffractionError(
+                f"{what} all orders, but the table was made for |q| up to {self.radius:.4g} and κ "
+                f"up to {self.expansion.kappa_max:.4g} rad/µm only; give a table without crop and "
+                "kappa_max, or the height field"
+            )
 
     def covers(self, qx: ArrayLike, qy: ArrayLike, kappa: ArrayLike) -> NDArray[np.bool_]:
-        """Whether a look-up lies inside the table (to rounding in single precision)."""
+        """Whether a look-up finds the orders (to rounding in single precision)."""
         slack = 1.0 + 1e-6
-        inside = np.hypot(qx, qy) <= self.reach * slack
+        inside = np.hypot(qx, qy) <= self.radius * slack
         return inside & (np.asarray(kappa) <= self.expansion.kappa_max * slack)
 
     def window_sum(self, qx: ArrayLike, qy: ArrayLike, kappa: ArrayLike) -> NDArray[np.float64]:
@@ -188,10 +220,23 @@ class DiffractionTable:
             "intervals_of_kappa": intervals,
             "taps": list(self.grid.taps),
             "orders": [nx, ny],
+            **self._restriction(),
             "components": components,
             "precision": str(self.coefficients.dtype),
             "memory_mb": round(self.nbytes / 1e6, 2),
             "source": dict(self.source),
+        }
+
+    def _restriction(self) -> dict[str, Any]:
+        if self.coarse is None:
+            return {}
+        _, ny, nx, _, _ = self.coarse.coefficients.shape
+        return {
+            "restricted_to": {
+                "frequency (rad/µm)": self.radius,
+                "kappa (rad/µm)": self.expansion.kappa_max,
+                "cells beyond": [nx, ny],
+            }
         }
 
     def __repr__(self) -> str:

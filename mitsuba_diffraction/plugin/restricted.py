@@ -1,0 +1,93 @@
+"""Reading a table of a restricted domain: the orders where it has them, coarse cells elsewhere."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Outside:
+    """Look-ups that the orders of a table did not reach.
+
+    Attributes
+    ----------
+    count : how many since the last `take`.
+    frequency, kappa : the largest |q| and κ among them, rad/µm.
+    """
+
+    count: int
+    frequency: float
+    kappa: float
+
+
+class RestrictedTable:
+    """Two tables as one: `fine` within its domain, `coarse` beyond, where it counts.
+
+    Parameters
+    ----------
+    fine, coarse : `plugin.lookup.DeviceTable`, or `ScalarTable` in scalar variants.
+    radius, kappa_max : where the fine one ends, rad/µm.
+    """
+
+    def __init__(self, fine: Any, coarse: Any, radius: float, kappa_max: float) -> None:
+        self.fine, self.coarse = fine, coarse
+        self._square, self._kappa_max = (radius * (1 + 1e-6)) ** 2, kappa_max * (1 + 1e-6)
+        self._jit = dr.is_jit_v(mi.Float)
+        self._count: Any = mi.UInt32(0)
+        self._farthest: Any = mi.Float(0.0)
+        self._deepest: Any = mi.Float(0.0)
+        self.take()
+
+    def window_sum(self, qx: Any, qy: Any, kappa: Any) -> Any:
+        """See `DeviceTable.window_sum`."""
+        square = dr.square(qx) + dr.square(qy)
+        inside = (square <= self._square) & (kappa <= self._kappa_max)
+        if not self._jit:
+            if inside:
+                return self.fine.window_sum(qx, qy, kappa)
+            self._count += 1
+            self._farthest = max(self._farthest, square)
+            self._deepest = max(self._deepest, kappa)
+            return self.coarse.window_sum(qx, qy, kappa)
+        # A NaN, as from a degenerate mesh, is no look-up, and stays one
+        outside = ~inside & dr.isfinite(square) & dr.isfinite(kappa)
+
+        def beyond(qx: Any, qy: Any, kappa: Any, result: Any) -> Any:
+            far = dr.detach(dr.square(qx) + dr.square(qy))
+            dr.scatter_reduce(dr.ReduceOp.Add, self._count, mi.UInt32(1), mi.UInt32(0))
+            dr.scatter_reduce(dr.ReduceOp.Max, self._farthest, far, mi.UInt32(0))
+            dr.scatter_reduce(dr.ReduceOp.Max, self._deepest, dr.detach(kappa), mi.UInt32(0))
+            return self.coarse.window_sum(qx, qy, kappa)
+
+        # Rare, so branched to: a kernel skips what none of its lanes needs
+        return dr.if_stmt(
+            (qx, qy, kappa, self.fine.window_sum(qx, qy, kappa)),
+            outside,
+            beyond,
+            lambda qx, qy, kappa, result: result,
+        )
+
+    def order_0(self, kappa: Any) -> Any:
+        """See `DeviceTable.order_0`."""
+        return dr.select(
+            kappa <= self._kappa_max, self.fine.order_0(kappa), self.coarse.order_0(kappa)
+        )
+
+    def take(self) -> Outside:
+        """What was counted since the last time."""
+        if not self._jit:
+            found = Outside(self._count, math.sqrt(self._farthest), self._deepest)
+            self._count, self._farthest, self._deepest = 0, 0.0, 0.0
+            return found
+        values = [float(np.array(a)[0]) for a in (self._count, self._farthest, self._deepest)]
+        for counter, kind in (
+            ("_count", mi.UInt32), ("_farthest", mi.Float), ("_deepest", mi.Float),
+        ):  # fmt: skip
+            setattr(self, counter, dr.opaque(kind, 0))
+        return Outside(int(values[0]), math.sqrt(values[1]), values[2])
