@@ -7,8 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mitsuba_diffraction.cli.scene_parameters import parameters_of
+from mitsuba_diffraction.files.recipes import Recipe
+
 SCENES = Path(__file__).resolve().parent.parent / "scenes"
 SUNNY = ("sphere", "snake", "xenopeltis")
+STUDIO = ("cd", "cd_window", "grating", "grating_window", "material_ball", "scales")
 SMALL = {"spp": "4", "resx": "48", "resy": "40"}
 
 # the look-alikes are as steep as the real scales, which the package says every time
@@ -30,6 +34,78 @@ def test_it_renders_at_its_defaults(name: str) -> None:
     assert np.isfinite(image).all()
     # shown as it is: neither black nor burnt out
     assert 0.02 < np.median(image.mean(axis=2)) < 0.8
+
+
+@pytest.fixture(scope="module")
+def gentle(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Parameters of any scene: a grating whose table and bound take a second."""
+    from mitsuba_diffraction import gratings
+
+    field = gratings.sinusoidal(period=1.6, depth=0.05, periods=4, rows=4)
+    file = tmp_path_factory.mktemp("patch") / "gentle.npy"
+    np.save(file, field.heights)
+    return {"patch": str(file), "pixel_size": str(field.pixel_size[0]), "coherence_width": "10"}
+
+
+@pytest.mark.parametrize("name", STUDIO)
+def test_it_renders_a_ray_at_a_time(name: str, gentle: dict[str, str]) -> None:
+    """The scenes in a studio: compiling the kernels of all would take a minute."""
+    import mitsuba as mi
+
+    mi.set_variant("scalar_spectral")
+    if name.startswith("cd"):
+        gentle = {**gentle, "height_scale": "1"}
+    image = _render(name, **gentle, spp="4", resx="12", resy="10")
+    assert image.shape == (10, 12, 3)
+    assert np.isfinite(image).all()
+    assert 0.02 < np.median(image.mean(axis=2)) < 0.8
+
+
+@pytest.mark.parametrize("name", [*STUDIO, "plate", *SUNNY])
+def test_its_patch_is_a_recipe(name: str) -> None:
+    defaults = parameters_of(SCENES / f"{name}.xml")
+    assert defaults is not None
+    assert Recipe.load(SCENES / str(defaults["patch"])).generator
+    assert {"spp", "resx", "resy", "patch", "pixel_size", "max_height"} <= set(defaults)
+
+
+@pytest.mark.usefixtures("variant")
+def test_the_patch_of_the_cd_follows_the_radius(gentle: dict[str, str]) -> None:
+    """The orders ±1 of what runs along x lie in the plane of the normal and the radius."""
+    import drjit as dr
+    import mitsuba as mi
+
+    file = SCENES / "meshes" / "cd_data.ply"
+    bsdf = {
+        "type": "diffraction",
+        "heightfield": gentle["patch"],
+        "pixel_size": gentle["pixel_size"],
+        "coherence_width": float(gentle["coherence_width"]),
+        "material": "none",
+        "orientation": {"type": "mesh_attribute", "name": "vertex_orientation"},
+    }
+    scene = mi.load_dict({"type": "scene", "cd": {"type": "ply", "filename": str(file), "d": bsdf}})
+    angle = np.linspace(0.0, 2 * np.pi, 41) + 0.003  # beside the edges of triangles
+    radial = np.stack([np.cos(angle), np.sin(angle), 0 * angle])
+    start = mi.Point3f(4.0 * radial + [[0], [0], [1]])
+    ray = mi.Ray3f(start, mi.Vector3f(0, 0, -1))
+    ray.wavelengths = mi.Color0f() if mi.is_rgb else 550.0
+    si = scene.ray_intersect(ray)
+    assert dr.all(si.is_valid())
+    sine = 0.55 / 1.6  # of order 1 at normal incidence, period 1.6 µm
+
+    def towards(direction: np.ndarray) -> np.ndarray:
+        """f·cosθ in a direction of the world."""
+        up = np.full(len(angle), np.sqrt(1 - sine**2))
+        wo = si.to_local(mi.Vector3f(sine * direction + [[0], [0], [1]] * up))
+        return np.array(si.bsdf().eval(mi.BSDFContext(), si, wo))[0]
+
+    across = np.stack([-np.sin(angle), np.cos(angle), 0 * angle])
+    for sign in (1, -1):
+        order = towards(sign * radial)
+        # exp(−(kσδ)²), σ = 2.5 µm: a thousandth is a patch turned by δ/sin θ = 0.18°
+        np.testing.assert_allclose(order, order.mean(), rtol=1e-3)
+        assert (towards(sign * across) < 1e-3 * order).all()
 
 
 @pytest.mark.usefixtures("variant")

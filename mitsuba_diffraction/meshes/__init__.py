@@ -8,15 +8,24 @@ scales     `Scales`: rows, relief, overlap and keels of the scales
 spine      how the body lies
 skin       the smooth skin between spine and scales
 head       shields, mouth, eyes; the tail tip
+piece      `piece`: a few scales for close views
 pigment    images of what lies under the skin, and of the ground
+disc       `disc`: a ring whose patch follows the radius
 tangents   whether a mesh has the tangents that a patch needs
+directions `direction_field`: a smooth field of directions on any mesh
+oriented   `oriented_mesh`: a mesh whose patch follows such a field
+options    the parameters as options of the command line
 trimesh    `TriangleMesh`, `write_ply`
 
-`python -m mitsuba_diffraction.meshes scenes` writes what the scenes use, and `... snake -o X.ply` a
-snake of one's own.
+`python -m mitsuba_diffraction.meshes scenes` writes what the scenes use; `snake`, `piece` and
+`disc` write one's own.
 """
 
 from .anatomy import Anatomy
+from .directions import DirectionField, direction_field
+from .disc import disc
+from .oriented import oriented_mesh
+from .piece import piece
 from .scales import Scales
 from .snake import Snake, build
 from .tangents import TangentReport, check_tangents, load_mesh
@@ -24,12 +33,17 @@ from .trimesh import TriangleMesh, write_ply
 
 __all__ = [
     "Anatomy",
+    "DirectionField",
     "Scales",
     "Snake",
     "TangentReport",
     "TriangleMesh",
     "build",
     "check_tangents",
+    "direction_field",
+    "disc",
     "load_mesh",
+    "oriented_mesh",
+    "piece",
     "write_ply",
 ]

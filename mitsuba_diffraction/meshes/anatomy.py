@@ -30,6 +30,13 @@ HEAD = np.array(
     ]
 )
 # fmt: on
+#: Lowest and highest value of each parameter of `Anatomy`; of the length, in girth radii.
+LIMITS: dict[str, tuple[float, float]] = {
+    "girth_radius": (0.05, 50.0),
+    "taper": (0.0, 1.5),
+    "head": (1.5, 4.0),
+}
+LENGTH_LIMITS = (20.0, 200.0)
 NECK = 1.35  # head lengths from the snout to where the body's own proportions hold
 
 
@@ -52,8 +59,9 @@ class Anatomy:
     _profile: PchipInterpolator = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        check_limits(self, {"girth_radius": (0.05, 50.0), "taper": (0.0, 1.5), "head": (1.5, 4.0)})
-        check_limits(self, {"length": (20 * self.girth_radius, 200 * self.girth_radius)})
+        check_limits(self, LIMITS)
+        low, high = (share * self.girth_radius for share in LENGTH_LIMITS)
+        check_limits(self, {"length": (low, high)})
         object.__setattr__(self, "_profile", self._interpolate())
 
     @property

@@ -160,9 +160,7 @@ def _paint(
     seen = visible_scales(snake.scales, u, v, seed)
     colour = (pattern(u, v) + pattern(seen.u, seen.v)) / 2
     colour = np.where(seen.belly[..., None], belly(seen.u, v, seen.tone), colour)
-    # skin shows between the scales, and scales wear pale at their free ends
-    shade = 1 + 0.06 * seen.tone - 0.32 * _step(-seen.along, -0.34, -0.14)
-    colour = colour * np.where(seen.belly, 1.0, shade)[..., None]
+    colour = colour * np.where(seen.belly, 1.0, _shade(seen))[..., None]
 
     x, d = skin.arc(u) / anatomy.head_length, np.abs(v - 0.5)
     paint = face(x, d)
@@ -175,6 +173,34 @@ def _paint(
     paint = _mix(paint, BLACK / 2, np.maximum(lips, np.exp(-((nostril / 0.016) ** 2))))
     colour = _mix(paint, colour, _step(x, 0.90, 1.02))
     return np.clip(colour, 0, 1)
+
+
+def _shade(seen: ScaleMap) -> Floats:
+    """Skin shows between the scales, and scales wear pale at their free ends."""
+    return 1 + 0.06 * seen.tone - 0.32 * _step(-seen.along, -0.34, -0.14)
+
+
+def corn_snake_piece(
+    scales: Scales, columns: int, rows: int, width: int = 1024, seed: int = 7
+) -> Floats:
+    """The edge of a saddle, over what `piece` shows of `rows` × `columns` scales; (h, width, 3)."""
+    long, wide = columns * scales.pitch, rows * scales.row_pitch
+    height = round(width * wide / long)
+    u, v = np.meshgrid(
+        ((np.arange(width) + 0.5) / width - 0.5) * long,
+        0.5 - ((np.arange(height) + 0.5) / height - 0.5) * wide,
+    )
+    seen = visible_scales(scales, u + columns * scales.pitch, v, seed)
+    warp = _noise(np.random.default_rng(seed), u.shape, width / 40)
+
+    def pattern(u: Floats, v: Floats) -> Floats:
+        distance = (u + 0.09 * long + 1.2 * (v - 0.5) ** 2) / long
+        colour = _mix(np.array([0.60, 0.20, 0.06]), BLACK, _step(distance, -0.05, 0.0))
+        return _mix(colour, np.array([0.71, 0.52, 0.30]), _step(distance, 0.07, 0.10))
+
+    colour = pattern(u + 0.004 * warp, v)
+    colour = (colour + pattern(seen.u - columns * scales.pitch, seen.v)) / 2
+    return np.clip(colour * _shade(seen)[..., None], 0, 1)
 
 
 def eye(iris: Floats, width: int = 128) -> Floats:

@@ -27,6 +27,21 @@ BELLY_COLUMNS = (1.0, 0.6, 0.25, 0.0)  # places across half a scute, from its ed
 CAMBER = 0.16  # how far the side corners of a scale lie lower than its middle, in reliefs
 BOW = 0.8  # how much a scale is bent along the body, in reliefs
 
+#: Lowest and highest value of each parameter of `Scales`.
+LIMITS: dict[str, tuple[float, float]] = {
+    "rows": (7, 61),
+    "aspect": (0.5, 3.0),
+    "relief": (0.0, 0.2),
+    "overlap": (0.0, 0.5),
+    "keel": (0.0, 1.0),
+    "roundness": (0.0, 0.3),
+    "irregularity": (0.0, 5.0),
+    "seed": (0, 2**32),
+    "turn": (-360.0, 360.0),
+    "fan": (-90.0, 90.0),
+    "detail": (1, 32),
+}
+
 
 @dataclass(frozen=True)
 class Scales:
@@ -42,7 +57,8 @@ class Scales:
     roundness : how far the rear edges bulge; 0 is a rhombus.
     irregularity : largest angle by which single scales lie askew; degrees.
     seed : which scales lie askew by how much.
-    fan : angle by which the patch turns outwards from the keel to the side corners; degrees.
+    turn : angle from dp/du, which points tailwards, to the patch's x axis; degrees.
+    fan : angle by which the patch turns further, outwards from keel to side corners; degrees.
     detail : subdivisions of an edge of a scale.
     """
 
@@ -54,23 +70,12 @@ class Scales:
     roundness: float = 0.16
     irregularity: float = 2.0
     seed: int = 0
+    turn: float = 0.0
     fan: float = 0.0
     detail: int = 4
 
     def __post_init__(self) -> None:
-        limits = {
-            "rows": (7, 61),
-            "aspect": (0.5, 3.0),
-            "relief": (0.0, 0.2),
-            "overlap": (0.0, 0.5),
-            "keel": (0.0, 1.0),
-            "roundness": (0.0, 0.3),
-            "irregularity": (0.0, 5.0),
-            "seed": (0, 2**32),
-            "fan": (-90.0, 90.0),
-            "detail": (1, 32),
-        }
-        check_limits(self, limits)
+        check_limits(self, LIMITS)
         if self.rows % 2 == 0:
             raise DiffractionError(
                 f"snake: rows = {self.rows} is even; one runs along the spine: make it odd"
@@ -288,9 +293,9 @@ class _Lattice:
 
     def orientation(self) -> Floats:
         """Cosine and sine of the angle between the patch and dp/du at all vertices."""
-        angle = np.zeros(self.count)
+        angle = np.full(self.count, np.radians(self.scales.turn))
         _, _, p, q, index = np.concatenate(self._tiles, axis=1)
-        angle[index.astype(np.int64)] = np.radians(self.scales.fan) * (q - p)
+        angle[index.astype(np.int64)] += np.radians(self.scales.fan) * (q - p)
         return np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
     def _number(self, keep: NDArray[np.bool_]) -> Ints:

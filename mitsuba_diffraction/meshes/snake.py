@@ -39,7 +39,8 @@ def build(
     """Make a snake that lies coiled on the plane z = 0, its head on top; lengths in cm.
 
     In the body's texture coordinates u runs from snout to tail and v around from the belly, both
-    in local circumferences; the seam lies under the belly.
+    in local circumferences; the seam lies under the belly. The orientation has the scales' `turn`
+    and `fan`.
 
     Parameters
     ----------
@@ -70,12 +71,13 @@ def build(
         ends.strip(body.uv, head_ring, n_front + covered.front),
         ends.strip(body.uv, n_front + covered.rear, tail_ring),
     ]
-    turns = np.tile([1.0, 0.0], (len(body.positions), 1))
+    angle = np.radians(scales.turn)
+    turns = np.tile([np.cos(angle), np.sin(angle)], (len(body.positions), 1))
     turns[n_front : n_front + n_covered] = covered.mesh.orientation
     body = dataclasses.replace(
         body,
         faces=np.concatenate([body.faces, *strips]),
-        orientation=turns if scales.fan else None,
+        orientation=turns,
     )
     return Snake(body, ends.eyes(skin), skin, scales)
 
