@@ -22,7 +22,10 @@ _SAMPLES = {"llvm": 2**21, "cuda": 2**24}
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a rendering: a `mi.Bitmap`, its samples per pixel, whether Ctrl-C ended it."""
+    """What came of a rendering: a `mi.Bitmap`, its samples per pixel, whether Ctrl-C ended it.
+
+    Without samples there is no bitmap.
+    """
 
     bitmap: Any
     spp: int
@@ -126,6 +129,8 @@ def render_passes(
             total = total + raw * (taken if splats else 1)
             done += taken
             progress(min(done, spp), spp, "rendering")
+        if done == 0:  # asked to stop before there was anything
+            return Result(None, 0, stop.asked)
         if splats:
             total = total / done
         film.prepare(integrator.aov_names())

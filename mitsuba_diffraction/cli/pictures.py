@@ -36,7 +36,9 @@ def write_exr(bitmap: Any, path: Path, metadata: Mapping[str, str | int]) -> Non
     _write(bitmap, path)
 
 
-def write_png(colours: Any, path: Path, exposure: float = 0.0) -> None:
+def write_png(
+    colours: Any, path: Path, exposure: float = 0.0, metadata: Mapping[str, str] | None = None
+) -> None:
     """Write 8 bits per channel: times 2^exposure, sRGB transfer, what is beyond [0, 1] clipped.
 
     Parameters
@@ -44,6 +46,7 @@ def write_png(colours: Any, path: Path, exposure: float = 0.0) -> None:
     colours : what `colours_of` returns; its alpha is premultiplied, that of the PNG is not.
     path : the file.
     exposure : stops.
+    metadata : text to store with it, ASCII.
     """
     import mitsuba as mi
 
@@ -60,6 +63,8 @@ def write_png(colours: Any, path: Path, exposure: float = 0.0) -> None:
         True,
         transform.Unpremultiply if has_alpha else transform.Empty,
     )
+    for key, value in (metadata or {}).items():
+        shown.metadata()[key] = value
     _write(shown, path)
 
 

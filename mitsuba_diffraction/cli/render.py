@@ -7,7 +7,8 @@ import time
 from pathlib import Path
 
 from ..errors import DiffractionError
-from .arguments import number_between, path_ending_in, whole_number
+from .animation import change
+from .arguments import number_between, whole_number
 from .console import say, say_warning
 from .output import check_writable
 from .progress import Bar
@@ -23,14 +24,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="render a Mitsuba scene",
         description=(
             "Render an XML scene to a linear EXR and a PNG beside it. Ctrl-C stops after the "
-            "current pass and keeps the picture so far."
+            "current pass and keeps the picture so far. With --frames, render a folder of PNG "
+            "files while parameters of the scene change; frames that are there already, with the "
+            "same settings, are kept, so an interrupted run goes on where it was."
         ),
     )
     add_scene_options(parser)
     parser.add_argument(
-        "-o", "--output", metavar="OUT", type=path_ending_in(".exr", ".png"),
+        "-o", "--output", metavar="OUT", type=Path,
         help="EXR, with a PNG beside it, or only a PNG; default: the scene's name with .exr in "
-        "the current folder",
+        "the current folder. With --frames: a folder, or a film, .webp or .gif, whose frames go "
+        "into a folder of its name; default: the folder SCENE_frames",
     )  # fmt: skip
     parser.add_argument(
         "-s", "--spp", metavar="N", type=whole_number(1),
@@ -44,13 +48,54 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--exposure", metavar="EV", type=number_between(-100, 100), default=0.0,
         help="of the PNG, in stops: +1 doubles the light; default: 0",
     )  # fmt: skip
+    parser.add_argument(
+        "--preview", action="store_true",
+        help="half the width and height, and few samples (8 to 16, unless -s is given)",
+    )  # fmt: skip
+    film = parser.add_argument_group("animation")
+    film.add_argument(
+        "--frames", metavar="N", type=whole_number(1), help="render N pictures, frame_0000.png on"
+    )
+    film.add_argument(
+        "--animate", metavar="KEY=FROM:TO", type=change, action="append", default=[],
+        help="change a parameter of the scene from the first frame to the last, e.g. "
+        "sun_elevation=10:60, or lists: camera=0,-9,3:4,-9,3; may be given several times",
+    )  # fmt: skip
+    film.add_argument(
+        "--turn", metavar="KEY", action="append", default=[],
+        help="turn an angle of the scene, in degrees, once around from its value on, e.g. "
+        "sun_azimuth for the light or turn for the snake; may be given several times",
+    )  # fmt: skip
+    film.add_argument("--exr", action="store_true", help="write a linear EXR of each frame, too")
+    film.add_argument(
+        "--fps", metavar="N", type=number_between(1, 100),
+        help="frames a second of the film; default: 24",
+    )  # fmt: skip
     parser.set_defaults(run=run, parser=parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Render, and return the exit code."""
+    moving = bool(args.animate or args.turn)
+    if args.frames is not None:
+        if not moving:
+            args.parser.error("argument --frames: say what changes, with --animate or --turn")
+        from .frames import run_frames
+
+        args.fps = args.fps or 24.0
+        return run_frames(args)
+    if moving or args.exr or args.fps:
+        args.parser.error("--animate, --turn, --exr and --fps belong to --frames: say how many")
+    return _run_one(args)
+
+
+def _run_one(args: argparse.Namespace) -> int:
     parameters = scene_parameters(args)
     output = args.output or Path(args.scene.with_suffix(".exr").name)
+    if output.suffix.lower() not in (".exr", ".png"):
+        args.parser.error(
+            f"argument -o: expected a name ending in .exr or .png, got {str(output)!r}"
+        )
     only_png = output.suffix.lower() == ".png"
     png = output if only_png else output.with_suffix(".png")
     for path in dict.fromkeys((output, png)):
@@ -59,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
     from .mitsuba_text import warnings_as_ours
     from .passes import Stop, render_passes
     from .pictures import colours_of, count_bad, write_exr, write_png
-    from .scenes import load_scene, sensor_of, set_variant
+    from .scenes import load_scene, preview_samples, sensor_of, set_variant, shrink
 
     start = time.perf_counter()
     variant = set_variant(args.mode)
@@ -69,7 +114,9 @@ def run(args: argparse.Namespace) -> int:
             bar(0, spp, "loading")
             scene = load_scene(args.scene, parameters)
             sensor = sensor_of(scene, args.sensor)
-            spp = spp or int(sensor.sampler().sample_count())
+            if args.preview:
+                shrink(sensor)
+            spp = spp or preview_samples(sensor, args.preview)
             if only_png and not _shows_colours(scene, sensor):
                 raise DiffractionError(
                     f"the film of '{args.scene}' holds no colours that a PNG could show; "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import re
 import xml.etree.ElementTree as ElementTree
@@ -13,6 +14,8 @@ from ..errors import DiffractionError
 _REFERENCE = re.compile(r"\$(\w+)")
 # Mitsuba stops at 15 includes within each other.
 _DEEPEST = 15
+# Of a path, in characters: longer texts name no file, and asking would be an error.
+_LONGEST = 1024
 
 
 def check_parameters(scene: Path, given: Mapping[str, str]) -> None:
@@ -64,6 +67,38 @@ def parameters_of(
     """
     found: dict[str, str | None] = {}
     return found if _collect(scene, dict(given or {}), found, 0) else None
+
+
+def files_of(scene: Path, given: Mapping[str, str] | None = None) -> list[Path]:
+    """The scene, its includes, and every file that one of them or a recipe among those names.
+
+    Parameters
+    ----------
+    scene : an XML file.
+    given : values that are set.
+    """
+    from ..files.recipes import Recipe
+
+    values = {name: value or "" for name, value in (parameters_of(scene, given) or {}).items()}
+    values |= given or {}
+    found: dict[Path, None] = {}
+    waiting = [scene]
+    while waiting:
+        file = waiting.pop()
+        if file in found or not file.is_file():
+            continue
+        found[file] = None
+        if file.suffix.lower() == ".toml":
+            waiting += Recipe.load(file).sources
+        if file.suffix.lower() != ".xml":
+            continue
+        with contextlib.suppress(ElementTree.ParseError, ValueError):
+            for element in ElementTree.parse(file).getroot().iter():
+                for text in element.attrib.values():
+                    named = _with_values(text, values, {})
+                    if named and len(named) < _LONGEST and "\0" not in named:
+                        waiting.append(scene.parent / named)
+    return list(found)
 
 
 def _collect(

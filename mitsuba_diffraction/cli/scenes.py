@@ -99,6 +99,23 @@ def _warn_of_missing_uv(scene: Any) -> None:
         )
 
 
+def shrink(sensor: Any) -> None:
+    """Halve the width and height of a sensor's film, its crop included."""
+    import mitsuba as mi
+
+    values = mi.traverse(sensor)
+    for name in ("film.size", "film.crop_size", "film.crop_offset"):
+        least = 0 if name.endswith("offset") else 1
+        values[name] = [max(least, length // 2) for length in values[name]]
+    values.update()
+
+
+def preview_samples(sensor: Any, preview: bool) -> int:
+    """The scene's own samples per pixel; for a preview an eighth of them, 8 to 16."""
+    own = int(sensor.sampler().sample_count())
+    return min(own, max(8, min(16, own // 8))) if preview else own
+
+
 def sensor_of(scene: Any, index: int) -> Any:
     """One of the scene's sensors.
 

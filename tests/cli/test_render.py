@@ -390,3 +390,15 @@ def test_doubts_about_a_patch_are_said_once(run, patch_scene):
     )  # fmt: skip
     assert ran.code == 0
     assert sum("coarser than a quarter" in line for line in ran.err.splitlines()) == 1
+
+
+def test_ctrl_c_while_compiling_writes_nothing(run, scene, monkeypatch):
+    def interrupt(self, done, total, text):
+        if text == "compiling":
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr("mitsuba_diffraction.cli.progress.Bar.__call__", interrupt)
+    ran = run("render", scene, *QUICK, "-o", "a.exr")
+    assert ran.code == 130
+    assert "nothing half-written" in ran.err
+    assert os.listdir() == ["room.xml"]
