@@ -12,7 +12,7 @@ from mitsuba_diffraction.files.recipes import Recipe
 
 SCENES = Path(__file__).resolve().parent.parent / "scenes"
 SUNNY = ("sphere", "snake", "xenopeltis")
-STUDIO = ("cd", "cd_window", "grating", "grating_window", "material_ball", "scales")
+STUDIO = ("cd", "cd_window", "grating", "grating_window", "material_ball", "own_mesh", "scales")
 SMALL = {"spp": "4", "resx": "48", "resy": "40"}
 
 # the look-alikes are as steep as the real scales, which the package says every time

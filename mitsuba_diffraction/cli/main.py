@@ -28,12 +28,14 @@ from . import (
     precompute,
     render,
     sweep,
+    tangents,
     view,
 )
 from .console import PROGRAM, say, say_error, warnings_in_one_line
 
 COMMANDS = (
-    precompute, info, render, brdf_map, evaluate, sweep, compare, view, export_viewer, bench
+    precompute, info, tangents, render, brdf_map, evaluate, sweep, compare, view, export_viewer,
+    bench,
 )  # fmt: skip
 
 FAILED = 1

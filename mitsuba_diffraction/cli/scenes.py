@@ -92,8 +92,9 @@ def _warn_of_missing_uv(scene: Any) -> None:
     if lacking:
         warnings.warn(
             f"no texture coordinates on {', '.join(lacking)}: the patch's direction is arbitrary "
-            "there and turns from triangle to triangle; unwrap the mesh so that u runs the way the "
-            "patch's x axis shall",
+            "there and turns from triangle to triangle; give the mesh directions with "
+            "'mitsuba-diffraction tangents', or unwrap it so that u runs the way the patch's x "
+            "axis shall",
             DiffractionWarning,
             stacklevel=2,
         )

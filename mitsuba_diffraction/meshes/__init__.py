@@ -11,6 +11,7 @@ head       shields, mouth, eyes; the tail tip
 piece      `piece`: a few scales for close views
 pigment    images of what lies under the skin, and of the ground
 disc       `disc`: a ring whose patch follows the radius
+knot       `knot`: a mesh without texture coordinates
 tangents   whether a mesh has the tangents that a patch needs
 directions `direction_field`: a smooth field of directions on any mesh
 oriented   `oriented_mesh`: a mesh whose patch follows such a field
@@ -24,6 +25,7 @@ trimesh    `TriangleMesh`, `write_ply`
 from .anatomy import Anatomy
 from .directions import DirectionField, direction_field
 from .disc import disc
+from .knot import knot
 from .oriented import oriented_mesh
 from .piece import piece
 from .scales import Scales
@@ -42,6 +44,7 @@ __all__ = [
     "check_tangents",
     "direction_field",
     "disc",
+    "knot",
     "load_mesh",
     "oriented_mesh",
     "piece",

@@ -20,8 +20,11 @@ from ..errors import DiffractionError
 from ..files.atomic import atomic_path
 from . import pigment
 from .anatomy import Anatomy
+from .directions import direction_field
 from .disc import disc
+from .knot import knot
 from .options import add_options_of, chosen
+from .oriented import oriented_mesh
 from .piece import piece
 from .scales import Scales
 from .snake import Snake, build
@@ -67,6 +70,9 @@ def write_scenes(folder: Path) -> None:
     _write_png(textures / "scales.png", painted)
     for name, inner, outer in CD:
         write_ply(meshes / f"cd_{name}.ply", disc(inner, outer), _comment(f"cd_{name}"))
+    shape = knot()
+    field = direction_field(*shape)
+    write_ply(meshes / "knot.ply", oriented_mesh(*shape, field.directions), _comment("knot"))
 
 
 def _write_scene_mesh(path: Path, mesh: TriangleMesh) -> None:

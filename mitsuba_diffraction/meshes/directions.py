@@ -26,6 +26,7 @@ from scipy.sparse.linalg import splu
 
 from ..errors import DiffractionError
 from .limits import check_limits
+from .tangents import carried
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -101,6 +102,12 @@ def direction_field(
     )
 
 
+def turned(directions: Floats, normals: Floats, degrees: float) -> Floats:
+    """Directions (n, 3) turned around their normals, counter-clockwise seen from outside."""
+    angle = np.radians(degrees)
+    return np.cos(angle) * directions + np.sin(angle) * np.cross(normals, directions)
+
+
 @dataclass(frozen=True)
 class _Surface:
     """A mesh welded by position, with frames, transport along its edges, weights and areas."""
@@ -153,14 +160,8 @@ class _Surface:
 
     def transport(self, to: Ints, origin: Ints) -> Complexes:
         """Rotations (e,) from the frames at `origin` to those at `to`, the normals' tilt apart."""
-        before, after = self.normals[origin], self.normals[to]
-        axis = np.cross(before, after)
-        cosine = (before * after).sum(axis=1, keepdims=True)
-        # Rodrigues' formula for the smallest rotation from one normal to the other
-        v = self.frames[origin, 0]
-        turned = v * cosine + np.cross(axis, v)
-        turned += axis * (axis * v).sum(axis=1, keepdims=True) / np.maximum(1 + cosine, 1e-3)
-        x, y = ((turned * self.frames[to, n]).sum(axis=1) for n in (0, 1))
+        laid_over = carried(self.frames[origin, 0], self.normals[origin], self.normals[to])
+        x, y = ((laid_over * self.frames[to, n]).sum(axis=1) for n in (0, 1))
         rotation = x + 1j * y
         length = np.abs(rotation)
         return np.where(length > 1e-6, rotation / np.maximum(length, 1e-6), 1.0)

@@ -56,8 +56,9 @@ class TangentReport:
         """One line for each thing that speaks against this mesh, with what to do."""
         if not self.has_uv:
             return [
-                "no texture coordinates, so the patch has no direction: unwrap the mesh "
-                "so that u runs the way the patch's x axis shall"
+                "no texture coordinates, so the patch has no direction: give the mesh one with "
+                "'mitsuba-diffraction tangents', or unwrap it so that u runs the way the patch's x "
+                "axis shall"
             ]
         lines = []
         if not self.has_normals:
@@ -191,6 +192,14 @@ def tangents(sides: Floats, uv_sides: Floats) -> tuple[Floats, Floats, Floats]:
     return dp_du, dp_dv, determinant / 2
 
 
+def carried(vectors: Floats, before: Floats, after: Floats) -> Floats:
+    """Vectors (n, 3) turned by the smallest rotation of one unit normal to another (Rodrigues)."""
+    axis = np.cross(before, after)
+    cosine = (before * after).sum(axis=1, keepdims=True)
+    along = (axis * vectors).sum(axis=1, keepdims=True) / np.maximum(1 + cosine, 1e-3)
+    return vectors * cosine + np.cross(axis, vectors) + axis * along
+
+
 def _turning(
     positions: Floats, faces: Ints, normals: Floats, tangent: Floats, good: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
@@ -207,7 +216,8 @@ def _turning(
     # sharp folds (scale edges, corners of a box) are edges of the surface, not of the texture
     smooth = good[one] & good[two] & ((normals[one] * normals[two]).sum(axis=1) > 0.5)
     one, two = one[smooth], two[smooth]
-    turn = (tangent[one] * tangent[two]).sum(axis=1) < np.cos(np.radians(TURN))
+    laid_over = carried(tangent[one], normals[one], normals[two])  # a fold alone is no turn
+    turn = (laid_over * tangent[two]).sum(axis=1) < np.cos(np.radians(TURN))
     marked = np.zeros(len(faces), dtype=bool)
     marked[one[turn]] = marked[two[turn]] = True
     return marked

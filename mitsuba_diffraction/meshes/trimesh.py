@@ -60,6 +60,17 @@ def grid_faces(grid: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
+def vertex_normals(positions: Floats, faces: NDArray[np.int64]) -> Floats:
+    """Unit normals (n, 3): the mean over a vertex's triangles, weighted by their areas."""
+    corners = positions[faces]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    total = np.zeros_like(positions)
+    for n in range(3):
+        np.add.at(total, faces[:, n], across)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.where(length > 0, total / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
+
+
 def join(meshes: list[TriangleMesh]) -> TriangleMesh:
     """One mesh out of several, without welding; an orientation is kept where all have one."""
     starts = np.cumsum([0] + [len(mesh.positions) for mesh in meshes])

@@ -1,0 +1,105 @@
+"""`mitsuba-diffraction tangents`: lay a patch smoothly over any mesh."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from .arguments import number_between, path_ending_in
+from .console import say_warning
+from .output import check_writable
+from .progress import Bar
+
+_GUIDES = ("smooth", "x", "y", "z", "body")
+_NAMED = 6  # singular points that are named
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the sub-command."""
+    parser = subparsers.add_parser(
+        "tangents",
+        help="give a mesh a smooth field of directions for its patch",
+        description=(
+            "Write a mesh (PLY, OBJ, serialized) as a PLY whose attribute vertex_orientation lays "
+            "the patch's x axis along a smooth field of directions. Texture coordinates are kept; "
+            "a mesh without them gets some that carry only the direction. On a closed surface that "
+            "is no torus every field has singular points, around which the patch turns."
+        ),
+    )
+    parser.add_argument("mesh", metavar="MESH", type=Path, help="what to read")
+    parser.add_argument(
+        "-o", "--output", metavar="OUT", type=path_ending_in(".ply"), required=True,
+        help="PLY to write",
+    )  # fmt: skip
+    parser.add_argument(
+        "--along", choices=_GUIDES, default="smooth",
+        help="smooth: the field that turns least; x, y, z: that axis, laid onto the surface; body: "
+        "from one end of the body to the other; default: smooth",
+    )  # fmt: skip
+    parser.add_argument(
+        "--turn", metavar="DEGREES", type=number_between(-360, 360), default=0.0,
+        help="from there to the patch's x axis, counter-clockwise seen from outside, e.g. -90 to "
+        "lay its y axis along the field; default: 0",
+    )  # fmt: skip
+    parser.add_argument(
+        "--smoothing", metavar="S", type=number_between(1e-4, 1), default=0.03,
+        help="distance within which the field may leave an axis or the body's direction to stay "
+        "smooth, as a share of the mesh's size; default: 0.03",
+    )  # fmt: skip
+    parser.set_defaults(run=run, parser=parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the mesh, say where its field is singular, and return the exit code."""
+    check_writable(args.output)
+    from ..meshes import check_tangents, load_mesh, oriented_mesh, write_ply
+    from ..meshes.directions import direction_field, turned
+    from ..meshes.trimesh import vertex_normals
+    from .mitsuba_text import warnings_as_ours
+
+    with Bar(args) as bar, warnings_as_ours():
+        bar(0, 0, "reading")
+        positions, normals, uv, faces = load_mesh(args.mesh)
+        if normals is None:
+            normals = vertex_normals(positions, faces)
+        bar(0, 0, "solving for the field")
+        field = direction_field(positions, normals, faces, args.along, smoothing=args.smoothing)
+        directions = turned(field.directions, normals, args.turn)
+        mesh = oriented_mesh(positions, normals, faces, directions, uv)
+        bar(0, 0, "writing")
+        write_ply(args.output, mesh, f"{args.mesh.name}, patch along {args.along}")
+    print(
+        f"{args.output}: {len(mesh.faces)} triangles, patch along {args.along}, "
+        f"{'texture coordinates kept' if uv is not None else 'had no texture coordinates'}"
+    )
+    print(_places(field.singular, field.indices))
+    print(
+        'in the scene: <texture type="mesh_attribute" name="orientation"><string name="name" '
+        'value="vertex_orientation"/></texture> within the diffraction BSDF'
+    )
+    if uv is None:
+        report = check_tangents(mesh.positions, mesh.normals, mesh.uv, mesh.faces)
+        if not report.usable:
+            say_warning(
+                f"the field turns by over 30 degrees between neighbours on {report.turning:.0%} of "
+                "the surface: use a finer mesh, or another --along"
+            )
+    return 0
+
+
+def _places(places: object, indices: object) -> str:
+    """The singular points in one line."""
+    import numpy as np
+
+    points, turns = np.asarray(places), np.asarray(indices)
+    if not len(points):
+        return "the field is smooth everywhere"
+    named = [
+        f"({', '.join(f'{value:.3g}' for value in point)}) {turn:+d}"
+        for point, turn in zip(points[:_NAMED], turns, strict=False)
+    ]
+    more = f" and {len(points) - _NAMED} more" if len(points) > _NAMED else ""
+    return (
+        f"{len(points)} singular points, with the turns around each: {', '.join(named)}{more}; "
+        f"together {turns.sum():+d}"
+    )

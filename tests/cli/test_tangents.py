@@ -1,0 +1,131 @@
+"""`tangents`: a mesh in, the same mesh with a field for its patch out."""
+
+from __future__ import annotations
+
+import os
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from mitsuba_diffraction.cli.tangents import _GUIDES
+from mitsuba_diffraction.meshes import TriangleMesh, knot, load_mesh, write_ply
+from mitsuba_diffraction.meshes.directions import GUIDES
+from mitsuba_diffraction.meshes.trimesh import vertex_normals
+
+
+def obj_of(path, positions, faces):
+    """Write an OBJ without normals and texture coordinates."""
+    lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in positions]
+    lines += [f"f {a} {b} {c}" for a, b, c in faces + 1]
+    path.write_text("\n".join(lines))
+
+
+@pytest.fixture
+def bare(tmp_path, monkeypatch):
+    """A coarse knot as OBJ, in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    positions, _, faces = knot(60, 8)
+    obj_of(tmp_path / "bare.obj", positions, faces)
+    return "bare.obj"
+
+
+@pytest.fixture
+def ball(tmp_path):
+    """An octahedron whose triangles were halved four times, on the unit sphere."""
+    corners = np.concatenate([np.eye(3), -np.eye(3)])
+    faces = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2],
+                      [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])  # fmt: skip
+    for _ in range(4):
+        a, b, c = (corners[faces[:, n]] for n in range(3))
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        every = np.concatenate([np.stack(t, 1) for t in
+                                ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])  # fmt: skip
+        corners, index = np.unique(every.reshape(-1, 3), axis=0, return_inverse=True)
+        faces = index.reshape(-1, 3)
+    corners /= np.linalg.norm(corners, axis=1, keepdims=True)
+    obj_of(tmp_path / "ball.obj", corners, faces)
+    return tmp_path / "ball.obj"
+
+
+def test_the_choices_are_those_of_the_field():
+    assert _GUIDES == GUIDES
+
+
+def test_a_mesh_without_texture_coordinates_gets_a_field(run, bare):
+    ran = run("tangents", bare, "-o", "field.ply")
+    assert ran.code == 0, ran.err
+    assert "field.ply: 960 triangles, patch along smooth, had no texture coordinates" in ran.out
+    assert "the field is smooth everywhere" in ran.out  # a knot's tube is a torus
+    assert '"usable": true' in run("info", "field.ply", "--json").out
+    mesh = mi.load_dict({"type": "ply", "filename": "field.ply"})
+    turn = np.array(mi.traverse(mesh)["vertex_orientation"]).reshape(-1, 3)
+    np.testing.assert_allclose(np.hypot(turn[:, 0], turn[:, 1]), 1, atol=1e-6)
+    # relative to the mean direction of the own triangle
+    assert np.abs(np.degrees(np.arctan2(turn[:, 1], turn[:, 0]))).max() < 30
+
+
+def test_singular_points_are_named(run, ball):
+    ran = run("tangents", ball, "-o", ball.with_name("field.ply"), "--along", "z")
+    assert ran.code == 0
+    line = ran.out.splitlines()[1]
+    assert line.startswith("2 singular points, with the turns around each: (")
+    assert line.endswith("together +2")
+
+
+def test_a_turn_is_counter_clockwise_from_outside(run, ball):
+    """Along z, turned by a right angle, the patch's x axis points west: −φ, as z × n is east."""
+    out = ball.with_name("field.ply")
+    assert run("tangents", ball, "-o", out, "--along", "z", "--turn", "90").code == 0
+    positions, _, uv, faces = load_mesh(out)
+    sides = positions[faces[:, 1:]] - positions[faces[:, :1]]
+    uv_sides = uv[faces[:, 1:]] - uv[faces[:, :1]]
+    from mitsuba_diffraction.meshes.tangents import tangents
+
+    along = tangents(sides, uv_sides)[0]
+    middle = positions[faces].mean(axis=1)
+    west = np.cross(middle, [0.0, 0.0, 1.0])
+    near = np.linalg.norm(west, axis=1) > 0.5
+    cosine = (along * west).sum(axis=1) / np.linalg.norm(along, axis=1)
+    # triangles are flat, and 6° wide
+    assert (cosine / np.linalg.norm(west, axis=1))[near].min() > np.cos(np.radians(6))
+
+
+def test_texture_coordinates_are_kept(run, tmp_path):
+    x, y = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 5))
+    positions = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
+    from mitsuba_diffraction.meshes.trimesh import grid_faces
+
+    faces = grid_faces(np.arange(25).reshape(5, 5))[:, ::-1]
+    uv = positions[:, 1::-1] * 3  # u runs along y
+    normals = vertex_normals(positions, faces)
+    np.testing.assert_array_equal(normals, np.tile([0, 0, 1], (25, 1)))
+    write_ply(tmp_path / "in.ply", TriangleMesh(positions, normals, uv, faces))
+    ran = run("tangents", tmp_path / "in.ply", "-o", tmp_path / "out.ply", "--along", "x")
+    assert "texture coordinates kept" in ran.out
+    got, _, got_uv, _ = load_mesh(tmp_path / "out.ply")
+    np.testing.assert_allclose(got_uv, got[:, 1::-1] * 3, atol=1e-6)
+    mesh = mi.load_dict({"type": "ply", "filename": str(tmp_path / "out.ply")})
+    turn = np.array(mi.traverse(mesh)["vertex_orientation"]).reshape(-1, 3)
+    # from y, where dp/du points, to x
+    np.testing.assert_allclose(turn, np.tile([0, -1, 0], (len(turn), 1)), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["none.obj", "-o", "a.ply"], "mesh 'none.obj': there is no such file"),
+        (["bare.obj", "-o", "no/a.ply"], "cannot write 'no/a.ply'"),
+    ],
+)
+def test_files_that_do_not_fit_are_one_line(run, bare, arguments, said):
+    assert said in run("tangents", *arguments).failed_in_one_line()
+    assert os.listdir() == ["bare.obj"]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [[], ["-o", "a.obj"], ["-o", "a.ply", "--along", "w"], ["-o", "a.ply", "--turn", "x"]],
+)
+def test_unusable_options_are_usage_errors(run, bare, options):
+    assert run("tangents", bare, *options).code == 2
