@@ -87,6 +87,7 @@ from mitsuba_diffraction.plugin.frozen import arrays_within, marks
 from mitsuba_diffraction.plugin.light import variant_light
 from mitsuba_diffraction.plugin.parameters import read_parameters
 from mitsuba_diffraction.plugin.sampling import COSINE, fold, unfolded
+from mitsuba_diffraction.plugin.session import enrol
 from mitsuba_diffraction.plugin.shadowing import vcavity
 
 
@@ -107,6 +108,7 @@ class Diffraction(mi.BSDF):
         self.vcavity = parameters.vcavity
         self._light = variant_light(self.table, parameters.wavelength)
         self._energy = EnergyBound(self.table) if parameters.energy_conserving else None
+        self._record = enrol(self, props.id())
         self._area_factor = 4.0 * dr.pi * self.table.sigma**2  # 4π²σ⁴ over the window's area πσ²
         front = mi.BSDFFlags.FrontSide
         glossy = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.Anisotropic | front
@@ -235,7 +237,8 @@ class Diffraction(mi.BSDF):
         one_plus_dot = 0.5 * dr.squared_norm(total)
         cos_i = dr.select(active, mi.Frame3f.cos_theta(si.wi), 1.0)
         outside = self._area_factor * dr.square(one_plus_dot / w) / cos_i
-        power = self._light.power(uv, w * self.height_scale, si)
+        scaled_w = w * self.height_scale
+        power = self._light.power(uv, scaled_w, si)
         if self._energy is not None:
             incident, outgoing = _in_patch(si.wi, rotation), _in_patch(wo, rotation)
             outside /= self._energy.divisor(incident, cos_i, outgoing, w - cos_i, self.height_scale)
@@ -243,7 +246,11 @@ class Diffraction(mi.BSDF):
             outside *= vcavity(cos_i, w - cos_i, one_plus_dot)
         cos_half = dr.safe_sqrt(0.5 * one_plus_dot)
         reflectance = self.surface.reflectance(cos_half, si, active)
-        return dr.select(active, outside * reflectance * power, 0.0)
+        value = dr.select(active, outside * reflectance * power, 0.0)
+        if self._record is not None and self._record[0].listening:
+            session, number = self._record
+            session.hear(number, si, uv, scaled_w, mi.unpolarized_spectrum(value))
+        return value
 
     def _density(self, si: Any, wo: Any, active: Any) -> Any:
         """Density of `_draw`: that of the orders, and a little cosine."""

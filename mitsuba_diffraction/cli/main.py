@@ -25,6 +25,7 @@ from . import (
     evaluate,
     export_viewer,
     info,
+    plan,
     precompute,
     render,
     sweep,
@@ -34,8 +35,8 @@ from . import (
 from .console import PROGRAM, say, say_error, warnings_in_one_line
 
 COMMANDS = (
-    precompute, info, tangents, render, brdf_map, evaluate, sweep, compare, view, export_viewer,
-    bench,
+    precompute, info, tangents, plan, render, brdf_map, evaluate, sweep, compare, view,
+    export_viewer, bench,
 )  # fmt: skip
 
 FAILED = 1

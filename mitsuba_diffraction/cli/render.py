@@ -5,12 +5,15 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
+from typing import Any
 
 from ..errors import DiffractionError
 from .animation import change
 from .arguments import number_between, whole_number
 from .console import say, say_warning
 from .output import check_writable
+from .plan import add_plan_options, plan_or_json
+from .planned import MAKE, check_plan_options, load_by_plan, say_outside
 from .progress import Bar
 from .scene_options import add_scene_options, scene_parameters
 
@@ -52,6 +55,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--preview", action="store_true",
         help="half the width and height, and few samples (8 to 16, unless -s is given)",
     )  # fmt: skip
+    parser.add_argument(
+        "--plan", nargs="?", const=MAKE, metavar="PLAN", type=plan_or_json,
+        help="render with tables of only what the scene needs: plan them first, or as in a file "
+        "that `plan -o` wrote",
+    )  # fmt: skip
+    add_plan_options(parser)
     film = parser.add_argument_group("animation")
     film.add_argument(
         "--frames", metavar="N", type=whole_number(1), help="render N pictures, frame_0000.png on"
@@ -76,10 +85,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Render, and return the exit code."""
+    check_plan_options(args)
     moving = bool(args.animate or args.turn)
     if args.frames is not None:
         if not moving:
             args.parser.error("argument --frames: say what changes, with --animate or --turn")
+        if args.plan is not None:
+            args.parser.error(
+                "argument --plan: is for one picture; with --frames, camera and light may leave it"
+            )
         from .frames import run_frames
 
         args.fps = args.fps or 24.0
@@ -111,8 +125,16 @@ def _run_one(args: argparse.Namespace) -> int:
     with warnings_as_ours():
         with Bar(args, unit=" spp", delay=0) as bar:
             spp = args.spp or 0
+
+            def load() -> Any:
+                return load_scene(args.scene, parameters)
+
+            planned = None
+            if args.plan is not None:
+                bar(0, 0, "planning")
+                planned = load_by_plan(args, variant, load)
             bar(0, spp, "loading")
-            scene = load_scene(args.scene, parameters)
+            scene = load() if planned is None else planned.scene
             sensor = sensor_of(scene, args.sensor)
             if args.preview:
                 shrink(sensor)
@@ -129,6 +151,9 @@ def _run_one(args: argparse.Namespace) -> int:
                 )  # fmt: skip
         if result.spp == 0:
             raise KeyboardInterrupt  # before the first pass: there is no picture
+        if planned is not None:
+            width, height = result.bitmap.size()
+            say_outside(planned, width * height * result.spp)
         bad = count_bad(result.bitmap)
         if bad:
             say_warning(f"{bad} pixels are not finite (NaN or infinite); they are black in a PNG")

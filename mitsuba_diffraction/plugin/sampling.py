@@ -55,6 +55,11 @@ class OrderSampler:
         self._occupied = upload(mi.Float, found.occupied.astype("float32"))
         self._bands_per_kappa = BANDS / (BANDED * table.expansion.kappa_max)
 
+    @property
+    def nbytes(self) -> int:
+        """Size in memory."""
+        return 4 * sum(len(a) for a in (self._row_sums, self._column_sums, self._occupied))
+
     def strategy(self, k: Any, cos_i: Any, height_scale: Any) -> tuple[Any, Any]:
         """Share of the samples that order 0 gets, and the band of the other orders."""
         band = mi.UInt32(
@@ -158,3 +163,18 @@ def order_sampler(table: DiffractionTable) -> OrderSampler:
     if mi.variant() not in variants:
         variants[mi.variant()] = OrderSampler(table)
     return variants[mi.variant()]
+
+
+def share_sampler(table: DiffractionTable, other: DiffractionTable) -> None:
+    """Have BSDFs of a table draw directions as those of another do, until `forget_sampler`."""
+    _samplers.setdefault(table, {})[mi.variant()] = order_sampler(other)
+
+
+def forget_sampler(table: DiffractionTable) -> None:
+    """Let the next BSDF of a table have a sampler of its own."""
+    _samplers.pop(table, None)
+
+
+def sampler_bytes(table: DiffractionTable) -> int:
+    """Memory of the densities that directions are drawn from."""
+    return order_sampler(table).nbytes

@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import gratings
 from ..errors import DiffractionError, DiffractionWarning
-from ..files.cache import cached_table, loaded_table
+from ..files.cache import cached_table, content_key, loaded_table
 from ..files.heights import load_heights
 from ..files.options import LoadOptions
 from ..files.raw import existing_file
@@ -21,6 +21,7 @@ from ..files.recipes import Recipe
 from ..files.table_exr import read_document
 from ..heightfield import HeightField
 from ..tables.table import DiffractionTable
+from .session import note_table, restricted_arguments, timed
 
 #: A table serves heights scaled by up to this times max(1, height_scale).
 HEIGHT_SCALE_ROOM = 1.5
@@ -118,13 +119,17 @@ def _built(
     height_scale: float,
 ) -> DiffractionTable:
     arguments = {**asked, "height_scale_max": HEIGHT_SCALE_ROOM * max(1.0, height_scale)}
+    key = content_key(digest, arguments)
+    restricted = restricted_arguments(key, arguments)
 
     def build() -> DiffractionTable:
         heights = load()
         mi.Log(mi.LogLevel.Info, f"diffraction: building the table of {heights[0].name}")
-        return DiffractionTable.build(heights, **arguments)
+        return DiffractionTable.build(heights, **restricted)
 
-    return cached_table(digest, arguments, build)
+    table = cached_table(digest, restricted, timed(key, build))
+    note_table(key, table)
+    return table
 
 
 def _warn(table: DiffractionTable) -> None:

@@ -1,0 +1,166 @@
+"""From what surfaces are asked to the tables that suffice (NumPy only)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..colour import delta_e, linear_srgb
+from ..geometry import wavenumber
+from ..tables.table import DiffractionTable
+
+#: Share of a surface's light that may be asked of beyond the largest κ; the crop gets the rest.
+KAPPA_SHARE = 0.1
+#: A largest κ above this share of what light of the shortest wavelength can make buys nothing.
+WORTH = 0.85
+#: No planned table is coarser than this in itself.
+MOST_TOLERANCE = 1e-2
+#: A frequency beyond the last that was asked for: a path not traced may go a little farther.
+ROOM = 1.02
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What one table is asked, over all surfaces that share it.
+
+    Attributes
+    ----------
+    u, v, w : (n,) ωi + ωo in the patch's frame, w times height_scale.
+    wavelength : (n,) nm.
+    xyz : (n, 3) light of the picture that each look-up adds, the whole picture's being 1.
+    total : light of all paths that meet the surfaces, what lies beneath included.
+    """
+
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    w: NDArray[np.float64]
+    wavelength: NDArray[np.float64]
+    xyz: NDArray[np.float64]
+    total: float
+
+    @property
+    def light(self) -> NDArray[np.float64]:
+        """(n,) relative to all light of the surfaces."""
+        return np.asarray(self.xyz.sum(axis=1) / self.total)
+
+    @property
+    def frequency(self) -> NDArray[np.float64]:
+        """(n,) |q| in rad/µm."""
+        return np.asarray(wavenumber(self.wavelength) * np.hypot(self.u, self.v))
+
+    @property
+    def frequency_per_sine(self) -> NDArray[np.float64]:
+        """(n,) k in rad/µm: u and v times it are α and β."""
+        return np.asarray(wavenumber(self.wavelength))
+
+    @property
+    def kappa(self) -> NDArray[np.float64]:
+        """(n,) rad/µm."""
+        return np.asarray(wavenumber(self.wavelength) * self.w)
+
+    def outside(self, crop: float, kappa_max: float) -> float:
+        """Share of the surfaces' light that is asked of beyond a domain."""
+        beyond = (self.frequency > crop) | (self.kappa > kappa_max)
+        return float(self.light[beyond].sum())
+
+
+@dataclass(frozen=True)
+class Domain:
+    """How much of a table a scene needs.
+
+    Attributes
+    ----------
+    crop, kappa_max : rad/µm, see `DiffractionTable.build`.
+    tolerance : of the table itself.
+    outside : share of the surfaces' light that is looked up beyond.
+    """
+
+    crop: float
+    kappa_max: float
+    tolerance: float
+    outside: float
+
+    def arguments(self) -> dict[str, float]:
+        """For `DiffractionTable.build`."""
+        return {"crop": self.crop, "kappa_max": self.kappa_max, "tolerance": self.tolerance}
+
+
+def domain_for(
+    asked: Asked, table: DiffractionTable, height_scale: float, tolerance: float
+) -> Domain:
+    """The smallest domain that leaves at most `tolerance` of the surfaces' light outside.
+
+    Diffraction is but a part of that light: the table's own relative error may be larger than the
+    picture's by that factor.
+
+    Parameters
+    ----------
+    asked : what is asked of the table.
+    table : the table of everything, as the scene would have it.
+    height_scale : largest of the surfaces'.
+    tolerance : relative error of the picture.
+    """
+    frequency, kappa, light = asked.frequency, asked.kappa, asked.light
+    crop = min(_reach(frequency, light, tolerance * (1.0 - KAPPA_SHARE)) * ROOM, table.reach)
+    inside = frequency <= crop
+    possible = table.reach * height_scale
+    kappa_max = _reach(kappa[inside], light[inside], tolerance * KAPPA_SHARE) * ROOM
+    if kappa_max > WORTH * possible:
+        kappa_max = possible
+    own = tolerance / max(float(light.sum()), 1e-6)
+    return Domain(
+        crop=float(f"{crop:.6g}"),
+        kappa_max=float(f"{kappa_max:.6g}"),
+        tolerance=max(table.tolerance, float(f"{min(own, MOST_TOLERANCE):.2g}")),
+        outside=asked.outside(crop, kappa_max),
+    )
+
+
+def _reach(values: NDArray[np.float64], light: NDArray[np.float64], share: float) -> float:
+    """The smallest limit that leaves at most this much of the light above it."""
+    order = np.argsort(values)[::-1]
+    above = np.cumsum(light[order])
+    first = int(np.searchsorted(above, share, side="right"))
+    return float(values[order][min(first, len(order) - 1)])
+
+
+def quantiles(
+    values: NDArray[np.float64], light: NDArray[np.float64], shares: list[float]
+) -> list[float]:
+    """Values below which these shares of the light lie."""
+    order = np.argsort(values)
+    below = np.cumsum(light[order])
+    places = np.searchsorted(below, np.asarray(shares) * below[-1])
+    return [float(values[order][min(int(n), len(order) - 1)]) for n in places]
+
+
+def lobes_in_a_pixel(turn: float, sigma: float) -> float:
+    """How many lobes of the window one pixel sees at once, at 550 nm, because the surface bends.
+
+    Where ωi turns by δ in the surface's frame, so does ωo: (u, v) moves by up to 2δ, and a lobe is
+    1/(kσ) wide.
+
+    Parameters
+    ----------
+    turn : δ between two places in a pixel, in direction cosines.
+    sigma : of the window, µm.
+    """
+    return float((2.0 * turn * float(wavenumber(550.0)) * sigma) ** 2)
+
+
+def wavelengths_needed(asked: Asked, share: float = 1e-3) -> dict[str, Any]:
+    """The band that all but a share of the diffracted light lies in, half of it on either side.
+
+    Returns
+    -------
+    range_nm, and lost_colour: ΔE2000 between the mean colours of all light and of the band alone.
+    """
+    low, high = quantiles(asked.wavelength, asked.light, [0.5 * share, 1.0 - 0.5 * share])
+    inside = (asked.wavelength >= low) & (asked.wavelength <= high)
+    colours = [linear_srgb(asked.xyz[mine].sum(axis=0)) for mine in (slice(None), inside)]
+    largest = max(float(np.abs(colours[0]).max()), 1e-30)
+    lost = delta_e(colours[0][None] / largest, colours[1][None] / largest, exposure=1.0)
+    return {"range_nm": [low, high], "lost_colour": float(lost[0])}

@@ -1,0 +1,309 @@
+"""Making a plan for a scene, and what it changes: memory, time, and the picture."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..colour import delta_e, linear_srgb
+from ..errors import DiffractionError
+from ..plugin.lookup import device_table
+from ..plugin.restricted import Outside, RestrictedTable
+from ..plugin.sampling import forget_sampler
+from ..plugin.session import Session
+from ..tables.table import DiffractionTable
+from .domain import Asked, domain_for
+from .paths import Seen, trace
+from .plan import Plan, PlannedTable
+
+Load = Callable[[], Any]
+Tell = Callable[[int, int, str], None]
+
+#: A planned table that is not smaller than this share of the whole one is not worth it.
+WORTH = 0.8
+#: A picture that differs by more than the tolerance is planned anew with a smaller share outside.
+ATTEMPTS, TIGHTER = 3, 0.3
+#: A plan is refused where this many times its tolerance lies outside: paths differ from the last.
+MOST_OUTSIDE = 3.0
+#: Of the pictures that are compared: width at most, and samples per pixel.
+WIDTH, SPP = 160, 64
+#: That are timed: some hundredths of a second.
+LOOKUPS = 1 << 19
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A scene in a recording session, and what its tables were asked."""
+
+    scene: Any
+    session: Session
+    seen: Seen
+    asked: dict[str, Asked]
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Between the pictures with whole and with planned tables, of the same random numbers.
+
+    Attributes
+    ----------
+    relative : mean |ΔXYZ| over mean XYZ, all pixels.
+    delta_e_mean, delta_e_99 : ΔE2000 of the pixels that are not black, or NaN.
+    size, spp : of the pictures.
+    """
+
+    relative: float
+    delta_e_mean: float
+    delta_e_99: float
+    size: tuple[int, int]
+    spp: int
+
+
+def look(
+    load: Load,
+    sensor: Callable[[Any], Any],
+    paths: int,
+    *,
+    plan: Plan | None = None,
+    seed: int = 0,
+    timing: bool = False,
+) -> Loaded:
+    """Load a scene with whole tables, or with those of a plan, and trace paths through it.
+
+    Parameters
+    ----------
+    load : loads the scene in the variant that is set.
+    sensor : the sensor of a scene.
+    paths : how many.
+    plan : whose tables to load it with.
+    seed : of the paths.
+    timing : build tables anew, and take the time.
+
+    Raises
+    ------
+    DiffractionError
+        If no surface diffracts, if no path meets one that does, or if the plan is for others.
+    """
+    session = Session(limits=plan.limits() if plan else {}, recording=True, timing=timing)
+    with session:
+        scene = load()
+    if not session.bsdfs:
+        raise DiffractionError(
+            "the scene has no BSDF 'diffraction'; there is nothing to plan, render it as it is"
+        )
+    if plan is not None:
+        _check_match(session, plan)
+    elif not session.tables:
+        names = ", ".join(sorted(name for name, _ in session.bsdfs))
+        raise DiffractionError(
+            f"the tables of {names} come from files and stay as they are; give the scene the "
+            "height field, or its recipe, to have smaller ones planned"
+        )
+    seen = trace(scene, sensor(scene), session, paths, seed)
+    if not len(seen.light):
+        names = ", ".join(sorted(name for name, _ in session.bsdfs))
+        raise DiffractionError(
+            f"none of {paths} paths carries light of a surface that diffracts ({names}): the "
+            "camera does not see it lit; check camera and lights, or raise --paths"
+        )
+    return Loaded(scene, session, seen, _asked(session, seen))
+
+
+def _asked(session: Session, seen: Seen) -> dict[str, Asked]:
+    """What each table is asked; tables from files, which cannot be made smaller, are left out."""
+    found = {}
+    for key, table in session.tables.items():
+        mine = [n for n, (_, bsdf) in enumerate(session.bsdfs) if bsdf.table is table]
+        chosen = seen.of(mine)
+        if chosen.any():
+            found[key] = Asked(
+                seen.u[chosen], seen.v[chosen], seen.w[chosen], seen.wavelength[chosen],
+                seen.xyz[chosen], float(min(seen.total[mine].sum(), 1.0)),
+            )  # fmt: skip
+    return found
+
+
+def draft(name: str, loaded: Loaded, tolerance: float, share: float | None = None) -> Plan:
+    """The plan that leaves a share of each surface's light outside, `tolerance` by default.
+
+    What it says of memory is not known yet: see `settled`.
+    """
+    session = loaded.session
+    tables = {}
+    for key, table in session.tables.items():
+        asked, mine = loaded.asked.get(key), [b for b in session.bsdfs if b[1].table is table]
+        # A surface that no path meets keeps what it has
+        domain = None
+        if asked is not None:
+            scale = max(float(dr.slice(dr.max(bsdf.height_scale))) for _, bsdf in mine)
+            domain = domain_for(asked, table, scale, share or tolerance)
+        tables[key] = PlannedTable(
+            surfaces=sorted(name for name, _ in mine),
+            name=str(table.source.get("name", "")),
+            digest=str(table.source.get("digest", "")),
+            domain=domain,
+            memory=(table.nbytes, table.nbytes),
+        )
+    return Plan(name, tolerance, loaded.seen.paths, tables)
+
+
+def settled(plan: Plan, planned: dict[str, DiffractionTable]) -> Plan:
+    """The plan without what is not worth it, and with what the rest saves."""
+    tables = {}
+    for key, table in plan.tables.items():
+        before, now = table.memory[0], planned[key].nbytes
+        worth = table.domain is not None and now < WORTH * before
+        tables[key] = replace(
+            table,
+            domain=table.domain if worth else None,
+            memory=(before, now if worth else before),
+        )
+    return replace(plan, tables=tables)
+
+
+def load_planned(load: Load, plan: Plan, *, timing: bool = False) -> tuple[Any, Session]:
+    """Load a scene with the tables of a plan.
+
+    Raises
+    ------
+    DiffractionError
+        If none of the plan's tables is one of the scene's.
+    """
+    session = Session(limits=plan.limits(), timing=timing)
+    with session:
+        scene = load()
+    _check_match(session, plan)
+    return scene, session
+
+
+def _check_match(session: Session, plan: Plan) -> None:
+    if session.tables and set(session.tables) <= set(plan.tables):
+        return
+    names = sorted(n for n, bsdf in session.bsdfs if session.key_of(bsdf.table) not in plan.tables)
+    session.close()
+    theirs = ", ".join(sorted({t.name for t in plan.tables.values()})) or "nothing"
+    raise DiffractionError(
+        f"the plan is for tables of {theirs} in '{plan.scene}', and not for "
+        f"{', '.join(names) or 'this scene'}: the heights or a table's parameters are others; "
+        "plan this scene"
+    )
+
+
+def check_light(loaded: Loaded, plan: Plan) -> dict[str, float]:
+    """Share of each table's light that a scene looks up outside its plan.
+
+    Raises
+    ------
+    DiffractionError
+        If it is several times what the plan was to leave out: camera or lights are others.
+    """
+    shares = {}
+    for key, asked in loaded.asked.items():
+        table = plan.tables[key]
+        if table.domain is None:
+            continue
+        domain = table.domain
+        shares[key] = asked.outside(domain.crop, domain.kappa_max)
+        if shares[key] > MOST_OUTSIDE * plan.tolerance:
+            farthest = float(asked.frequency.max())
+            raise DiffractionError(
+                f"the plan does not fit: {100 * shares[key]:.2g} % of the light of "
+                f"{', '.join(table.surfaces)} is looked up outside of it (|q| up to "
+                f"{farthest:.3g} rad/µm; the plan ends at {domain.crop:.3g}, κ at "
+                f"{domain.kappa_max:.3g}), and it was made for {100 * plan.tolerance:.2g} %; plan "
+                "the scene with this camera and these lights, or render without --plan"
+            )
+    return shares
+
+
+def planned_tables(
+    load: Load, plan: Plan, *, timing: bool = False
+) -> tuple[dict[str, DiffractionTable], dict[str, float]]:
+    """Load a scene with a plan, for its tables only, and the seconds that they took."""
+    _, session = load_planned(load, plan, timing=timing)
+    tables, seconds = dict(session.tables), dict(session.seconds)
+    session.close()
+    return tables, seconds
+
+
+def difference(
+    loaded: Loaded, load: Load, plan: Plan, sensor: Callable[[Any], Any], tell: Tell
+) -> Difference:
+    """Render both ways, small, with the same random numbers and the same directions drawn."""
+    whole = {key: loaded.session.tables[key] for key in plan.limits()}
+    session = Session(limits=plan.limits(), sample_like=whole)
+    with session:
+        scene = load()
+    try:
+        pictures = []
+        for n, other in enumerate((loaded.scene, scene)):
+            tell(n, 2, "comparing pictures")
+            pictures.append(_picture(other, sensor(other)))
+        tell(2, 2, "comparing pictures")
+    finally:
+        for table in session.tables.values():
+            forget_sampler(table)
+        session.close()
+    (first, xyz), (second, _) = pictures
+    mean = float(first.mean())
+    values = np.full(1, np.nan)
+    if xyz:
+        values = delta_e(linear_srgb(first), linear_srgb(second))
+        values = values[np.isfinite(values)]
+    height, width = first.shape[:2]
+    return Difference(
+        relative=float(np.abs(second - first).mean()) / mean if mean > 0.0 else float("nan"),
+        delta_e_mean=float(values.mean()) if values.size else float("nan"),
+        delta_e_99=float(np.percentile(values, 99.0)) if values.size else float("nan"),
+        size=(width, height),
+        spp=SPP,
+    )
+
+
+def _picture(scene: Any, sensor: Any) -> tuple[NDArray[np.float64], bool]:
+    """A small picture (height, width, channels), and whether it is in XYZ."""
+    film = sensor.film()
+    size = np.array(film.size(), int)
+    if size[0] > WIDTH:
+        parameters = mi.traverse(sensor)
+        parameters["film.size"] = [WIDTH, max(1, round(WIDTH * int(size[1]) / int(size[0])))]
+        parameters.update()
+    mi.render(scene, sensor=sensor, spp=SPP, seed=0)
+    root = dict(film.bitmap().split()).get("<root>")
+    if root is None or root.pixel_format().name not in ("RGB", "RGBA", "XYZ", "XYZA"):
+        return np.array(film.bitmap(), np.float64), False
+    kinds = mi.Bitmap.PixelFormat
+    converted = root.convert(kinds.XYZ, mi.Struct.Type.Float32, False)
+    return np.array(converted, np.float64), True
+
+
+def evaluation_ratio(asked: Asked, whole: DiffractionTable, planned: DiffractionTable) -> float:
+    """Time of a look-up in the planned table over that in the whole one, where the scene asks."""
+    rng = np.random.default_rng(0)
+    chosen = rng.choice(len(asked.w), LOOKUPS, p=asked.light / asked.light.sum())
+    k = 2e3 * np.pi / asked.wavelength[chosen]
+    q = [mi.Float((k * a[chosen]).astype(np.float32)) for a in (asked.u, asked.v, asked.w)]
+    dr.eval(q)
+    seconds: dict[int, float] = {}
+    for _ in range(6):  # in turn, the first to compile
+        for n, table in enumerate((whole, planned)):
+            start = time.perf_counter()
+            dr.eval(device_table(table).window_sum(*q))
+            dr.sync_thread()
+            passed = time.perf_counter() - start
+            seconds[n] = min(seconds.get(n, passed), passed)
+    outside_of(planned)
+    return seconds[1] / seconds[0]
+
+
+def outside_of(table: DiffractionTable) -> Outside | None:
+    """Look-ups beyond a planned table since the last time, or None if it is a whole one."""
+    device = device_table(table)
+    return device.take() if isinstance(device, RestrictedTable) else None

@@ -1,0 +1,161 @@
+"""`plan` and `render --plan`: less memory, the same picture, and one line where it does not fit."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from tests.optics import rough_patch
+
+# A plate seen from above in light from 20°, with next to no sky.
+SCENE = """<scene version="3.5.0">
+  <default name="elevation" value="70"/>
+  <default name="heights" value="heights.npy"/>
+  <integrator type="path"><integer name="max_depth" value="3"/></integrator>
+  <sensor type="orthographic">
+    <transform name="to_world">
+      <scale value="0.5"/><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/>
+    </transform>
+    <film type="hdrfilm">
+      <integer name="width" value="12"/><integer name="height" value="8"/>
+      <string name="component_format" value="float32"/>
+    </film>
+    <sampler type="independent"><integer name="sample_count" value="64"/></sampler>
+  </sensor>
+  <emitter type="directional">
+    <transform name="to_world">
+      <rotate y="1" angle="90"/><rotate y="1" angle="$elevation"/>
+    </transform>
+  </emitter>
+  <emitter type="constant"><spectrum name="radiance" value="1e-6"/></emitter>
+  <shape type="rectangle">
+    <bsdf type="diffraction" id="foil">
+      <string name="heightfield" value="$heights"/>
+      <string name="pixel_size" value="0.3"/>
+      <float name="coherence_width" value="18"/>
+      <boolean name="energy_conserving" value="false"/>
+      <string name="material" value="none"/>
+    </bsdf>
+  </shape>
+</scene>
+"""
+PATHS = ("--paths", 20000)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A scene and its heights."""
+    folder = tmp_path_factory.mktemp("plan")
+    np.save(folder / "heights.npy", rough_patch((64, 64), (0.3, 0.3), 0.2).heights)
+    np.save(folder / "others.npy", rough_patch((64, 64), (0.3, 0.3), 0.1).heights)
+    (folder / "foil.xml").write_text(SCENE)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def planned(folder):
+    """Report and plan."""
+    from mitsuba_diffraction.cli import main
+
+    plan, report = folder / "plan.json", folder / "report.json"
+    arguments = ["plan", folder / "foil.xml", "-o", plan, "--json", report, *PATHS]
+    assert main([str(a) for a in arguments]) == 0
+    return plan, json.loads(report.read_text())
+
+
+def pixels(path):
+    channels = OpenEXR.File(str(path)).channels()
+    return np.asarray(channels["RGB"].pixels, float)
+
+
+def test_the_report_says_what_is_needed_and_what_it_changes(planned):
+    _, report = planned
+    (table,) = report["tables"]
+    assert table["surfaces"] == "foil"
+    # light from 20°, view from 0°: |q| = k sin 20°, at 390 to 360 nm
+    needed = table["needs"]["frequency (rad/µm)"]
+    assert 0.9 * 5.97 < needed < 1.1 * 5.97
+    assert table["planned"]["memory_mb"] < 0.8 * table["whole"]["memory_mb"]
+    assert table["planned"]["build_s"] > 0.0
+    assert table["planned"]["time of a look-up / that in the whole"] > 0.0
+    low, high = table["asked for"]["wavelengths of 99.9 %"]["range_nm"]
+    assert 360.0 < low < 420.0
+    assert 650.0 < high < 720.0
+    picture = report["picture, planned against whole, same random numbers"]
+    assert picture["mean difference / mean (XYZ)"] <= report["tolerance"] == 1e-3
+    assert picture["below the tolerance"] is True
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_spectral", "scalar_spectral"])
+def test_a_planned_picture_is_the_whole_one(run, folder, planned, variant):
+    plan, _ = planned
+    spp = 256 if variant.startswith("llvm") else 4
+    pictures = []
+    for option in ((), ("--plan", plan, *PATHS)):
+        out = folder / "picture.exr"
+        ran = run("render", folder / "foil.xml", "-m", variant, "-s", spp, "-o", out, *option)
+        assert ran.code == 0, ran.err
+        pictures.append(pixels(out).mean())
+    assert "plan: foil has a table of 0.0" in ran.err
+    assert "MB instead of 0.171 MB" in ran.err
+    # Direct light is the same in all samples; the sky is next to nothing.
+    # Wavelengths are drawn alike.
+    assert pictures[1] == pytest.approx(pictures[0], rel=0.01)
+
+
+def test_what_lies_outside_is_said(run, folder, planned):
+    plan, _ = planned
+    out = folder / "sky.exr"
+    ran = run("render", folder / "foil.xml", "-s", 4, "-o", out, "--plan", plan, *PATHS)
+    (line,) = [line for line in ran.err.splitlines() if "outside" in line]
+    assert "look-ups a sample lay outside, about 0" in line
+    assert "of the surface's light, and were read from coarse cells (|q| up to" in line
+
+
+def test_light_that_was_turned_away_is_an_error_before_rendering(run, folder, planned):
+    plan, _ = planned
+    ran = run("render", folder / "foil.xml", "-D", "elevation=40", "--plan", plan, *PATHS)
+    assert "the plan does not fit: " in ran.err.splitlines()[-1]
+    assert "light of foil is looked up outside of it" in ran.err.splitlines()[-1]
+    assert ran.code == 1
+
+
+def test_plans_of_other_heights_are_refused(run, folder, planned):
+    plan, _ = planned
+    ran = run("render", folder / "foil.xml", "-D", "heights=others.npy", "--plan", plan)
+    assert ran.code == 1
+    assert "and not for foil: the heights or a table's parameters are" in ran.err.splitlines()[-1]
+
+
+def test_variants_without_wavelengths_say_so_and_render(run, folder, planned):
+    plan, _ = planned
+    out = folder / "mono.exr"
+    ran = run(
+        "render", folder / "foil.xml", "-m", "llvm_ad_mono", "-s", 1, "-o", out, "--plan", plan
+    )
+    assert ran.code == 0
+    assert "warning: --plan: llvm_ad_mono looks up" in ran.err
+    assert run("plan", folder / "foil.xml", "-m", "llvm_ad_mono").code == 1
+
+
+def test_usage(run, folder):
+    for arguments, says in (
+        (("render", "--plan", folder / "foil.xml"), "to have one made, write SCENE --plan"),
+        (("render", folder / "foil.xml", "--paths", 9), "--paths: is for --plan"),
+        (("plan", folder / "foil.xml", "--paths", 1), "expected a whole number from 2"),
+        (("plan", folder / "foil.xml", "--paths", 2**23), "--paths: at most"),
+        (
+            ("render", folder / "foil.xml", "--plan", "--frames", 2, "--turn", "elevation"),
+            "argument --plan: is for one picture",
+        ),
+    ):
+        ran = run(*arguments)
+        assert ran.code == 2
+        assert says in ran.err
+    missing = run("render", folder / "foil.xml", "--plan", folder / "no.json")
+    assert "there is no plan" in missing.failed_in_one_line()
+    unknown = run("plan", folder / "foil.xml", "-D", "elevatoin=3")
+    assert "did you mean elevation?" in unknown.failed_in_one_line()
