@@ -88,7 +88,16 @@ def run(args: argparse.Namespace) -> int:
     if args.paths > _MOST_PATHS:
         args.parser.error(f"argument --paths: at most {_MOST_PATHS}, got {args.paths}")
 
-    from ..planning.make import ATTEMPTS, TIGHTER, difference, draft, look, planned_tables, settled
+    from ..planning.make import (
+        ATTEMPTS,
+        TIGHTER,
+        difference,
+        draft,
+        given_up,
+        look,
+        planned_tables,
+        settled,
+    )
     from .mitsuba_text import warnings_as_ours
     from .scenes import load_scene, sensor_of
 
@@ -106,7 +115,7 @@ def run(args: argparse.Namespace) -> int:
         loaded = look(load, sensor, args.paths, timing=True)
         share = tolerance
         measured: Difference | None = None
-        for attempt in range(ATTEMPTS):
+        for _ in range(ATTEMPTS):
             bar(0, 0, "building tables")
             plan = draft(str(args.scene), loaded, tolerance, share)
             planned, seconds = planned_tables(load, plan, timing=True)
@@ -117,11 +126,13 @@ def run(args: argparse.Namespace) -> int:
             if measured.relative <= tolerance:
                 break
             share *= TIGHTER
-            if attempt == ATTEMPTS - 1:
-                say_warning(
-                    f"the picture still differs by {measured.relative:.2g}, more than "
-                    f"{tolerance:g}: a plan does not suit this scene"
-                )
+        else:
+            assert measured is not None
+            say_warning(
+                f"the picture still differs by {measured.relative:.2g}, more than {tolerance:g}: "
+                "no plan suits this scene, its tables stay whole"
+            )
+            plan = given_up(plan)
         bar(0, 0, "timing look-ups")
         report = {
             "scene": str(args.scene),

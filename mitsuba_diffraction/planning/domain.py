@@ -12,10 +12,6 @@ from ..colour import delta_e, linear_srgb
 from ..geometry import wavenumber
 from ..tables.table import DiffractionTable
 
-#: Share of a surface's light that may be asked of beyond the largest κ; the crop gets the rest.
-KAPPA_SHARE = 0.1
-#: A largest κ above this share of what light of the shortest wavelength can make buys nothing.
-WORTH = 0.85
 #: No planned table is coarser than this in itself.
 MOST_TOLERANCE = 1e-2
 #: A frequency beyond the last that was asked for: a path not traced may go a little farther.
@@ -103,13 +99,11 @@ def domain_for(
     height_scale : largest of the surfaces'.
     tolerance : relative error of the picture.
     """
-    frequency, kappa, light = asked.frequency, asked.kappa, asked.light
-    crop = min(_reach(frequency, light, tolerance * (1.0 - KAPPA_SHARE)) * ROOM, table.reach)
-    inside = frequency <= crop
-    possible = table.reach * height_scale
-    kappa_max = _reach(kappa[inside], light[inside], tolerance * KAPPA_SHARE) * ROOM
-    if kappa_max > WORTH * possible:
-        kappa_max = possible
+    frequency, light = asked.frequency, asked.light
+    crop = min(_reach(frequency, light, tolerance) * ROOM, table.reach)
+    # All that these heights can make: the bound of the albedo looks at every direction, and next
+    # to nothing is gained by less
+    kappa_max = table.reach * height_scale
     own = tolerance / max(float(light.sum()), 1e-6)
     return Domain(
         crop=float(f"{crop:.6g}"),

@@ -154,6 +154,15 @@ def draft(name: str, loaded: Loaded, tolerance: float, share: float | None = Non
     return Plan(name, tolerance, loaded.seen.paths, tables)
 
 
+def given_up(plan: Plan) -> Plan:
+    """The plan with every table whole."""
+    tables = {
+        key: replace(table, domain=None, memory=(table.memory[0], table.memory[0]))
+        for key, table in plan.tables.items()
+    }
+    return replace(plan, tables=tables)
+
+
 def settled(plan: Plan, planned: dict[str, DiffractionTable]) -> Plan:
     """The plan without what is not worth it, and with what the rest saves."""
     tables = {}
@@ -292,7 +301,7 @@ def evaluation_ratio(asked: Asked, whole: DiffractionTable, planned: Diffraction
     q = [mi.Float((k * a[chosen]).astype(np.float32)) for a in (asked.u, asked.v, asked.w)]
     dr.eval(q)
     seconds: dict[int, float] = {}
-    for _ in range(6):  # in turn, the first to compile
+    for _ in range(10):  # in turn, the first to compile
         for n, table in enumerate((whole, planned)):
             start = time.perf_counter()
             dr.eval(device_table(table).window_sum(*q))
