@@ -38,7 +38,7 @@ def pairs(n=200, seed=1, field=PATCH):
 # ------------------------------------------------------------------------ values
 
 
-@pytest.mark.parametrize("basis", ["chebyshev", "taylor"])
+@pytest.mark.parametrize("basis", ["svd", "chebyshev", "taylor"])
 @pytest.mark.parametrize("coherence", md.reference.COHERENCES)
 def test_the_plugin_is_its_table(variant, coherence, basis):
     bsdf = load(coherence=coherence, basis=basis, tolerance=1e-4)

@@ -153,8 +153,8 @@ def bare_gathers(table: DiffractionTable, queries: Queries) -> Callable[[], Any]
     dr.eval(firsts)
 
     def body(n: Any, firsts: list[Any], total: Any) -> tuple[Any, list[Any], Any]:
-        for row in range(device.grid.taps[1]):
-            for column in range(device.grid.taps[0]):
+        for row, columns in device.taps():
+            for column in columns:
                 for packet in device.read(firsts[0] + row * device.columns + column):
                     total += dr.sum(packet, axis=0)
         return n + 1, [*firsts[1:], firsts[0]], total

@@ -13,7 +13,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..plugin.lookup import DeviceTable, series_weights, upload
+from ..plugin.lookup import DeviceTable
+from ..plugin.memory import upload
 from ..tables.table import DiffractionTable
 
 
@@ -36,9 +37,7 @@ class TermImages(DeviceTable):
             for column in range(grid.taps[0])
         ]
         lobe = dr.exp(-grid.exponents[0] * dr.square(x) - grid.exponents[1] * dr.square(y))
-        only = mi.UInt32(0)
-        powers = series_weights(expansion, self.terms, mi.Float(0.0), only, kappa)
-        order_0 = mi.Complex2f(*(lobe * c for c in self._centre(only, powers)))
+        order_0 = mi.Complex2f(*(lobe * c for c in self.series.at(kappa)[2]))
         scaled = kappa * expansion.half_range
 
         def of_term(n: Any, image: Any, weight: Any, total: Any) -> tuple[Any, ...]:

@@ -2,8 +2,9 @@
 
 A pixel is a bin; bin (0, 0), order 0, is in the middle, x runs along the rows, and the first row
 holds the lowest frequency along y. The channel `power.I.T` holds term T of interval I of a power,
-`re.I.T` and `im.I.T` those of an amplitude. Order 0 itself is in the attribute, in full precision.
-The cells around a table of a restricted domain are a second part of the file.
+`re.I.T` and `im.I.T` those of an amplitude. Order 0 itself and the functions of κ that the terms of
+basis "svd" are multiplied with are in the attribute, in full precision. The cells around a table of
+a restricted domain are a second part of the file.
 """
 
 from __future__ import annotations
@@ -93,11 +94,10 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
 
 def _document(table: DiffractionTable) -> dict[str, Any]:
     """Everything but the coefficients; what a table need not have is left out where it has not."""
-    grid = dataclasses.asdict(table.grid)
     document = {
         **{name: getattr(table, name) for name in _PLAIN},
-        "expansion": dataclasses.asdict(table.expansion),
-        "grid": {name: value for name, value in grid.items() if value is not None},
+        "expansion": _given(table.expansion),
+        "grid": _given(table.grid),
         "order_0": table.order_0.astype(float).tolist(),
     }
     if table.crop is not None:
@@ -105,6 +105,12 @@ def _document(table: DiffractionTable) -> dict[str, Any]:
     if table.coarse is not None:
         document["coarse"] = _document(table.coarse)
     return document
+
+
+def _given(record: Expansion | Grid) -> dict[str, Any]:
+    """Its fields, without those that are None."""
+    fields = dataclasses.asdict(record)
+    return {name: value for name, value in fields.items() if value is not None}
 
 
 def _part(table: DiffractionTable, name: str, attributes: dict[str, Any]) -> OpenEXR.Part:
@@ -123,12 +129,14 @@ def _part(table: DiffractionTable, name: str, attributes: dict[str, Any]) -> Ope
 
 def _table(path: str | os.PathLike[str], document: dict[str, Any], part: int) -> DiffractionTable:
     """What `_document` describes, with the coefficients of a part of the file."""
-    expansion = Expansion(**document["expansion"])
+    expansion = _expansion(document["expansion"])
     grid = Grid(**{k: _tuple(v) for k, v in dict(document["grid"]).items()})
+    if grid.trims and len(grid.trims) != grid.taps[1]:
+        raise ValueError(f"{len(grid.trims)} trims of {grid.taps[1]} rows")
     order_0 = np.array(document["order_0"], np.float32)
     plain = {name: _tuple(document[name]) for name in _PLAIN}
     coefficients = _read_coefficients(path, expansion, grid, part)
-    expected = (expansion.intervals, coefficients.shape[3], expansion.terms)
+    expected = (expansion.intervals, coefficients.shape[3], expansion.series_terms)
     if expansion.basis not in BASES or expansion.kind not in KINDS:
         raise ValueError(f"basis {expansion.basis!r} of {expansion.kind!r}")
     if order_0.shape != expected:
@@ -214,6 +222,17 @@ def _read(
         ) from error
 
 
+def _expansion(document: dict[str, Any]) -> Expansion:
+    """The series, with the functions of basis "svd"."""
+    if "functions" not in document:
+        return Expansion(**document)
+    functions = np.array(document["functions"], float)
+    found = Expansion(**{**document, "functions": functions})
+    if functions.ndim != 3 or functions.shape[::2] != (found.intervals, found.terms):
+        raise ValueError(f"functions of shape {functions.shape}")
+    return found
+
+
 def _tuple(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
 
@@ -222,4 +241,4 @@ def _plain(value: Any) -> Any:
     """JSON for what the table holds besides plain Python: NumPy scalars and read-only mappings."""
     if isinstance(value, Mapping):
         return dict(value)
-    return value.item()
+    return value.tolist()

@@ -14,12 +14,15 @@ from ..fresnel import reflectance
 from ..tables.bound import AZIMUTHAL, LAST_ANGLE, POLAR, SHARE, AlbedoBound
 from ..tables.colour_build import VISIBLE
 from ..tables.colour_table import ColourTable
-from ..tables.powers import power_series
+from ..tables.powers import order_0_power, power_series
 from ..tables.table import DiffractionTable
 from .textures import Packed, Texture, as_half, listed, texels
 
 #: First and last wavenumber of the loops over wavelengths, rad/µm.
 WAVENUMBERS = (2e3 * math.pi / VISIBLE[1], 2e3 * math.pi / VISIBLE[0])
+
+#: Phase of a cell of κ within which functions are straight: off by its square over 8, 1e-4.
+_CELL = 0.03
 
 _RESPONSES = 2048  # over k: 0.4 nm apart
 _ANGLES, _WAVELENGTHS = 129, 64  # of a conductor's reflectance
@@ -67,12 +70,19 @@ def pack_powers(table: DiffractionTable) -> Packed:
             "method spectral adds powers, but the table has coherence='patch', where amplitudes "
             "interfere; use method lut"
         )
-    series, order_0, scale, expansion = power_series(table)
+    series, _, scale, expansion = power_series(table)
     packed = as_half(texels(series.reshape(-1, expansion.terms)))
+    cells = max(8, math.ceil(2.0 * expansion.half_range * expansion.length / _CELL))
+    share = np.clip(np.arange(cells + 1) / cells, 1e-6, 1.0 - 1e-6)
+    kappa = expansion.length * (np.arange(expansion.intervals)[:, None] + share).ravel()
+    functions = texels(expansion.weights(kappa) / expansion.fading(kappa)[:, None])
+    order_0 = np.zeros((len(kappa), 1, 4))
+    order_0[:, 0, 0] = order_0_power(table, kappa)
+    of_kappa = np.concatenate([functions.reshape(len(kappa), -1, 4), order_0], axis=1)
     return Packed(
         textures=(
             listed("orders", packed),
-            listed("order_zero", texels(order_0.astype(np.float32))),
+            listed("functions", of_kappa.reshape(-1, 4).astype(np.float32)),
         ),
         uniforms={
             "last_order": (table.grid.last[0], table.grid.last[1]),
@@ -80,6 +90,7 @@ def pack_powers(table: DiffractionTable) -> Packed:
             "sigma": table.sigma,
             "interval_length": expansion.length,
             "intervals": expansion.intervals,
+            "cells": cells,
             "inverse_scale": 1.0 / scale,
             "area_factor": area_factor(table.sigma),
         },

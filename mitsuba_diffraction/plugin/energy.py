@@ -16,7 +16,7 @@ import numpy as np
 from ..files.bound_cache import BoundsAround, bounds_around
 from ..tables.bound import AZIMUTHAL, LAST_ANGLE, POLAR, SHARE
 from ..tables.table import DiffractionTable
-from .lookup import index_between, read, upload
+from .memory import index_between, read, upload
 
 
 class EnergyBound:

@@ -38,7 +38,15 @@ def marks(table: DiffractionTable, *constants: object) -> list[Any]:
     Types, because Dr.Jit compares those, and stops comparing values once they have changed.
     """
     described = repr(
-        (table.expansion, table.grid, table.spacing, table.scale, table.sigma, table.radius)
+        (
+            table.expansion,
+            table.tolerance,
+            table.grid,
+            table.spacing,
+            table.scale,
+            table.sigma,
+            table.radius,
+        )
     )
     if table.coarse is not None:
         constants += (table.coarse.expansion, table.coarse.grid, table.coarse.spacing)

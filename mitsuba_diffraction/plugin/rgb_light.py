@@ -17,7 +17,7 @@ from ..files.cache import cached_colours
 from ..tables.colour_proposals import BANDED, BANDS, LOBES, colour_proposals
 from ..tables.colour_table import ColourTable
 from ..tables.table import DiffractionTable
-from .lookup import index_between, read, upload
+from .memory import index_between, read, upload
 from .rgb_lookup import ColourLookup
 from .sampling import BELOW_ONE, invert, order_0_share
 

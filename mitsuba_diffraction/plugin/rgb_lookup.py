@@ -13,7 +13,8 @@ import mitsuba as mi
 import numpy as np
 
 from ..tables.colour_table import PACKET, TERMS, ColourTable
-from .lookup import read, series_interval, series_weights, upload
+from .memory import read, upload
+from .series import series_interval, series_weights
 
 
 class PolarCoordinates:

@@ -24,7 +24,8 @@ import numpy as np
 
 from ..tables.proposals import BANDED, BANDS, proposals
 from ..tables.table import DiffractionTable
-from .lookup import device_table, index_between, read, upload
+from .lookup import device_table
+from .memory import index_between, read, upload
 
 #: Share of the samples drawn from the cosine density.
 COSINE = 0.03

@@ -22,6 +22,10 @@ class ScalarTable:
     def __init__(self, table: DiffractionTable) -> None:
         # A copy: whoever keeps this by its table must not keep that table alive
         self._table = dataclasses.replace(table)
+        grid = table.grid
+        self._read = np.ones(grid.taps[::-1], np.float32)  # 0 for taps left out
+        for row, trim in enumerate(grid.trims):
+            self._read[row, :trim] = self._read[row, grid.taps[0] - trim :] = 0.0
 
     def window_sum(self, qx: float, qy: float, kappa: float) -> float:
         """Σ over orders under the window; NaN outside the table."""
@@ -33,33 +37,29 @@ class ScalarTable:
         x, y = qx / table.spacing[0], qy / table.spacing[1]
         column, weights_x = _taps(x, grid.last[0], grid.taps[0], grid.exponents[0])
         row, weights_y = _taps(y, grid.last[1], grid.taps[1], grid.exponents[1])
+        window = weights_y[:, None] * weights_x * self._read
         bins = table.coefficients[
             interval, row : row + grid.taps[1], column : column + grid.taps[0]
         ]
         values = bins.astype(np.float32) @ (weights / np.float32(table.scale))
-        centre = self._centre(interval, weights)
+        centre = table.centre(kappa).astype(np.float32)
         lobe_x, lobe_y = grid.order_0_exponents
         lobe = math.exp(-lobe_x * x * x - lobe_y * y * y)
         if expansion.kind == "amplitude" and not grid.coherent:
             power = (values * values).sum(axis=2)
-            return float(weights_y @ power @ weights_x + lobe * (centre @ centre))
-        total = weights_x @ np.tensordot(weights_y, values, 1) + centre * lobe
+            return float((window * power).sum() + lobe * (centre @ centre))
+        total = np.tensordot(window, values, 2) + centre * lobe
         return float(total @ total) if grid.coherent else max(float(total[0]), 0.0)
 
     def order_0(self, kappa: float) -> float:
         """|a_0(κ)|², the power of order 0."""
-        centre = self._centre(*self._series(kappa))
+        centre = self._table.centre(kappa)
         return float(centre @ centre) if len(centre) == 2 else max(float(centre[0]), 0.0)
 
     def _series(self, kappa: float) -> tuple[int, NDArray[np.float32]]:
         expansion = self._table.expansion
         weights = expansion.weights(np.float64(kappa)).astype(np.float32)
         return int(expansion.interval(kappa)), weights
-
-    def _centre(self, interval: int, weights: NDArray[np.float32]) -> NDArray[np.float32]:
-        centre: NDArray[np.float32] = self._table.order_0[interval] @ weights
-        centre[0] += self._table.expansion.specular(interval)
-        return centre
 
 
 def _taps(

@@ -173,11 +173,9 @@ class _Powers:
         if interval != self._interval:
             flat = table.coefficients[interval].reshape(-1, terms)
             self._interval, self._coefficients = interval, flat.astype(np.float32)
-        weights = expansion.weights(kappa)
-        scaled = (weights / table.scale).astype(np.float32)
+        scaled = (expansion.weights(kappa) / table.scale).astype(np.float32)
         parts = (self._coefficients @ scaled).reshape(ny, nx, components)
-        centre = table.order_0[interval].astype(float) @ weights
-        centre[0] += expansion.specular(interval)
+        centre = table.centre(kappa)
         if table.grid.coherent:
             amplitude = parts[..., 0] + 1j * parts[..., 1]
             amplitude[table.grid.last[1], table.grid.last[0]] = complex(*centre)

@@ -15,17 +15,25 @@ from ..geometry import sigma_of
 from ..heightfield import HeightField
 from ..reference import check_coherence
 from .checks import check_parameters, check_patches, check_size, check_taylor, restricted
-from .choose import MAX_INTERVALS, chebyshev_expansion, taylor_expansion, too_many_intervals
+from .choose import (
+    MAX_INTERVALS,
+    chebyshev_expansion,
+    svd_expansion,
+    taylor_expansion,
+    too_many_intervals,
+)
 from .coarse import coarse_table
 from .describe import describe
-from .error import FLOOR, ErrorMeter, Grid, Parts, Progress, alternate, worst
-from .expansion import Expansion
+from .error import FLOOR, NEAR, ErrorMeter, Grid, Parts, Progress, alternate, worst
+from .expansion import Expansion, principal_functions
 from .spectrum import Spectrum
 from .table import DiffractionTable, reach_of, refuse
-from .window import FULL_REACH, MAX_TAPS, taps_for
+from .window import FULL_REACH, MAX_TAPS, reach_error, taps_for, trims_for
 
-#: Shares of the tolerance that taps and series may use up when their sizes are chosen.
-TAPS_SHARE, SERIES_SHARE = 0.5, 0.4
+#: What taps may use up of the tolerance when their number is chosen, and series of what they leave.
+TAPS_SHARE, SERIES_SHARE = 0.5, 0.8
+#: What the taps may use up, if leaving out corners then still meets the tolerance.
+TRIMMED_SHARE = 0.8
 #: Half floats (rounding 2⁻¹², a few of them added) are tried from this tolerance on.
 HALF_FROM = 7e-4
 #: Below it single precision transforms would spend a share of the tolerance themselves.
@@ -65,9 +73,16 @@ def build_table(
     reach = reach_of(wavelength_range)
     crop, kappa_max = restricted(crop, kappa_max, reach, reach * height_scale_max)
     whole = crop == reach and kappa_max == reach * height_scale_max
-    choose = taylor_expansion if basis == "taylor" else chebyshev_expansion
-    expansion = choose(deepest, coherence, kappa_max, tolerance * SERIES_SHARE, terms)
     chosen_taps = (taps, taps) if taps else taps_for(steps, tolerance * TAPS_SHARE, coherent)
+    spare = tolerance - reach_error(steps, chosen_taps, coherent)
+    budget = SERIES_SHARE * max(spare, tolerance * TAPS_SHARE)
+    functions = None
+    if basis in ("auto", "svd"):
+        expansion, functions = svd_expansion(deepest, coherence, kappa_max, budget, terms)
+    else:
+        choose = taylor_expansion if basis == "taylor" else chebyshev_expansion
+        expansion = choose(deepest, coherence, kappa_max, budget, terms)
+    trims = trims_for(steps, chosen_taps, tolerance * TRIMMED_SHARE, coherent)
 
     if basis == "taylor":
         check_taylor(deepest, expansion, tolerance)
@@ -76,23 +91,23 @@ def build_table(
     half = expansion.basis == "chebyshev" and tolerance >= HALF_FROM
     for _ in range(_ATTEMPTS):
         grid = _grid(spacing, steps, crop, chosen_taps, coherent, patches)
-        coefficients, order_0, scale, meter, error, parts = _attempt(
-            patches, grid, expansion, half, tolerance, tell
-        )
-        if max(error["near"], error["far"]) <= tolerance:
+        attempt = _Attempt(patches, grid, expansion, functions, half, tolerance, tell)
+        if trims and attempt.error(trims) > tolerance:
+            trims = ()
+        if attempt.error(trims) <= tolerance:
             return DiffractionTable(
-                coefficients=coefficients,
-                order_0=order_0,
-                scale=scale,
-                expansion=expansion,
-                grid=grid,
+                coefficients=attempt.coefficients,
+                order_0=attempt.order_0,
+                scale=attempt.scale,
+                expansion=attempt.expansion,
+                grid=replace(grid, trims=trims),
                 spacing=spacing,
                 coherence_width=float(coherence_width),
                 coherence=coherence,
                 tolerance=float(tolerance),
                 wavelength_range=(float(wavelength_range[0]), float(wavelength_range[1])),
                 height_scale_max=float(height_scale_max),
-                error=error,
+                error=attempt.measured,
                 source=describe(patches, coherence_width, wavelength_range, chosen_taps),
                 crop=None if crop == reach else crop,
                 coarse=None
@@ -105,75 +120,116 @@ def build_table(
                     progress=tell,
                 ),
             )
-        del coefficients
-        if _taps_error(meter, error, parts) > TAPS_SHARE * tolerance:
+        if attempt.taps_error() > TAPS_SHARE * tolerance:
             if taps is not None:
                 raise refuse(
-                    f"taps={taps} leave an error of {_larger(error):.2g}, more than "
+                    f"taps={taps} leave an error of {attempt.error():.2g}, more than "
                     f"tolerance={tolerance:g}; leave taps out, or raise the tolerance"
                 )
             chosen_taps = (chosen_taps[0] + 1, chosen_taps[1] + 1)
         elif half:
             half = False
         else:
-            expansion = _extended(expansion, terms, error, tolerance)
+            expansion = _extended(expansion, functions, terms, attempt.error(), tolerance)
+        found = attempt.error()
+        del attempt
     raise refuse(
-        f"the error is still {_larger(error):.2g} with {expansion.intervals}×{expansion.terms} "
+        f"the error is still {found:.2g} with {expansion.intervals}×{functions or expansion.terms} "
         f"terms and {chosen_taps[0]}×{chosen_taps[1]} taps; raise tolerance={tolerance:g}"
     )
 
 
-def _attempt(
-    patches: Sequence[HeightField],
-    grid: Grid,
-    expansion: Expansion,
-    half: bool,
-    tolerance: float,
-    tell: Progress,
-) -> tuple[
-    NDArray[np.floating], NDArray[np.float32], float, ErrorMeter, dict[str, float], list[Parts]
-]:
-    """Tabulate with one setting, and measure it."""
-    check_size(grid, expansion)
-    double = expansion.basis == "taylor" or tolerance < DOUBLE_BELOW
-    margin = math.ceil(FULL_REACH * math.sqrt(2.0) / min(grid.steps)) + 2
-    outer = (grid.last[0] + margin, grid.last[1] + margin)
-    spectra = [Spectrum(patch, outer, double) for patch in patches]
-    checks = [expansion.extrema(interval) for interval in range(expansion.intervals)]
-    transforms = expansion.intervals * expansion.terms
-    total = transforms + sum(map(len, checks))
-    coefficients: NDArray[Any] = _coefficients(
-        spectra, grid, expansion, lambda done: tell(done, total, "transforming")
-    )
-    centre = coefficients[:, grid.last[1], grid.last[0]]
-    order_0 = centre.copy()
-    centre[...] = 0.0
-    scale = 1.0
-    if half:
-        coefficients, scale = _halved(coefficients)
-    meter = ErrorMeter(spectra, grid, expansion)
-    parts: list[Parts] = []
-    for values, centre, kappas in zip(coefficients, order_0, checks, strict=True):
-        for part in meter.series(values, centre, kappas, scale):
-            parts.append(part)
-            tell(transforms + len(parts), total, "measuring the error")
-    error = worst(np.concatenate(checks).tolist(), parts)
-    return coefficients, order_0, scale, meter, error, parts
+class _Attempt:
+    """A table with one setting, and its error.
+
+    Attributes
+    ----------
+    coefficients, order_0, scale, expansion : of the table.
+    measured : the error last measured, see `tables.error.worst`.
+    """
+
+    def __init__(
+        self,
+        patches: Sequence[HeightField],
+        grid: Grid,
+        expansion: Expansion,
+        functions: int | None,
+        half: bool,
+        tolerance: float,
+        tell: Progress,
+    ) -> None:
+        check_size(grid, expansion, functions)
+        double = expansion.basis == "taylor" or tolerance < DOUBLE_BELOW
+        margin = math.ceil(FULL_REACH * math.sqrt(2.0) / min(grid.steps)) + 2
+        outer = (grid.last[0] + margin, grid.last[1] + margin)
+        self._spectra = [Spectrum(patch, outer, double) for patch in patches]
+        self._checks = [expansion.extrema(interval) for interval in range(expansion.intervals)]
+        self._transforms = expansion.intervals * expansion.series_terms
+        self._total = self._transforms + sum(map(len, self._checks))
+        self._tell, self._grid = tell, grid
+        self.measured: dict[str, float] = {}
+        self._parts: list[Parts] = []
+        self._trims: tuple[int, ...] | None = None
+        self.coefficients: NDArray[Any]
+        self.coefficients, self.order_0, self.expansion = _coefficients(
+            self._spectra,
+            grid,
+            expansion,
+            functions,
+            lambda done: tell(done, self._total, "transforming"),
+        )
+        self.scale = 1.0
+        if half:
+            self.coefficients, self.scale = _halved(self.coefficients)
+
+    def error(self, trims: tuple[int, ...] = ()) -> float:
+        """The larger of both errors, with some taps left out."""
+        if trims != self._trims:
+            self._meter = ErrorMeter(
+                self._spectra, replace(self._grid, trims=trims), self.expansion
+            )
+            self._parts = []
+            for values, centre, kappas in zip(
+                self.coefficients, self.order_0, self._checks, strict=True
+            ):
+                for part in self._meter.series(values, centre, kappas, self.scale):
+                    self._parts.append(part)
+                    done = self._transforms + len(self._parts)
+                    self._tell(done, self._total, "measuring the error")
+            self.measured = worst(np.concatenate(self._checks).tolist(), self._parts)
+            self._trims = trims
+        return max(self.measured["near"], self.measured["far"])
+
+    def taps_error(self) -> float:
+        """The taps' own share of the error where it was worst."""
+        floor = FLOOR * np.array(self._parts)[:, 1].max(axis=0)
+        shares = []
+        for n, name in enumerate(("near", "far")):
+            alone = self._meter.taps_alone(self.measured[f"kappa_{name}"])
+            shares.append(float(alone[0, n] / max(alone[1, n], floor[n], 1e-30)))
+        return max(shares)
 
 
 def _coefficients(
-    spectra: Sequence[Spectrum], grid: Grid, expansion: Expansion, done: Callable[[int], None]
-) -> NDArray[np.float32]:
-    """Series coefficients of every bin, shape (intervals, ny, nx, components, terms)."""
+    spectra: Sequence[Spectrum],
+    grid: Grid,
+    expansion: Expansion,
+    functions: int | None,
+    done: Callable[[int], None],
+) -> tuple[NDArray[np.float32], NDArray[np.float32], Expansion]:
+    """Series coefficients of every bin, (intervals, ny, nx, components, terms), and of order 0.
+
+    functions : how many functions of basis "svd" the Chebyshev series is made into, if it is; the
+        expansion returned then has them.
+    """
     ny, nx = 2 * grid.last[1] + 1, 2 * grid.last[0] + 1
+    centre = (grid.last[1], grid.last[0])
     components = 1 if expansion.kind == "power" else 2
-    shape = (expansion.intervals, ny, nx, components, expansion.terms)
-    inner = tuple(
-        slice(outer - last, outer + last + 1)
-        for outer, last in zip(spectra[0].last[::-1], grid.last[::-1], strict=True)
-    )
-    result = np.empty(shape, np.float32)
+    terms = functions or expansion.terms
+    result = np.empty((expansion.intervals, ny, nx, components, terms), np.float32)
+    order_0 = np.empty((expansion.intervals, components, expansion.terms), np.float32)
     if expansion.basis == "taylor":
+        inner = _inner(spectra[0], grid)
         for n in range(1, expansion.terms + 1):
             power_of_height = partial(_height_power, expansion.half_range, n)
             amplitude = spectra[0].of(power_of_height)[inner]
@@ -182,32 +238,75 @@ def _coefficients(
             amplitude *= 1j**n
             result[0, :, :, 0, n - 1], result[0, :, :, 1, n - 1] = amplitude.real, amplitude.imag
             done(n)
-        return result
+        order_0[0] = result[0, *centre]
+        result[0, *centre] = 0.0
+        return result, order_0, expansion
     values = np.empty((expansion.terms, ny, nx, components), np.float32)
-    centre = (grid.last[1], grid.last[0])
+    flat = values.reshape(expansion.terms, -1)
+    near = _near(grid, components)
+    found = []
     for interval in range(expansion.intervals):
-        specular = float(expansion.specular(interval))
         for n, kappa in enumerate(expansion.nodes(interval)):
-            values[n] = 0.0
-            # The transform is of exp(iκh) − 1, so what is left of order 0 here is a_0 − 1
-            for spectrum in spectra:
-                amplitude = spectrum.of_phase(kappa, minus_one=True)[inner]
-                if expansion.kind == "power":
-                    values[n, ..., 0] += amplitude.real**2
-                    values[n, ..., 0] += amplitude.imag**2
-                    values[n, *centre, 0] += 2.0 * amplitude[centre].real + 1.0 - specular
-                else:
-                    amplitude[centre] += 1.0 - specular
-                    if grid.coherent:
-                        alternate(amplitude, grid.last)
-                    values[n, ..., 0], values[n, ..., 1] = amplitude.real, amplitude.imag
-            if len(spectra) > 1:
-                values[n] /= len(spectra)
+            _values_at(kappa, spectra, grid, expansion, interval, values[n])
             done(interval * expansion.terms + n + 1)
-        fit = expansion.fit(interval).astype(np.float32)
-        flat = values.reshape(expansion.terms, -1)
-        np.matmul(flat.T, fit, out=result[interval].reshape(-1, expansion.terms))
-    return result
+        fit = expansion.fit(interval)
+        order_0[interval] = values[:, *centre].T @ fit
+        values[:, *centre] = 0.0
+        if functions is not None:
+            fit, series = principal_functions(flat, expansion, interval, functions, near)
+            found.append(series)
+        np.matmul(flat.T, fit.astype(np.float32), out=result[interval].reshape(-1, terms))
+    if functions is not None:
+        expansion = replace(expansion, basis="svd", terms=terms, functions=np.array(found))
+    return result, order_0, expansion
+
+
+def _near(grid: Grid, components: int) -> NDArray[np.int64]:
+    """Indices of the bins close to order 0, which it is none of, in (ny, nx, components)."""
+    x, y = (
+        step * np.arange(-last, last + 1) for step, last in zip(grid.steps, grid.last, strict=True)
+    )
+    distance = np.hypot(x, y[:, None])
+    rows, columns = np.nonzero((distance <= NEAR) & (distance > 0.0))
+    bins = rows * len(x) + columns
+    return np.asarray((bins[:, None] * components + np.arange(components)).ravel())
+
+
+def _values_at(
+    kappa: float,
+    spectra: Sequence[Spectrum],
+    grid: Grid,
+    expansion: Expansion,
+    interval: int,
+    values: NDArray[np.float32],
+) -> None:
+    """What is expanded, of all bins (ny, nx, components) at one κ, written to `values`."""
+    centre = (grid.last[1], grid.last[0])
+    specular = float(expansion.specular(interval))
+    values[...] = 0.0
+    # The transform is of exp(iκh) − 1, so what is left of order 0 here is a_0 − 1
+    for spectrum in spectra:
+        amplitude = spectrum.of_phase(kappa, minus_one=True)[_inner(spectrum, grid)]
+        if expansion.kind == "power":
+            values[..., 0] += amplitude.real**2
+            values[..., 0] += amplitude.imag**2
+            values[*centre, 0] += 2.0 * amplitude[centre].real + 1.0 - specular
+        else:
+            amplitude[centre] += 1.0 - specular
+            if grid.coherent:
+                alternate(amplitude, grid.last)
+            values[..., 0], values[..., 1] = amplitude.real, amplitude.imag
+    if len(spectra) > 1:
+        values /= len(spectra)
+
+
+def _inner(spectrum: Spectrum, grid: Grid) -> tuple[slice, slice]:
+    """Where a spectrum, which has a margin for the error's sake, has the grid's bins."""
+    rows, columns = (
+        slice(outer - last, outer + last + 1)
+        for outer, last in zip(spectrum.last[::-1], grid.last[::-1], strict=True)
+    )
+    return rows, columns
 
 
 def _height_power(half_range: float, n: int, heights: NDArray[Any]) -> NDArray[Any]:
@@ -253,33 +352,19 @@ def _grid(
     return Grid((last_x, last_y), steps, radius, taps, coherent)
 
 
-def _taps_error(meter: ErrorMeter, error: dict[str, float], parts: list[Parts]) -> float:
-    """The taps' own share of the error where it was worst."""
-    floor = FLOOR * np.array(parts)[:, 1].max(axis=0)
-    shares = []
-    for n, name in enumerate(("near", "far")):
-        alone = meter.taps_alone(error[f"kappa_{name}"])
-        shares.append(float(alone[0, n] / max(alone[1, n], floor[n], 1e-30)))
-    return max(shares)
-
-
 def _extended(
-    expansion: Expansion, terms: int | None, error: dict[str, float], tolerance: float
+    expansion: Expansion, functions: int | None, terms: int | None, error: float, tolerance: float
 ) -> Expansion:
     """A longer series, or an error where the user fixed its length."""
     if expansion.basis == "chebyshev":
         if expansion.intervals >= MAX_INTERVALS:
-            raise too_many_intervals(expansion, _larger(error))
+            raise too_many_intervals(expansion, functions or expansion.terms, error)
         return replace(
             expansion, intervals=max(expansion.intervals + 1, expansion.intervals * 5 // 4)
         )
     if terms is not None:
         raise refuse(
-            f"terms={terms} of basis='taylor' leave an error of {_larger(error):.2g}, more than "
-            f"tolerance={tolerance:g}; leave terms out, raise it, or use basis='chebyshev'"
+            f"terms={terms} of basis='taylor' leave an error of {error:.2g}, more than "
+            f"tolerance={tolerance:g}; leave terms out, raise it, or use basis='svd'"
         )
     return replace(expansion, terms=expansion.terms + 3)
-
-
-def _larger(error: dict[str, float]) -> float:
-    return max(error["near"], error["far"])

@@ -70,7 +70,7 @@ def check_patches(patches: Sequence[HeightField], coherence: str, basis: str) ->
         given = "basis='taylor'" if basis == "taylor" else f"coherence='{coherence}'"
         raise refuse(
             f"{len(patches)} patches have their powers averaged, which {given} cannot; use "
-            "coherence='ensemble' and basis='chebyshev', or one patch"
+            "coherence='ensemble' and basis='svd', or one patch"
         )
     for patch in patches[1:]:
         if not np.allclose(patch.extent, patches[0].extent, rtol=1e-6):
@@ -88,24 +88,26 @@ def check_taylor(heights: HeightField, expansion: Expansion, tolerance: float) -
         raise refuse(
             f"basis='taylor' cannot reach tolerance={tolerance:g} for heights of "
             f"{heights.range:.3g} µm: its terms cancel, with a predicted error of {rounding:.2g} "
-            "in single precision; use basis='chebyshev'"
+            "in single precision; use basis='svd'"
         )
     truncation = taylor_truncation(heights, expansion.kappa_max, expansion.terms)
     if truncation > 100.0 * tolerance:  # a bound: anything closer is left to the measurement
         raise refuse(
             f"terms={expansion.terms} of basis='taylor' leave a predicted error of up to "
             f"{truncation:.2g}, more than tolerance={tolerance:g}; leave terms out, raise it, or "
-            "use basis='chebyshev'"
+            "use basis='svd'"
         )
 
 
-def check_size(grid: Grid, expansion: Expansion) -> None:
+def check_size(grid: Grid, expansion: Expansion, functions: int | None) -> None:
+    """Refuse a table that would not fit; `functions` of basis "svd", if it is made of them."""
     components = 1 if expansion.kind == "power" else 2
     bins = (2 * grid.last[0] + 1) * (2 * grid.last[1] + 1)
-    size = 4 * bins * components * expansion.terms * expansion.intervals
+    terms = functions or expansion.terms
+    size = 4 * bins * components * terms * expansion.intervals
     if size > MAX_BYTES:
         raise refuse(
             f"it would take {size / 1e9:.1f} GB ({bins:.3g} orders of {expansion.intervals}×"
-            f"{expansion.terms} terms); use a smaller or shallower patch, a larger tolerance, or "
+            f"{terms} terms); use a smaller or shallower patch, a larger tolerance, or "
             "a longer shortest wavelength"
         )

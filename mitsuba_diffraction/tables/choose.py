@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,12 +14,12 @@ from scipy.special import gammaln
 from ..errors import DiffractionError
 from ..heightfield import HeightField
 from .error import FLOOR
-from .expansion import Expansion
+from .expansion import Expansion, principal_functions
 from .spectrum import Spectrum
 from .table import refuse
 
-#: Terms of one Chebyshev interval when the user does not say: a packet of 8 is what processors
-#: gather at best; shallow surfaces do with 4.
+#: Terms of one interval when the user does not say: a packet of 8 is what processors gather at
+#: best; shallow surfaces do with 4.
 PACKET, SMALL_PACKET = 8, 4
 #: Largest number of intervals that is tried.
 MAX_INTERVALS = 1024
@@ -25,6 +27,10 @@ MAX_INTERVALS = 1024
 _SAMPLE = 160  # pixels a side of the cut-out that trials are made on
 _TRIALS = 6  # intervals looked at in one trial, from the first to the last
 _SINGLE_ROUNDING = 2.0**-24
+#: Share of a series' budget that its interpolation between nodes may take, besides the functions.
+_FINE, _LONGEST = 0.15, 200
+
+_Maker = Callable[[int, int], Expansion]
 
 
 def expansion_kind(basis: str, coherence: str) -> str:
@@ -39,44 +45,90 @@ def chebyshev_expansion(
 
     The exact measure on the whole patch has the last word (`tables.build`).
     """
-    kind = expansion_kind("chebyshev", coherence)
-    half_range = 0.5 * heights.range
-
-    def make(terms: int, intervals: int) -> Expansion:
-        return Expansion("chebyshev", kind, terms, intervals, kappa_max, half_range)
-
+    make = _maker(heights, coherence, kappa_max)
     if heights.range == 0.0:
         return make(terms or SMALL_PACKET, 1)
     trial = _Trial(heights, kappa_max)
     if terms is None and trial.error(make(SMALL_PACKET, 1)) <= budget:
         return make(SMALL_PACKET, 1)
     chosen = terms or PACKET
+    return make(chosen, _fewest_intervals(partial(make, chosen), trial.error, chosen, budget))
+
+
+def svd_expansion(
+    heights: HeightField, coherence: str, kappa_max: float, budget: float, terms: int | None
+) -> tuple[Expansion, int | None]:
+    """The Chebyshev series to start from, and how many functions to make of it, if any.
+
+    Their error on a cut-out of the patch is at most `budget`. Unless the user says how many
+    functions, there are as many as make the smallest table, the fewer if that makes no difference.
+    """
+    make = _maker(heights, coherence, kappa_max)
+    if heights.range == 0.0:
+        return make(terms or SMALL_PACKET, 1), None
+    trial = _Trial(heights, kappa_max)
+
+    def series(count: int, intervals: int) -> Expansion:
+        return make(max(count + 2, trial.length(make, intervals, budget)), intervals)
+
+    def suffices(count: int, intervals: int) -> bool:
+        return trial.error(series(count, intervals), count) <= budget
+
+    if terms is None and suffices(SMALL_PACKET, 1):
+        return series(SMALL_PACKET, 1), SMALL_PACKET
+    count = terms or PACKET
+    intervals = _fewest_intervals(
+        partial(series, count), lambda expansion: trial.error(expansion, count), count, budget
+    )
+    if terms is None and intervals == 1 and suffices(SMALL_PACKET, 2):
+        return series(SMALL_PACKET, 2), SMALL_PACKET
+    return series(count, intervals), count
+
+
+def _maker(heights: HeightField, coherence: str, kappa_max: float) -> _Maker:
+    kind = expansion_kind("chebyshev", coherence)
+    half_range = 0.5 * heights.range
+
+    def make(terms: int, intervals: int) -> Expansion:
+        return Expansion("chebyshev", kind, terms, intervals, kappa_max, half_range)
+
+    return make
+
+
+def _fewest_intervals(
+    make: Callable[[int], Expansion],
+    error: Callable[[Expansion], float],
+    terms: int,
+    budget: float,
+) -> int:
+    """About the smallest number of intervals whose error is at most `budget`."""
     # An interval's worth of phase that so many terms resolve, as a first guess
-    guess = max(1, round(kappa_max * half_range / (0.6 * chosen)))
-    if trial.error(make(chosen, guess)) <= budget:
-        good, bad = guess, 0
-        while good > 1 and trial.error(make(chosen, good // 2)) <= budget:
+    first = make(1)
+    guess = max(1, round(first.kappa_max * first.half_range / 8.0))
+    if error(make(guess)) <= budget:
+        good = guess
+        while good > 1 and error(make(good // 2)) <= budget:
             good //= 2
         bad = good // 2
     else:
         bad, good = guess, 2 * guess
-        while (error := trial.error(make(chosen, good))) > budget:
+        while (found := error(make(good))) > budget:
             if good >= MAX_INTERVALS:
-                raise too_many_intervals(make(chosen, good), error)
+                raise too_many_intervals(make(good), terms, found)
             bad, good = good, 2 * good
     while good - bad > max(1, good // 16):
         middle = (good + bad) // 2
-        if trial.error(make(chosen, middle)) <= budget:
+        if error(make(middle)) <= budget:
             good = middle
         else:
             bad = middle
-    return make(chosen, good)
+    return good
 
 
-def too_many_intervals(expansion: Expansion, error: float) -> DiffractionError:
+def too_many_intervals(expansion: Expansion, terms: int, error: float) -> DiffractionError:
     """What to say of a series that has been cut into as many intervals as make sense."""
     return refuse(
-        f"{expansion.intervals} intervals of κ with {expansion.terms} terms each still leave an "
+        f"{expansion.intervals} intervals of κ with {terms} terms each still leave an "
         f"error of {error:.2g} for heights of {2 * expansion.half_range:.3g} µm; give more terms "
         "or a larger tolerance"
     )
@@ -156,15 +208,30 @@ class _Trial:
         # In single precision its rounding would look like a series that is too short
         self._spectrum = Spectrum(field, (last[0], last[1]), double=True)
         self._centre = (last[1], last[0])
+        self._lengths: dict[int, int] = {}
 
-    def error(self, expansion: Expansion) -> float:
-        """Worst relative error near and away from order 0, over a few intervals."""
+    def length(self, make: _Maker, intervals: int, budget: float) -> int:
+        """Terms of a Chebyshev series that is so good that the functions' number is what counts."""
+        if intervals not in self._lengths:
+            length = SMALL_PACKET + 2
+            while self.error(make(length, intervals)) > _FINE * budget and length < _LONGEST:
+                length = math.ceil(1.2 * length)
+            self._lengths[intervals] = length
+        return self._lengths[intervals]
+
+    def error(self, expansion: Expansion, functions: int | None = None) -> float:
+        """Worst relative error near and away from order 0, over a few intervals.
+
+        functions : of basis "svd" that the Chebyshev series is made into, if it is.
+        """
         count = min(expansion.intervals, _TRIALS)
         errors, exact = [], []
         for interval in np.unique(np.linspace(0, expansion.intervals - 1, count).round()):
             values = np.stack([self._value(k, expansion) for k in expansion.nodes(int(interval))])
             specular = float(expansion.specular(interval))
             values[:, *self._centre] -= specular
+            if functions is not None:
+                values = self._projected(values, expansion, int(interval), functions)
             coefficients = np.tensordot(expansion.fit(int(interval)), values, (0, 0))
             for kappa in expansion.extrema(int(interval)):
                 series = np.tensordot(expansion.weights(kappa), coefficients, 1)
@@ -177,6 +244,31 @@ class _Trial:
                 exact.append(self._parts(truth))
         scale = np.maximum(exact, FLOOR * np.max(exact, axis=0))
         return float(np.max(np.array(errors) / np.maximum(scale, 1e-30)))
+
+    def _projected(
+        self, values: NDArray[Any], expansion: Expansion, interval: int, functions: int
+    ) -> NDArray[Any]:
+        """The nodes' values with all bins but order 0 made of a few functions."""
+        centre = values[:, *self._centre].copy()
+        values[:, *self._centre] = 0.0
+        parts = [values] if expansion.kind == "power" else [values.real, values.imag]
+        flat = np.stack(parts, axis=-1).reshape(len(values), -1)
+        projection, series = principal_functions(
+            flat, expansion, interval, functions, self._near(len(parts))
+        )
+        back = np.linalg.solve(expansion.fit(interval).T, series)  # functions at the nodes
+        flat = back @ (projection.T @ flat)
+        found = flat.reshape(*values.shape, len(parts))
+        result = found[..., 0] if len(parts) == 1 else found[..., 0] + 1j * found[..., 1]
+        result[:, *self._centre] = centre
+        return np.asarray(result)
+
+    def _near(self, parts: int) -> NDArray[np.int64]:
+        """Indices (…, parts) of the bins around order 0."""
+        row, column = self._centre
+        rows, columns = np.mgrid[row - 1 : row + 2, column - 1 : column + 2].reshape(2, -1)
+        bins = (rows * (2 * column + 1) + columns)[np.arange(9) != 4]
+        return np.asarray((bins[:, None] * parts + np.arange(parts)).ravel())
 
     def _value(self, kappa: float, expansion: Expansion) -> NDArray[Any]:
         amplitude = self._spectrum.of_phase(kappa, minus_one=True)

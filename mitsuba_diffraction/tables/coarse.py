@@ -66,7 +66,14 @@ def coarse_table(
         min(math.ceil(r), int(pixels) // (2 * n) + 1) + tap
         for r, pixels, n, tap in zip(radius, (nx, ny), each, taps, strict=True)
     )
-    grid = Grid((last[0], last[1]), (steps[0], steps[1]), radius, taps, False, (own[0], own[1]))
+    grid = Grid(
+        (last[0], last[1]),
+        (steps[0], steps[1]),
+        radius,
+        taps,
+        False,
+        order_0_steps=(own[0], own[1]),
+    )
     coefficients, order_0 = _coefficients(patches, grid, expansion, (each[0], each[1]), progress)
     coefficients *= np.float32(steps[0] * steps[1] / (own[0] * own[1]))
     largest = max(float(np.abs(coefficients).max()), 1e-30)

@@ -25,7 +25,7 @@ from scipy import sparse
 
 from .expansion import Expansion
 from .spectrum import Spectrum
-from .window import apply_window, tap_matrix
+from .window import apply_window, rows_by_trim, tap_matrix
 
 #: Radius of the bins counted as the glossy reflection, in units of 1/σ.
 NEAR = 3.0
@@ -52,6 +52,7 @@ class Grid:
     taps : (x, y) bins read by a look-up.
     coherent : amplitudes are added (`patch`) instead of powers.
     order_0_steps : bin spacing in units of order 0's own 1/σ, where that differs (`coarse`).
+    trims : taps left out at both ends of each row, one number a row; empty if none are.
     """
 
     last: tuple[int, int]
@@ -59,8 +60,14 @@ class Grid:
     reach: tuple[float, float]
     taps: tuple[int, int]
     coherent: bool
+    trims: tuple[int, ...] = ()
     # Not part of repr, by which files in the cache are found
     order_0_steps: tuple[float, float] | None = field(default=None, repr=False)
+
+    @property
+    def taps_read(self) -> int:
+        """Bins that one look-up reads."""
+        return self.taps[0] * self.taps[1] - 2 * sum(self.trims)
 
     @property
     def exponents(self) -> tuple[float, float]:
@@ -90,7 +97,8 @@ class ErrorMeter:
         axes = []
         self._lobe: list[NDArray[Any]] = []
         self._wide: list[sparse.csr_array] = []
-        self._tapped: list[sparse.csr_array] = []
+        tapped: list[list[sparse.csr_array]] = []
+        rows = rows_by_trim(grid.taps, grid.trims)
         for axis in (0, 1):
             outer = min(int(grid.reach[axis]), spectrum.last[axis])
             bins = np.arange(-outer, outer + 1)
@@ -101,11 +109,16 @@ class ErrorMeter:
             wide = tap_matrix(
                 positions, -spectrum.last[axis], spectrum.shape[1 - axis], exponent, None
             )
-            few = tap_matrix(positions, -last, 2 * last + 1, exponent, grid.taps[axis])
+            chosen = [range(trim, grid.taps[0] - trim) for trim in rows]
+            few = [
+                tap_matrix(positions, -last, 2 * last + 1, exponent, grid.taps[axis], numbers)
+                for numbers in (chosen if axis == 0 else rows.values())
+            ]
             self._wide.append(wide.astype(spectrum.real_type))
-            self._tapped.append(few.astype(spectrum.real_type))
+            tapped.append([matrix.astype(spectrum.real_type) for matrix in few])
             self._lobe.append(np.exp(-exponent * positions**2).astype(spectrum.real_type))
             axes.append(bins)
+        self._tapped = list(zip(*tapped, strict=True))
         x, y = np.meshgrid(axes[0], axes[1])
         reached = (x / grid.reach[0]) ** 2 + (y / grid.reach[1]) ** 2 <= 1.0
         self._near = reached & (np.hypot(x * grid.steps[0], y * grid.steps[1]) <= NEAR)
@@ -123,17 +136,17 @@ class ErrorMeter:
         Parameters
         ----------
         coefficients : (ny, nx, components, terms), those of the interval.
-        order_0 : (components, terms), likewise.
+        order_0 : (components, series_terms), likewise.
         kappas : (n,), rad/µm.
         scale : what `coefficients` were multiplied with.
         """
         weights = self.expansion.weights(kappas).astype(self._real)
+        centres = self.expansion.series_weights(kappas) @ order_0.T
+        centres[:, 0] += self.expansion.specular(self.expansion.interval(kappas))
         for start in range(0, len(kappas), _TOGETHER):
             few = slice(start, start + _TOGETHER)
             tables = self._tables(coefficients, weights[few].T / self._real(scale))
-            for kappa, weight, table in zip(kappas[few], weights[few], tables, strict=True):
-                centre = order_0 @ weight
-                centre[0] += self.expansion.specular(self.expansion.interval(kappa))
+            for kappa, centre, table in zip(kappas[few], centres[few], tables, strict=True):
                 if self.expansion.kind == "power":
                     yield self._compare(self._exact(kappa), table[..., 0], centre[0])
                 else:
@@ -173,17 +186,24 @@ class ErrorMeter:
             total = total + (_power(amplitude) if self.expansion.kind == "power" else amplitude)
         return total / self._real(len(self.spectra))
 
+    def _tap(self, table: NDArray[Any]) -> NDArray[Any]:
+        """What a look-up's taps add up to, without order 0."""
+        total: Any = 0.0
+        for matrices in self._tapped:
+            total = total + apply_window(matrices, table)
+        return total
+
     def _compare(self, exact: NDArray[Any], table: NDArray[Any], centre: complex) -> Parts:
         """Sums over the bins, of a table without order 0 and of the whole lobe of `centre`."""
         lobe = np.outer(self._lobe[1], self._lobe[0])
         if self.grid.coherent:
             truth = _power(apply_window(self._wide, exact))
-            approximate = _power(apply_window(self._tapped, table) + centre * lobe)
+            approximate = _power(self._tap(table) + centre * lobe)
         else:
             if self.expansion.kind == "amplitude":
                 exact, table, centre = _power(exact), _power(table), abs(centre) ** 2
             truth = apply_window(self._wide, exact)
-            approximate = np.maximum(apply_window(self._tapped, table) + centre.real * lobe, 0.0)
+            approximate = np.maximum(self._tap(table) + centre.real * lobe, 0.0)
         difference = np.abs(approximate - truth)
         return np.array(
             [

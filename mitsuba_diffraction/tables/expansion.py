@@ -14,6 +14,13 @@ grow with the depth of the surface. In the first interval what is expanded is (|
 (or (a_j − δ_j0)/κ̂, with κ̂ = κ over the interval's length): both are smooth, and the light that
 leaves the specular direction keeps its relative accuracy down to κ → 0, where it fades as κ².
 
+**SVD** (the default). Over one interval the powers of all bins, as functions of κ, lie close to a
+space of few dimensions (their singular value decomposition; Eckart and Young 1936): fewer than
+polynomials take, since most pairs of heights differ by much less than the deepest and the highest.
+`principal_functions` finds that space; its functions of κ are kept as Chebyshev series of their
+own, and a bin has one number for each of them. Order 0, which need not lie in that space, keeps
+the plain Chebyshev series.
+
 **Taylor.** a_j(κ) = δ_j0 + Σ_n xⁿ/n! · DFT[iⁿ(2h/H)ⁿ]_j with x = κH/2 and centred heights
 (Stam 1999, eq. 12, after the source documents), one interval. The terms grow to e^x before they
 cancel, which single precision survives for shallow surfaces only.
@@ -21,15 +28,18 @@ cancel, which single precision survives for shallow surfaces only.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import linalg
 from scipy.special import gammaln
 
-BASES = ("taylor", "chebyshev")
+BASES = ("svd", "chebyshev", "taylor")
 KINDS = ("power", "amplitude")
 
+_DARK = 1e-3  # the share of the brightest that tables.error compares the darkest κ with
+_BLOCK = 1 << 15  # bins at a time
 _INSIDE = 1e-9  # keeps the ends of an interval on its own side of floor()
 
 
@@ -39,12 +49,14 @@ class Expansion:
 
     Attributes
     ----------
-    basis : "taylor" or "chebyshev".
+    basis : "svd", "chebyshev" or "taylor".
     kind : "power" or "amplitude", what is expanded.
     terms : coefficients per interval. Taylor's count starts at n = 1: n = 0 is δ_j0 itself.
     intervals : equal parts of [0, kappa_max].
     kappa_max : rad/µm.
     half_range : H/2 in µm, which scales Taylor's x.
+    functions : (intervals, series_terms, terms) of basis "svd": the Chebyshev series of each of
+        its functions; None otherwise.
     """
 
     basis: str
@@ -53,6 +65,12 @@ class Expansion:
     intervals: int
     kappa_max: float
     half_range: float
+    functions: NDArray[np.float64] | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def series_terms(self) -> int:
+        """Length of the series that order 0 and the functions of basis "svd" have."""
+        return self.terms if self.functions is None else self.functions.shape[1]
 
     @property
     def length(self) -> float:
@@ -69,7 +87,17 @@ class Expansion:
         return np.where(self._factored(interval), 1.0, 0.0)
 
     def weights(self, kappa: ArrayLike) -> NDArray[np.float64]:
-        """What each coefficient is multiplied with, shape κ.shape + (terms,)."""
+        """What each coefficient of a bin is multiplied with, shape κ.shape + (terms,)."""
+        series = self.series_weights(kappa)
+        if self.functions is None:
+            return series
+        weights: NDArray[np.float64] = np.einsum(
+            "...s,...st->...t", series, self.functions[self.interval(kappa)]
+        )
+        return weights
+
+    def series_weights(self, kappa: ArrayLike) -> NDArray[np.float64]:
+        """The same for order 0: shape κ.shape + (series_terms,)."""
         kappa = np.asarray(kappa, float)
         if self.basis == "taylor":
             n = np.arange(1, self.terms + 1)
@@ -78,12 +106,12 @@ class Expansion:
                 return np.exp(n * np.log(x) - gammaln(n + 1))
         index = self.interval(kappa)
         t = np.clip(2.0 * (kappa / self.length - index) - 1.0, -1.0, 1.0)
-        polynomials = np.cos(np.arange(self.terms) * np.arccos(t)[..., None])
-        return polynomials * self._prefactor(kappa, index)[..., None]
+        polynomials = np.cos(np.arange(self.series_terms) * np.arccos(t)[..., None])
+        return polynomials * self.fading(kappa)[..., None]
 
     def nodes(self, interval: int) -> NDArray[np.float64]:
-        """κ of the interval's Chebyshev points of the first kind, as many as terms."""
-        angle = np.pi * (np.arange(self.terms) + 0.5) / self.terms
+        """κ of the interval's Chebyshev points of the first kind, `series_terms` of them."""
+        angle = np.pi * (np.arange(self.series_terms) + 0.5) / self.series_terms
         return self.length * (interval + 0.5 * (1.0 + np.cos(angle)))
 
     def extrema(self, interval: int) -> NDArray[np.float64]:
@@ -92,30 +120,96 @@ class Expansion:
         These are the extrema of the first Chebyshev polynomial left out; κ = 0 itself, where only
         the specular order is left, gives way to a small κ.
         """
-        angle = np.pi * np.arange(self.terms + 1) / self.terms
+        angle = np.pi * np.arange(self.series_terms + 1) / self.series_terms
         lowest = 1e-3 if interval == 0 else _INSIDE
         inside = np.clip(0.5 * (1.0 - np.cos(angle)), lowest, 1.0 - _INSIDE)
         return self.length * (interval + inside)
 
     def fit(self, interval: int) -> NDArray[np.float64]:
-        """Matrix (nodes, terms) that takes values at the nodes to coefficients.
+        """Matrix (nodes, series_terms) that takes values at the nodes to Chebyshev coefficients.
 
         The values are those of the power or amplitude less `specular`·δ_j0; the matrix divides out
         the factor κ̂² or κ̂ of the first interval.
         """
         nodes = self.nodes(interval)
-        order = np.arange(self.terms)
-        angle = np.pi * (order + 0.5) / self.terms
-        cosines = np.cos(np.outer(angle, order)) * np.where(order == 0, 1.0, 2.0) / self.terms
-        index = np.full(len(nodes), interval)
-        return cosines / self._prefactor(nodes, index)[:, None]
+        count = self.series_terms
+        order = np.arange(count)
+        angle = np.pi * (order + 0.5) / count
+        cosines = np.cos(np.outer(angle, order)) * np.where(order == 0, 1.0, 2.0) / count
+        return cosines / self.fading(nodes)[:, None]
 
     def _factored(self, interval: ArrayLike) -> NDArray[np.bool_]:
         first = np.asarray(interval) == 0
         return np.ones_like(first) if self.basis == "taylor" else first
 
-    def _prefactor(
-        self, kappa: NDArray[np.float64], index: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
+    def fading(self, kappa: ArrayLike) -> NDArray[np.float64]:
+        """The factor κ̂² or κ̂ of the first interval, 1 in all others; not for Taylor's series."""
+        kappa = np.asarray(kappa, float)
         power = 2 if self.kind == "power" else 1
-        return np.where(index == 0, (kappa / self.length) ** power, 1.0)
+        return np.where(self.interval(kappa) == 0, (kappa / self.length) ** power, 1.0)
+
+
+def principal_functions(
+    values: NDArray[np.floating],
+    expansion: Expansion,
+    interval: int,
+    terms: int,
+    near: NDArray[np.int64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The few functions of κ that bins are best made of, over one interval.
+
+    Parameters
+    ----------
+    values : (nodes, bins), each bin's power, or part of its amplitude, at the interval's nodes.
+    expansion : the Chebyshev series whose nodes they are.
+    terms : how many functions.
+    near : the bins close to order 0, whose error is measured apart from that of all others.
+
+    Returns
+    -------
+    projection : (nodes, terms); values.T @ projection are a bin's coefficients.
+    functions : (nodes, terms), the functions' Chebyshev series.
+    """
+    nodes = expansion.nodes(interval)
+    power = expansion.kind == "power"
+    fading = expansion.fading(nodes)
+    parts = [_sizes(values, power), _sizes(values[:, near], power)]
+    parts[0] -= parts[1]
+    size = parts[0] + parts[1]
+    size = size if power else np.sqrt(size)
+    # An error counts relative to all the light at its κ, and where there is next to none, to
+    # a share of the most
+    size = np.maximum(size, _DARK * (size / fading).max() * fading) + 1e-30
+    covariance = np.zeros((len(nodes), len(nodes)))
+    for start in range(0, values.shape[1], _BLOCK):
+        covariance += _covariance(values[:, start : start + _BLOCK] / size[:, None], power)
+    # Both parts count alike, however few bins the one has
+    share = (parts[1] / size).sum() / max((parts[0] / size).sum(), 1e-300)
+    if 0.0 < share < 1.0:
+        close = _covariance(values[:, near] / size[:, None], power)
+        covariance += close * min(1.0 / share - 1.0, 1e6)
+    vectors = np.linalg.eigh(covariance)[1][:, ::-1][:, :terms]
+    # Of all functions that span this space, those that are 1 at one node and 0 at the others: then
+    # a coefficient is a power, and what rounding adds to it is in proportion where it is dark too
+    chosen = np.sort(linalg.qr(vectors.T, mode="r", pivoting=True)[1][:terms])
+    change = np.linalg.inv(vectors[chosen])
+    projection = (vectors / size[:, None]) @ vectors[chosen].T
+    return projection, expansion.fit(interval).T @ (size[:, None] * (vectors @ change))
+
+
+def _sizes(values: NDArray[np.floating], power: bool) -> NDArray[np.float64]:
+    """Sum over the bins (nodes, bins) of powers, or of squared amplitudes."""
+    sizes: NDArray[np.float64] = (np.abs(values) if power else values.astype(float) ** 2).sum(
+        axis=1, dtype=float
+    )
+    return sizes
+
+
+def _covariance(scaled: NDArray[np.float64], power: bool) -> NDArray[np.float64]:
+    """Σ over bins (nodes, bins) of products of their values at two nodes."""
+    if power:
+        # What is measured is the sum of errors, not of their squares: this makes up for it as far
+        # as errors are in proportion to powers
+        scaled = scaled / np.sqrt(np.sqrt(np.einsum("nb,nb->b", scaled, scaled)) + 1e-12)
+    product: NDArray[np.float64] = scaled @ scaled.T
+    return product

@@ -76,7 +76,8 @@ def weighted_sum(
 ) -> NDArray[np.float64]:
     """Σ_j of the series at κ times kernel_x(x − j_x)·kernel_y(y − j_y), with x = qx/dqx in bins.
 
-    Only the `taps` bins nearest to (x, y) are read, besides order 0, which is never left out.
+    Only the `taps` bins nearest to (x, y) are read, less the corners that the table's own taps
+    leave out, besides order 0, which is never left out.
 
     Parameters
     ----------
@@ -101,15 +102,14 @@ def weighted_sum(
     def squared(values: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.sum(values**2, axis=1, keepdims=True) if incoherent_amplitudes else values
 
-    centre = np.einsum("npt,nt->np", table.order_0[interval].astype(float), weights)
-    centre[:, 0] += expansion.specular(interval)
     if grid.order_0_steps is not None:
         lobe = [_gaussian(exponent) for exponent in grid.order_0_exponents]
     else:
         lobe = list(kernels)
-    total = squared(centre) * (lobe[0](x) * lobe[1](y))[:, None]
-    for j in range(taps[1]):
-        for i in range(taps[0]):
+    total = squared(table.centre(kappa)) * (lobe[0](x) * lobe[1](y))[:, None]
+    trims = grid.trims if taps == grid.taps and grid.trims else (0,) * taps[1]
+    for j, trim in enumerate(trims):
+        for i in range(trim, taps[0] - trim):
             packet = table.coefficients[interval, row + j, column + i].astype(float)
             value = squared(np.einsum("npt,nt->np", packet, scaled))
             total += (weight_x[:, i] * weight_y[:, j])[:, None] * value

@@ -45,15 +45,10 @@ def powers_of(
 
 def order_0_power(table: DiffractionTable, kappa: NDArray[np.float64]) -> NDArray[np.float64]:
     """|a_0(κ)|², the shape of κ."""
-    expansion = table.expansion
-    interval = expansion.interval(kappa)
-    series = np.einsum(
-        "...pt,...t->...p", table.order_0[interval].astype(float), expansion.weights(kappa)
-    )
-    series[..., 0] += expansion.specular(interval)
-    if expansion.kind == "power":
-        return np.asarray(np.maximum(series[..., 0], 0.0))
-    return np.asarray(np.sum(series**2, axis=-1))
+    parts = table.centre(kappa)
+    if table.expansion.kind == "power":
+        return np.asarray(np.maximum(parts[..., 0], 0.0))
+    return np.asarray(np.sum(parts**2, axis=-1))
 
 
 def power_series(
@@ -64,7 +59,7 @@ def power_series(
     Returns
     -------
     coefficients : (intervals, ny, nx, terms), to be divided by the scale; order 0 is zero.
-    order_0 : (intervals, terms) of order 0, less 1 in the first interval.
+    order_0 : (intervals, series_terms) of order 0, less 1 in the first interval.
     scale, expansion
     """
     table.require_whole("a list of powers is made of")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..heightfield import HeightField
 
+_SMALL = 1 << 16  # pixels
 _ROWS = 64  # rows (or columns) a task: large enough for the FFT, small enough to stay in cache
 
 
@@ -81,9 +82,15 @@ class Spectrum:
             columns = self._columns.target[start : start + _ROWS]
             result[self._rows.target[0] : self._rows.target[-1] + 1, columns] = wanted
 
+        blocks = range(0, ny, _ROWS), range(0, half.shape[1], _ROWS)
+        if self.heights.size < _SMALL:  # threads would take longer to start
+            for work, starts in zip((along_x, along_y), blocks, strict=True):
+                for start in starts:
+                    work(start)
+            return result
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            list(pool.map(along_x, range(0, ny, _ROWS)))
-            list(pool.map(along_y, range(0, half.shape[1], _ROWS)))
+            for work, starts in zip((along_x, along_y), blocks, strict=True):
+                list(pool.map(work, starts))
         return result
 
 

@@ -18,7 +18,7 @@ from .expansion import Expansion
 from .lookup import window_sum
 
 #: Raised whenever what the coefficients mean changes; tables of another version are refused.
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -32,7 +32,8 @@ class DiffractionTable:
     coefficients : (intervals, ny, nx, components, terms) float32 or float16; one component for a
         power, two (real, imaginary) for an amplitude; divided by `scale` before use. Bin (0, 0)
         is in the middle of (ny, nx), and zero.
-    order_0 : (intervals, components, terms) float32, the coefficients of that bin, not scaled.
+    order_0 : (intervals, components, expansion.series_terms) float32, the series of that bin; not
+        scaled.
     scale : what the coefficients were multiplied with, to suit half floats.
     expansion : which series in κ.
     grid : bins, window and taps.
@@ -85,7 +86,7 @@ class DiffractionTable:
             averaged (`ensemble` only).
         coherence_width : 4σ of the Gaussian amplitude window, µm.
         coherence : "ensemble" (window power averaged over its position) or "patch" (one window).
-        basis : "chebyshev", "taylor" or "auto" (the cheaper that meets the tolerance).
+        basis : "svd" (also as "auto"), "chebyshev" or "taylor"; see `tables.expansion`.
         tolerance : relative error of ⟨|P|²⟩ at the worst κ, as `tables.error` measures it.
         terms : coefficients of a series; by default as many as the tolerance takes.
         wavelength_range : nm; the shortest sets how far the table reaches.
@@ -185,6 +186,17 @@ class DiffractionTable:
         slack = 1.0 + 1e-6
         inside = np.hypot(qx, qy) <= self.radius * slack
         return inside & (np.asarray(kappa) <= self.expansion.kappa_max * slack)
+
+    def centre(self, kappa: ArrayLike) -> NDArray[np.float64]:
+        """Order 0 at κ (rad/µm): κ.shape + (components,), its power or the parts of a_0."""
+        interval = self.expansion.interval(kappa)
+        parts: NDArray[np.float64] = np.einsum(
+            "...pt,...t->...p",
+            self.order_0[interval].astype(float),
+            self.expansion.series_weights(kappa),
+        )
+        parts[..., 0] += self.expansion.specular(interval)
+        return parts
 
     def window_sum(self, qx: ArrayLike, qy: ArrayLike, kappa: ArrayLike) -> NDArray[np.float64]:
         """⟨|P|²⟩ / 4π²σ⁴ at spatial frequencies (rad/µm) and κ (rad/µm); see `tables.lookup`."""

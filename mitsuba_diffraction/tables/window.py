@@ -20,6 +20,8 @@ FULL_REACH = 4.6
 #: Beyond this the patch is so much larger than the window that a look-up would take minutes.
 MAX_TAPS = 64
 
+_MOST_TRIMMED = 64  # taps; more are read in a loop over whole rows
+
 
 def first_tap(taps: int) -> int:
     """Offset of the first tap from floor(x) for even `taps`, from round(x) for odd ones."""
@@ -57,8 +59,53 @@ def taps_for(steps: tuple[float, float], error: float, coherent: bool) -> tuple[
     return fewest(steps[0]), fewest(steps[1])
 
 
+def trims_for(
+    steps: tuple[float, float], taps: tuple[int, int], error: float, coherent: bool
+) -> tuple[int, ...]:
+    """How many taps at both ends of each row can be left out besides: the corners matter least.
+
+    Parameters
+    ----------
+    steps, taps, coherent : as in `reach_error`.
+    error : relative L1 error of ⟨|P|²⟩ that all taps left out may cause together.
+
+    Returns
+    -------
+    One number a row; empty if none can be left out.
+    """
+    if taps[0] * taps[1] > _MOST_TRIMMED:
+        return ()
+    shares = [_tap_shares(step, count) for step, count in zip(steps, taps, strict=True)]
+    spare = (0.5 * error) ** 2 if coherent else error
+    spare -= sum(missing_power(step, count) for step, count in zip(steps, taps, strict=True))
+    trims = [0] * taps[1]
+    most = (taps[0] - 1) // 2
+    # taps of the same share go together, so that the rest stays symmetric
+    corners = [(shares[1][y] * shares[0][x], y, x) for y in range(taps[1]) for x in range(most)]
+    for share, y, x in sorted(corners):
+        same = 2.0 * share * (1 if 2 * y + 1 == taps[1] else 2)
+        if y >= (taps[1] + 1) // 2 or x != trims[y]:
+            continue
+        if same > spare:
+            break
+        spare -= same
+        trims[y] = trims[taps[1] - 1 - y] = x + 1
+    return tuple(trims) if any(trims) else ()
+
+
+def _tap_shares(step: float, taps: int) -> NDArray[np.float64]:
+    """Each tap's share of ∫exp(−s²Δ²) along one direction, the mean over positions."""
+    edges = step * (np.arange(taps + 1) - 0.5 * taps)
+    return 0.5 * np.diff(special.erf(edges))
+
+
 def tap_matrix(
-    positions: NDArray[np.float64], first_bin: int, bins: int, exponent: float, taps: int | None
+    positions: NDArray[np.float64],
+    first_bin: int,
+    bins: int,
+    exponent: float,
+    taps: int | None,
+    chosen: Sequence[int] | None = None,
 ) -> sparse.csr_array:
     """Weights exp(−exponent·Δ²) from bins to positions, as a sparse (positions, bins) matrix.
 
@@ -68,11 +115,13 @@ def tap_matrix(
     first_bin, bins : the bin of column 0, and the number of columns.
     exponent : s² for powers, s²/2 for amplitudes.
     taps : how many bins around each position, or None for the full reach of the window.
+    chosen : which of these taps, from 0; by default all.
     """
     if taps is None:
         reach = FULL_REACH * np.sqrt(2.0) / np.sqrt(exponent)  # enough for either exponent
         taps = 2 * int(np.ceil(reach)) + 2
-    columns = (base_bin(positions, taps) + first_tap(taps))[:, None] + np.arange(taps)
+    numbers = np.arange(taps) if chosen is None else np.asarray(chosen, int)
+    columns = (base_bin(positions, taps) + first_tap(taps))[:, None] + numbers
     weights = np.exp(-exponent * (positions[:, None] - columns) ** 2)
     columns = columns.astype(int) - first_bin
     rows = np.broadcast_to(np.arange(len(positions))[:, None], columns.shape)
@@ -86,3 +135,11 @@ def apply_window(matrices: Sequence[sparse.csr_array], bins: NDArray[Any]) -> ND
     """Sum over the bins (ny, nx) with the weights of a matrix along x and one along y."""
     along_y = matrices[1] @ bins
     return (matrices[0] @ np.ascontiguousarray(along_y.T)).T
+
+
+def rows_by_trim(taps: tuple[int, int], trims: Sequence[int]) -> dict[int, list[int]]:
+    """Rows of taps that leave out the same number at either end, by that number."""
+    rows: dict[int, list[int]] = {}
+    for row in range(taps[1]):
+        rows.setdefault(trims[row] if trims else 0, []).append(row)
+    return rows

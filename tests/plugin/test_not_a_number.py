@@ -42,7 +42,7 @@ print("alive")
 
 @pytest.mark.usefixtures("variant")
 def test_an_index_is_always_in_its_range():
-    from mitsuba_diffraction.plugin.lookup import index_between
+    from mitsuba_diffraction.plugin.memory import index_between
 
     values = mi.Float([np.nan, np.inf, -np.inf, 2.0, -1.0, 1e30])
     dr.make_opaque(values)

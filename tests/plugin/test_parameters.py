@@ -123,7 +123,10 @@ REFUSED = [
     ({"foo": 1.0}, "unknown parameter 'foo'; Allowed: heightfield, table, data, pixel_size"),
     ({"coherence_widht": 60.0}, "unknown parameter 'coherence_widht'; did you mean coherence_wi"),
     ({"coherence": "full"}, "coherence='full' is unknown; choose one of ensemble, patch"),
-    ({"basis": "fourier"}, "basis='fourier' is unknown; choose one of taylor, chebyshev, auto"),
+    (
+        {"basis": "fourier"},
+        "basis='fourier' is unknown; choose one of svd, chebyshev, taylor, auto",
+    ),
     ({"coherence_width": 0.0}, "coherence_width=0.0 must be a positive number of µm"),
     ({"coherence_width": -3.0}, "coherence_width=-3.0 must be a positive number of µm"),
     ({"coherence_width": "wide"}, "coherence_width='wide' must be a number"),

@@ -13,7 +13,7 @@ PATCH = rough_patch((50, 41), (0.08, 0.09), 0.2)
 
 
 @pytest.mark.parametrize("coherence", ["ensemble", "patch"])
-@pytest.mark.parametrize("basis", ["chebyshev", "taylor"])
+@pytest.mark.parametrize("basis", ["svd", "chebyshev", "taylor"])
 def test_they_are_cumulative_distributions(coherence, basis):
     table = DiffractionTable.build(PATCH, coherence_width=3.7, coherence=coherence, basis=basis)
     found = proposals(table)

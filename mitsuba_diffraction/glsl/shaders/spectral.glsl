@@ -9,13 +9,15 @@
 // loop steps in k.
 
 uniform sampler2D orders;        // TEXELS texels an order: terms of its series in κ
-uniform sampler2D order_zero;    // the same of order 0, per interval
+uniform sampler2D functions;     // what each term is multiplied with over κ, and |a₀|²: TEXELS + 1
+                                 // texels at each end of `cells` cells an interval
 uniform sampler2D responses;     // linear sRGB / 2π over k, one row per light
 uniform ivec2 last_order;        // orders run from −last to last
 uniform vec2 spacing;            // of orders, rad/µm
 uniform float sigma;
 uniform float interval_length;
 uniform int intervals;
+uniform int cells;
 uniform float inverse_scale;
 
 const float REACH = 2.6;         // of the window, in 1/σ: erfc(2.6) = 2e-4 is left out
@@ -27,19 +29,21 @@ int interval_of(float kappa)
     return int(clamp(floor(kappa / interval_length), 0.0, float(intervals - 1)));
 }
 
-void series(float kappa, int interval, out vec4 weights[TEXELS])
+// Weights of the terms, and the power of order 0.
+float series(float kappa, int interval, out vec4 weights[TEXELS])
 {
-    float offset = kappa / interval_length - float(interval);
-    float t = clamp(2.0 * offset - 1.0, -1.0, 1.0);
-    float a = interval == 0 ? offset * offset : 1.0;  // powers fade as κ²
-    float b = a * t;
+    float offset = clamp(kappa / interval_length - float(interval), 0.0, 1.0);
+    float fading = interval == 0 ? offset * offset : 1.0;  // powers fade as κ²
+    float place = offset * float(cells);
+    int cell = min(int(place), cells - 1);
+    float t = place - float(cell);
+    int texel = (interval * (cells + 1) + cell) * (TEXELS + 1);
     for (int n = 0; n < TEXELS; ++n) {
-        float c = 2.0 * t * b - a;
-        float d = 2.0 * t * c - b;
-        weights[n] = vec4(a, b, c, d);
-        a = 2.0 * t * d - c;
-        b = 2.0 * t * a - d;
+        vec4 low = entry(functions, texel + n);
+        weights[n] = fading * mix(low, entry(functions, texel + TEXELS + 1 + n), t);
     }
+    float low = entry(functions, texel + TEXELS).x;
+    return mix(low, entry(functions, texel + 2 * TEXELS + 1).x, t);
 }
 
 int first_texel(int interval, ivec2 order)
@@ -122,7 +126,7 @@ vec3 from_wavelength_to_wavelength(vec2 uv, float r, float z, float cos_half, in
     for (int n = 0; n < count; ++n) {
         float k = wavenumbers.x + (float(n) + 0.5) * delta;
         int interval = interval_of(k * z);
-        series(k * z, interval, weights);
+        float specular = series(k * z, interval, weights);
         vec2 place = k * uv / spacing;
         ivec2 low = max(ivec2(ceil(place - reach)), -last_order);
         ivec2 high = min(ivec2(floor(place + reach)), last_order);
@@ -137,9 +141,6 @@ vec3 from_wavelength_to_wavelength(vec2 uv, float r, float z, float cos_half, in
             }
         }
         power *= inverse_scale;
-        float specular = interval == 0 ? 1.0 : 0.0;
-        for (int i = 0; i < TEXELS; ++i)
-            specular += dot(entry(order_zero, interval * TEXELS + i), weights[i]);
         float apart = sigma * k * r;
         power += exp(-apart * apart) * specular;
         sum += power * reflectance_at(cos_half, k) * response(k, light);

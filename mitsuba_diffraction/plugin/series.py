@@ -1,0 +1,173 @@
+"""Series in κ inside a Dr.Jit kernel: what the terms of a bin are multiplied with.
+
+The twin of `tables.expansion`. Chebyshev's and Taylor's weights follow from a recurrence. The
+functions of basis "svd" have none: they are tabulated, as parabolas on equal cells of κ.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..tables.expansion import Expansion
+from ..tables.table import DiffractionTable
+from .memory import index_between, upload
+
+#: Largest number of floats that one packet load fetches.
+PACKET = 16
+
+#: A parabola through three points on a cell of phase h leaves max|f'''| h³/192 (Chebyshev nodes);
+#: this share of the tolerance is what the cells may add.
+_CELLS_SHARE = 0.02
+
+
+class Recurrence:
+    """Weights of Chebyshev's and Taylor's series."""
+
+    def __init__(self, table: DiffractionTable) -> None:
+        self._expansion = table.expansion
+        self._terms = padded(table.expansion.terms)
+        self._order_0 = upload(mi.Float, pad(table.order_0, self._terms))
+        self._components = table.order_0.shape[1]
+
+    def at(self, kappa: Any) -> tuple[Any, list[Any], list[Any]]:
+        """Interval, weights of a bin's terms, and order 0: its power, or the parts of a_0."""
+        offset, interval = series_interval(self._expansion, kappa)
+        weights = series_weights(self._expansion, self._terms, offset, interval, kappa)
+        floats = self._components * self._terms
+        values = load(self._order_0, interval, mi.ArrayXf, floats)
+        centre = [
+            inner(values[n * self._terms : (n + 1) * self._terms], weights)
+            for n in range(self._components)
+        ]
+        factored = interval == 0 if self._expansion.basis == "chebyshev" else mi.Mask(True)
+        centre[0] += dr.select(factored, mi.Float(1.0), 0.0)
+        return interval, weights, centre
+
+
+class Tabulated:
+    """Weights of basis "svd", and order 0, from tables over κ."""
+
+    def __init__(self, table: DiffractionTable) -> None:
+        expansion = table.expansion
+        self._expansion = expansion
+        self._terms = padded(expansion.terms)
+        self._components = table.order_0.shape[1]
+        phase = 2.0 * expansion.half_range * expansion.length
+        step = (192.0 * _CELLS_SHARE * table.tolerance) ** (1 / 3)
+        self._cells = max(8, math.ceil(phase / step))
+        # Chebyshev's three nodes of every cell, and the parabola a + t (b + t c) through them
+        t = 0.5 + 0.5 * np.cos(np.pi * (np.arange(3) + 0.5) / 3)
+        start = np.arange(expansion.intervals * self._cells)
+        kappa = expansion.length / self._cells * (start[:, None] + t)
+        kappa = np.clip(kappa, 0.0, np.nextafter(expansion.kappa_max, 0.0))
+        parabola = np.linalg.inv(t[:, None] ** np.arange(3))
+        # Without the factor they fade with as κ → 0, where a parabola would lose it
+        plain = expansion.weights(kappa) / expansion.fading(kappa)[..., None]
+        functions = np.einsum("pn,cnt->cpt", parabola, plain)
+        order_0 = np.einsum("pn,cnk->cpk", parabola, table.centre(kappa))
+        self._functions = upload(mi.Float, pad(functions.astype(np.float32), self._terms))
+        self._order_0 = upload(mi.Float, pad(order_0.astype(np.float32), padded(self._components)))
+
+    def at(self, kappa: Any) -> tuple[Any, list[Any], list[Any]]:
+        """Interval, weights of a bin's terms, and order 0: its power, or the parts of a_0."""
+        last = self._expansion.intervals * self._cells - 1.0
+        position = kappa * (self._cells / self._expansion.length)
+        lower = index_between(dr.floor(position), 0.0, last)
+        t = dr.clip(position - lower, 0.0, 1.0)
+        cell = mi.UInt32(lower)
+        weights = self._parabolas(self._functions, cell, t, self._terms)
+        centre = self._parabolas(self._order_0, cell, t, padded(self._components))
+        offset = dr.minimum(kappa * (1.0 / self._expansion.length), 1.0)
+        factor = offset if self._expansion.kind == "amplitude" else dr.square(offset)
+        interval = mi.UInt32(0)
+        if self._expansion.intervals > 1:
+            interval = cell // self._cells
+            factor = dr.select(interval == 0, factor, 1.0)
+        return interval, [w * factor for w in weights], centre[: self._components]
+
+    def _parabolas(self, source: Any, cell: Any, t: Any, count: int) -> list[Any]:
+        values = load(source, cell, mi.ArrayXf, 3 * count)
+        a, b, c = (values[n * count : (n + 1) * count] for n in range(3))
+        return [dr.fma(dr.fma(z, t, y), t, x) for x, y, z in zip(a, b, c, strict=True)]
+
+
+def series_of(table: DiffractionTable) -> Recurrence | Tabulated:
+    """How this table's series is evaluated."""
+    return Recurrence(table) if table.expansion.functions is None else Tabulated(table)
+
+
+def series_interval(expansion: Expansion, kappa: Any) -> tuple[Any, Any]:
+    """Where in its interval κ lies (0 … 1), and the interval."""
+    position = kappa * (1.0 / expansion.length)
+    lower = index_between(dr.floor(position), 0.0, expansion.intervals - 1.0)
+    return position - lower, mi.UInt32(lower)
+
+
+def series_weights(
+    expansion: Expansion, terms: int, offset: Any, interval: Any, kappa: Any
+) -> list[Any]:
+    """What each term of a Chebyshev or Taylor series is multiplied with; `offset` is 0 … 1."""
+    if expansion.basis == "taylor":
+        x = kappa * expansion.half_range
+        weights = [x]
+        for n in range(2, terms + 1):
+            weights.append(weights[-1] * x * (1.0 / n))
+        return weights
+    t = dr.clip(dr.fma(2.0, offset, -1.0), -1.0, 1.0)
+    factor = offset if expansion.kind == "amplitude" else dr.square(offset)
+    scale = dr.select(interval == 0, factor, 1.0)
+    weights = [scale, scale * t]  # Tₙ(t) by their recurrence, the factor carried along
+    while len(weights) < terms:
+        weights.append(dr.fma(2.0 * t, weights[-1], -weights[-2]))
+    return weights[:terms]
+
+
+def inner(terms: list[Any], weights: list[Any]) -> Any:
+    """Σ terms·weights."""
+    total = terms[0] * weights[0]
+    for term, weight in zip(terms[1:], weights[1:], strict=True):
+        total = dr.fma(term, weight, total)
+    return total
+
+
+def load(source: Any, index: Any, kind: Any, floats: int) -> list[Any]:
+    """A record of so many floats, fetched in packets as large as divide it."""
+    return [
+        packet[n] for packet in packets(source, index, kind, floats) for n in range(len(packet))
+    ]
+
+
+def packets(source: Any, index: Any, kind: Any, floats: int) -> list[Any]:
+    """The same, each packet an array of its own in single precision."""
+    size = packet_size(floats)
+    count = floats // size
+    found = []
+    for n in range(count):
+        packet = dr.gather(kind, source, index * count + n, shape=(size, dr.width(index)))
+        found.append(packet if kind is mi.ArrayXf else mi.ArrayXf(packet))
+    return found
+
+
+def packet_size(floats: int) -> int:
+    """The largest power of two that divides a record, at most `PACKET`."""
+    return min(PACKET, floats & -floats)
+
+
+def padded(terms: int) -> int:
+    """Terms as stored on the device: 1, 2, 4 or a multiple of 4, of 8 from 17 on."""
+    if terms <= 2:
+        return terms
+    step = 4 if terms <= 16 else 8
+    return -(-terms // step) * step
+
+
+def pad(values: NDArray[np.floating], terms: int) -> NDArray[np.floating]:
+    """The last axis filled up with zeros."""
+    missing = terms - values.shape[-1]
+    return np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, missing)])
