@@ -30,12 +30,13 @@ from . import (
     render,
     sweep,
     tangents,
+    tradeoff,
     view,
 )
 from .console import PROGRAM, say, say_error, warnings_in_one_line
 
 COMMANDS = (
-    precompute, info, tangents, plan, render, brdf_map, evaluate, sweep, compare, view,
+    precompute, info, tangents, plan, render, brdf_map, evaluate, sweep, tradeoff, compare, view,
     export_viewer, bench,
 )  # fmt: skip
 

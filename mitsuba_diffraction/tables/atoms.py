@@ -223,15 +223,13 @@ class _Beyond:
         """Density (ny, nx), and the power of order 0."""
         coarse = self._coarse
         interval = int(coarse.expansion.interval(kappa))
-        weights = coarse.expansion.weights(kappa)
-        scaled = (weights / coarse.scale).astype(np.float32)
+        scaled = (coarse.expansion.weights(kappa) / coarse.scale).astype(np.float32)
         series = coarse.coefficients[interval, :, :, 0].astype(np.float32) @ scaled
         power, _ = cell_powers(coarse, series)
         if kappa <= self._kappa_max:
             power = power * self._outside
-        order_0 = float(coarse.order_0[interval, 0] @ weights + coarse.expansion.specular(interval))
         density = (self._splats[0] @ (self._splats[1] @ power).T).T
-        return density.astype(np.float32), max(order_0, 0.0)
+        return density.astype(np.float32), max(float(coarse.centre(kappa)[0]), 0.0)
 
 
 def _splat(

@@ -82,7 +82,9 @@ def build_table(
     else:
         choose = taylor_expansion if basis == "taylor" else chebyshev_expansion
         expansion = choose(deepest, coherence, kappa_max, budget, terms)
-    trims = trims_for(steps, chosen_taps, tolerance * TRIMMED_SHARE, coherent)
+    trims: tuple[int, ...] = ()
+    if taps is None:
+        trims = trims_for(steps, chosen_taps, tolerance * TRIMMED_SHARE, coherent)
 
     if basis == "taylor":
         check_taylor(deepest, expansion, tolerance)

@@ -15,15 +15,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry import sigma_of
 from ..heightfield import HeightField
-from .choose import chebyshev_expansion
+from .choose import svd_expansion
 from .error import Grid, Progress
-from .expansion import Expansion
+from .expansion import Expansion, principal_functions
 from .spectrum import Spectrum
 from .table import DiffractionTable, reach_of
 from .window import taps_for
@@ -49,7 +50,7 @@ def coarse_table(
     """Sum a patch's orders over coarse cells, as far as light can probe."""
     deepest = max(patches, key=lambda patch: patch.range)
     sigma, reach = sigma_of(coherence_width), reach_of(wavelength_range)
-    expansion = chebyshev_expansion(
+    expansion, functions = svd_expansion(
         deepest, "ensemble", reach * height_scale_max, 0.5 * TOLERANCE, None
     )
     orders = [2.0 * np.pi / length for length in patches[0].extent]
@@ -74,7 +75,9 @@ def coarse_table(
         False,
         order_0_steps=(own[0], own[1]),
     )
-    coefficients, order_0 = _coefficients(patches, grid, expansion, (each[0], each[1]), progress)
+    coefficients, order_0, expansion = _coefficients(
+        patches, grid, expansion, functions, (each[0], each[1]), progress
+    )
     coefficients *= np.float32(steps[0] * steps[1] / (own[0] * own[1]))
     largest = max(float(np.abs(coefficients).max()), 1e-30)
     scale = 2.0 ** math.floor(math.log2(_HALF_PEAK / largest))
@@ -121,14 +124,21 @@ def _coefficients(
     patches: Sequence[HeightField],
     grid: Grid,
     expansion: Expansion,
+    functions: int | None,
     each: tuple[int, int],
     tell: Progress,
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Series coefficients of the cells' power (intervals, ny, nx, 1, terms), and of order 0."""
+) -> tuple[NDArray[np.float32], NDArray[np.float32], Expansion]:
+    """Series coefficients of the cells' power (intervals, ny, nx, 1, terms), and of order 0.
+
+    functions : how many functions of basis "svd" the Chebyshev series is made into, if it is; the
+        expansion returned then has them.
+    """
     ny, nx = 2 * grid.last[1] + 1, 2 * grid.last[0] + 1
     outermost = [n * last + n // 2 for n, last in zip(each, grid.last, strict=True)]
     spectra = [Spectrum(patch, (outermost[0], outermost[1])) for patch in patches]
-    coefficients = np.empty((expansion.intervals, ny, nx, 1, expansion.terms), np.float32)
+    terms = functions or expansion.terms
+    coefficients = np.empty((expansion.intervals, ny, nx, 1, terms), np.float32)
+    found = []
     order_0 = np.empty((expansion.intervals, 1, expansion.terms), np.float32)
     total = expansion.intervals * expansion.terms
     for interval in range(expansion.intervals):
@@ -146,6 +156,12 @@ def _coefficients(
         fit = expansion.fit(interval)
         centre = centre / len(spectra) + (1.0 - float(expansion.specular(interval)))
         order_0[interval, 0] = centre @ fit
-        mean = cells.reshape(expansion.terms, -1).T / np.float32(len(spectra))
-        coefficients[interval] = (mean @ fit.astype(np.float32)).reshape(ny, nx, 1, -1)
-    return coefficients, order_0
+        mean = cells.reshape(expansion.terms, -1) / np.float32(len(spectra))
+        if functions is not None:
+            none = np.zeros(0, np.int64)  # a cell is much wider than the light close to order 0
+            fit, series = principal_functions(mean, expansion, interval, functions, none)
+            found.append(series)
+        coefficients[interval] = (mean.T @ fit.astype(np.float32)).reshape(ny, nx, 1, -1)
+    if functions is not None:
+        expansion = replace(expansion, basis="svd", terms=functions, functions=np.array(found))
+    return coefficients, order_0, expansion

@@ -11,8 +11,9 @@ import numpy as np
 from ..files.cache import cached_colours
 from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.textures import Packed
+from ..tables.loss import colour_loss, power_loss
 from ..tables.table import DiffractionTable
-from .rounding import colour_loss, power_loss, power_table, rounded_colours, rounded_table
+from .rounding import power_table, rounded_colours, rounded_table
 from .sections import Section, packed_array
 
 #: What a page can draw with.
