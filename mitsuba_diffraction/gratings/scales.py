@@ -222,7 +222,7 @@ def _patch(
     """Draw a patch of a species; parameters as in `elaphe_like`."""
     who = species.name
     size = length_pair(extent, f"{who}: extent", 2.0, 500.0)
-    nx, ny = count_pair(pixels, f"{who}: pixels", 8, 4096)
+    nx, ny = count_pair(pixels, f"{who}: pixels", 8, 8192)
     full = number_between(depth, f"{who}: depth", 0.0, 10.0, " µm")
     names = ("irregularity", "bending", "roughness", "dirt")
     irregularity, bending, roughness, dirt = (
