@@ -17,7 +17,7 @@ coherence_width : float [65]
 coherence : string [ensemble]
     `ensemble`: what a pixel sees that covers many coherence areas; `patch`: one window's speckle.
 basis : string [auto]
-    `chebyshev` or `taylor`: the series in κ.
+    `svd` (also as `auto`), `chebyshev` or `taylor`: the series in κ.
 tolerance : float [1e-3]
     Relative error of ⟨|P|²⟩, met or refused.
 terms : integer [from the tolerance]

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # Written out so that --help need not load NumPy and SciPy; a test holds them against the library.
 COHERENCES = ("ensemble", "patch")
-BASES = ("auto", "chebyshev", "taylor")
+BASES = ("auto", "svd", "chebyshev", "taylor")
 
 _TABLE_NAMES = (
     "coherence_width", "coherence", "basis", "tolerance", "terms", "taps", "wavelength_range",
