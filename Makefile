@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test bench figures evaluation methods sweeps validation realtime lint clean help
+.PHONY: setup demo test bench figures gallery evaluation methods sweeps validation realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -43,6 +43,9 @@ bench: setup  ## measure speed and noise, and put the figures into README.md
 # a measured patch beside the look-alikes: make figures MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"
 figures: setup  ## make the pictures in docs/images
 	@$(PYTHON3) -m mitsuba_diffraction.figures -o docs/images $(if $(MEASURED),--measured $(MEASURED))
+
+gallery: setup  ## make docs/gallery.md and the pictures of docs/meshes.md
+	@$(PYTHON3) -m mitsuba_diffraction.figures.gallery -o docs
 
 evaluation: setup  ## make docs/evaluation.md: ridges, grating equation, fitted periods
 	@$(PYTHON3) -m mitsuba_diffraction.figures.evaluation -o docs/evaluation.md $(if $(MEASURED),--measured $(MEASURED))

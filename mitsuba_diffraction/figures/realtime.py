@@ -12,17 +12,15 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from PIL import Image
-
 from ..comparison.table import markdown
 from ..errors import DiffractionError
-from ..files.atomic import atomic_path
 from . import markers
+from .jpeg import write_jpeg
 
 #: Beside the README; the sheet that it shows is that of the default method.
 SHEET = Path("docs", "images", "realtime.jpg")
 
-_METHOD, _WIDTH, _QUALITY = "lut", 1600, 88
+_METHOD, _WIDTH = "lut", 1600
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -33,7 +31,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = parser.parse_args(argv)
     try:
         text = _table(args.compared / "compare.json")
-        _write_sheet(args.compared / f"{_METHOD}.png", args.output.parent / SHEET)
+        sheet = args.output.parent / SHEET
+        write_jpeg(args.compared / f"{_METHOD}.png", sheet, width=_WIDTH)
         markers.update(args.output, {"realtime": text})
     except DiffractionError as error:
         print(f"realtime: error: {error}", file=sys.stderr)
@@ -48,16 +47,6 @@ def _table(file: Path) -> str:
         raise DiffractionError(
             f"'{file}' is not what compare writes ({error}); run compare --method all"
         ) from error
-
-
-def _write_sheet(source: Path, target: Path) -> None:
-    try:
-        with Image.open(source) as image, atomic_path(target) as path:
-            size = (_WIDTH, round(_WIDTH * image.height / image.width))
-            small = image.convert("RGB").resize(size, Image.Resampling.LANCZOS)
-            small.save(path, format="JPEG", quality=_QUALITY, subsampling=0)
-    except OSError as error:
-        raise DiffractionError(f"cannot make '{target}' of '{source}': {error}") from error
 
 
 if __name__ == "__main__":

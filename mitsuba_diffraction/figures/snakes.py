@@ -13,11 +13,9 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from PIL import Image
-
 from ..cli.main import main as command
 from ..errors import DiffractionError
-from ..files.atomic import atomic_path
+from .jpeg import write_jpeg
 
 #: Names of the pictures and what is rendered: scene, azimuth of the sun in degrees.
 PICTURES = {
@@ -28,8 +26,6 @@ PICTURES = {
 }
 
 _SIZE = (900, 563)
-# JPEG's default blurs single sparkling pixels; at 90 they stay, in a quarter of a PNG's size.
-_QUALITY = 90
 
 
 def render_snakes(
@@ -65,8 +61,7 @@ def render_snakes(
                 code = command(["render", str(file), "-o", str(png), "-s", str(spp), *defined])
             if code != 0:
                 raise DiffractionError(f"rendering '{file}' failed; see above")
-            with Image.open(png) as image, atomic_path(output) as path:
-                image.convert("RGB").save(path, format="JPEG", quality=_QUALITY, subsampling=0)
+            write_jpeg(png, output)
         written.append(output)
     return written
 

@@ -119,6 +119,14 @@ def write_disc(args: argparse.Namespace) -> None:
     _report(args.output, mesh, "patch along the radius")
 
 
+def write_knot(args: argparse.Namespace) -> None:
+    """Write the knot, without texture coordinates."""
+    positions, normals, faces = knot(args.along, args.around)
+    mesh = TriangleMesh(positions, normals, np.zeros((len(positions), 2)), faces)
+    write_ply(args.output, mesh, UNITS, with_uv=False)
+    _report(args.output, mesh, "no texture coordinates")
+
+
 def _report(path: Path, mesh: TriangleMesh, more: str) -> None:
     print(f"{path}: {len(mesh.positions)} vertices, {len(mesh.faces)} triangles, {more}")
 
@@ -167,6 +175,12 @@ def _parser() -> argparse.ArgumentParser:
     for subparser, detail in ((snake, 4), (part, 12)):
         add_options_of(Anatomy(), subparser.add_argument_group("anatomy"))
         add_options_of(Scales(detail=detail), subparser.add_argument_group("scales"))
+
+    tied = command("knot", "a knot without texture coordinates, to try things on")
+    tied.add_argument("-o", "--output", type=Path, required=True, help="PLY file")
+    tied.add_argument("--along", type=int, default=160, help="quadrangles along; 24 to 10000")
+    tied.add_argument("--around", type=int, default=18, help="quadrangles around; 3 to 1000")
+    tied.set_defaults(write=write_knot)
 
     ring = command("disc", "a flat ring whose patch follows the radius")
     ring.add_argument("-o", "--output", type=Path, required=True, help="PLY file")

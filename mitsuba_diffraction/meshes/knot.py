@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .limits import check_limits
 from .trimesh import grid_faces
 
 Floats = NDArray[np.float64]
@@ -16,7 +17,14 @@ def knot(along: int = 160, around: int = 18) -> tuple[Floats, Floats, NDArray[np
     Parameters
     ----------
     along, around : number of quadrangles; at the ends they meet in the same vertices.
+
+    Raises
+    ------
+    DiffractionError
+        If a number is out of its range.
     """
+    given = {"along": along, "around": around}
+    check_limits(given, {"along": (24, 10000), "around": (3, 1000)}, "knot")
     t = 2 * np.pi * np.arange(along) / along
     curve = np.stack(
         [np.sin(t) + 2 * np.sin(2 * t), np.sin(3 * t) * 1.2, np.cos(t) - 2 * np.cos(2 * t)], axis=1

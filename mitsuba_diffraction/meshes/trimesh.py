@@ -84,7 +84,9 @@ def join(meshes: list[TriangleMesh]) -> TriangleMesh:
     )
 
 
-def write_ply(path: str | os.PathLike[str], mesh: TriangleMesh, comment: str = "") -> None:
+def write_ply(
+    path: str | os.PathLike[str], mesh: TriangleMesh, comment: str = "", *, with_uv: bool = True
+) -> None:
     """Write a binary little-endian PLY with the property names that Mitsuba reads.
 
     An orientation becomes the mesh attribute `vertex_orientation` with the channels (cos, sin, 0):
@@ -98,8 +100,9 @@ def write_ply(path: str | os.PathLike[str], mesh: TriangleMesh, comment: str = "
     columns: dict[str, Floats] = {
         **dict(zip(("x", "y", "z"), mesh.positions.T, strict=True)),
         **dict(zip(("nx", "ny", "nz"), mesh.normals.T, strict=True)),
-        **dict(zip(("u", "v"), mesh.uv.T, strict=True)),
     }
+    if with_uv:
+        columns |= dict(zip(("u", "v"), mesh.uv.T, strict=True))
     if mesh.orientation is not None:
         cosine, sine = mesh.orientation.T
         columns |= {"orientation_x": cosine, "orientation_y": sine}
