@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from . import maps, patches, snakes
+from .program import add_measured
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -26,9 +27,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--only", metavar="NAME", action="append", choices=tuple(FIGURES),
         help=f"one of {', '.join(FIGURES)}; may be given several times",
     )  # fmt: skip
-    parser.add_argument("--measured", metavar="FILE", help="height field to compare with")
-    parser.add_argument("--pixel-size", metavar="DX", help="of the measured patch, µm")
-    parser.add_argument("--max-height", metavar="H", help="of the measured patch, µm")
+    add_measured(parser, "height field to compare with")
     parser.add_argument("--scenes", metavar="FOLDER", default="scenes")
     parser.add_argument("-s", "--spp", metavar="N", default="64", help="samples of renderings")
     args = parser.parse_args(argv)

@@ -37,6 +37,7 @@ from ..gratings import blazed, elaphe_like, sinusoidal, xenopeltis_like
 from ..heightfield import HeightField
 from ..methods import FullSpectrum, make, make_all
 from . import markers
+from .program import add_measured, exit_code, measured_patch
 
 METHODS = ("default", "flss", "nmm", "pq", "pq-sinc")
 
@@ -202,19 +203,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Make the picture and the tables."""
     parser = argparse.ArgumentParser(prog="python -m mitsuba_diffraction.figures.evaluation")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/evaluation.md"))
-    parser.add_argument("--measured", help="height field that is evaluated, too")
-    parser.add_argument("--pixel-size", help="of the measured patch, µm")
-    parser.add_argument("--max-height", help="of the measured patch, µm")
+    add_measured(parser, "height field that is evaluated, too")
     parser.add_argument("--windows", type=int, default=64)
     parser.add_argument("--angle-step", type=float, default=0.05, help="degrees")
     parser.add_argument("--small", action="store_true", help="gratings only, coarsely: a check")
     args = parser.parse_args(argv)
-    try:
+
+    def work() -> None:
         patches = exact_gratings()
-        if args.measured is not None:
-            measured = HeightField.load(
-                args.measured, pixel_size=args.pixel_size, max_height=args.max_height
-            )
+        measured = measured_patch(args)
+        if measured is not None:
             patches.append((measured, None))
         if not args.small:
             patches += [(elaphe_like(), None), (xenopeltis_like(), None)]
@@ -238,10 +236,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
         with atomic_path(args.output.parent / "images" / "evaluation.png") as path:
             evaluation_figure(results).savefig(path, format="png")
-    except DiffractionError as error:
-        print(f"evaluation: error: {error}", file=sys.stderr)
-        return 1
-    return 0
+
+    return exit_code("evaluation", work)
 
 
 if __name__ == "__main__":

@@ -25,6 +25,7 @@ from ..files.atomic import atomic_path
 from ..meshes.__main__ import main as meshes
 from . import markers
 from .jpeg import write_jpeg
+from .program import exit_code
 
 FOLDER = Path("images", "gallery")  # beside the pages
 _MOST = 250_000  # bytes of a picture
@@ -241,7 +242,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         help="make one picture; may be given several times",
     )  # fmt: skip
     args = parser.parse_args(argv)
-    try:
+
+    def work() -> None:
         (args.output / FOLDER).mkdir(parents=True, exist_ok=True)
         for picture in PICTURES:
             if args.only is None or picture.name in args.only:
@@ -251,10 +253,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         markers.update(args.output / "gallery.md", {"gallery": shown("gallery")})
         parts = {name: shown(name) for name in ("meshes", "meshes-field")}
         markers.update(args.output / "meshes.md", parts)
-    except (DiffractionError, OSError) as error:
-        print(f"gallery: error: {error}", file=sys.stderr)
-        return 1
-    return 0
+
+    return exit_code("gallery", work)
 
 
 if __name__ == "__main__":

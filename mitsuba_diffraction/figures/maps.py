@@ -16,12 +16,13 @@ from typing import Any
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionWarning
 from ..files.atomic import atomic_path
 from ..gratings import blazed, cd, elaphe_like, xenopeltis_like
 from ..heightfield import HeightField
 from ..maps import Light, brdf_map, draw
 from ..maps.picture import signed
+from .program import add_measured, exit_code, measured_patch
 
 LIGHTS = (Light(0.0), Light(45.0, 180.0))
 
@@ -92,27 +93,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     parser = argparse.ArgumentParser(prog="python -m mitsuba_diffraction.figures.maps")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/images/maps.png"))
-    parser.add_argument("--measured", help="height field to compare with, drawn first")
-    parser.add_argument("--pixel-size", help="of the measured patch, µm")
-    parser.add_argument("--max-height", help="of the measured patch, µm")
+    add_measured(parser, "height field to compare with, drawn first")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--resolution", type=int, default=_RESOLUTION)
     args = parser.parse_args(argv)
-    try:
-        fields = []
-        if args.measured is not None:
-            measured = HeightField.load(
-                args.measured, pixel_size=args.pixel_size, max_height=args.max_height
-            )
-            fields.append(measured)
+
+    def work() -> None:
+        measured = measured_patch(args)
+        fields = [] if measured is None else [measured]
         fields += default_patches(args.seed)
         set_variant(None)
         with atomic_path(args.output) as path:
             maps_figure(fields, resolution=args.resolution).savefig(path, dpi=_DPI)
-    except DiffractionError as error:
-        print(f"maps: error: {error}", file=sys.stderr)
-        return 1
-    return 0
+
+    return exit_code("maps", work)
 
 
 if __name__ == "__main__":

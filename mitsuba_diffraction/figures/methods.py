@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionWarning
 from ..gratings import blazed, elaphe_like
 from ..heightfield import HeightField
 from ..maps.light import Light
@@ -24,6 +24,7 @@ from ..methods import NAMES, OrdersOnly, make, make_all
 from ..sweeps.compiled import Compiled, time_compiled
 from ..sweeps.run import Step, compared, timed_map
 from . import markers
+from .program import add_measured, exit_code, measured_patch
 
 #: What each method leaves out.
 APPROXIMATES = {
@@ -118,19 +119,15 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     parser = argparse.ArgumentParser(prog="python -m mitsuba_diffraction.figures.methods")
     parser.add_argument("-o", "--output", type=Path, default=Path("README.md"))
-    parser.add_argument("--measured", help="scale to measure; default: elaphe_like")
-    parser.add_argument("--pixel-size", help="of the measured patch, µm")
-    parser.add_argument("--max-height", help="of the measured patch, µm")
+    add_measured(parser, "scale to measure; default: elaphe_like")
     parser.add_argument("--resolution", type=int, default=128)
     parser.add_argument("--small", action="store_true", help="small patches: a check")
     args = parser.parse_args(argv)
-    try:
+
+    def work() -> None:
         set_variant(None)
-        if args.measured is not None:
-            scale = HeightField.load(
-                args.measured, pixel_size=args.pixel_size, max_height=args.max_height
-            )
-        else:
+        scale = measured_patch(args)
+        if scale is None:
             scale = elaphe_like(8.0, 128) if args.small else elaphe_like()
         with warnings.catch_warnings():
             # how far the model holds is not the question here
@@ -142,10 +139,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             )  # fmt: skip
         text = table(measured)
         markers.update(args.output, {"methods": text})
-    except DiffractionError as error:
-        print(f"methods: error: {error}", file=sys.stderr)
-        return 1
-    return 0
+
+    return exit_code("methods", work)
 
 
 if __name__ == "__main__":

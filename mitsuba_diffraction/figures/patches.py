@@ -16,11 +16,11 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from ..errors import DiffractionError
 from ..files.atomic import atomic_path
 from ..gratings import cd, dvd, elaphe_like, xenopeltis_like
 from ..heightfield import HeightField
 from ..spectra import FloatArray, far_field, height_spectrum, order_powers, profile
+from .program import add_measured, exit_code, measured_patch
 
 LOOKALIKES = (elaphe_like, xenopeltis_like, cd, dvd)
 
@@ -127,24 +127,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Write the figure of all look-alikes, below a measured patch where one is given."""
     parser = argparse.ArgumentParser(prog="python -m mitsuba_diffraction.figures.patches")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/images/patches.png"))
-    parser.add_argument("--measured", help="height field to compare with, drawn first")
-    parser.add_argument("--pixel-size", help="of the measured patch, µm")
-    parser.add_argument("--max-height", help="of the measured patch, µm")
+    add_measured(parser, "height field to compare with, drawn first")
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args(argv)
-    try:
+
+    def work() -> None:
         fields = [make(seed=args.seed) for make in LOOKALIKES]
-        if args.measured is not None:
-            measured = HeightField.load(
-                args.measured, pixel_size=args.pixel_size, max_height=args.max_height
-            )
+        measured = measured_patch(args)
+        if measured is not None:
             fields.insert(0, measured)
         with atomic_path(args.output) as path:
             patches_figure(fields).savefig(path, dpi=80)
-    except DiffractionError as error:
-        print(f"patches: error: {error}", file=sys.stderr)
-        return 1
-    return 0
+
+    return exit_code("patches", work)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ from ..comparison.table import markdown
 from ..errors import DiffractionError
 from . import markers
 from .jpeg import write_jpeg
+from .program import exit_code
 
 #: Beside the README; the sheet that it shows is that of the default method.
 SHEET = Path("docs", "images", "realtime.jpg")
@@ -29,15 +30,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("compared", metavar="FOLDER", type=Path, help="written by compare")
     parser.add_argument("-o", "--output", metavar="FILE", type=Path, default=Path("README.md"))
     args = parser.parse_args(argv)
-    try:
+
+    def work() -> None:
         text = _table(args.compared / "compare.json")
         sheet = args.output.parent / SHEET
         write_jpeg(args.compared / f"{_METHOD}.png", sheet, width=_WIDTH)
         markers.update(args.output, {"realtime": text})
-    except DiffractionError as error:
-        print(f"realtime: error: {error}", file=sys.stderr)
-        return 1
-    return 0
+
+    return exit_code("realtime", work)
 
 
 def _table(file: Path) -> str:

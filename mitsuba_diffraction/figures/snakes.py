@@ -16,6 +16,7 @@ from pathlib import Path
 from ..cli.main import main as command
 from ..errors import DiffractionError
 from .jpeg import write_jpeg
+from .program import exit_code
 
 #: Names of the pictures and what is rendered: scene, azimuth of the sun in degrees.
 PICTURES = {
@@ -73,12 +74,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--scenes", type=Path, default=Path("scenes"))
     parser.add_argument("-s", "--spp", type=int, default=64, help="samples per pixel")
     args = parser.parse_args(argv)
-    try:
+
+    def work() -> None:
         render_snakes(args.output, args.scenes, spp=args.spp)
-    except DiffractionError as error:
-        print(f"snakes: error: {error}", file=sys.stderr)
-        return 1
-    return 0
+
+    return exit_code("snakes", work)
 
 
 if __name__ == "__main__":

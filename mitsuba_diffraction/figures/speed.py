@@ -16,6 +16,7 @@ from typing import Any
 
 from ..errors import DiffractionError
 from . import markers
+from .program import exit_code
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("measured", metavar="BENCH.json", type=Path, help="from bench --json")
     parser.add_argument("-o", "--output", metavar="FILE", type=Path, default=Path("README.md"))
     args = parser.parse_args(argv)
-    try:
+
+    def work() -> None:
         try:
             measured = json.loads(args.measured.read_text(encoding="utf-8"))
             text = table(measured)
@@ -124,10 +126,8 @@ def main(argv: Sequence[str] | None = None) -> int:
                 f"'{args.measured}' is not what bench --json writes ({error}); run make bench"
             ) from error
         markers.update(args.output, {"speed": text})
-    except DiffractionError as error:
-        print(f"speed: error: {error}", file=sys.stderr)
-        return 1
-    return 0
+
+    return exit_code("speed", work)
 
 
 if __name__ == "__main__":

@@ -15,14 +15,14 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionWarning
 from ..files.atomic import atomic_path
 from ..gratings import blazed, elaphe_like
-from ..heightfield import HeightField
 from ..maps.light import Light
 from ..maps.sheet import contact_sheet
 from ..sweeps import SWEEPS, Sweep, sweep
 from . import markers
+from .program import add_measured, exit_code, measured_patch
 
 _LIGHT = Light(30.0)
 
@@ -47,19 +47,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Make all sheets and tables."""
     parser = argparse.ArgumentParser(prog="python -m mitsuba_diffraction.figures.sweeps")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/sweeps.md"))
-    parser.add_argument("--measured", help="scale to sweep over; default: elaphe_like")
-    parser.add_argument("--pixel-size", help="of the measured patch, µm")
-    parser.add_argument("--max-height", help="of the measured patch, µm")
+    add_measured(parser, "scale to sweep over; default: elaphe_like")
     parser.add_argument("--only", metavar="KIND", action="append", choices=tuple(SWEEPS))
     parser.add_argument("--resolution", type=int, default=160)
     parser.add_argument("--small", action="store_true", help="a small grating: a check")
     args = parser.parse_args(argv)
-    try:
-        if args.measured is not None:
-            patch = HeightField.load(
-                args.measured, pixel_size=args.pixel_size, max_height=args.max_height
-            )
-        else:
+
+    def work() -> None:
+        patch = measured_patch(args)
+        if patch is None:
             patch = blazed(2.0, 0.2, periods=6, rows=8) if args.small else elaphe_like()
         parts = {}
         for kind in args.only or SWEEPS:
@@ -79,10 +75,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             with atomic_path(args.output.parent / "images" / f"sweep-{kind}.png") as path:
                 sheet.savefig(path, format="png")
         markers.update(args.output, parts)
-    except DiffractionError as error:
-        print(f"sweeps: error: {error}", file=sys.stderr)
-        return 1
-    return 0
+
+    return exit_code("sweeps", work)
 
 
 if __name__ == "__main__":
