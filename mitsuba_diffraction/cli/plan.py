@@ -196,8 +196,8 @@ def _of_table(
         "frequency (rad/µm) below which are 50, 99, 99.9 %": quantiles(
             asked.frequency, light, shares
         ),
-        "the same along x": quantiles(abs(asked.u) * asked.frequency_per_sine, light, shares),
-        "along y": quantiles(abs(asked.v) * asked.frequency_per_sine, light, shares),
+        "the same along x": quantiles(asked.along[0], light, shares),
+        "along y": quantiles(asked.along[1], light, shares),
         "kappa (rad/µm) of 0.1, 50, 99.9 %": quantiles(asked.kappa, light, [1e-3, 0.5, 0.999]),
         "light can probe up to": [table.reach, table.expansion.kappa_max],
         "wavelengths of 99.9 %": wavelengths_needed(asked),
@@ -212,7 +212,7 @@ def _of_table(
     smaller = planned[key]
     return result | {
         "needs": {
-            "frequency (rad/µm)": mine.domain.crop,
+            "frequency (rad/µm), along x and y": list(mine.domain.crop),
             "kappa (rad/µm)": mine.domain.kappa_max,
             "tolerance of the table": mine.domain.tolerance,
             "share of the light outside, read from coarse cells": mine.domain.outside,

@@ -108,7 +108,8 @@ def say_outside(planned: Planned, samples: int) -> None:
             continue
         share = planned.shares.get(key)
         light = "" if share is None else f", about {100 * share:.2g} % of the surface's light"
-        far = f"|q| up to {found.frequency:.3g} rad/µm, planned {mine.domain.crop:.3g}"
+        far = f"|q| up to {found.frequency:.3g} rad/µm, planned "
+        far += " × ".join(f"{half:.3g}" for half in mine.domain.crop)
         if found.kappa > mine.domain.kappa_max:
             far += f"; κ up to {found.kappa:.3g}, planned {mine.domain.kappa_max:.3g}"
         say(

@@ -129,7 +129,7 @@ def _key(table: DiffractionTable, height_scale: float) -> str:
     content.update(np.ascontiguousarray(table.order_0).tobytes())
     content.update(np.ascontiguousarray(table.coefficients).data)
     if table.coarse is not None:
-        content.update(repr((table.radius, table.coarse.expansion, table.coarse.grid)).encode())
+        content.update(repr((table.radii, table.coarse.expansion, table.coarse.grid)).encode())
         content.update(np.ascontiguousarray(table.coarse.coefficients).data)
     return content.hexdigest()[:32]
 

@@ -146,7 +146,7 @@ def _table(path: str | os.PathLike[str], document: dict[str, Any], part: int) ->
         order_0=order_0,
         expansion=expansion,
         grid=grid,
-        crop=document.get("crop"),
+        crop=_tuple(document.get("crop")),
         **plain,
     )
 

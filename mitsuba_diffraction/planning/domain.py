@@ -43,23 +43,29 @@ class Asked:
         return np.asarray(self.xyz.sum(axis=1) / self.total)
 
     @property
-    def frequency(self) -> NDArray[np.float64]:
-        """(n,) |q| in rad/µm."""
-        return np.asarray(wavenumber(self.wavelength) * np.hypot(self.u, self.v))
-
-    @property
-    def frequency_per_sine(self) -> NDArray[np.float64]:
+    def wavenumber(self) -> NDArray[np.float64]:
         """(n,) k in rad/µm: u and v times it are α and β."""
         return np.asarray(wavenumber(self.wavelength))
 
     @property
+    def along(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n,), (n,) |α| and |β| in rad/µm."""
+        return np.abs(self.wavenumber * self.u), np.abs(self.wavenumber * self.v)
+
+    @property
+    def frequency(self) -> NDArray[np.float64]:
+        """(n,) |q| in rad/µm."""
+        return np.hypot(*self.along)
+
+    @property
     def kappa(self) -> NDArray[np.float64]:
         """(n,) rad/µm."""
-        return np.asarray(wavenumber(self.wavelength) * self.w)
+        return np.asarray(self.wavenumber * self.w)
 
-    def outside(self, crop: float, kappa_max: float) -> float:
+    def outside(self, crop: tuple[float, float], kappa_max: float) -> float:
         """Share of the surfaces' light that is asked of beyond a domain."""
-        beyond = (self.frequency > crop) | (self.kappa > kappa_max)
+        x, y = (q / half for q, half in zip(self.along, crop, strict=True))
+        beyond = (np.hypot(x, y) > 1.0) | (self.kappa > kappa_max)
         return float(self.light[beyond].sum())
 
 
@@ -74,12 +80,12 @@ class Domain:
     outside : share of the surfaces' light that is looked up beyond.
     """
 
-    crop: float
+    crop: tuple[float, float]
     kappa_max: float
     tolerance: float
     outside: float
 
-    def arguments(self) -> dict[str, float]:
+    def arguments(self) -> dict[str, Any]:
         """For `DiffractionTable.build`."""
         return {"crop": self.crop, "kappa_max": self.kappa_max, "tolerance": self.tolerance}
 
@@ -99,18 +105,33 @@ def domain_for(
     height_scale : largest of the surfaces'.
     tolerance : relative error of the picture.
     """
-    frequency, light = asked.frequency, asked.light
-    crop = min(_reach(frequency, light, tolerance) * ROOM, table.reach)
+    light = asked.light
+    crop = _ellipse(asked.along, light, tolerance)
+    crop = (min(crop[0] * ROOM, table.reach), min(crop[1] * ROOM, table.reach))
     # All that these heights can make: the bound of the albedo looks at every direction, and next
     # to nothing is gained by less
     kappa_max = table.reach * height_scale
     own = tolerance / max(float(light.sum()), 1e-6)
     return Domain(
-        crop=float(f"{crop:.6g}"),
-        kappa_max=float(f"{kappa_max:.6g}"),
+        crop=crop,
+        kappa_max=kappa_max,
         tolerance=max(table.tolerance, float(f"{min(own, MOST_TOLERANCE):.2g}")),
         outside=asked.outside(crop, kappa_max),
     )
+
+
+def _ellipse(
+    along: tuple[NDArray[np.float64], NDArray[np.float64]],
+    light: NDArray[np.float64],
+    share: float,
+) -> tuple[float, float]:
+    """Half axes of the smallest ellipse that leaves at most a share of the light outside."""
+    x, y = along
+    # Fingers and tracks spread light across themselves much farther than along
+    ratios = 2.0 ** np.arange(-3.0, 3.01, 0.25)
+    halves = [(_reach(np.hypot(x, y / ratio), light, share), ratio) for ratio in ratios]
+    half, ratio = min(halves, key=lambda found: found[0] ** 2 * found[1])
+    return half, float(half * ratio)
 
 
 def _reach(values: NDArray[np.float64], light: NDArray[np.float64], share: float) -> float:

@@ -225,9 +225,10 @@ def check_light(loaded: Loaded, plan: Plan) -> dict[str, float]:
             raise DiffractionError(
                 f"the plan does not fit: {100 * shares[key]:.2g} % of the light of "
                 f"{', '.join(table.surfaces)} is looked up outside of it (|q| up to "
-                f"{farthest:.3g} rad/µm; the plan ends at {domain.crop:.3g}, κ at "
-                f"{domain.kappa_max:.3g}), and it was made for {100 * plan.tolerance:.2g} %; plan "
-                "the scene with this camera and these lights, or render without --plan"
+                f"{farthest:.3g} rad/µm; the plan ends at {domain.crop[0]:.3g} along x, "
+                f"{domain.crop[1]:.3g} along y, κ at {domain.kappa_max:.3g}), and it was made for "
+                f"{100 * plan.tolerance:.2g} %; plan the scene with this camera and these lights, "
+                "or render without --plan"
             )
     return shares
 

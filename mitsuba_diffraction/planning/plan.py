@@ -55,7 +55,7 @@ class Plan:
     paths: int
     tables: Mapping[str, PlannedTable] = field(default_factory=dict)
 
-    def limits(self) -> dict[str, dict[str, float]]:
+    def limits(self) -> dict[str, dict[str, Any]]:
         """What `plugin.session.Session` follows."""
         return {
             key: table.domain.arguments()
@@ -110,8 +110,9 @@ _REMEDY = "make one with 'mitsuba-diffraction plan SCENE -o plan.json'"
 def _table(document: dict[str, Any]) -> PlannedTable:
     domain = document["domain"]
     if domain is not None:
-        domain = Domain(**{name: float(value) for name, value in domain.items()})
-        if not all(value > 0.0 for value in domain.arguments().values()):
+        x, y = (float(value) for value in domain.pop("crop"))
+        domain = Domain(crop=(x, y), **{name: float(value) for name, value in domain.items()})
+        if not min(x, y, domain.kappa_max, domain.tolerance) > 0.0:
             raise ValueError(f"domain {domain}")
     whole, planned = document["memory"]
     return PlannedTable(

@@ -45,7 +45,7 @@ def marks(table: DiffractionTable, *constants: object) -> list[Any]:
             table.spacing,
             table.scale,
             table.sigma,
-            table.radius,
+            table.radii,
         )
     )
     if table.coarse is not None:

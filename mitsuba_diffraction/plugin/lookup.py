@@ -17,7 +17,7 @@ from ..errors import DiffractionError
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
 from .memory import index_between, upload
-from .restricted import RestrictedTable
+from .restricted import RestrictedTable, within
 from .scalar_lookup import ScalarTable
 from .series import inner, packet_size, packets, pad, padded, series_of
 
@@ -36,7 +36,7 @@ class DeviceTable:
 
     def __init__(self, table: DiffractionTable) -> None:
         self.expansion, self.grid = table.expansion, table.grid
-        self.spacing, self.reach = table.spacing, table.radius
+        self.spacing, self.radii = table.spacing, table.radii
         self.components = table.coefficients.shape[3]
         self.terms = padded(table.expansion.terms)
         self.half = table.coefficients.dtype == np.float16
@@ -59,9 +59,7 @@ class DeviceTable:
         qx, qy, kappa : mi.Float, rad/µm. Outside the table the result is NaN, never a guess.
         """
         grid, expansion = self.grid, self.expansion
-        inside = (dr.square(qx) + dr.square(qy) <= (self.reach * (1 + 1e-6)) ** 2) & (
-            kappa <= expansion.kappa_max * (1 + 1e-6)
-        )
+        inside = within(qx, qy, self.radii) & (kappa <= expansion.kappa_max * (1 + 1e-6))
         interval, weights, centre = self.series.at(kappa)
 
         x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
@@ -177,7 +175,7 @@ def device_table(table: DiffractionTable) -> DeviceTable | ScalarTable | Restric
         device = kind(table)
         if table.coarse is not None:
             coarse = kind(table.coarse)
-            device = RestrictedTable(device, coarse, table.radius, table.expansion.kappa_max)
+            device = RestrictedTable(device, coarse, table.radii, table.expansion.kappa_max)
         variants[mi.variant()] = device
     return variants[mi.variant()]
 

@@ -11,6 +11,11 @@ import mitsuba as mi
 import numpy as np
 
 
+def within(qx: Any, qy: Any, radii: tuple[float, float]) -> Any:
+    """Whether frequencies lie in an ellipse, to rounding in single precision."""
+    return dr.square(qx * (1.0 / radii[0])) + dr.square(qy * (1.0 / radii[1])) <= 1.0 + 2e-6
+
+
 @dataclass(frozen=True)
 class Outside:
     """Look-ups that the orders of a table did not reach.
@@ -32,12 +37,14 @@ class RestrictedTable:
     Parameters
     ----------
     fine, coarse : `plugin.lookup.DeviceTable`, or `ScalarTable` in scalar variants.
-    radius, kappa_max : where the fine one ends, rad/µm.
+    radii, kappa_max : where the fine one ends, (x, y) and κ in rad/µm.
     """
 
-    def __init__(self, fine: Any, coarse: Any, radius: float, kappa_max: float) -> None:
+    def __init__(
+        self, fine: Any, coarse: Any, radii: tuple[float, float], kappa_max: float
+    ) -> None:
         self.fine, self.coarse = fine, coarse
-        self._square, self._kappa_max = (radius * (1 + 1e-6)) ** 2, kappa_max * (1 + 1e-6)
+        self._radii, self._kappa_max = radii, kappa_max * (1 + 1e-6)
         self._jit = dr.is_jit_v(mi.Float)
         self._count: Any = mi.UInt32(0)
         self._farthest: Any = mi.Float(0.0)
@@ -47,7 +54,7 @@ class RestrictedTable:
     def window_sum(self, qx: Any, qy: Any, kappa: Any) -> Any:
         """See `DeviceTable.window_sum`."""
         square = dr.square(qx) + dr.square(qy)
-        inside = (square <= self._square) & (kappa <= self._kappa_max)
+        inside = within(qx, qy, self._radii) & (kappa <= self._kappa_max)
         if not self._jit:
             if inside:
                 return self.fine.window_sum(qx, qy, kappa)

@@ -63,7 +63,7 @@ class Session:
     listening : whether calls are recorded at the moment.
     """
 
-    limits: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    limits: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     sample_like: Mapping[str, DiffractionTable] = field(default_factory=dict)
     recording: bool = False
     timing: bool = False

@@ -209,13 +209,14 @@ class _Beyond:
         self._splats = [_splat(middle, grid, smoothing) for middle in middles]
         # Which orders the table itself has, and the share of each cell that it has not
         x, y = (axis.frequency for axis in axes)
-        self.inside = (np.hypot(x, y[:, None]) <= table.radius).astype(np.float32)
+        along_x, along_y = table.radii
+        self.inside = (np.hypot(x / along_x, y[:, None] / along_y) <= 1.0).astype(np.float32)
         within = (np.arange(_PARTS) + 0.5) / _PARTS - 0.5
         x, y = (
             (middle[:, None] + width * within).ravel()
             for middle, width in zip(middles, self._coarse.spacing, strict=True)
         )
-        outside = np.hypot(x, y[:, None]) > table.radius
+        outside = np.hypot(x / along_x, y[:, None] / along_y) > 1.0
         shape = (len(middles[1]), _PARTS, len(middles[0]), _PARTS)
         self._outside = outside.reshape(shape).mean(axis=(1, 3)).astype(np.float32)
 

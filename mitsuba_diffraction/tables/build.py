@@ -55,7 +55,7 @@ def build_table(
     wavelength_range: tuple[float, float],
     height_scale_max: float,
     taps: int | None,
-    crop: float | None,
+    crop: float | tuple[float, float] | None,
     kappa_max: float | None,
     progress: Progress | None,
 ) -> DiffractionTable:
@@ -71,8 +71,9 @@ def build_table(
     steps = (sigma * spacing[0], sigma * spacing[1])
     coherent = coherence == "patch"
     reach = reach_of(wavelength_range)
-    crop, kappa_max = restricted(crop, kappa_max, reach, reach * height_scale_max)
-    whole = crop == reach and kappa_max == reach * height_scale_max
+    radii, kappa_max = restricted(crop, kappa_max, reach, reach * height_scale_max)
+    everywhere = radii == (reach, reach)
+    whole = everywhere and kappa_max == reach * height_scale_max
     chosen_taps = (taps, taps) if taps else taps_for(steps, tolerance * TAPS_SHARE, coherent)
     spare = tolerance - reach_error(steps, chosen_taps, coherent)
     budget = SERIES_SHARE * max(spare, tolerance * TAPS_SHARE)
@@ -92,7 +93,7 @@ def build_table(
 
     half = expansion.basis == "chebyshev" and tolerance >= HALF_FROM
     for _ in range(_ATTEMPTS):
-        grid = _grid(spacing, steps, crop, chosen_taps, coherent, patches)
+        grid = _grid(spacing, steps, radii, chosen_taps, coherent, patches)
         attempt = _Attempt(patches, grid, expansion, functions, half, tolerance, tell)
         if trims and attempt.error(trims) > tolerance:
             trims = ()
@@ -111,7 +112,7 @@ def build_table(
                 height_scale_max=float(height_scale_max),
                 error=attempt.measured,
                 source=describe(patches, coherence_width, wavelength_range, chosen_taps),
-                crop=None if crop == reach else crop,
+                crop=None if everywhere else radii,
                 coarse=None
                 if whole
                 else coarse_table(
@@ -335,7 +336,7 @@ def _halved(coefficients: NDArray[np.float32]) -> tuple[NDArray[np.float16], flo
 def _grid(
     spacing: tuple[float, float],
     steps: tuple[float, float],
-    reach: float,
+    radii: tuple[float, float],
     taps: tuple[int, int],
     coherent: bool,
     patches: Sequence[HeightField],
@@ -346,7 +347,7 @@ def _grid(
             f"window that a look-up would read {taps[0]}×{taps[1]} orders; crop the patch, or "
             "raise coherence_width or tolerance"
         )
-    radius = (reach / spacing[0], reach / spacing[1])
+    radius = (radii[0] / spacing[0], radii[1] / spacing[1])
     ny, nx = np.max([patch.shape for patch in patches], axis=0)
     # A margin as wide as the taps: see tables.lookup
     last_x = min(math.ceil(radius[0]), int(nx) // 2) + taps[0]

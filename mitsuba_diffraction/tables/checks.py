@@ -51,13 +51,18 @@ def check_parameters(
 
 
 def restricted(
-    crop: float | None, kappa_max: float | None, reach: float, whole: float
-) -> tuple[float, float]:
-    """The domain of a table, at most `reach` and `whole`; refuse what leaves nothing."""
-    for name, value in (("crop", crop), ("kappa_max", kappa_max)):
+    crop: float | tuple[float, float] | None,
+    kappa_max: float | None,
+    reach: float,
+    whole: float,
+) -> tuple[tuple[float, float], float]:
+    """The domain of a table, at most `reach` in x and y and `whole`; refuse what leaves nothing."""
+    x, y = crop if isinstance(crop, Sequence) else (crop, crop)
+    for name, value in (("crop", x), ("crop", y), ("kappa_max", kappa_max)):
         if value is not None and not value > 0.0:
             raise DiffractionError(f"{name}={value:g} must be a positive number, in rad/µm")
-    return min(crop or reach, reach), min(kappa_max or whole, whole)
+    radii = (float(min(x or reach, reach)), float(min(y or reach, reach)))
+    return radii, float(min(kappa_max or whole, whole))
 
 
 def check_patches(patches: Sequence[HeightField], coherence: str, basis: str) -> None:

@@ -53,8 +53,8 @@ class Proposals:
 def proposals(table: DiffractionTable) -> Proposals:
     """Tabulate the densities of all bands."""
     edge = [
-        min(table.radius, n * spacing) + 2.0 / table.sigma
-        for n, spacing in zip(table.grid.last, table.spacing, strict=True)
+        min(radius, n * spacing) + 2.0 / table.sigma
+        for radius, n, spacing in zip(table.radii, table.grid.last, table.spacing, strict=True)
     ]
     cell = max(CELL / table.sigma, 2.0 * max(edge) / MOST_CELLS)
     counts = [math.ceil(2.0 * e / cell) for e in edge]

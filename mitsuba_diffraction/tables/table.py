@@ -41,7 +41,7 @@ class DiffractionTable:
     coherence_width, coherence, tolerance, wavelength_range, height_scale_max : as asked for.
     error : the measured error (see `tables.error`): near, far, and where.
     source : the heights: name, digest, size, statistics, history.
-    crop : where the orders end, rad/µm from order 0, if before what light can probe.
+    crop : (x, y), half axes of the ellipse of orders, rad/µm, if less than what light can probe.
     coarse : what a table of a restricted domain has beyond `crop` and its κ_max (`tables.coarse`).
     """
 
@@ -58,7 +58,7 @@ class DiffractionTable:
     height_scale_max: float
     error: Mapping[str, float]
     source: Mapping[str, Any] = field(default_factory=dict)
-    crop: float | None = None
+    crop: tuple[float, float] | None = None
     coarse: DiffractionTable | None = None
 
     @classmethod
@@ -74,7 +74,7 @@ class DiffractionTable:
         wavelength_range: tuple[float, float] = (360.0, 830.0),
         height_scale_max: float = 1.5,
         taps: int | None = None,
-        crop: float | None = None,
+        crop: float | tuple[float, float] | None = None,
         kappa_max: float | None = None,
         progress: Progress | None = None,
     ) -> DiffractionTable:
@@ -92,8 +92,8 @@ class DiffractionTable:
         wavelength_range : nm; the shortest sets how far the table reaches.
         height_scale_max : largest factor on the heights that the table serves.
         taps : bins read in each direction; by default as many as the tolerance takes.
-        crop : largest spatial frequency k·|(u, v)| that is tabulated, rad/µm; by default all that
-            light of the shortest wavelength can probe.
+        crop : largest spatial frequency k·|(u, v)| that is tabulated, rad/µm, or half axes of an
+            ellipse along x and y; by default all that light of the shortest wavelength can probe.
         kappa_max : largest k·w·height_scale that is, rad/µm; by default likewise. Beyond either, a
             table of coarse cells answers, which is right on average (`tables.coarse`).
         progress : called as progress(done, total, text) while it works.
@@ -157,9 +157,9 @@ class DiffractionTable:
         return reach_of(self.wavelength_range)
 
     @property
-    def radius(self) -> float:
-        """Largest spatial frequency at which the table has the orders, rad/µm."""
-        return self.reach if self.crop is None else min(self.crop, self.reach)
+    def radii(self) -> tuple[float, float]:
+        """Half axes (x, y) of the ellipse in which the table has the orders, rad/µm."""
+        return (self.reach, self.reach) if self.crop is None else self.crop
 
     @property
     def nbytes(self) -> int:
@@ -176,15 +176,17 @@ class DiffractionTable:
         """
         if self.coarse is not None:
             raise DiffractionError(
-                f"{what} all orders, but the table was made for |q| up to {self.radius:.4g} and κ "
-                f"up to {self.expansion.kappa_max:.4g} rad/µm only; give a table without crop and "
+                f"{what} all orders, but the table was made for frequencies up to "
+                f"{self.radii[0]:.4g} along x, {self.radii[1]:.4g} along y and κ up to "
+                f"{self.expansion.kappa_max:.4g} rad/µm only; give a table without crop and "
                 "kappa_max, or the height field"
             )
 
     def covers(self, qx: ArrayLike, qy: ArrayLike, kappa: ArrayLike) -> NDArray[np.bool_]:
         """Whether a look-up finds the orders (to rounding in single precision)."""
         slack = 1.0 + 1e-6
-        inside = np.hypot(qx, qy) <= self.radius * slack
+        x, y = (np.asarray(q) / r for q, r in zip((qx, qy), self.radii, strict=True))
+        inside = np.hypot(x, y) <= slack
         return inside & (np.asarray(kappa) <= self.expansion.kappa_max * slack)
 
     def centre(self, kappa: ArrayLike) -> NDArray[np.float64]:
@@ -245,7 +247,7 @@ class DiffractionTable:
         _, ny, nx, _, _ = self.coarse.coefficients.shape
         return {
             "restricted_to": {
-                "frequency (rad/µm)": self.radius,
+                "frequency (rad/µm)": list(self.radii),
                 "kappa (rad/µm)": self.expansion.kappa_max,
                 "cells beyond": [nx, ny],
             }

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.Diff
 @pytest.fixture(scope="module", params=["ensemble", "patch"])
 def table(request):
     return md.DiffractionTable.build(
-        PATCH, coherence_width=18.0, coherence=request.param, crop=6.0, kappa_max=20.0
+        PATCH, coherence_width=18.0, coherence=request.param, crop=(6.0, 5.0), kappa_max=20.0
     )
 
 
