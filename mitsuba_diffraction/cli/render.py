@@ -53,7 +53,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )  # fmt: skip
     parser.add_argument(
         "--preview", action="store_true",
-        help="half the width and height, and few samples (8 to 16, unless -s is given)",
+        help="half the width and height, and at most 16 samples, unless -s is given",
     )  # fmt: skip
     parser.add_argument(
         "--plan", nargs="?", const=MAKE, metavar="PLAN", type=plan_or_json,

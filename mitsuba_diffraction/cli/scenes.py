@@ -112,9 +112,9 @@ def shrink(sensor: Any) -> None:
 
 
 def preview_samples(sensor: Any, preview: bool) -> int:
-    """The scene's own samples per pixel; for a preview an eighth of them, 8 to 16."""
+    """The scene's own samples per pixel; for a preview at most 16."""
     own = int(sensor.sampler().sample_count())
-    return min(own, max(8, min(16, own // 8))) if preview else own
+    return min(own, 16) if preview else own
 
 
 def sensor_of(scene: Any, index: int) -> Any:

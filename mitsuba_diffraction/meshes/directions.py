@@ -76,11 +76,17 @@ def direction_field(
     Raises
     ------
     DiffractionError
-        If `along` or `smoothing` is none of these, or the mesh has no area.
+        If `along` or `smoothing` is none of these, or the mesh has no area or is not finite.
     """
     if along not in GUIDES:
         raise DiffractionError(f"along={along!r} is unknown; choose one of {', '.join(GUIDES)}")
     check_limits({"smoothing": smoothing}, {"smoothing": (1e-4, 1.0)}, "directions")
+    lost = np.flatnonzero(~np.isfinite(np.hstack([positions, normals])).all(axis=1))
+    if len(lost):
+        raise DiffractionError(
+            f"mesh: the position or normal of vertex {lost[0]} is not finite ({len(lost)} such "
+            "vertices); repair the mesh"
+        )
     surface = _Surface.weld(positions, normals, faces)
     if along == "smooth":
         field = _smoothest(surface)

@@ -172,7 +172,6 @@ def test_linear_frames_can_be_asked_for(render):
 def test_a_preview_is_half_as_wide_and_quick(render):
     ran = render("--preview", "-D", "spp=512", "-o", "a.png")
     assert "a.png: 8 x 5 pixels, 16 samples per pixel" in ran.out
-    assert "8 samples" in render("--preview", "-D", "spp=64", "-o", "a.png").out
     assert "2 samples" in render("--preview", "-o", "a.png").out
     assert "3 samples" in render("--preview", "-s", "3", "-o", "a.png").out
 

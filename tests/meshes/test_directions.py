@@ -6,6 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.meshes import (
@@ -20,7 +23,7 @@ from mitsuba_diffraction.meshes import (
 )
 from mitsuba_diffraction.meshes.directions import GUIDES
 from mitsuba_diffraction.meshes.scales import Scales
-from mitsuba_diffraction.meshes.trimesh import grid_faces
+from mitsuba_diffraction.meshes.trimesh import grid_faces, vertex_normals
 
 Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -155,6 +158,28 @@ def test_what_is_oriented_is_usable_and_reads_back(tmp_path: Path) -> None:
     np.testing.assert_allclose(again[0], mesh.positions, atol=1e-6)
 
 
+@given(
+    arrays(np.int64, st.tuples(st.integers(1, 12), st.just(3)), elements=st.integers(0, 7)),
+    st.integers(0, 99),
+    st.sampled_from(GUIDES),
+    st.booleans(),
+)
+@settings(max_examples=60, deadline=None)
+def test_any_triangles_get_a_finite_field_or_are_refused(faces, seed, along, own_uv):
+    rng = np.random.default_rng(seed)
+    positions = rng.normal(size=(8, 3))
+    normals = vertex_normals(positions, faces)
+    try:
+        field = direction_field(positions, normals, faces, along)
+    except DiffractionError as error:
+        assert "no triangle has an area" in str(error)
+        return
+    uv = None if own_uv else rng.normal(size=(8, 2))
+    mesh = oriented_mesh(positions, normals, faces, field.directions, uv)
+    assert np.isfinite(mesh.uv).all()
+    assert np.isfinite(mesh.orientation).all()
+
+
 def test_bad_requests_are_one_line() -> None:
     with pytest.raises(DiffractionError, match="along='w' is unknown; choose one of smooth, x"):
         direction_field(*ball(), "w")
@@ -163,6 +188,10 @@ def test_bad_requests_are_one_line() -> None:
     flat = np.zeros((3, 3)), np.ones((3, 3)), np.array([[0, 1, 2]])
     with pytest.raises(DiffractionError, match="no triangle has an area"):
         direction_field(*flat)
+    positions, normals, faces = ball()
+    positions[7] = np.inf
+    with pytest.raises(DiffractionError, match="normal of vertex 7 is not finite"):
+        direction_field(positions, normals, faces)
     with pytest.raises(DiffractionError, match="disc: inner = 3 is outside"):
         disc(3.0, 2.0)
     with pytest.raises(DiffractionError, match="piece: rows = 99 is outside 3 to 17"):
