@@ -59,9 +59,12 @@ methods: setup  ## measure the methods, and put the table into the README
 validation: setup  ## compare the model with rigorous solutions: docs/validation.md
 	@$(PYTHON3) -m mitsuba_diffraction.validation report -o docs
 
-realtime: setup  ## compare the shaders with the path tracer, and put sheet and table into README.md
-	@$(RUN) compare scenes/snake.xml --method all -s 768 --full-spp 48 -o out/compare
-	@$(PYTHON3) -m mitsuba_diffraction.figures.realtime out/compare -o README.md
+COMPARE := $(RUN) compare
+realtime: setup  ## compare the shaders with the path tracer, and put sheet and tables into README.md
+	@$(COMPARE) scenes/snake.xml --method all -s 768 --full-spp 48 -o out/compare/snake
+	@$(COMPARE) scenes/plate.xml --method lut spectral -s 512 --full-spp 0 -D resx=240 -D resy=200 -o out/compare/plate
+	@$(COMPARE) scenes/sphere.xml --method lut spectral -s 512 --full-spp 0 -D resx=240 -D resy=200 -o out/compare/sphere
+	@$(PYTHON3) -m mitsuba_diffraction.figures.realtime $(addprefix out/compare/,snake plate sphere) -o README.md
 
 lint: setup  ## check style and types
 	@$(PYTHON3) -m ruff check

@@ -42,8 +42,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "_compare in the current folder",
     )  # fmt: skip
     parser.add_argument(
-        "--method", choices=(*METHODS, "all"), default="lut", help="of the shaders; default: lut"
-    )
+        "--method", nargs="+", metavar="NAME", choices=(*METHODS, "all"), default=["lut"],
+        help=f"of the shaders: some of {', '.join(METHODS)}, or all; default: lut",
+    )  # fmt: skip
     parser.add_argument(
         "-s", "--spp", metavar="N", type=whole_number(2), default=1024,
         help="samples per pixel of the path-traced direct light; default: 1024",
@@ -71,13 +72,15 @@ def run(args: argparse.Namespace) -> int:
     if folder.exists() and not folder.is_dir():
         raise DiffractionError(f"-o {folder}: it is a file; name a folder")
     check_writable(folder / "compare.json", make_folder=True)
-    methods = METHODS if args.method == "all" else (args.method,)
+    every = "all" in args.method
+    methods = METHODS if every else tuple(dict.fromkeys(args.method))
 
     from ..comparison.measures import as_json, difference, exposure_of, regions
     from ..comparison.sheet import write_sheet
     from ..comparison.table import markdown
     from ..comparison.truth import box_sensor, seen, with_lights
     from ..glsl.renderer import Renderer
+    from ..glsl.timing import fragment_times
     from .mitsuba_text import warnings_as_ours
     from .passes import Stop
     from .scenes import load_scene, sensor_of, set_variant
@@ -122,7 +125,7 @@ def run(args: argparse.Namespace) -> int:
                 samples = min(args.supersampling, _FEWER if method in DOCUMENTED else 64)
                 drawn = renderer.render(method, supersampling=samples)
             except DiffractionError as error:
-                if args.method != "all":
+                if not every:
                     raise
                 say_warning(f"left out: {error}")  # it does not suit this surface
                 continue
@@ -131,7 +134,7 @@ def run(args: argparse.Namespace) -> int:
             errors = {
                 name: difference(reference, other, mask, exposure) for name, mask in areas.items()
             }
-            seconds = renderer.frame_time(method, frames=3)
+            seconds = renderer.frame_time(method, frames=1 if method in DOCUMENTED else 3)
             _write(other, folder / f"{method}.exr", args, variant, samples**2)
             write_sheet(
                 folder / f"{method}.png", reference, other, full, method=method,
@@ -140,10 +143,13 @@ def run(args: argparse.Namespace) -> int:
             table[method] = {
                 "supersampling": samples,
                 "frame_ms": 1e3 * seconds,
-                "fragment_ns": 1e9 * renderer.fragment_time(method),
                 "texture_bytes": renderer.texture_bytes(method),
                 **errors,
             }
+        bar(0, 1, "timing fragments")
+        for method, times in fragment_times(renderer, tuple(table)).items():
+            table[method]["fragment_ns"] = 1e9 * times["whole"]
+            table[method]["look_up_ns"] = 1e9 * times["look_up"]
     noise = difference(halves[0], halves[1], areas["both"], exposure)
     document = {
         "scene": str(args.scene), "parameters": parameters, "variant": variant,

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
+_OURS = ("lut", "spectral")
 _HEAD = (
-    "| method | ΔE2000 mean | 99 % | FLIP | relative RMSE | frame, ms | look-up, ns "
-    "| textures, MB |\n|---|---|---|---|---|---|---|---|"
+    "| method | ΔE2000 mean | 99 % | FLIP | relative RMSE | frame, ms | fragment, ns "
+    "| × `flss` | look-up, ns | textures, MB |\n|---|---|---|---|---|---|---|---|---|---|"
 )
 
 
@@ -18,7 +21,8 @@ def markdown(document: dict[str, Any]) -> str:
     ----------
     document : what is in compare.json.
     """
-    rows = [_row(method, entry) for method, entry in document["methods"].items()]
+    slow = document["methods"].get("flss", {}).get("fragment_ns")
+    rows = [_row(method, entry, slow) for method, entry in document["methods"].items()]
     share = next(iter(document["methods"].values()))["diffracting"]["share"]
     width, height = document["size"]
     return "\n".join(
@@ -33,7 +37,28 @@ def markdown(document: dict[str, Any]) -> str:
     )
 
 
-def _row(method: str, entry: dict[str, Any]) -> str:
+def scenes_table(documents: Sequence[dict[str, Any]]) -> str:
+    """How far `lut` and `spectral` are off in some scenes, as Markdown.
+
+    Parameters
+    ----------
+    documents : what is in each compare.json.
+    """
+    head = "| scene |" + "".join(f" `{m}`, ΔE2000 mean | 99 % |" for m in _OURS)
+    rows = [head + " noise | pixels |", "|---|" + 2 * len(_OURS) * "---|" + "---|---|"]
+    for document in documents:
+        cells = [f"[{Path(document['scene']).stem}]({document['scene']})"]
+        for method in _OURS:
+            found = document["methods"][method]["diffracting"]
+            cells += [_plain(found["delta_e_mean"]), _plain(found["delta_e_percentiles"]["99"])]
+        pixels = document["methods"][_OURS[0]]["diffracting"]["pixels"]
+        rows.append(
+            f"| {' | '.join(cells)} | {_plain(document['noise_delta_e_mean'])} | {pixels} |"
+        )
+    return "\n".join(rows)
+
+
+def _row(method: str, entry: dict[str, Any], slow: float | None) -> str:
     found = entry["diffracting"]
     cells = (
         f"`{method}`",
@@ -43,6 +68,8 @@ def _row(method: str, entry: dict[str, Any]) -> str:
         _plain(found["relative_rmse"]),
         _plain(entry["frame_ms"]),
         _plain(entry["fragment_ns"]),
+        _plain(slow / entry["fragment_ns"] if slow else None),
+        _plain(entry["look_up_ns"]),
         _plain(entry["texture_bytes"] / 1e6),
     )
     return "| " + " | ".join(cells) + " |"

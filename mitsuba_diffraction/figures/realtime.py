@@ -1,7 +1,8 @@
-"""The README's sheet and table of the shaders, from what `compare` measured.
+"""The README's sheet and tables of the shaders, from what `compare` measured.
 
-mitsuba-diffraction compare scenes/snake.xml --method all -o out/compare
-python -m mitsuba_diffraction.figures.realtime out/compare -o README.md
+mitsuba-diffraction compare scenes/snake.xml --method all -o out/compare/snake
+mitsuba-diffraction compare scenes/plate.xml --method lut spectral -o out/compare/plate
+python -m mitsuba_diffraction.figures.realtime out/compare/snake out/compare/plate -o README.md
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..comparison.table import markdown
+from ..comparison.table import markdown, scenes_table
 from ..errors import DiffractionError
 from . import markers
 from .jpeg import write_jpeg
@@ -25,28 +26,37 @@ _METHOD, _WIDTH = "lut", 1600
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Replace both, and return the exit code."""
+    """Replace them, and return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m mitsuba_diffraction.figures.realtime")
-    parser.add_argument("compared", metavar="FOLDER", type=Path, help="written by compare")
+    parser.add_argument(
+        "compared", metavar="FOLDER", type=Path, nargs="+",
+        help="written by compare; of the first the sheet and all methods are shown",
+    )  # fmt: skip
     parser.add_argument("-o", "--output", metavar="FILE", type=Path, default=Path("README.md"))
     args = parser.parse_args(argv)
 
     def work() -> None:
-        text = _table(args.compared / "compare.json")
+        text = _tables([folder / "compare.json" for folder in args.compared])
         sheet = args.output.parent / SHEET
-        write_jpeg(args.compared / f"{_METHOD}.png", sheet, width=_WIDTH)
+        write_jpeg(args.compared[0] / f"{_METHOD}.png", sheet, width=_WIDTH)
         markers.update(args.output, {"realtime": text})
 
     return exit_code("realtime", work)
 
 
-def _table(file: Path) -> str:
-    try:
-        return markdown(json.loads(file.read_text(encoding="utf-8")))
-    except (OSError, ValueError, KeyError, TypeError, StopIteration) as error:
-        raise DiffractionError(
-            f"'{file}' is not what compare writes ({error}); run compare --method all"
-        ) from error
+def _tables(files: Sequence[Path]) -> str:
+    documents = []
+    for file in files:
+        try:
+            document = json.loads(file.read_text(encoding="utf-8"))
+            markdown(document), scenes_table([document])  # what is missing is missed here
+        except (OSError, ValueError, KeyError, TypeError, StopIteration) as error:
+            raise DiffractionError(
+                f"'{file}' is not what compare writes ({error}); run compare with the methods lut "
+                "and spectral, or all"
+            ) from error
+        documents.append(document)
+    return f"{scenes_table(documents)}\n\n{markdown(documents[0])}"
 
 
 if __name__ == "__main__":

@@ -16,7 +16,12 @@ from .textures import Packed, Texture, Uniform
 REQUIRED = 330
 
 _INSTALL = "apt install libegl1 libgl1 libgl1-mesa-dri"
-_KINDS = {np.dtype(np.float16): "f2", np.dtype(np.float32): "f4", np.dtype(np.uint8): "f1"}
+_KINDS = {
+    np.dtype(np.float16): "f2",
+    np.dtype(np.float32): "f4",
+    np.dtype(np.uint8): "f1",
+    np.dtype(np.uint32): "u4",
+}
 
 
 def headless_context() -> Any:

@@ -81,6 +81,19 @@ def read_lights(scene: Any, middle: Array, most: int) -> Lighting:
     return found
 
 
+def light_definitions(lights: int, sky: bool, displayed: bool = False) -> dict[str, str]:
+    """What a shader's compiler must know of the light: how many without extent, whether any sky.
+
+    displayed : whether the picture goes to a screen, exposed and with the transfer curve of sRGB.
+    """
+    found = {"LIGHTS_LIT": str(lights)}
+    if sky:
+        found["SKY"] = ""
+    if displayed:
+        found["DISPLAYED"] = ""
+    return found
+
+
 def _add(found: Lighting, emitter: Any, middle: Array) -> None:
     import mitsuba as mi
 

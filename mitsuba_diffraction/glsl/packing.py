@@ -16,7 +16,7 @@ from ..tables.colour_build import VISIBLE
 from ..tables.colour_table import ColourTable
 from ..tables.powers import order_0_power, power_series
 from ..tables.table import DiffractionTable
-from .textures import Packed, Texture, as_half, listed, texels
+from .textures import Packed, Texture, as_half, listed, paired, texels
 
 #: First and last wavenumber of the loops over wavelengths, rad/µm.
 WAVENUMBERS = (2e3 * math.pi / VISIBLE[1], 2e3 * math.pi / VISIBLE[0])
@@ -32,14 +32,14 @@ def pack_colours(table: ColourTable) -> Packed:
     """A colour table, for `lut`."""
     grid = table.grid
     starts = np.array([grid.start(n) for n in range(grid.rings)])
-    ring = np.stack([starts, grid.counts], axis=1)
-    pairs = np.concatenate([ring[:-1], ring[1:]], axis=1).astype(np.float32)  # exact to 2²⁴
+    counts = np.array(grid.counts)  # below 2¹⁶: the table would be too large before
+    pairs = np.stack([starts[:-1], counts[:-1] | counts[1:] << 16], axis=1).astype(np.uint32)
     radii, zs = table.order_0.shape[:2]
     return Packed(
         textures=(
-            listed("colours", table.coefficients.reshape(-1, 4)),
+            listed("colours", paired(table.coefficients).reshape(-1, 4)),
             listed("rings", pairs),
-            listed("glossy", table.order_0.reshape(-1, 4)),
+            listed("glossy", paired(_with_next(table.order_0[..., :3]))),
         ),
         uniforms={
             "bins": grid.bins,
@@ -55,6 +55,13 @@ def pack_colours(table: ColourTable) -> Packed:
         },
         definitions={"COHERENT": ""} if table.expansion.kind == "amplitude" else {},
     )
+
+
+def _with_next(values: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Of order 0 (radii, zs, 3): each colour, that of the next z, and two zeros, (n, 8)."""
+    following = np.concatenate([values[:, 1:], values[:, -1:]], axis=1)
+    both = np.concatenate([values, following, np.zeros((*values.shape[:2], 2))], axis=-1)
+    return np.asarray(both.reshape(-1, 8))
 
 
 def pack_powers(table: DiffractionTable) -> Packed:

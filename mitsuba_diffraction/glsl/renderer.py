@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,17 +11,15 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError, DiffractionWarning
 from ..files.bound_cache import cached_bound
-from ..files.cache import cached_colours
-from ..geometry import sigma_of
 from .camera import Camera
-from .context import Bindings, check_version, compile_program, headless_context, set_uniforms
-from .documents import DOCUMENTED, make_documented, pack_method
-from .lights import Light
+from .context import Bindings, check_version, headless_context, set_uniforms
+from .lights import Light, light_definitions
 from .materials import Material, height_scale, pack_surface
-from .packing import area_factor, pack_bounds, pack_colours, pack_powers, pack_responses
-from .scene import VERTEX, RealtimeScene, load, read_scene
-from .source import LIGHTS, METHODS
-from .textures import Packed, Texture, Uniform
+from .packing import pack_bounds, pack_responses
+from .prepared import Prepared, window
+from .scene import RealtimeScene, load, read_scene
+from .source import LIGHTS
+from .textures import Packed, Uniform
 
 Image = NDArray[np.float32]
 
@@ -60,10 +57,10 @@ class Renderer:
         self.context = headless_context() if context is None else context
         check_version(self.context)
         self._buffers = [self.context.buffer(s.vertices.tobytes()) for s in self.scene.surfaces]
-        self._surfaces = [
+        self.bindings = [
             Bindings(self.context, self._common(s.material)) for s in self.scene.surfaces
         ]
-        self._methods: dict[str, _Prepared] = {}
+        self._methods: dict[str, Prepared] = {}
         self._responses: Bindings | None = None
         self._lit_by: tuple[int, ...] = ()
 
@@ -110,49 +107,9 @@ class Renderer:
         target.release()
         return min(times)
 
-    def fragment_time(self, method: str) -> float:
-        """Seconds that a method's own function takes a fragment, the surface's shading apart.
-
-        Looked up are the colours of a plane lit and seen from changing directions; the fastest of
-        some pictures, each of them large enough for a hundredth of a second.
-        """
-        prepared = self._prepared(method)
-        part = next(p for p, s in zip(prepared.parts, self.scene.surfaces, strict=True)
-                    if s.material.bsdf is not None)  # fmt: skip
-        definitions = part.tables.definitions
-        program = compile_program(
-            self.context, method, definitions, vertex="whole.vert", main="probe.frag"
-        )
-        array = self.context.vertex_array(program, [])
-        self.context.enable_only(_moderngl().NOTHING)  # no depth test
-        side = 32
-        found: list[float] = []
-        while len(found) < 3:
-            u, v = np.meshgrid(*2 * [np.linspace(-0.7, 0.7, side)])
-            places = np.stack([u, v, 1.8 - 0.5 * u, np.ones_like(u)], axis=-1).astype(np.float32)
-            given = Bindings(self.context, Packed((Texture("places", places),)))
-            target = self.target(side, side)
-            target.frame.use()
-            unit = given.use(program, part.tables.use(program))
-            self._use_responses(program, unit)
-            set_uniforms(program, {"light_colour": np.ones((LIGHTS, 3), np.float32)})
-            start = time.perf_counter()
-            array.render(vertices=3)
-            self.context.finish()
-            seconds = time.perf_counter() - start
-            if seconds > 0.01 or side >= 1024:
-                found.append(seconds / side**2)
-            else:
-                side *= 2
-            given.release()
-            target.release()
-        array.release()
-        program.release()
-        return min(found)
-
     def texture_bytes(self, method: str) -> int:
         """Memory of a method's own textures."""
-        return self._prepared(method).nbytes
+        return self.prepared(method).nbytes
 
     def draw(
         self,
@@ -177,7 +134,7 @@ class Renderer:
         """
         moderngl = _moderngl()
         camera = camera or self.camera
-        prepared = self._prepared(method)
+        prepared = self.prepared(method)
         frame.use()
         frame.clear(0.0, 0.0, 0.0, 0.0)
         self.context.enable_only(moderngl.DEPTH_TEST)
@@ -193,32 +150,32 @@ class Renderer:
             "view_projection": tuple(matrix.T.ravel().tolist()),
             "eye": tuple(camera.eye.tolist()),
             "view_axis": (0.0, 0.0, 0.0),
-            "lights": len(self.lights),
             "light_place": places,
             "light_colour": colours,
             "sky": tuple(float(x) for x in self.sky),
-            "skies": int(np.any(self.sky != 0.0)),
-            "displays": int(exposure is not None),
             "exposure": 1.0 if exposure is None else exposure,
         }
+        lit = light_definitions(
+            len(self.lights), bool(np.any(self.sky != 0.0)), exposure is not None
+        )
         for surface, own, part in zip(
-            self.scene.surfaces, self._surfaces, prepared.parts, strict=True
+            self.scene.surfaces, self.bindings, prepared.parts(lit), strict=True
         ):
             program, array = part.program, part.array
             set_uniforms(program, shared)
             unit = own.use(program)
             unit = part.tables.use(program, unit)
-            self._use_responses(program, unit)
+            self.use_responses(program, unit)
             if surface.material.bsdf is not None:
                 factor = scale if scale is not None else height_scale(surface.material)
                 set_uniforms(program, {"height_scale": factor})
                 if coherence_width is not None:
-                    set_uniforms(program, _window(part.tables, coherence_width))
+                    set_uniforms(program, window(part.tables, coherence_width))
             array.render(moderngl.TRIANGLES)
 
     def bound_for(self, scale: float) -> None:
         """Take the albedo's bound for another height scale: a second or so, where it is new."""
-        for surface, own in zip(self.scene.surfaces, self._surfaces, strict=True):
+        for surface, own in zip(self.scene.surfaces, self.bindings, strict=True):
             if "bounds" in own.textures:
                 packed = pack_bounds([cached_bound(surface.material.table, scale)])
                 own.textures["bounds"].write(packed.textures[0].data.tobytes())
@@ -227,7 +184,7 @@ class Renderer:
         """Free what lies in the graphics card's memory."""
         for prepared in self._methods.values():
             prepared.release()
-        for thing in (*self._surfaces, *self._buffers):
+        for thing in (*self.bindings, *self._buffers):
             thing.release()
         if self._responses is not None:
             self._responses.release()
@@ -242,12 +199,21 @@ class Renderer:
             return packed | pack_bounds(None)
         return packed | pack_bounds([cached_bound(material.table, height_scale(material))])
 
-    def _prepared(self, method: str) -> _Prepared:
+    def prepared(self, method: str) -> Prepared:
+        """A method's tables and programs, uploaded when it is first wanted.
+
+        Raises
+        ------
+        DiffractionError
+            If there is no such method, or a table does not suit it.
+        """
         if method not in self._methods:
-            self._methods[method] = _Prepared(self, method)
+            self._methods[method] = Prepared(
+                self.context, self.scene, method, self.bindings, self._buffers
+            )
         return self._methods[method]
 
-    def _use_responses(self, program: Any, unit: int) -> None:
+    def use_responses(self, program: Any, unit: int) -> None:
         """The lights' spectra, uploaded anew when other lights are set."""
         if "responses" not in program:
             return
@@ -289,87 +255,6 @@ class Target:
         """Free it."""
         for thing in (self.frame, self.colour, self.depth):
             thing.release()
-
-
-class _Part:
-    """One surface's program, its vertices in it, and its tables."""
-
-    def __init__(self, program: Any, array: Any, tables: Bindings) -> None:
-        self.program, self.array, self.tables = program, array, tables
-
-
-class _Prepared:
-    """Programs and tables of one method for all surfaces of a scene."""
-
-    def __init__(self, renderer: Renderer, method: str) -> None:
-        surfaces = renderer.scene.surfaces
-        packed: dict[int, Packed] = {}
-        tables: dict[int, Bindings] = {}
-        programs: dict[tuple[tuple[str, str], ...], Any] = {}
-        self.parts: list[_Part] = []
-        for surface in surfaces:
-            if surface.material.bsdf is not None:
-                key = id(surface.material.table)
-                if key not in packed:
-                    packed[key] = method_tables(method, surface.material)
-        # what does not diffract is drawn by any of the programs
-        first = next(iter(packed))
-        for surface, own in zip(surfaces, renderer._surfaces, strict=True):
-            key = first if surface.material.bsdf is None else id(surface.material.table)
-            if key not in tables:
-                tables[key] = Bindings(renderer.context, packed[key])
-            definitions = {**own.definitions, **packed[key].definitions}
-            names = tuple(sorted(definitions.items()))
-            if names not in programs:
-                programs[names] = compile_program(renderer.context, method, definitions)
-            program = programs[names]
-            buffer = renderer._buffers[surfaces.index(surface)]
-            array = _vertex_array(renderer.context, program, buffer)
-            self.parts.append(_Part(program, array, tables[key]))
-        self.nbytes = sum(p.nbytes for p in packed.values())
-        self._tables, self._programs = tables.values(), programs.values()
-
-    def release(self) -> None:
-        for part in self.parts:
-            part.array.release()
-        for thing in (*self._tables, *self._programs):
-            thing.release()
-
-
-def method_tables(method: str, material: Material) -> Packed:
-    """What a method reads of a material's table.
-
-    Raises
-    ------
-    DiffractionError
-        If there is no such method, or the table does not suit it.
-    """
-    if method == "lut":
-        return pack_colours(cached_colours(material.table))
-    if method == "spectral":
-        return pack_powers(material.table)
-    if method in DOCUMENTED:
-        heights = material.bsdf.heights()
-        return pack_method(make_documented(method, heights, material.table))
-    raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
-
-
-def _window(tables: Bindings, coherence_width: float) -> dict[str, Uniform]:
-    """Uniforms of another coherence window."""
-    sigma = sigma_of(coherence_width)
-    factor = area_factor(sigma)
-    exponents, own = tables.uniforms.get("exponents"), tables.uniforms["area_factor"]
-    found: dict[str, Uniform] = {"sigma": sigma, "area_factor": factor}
-    if isinstance(exponents, tuple) and isinstance(own, float):
-        found["exponents"] = tuple(float(e) * factor / own for e in exponents)  # both ∝ σ²
-    return found
-
-
-def _vertex_array(context: Any, program: Any, buffer: Any) -> Any:
-    """Those attributes of the vertices that the program reads."""
-    used: Sequence[tuple[str, int]] = [(name, size) for name, size in VERTEX if name in program]
-    layout = " ".join(f"{n}f" if name in program else f"{4 * n}x" for name, n in VERTEX)
-    return context.vertex_array(program, [(buffer, layout, *(name for name, _ in used))])
 
 
 def _moderngl() -> Any:

@@ -14,7 +14,7 @@ from ..errors import DiffractionError
 from .camera import Camera, read_camera
 from .lights import Lighting, read_lights
 from .materials import Map, Material, diffracts, read_material
-from .shapes import Triangles, triangles_of
+from .shapes import Triangles, across, triangles_of
 from .source import LIGHTS
 
 Array = NDArray[np.float64]
@@ -144,7 +144,12 @@ def _middle(triangles: list[Triangles]) -> Array:
 
 def _vertices(triangles: Triangles, material: Material, shape: Any) -> NDArray[np.float32]:
     count = len(triangles.positions)
-    parts = [triangles.positions, triangles.normals, triangles.tangents, triangles.texcoords]
+    normals, tangents = triangles.normals, triangles.tangents
+    # shaders divide by the length of what is left of it across the normal
+    left = np.cross(normals, tangents)
+    lost = np.sum(left**2, axis=1) <= 1e-12 * np.sum(tangents**2, axis=1)
+    tangents = np.where(lost[:, None], across(normals), tangents)
+    parts = [triangles.positions, normals, tangents, triangles.texcoords]
     parts += [
         _attribute(material.pigment, triangles, shape, 3),
         _attribute(material.axis, triangles, shape, 2),

@@ -72,7 +72,7 @@ def _of_mesh(shape: Any) -> Triangles:
     normals = np.repeat(flat, 3, axis=0)
     if shape.has_vertex_normals():
         normals = np.array(shape.vertex_normals_buffer(), np.float64).reshape(-1, 3)[corners]
-    tangents = _across(flat)
+    tangents = across(flat)
     texcoords = np.zeros((len(corners), 2))
     if shape.has_vertex_texcoords():
         texcoords = np.array(shape.vertex_texcoords_buffer(), np.float64).reshape(-1, 2)[corners]
@@ -85,7 +85,7 @@ def _of_mesh(shape: Any) -> Triangles:
     return Triangles(positions, normals, np.repeat(tangents, 3, axis=0), texcoords, corners)
 
 
-def _across(normals: Array) -> Array:
+def across(normals: Array) -> Array:
     """Mitsuba's tangent where there are no texture coordinates (Duff et al. 2017)."""
     x, y, z = normals.T
     sign = np.where(z < 0.0, -1.0, 1.0)

@@ -24,7 +24,7 @@ _PREAMBLES = {
     "desktop": "#version 330 core\n",
     "web": (
         "#version 300 es\nprecision highp float;\nprecision highp int;\n"
-        "precision highp sampler2D;\n"
+        "precision highp sampler2D;\nprecision highp usampler2D;\n"
     ),
 }
 
@@ -72,7 +72,7 @@ def fragment_parts(
     if method not in METHODS:
         raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
     constants = {"PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1), "LIGHTS": str(LIGHTS)}
-    constants |= {"SURFACE_KIND": "0", **definitions}
+    constants |= {"SURFACE_KIND": "0", "LIGHTS_LIT": "1", **definitions}
     lines = [f"#define {name} {value}\n" for name, value in constants.items()]
     parts = [("preamble", _PREAMBLES[dialect] + "".join(lines))]
     shared = (

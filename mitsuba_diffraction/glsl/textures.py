@@ -30,7 +30,8 @@ class Texture:
     Attributes
     ----------
     name : of the sampler in the shader.
-    data : (rows, columns, channels) float16, float32 or uint8, one, two or four channels.
+    data : (rows, columns, channels) float16, float32, uint8 or uint32 (read as whole numbers), one,
+        two or four channels.
     smooth : whether it is a picture, filtered and repeated; else a list, read texel by texel.
     """
 
@@ -72,7 +73,7 @@ class Packed:
         )
 
 
-def listed(name: str, entries: NDArray[np.floating]) -> Texture:
+def listed(name: str, entries: NDArray[np.generic]) -> Texture:
     """Entries (n, channels) as a texture with rows of `PAGE` texels: what `entry` reads."""
     count, channels = entries.shape
     rows = -(-count // PAGE)
@@ -108,3 +109,20 @@ def as_half(values: NDArray[np.floating]) -> NDArray[np.floating]:
     if np.abs(values).max(initial=0.0) < 6e4 and half_error(values) <= HALF_ERROR:
         return values.astype(np.float16)
     return values.astype(np.float32, copy=False)
+
+
+def shortened(values: NDArray[np.floating]) -> NDArray[np.float32]:
+    """The values rounded to 8 binary digits: what the upper half of a float32 holds.
+
+    Half floats have 11 digits, but other exponents: drivers in software take as long to undo that
+    as to fetch the numbers, where these take a shift.
+    """
+    bits = np.ascontiguousarray(values, np.float32).view(np.uint32)
+    nearest = bits + (0x7FFF + (bits >> 16 & 1))  # ties to even
+    return (nearest & np.uint32(0xFFFF0000)).view(np.float32)
+
+
+def paired(values: NDArray[np.floating]) -> NDArray[np.uint32]:
+    """The upper halves of numbers (…, 2n), `shortened`, two in each word (…, n), low one first."""
+    upper = shortened(values).view(np.uint32)
+    return np.asarray(upper[..., ::2] >> 16 | upper[..., 1::2], np.uint32)

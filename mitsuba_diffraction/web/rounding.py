@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
+from ..glsl.textures import shortened
 from ..tables.colour_table import ColourTable
 from ..tables.powers import power_series
 from ..tables.table import DiffractionTable
@@ -42,5 +43,6 @@ def rounded_table(table: DiffractionTable, bits: int) -> DiffractionTable:
 
 
 def rounded_colours(table: ColourTable, bits: int) -> ColourTable:
-    """A colour table with fewer digits."""
-    return dataclasses.replace(table, coefficients=rounded(table.coefficients, bits))
+    """A colour table with fewer digits, each of which the shader can read."""
+    fewer = shortened(rounded(table.coefficients, bits)).astype(np.float16)
+    return dataclasses.replace(table, coefficients=fewer, order_0=shortened(table.order_0))

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..colour import encode_srgb
 from ..errors import DiffractionError
 from ..files.bound_cache import cached_bound
+from ..glsl.lights import light_definitions
 from ..glsl.materials import Material, height_scale, pack_surface
 from ..glsl.packing import pack_bounds, pack_responses
 from ..glsl.scene import RealtimeScene
@@ -122,7 +123,8 @@ def web_scene(
         "box": [scene.low.tolist(), scene.high.tolist()],
         "subject": _box([s.vertices[:, :3] for s in scene.diffracting]),
     }
-    _add_programs(header, surfaces, shown, packed)
+    lit = light_definitions(len(lights), any(x != 0.0 for x in header["sky"]))
+    _add_programs(header, surfaces, shown, packed, lit)
     loss = {
         method: _worst([packed[method, n].loss for n in range(len(tables))]) for method in shown
     }
@@ -183,7 +185,9 @@ def _texture(texture: Texture, sections: Sections, done: Any) -> dict[str, Any]:
         entry["kind"] = "picture"
         entry["section"] = sections.add(packed_file(_png(texture.data)))
         return entry
-    entry["kind"] = "half" if texture.data.dtype == np.float16 else "single"
+    entry["kind"] = {2: "half", 4: "single"}[texture.data.dtype.itemsize]
+    if texture.data.dtype == np.uint32:
+        entry["kind"] = "words"
     if done is None:
         done = packed_array(as_columns(texture.data, channels))
     entry["section"] = sections.add(done)
@@ -206,6 +210,7 @@ def _add_programs(
     surfaces: Sequence[tuple[dict[str, Any], Packed]],
     methods: Sequence[str],
     packed: Any,
+    lit: dict[str, str],
 ) -> None:
     """The shaders, each once, and which surface is drawn with which."""
     sources: list[str] = []
@@ -214,7 +219,8 @@ def _add_programs(
         table = entry.setdefault("table", 0)
         entry["programs"] = {}
         for method in methods:
-            definitions = {**common.definitions, **packed[method, table].packed.definitions}
+            tables = packed[method, table].packed.definitions
+            definitions = {**common.definitions, **tables, **lit}
             source = fragment_source(method, definitions, "web")
             if source not in sources:
                 sources.append(source)

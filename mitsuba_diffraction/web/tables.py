@@ -53,7 +53,7 @@ def web_table(method: str, table: DiffractionTable, digits: int) -> WebTable:
         colours = cached_colours(table)
         fewer = rounded_colours(colours, digits)
         packed, loss = pack_colours(fewer), colour_loss(colours, fewer)
-        width = fewer.coefficients.shape[-1]
+        width = fewer.coefficients.shape[-1] // 2  # two numbers a word
     else:
         powers = power_table(table)
         less = rounded_table(powers, digits)

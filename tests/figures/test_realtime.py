@@ -16,12 +16,21 @@ README = Path(__file__).parents[2] / "README.md"
 @pytest.fixture
 def compared(tmp_path):
     found = {
-        "share": 0.25, "delta_e_mean": 0.4567, "delta_e_percentiles": {"99": 3.21},
+        "pixels": 640, "share": 0.25, "delta_e_mean": 0.4567, "delta_e_percentiles": {"99": 3.21},
         "flip": 0.0213, "relative_rmse": None,
     }  # fmt: skip
-    entry = {"diffracting": found, "frame_ms": 1234.5, "fragment_ns": 35.2, "texture_bytes": 2.1e7}
+    entry = {
+        "diffracting": found, "frame_ms": 1234.5, "fragment_ns": 35.2, "look_up_ns": 12.3,
+        "texture_bytes": 2.1e7,
+    }  # fmt: skip
     document = {
-        "size": [64, 40], "driver": "abacus", "noise_delta_e_mean": 0.29, "methods": {"lut": entry},
+        "scene": "scenes/plate.xml", "size": [64, 40], "driver": "abacus",
+        "noise_delta_e_mean": 0.29,
+        "methods": {
+            "lut": entry,
+            "spectral": {**entry, "diffracting": {**found, "delta_e_mean": 0.321}},
+            "flss": {**entry, "fragment_ns": 35200.0},
+        },
     }  # fmt: skip
     folder = tmp_path / "compared"
     folder.mkdir()
@@ -41,7 +50,8 @@ def page(tmp_path):
 def test_table_and_sheet_are_replaced(compared, page):
     assert realtime.main([str(compared), "-o", str(page)]) == 0
     text = page.read_text("utf-8")
-    assert "| `lut` | 0.46 | 3.21 | 0.021 |  | 1230 | 35.2 | 21.0 |" in text
+    assert "| `lut` | 0.46 | 3.21 | 0.021 |  | 1230 | 35.2 | 1000 | 12.3 | 21.0 |" in text
+    assert "| [plate](scenes/plate.xml) | 0.46 | 3.21 | 0.32 | 3.21 | 0.29 | 640 |" in text
     assert "25 % of 64 × 40 pixels" in text
     assert "stale" not in text
     with Image.open(page.parent / realtime.SHEET) as image:
@@ -60,4 +70,6 @@ def test_the_committed_readme_has_all_methods():
     text = markers.part(README.read_text("utf-8"), "realtime")
     for method in ("lut", "spectral", "flss", "nmm", "pq"):
         assert f"| `{method}` |" in text
+    for scene in ("snake", "plate", "sphere"):
+        assert f"| [{scene}](scenes/{scene}.xml) |" in text
     assert (README.parent / realtime.SHEET).is_file()

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
@@ -22,10 +26,18 @@ from mitsuba_diffraction.glsl.packing import (
     pack_responses,
 )
 from mitsuba_diffraction.glsl.source import METHODS, fragment_parts, fragment_source, vertex_source
-from mitsuba_diffraction.glsl.textures import PAGE, Packed, half_error, listed
+from mitsuba_diffraction.glsl.textures import (
+    PAGE,
+    Packed,
+    half_error,
+    listed,
+    paired,
+    shortened,
+)
 from mitsuba_diffraction.methods import make
 from mitsuba_diffraction.tables.bound import AZIMUTHAL, POLAR, AlbedoBound
 from mitsuba_diffraction.tables.colour_table import ColourTable
+from mitsuba_diffraction.web.rounding import colour_loss
 
 from .conftest import probed
 
@@ -70,8 +82,27 @@ def test_lut_reads_a_colour_table_as_its_numpy_twin_does(
     colours = ColourTable.build(table)
     at = places(3000)
     found = probed(gl, "lut", pack_colours(colours) | PERFECT, at)
+    read = dataclasses.replace(
+        colours,
+        coefficients=shortened(colours.coefficients),
+        order_0=shortened(colours.order_0),
+    )
     # single precision, in the logarithm of the radius above all
-    assert difference(found, colours.colour(*at.T[:3])) < 1e-4
+    assert difference(found, read.colour(*at.T[:3])) < 1e-4
+    # and eight digits of each number: what the eye can tell apart is one
+    loss = colour_loss(colours, read)
+    assert loss.mean() < 0.1
+    assert np.percentile(loss, 99) < 0.5
+
+
+@given(arrays.arrays(np.float32, (3, 4), elements=st.floats(-16384, 16384, width=32)))
+def test_two_numbers_lie_in_a_word(values: NDArray[np.float32]) -> None:
+    words = paired(values)
+    assert words.shape == (3, 2)
+    found = np.stack([words << 16, words & np.uint32(0xFFFF0000)], axis=-1).view(np.float32)
+    np.testing.assert_array_equal(found.reshape(3, 4), shortened(values))
+    # half a unit of the eighth digit; numbers too small to have eight are off by less than 2⁻¹³⁰
+    np.testing.assert_allclose(shortened(values), values, rtol=2.0**-8, atol=1e-39)
 
 
 def test_spectral_sums_the_table_over_wavelengths(gl: Any, table: DiffractionTable) -> None:

@@ -1,9 +1,9 @@
 // `lut`: the colours of daylight, summed over all wavelengths beforehand; the twin of
 // plugin/rgb_lookup.py. Rings even in ln r with azimuths of their own, a series of five terms in z.
 
-uniform sampler2D colours;      // four texels a bin: term t of channel c is number 5c + t
-uniform sampler2D rings;        // first bin and azimuths of a ring, and of the next one
-uniform sampler2D glossy;       // order 0: radii × zs
+uniform usampler2D colours;     // two texels a bin: term t of channel c is number 5c + t
+uniform usampler2D rings;       // first bin of a ring; its azimuths, and of the next one
+uniform usampler2D glossy;      // order 0, radii × zs: colours of this z and the next
 uniform int bins;               // of one interval of z
 uniform int last_ring;
 uniform float smallest_radius;
@@ -14,18 +14,25 @@ uniform float inverse_scale;
 uniform vec2 glossy_steps;      // 1/µm… of radius and z: entries per unit
 uniform ivec2 glossy_size;      // radii, zs
 
-void add_azimuth(float start, float azimuths, float turn, float share, int interval,
+void add_bin(int bin, float weight, inout vec4 a, inout vec4 b, inout vec4 c, inout vec4 d)
+{
+    uvec4 low = entry(colours, bin);
+    uvec4 high = entry(colours, bin + 1);
+    a += weight * vec4(upper_halves(low.x), upper_halves(low.y));
+    b += weight * vec4(upper_halves(low.z), upper_halves(low.w));
+    c += weight * vec4(upper_halves(high.x), upper_halves(high.y));
+    d += weight * vec4(upper_halves(high.z), upper_halves(high.w));
+}
+
+void add_azimuth(int start, float azimuths, float turn, float share,
                  inout vec4 a, inout vec4 b, inout vec4 c, inout vec4 d)
 {
     float x = turn * azimuths;
     float lower = min(floor(x), azimuths - 1.0);
-    float t = min(x - lower, 1.0);
-    int bin = 4 * (interval * bins + int(start) + int(lower));
-    vec2 weight = share * vec2(1.0 - t, t);
-    a += weight.x * entry(colours, bin) + weight.y * entry(colours, bin + 4);
-    b += weight.x * entry(colours, bin + 1) + weight.y * entry(colours, bin + 5);
-    c += weight.x * entry(colours, bin + 2) + weight.y * entry(colours, bin + 6);
-    d += weight.x * entry(colours, bin + 3) + weight.y * entry(colours, bin + 7);
+    float t = share * min(x - lower, 1.0);
+    int bin = 2 * (start + int(lower));
+    add_bin(bin, share - t, a, b, c, d);
+    add_bin(bin + 2, t, a, b, c, d);
 }
 
 vec3 other_orders(vec2 uv, float squared_radius, float z)
@@ -48,13 +55,15 @@ vec3 other_orders(vec2 uv, float squared_radius, float z)
     ring = max(ring, 0.0);
     float lower = min(floor(ring), float(last_ring - 1));
     float share = min(ring - lower, 1.0);
-    float turn = atan(uv.y, uv.x) * (0.5 / PI);
-    if (turn < 0.0) turn += 1.0;
+    float turn = turn_of(uv);
 
-    vec4 pair = entry(rings, int(lower));
+    uvec2 pair = entry(rings, int(lower)).xy;
+    uint azimuths = pair.y & 0xffffu;
+    int start = interval * bins + int(pair.x);
     vec4 a = vec4(0.0), b = vec4(0.0), c = vec4(0.0), d = vec4(0.0);
-    add_azimuth(pair.x, pair.y, turn, 1.0 - share, interval, a, b, c, d);
-    add_azimuth(pair.z, pair.w, turn, share, interval, a, b, c, d);
+    add_azimuth(start, float(azimuths), turn, 1.0 - share, a, b, c, d);
+    start += int(azimuths) + 1;  // a ring repeats its first bin at its end
+    add_azimuth(start, float(pair.y >> 16), turn, share, a, b, c, d);
     vec4 first = vec4(1.0, t, t2, t3);
     vec3 sum = vec3(dot(a, first) + b.x * t4,
                     dot(vec4(b.yzw, c.x), first) + c.y * t4,
@@ -62,23 +71,23 @@ vec3 other_orders(vec2 uv, float squared_radius, float z)
     return sum * (fade * inverse_scale);
 }
 
-// The glossy reflection, bright within a degree or so: a loop of one step, so that rasterisers in
-// software skip it elsewhere.
+vec3 between(uvec4 pair, float t)
+{
+    vec2 middle = upper_halves(pair.y);
+    return mix(vec3(upper_halves(pair.x), middle.x), vec3(middle.y, upper_halves(pair.z)), t);
+}
+
+// The glossy reflection, bright within a degree or so.
 vec3 order_0(float radius, float z)
 {
     vec2 last = vec2(glossy_size) - 1.0;
     vec2 position = vec2(radius, z) * glossy_steps;
-    vec3 colour = vec3(0.0);
-    for (int n = 0; n < (position.x < last.x ? 1 : 0); ++n) {
-        vec2 lower = min(floor(position), last - 1.0);
-        vec2 t = clamp(position - lower, 0.0, 1.0);
-        int index = int(lower.x) * glossy_size.y + int(lower.y);
-        vec3 inner = mix(entry(glossy, index).rgb, entry(glossy, index + 1).rgb, t.y);
-        index += glossy_size.y;
-        vec3 outer = mix(entry(glossy, index).rgb, entry(glossy, index + 1).rgb, t.y);
-        colour = mix(inner, outer, t.x);
-    }
-    return colour;
+    vec2 lower = floor(min(position, last - 1.0));
+    vec2 t = clamp(position - lower, 0.0, 1.0);
+    int index = int(lower.x) * glossy_size.y + int(lower.y);
+    vec3 inner = between(entry(glossy, index), t.y);
+    vec3 outer = between(entry(glossy, index + glossy_size.y), t.y);
+    return mix(inner, outer, t.x);  // the last radius is dark
 }
 
 // R ⟨|P|²⟩ / (4π²σ⁴ λ²) over the light's wavelengths, linear sRGB, 1/µm².

@@ -8,6 +8,8 @@
 // at one step share their mean wavelength. Close to the specular direction lobes are wide, and the
 // loop steps in k.
 
+#define SKIPS_UNLIT  // loops end early where no fragment is lit
+
 uniform sampler2D orders;        // TEXELS texels an order: terms of its series in κ
 uniform sampler2D functions;     // what each term is multiplied with over κ, and |a₀|²: TEXELS + 1
                                  // texels at each end of `cells` cells an interval
@@ -22,7 +24,7 @@ uniform float inverse_scale;
 
 const float REACH = 2.6;         // of the window, in 1/σ: erfc(2.6) = 2e-4 is left out
 const float WIDEST_LOBE = 0.25;  // rad/µm, 12 nm in the green
-const float LARGEST_STEP = 0.15; // rad/µm, for the eye's curves
+const float LARGEST_STEP = 0.25; // rad/µm, for the eye's curves
 
 int interval_of(float kappa)
 {
@@ -77,6 +79,10 @@ vec3 from_order_to_order(vec2 uv, float r, float z, float cos_half, int light)
     int first = max(int(ceil(min(ends.x, ends.y))), -last.x);
     int end = min(int(floor(max(ends.x, ends.y))), last.x);
     float falloff = sigma * steps.y * direction.x;
+    float squared_falloff = falloff * falloff;
+    float step_factor = exp(-2.0 * squared_falloff);
+    ivec2 size = 2 * last_order + 1;
+    int stride = TEXELS * (steep ? 1 : size.x);  // of the list, across
 
     float deviation = sqrt(0.5) / (sigma * r);
 
@@ -93,18 +99,24 @@ vec3 from_order_to_order(vec2 uv, float r, float z, float cos_half, int light)
         int high = min(int(floor(centre + reach)), last.y);
         vec2 power = vec2(0.0);
         vec2 moment = vec2(0.0);  // the orders' mean place across the ray
+        int texel = first_texel(interval, steep ? ivec2(low, n) : ivec2(n, low));
+        // exp(−f²x²) of x, x + 1, …: factors that are a geometric series themselves
+        float across = float(low) - centre;
+        float weight = exp(-squared_falloff * across * across);
+        float factor = exp(-squared_falloff * (2.0 * across + 1.0));
         for (int m = low; m <= high; ++m) {
-            int texel = first_texel(interval, steep ? ivec2(m, n) : ivec2(n, m));
             vec2 value = vec2(0.0);
             for (int i = 0; i < TEXELS; ++i) {
                 vec4 terms = entry(orders, texel + i);
                 value += vec2(dot(terms, weights_low[i]), dot(terms, weights_high[i]));
             }
-            float across = float(m) - centre;
-            float apart = falloff * across;
-            value *= exp(-apart * apart);
+            value *= weight;
             power += value;
             moment += value * across;
+            across += 1.0;
+            weight *= factor;
+            factor *= step_factor;
+            texel += stride;
         }
         vec2 mean = clamp(moment / max(power, 1e-20), -reach, reach);
         vec2 at = k + mean * shift + vec2(-deviation, deviation);
@@ -119,8 +131,8 @@ vec3 from_wavelength_to_wavelength(vec2 uv, float r, float z, float cos_half, in
     float deviation = sqrt(0.5) / (sigma * max(r, 1e-6));
     int count = int(ceil((wavenumbers.y - wavenumbers.x) / min(LARGEST_STEP, 1.5 * deviation)));
     float delta = (wavenumbers.y - wavenumbers.x) / float(count);
-    vec2 reach = REACH / (sigma * spacing);
     vec2 falloff = sigma * spacing;
+    float step_factor = exp(-2.0 * falloff.x * falloff.x);
     vec3 sum = vec3(0.0);
     vec4 weights[TEXELS];
     for (int n = 0; n < count; ++n) {
@@ -128,16 +140,26 @@ vec3 from_wavelength_to_wavelength(vec2 uv, float r, float z, float cos_half, in
         int interval = interval_of(k * z);
         float specular = series(k * z, interval, weights);
         vec2 place = k * uv / spacing;
-        ivec2 low = max(ivec2(ceil(place - reach)), -last_order);
-        ivec2 high = min(ivec2(floor(place + reach)), last_order);
+        float reach = REACH / falloff.y;
+        int low = max(int(ceil(place.y - reach)), -last_order.y);
+        int high = min(int(floor(place.y + reach)), last_order.y);
         float power = 0.0;
-        for (int y = low.y; y <= high.y; ++y) {
-            for (int x = low.x; x <= high.x; ++x) {
-                vec2 apart = falloff * (vec2(x, y) - place);
-                int texel = first_texel(interval, ivec2(x, y));
+        for (int y = low; y <= high; ++y) {
+            float apart = falloff.y * (float(y) - place.y);
+            float width = sqrt(max(REACH * REACH - apart * apart, 0.0)) / falloff.x;  // of a disc
+            int first = max(int(ceil(place.x - width)), -last_order.x);
+            int last = min(int(floor(place.x + width)), last_order.x);
+            float from = falloff.x * (float(first) - place.x);
+            float weight = exp(-apart * apart - from * from);
+            float factor = exp(-falloff.x * (2.0 * from + falloff.x));
+            int texel = first_texel(interval, ivec2(first, y));
+            for (int x = first; x <= last; ++x) {
                 float value = 0.0;
                 for (int i = 0; i < TEXELS; ++i) value += dot(entry(orders, texel + i), weights[i]);
-                power += exp(-dot(apart, apart)) * value;
+                power += weight * value;
+                weight *= factor;
+                factor *= step_factor;
+                texel += TEXELS;
             }
         }
         power *= inverse_scale;
@@ -152,7 +174,8 @@ vec3 from_wavelength_to_wavelength(vec2 uv, float r, float z, float cos_half, in
 vec3 diffracted(vec2 uv, float z, float cos_half, int light)
 {
     float r = length(uv);
-    if (r * sigma * WIDEST_LOBE > sqrt(0.5))
-        return from_order_to_order(uv, r, z, cos_half, light);
-    return from_wavelength_to_wavelength(uv, r, z, cos_half, light);
+    vec3 sum;
+    if (r * sigma * WIDEST_LOBE > sqrt(0.5)) sum = from_order_to_order(uv, r, z, cos_half, light);
+    else sum = from_wavelength_to_wavelength(uv, r, z, cos_half, light);
+    return reflectance_at_all(cos_half) * sum;
 }

@@ -9,9 +9,7 @@ in vec2 v_axis;
 
 uniform vec3 eye;
 uniform vec3 view_axis;           // of an orthographic camera, towards it; zero otherwise
-uniform int lights;
 uniform vec4 light_place[LIGHTS];   // w = 0: direction towards it; w = 1: position
-uniform int skies;                // 1 if there is
 uniform vec3 sky;                 // radiance from everywhere
 
 uniform bool two_sided;
@@ -28,8 +26,7 @@ uniform sampler2D axis_map;
 uniform mat3 axis_uv;
 #endif
 
-uniform int displays;             // 1 for a screen: exposed, with the transfer curve of sRGB
-uniform float exposure;           // factor
+uniform float exposure;           // factor, for a display
 
 out vec4 fragment;
 
@@ -38,6 +35,8 @@ vec2 in_patch(vec3 direction, vec2 rotation)
     return vec2(rotation.x * direction.x + rotation.y * direction.y,
                 rotation.x * direction.y - rotation.y * direction.x);
 }
+
+const float LOWEST = 1e-6;  // cosine of what is seen or lit, so that all is finite
 
 #ifdef DIFFRACTING
 
@@ -77,12 +76,13 @@ void main()
 {
     vec3 n = normalize(v_normal);
     vec3 s = v_tangent - n * dot(n, v_tangent);
-    s = dot(s, s) > 1e-20 ? normalize(s) : normalize(cross(n, abs(n.x) < 0.7 ? vec3(1, 0, 0) : vec3(0, 1, 0)));
+    s *= inversesqrt(max(dot(s, s), 1e-20));
     vec3 t = cross(n, s);
     vec3 towards_eye = dot(view_axis, view_axis) > 0.0 ? view_axis : normalize(eye - v_position);
     vec3 wi = vec3(dot(towards_eye, s), dot(towards_eye, t), dot(towards_eye, n));
     float side = two_sided && wi.z < 0.0 ? -1.0 : 1.0;
-    wi.z *= side;
+    bool seen = side * wi.z > 0.0;
+    wi.z = max(side * wi.z, LOWEST);
 
     vec3 pigment = v_colour;
 #ifdef COLOUR_MAPPED
@@ -96,31 +96,40 @@ void main()
     rotation = turned > 1e-6 ? rotation / turned : vec2(1.0, 0.0);
 
     vec3 radiance = vec3(0.0);
-    int seen = wi.z > 0.0 ? lights : 0;
-    for (int i = 0; i < seen; ++i) {
+    for (int i = 0; i < LIGHTS_LIT; ++i) {
         vec3 away = light_place[i].xyz - light_place[i].w * v_position;
-        float falloff = light_place[i].w > 0.0 ? 1.0 / dot(away, away) : 1.0;
-        vec3 direction = normalize(away);
+        float square = dot(away, away);
+        vec3 direction = away * inversesqrt(square);
         vec3 wo = vec3(dot(direction, s), dot(direction, t), side * dot(direction, n));
-        if (wo.z <= 0.0) continue;
+        bool lit = seen && wo.z > 0.0;
+#ifdef SKIPS_UNLIT
+        if (!lit) continue;
+#endif
+        wo.z = max(wo.z, LOWEST);
+        vec3 added = vec3(0.0);
 #ifdef PIGMENTED
-        radiance += falloff * light_colour[i] * wo.z * (1.0 / PI) * pigment * transmission(wi, wo);
+        added += light_colour[i] * wo.z * (1.0 / PI) * pigment * transmission(wi, wo);
 #endif
 #ifdef DIFFRACTING
+        vec3 diffracting = diffraction(wi, wo, rotation, i);
 #ifdef THESIS
-        falloff *= 1.0 - diffuse_weight;
+        diffracting *= 1.0 - diffuse_weight;
 #endif
-        radiance += falloff * diffraction(wi, wo, rotation, i);
+        added += diffracting;
 #endif
+        float falloff = light_place[i].w > 0.0 ? 1.0 / square : 1.0;
+        radiance += lit ? falloff * added : vec3(0.0);
     }
+#ifdef SKY
     // Light from everywhere: a diffracting surface returns about what a smooth one does
-    for (int i = 0; i < (wi.z > 0.0 ? skies : 0); ++i) {
-        vec3 returned = pigment * transmission(wi, vec3(0.0, 0.0, 1.0));
+    vec3 returned = pigment * transmission(wi, vec3(0.0, 0.0, 1.0));
 #ifdef DIFFRACTING
-        returned += reflectance(wi.z);
+    returned += reflectance(wi.z);
 #endif
-        radiance += sky * returned;
-    }
-    for (int i = 0; i < displays; ++i) radiance = encode_srgb(radiance * exposure);
+    radiance += seen ? sky * returned : vec3(0.0);
+#endif
+#ifdef DISPLAYED
+    radiance = encode_srgb(radiance * exposure);
+#endif
     fragment = vec4(radiance, 1.0);
 }

@@ -1,6 +1,8 @@
 // The source documents' table: the DFT of (2h/H)ⁿ, complex, summed as a Taylor series in κH/2
 // before it is squared. Shared by flss, nmm and pq; what is summed says methods/ in Python.
 
+#define SKIPS_UNLIT  // loops end early where no fragment is lit
+
 uniform sampler2D amplitudes;       // TEXELS texels a bin: real, imaginary of two terms each
 uniform sampler2D amplitude_zero;   // the same of order 0, less 1
 uniform sampler2D responses;        // linear sRGB / 2π over k, one row per light
@@ -119,5 +121,5 @@ vec3 over_spectrum(vec2 uv, float z, float cos_half, int light)
         before = next - wavelength;
         sum += weight * of_wavelength(uv, z, cos_half, wavelength, light);
     }
-    return sum;
+    return reflectance_at_all(cos_half) * sum;
 }

@@ -81,12 +81,16 @@ async function uploadTexture(gl, data, entry) {
     content.close();
   } else {
     const n = [1, 2, 4].indexOf(channels);
-    const half = entry.kind === "half";
-    const internal = [[gl.R16F, gl.RG16F, gl.RGBA16F], [gl.R32F, gl.RG32F, gl.RGBA32F]][half ? 0 : 1][n];
-    const format = [gl.RED, gl.RG, gl.RGBA][n];
+    const { internal, type } = {
+      half: { internal: [gl.R16F, gl.RG16F, gl.RGBA16F], type: gl.HALF_FLOAT },
+      single: { internal: [gl.R32F, gl.RG32F, gl.RGBA32F], type: gl.FLOAT },
+      words: { internal: [gl.R32UI, gl.RG32UI, gl.RGBA32UI], type: gl.UNSIGNED_INT },
+    }[entry.kind];
+    const words = [gl.RED_INTEGER, gl.RG_INTEGER, gl.RGBA_INTEGER];
+    const format = (entry.kind === "words" ? words : [gl.RED, gl.RG, gl.RGBA])[n];
     const numbers = content.subarray(0, width * height * channels);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
-    gl.texImage2D(gl.TEXTURE_2D, 0, internal, width, height, 0, format, half ? gl.HALF_FLOAT : gl.FLOAT, numbers);
+    gl.texImage2D(gl.TEXTURE_2D, 0, internal[n], width, height, 0, format, type, numbers);
   }
   const filter = entry.smooth ? gl.LINEAR : gl.NEAREST;
   const wrap = entry.smooth ? gl.REPEAT : gl.CLAMP_TO_EDGE;

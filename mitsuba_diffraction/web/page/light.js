@@ -58,6 +58,6 @@ class Sun {
       places.set([place[0] / length, place[1] / length, place[2] / length, place[3]], 4 * n);
       colours.set(colour, 3 * n);
     });
-    return { lights: this.lights.length, light_place: places, light_colour: colours };
+    return { light_place: places, light_colour: colours };
   }
 }

@@ -68,8 +68,6 @@ class Viewer {
       eye: this.camera.eye,
       view_axis: [0, 0, 0],
       sky: this.header.sky,
-      skies: this.header.sky.some((x) => x !== 0) ? 1 : 0,
-      displays: 0,
       exposure: 1,
       ...this.sun.uniforms(),
     };
