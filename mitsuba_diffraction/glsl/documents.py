@@ -1,10 +1,13 @@
-"""The source documents' methods as textures, from their evaluators in `methods` (NumPy only)."""
+"""The source documents' methods as textures, from their evaluators in `methods`; no OpenGL."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
 from ..errors import DiffractionError
+from ..files.cache import cached_table
 from ..heightfield import HeightField
 from ..methods import FullSpectrum, OrdersOnly, Repeated, make
 from ..methods.method import Method
@@ -41,8 +44,18 @@ def make_documented(name: str, heights: HeightField, table: DiffractionTable) ->
     settings = {} if name == "pq" else {"taps": TAPS}  # pq reads two bins along each axis
     return make(
         name, heights, coherence_width=table.coherence_width, coherence=table.coherence,
-        terms=TERMS, tolerance=TOLERANCE, step=STEP, **settings,
+        terms=TERMS, tolerance=TOLERANCE, step=STEP, build=_kept, **settings,
     )  # fmt: skip
+
+
+def _kept(heights: HeightField, **arguments: Any) -> DiffractionTable:
+    """`DiffractionTable.build`, once for a patch and its arguments."""
+    progress = arguments.pop("progress", None)
+    return cached_table(
+        heights.digest(),
+        arguments,
+        lambda: DiffractionTable.build(heights, progress=progress, **arguments),
+    )
 
 
 def pack_method(method: Method) -> Packed:

@@ -19,6 +19,9 @@ from .rainbow import Rainbow
 
 NAMES = ("default", "flss", "nmm", "pq", "pq-sinc", "rainbow")
 
+#: Makes a table of a patch, like `DiffractionTable.build`.
+Build = Callable[..., DiffractionTable]
+
 #: Bins that "pq-sinc" reads along each axis.
 SINC_TAPS = 8
 
@@ -44,6 +47,7 @@ def make_all(
     nmm_weights: str = "step",
     specular: float | None = None,
     progress: Progress | None = None,
+    build: Build | None = None,
 ) -> dict[str, Method]:
     """Methods by name, for one patch.
 
@@ -66,6 +70,8 @@ def make_all(
     repeats : (N₁, N₂) of `pq`; by default as many as fill the coherence width, at least 2.
     nmm_weights, specular : see `OrdersOnly`.
     progress : called as progress(done, total, text) while tables are built.
+    build : makes a table of heights and the arguments of `DiffractionTable.build`, that function by
+        default; another may keep them.
 
     Raises
     ------
@@ -79,7 +85,10 @@ def make_all(
     trapezoid_rule(wavelength_range, step)
     if period is not None:
         check_period(period)
-    tables = _Tables(heights, coherence_width, tolerance, terms, taps, wavelength_range, progress)
+    tables = _Tables(
+        heights, coherence_width, tolerance, terms, taps, wavelength_range, progress,
+        build or DiffractionTable.build,
+    )  # fmt: skip
 
     def flss(name: str) -> FullSpectrum:
         table = tables.taylor(coherence or "patch")
@@ -135,6 +144,7 @@ class _Tables:
     taps: int | None
     wavelength_range: tuple[float, float]
     progress: Progress | None
+    build: Build
     _built: dict[str, DiffractionTable] = field(default_factory=dict)
 
     def own(self, coherence: str) -> DiffractionTable:
@@ -167,8 +177,5 @@ class _Tables:
                 "height_scale_max": 1.0,
                 "progress": self.progress,
             }
-            self._built[key] = DiffractionTable.build(
-                self.heights,
-                **(settings | arguments),  # type: ignore[arg-type]
-            )
+            self._built[key] = self.build(self.heights, **(settings | arguments))
         return self._built[key]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,10 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.colour import linear_srgb, response
+from mitsuba_diffraction.files import cache
 from mitsuba_diffraction.fresnel import reflectance
 from mitsuba_diffraction.glsl.context import compile_program, compiler_words
-from mitsuba_diffraction.glsl.documents import pack_method
+from mitsuba_diffraction.glsl.documents import make_documented, pack_method
 from mitsuba_diffraction.glsl.packing import (
     WAVENUMBERS,
     pack_bounds,
@@ -251,6 +253,25 @@ def test_lists_keep_their_order_over_rows() -> None:
     data = listed("numbers", entries).data
     assert data.shape == (3, PAGE, 4)
     np.testing.assert_array_equal(data.reshape(-1, 4)[: len(entries)], entries)
+
+
+def test_the_documents_tables_are_built_once(
+    table: DiffractionTable, patch: HeightField, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("MITSUBA_DIFFRACTION_CACHE", str(tmp_path))
+    first = make_documented("flss", patch, table)
+    kept = [path.stem for path in tmp_path.glob("*.exr")]
+    assert len(kept) == 1
+
+    def build(*_: object, **__: object) -> DiffractionTable:
+        raise AssertionError("built again")
+
+    monkeypatch.setattr(DiffractionTable, "build", build)
+    del cache._open_tables[kept[0]]  # as in the next process
+    second = make_documented("flss", patch, table)
+    np.testing.assert_array_equal(second.table.coefficients, first.table.coefficients)
+    with pytest.raises(AssertionError, match="built again"):
+        make_documented("pq", patch, table)
 
 
 def test_half_floats_are_taken_where_they_hold(table: DiffractionTable) -> None:
