@@ -62,8 +62,8 @@ validation: setup  ## compare the model with rigorous solutions: docs/validation
 COMPARE := $(RUN) compare
 realtime: setup  ## compare the shaders with the path tracer, and put sheet and tables into README.md
 	@$(COMPARE) scenes/snake.xml --method all -s 768 --full-spp 48 -o out/compare/snake
-	@$(COMPARE) scenes/plate.xml --method lut spectral -s 512 --full-spp 0 -D resx=240 -D resy=200 -o out/compare/plate
-	@$(COMPARE) scenes/sphere.xml --method lut spectral -s 512 --full-spp 0 -D resx=240 -D resy=200 -o out/compare/sphere
+	@$(COMPARE) scenes/plate.xml --method lut spectral -s 2048 --full-spp 0 -D resx=240 -D resy=200 -o out/compare/plate
+	@$(COMPARE) scenes/sphere.xml --method lut spectral -s 1024 --full-spp 0 -D resx=240 -D resy=200 -o out/compare/sphere
 	@$(PYTHON3) -m mitsuba_diffraction.figures.realtime $(addprefix out/compare/,snake plate sphere) -o README.md
 
 lint: setup  ## check style and types
