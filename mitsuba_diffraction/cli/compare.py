@@ -98,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
                 f"'{args.scene}' has no light with a direction or place to compare under; add a "
                 "directional or point emitter, or a sky with a sun"
             )
-        renderer.sky = np.zeros(3)
+        renderer.sky = np.zeros((4, 3))
         direct = with_lights(scene, renderer.camera, lights)
         sees = seen(direct, lights)
         with Stop() as stop:

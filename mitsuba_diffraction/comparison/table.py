@@ -38,7 +38,7 @@ def markdown(document: dict[str, Any]) -> str:
 
 
 def scenes_table(documents: Sequence[dict[str, Any]]) -> str:
-    """How far `lut` and `spectral` are off in some scenes, as Markdown.
+    """How far `lut` and `spectral` are off in some scenes, over all pixels that are compared.
 
     Parameters
     ----------
@@ -49,9 +49,9 @@ def scenes_table(documents: Sequence[dict[str, Any]]) -> str:
     for document in documents:
         cells = [f"[{Path(document['scene']).stem}]({document['scene']})"]
         for method in _OURS:
-            found = document["methods"][method]["diffracting"]
+            found = document["methods"][method]["both"]
             cells += [_plain(found["delta_e_mean"]), _plain(found["delta_e_percentiles"]["99"])]
-        pixels = document["methods"][_OURS[0]]["diffracting"]["pixels"]
+        pixels = document["methods"][_OURS[0]]["both"]["pixels"]
         rows.append(
             f"| {' | '.join(cells)} | {_plain(document['noise_delta_e_mean'])} | {pixels} |"
         )

@@ -1,4 +1,4 @@
-"""A scene's light as a shader knows it: directions, points, and one radiance from everywhere."""
+"""A scene's light as a shader knows it: directions, points, and a sky that is smooth."""
 
 from __future__ import annotations
 
@@ -43,10 +43,17 @@ class Light:
 
 @dataclass
 class Lighting:
-    """All of a scene's light, and what of it is shown otherwise or not at all."""
+    """All of a scene's light, and what of it is shown otherwise or not at all.
+
+    Attributes
+    ----------
+    lights : without extent.
+    sky : (4, 3) linear sRGB: a plane of normal n gets the irradiance π (sky[0] + Σᵢ nᵢ sky[1 + i]).
+    omissions : in a few words each.
+    """
 
     lights: list[Light] = field(default_factory=list)
-    sky: Array = field(default_factory=lambda: np.zeros(3))
+    sky: Array = field(default_factory=lambda: np.zeros((4, 3)))
     omissions: list[str] = field(default_factory=list)
 
     @property
@@ -62,7 +69,8 @@ def read_lights(scene: Any, middle: Array, most: int) -> Lighting:
     """The emitters of a Mitsuba scene.
 
     Lights with an extent become lights without, with the same irradiance at `middle`: an area
-    light a point, the sun of a sky a direction; skies and environments one mean radiance.
+    light a point, the sun of a sky a direction; skies and environments their mean radiance and how
+    it changes from one side to the other.
 
     Parameters
     ----------
@@ -113,17 +121,19 @@ def _add(found: Lighting, emitter: Any, middle: Array) -> None:
         found.lights.append(Light(name, place, wavelengths, spectrum * distance**2))
         found.omissions.append(f"the extent of {name} (area light, shown as a point)")
     elif kind == "ConstantBackgroundEmitter":
-        found.sky = found.sky + _mean_radiance(emitter, middle)
+        found.sky = found.sky + _sky(emitter, middle)
     elif "sun_direction" in parameters:
         sun = np.array(parameters["sun_direction"], float).ravel()
         wavelengths, spectrum, _, _ = _sampled(emitter, middle, 4 * _SAMPLES, sun)
         if spectrum.any():
             found.lights.append(Light(f"sun of {name}", np.append(sun, 0.0), wavelengths, spectrum))
-        found.sky = found.sky + _mean_radiance(emitter, middle, sun)
-        found.omissions.append(f"the sun's disc and the sky of {name} (a direction, and its mean)")
+        found.sky = found.sky + _sky(emitter, middle, sun)
+        found.omissions.append(
+            f"the sun's disc and the sky of {name} (a direction, and a smooth sky)"
+        )
     elif kind == "EnvironmentMapEmitter":
-        found.sky = found.sky + _mean_radiance(emitter, middle)
-        found.omissions.append(f"the picture of {name} (environment, shown as its mean)")
+        found.sky = found.sky + _sky(emitter, middle)
+        found.omissions.append(f"the picture of {name} (environment, shown as a smooth one)")
     else:
         found.omissions.append(f"{name} ({kind})")
 
@@ -153,15 +163,19 @@ def _sampled(
     )
 
 
-def _mean_radiance(emitter: Any, at: Array, without: Array | None = None) -> Array:
-    """Linear sRGB (3,) of what comes from one half of all directions, spread evenly over it."""
+def _sky(emitter: Any, at: Array, without: Array | None = None) -> Array:
+    """What `Lighting.sky` says of one emitter: spherical harmonics of its light up to order 1.
+
+    With L = Σ L_lm Y_lm the irradiance is Σ A_l L_lm Y_lm(n), A_0 = π, A_1 = 2π/3 (Ramamoorthi and
+    Hanrahan 2001), so E/π = ∫L dω/4π + n·∫L ω dω/2π: exact for a constant sky over one half, whose
+    other even orders and all of whose odd ones beyond 1 add nothing.
+    """
     values, directions, _, wavelengths = _samples(emitter, at, _SAMPLES)
     keep = np.ones(len(values)) if without is None else directions @ without <= _SUN_COSINE
-    spectrum = (values * keep[:, None, None]).mean(axis=0)
-    # a constant one sends from all directions, a sky from those above
-    solid_angle = 4 * np.pi if np.mean(directions[:, 2] < -0.01) > 0.2 else 2 * np.pi
-    return daylight_colour(
-        wavelengths, (spectrum[:, 0] if spectrum.shape[1] == 1 else spectrum) / solid_angle
+    factors = np.column_stack([keep / (4.0 * np.pi), keep[:, None] * directions / (2.0 * np.pi)])
+    spectra = np.einsum("sf,swc->fwc", factors, values) / len(values)
+    return np.stack(
+        [daylight_colour(wavelengths, s[:, 0] if s.shape[1] == 1 else s) for s in spectra]
     )
 
 

@@ -152,7 +152,7 @@ class Renderer:
             "view_axis": (0.0, 0.0, 0.0),
             "light_place": places,
             "light_colour": colours,
-            "sky": tuple(float(x) for x in self.sky),
+            "sky": np.asarray(self.sky, np.float32),
             "exposure": 1.0 if exposure is None else exposure,
         }
         lit = light_definitions(

@@ -113,7 +113,8 @@ def web_scene(
             {"name": light.name, "place": light.place.tolist(), "colour": light.colour.tolist()}
             for light in lights
         ],
-        "sky": [float(x) for x in scene.lighting.sky],
+        "sky": scene.lighting.sky.ravel().tolist(),
+        "background": _zenith(scene.lighting.sky),
         "camera": {
             "to_world": scene.camera.to_world.tolist(),
             "fov": scene.camera.fov,
@@ -239,6 +240,12 @@ def _plain(value: Any) -> Any:
     if isinstance(value, tuple):
         return [_plain(v) for v in value]
     return value.item() if isinstance(value, np.generic) else value
+
+
+def _zenith(sky: NDArray[np.float64]) -> list[float]:
+    """The brightest of a sky: its own where it lights one half, the mean where it is all around."""
+    slope = np.linalg.norm(sky[1:], axis=0)
+    return [float(x) for x in np.maximum(sky[0] + slope, 0.0)]
 
 
 def _box(positions: Sequence[NDArray[np.float32]]) -> list[list[float]]:

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, DiffractionWarning
 from mitsuba_diffraction.colour import delta_e
 from mitsuba_diffraction.comparison.measures import regions
-from mitsuba_diffraction.comparison.truth import seen, with_lights
+from mitsuba_diffraction.comparison.truth import box_sensor, seen, with_lights
 from mitsuba_diffraction.glsl.context import check_version, headless_context
 from mitsuba_diffraction.glsl.renderer import Renderer
 from mitsuba_diffraction.tables.bound import AZIMUTHAL, POLAR, AlbedoBound
@@ -200,9 +201,57 @@ def test_all_that_is_not_shown_is_named_in_one_warning(
     (text,) = [str(w.message) for w in caught if "realtime" in str(w.message)]
     for part in ("the lens", "hair (SDFGrid)", "the material of glass", "torch (SpotLight)"):
         assert part in text
-    np.testing.assert_allclose(made.sky, 0.25, rtol=0.02)  # its sampling
+    np.testing.assert_allclose(made.sky[0], 0.25, rtol=0.02)  # its sampling
+    assert np.abs(made.sky[1:]).max() < 0.02
     assert len(made.lights) == 1
     made.release()
+
+
+def test_a_sky_over_one_half_lights_what_faces_it(
+    gl: Any, some_variant: str, table_file: Path
+) -> None:
+    half = np.zeros((32, 64, 3), np.float32)
+    half[:16] = [0.2, 0.4, 1.0]  # around Mitsuba's y axis
+    upright = mi.ScalarTransform4f().rotate([1, 0, 0], 90).rotate([0, 0, 1], 25)
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "sensor": sensor(30, 20),
+            "ball": {
+                "type": "sphere", "radius": 1.2, "bsdf": {"type": "diffuse", "reflectance": 0.5}
+            },
+            "speck": {
+                "type": "rectangle", "to_world": mi.ScalarTransform4f().scale(1e-3),
+                "bsdf": {
+                    "type": "diffraction", "table": str(table_file), "energy_conserving": False
+                },
+            },
+            "sky": {"type": "envmap", "bitmap": mi.Bitmap(half), "to_world": upright},
+        }
+    )  # fmt: skip
+    with pytest.warns(DiffractionWarning, match="shown as a smooth one"):
+        made = Renderer(scene, context=gl)
+    drawn = made.render("lut", supersampling=2)
+    traced = path_traced(with_lights_of(scene, made), 128, 1)
+    ball = binary_erosion(drawn[..., 3] > 0.999, np.ones((3, 3)))
+    assert ball.sum() > 60
+    # half of what a plane gets that faces all of it times 1 + cosθ; 3 % is the sampling of both
+    np.testing.assert_allclose(drawn[ball, :3], traced[ball], rtol=0.03, atol=0.03 * traced.max())
+    assert traced[ball].max() > 4.0 * traced[ball, 2].min()
+    made.release()
+
+
+def with_lights_of(scene: Any, made: Renderer) -> Any:
+    """The scene with a film that averages evenly over pixels, and direct light."""
+    parts = {f"shape_{n}": s for n, s in enumerate(scene.shapes())}
+    parts |= {f"emitter_{n}": e for n, e in enumerate(scene.emitters())}
+    return mi.load_dict(
+        {
+            "type": "scene", "sensor": box_sensor(made.camera),
+            "integrator": {"type": "direct", "emitter_samples": 4, "bsdf_samples": 0},
+            **parts,
+        }
+    )  # fmt: skip
 
 
 def test_a_scene_without_diffraction_is_refused(gl: Any, some_variant: str) -> None:

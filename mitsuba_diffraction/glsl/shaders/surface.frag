@@ -10,7 +10,7 @@ in vec2 v_axis;
 uniform vec3 eye;
 uniform vec3 view_axis;           // of an orthographic camera, towards it; zero otherwise
 uniform vec4 light_place[LIGHTS];   // w = 0: direction towards it; w = 1: position
-uniform vec3 sky;                 // radiance from everywhere
+uniform vec3 sky[4];              // irradiance over π: the mean, and its change along x, y, z
 
 uniform bool two_sided;
 uniform float area_factor;        // 4πσ², that is 4π²σ⁴ over the window's area πσ²
@@ -121,12 +121,14 @@ void main()
         radiance += lit ? falloff * added : vec3(0.0);
     }
 #ifdef SKY
-    // Light from everywhere: a diffracting surface returns about what a smooth one does
+    // A diffracting surface returns about what a smooth one does
+    vec3 facing = side * n;
+    vec3 above = sky[0] + facing.x * sky[1] + facing.y * sky[2] + facing.z * sky[3];
     vec3 returned = pigment * transmission(wi, vec3(0.0, 0.0, 1.0));
 #ifdef DIFFRACTING
     returned += reflectance(wi.z);
 #endif
-    radiance += seen ? sky * returned : vec3(0.0);
+    radiance += seen ? max(above, 0.0) * returned : vec3(0.0);
 #endif
 #ifdef DISPLAYED
     radiance = encode_srgb(radiance * exposure);

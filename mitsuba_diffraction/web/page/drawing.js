@@ -237,7 +237,7 @@ class Drawing {
     this.shown.use();
     this.shown.set({
       sample_count: count, exposure, pixel: [view.width / this.width, view.height / this.height],
-      background: this.header.sky.map((x) => Math.max(x * exposure, 0)),
+      background: this.header.background.map((x) => Math.max(x * exposure, 0)),
     });
     this.shown.texture("samples", this.sums[0].texture);
     this.full(null, this.width, this.height);
