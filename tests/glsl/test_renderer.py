@@ -232,12 +232,15 @@ def test_a_sky_over_one_half_lights_what_faces_it(
     with pytest.warns(DiffractionWarning, match="shown as a smooth one"):
         made = Renderer(scene, context=gl)
     drawn = made.render("lut", supersampling=2)
-    traced = path_traced(with_lights_of(scene, made), 128, 1)
+    traced = path_traced(with_lights_of(scene, made), 1024, 1)
     ball = binary_erosion(drawn[..., 3] > 0.999, np.ones((3, 3)))
     assert ball.sum() > 60
-    # half of what a plane gets that faces all of it times 1 + cosθ; 3 % is the sampling of both
-    np.testing.assert_allclose(drawn[ball, :3], traced[ball], rtol=0.03, atol=0.03 * traced.max())
-    assert traced[ball].max() > 4.0 * traced[ball, 2].min()
+    # half of what a plane gets that faces all of it times 1 + cosθ; a pixel's 1024 samples scatter
+    # by 1 %
+    error = np.abs(drawn[ball, :3] - traced[ball]) / traced.max()
+    assert error.mean() < 0.01
+    assert error.max() < 0.06
+    assert traced[ball, 2].max() > 2.0 * traced[ball, 2].min()
     made.release()
 
 
