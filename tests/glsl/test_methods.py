@@ -39,7 +39,7 @@ from mitsuba_diffraction.glsl.textures import (
 from mitsuba_diffraction.methods import make
 from mitsuba_diffraction.tables.bound import AZIMUTHAL, POLAR, AlbedoBound
 from mitsuba_diffraction.tables.colour_table import ColourTable
-from mitsuba_diffraction.web.rounding import colour_loss
+from mitsuba_diffraction.tables.loss import colour_loss
 
 from .conftest import probed
 
