@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from .textures import Packed, Texture, Uniform
 #: OpenGL 3.3.
 REQUIRED = 330
 
+_SOFTWARE = re.compile("llvmpipe|softpipe|swr|SwiftShader", re.IGNORECASE)
 _INSTALL = "apt install libegl1 libgl1 libgl1-mesa-dri"
 _KINDS = {
     np.dtype(np.float16): "f2",
@@ -74,6 +77,18 @@ def check_version(context: Any) -> None:
             f"need {REQUIRED // 100}.{REQUIRED % 100 // 10}; update it, or use Mesa's software "
             f"rasteriser: LIBGL_ALWAYS_SOFTWARE=1"
         )
+
+
+def clock_of(driver: str) -> Callable[[], float]:
+    """Seconds, for differences: what to time a driver's pictures with.
+
+    Of a rasteriser in software this is the processor's time, shared evenly by its cores: other
+    programs do not count, as they would not on a graphics card.
+    """
+    if not _SOFTWARE.search(driver):
+        return time.perf_counter
+    cores = len(os.sched_getaffinity(0))
+    return lambda: time.process_time() / cores
 
 
 def compile_program(

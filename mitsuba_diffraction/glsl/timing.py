@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import re
-import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from .context import Bindings, compile_program, set_uniforms
+from .context import Bindings, clock_of, compile_program, set_uniforms
 from .lights import light_definitions
 from .prepared import vertex_array
 from .renderer import Renderer
@@ -22,7 +19,6 @@ SIDE = 256
 
 _SHORTEST = 0.05  # s that a timing takes, by drawing several times
 _ROUNDS = 3  # of which the fastest counts
-_SOFTWARE = re.compile("llvmpipe|softpipe|swr|SwiftShader", re.IGNORECASE)
 _EYE = (-0.4, -1.0, 1.6)
 _LIGHT = (0.36, 0.48, 0.8, 0.0)
 
@@ -34,8 +30,7 @@ def fragment_times(renderer: Renderer, methods: Sequence[str]) -> dict[str, dict
     the picture under one directional light: all of the fragment stage, with next to no geometry. A
     look-up is the method's own function at as many places, without the surface's shading. All
     methods take turns, and of each the fastest time counts: what else a computer does slows some.
-    Of a rasteriser in software the processor's time counts, shared evenly by its cores, so that
-    other programs do not.
+    The clock is that of `context.clock_of`.
     """
     drawn = {
         method: {"whole": _Whole(renderer, method), "look_up": _LookUp(renderer, method)}
@@ -64,7 +59,7 @@ def _seconds(renderer: Renderer, drawn: _Drawn) -> float:
         renderer.context.finish()
         target.frame.viewport = (0, 0, SIDE, SIDE)
         drawn.warm = True
-    clock = _processor if _SOFTWARE.search(renderer.driver) else time.perf_counter
+    clock = clock_of(renderer.driver)
     times = 1
     while True:
         start = clock()
@@ -76,10 +71,6 @@ def _seconds(renderer: Renderer, drawn: _Drawn) -> float:
             target.release()
             return seconds / times
         times = max(2 * times, int(1.2 * times * _SHORTEST / max(seconds, 1e-6)))
-
-
-def _processor() -> float:
-    return time.process_time() / len(os.sched_getaffinity(0))
 
 
 class _Drawn:
