@@ -12,5 +12,7 @@ evaluation   `eval`, `sample` and `pdf` of all of them
 rendering    whole pictures, the snake's among them
 variance     noise of the sampling, beside that of the cosine
 colours      RGB variants beside spectral ones
+scaling      costs over terms, patches, samples and pixels
+history      two runs side by side
 scenes       what is rendered
 """

@@ -22,6 +22,7 @@ from .plan import PIXEL, SEED, Plan
 ALUMINIUM = "roughconductor, Al"
 DEFAULT = "diffraction, the defaults"
 DEFAULT_AL = "diffraction, Al"
+COARSE = "diffraction, tolerance 1e-2"
 DOCUMENTS = "documents: Taylor, 37 terms, 3×3, an image a term"
 TAYLOR = "the same series, all terms of a bin together"
 
@@ -32,6 +33,7 @@ class Tables:
 
     folder: Path
     patch: str
+    heights: HeightField
     paths: dict[str, Path] = field(default_factory=dict)
 
     def bsdf(self, name: str, **parameters: Any) -> Any:
@@ -67,7 +69,8 @@ def build_tables(
             "coherence": "patch", "basis": "taylor", "terms": 37, "taps": 3, "tolerance": 0.999,
         },
     }  # fmt: skip
-    tables = Tables(folder, f"{patch.name}, {patch.heights.shape[1]} × {patch.heights.shape[0]}")
+    words = f"{patch.name}, {patch.heights.shape[1]} × {patch.heights.shape[0]}"
+    tables = Tables(folder, words, patch)
     for n, (name, arguments) in enumerate(settings.items()):
         progress(n, len(settings), "building tables")
         tables.paths[name] = folder / f"{name}.exr"
@@ -93,10 +96,16 @@ def bsdf_makers(tables: Tables) -> dict[str, Callable[[], Any]]:
     return {
         ALUMINIUM: rough("Al"),
         "roughconductor, none": rough("none"),
+        "principled, metal": lambda: mi.load_dict(
+            {"type": "principled", "metallic": 1.0, "roughness": 0.3}
+        ),
+        "principled, metal beneath a coat": lambda: mi.load_dict(
+            {"type": "principled", "metallic": 1.0, "roughness": 0.3, "clearcoat": 1.0}
+        ),
         DEFAULT: ours("default"),
         DEFAULT_AL: ours("default", material="Al"),
         "diffraction, none": ours("default", material="none"),
-        "diffraction, tolerance 1e-2": ours("1e-2"),
+        COARSE: ours("1e-2"),
         "diffraction, tolerance 1e-4": ours("1e-4"),
         "diffraction, patch": ours("patch"),
         DOCUMENTS: documents,

@@ -25,10 +25,11 @@ class Plan:
     resolution, spp : of the rendered pictures.
     reference_spp : of pictures that are to have converged.
     map_resolution : directions of view along each axis, to compare colours at.
+    sides : of patches, in pixels, that the cost of `eval` is followed over.
     """
 
     pixels: int = 1332
-    more_pixels: tuple[int, ...] = (4096,)
+    more_pixels: tuple[int, ...] = (4096, 8192)
     other_tables: bool = True
     lanes: int = 1 << 20
     slow_lanes: int = 1 << 17
@@ -37,6 +38,7 @@ class Plan:
     spp: int = 16
     reference_spp: int = 2048
     map_resolution: int = 256
+    sides: tuple[int, ...] = (333, 666, 1332, 2664)
 
 
 FULL = Plan()
@@ -50,4 +52,5 @@ QUICK = Plan(
     spp=4,
     reference_spp=256,
     map_resolution=96,
+    sides=(333, 666),
 )

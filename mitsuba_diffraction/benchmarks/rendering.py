@@ -27,8 +27,8 @@ _SKIN, _ROUGH = "the skin diffracts, pigment beneath", "the skin is roughconduct
 def measure_rendering(plan: Plan, tables: Tables, progress: Progress) -> Section:
     """Time to render a ball under a lamp and a sky, most of the picture, with each BSDF."""
     makers = bsdf_makers(tables)
-    scenes = {name: _scene(plan, makers[name]()) for name in (ALUMINIUM, DEFAULT, DEFAULT_AL)}
-    calls = {name: partial(_seconds, scene, plan) for name, scene in scenes.items()}
+    scenes = {name: ball_scene(plan, makers[name]()) for name in (ALUMINIUM, DEFAULT, DEFAULT_AL)}
+    calls = {name: partial(render_seconds, scene, plan) for name, scene in scenes.items()}
     seconds = rounds_of(calls, plan.rounds, lambda done, total: progress(done, total, "render"))
     rows = []
     for name, taken in seconds.items():
@@ -50,7 +50,7 @@ def measure_snake(plan: Plan, tables: Tables, scenes: Path, progress: Progress) 
     rough = mi.load_dict({"type": "twosided", "b": {"type": "roughconductor", "material": "Al"}})
     skin_of(made[_ROUGH]).set_bsdf(rough)
     covered = share_of(made[_SKIN], skin_of(made[_SKIN]))
-    calls = {name: partial(_seconds, scene, plan) for name, scene in made.items()}
+    calls = {name: partial(render_seconds, scene, plan) for name, scene in made.items()}
     rounds = max(3, plan.rounds // 2)
     seconds = rounds_of(calls, rounds, lambda done, total: progress(done, total, "snake"))
     rows = []
@@ -69,14 +69,14 @@ def measure_snake(plan: Plan, tables: Tables, scenes: Path, progress: Progress) 
     return Section(title, _COLUMNS, rows)
 
 
-def _seconds(scene: Any, plan: Plan) -> float:
+def render_seconds(scene: Any, plan: Plan) -> float:
     start = time.perf_counter()
     dr.eval(mi.render(scene, spp=plan.spp))
     dr.sync_thread()
     return time.perf_counter() - start
 
 
-def _scene(plan: Plan, bsdf: Any) -> Any:
+def ball_scene(plan: Plan, bsdf: Any) -> Any:
     look = mi.ScalarTransform4f().look_at(origin=[0, -4, 0], target=[0, 0, 0], up=[0, 0, 1])
     lamp = mi.ScalarTransform4f().look_at(origin=[2, -3, 3], target=[0, 0, 0], up=[0, 0, 1])
     return mi.load_dict(

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..benchmarks.figures import Section
     from ..benchmarks.plan import Plan
 
-PARTS = ("build", "eval", "sample", "render", "snake", "noise", "efficiency", "colours")
+PARTS = ("build", "eval", "sample", "render", "snake", "noise", "efficiency", "colours", "scaling")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -41,6 +41,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--json", metavar="FILE", type=path_ending_in(".json"),
         help="write every single measurement as well",
+    )  # fmt: skip
+    parser.add_argument(
+        "--against", metavar="FILE", type=path_ending_in(".json"),
+        help="compare with an earlier run, written by --json",
     )  # fmt: skip
     parser.add_argument("--only", choices=PARTS, help="measure only this")
     parser.add_argument(
@@ -64,6 +68,9 @@ def run(args: argparse.Namespace) -> int:
         check_writable(args.json)
     if args.heights is None and was_given(args):
         args.parser.error(f"{was_given(args)[0]} needs a file of heights")
+    from ..benchmarks.history import compared, read_run
+
+    earlier = read_run(args.against) if args.against is not None else None
     parts = (args.only,) if args.only else PARTS
     if not {"snake", "efficiency", "colours"}.isdisjoint(parts):
         _check_scenes(args.scenes)
@@ -87,12 +94,15 @@ def run(args: argparse.Namespace) -> int:
     goals = [goal for section in sections for goal in section.goals]
     if goals:
         print(f"\n{sum(goal.met for goal in goals)} of {len(goals)} goals met")
+    data = {
+        "machine": machine,
+        "plan": asdict(chosen),
+        "sections": [section.plain() for section in sections],
+    }
+    if earlier is not None:
+        print(f"\nnow / {args.against}")
+        print("\n".join(compared(earlier, data)))
     if args.json is not None:
-        data = {
-            "machine": machine,
-            "plan": asdict(chosen),
-            "sections": [section.plain() for section in sections],
-        }
         with atomic_path(args.json) as path:
             path.write_text(json.dumps(plain(data), indent=1, ensure_ascii=False), encoding="utf-8")
     return 0
@@ -124,6 +134,7 @@ def _sections(
     from ..benchmarks.contenders import build_tables
     from ..benchmarks.evaluation import measure_eval, measure_sampling
     from ..benchmarks.rendering import measure_rendering, measure_snake
+    from ..benchmarks.scaling import measure_lookups, measure_pictures
     from ..benchmarks.variance import measure_efficiency, measure_noise
     from ..files.heights import load_heights
     from .scenes import set_variant
@@ -150,3 +161,7 @@ def _sections(
             yield measure_efficiency(plan, tables, args.scenes, bar)
         if "colours" in parts:
             yield from measure_colours(plan, tables, args.scenes, backend, bar)
+        if "scaling" in parts:
+            set_variant(f"{backend}_ad_spectral")
+            yield measure_lookups(plan, folder, bar)
+            yield measure_pictures(plan, tables, bar)

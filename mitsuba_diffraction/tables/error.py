@@ -35,6 +35,7 @@ FLOOR = 1e-3
 #: Units of 1/σ from a bin within which its lobe is looked at: 1/e⁴ of its power at the edge.
 _WITHIN = 2.0
 _SEED = 20140113
+_SMALL = 1 << 16  # coefficients
 _TOGETHER = 10  # κ whose series are summed at once: widening half floats takes longer than the sum
 
 Parts = NDArray[np.float64]  # [[|error| near, |error| far], [exact near, exact far]]
@@ -157,6 +158,8 @@ class ErrorMeter:
         self, coefficients: NDArray[np.floating], weights: NDArray[np.floating]
     ) -> NDArray[np.floating]:
         """Series (n, ny, nx, components) with weights (terms, n): each coefficient is read once."""
+        if coefficients.size < _SMALL:  # threads would take longer to start
+            return np.moveaxis(coefficients.astype(self._real) @ weights, -1, 0)
         result = np.empty((weights.shape[1], *coefficients.shape[:3]), self._real)
 
         def sum_row(y: int) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.benchmarks import colours, plan
+from mitsuba_diffraction.benchmarks import colours, plan, scaling
 from mitsuba_diffraction.benchmarks.figures import Goal, Row, Section
 from mitsuba_diffraction.benchmarks.plan import Plan
 from mitsuba_diffraction.benchmarks.timing import ratio, rounds_of
@@ -26,6 +26,7 @@ TINY = Plan(
     spp=1,
     reference_spp=2,
     map_resolution=8,
+    sides=(48,),
 )
 SCENES = Path(__file__).parents[2] / "scenes"
 
@@ -33,6 +34,7 @@ SCENES = Path(__file__).parents[2] / "scenes"
 @pytest.fixture(autouse=True)
 def tiny(monkeypatch):
     monkeypatch.setattr(plan, "QUICK", TINY)
+    monkeypatch.setattr(scaling, "TERMS", (4,))
     monkeypatch.setattr(colours, "MATERIALS", {"none": colours.MATERIALS["none"]})
 
 
@@ -40,7 +42,19 @@ def test_everything_is_measured_and_written(run, tmp_path):
     file = tmp_path / "bench.json"
     ran = run("bench", "--quick", "--json", file, "--scenes", SCENES)
     assert ran.code == 0, ran.err
-    parts = ("build", "eval", "sample", "pdf", "render", "snake", "noise", "efficiency", "colours")
+    parts = (
+        "build",
+        "eval",
+        "sample",
+        "pdf",
+        "render",
+        "snake",
+        "noise",
+        "efficiency",
+        "colours",
+        "scaling",
+        "pictures",
+    )
     for part in ("processor", "llvm 1", "gathers", *(f"{part}:" for part in parts)):
         assert part in ran.out
     data = json.loads(file.read_text(encoding="utf-8"))
@@ -53,7 +67,29 @@ def test_everything_is_measured_and_written(run, tmp_path):
         assert len(row["ns"]) == TINY.rounds
         assert min(row["ns"]) > 0
     goals = {goal["goal"] for row in evaluation["rows"] for goal in row["goals"]}
-    assert goals == {"at most 8× roughconductor", "at least 30× the defaults"}
+    assert goals == {
+        "at most 4× roughconductor",
+        "within 1.5× of bare gathers",
+        "at most 3× roughconductor",
+        "at least 30× the defaults",
+    }
+
+
+def test_two_runs_are_compared_number_by_number(run, tmp_path):
+    file = tmp_path / "bench.json"
+    assert run("bench", "--quick", "--only", "build", "--json", file).code == 0
+    ran = run("bench", "--quick", "--only", "build", "--against", file)
+    assert ran.code == 0, ran.err
+    assert f"now / {file}" in ran.out
+    # the same heights: the same error
+    assert "1.00×  build: 96² pixels, the defaults: error/tolerance:" in ran.out
+
+
+def test_a_run_that_is_none_is_refused_before_measuring(run, tmp_path):
+    file = tmp_path / "bench.json"
+    file.write_text("{}", encoding="utf-8")
+    ran = run("bench", "--quick", "--only", "build", "--against", file)
+    assert "is not what bench --json writes" in ran.failed_in_one_line()
 
 
 def test_a_part_alone(run):

@@ -15,7 +15,7 @@ from mitsuba_diffraction.reference import screen_power
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
 
 #: Examples and samples of each: together more than 10 000 on more than 200 tables.
-TABLES, SAMPLES = 240, 50
+TABLES, SAMPLES = 206, 50
 
 
 def between(low: float, high: float) -> st.SearchStrategy[float]:
@@ -26,7 +26,8 @@ def between(low: float, high: float) -> st.SearchStrategy[float]:
 @st.composite
 def patches(draw: st.DrawFn) -> HeightField:
     """From a nanometre to 20 µm deep, 2 × 2 pixels up, with pixels of up to 1:10."""
-    depth = draw(between(1e-3, 20.0))
+    # deep surfaces take long series: one in four is as deep as any
+    depth = draw(between(1e-3, 20.0) if draw(st.integers(0, 3)) == 0 else between(1e-3, 1.0))
     most = 24 if depth < 2.0 else 8  # deep series are long: keep the tables small
     ny, nx = draw(st.integers(2, most)), draw(st.integers(2, most))
     x, y = np.arange(nx), np.arange(ny)[:, None]
@@ -103,9 +104,11 @@ def test_right_or_refused(field, asked, seed):
             for a, qx, qy in zip((k * w)[:, None, None] * field.heights, k * u, k * v, strict=True)
         ]
     ) / (4.0 * np.pi**2 * sigma**4)
+    # What all directions have on average: Σ|a_j|² = 1, each order spread over 1/(s_x s_y) bins
+    mean = min(1.0, 1.0 / np.prod([*table.grid.steps, *table.grid.reach]))
     mirror = slice(5, 15)
     for part in (mirror, np.setdiff1d(np.arange(SAMPLES), np.arange(SAMPLES)[mirror])):
         error = np.abs(found[part] - exact[part]).sum()
-        # the tolerance holds for thousands of directions: twice that for some ten of them; far from
-        # all lobes the window is cut off, and what is less than 1e-7 of Σ|a|² = 1 counts as none
-        assert error <= 2.0 * asked["tolerance"] * exact[part].sum() + 1e-7 * len(exact[part])
+        # the tolerance is relative to the light of thousands of directions: twice that for some ten
+        # of them, which may all be darker than the average
+        assert error <= asked["tolerance"] * (2.0 * exact[part].sum() + mean * len(exact[part]))

@@ -1,0 +1,109 @@
+"""The README's and docs/accuracy.md's tables of the trade, from what `tradeoff` measured.
+
+mitsuba-diffraction tradeoff -o out/tradeoff
+python -m mitsuba_diffraction.figures.tradeoff out/tradeoff -o README.md docs/accuracy.md
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import DiffractionError
+from ..files.atomic import atomic_path
+from . import markers
+
+#: What the README shows: groups, in this order.
+SHORT = ("default", "tolerance", "basis")
+_HEAD = (
+    "setting", "error", "ΔE2000, mean (99 %)", "`eval` / `roughconductor`", "taps × numbers", "MB",
+    "built in, s",
+)  # fmt: skip
+
+
+def tables(measured: dict[str, Any]) -> dict[str, str]:
+    """Markdown by the name of its markers: `tradeoff` for the README, `settings` and `spectral`.
+
+    Parameters
+    ----------
+    measured : the content of `tradeoff.json`.
+    """
+    settings = measured["settings"]
+    short = [record for record in settings if record["group"] in SHORT]
+    machine = measured["machine"]
+    where = f"{measured['patch']}; {machine['cores']} cores ({machine['processor']})"
+    return {
+        "tradeoff": f"{markers.table(_HEAD, tuple(_rows(short)))}\n\n{where}.",
+        "settings": f"{markers.table(_HEAD, tuple(_rows(settings)))}\n\n{where}.",
+        "spectral": _spectral(measured["spectral"]),
+    }
+
+
+def _rows(records: Sequence[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
+    for record in records:
+        if record["refused"]:
+            yield record["setting"], f"refused: {record['refused']}", "", "", "", "", ""
+            continue
+        yield (
+            record["setting"],
+            f"{record['error']:.1e}",
+            f"{record['delta_e']:.3f} ({record['delta_e_99']:.2f})",
+            f"{record['relative']:.2f}",
+            f"{record['taps']} × {record['terms']} ({record['precision']})",
+            f"{record['megabytes']:.1f}",
+            f"{record['seconds']:.1f}",
+        )
+
+
+def _spectral(spectral: dict[str, Any]) -> str:
+    steps, counts = spectral["steps"], spectral["counts"]
+    by_step = markers.table(
+        ("step of a sum", *(f"{float(step):g} nm" for step in steps)),
+        [("ΔE2000, mean", *(f"{error:.2f}" for error in steps.values()))],
+    )
+    by_count = markers.table(
+        ("wavelengths of a ray", *counts),
+        [("noise of its luminance", *(f"{noise:.2f}" for noise in counts.values()))],
+    )
+    return f"{by_step}\n\n{by_count}"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Replace the tables and copy the plots, and return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m mitsuba_diffraction.figures.tradeoff")
+    parser.add_argument("measured", metavar="FOLDER", type=Path, help="from tradeoff -o")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", type=Path, nargs="+",
+        default=[Path("README.md"), Path("docs/accuracy.md")],
+        help="pages, each with some of the markers; default: README.md docs/accuracy.md",
+    )  # fmt: skip
+    parser.add_argument("--images", metavar="FOLDER", type=Path, default=Path("docs/images"))
+    args = parser.parse_args(argv)
+    try:
+        file = args.measured / "tradeoff.json"
+        try:
+            found = tables(json.loads(file.read_text(encoding="utf-8")))
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise DiffractionError(
+                f"'{file}' is not what tradeoff writes ({error}); run make tradeoff"
+            ) from error
+        for page in args.output:
+            text = page.read_text(encoding="utf-8")
+            named = {name: part for name, part in found.items() if f"<!-- begin {name} -->" in text}
+            markers.update(page, named)
+        for name, target in (("tradeoff.png", "tradeoff.png"), ("depth.png", "depth.png")):
+            with atomic_path(args.images / target) as temporary:
+                shutil.copyfile(args.measured / name, temporary)
+    except DiffractionError as error:
+        print(f"tradeoff: error: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,74 @@
+"""The plugin at the extremes of surfaces and angles: finite, not negative, and its table's twin."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import HeightField
+from tests.lanes import evaluated
+from tests.optics import as_single, rough_patch
+
+pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
+
+
+def deep(depth: float, shape=(12, 12), pixels=(0.1, 0.1), offset: float = 0.0) -> HeightField:
+    field = rough_patch(shape, pixels, depth)
+    return HeightField(field.heights + offset, pixels)
+
+
+CASES = {
+    "1 nm": (deep(1e-3), 1.0, {}),
+    "5 µm": (deep(5.0, (6, 6)), 1.0, {"tolerance": 1e-2}),
+    "2 × 2 pixels": (deep(0.1, (2, 2)), 1.0, {}),
+    "pixels of 1:10, 5 mm up": (deep(0.2, (8, 40), (0.05, 0.5), 5e3), 1.0, {}),
+    "a window of a tenth, one spot": (deep(0.2, (32, 32)), 0.1, {"coherence": "patch"}),
+    "a window of ten": (deep(0.2), 10.0, {}),
+}
+
+
+def extreme_pairs() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Random directions, and grazing, mirroring and retro-reflecting ones; nm."""
+    rng = np.random.default_rng(3)
+    cosine = rng.random((2, 400))
+    cosine[:, :100] = np.cos(np.radians(rng.uniform(89.0, 89.99, (2, 100))))
+    phi = rng.uniform(0.0, 2.0 * np.pi, (2, 400))
+    cosine[1, 100:300] = cosine[0, 100:300]
+    phi[1, 100:200], phi[1, 200:300] = phi[0, 100:200] + np.pi, phi[0, 200:300]
+    sine = np.sqrt(1.0 - cosine**2)
+    wi, wo = np.stack([sine * np.cos(phi), sine * np.sin(phi), cosine], axis=-1)
+    return as_single(wi), as_single(wo), as_single(rng.uniform(360.0, 830.0, 400))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_values_are_finite_and_those_of_the_table(variant, name):
+    field, width, parameters = CASES[name]
+    bsdf = mi.load_dict(
+        md.bsdf_dict(
+            field,
+            coherence_width=width * min(field.extent),
+            material="none",
+            energy_conserving=False,
+            **parameters,
+        )
+    )
+    wi, wo, lam = extreme_pairs()
+    found = evaluated(bsdf, wi, wo, lam[:, None])
+    assert np.all(np.isfinite(found))
+    assert np.all(found >= 0.0)
+    expected = bsdf.table.brdf(wi, wo, lam) * wo[:, 2]
+    # single precision of phases, as in test_bsdf; the deepest series has functions of κ that turn
+    # once in 2π/κH = 1/40 of the range of κ, known to 6e-8·κH = 2e-5 of a radian
+    assert np.abs(found[:, 0] - expected).sum() < 2e-4 * expected.sum()
+
+
+@pytest.mark.parametrize("name", ["1 nm", "2 × 2 pixels", "a window of ten"])
+def test_conserved_energy_and_samples_are_finite(variant, name):
+    field, width, parameters = CASES[name]
+    bsdf = mi.load_dict(
+        md.bsdf_dict(field, coherence_width=width * min(field.extent), **parameters)
+    )
+    wi, wo, lam = extreme_pairs()
+    assert np.all(np.isfinite(evaluated(bsdf, wi, wo, lam[:, None])))
