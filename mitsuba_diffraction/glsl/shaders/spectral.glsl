@@ -23,7 +23,7 @@ uniform int cells;
 uniform float inverse_scale;
 
 const float REACH = 2.6;         // of the window, in 1/σ: erfc(2.6) = 2e-4 is left out
-const float WIDEST_LOBE = 0.35;  // rad/µm, 12 nm in the green
+const float WIDEST_LOBE = 0.35;  // rad/µm, 17 nm in the green
 const float LARGEST_STEP = 0.25; // rad/µm, for the eye's curves
 
 int interval_of(float kappa)
