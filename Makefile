@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test bench figures gallery evaluation methods sweeps tradeoff validation realtime lint clean help
+.PHONY: setup demo test bench figures gallery evaluation methods sweeps tradeoff plan validation realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -59,6 +59,11 @@ methods: setup  ## measure the methods, and put the table into the README
 tradeoff: setup  ## measure accuracy against speed and memory: README.md and docs/accuracy.md
 	@$(RUN) tradeoff $(MEASURED) -o out/tradeoff
 	@$(PYTHON3) -m mitsuba_diffraction.figures.tradeoff out/tradeoff
+
+plan: setup  ## plan the snake's scene, and put the figures into README.md and docs/plan.md
+	@mkdir -p out
+	@$(RUN) plan scenes/snake.xml --json out/plan.json
+	@$(PYTHON3) -m mitsuba_diffraction.figures.plan out/plan.json
 
 validation: setup  ## compare the model with rigorous solutions: docs/validation.md
 	@$(PYTHON3) -m mitsuba_diffraction.validation report -o docs

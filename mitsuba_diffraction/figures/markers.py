@@ -43,10 +43,7 @@ def update(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
         If the file or a marker is missing, or it cannot be written.
     """
     file = Path(path)
-    try:
-        text = file.read_text(encoding="utf-8")
-    except OSError as error:
-        raise DiffractionError(f"cannot read '{file}': {error.strerror}") from error
+    text = _read(file)
     for name, content in parts.items():
         try:
             text = replaced(text, name, content)
@@ -54,6 +51,30 @@ def update(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
             raise DiffractionError(f"'{file}': {error}") from error
     with atomic_path(file) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def update_present(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
+    """Replace those parts that a file has markers for.
+
+    Raises
+    ------
+    DiffractionError
+        If it has none, or as in `update`.
+    """
+    text = _read(Path(path))
+    present = {name: part for name, part in parts.items() if f"<!-- begin {name} -->" in text}
+    if not present:
+        raise DiffractionError(
+            f"'{path}' has none of the markers {', '.join(f'<!-- begin {n} -->' for n in parts)}"
+        )
+    update(path, present)
+
+
+def _read(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8")
+    except OSError as error:
+        raise DiffractionError(f"cannot read '{file}': {error.strerror}") from error
 
 
 def table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:

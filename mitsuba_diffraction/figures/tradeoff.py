@@ -93,9 +93,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 f"'{file}' is not what tradeoff writes ({error}); run make tradeoff"
             ) from error
         for page in args.output:
-            text = page.read_text(encoding="utf-8")
-            named = {name: part for name, part in found.items() if f"<!-- begin {name} -->" in text}
-            markers.update(page, named)
+            markers.update_present(page, found)
         for name, target in (("tradeoff.png", "tradeoff.png"), ("depth.png", "depth.png")):
             with atomic_path(args.images / target) as temporary:
                 shutil.copyfile(args.measured / name, temporary)

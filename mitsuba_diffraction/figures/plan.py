@@ -1,0 +1,89 @@
+"""The README's and docs/plan.md's figures of a planned scene, from what `plan` measured.
+
+mitsuba-diffraction plan scenes/snake.xml --json out/plan.json
+python -m mitsuba_diffraction.figures.plan out/plan.json -o README.md docs/plan.md
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import DiffractionError
+from . import markers
+
+_PICTURE = "picture, planned against whole, same random numbers"
+
+
+def tables(report: dict[str, Any]) -> dict[str, str]:
+    """Markdown by the name of its markers: `planned` for the README, `plan` in full.
+
+    Parameters
+    ----------
+    report : what `plan --json` wrote.
+    """
+    table, picture = report["tables"][0], report[_PICTURE]
+    whole, planned = table["whole"], table["planned"]
+    asked, needs = table["asked for"], table["needs"]
+    frequency, kappa = asked["light can probe up to"]
+    rows = [
+        ("frequencies, rad/µm", f"up to {frequency:.1f}", _frequencies(needs)),
+        ("κ, rad/µm", f"up to {kappa:.1f}", f"up to {needs['kappa (rad/µm)']:.1f}"),
+        ("series in κ, terms", str(whole["terms"]), str(planned["terms"])),
+        ("table", *(f"{one['memory_mb']:.2g} MB" for one in (whole, planned))),
+        (
+            "densities for sampling",
+            *(f"{one['sampling_memory_mb']:.2g} MB" for one in (whole, planned)),
+        ),
+    ]
+    change = (
+        f"and the picture changes by {picture['mean difference / mean (XYZ)']:.0e} of its mean (XYZ; "
+        f"ΔE2000 {picture['delta E 2000, mean']:.2f}, 99 % {picture['delta E 2000, 99 %']:.2f})"
+    )
+    less = table["times less memory"]
+    return {
+        "planned": f"The snake's table shrinks from {whole['memory_mb']:.1f} to "
+        f"{planned['memory_mb']:.1f} MB, to 1/{less:.1f}, {change}.",
+        "plan": f"{markers.table(('', 'whole table', 'planned'), rows)}\n\n"
+        f"{less:.1f} times less memory, {change}.",
+    }
+
+
+def _frequencies(needs: dict[str, Any]) -> str:
+    for name, value in needs.items():
+        if name.startswith("frequency"):
+            return f"up to {' and '.join(f'{v:.1f}' for v in value)} along x and y"
+    raise KeyError("frequency")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Replace the figures, and return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m mitsuba_diffraction.figures.plan")
+    parser.add_argument("report", metavar="PLAN.json", type=Path, help="from plan --json")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", type=Path, nargs="+",
+        default=[Path("README.md"), Path("docs/plan.md")],
+        help="pages, each with some of the markers; default: README.md docs/plan.md",
+    )  # fmt: skip
+    args = parser.parse_args(argv)
+    try:
+        try:
+            found = tables(json.loads(args.report.read_text(encoding="utf-8")))
+        except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
+            raise DiffractionError(
+                f"'{args.report}' is not what plan --json writes ({error}); run make plan"
+            ) from error
+        for page in args.output:
+            markers.update_present(page, found)
+    except DiffractionError as error:
+        print(f"plan: error: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
