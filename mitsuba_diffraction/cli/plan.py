@@ -167,7 +167,7 @@ def plan_or_json(text: str) -> Path:
 def _of_table(
     key: str, loaded: Loaded, plan: Plan, planned: dict[str, Any], seconds: dict[str, float]
 ) -> dict[str, Any]:
-    from ..planning.domain import lobes_in_a_pixel, quantiles, wavelengths_needed
+    from ..planning.domain import lobes_in_a_pixel, wavelengths_needed
     from ..planning.make import evaluation_ratio
     from ..plugin.sampling import sampler_bytes
 
@@ -189,17 +189,13 @@ def _of_table(
         (lobes_in_a_pixel(float(loaded.seen.lobe_turn[n]), table.sigma) for n in bsdfs),
         default=math.nan,
     )
-    shares = [0.5, 0.99, 0.999]
     light = asked.light
     result["asked for"] = {
         "share of the surfaces' light that is diffracted": float(light.sum()),
-        "frequency (rad/µm) below which are 50, 99, 99.9 %": quantiles(
-            asked.frequency, light, shares
-        ),
-        "the same along x": quantiles(asked.along[0], light, shares),
-        "along y": quantiles(asked.along[1], light, shares),
-        "kappa (rad/µm) of 0.1, 50, 99.9 %": quantiles(asked.kappa, light, [1e-3, 0.5, 0.999]),
-        "light can probe up to": [table.reach, table.expansion.kappa_max],
+        "frequency (rad/µm)": _shares(asked.frequency, light, "light can probe", table.reach),
+        "frequency along x (rad/µm)": _shares(asked.along[0], light),
+        "frequency along y (rad/µm)": _shares(asked.along[1], light),
+        "kappa (rad/µm)": _shares(asked.kappa, light, "the table has", table.expansion.kappa_max),
         "wavelengths of 99.9 %": wavelengths_needed(asked),
         "lobes of the window in a pixel": lobes,
         "coherence": _coherence(table.coherence, lobes),
@@ -229,6 +225,18 @@ def _of_table(
         },
         "times less memory": table.nbytes / smaller.nbytes,
     }
+
+
+def _shares(values: Any, light: Any, name: str = "", limit: float = 0.0) -> dict[str, float]:
+    """Below which values there are these shares of the light, and the largest that could be."""
+    from ..planning.domain import quantiles
+
+    below = [0.5, 0.99, 0.999]
+    found = {
+        f"{100 * share:g} % of the light below": value
+        for share, value in zip(below, quantiles(values, light, below), strict=True)
+    }
+    return found | ({name: limit} if name else {})
 
 
 def _coherence(given: str, lobes: float) -> str:
