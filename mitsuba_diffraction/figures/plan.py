@@ -29,7 +29,8 @@ def tables(report: dict[str, Any]) -> dict[str, str]:
     table, picture = report["tables"][0], report[_PICTURE]
     whole, planned = table["whole"], table["planned"]
     asked, needs = table["asked for"], table["needs"]
-    frequency, kappa = asked["light can probe up to"]
+    frequency = asked["frequency (rad/µm)"]["light can probe"]
+    kappa = asked["kappa (rad/µm)"]["the table has"]
     rows = [
         ("frequencies, rad/µm", f"up to {frequency:.1f}", _frequencies(needs)),
         ("κ, rad/µm", f"up to {kappa:.1f}", f"up to {needs['kappa (rad/µm)']:.1f}"),
@@ -40,9 +41,10 @@ def tables(report: dict[str, Any]) -> dict[str, str]:
             *(f"{one['sampling_memory_mb']:.2g} MB" for one in (whole, planned)),
         ),
     ]
+    shift, mean = picture["mean difference / mean (XYZ)"], picture["delta E 2000, mean"]
     change = (
-        f"and the picture changes by {picture['mean difference / mean (XYZ)']:.0e} of its mean (XYZ; "
-        f"ΔE2000 {picture['delta E 2000, mean']:.2f}, 99 % {picture['delta E 2000, 99 %']:.2f})"
+        f"and the picture changes by {shift:.0e} of its mean (XYZ; ΔE2000 {mean:.2f}, 99 % "
+        f"{picture['delta E 2000, 99 %']:.2f})"
     )
     less = table["times less memory"]
     return {

@@ -18,7 +18,10 @@ def report() -> dict:
     return {
         "tables": [
             {
-                "asked for": {"light can probe up to": [34.9, 52.4]},
+                "asked for": {
+                    "frequency (rad/µm)": {"light can probe": 34.9},
+                    "kappa (rad/µm)": {"the table has": 52.4},
+                },
                 "needs": {"frequency (rad/µm), along x and y": [20.5, 6.5], "kappa (rad/µm)": 35.0},
                 "whole": one,
                 "planned": one | {"memory_mb": 1.0},
