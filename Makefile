@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test bench figures gallery evaluation methods sweeps tradeoff plan validation realtime lint clean help
+.PHONY: setup demo test bench figures gallery evaluation methods sweeps tradeoff plan parameters validation realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -64,6 +64,9 @@ plan: setup  ## plan the snake's scene, and put the figures into README.md and d
 	@mkdir -p out
 	@$(RUN) plan scenes/snake.xml --json out/plan.json
 	@$(PYTHON3) -m mitsuba_diffraction.figures.plan out/plan.json
+
+parameters: setup  ## make docs/parameters.md from the plugin's docstring
+	@$(PYTHON3) -m mitsuba_diffraction.figures.parameters -o docs/parameters.md
 
 validation: setup  ## compare the model with rigorous solutions: docs/validation.md
 	@$(PYTHON3) -m mitsuba_diffraction.validation report -o docs

@@ -1,31 +1,34 @@
 """The Mitsuba BSDF plugin `diffraction`: measured surfaces that diffract.
 
-.. list: parameters (defaults in brackets, ∂ differentiable)
+Parameters, with defaults in brackets; ∂: differentiable. Lengths are in µm, wavelengths in nm.
+`docs/parameters.md` is made of this text.
 
+The surface
+-----------
 heightfield : string
-    Height field: image (PNG, BMP, TIFF, EXR), array (NPY), AFM file, recipe (TOML), or table.
+    Heights: image (PNG, BMP, TIFF, EXR), array (NPY), text, instrument file, recipe (TOML); a table
+    works too.
 table : string
     A table made by `mitsuba-diffraction precompute` instead.
 data : mi.TensorXf
-    Heights in µm instead, shape (ny, nx); dictionaries only (see `bsdf_dict`).
+    Heights in µm instead, shape (ny, nx); dictionaries only, where `md.bsdf_dict` fills it in.
 pixel_size : float or string [from the file]
     Distance between heights in µm: one number, "dx, dy", or "auto".
 max_height : float or string [from the file]
     Height of white in an integer image, µm, or "auto".
-coherence_width : float [65]
-    4σ of the Gaussian amplitude window, µm.
-coherence : string [ensemble]
-    `ensemble`: what a pixel sees that covers many coherence areas; `patch`: one window's speckle.
-basis : string [auto]
-    `svd` (also as `auto`), `chebyshev` or `taylor`: the series in κ.
-tolerance : float [1e-3]
-    Relative error of ⟨|P|²⟩, met or refused.
-terms : integer [from the tolerance]
-    Length of the series.
-material, eta, k : string, spectra
-    A conductor, as in `roughconductor`; material "none" reflects everything.
-int_ior, ext_ior : float or string [1.5, 1.000277]
-    A dielectric, the default (1.5: shed snake skin).
+channel : string or integer [the heights]
+    Which channel of an instrument file: its name or index; of an EXR image, its name.
+fill : string [none]
+    How points without data are filled: `none` (they are refused), `nearest` (the nearest height)
+    or `harmonic` (a membrane spanned over the gap).
+level : string [none]
+    `plane` subtracts the best plane, `lines` aligns the scan lines by their medians first; `none`.
+clip : float [none]
+    Cuts heights off beyond so many robust standard deviations: dust. At least 1.
+periodic : string [none]
+    How opposite edges are made to meet, since the patch tiles the surface: `smooth` (its periodic
+    component, Moisan 2011) or `taper` (heights fade towards the edges); `none`. The
+    treatments are applied in the order fill, level, clip, periodic.
 orientation : float or texture ∂ [0]
     Degrees that the patch's x axis is turned by from the first tangent; or a texture (raw, in a
     float format) or mesh attribute of three channels, the first two of which are (cos, sin) of that
@@ -33,7 +36,30 @@ orientation : float or texture ∂ [0]
     triangle to triangle. A BSDF cannot see that; `info MESH` and `render` warn.
 height_scale : float ∂ [1]
     Multiplies the heights, up to 1.5 × max(1, value given).
-energy_conserving : bool [true]
+
+The table
+---------
+coherence_width : float [65]
+    4σ of the Gaussian amplitude window, µm: the width over which light is coherent.
+coherence : string [ensemble]
+    `ensemble`: what a pixel sees that covers many coherence areas; `patch`: one window's speckle.
+basis : string [auto]
+    `svd` (also as `auto`), `chebyshev` or `taylor`: the series in κ.
+tolerance : float [0.001]
+    Relative error of ⟨|P|²⟩, met or refused.
+terms : integer [from tolerance]
+    Length of the series.
+
+The material
+------------
+material : string
+    A conductor by name, as in `roughconductor`; `none` reflects everything.
+eta, k : spectra ∂
+    The same by its complex refractive index.
+int_ior, ext_ior : float or string [1.5, 1.000277]
+    A dielectric, which the surface is unless it is a conductor (1.5: shed snake skin).
+    Their ratio is the differentiable parameter `eta`.
+energy_conserving : boolean [true]
     Divides by max(1, a(ωi), a(ωo)), where a bounds the directional albedo for R = 1 from above at
     all wavelengths: reciprocal, never brighter than white. `false` is raw Kirchhoff, which gains
     energy at grazing angles (1.3 at 80°, more beyond), for checks. The bound takes a second or
@@ -41,7 +67,13 @@ energy_conserving : bool [true]
     bounds at a few scales: an optimisation waits where it enters such an interval for the first
     time. For its derivative, enable that of height_scale before parameters.update().
 shadowing : string [none]
-    `vcavity`: the surface shadows itself like long V-shaped grooves (Torrance and Sparrow 1967).
+    `vcavity`: the surface shadows itself like long V-shaped grooves (Torrance and Sparrow 1967);
+    `none`.
+
+The light beneath
+-----------------
+(nested) : BSDF ∂
+    What lies beneath a dielectric and receives the light that is not reflected, e.g. pigment.
 layering : string [transmission]
     How the nested BSDF shares the light. `transmission`: it gets and returns T(ωi) T(ωo), with
     T = 1 − R of the flat interface. `thesis`: (1 − w) f_diffraction + (1 − F + w) f_nested, F at
@@ -49,10 +81,11 @@ layering : string [transmission]
     its pictures only, since it gains energy.
 diffuse_weight : float [0]
     That w.
+
+Variants
+--------
 wavelength : float [550]
     nm, in mono variants; the others have their own.
-(nested) : BSDF
-    What lies beneath a dielectric and receives the light that is not reflected, e.g. pigment.
 
 The model is scalar Kirchhoff diffraction (Beckmann and Spizzichino 1963; Stam 1999) under a
 Gaussian coherence window, looked up in a table of the patch's diffraction orders:
@@ -62,13 +95,23 @@ Gaussian coherence window, looked up in a table of the patch's diffraction order
 XML and the same in Python:
 
     <bsdf type="diffraction">
-        <string name="heightfield" value="elaphe.png"/>
+        <string name="heightfield" value="scale.png"/>
         <float name="pixel_size" value="0.0488"/>
         <float name="max_height" value="0.375"/>
     </bsdf>
 
-    mi.load_dict({"type": "diffraction", "heightfield": "elaphe.png", "pixel_size": 0.0488,
-                  "max_height": 0.375})
+    import mitsuba_diffraction  # before Mitsuba: registers the plugin
+    import mitsuba as mi
+
+    mi.set_variant("llvm_ad_spectral")
+    bsdf = mi.load_dict(
+        {
+            "type": "diffraction",
+            "heightfield": "scale.png",
+            "pixel_size": 0.0488,
+            "max_height": 0.375,
+        }
+    )
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ import warnings
 
 import pytest
 
+from mitsuba_diffraction import __version__
 from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 
@@ -49,6 +50,13 @@ def test_version_is_printed(run):
     ran = run("--version")
     assert ran.code == 0
     assert ran.out.startswith("mitsuba-diffraction ")
+
+
+def test_the_package_runs_as_a_module():
+    words = [sys.executable, "-m", "mitsuba_diffraction", "--version"]
+    ran = subprocess.run(words, capture_output=True, text=True, timeout=60, check=True)
+    assert ran.stdout == f"mitsuba-diffraction {__version__}\n"
+    assert ran.stderr == ""
 
 
 def test_the_parser_loads_no_command_s_machinery():

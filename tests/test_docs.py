@@ -1,0 +1,203 @@
+"""What README and docs say to type works: commands parse, targets, files and examples exist."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import shlex
+import tomllib
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from mitsuba_diffraction.cli.main import build_parser
+from mitsuba_diffraction.cli.scene_parameters import parameters_of
+from mitsuba_diffraction.meshes.__main__ import _parser as meshes_parser
+
+ROOT = Path(__file__).parents[1]
+PAGES = {
+    path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
+    for path in (
+        *(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CHANGELOG.md")),
+        *sorted((ROOT / "docs").glob("*.md")),
+    )
+}
+TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+_FENCE = re.compile(r"^ *```(\w*)\n(.*?)^ *```$", re.M | re.S)
+_COMMAND = re.compile(r"(\.venv/bin/)?(mitsuba-diffraction|python -m|make) ")
+
+
+def blocks(page: str, language: str) -> list[str]:
+    """Code blocks of a page, in that language."""
+    return [text for name, text in _FENCE.findall(PAGES[page]) if name == language]
+
+
+def spans(page: str) -> list[str]:
+    """Code within a page's sentences, on one line each."""
+    return [" ".join(s.split()) for s in re.findall(r"`([^`]+)`", _FENCE.sub("", PAGES[page]))]
+
+
+def typed(text: str) -> list[list[str]]:
+    """The words of each command of a shell block."""
+    lines = text.replace("\\\n", " ").splitlines()
+    return [words for line in lines if (words := shlex.split(line, comments=True))]
+
+
+COMMANDS = [
+    pytest.param(words, id=f"{page}: {' '.join(words)}"[:90])
+    for page in PAGES
+    for text in (
+        *blocks(page, "sh"),
+        *(span for span in spans(page) if _COMMAND.match(span)),
+    )
+    for words in typed(text)
+]
+
+
+@pytest.mark.parametrize("words", COMMANDS)
+def test_a_documented_command_is_one(words):
+    program, *rest = words
+    match Path(program).name, rest:
+        case "mitsuba-diffraction", _:
+            check_command(rest)
+        case "python", ["-m", "mitsuba_diffraction.meshes", _, _, *_]:
+            meshes_parser().parse_args(rest[2:])
+        case "python", ["-m", module, *_]:
+            assert importlib.util.find_spec(module) is not None
+        case "make", _:
+            assert {word for word in rest if "=" not in word} <= TARGETS
+        case "pip", ["install", what]:
+            extras = re.search(r"\[(.*)\]", what)
+            assert what.startswith(".")
+            assert extras is None or set(extras[1].split(",")) <= set(
+                PROJECT["optional-dependencies"]
+            )
+        case "apt", ["install", *_]:
+            pass
+        case _:
+            pytest.fail(f"nothing here knows how to check '{program}'")
+    for word in rest:
+        if word.startswith(("scenes/", "precompute/")):
+            assert (ROOT / word).exists(), word
+
+
+def check_command(words: list[str]) -> None:
+    """The real parser takes it, and its scene has the parameters."""
+    if len(words) == 1 and not words[0].startswith("-"):
+        words = [*words, "--help"]  # a command that a sentence names
+    try:
+        args = build_parser().parse_args(words)
+    except SystemExit as stop:
+        assert stop.code == 0, words  # --help and --version
+        return
+    if hasattr(args, "scene") and hasattr(args, "parameters"):
+        known = parameters_of(ROOT / args.scene)
+        assert known is not None
+        assert {name for name, _ in args.parameters} <= set(known)
+
+
+def test_every_option_in_a_sentence_is_one_of_some_command():
+    known = options_of(build_parser()) | options_of(meshes_parser())
+    # those of the programs that make documents
+    own = {
+        option
+        for path in (ROOT / "mitsuba_diffraction").rglob("*.py")
+        for option in re.findall(r'add_argument\([^)]*?"(--[\w-]+)"', path.read_text("utf-8"))
+    }
+    for page in PAGES:
+        for span in spans(page):
+            if span.startswith("-"):
+                for option in re.findall(r"(?<!\S)--?[a-zA-Z][\w-]*", span):
+                    assert option in known | own, f"{page}: {span}"
+
+
+def options_of(parser) -> set[str]:
+    """All options of a parser and its sub-commands."""
+    found: set[str] = set()
+    for action in parser._actions:
+        found.update(action.option_strings)
+        if hasattr(action, "choices") and isinstance(action.choices, dict):
+            for subparser in action.choices.values():
+                found |= options_of(subparser)
+    return found
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_linked_files_exist(page):
+    text = _FENCE.sub("", PAGES[page])
+    absent = []
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if "://" in target:
+            continue
+        name, _, anchor = target.partition("#")
+        file = ((ROOT / page).parent / name) if name else ROOT / page
+        if not file.exists():
+            absent.append(target)
+        elif anchor:
+            headings = re.findall(r"^#+ (.*)$", file.read_text(encoding="utf-8"), re.M)
+            assert anchor in {slug(heading) for heading in headings}, target
+    # a picture that is made together with figures, while these are still to be measured
+    empty = re.findall(r"<!-- begin (\S+) -->\s*<!-- end \1 -->", text)
+    if absent and empty and all(target.endswith(".png") for target in absent):
+        pytest.skip(f"to be measured: {', '.join(empty)}; without {', '.join(absent)} until then")
+    assert not absent
+
+
+def slug(heading: str) -> str:
+    """A heading's anchor, as hosts of Markdown make it."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+
+
+def test_no_code_block_escapes():
+    for page in PAGES:
+        found = _FENCE.findall(PAGES[page])
+        drawn = {""} if page == "ARCHITECTURE.md" else set()
+        assert {language for language, _ in found} <= {"sh", "python", "xml", "json"} | drawn, page
+        assert PAGES[page].count("```") == 2 * len(found), page
+    # test_readme.py runs the first of each
+    assert [len(blocks("README.md", name)) for name in ("python", "xml")] == [1, 1]
+
+
+def test_architecture_names_modules_that_exist():
+    package = ROOT / "mitsuba_diffraction"
+    modules = set(re.findall(r"[\w/]+\.py\b", PAGES["ARCHITECTURE.md"]))
+    assert len(modules) > 5
+    assert {name for name in modules if not (package / name).is_file()} == set()
+
+
+@pytest.mark.parametrize(
+    ("page", "text"),
+    [(page, text) for page in PAGES for text in blocks(page, "xml")],
+    ids=lambda value: value if value in PAGES else "",
+)
+def test_xml_blocks_set_parameters_that_exist(page, text, some_variant):
+    from mitsuba_diffraction.plugin.parameters import NAMES
+
+    root = ElementTree.fromstring(f"<scene>{text}</scene>")
+    for bsdf in root.iterfind(".//bsdf[@type='diffraction']"):
+        named = {child.get("name") for child in bsdf if child.tag != "bsdf"}
+        assert named <= set(NAMES)
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory) -> Path:
+    """A folder with the files that examples name."""
+    folder = tmp_path_factory.mktemp("inputs")
+    x = np.arange(32)
+    rows = np.tile(np.uint8(127 + 127 * np.sin(2 * np.pi * x / 32)), (32, 1))
+    Image.fromarray(rows).save(folder / "scale.png")
+    return folder
+
+
+# the example's smooth heights are far from what its pixel size would resolve
+@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+@pytest.mark.parametrize("page", [p for p in PAGES if p != "README.md" and blocks(p, "python")])
+def test_python_blocks_run(page, inputs, monkeypatch, some_variant):
+    monkeypatch.chdir(inputs)
+    for text in blocks(page, "python"):
+        exec(text, {})
