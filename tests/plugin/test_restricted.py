@@ -18,17 +18,22 @@ PATCH = rough_patch((64, 64), (0.3, 0.3), 0.2)
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
 
 
-@pytest.fixture(scope="module", params=["ensemble", "patch"])
-def table(request):
+def build(coherence):
     return md.DiffractionTable.build(
-        PATCH, coherence_width=18.0, coherence=request.param, crop=(6.0, 5.0), kappa_max=20.0
+        PATCH, coherence_width=18.0, coherence=coherence, crop=(6.0, 5.0), kappa_max=20.0
     )
 
 
-@pytest.fixture
-def saved(table, tmp_path):
-    file = tmp_path / "table.exr"
-    table.save(file)
+@pytest.fixture(scope="module", params=["ensemble", "patch"])
+def table(request):
+    return build(request.param)
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    """A file with one of them: all else is the same for both."""
+    file = tmp_path_factory.mktemp("restricted") / "table.exr"
+    build("ensemble").save(file)
     return str(file)
 
 
@@ -67,7 +72,7 @@ def test_scalar_variants_do_the_same(table):
     assert device.take().count == (~table.covers(x, y, kappa)).sum()
 
 
-def test_a_scene_counts_what_it_looks_up_outside(variant, table, saved):
+def test_a_scene_counts_what_it_looks_up_outside(variant, saved):
     scene = mi.load_dict(
         {
             "type": "scene",
