@@ -18,7 +18,7 @@ from .report import lines_of, plain
 from .scene_options import add_scene_options, scene_parameters
 
 if TYPE_CHECKING:
-    from ..planning.make import Difference, Loaded
+    from ..planning.make import Difference, Fitted, Loaded
     from ..planning.plan import Plan
 
 PATHS, TOLERANCE = 1 << 15, 1e-3
@@ -88,16 +88,7 @@ def run(args: argparse.Namespace) -> int:
     if args.paths > _MOST_PATHS:
         args.parser.error(f"argument --paths: at most {_MOST_PATHS}, got {args.paths}")
 
-    from ..planning.make import (
-        ATTEMPTS,
-        TIGHTER,
-        difference,
-        draft,
-        given_up,
-        look,
-        planned_tables,
-        settled,
-    )
+    from ..planning.make import fitted, look
     from .mitsuba_text import warnings_as_ours
     from .scenes import load_scene, sensor_of
 
@@ -113,26 +104,9 @@ def run(args: argparse.Namespace) -> int:
 
         bar(0, 0, "tracing paths")
         loaded = look(load, sensor, args.paths, timing=True)
-        share = tolerance
-        measured: Difference | None = None
-        for _ in range(ATTEMPTS):
-            bar(0, 0, "building tables")
-            plan = draft(str(args.scene), loaded, tolerance, share)
-            planned, seconds = planned_tables(load, plan, timing=True)
-            plan = settled(plan, planned)
-            if not plan.limits():
-                break
-            measured = difference(loaded, load, plan, sensor, bar)
-            if measured.relative <= tolerance:
-                break
-            share *= TIGHTER
-        else:
-            assert measured is not None
-            say_warning(
-                f"the picture still differs by {measured.relative:.2g}, more than {tolerance:g}: "
-                "no plan suits this scene, its tables stay whole"
-            )
-            plan = given_up(plan)
+        found = fitted(str(args.scene), loaded, load, sensor, tolerance, bar, timing=True)
+        plan, planned, seconds = found.plan, found.planned, found.seconds
+        say_if_unsuited(found)
         bar(0, 0, "timing look-ups")
         report = {
             "scene": str(args.scene),
@@ -140,7 +114,7 @@ def run(args: argparse.Namespace) -> int:
             "paths": loaded.seen.paths,
             "tolerance": tolerance,
             "tables": [_of_table(key, loaded, plan, planned, seconds) for key in plan.tables],
-            **_of_picture(plan, measured),
+            **_of_picture(plan, found.difference),
         }
     loaded.session.close()
     for line in lines_of(report):
@@ -153,6 +127,15 @@ def run(args: argparse.Namespace) -> int:
         plan.save(args.output)
         print(f"{args.output}: for mitsuba-diffraction render {args.scene} --plan {args.output}")
     return 0
+
+
+def say_if_unsuited(found: Fitted) -> None:
+    """Warn of a scene whose picture no plan keeps."""
+    if not found.suits and found.difference is not None:
+        say_warning(
+            f"the picture still differs by {found.difference.relative:.2g}, more than "
+            f"{found.plan.tolerance:g}: no plan suits this scene, its tables stay whole"
+        )
 
 
 def plan_or_json(text: str) -> Path:

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
 from .console import say, say_warning
-from .plan import planning_variant
+from .plan import planning_variant, say_if_unsuited
 from .scenes import sensor_of, set_variant
 
 if TYPE_CHECKING:
     from ..planning.plan import Plan
 
+Tell = Callable[[int, int, str], None]
 #: `--plan` without a file.
 MAKE = Path()
 
@@ -38,7 +39,9 @@ class Planned:
     shares: dict[str, float]
 
 
-def load_by_plan(args: argparse.Namespace, variant: str, load: Callable[[], Any]) -> Planned | None:
+def load_by_plan(
+    args: argparse.Namespace, variant: str, load: Callable[[], Any], tell: Tell
+) -> Planned | None:
     """A scene with the tables of a plan, or None where the variant has no use for one.
 
     Raises
@@ -56,7 +59,7 @@ def load_by_plan(args: argparse.Namespace, variant: str, load: Callable[[], Any]
     from ..planning.make import load_planned, outside_of
 
     try:
-        plan, shares = _plan(args, variant, load)
+        plan, shares = _plan(args, variant, load, tell)
     finally:
         set_variant(variant)
     for mine in plan.tables.values():
@@ -75,10 +78,10 @@ def load_by_plan(args: argparse.Namespace, variant: str, load: Callable[[], Any]
 
 
 def _plan(
-    args: argparse.Namespace, variant: str, load: Callable[[], Any]
+    args: argparse.Namespace, variant: str, load: Callable[[], Any], tell: Tell
 ) -> tuple[Plan, dict[str, float]]:
     """The plan, and the shares of light outside; in the variant that paths are traced in."""
-    from ..planning.make import check_light, draft, look, planned_tables, settled
+    from ..planning.make import check_light, fitted, look
     from ..planning.plan import Plan
 
     def sensor(scene: Any) -> Any:
@@ -90,11 +93,11 @@ def _plan(
     try:
         if given is not None:
             return given, check_light(loaded, given)
-        plan = draft(str(args.scene), loaded, args.plan_tolerance)
+        found = fitted(str(args.scene), loaded, load, sensor, args.plan_tolerance, tell)
     finally:
         loaded.session.close()
-    del loaded  # and with it the whole tables
-    plan = settled(plan, planned_tables(load, plan)[0])
+    say_if_unsuited(found)
+    plan = found.plan
     return plan, {k: t.domain.outside for k, t in plan.tables.items() if t.domain is not None}
 
 

@@ -132,7 +132,7 @@ def _run_one(args: argparse.Namespace) -> int:
             planned = None
             if args.plan is not None:
                 bar(0, 0, "planning")
-                planned = load_by_plan(args, variant, load)
+                planned = load_by_plan(args, variant, load, bar)
             bar(0, spp, "loading")
             scene = load() if planned is None else planned.scene
             sensor = sensor_of(scene, args.sensor)

@@ -277,6 +277,59 @@ def difference(
     )
 
 
+@dataclass(frozen=True)
+class Fitted:
+    """A plan that was tried.
+
+    Attributes
+    ----------
+    plan : the plan; without any restriction where no picture came near enough.
+    planned : its tables by key, as they were last tried.
+    seconds : that they took to build, with `timing`.
+    difference : between the last pictures, or None where nothing could be made smaller.
+    """
+
+    plan: Plan
+    planned: dict[str, DiffractionTable]
+    seconds: dict[str, float]
+    difference: Difference | None
+
+    @property
+    def suits(self) -> bool:
+        """Whether the picture is within the plan's tolerance."""
+        return self.difference is None or self.difference.relative <= self.plan.tolerance
+
+
+def fitted(
+    name: str,
+    loaded: Loaded,
+    load: Load,
+    sensor: Callable[[Any], Any],
+    tolerance: float,
+    tell: Tell,
+    *,
+    timing: bool = False,
+) -> Fitted:
+    """Draft plans, with less and less light outside, until the picture is near enough.
+
+    Orders that cells average may be far apart, as those of gratings are, and a flat surface under
+    one light asks between them: the light outside then says little of the error, so it is measured.
+    """
+    share = tolerance
+    for _ in range(ATTEMPTS):
+        tell(0, 0, "building tables")
+        drafted = draft(name, loaded, tolerance, share)
+        planned, seconds = planned_tables(load, drafted, timing=timing)
+        plan = settled(drafted, planned)
+        if not plan.limits():
+            return Fitted(plan, planned, seconds, None)
+        found = Fitted(plan, planned, seconds, difference(loaded, load, plan, sensor, tell))
+        if found.suits:
+            return found
+        share *= TIGHTER
+    return replace(found, plan=given_up(plan))
+
+
 def _picture(scene: Any, sensor: Any) -> tuple[NDArray[np.float64], bool]:
     """A small picture (height, width, channels), and whether it is in XYZ."""
     film = sensor.film()

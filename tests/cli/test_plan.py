@@ -107,6 +107,29 @@ def test_a_planned_picture_is_the_whole_one(run, folder, planned, variant):
     assert pictures[1] == pytest.approx(pictures[0], rel=0.01)
 
 
+def test_a_plan_is_made_and_tried_before_rendering(run, folder, planned):
+    _, report = planned
+    out = folder / "made.exr"
+    ran = run("render", folder / "foil.xml", "-s", 4, "-o", out, "--plan", *PATHS)
+    assert ran.code == 0
+    now, before = (report["tables"][0][which]["memory_mb"] for which in ("planned", "whole"))
+    assert f"plan: foil has a table of {now:.3g} MB instead of {before:.3g} MB" in ran.err
+
+
+def test_a_picture_that_no_plan_keeps_has_whole_tables(run, folder, planned, monkeypatch):
+    from mitsuba_diffraction.planning import make
+
+    # as between the orders of a grating, where cells have light and the whole table has none
+    far = make.Difference(0.02, 0.5, 2.0, (12, 8), 64)
+    monkeypatch.setattr(make, "difference", lambda *_: far)
+    out = folder / "kept.exr"
+    ran = run("render", folder / "foil.xml", "-s", 4, "-o", out, "--plan", *PATHS)
+    assert ran.code == 0
+    assert "warning: the picture still differs by 0.02, more than 0.001: no plan suits" in ran.err
+    assert "plan: foil keeps its whole table of " in ran.err
+    assert "lay outside" not in ran.err
+
+
 def test_what_lies_outside_is_said(run, folder, planned):
     plan, _ = planned
     out = folder / "sky.exr"
