@@ -65,6 +65,31 @@ def test_the_page_s_reader_finds_the_orders_of_our_tables(examples, tmp_path, ki
         assert np.abs(mirrored - exact).sum() > 3 * allowed
 
 
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-2])
+def test_the_page_s_rules_of_a_look_up_are_ours(examples, tmp_path, tolerance):
+    power, file = examples[0]["power"], str(tmp_path / "table.exr")
+    table = DiffractionTable.build(PATCH, coherence_width=1.8, tolerance=tolerance)
+    table.save(file)
+    document = read_document(file)
+    grid, spacing = document["grid"], np.array(document["spacing"])
+    taps, steps = np.array(grid["taps"]), np.array(grid["steps"])
+    assert tolerance < 1e-2 or any(taps % 2)  # odd and even numbers of taps have their own rule
+    kappa = 30.0
+    for position in (np.array([0.3, -1.6]), np.array([5.7, 2.2])):
+        even, odd = np.floor(position) + 1 - taps / 2, np.floor(position + 0.5) - (taps - 1) / 2
+        first = np.where(taps % 2 == 0, even, odd).astype(int)
+        read = {(0, 0)}
+        for row in range(taps[1]):
+            trim = grid["trims"][row] if grid["trims"] else 0
+            read |= {(first[0] + column, first[1] + row) for column in range(trim, taps[0] - trim)}
+        total = sum(
+            power(file, x, y, kappa) * np.exp(-np.sum((steps * (position - (x, y))) ** 2))
+            for x, y in read
+        )
+        # rounding only: the same coefficients, in double precision on either side
+        assert table.window_sum(*(position * spacing), kappa) == pytest.approx(total, rel=1e-9)
+
+
 def test_our_reader_finds_what_the_page_s_writer_wrote(examples):
     names, printed, file = examples
     table = DiffractionTable.load(file)
