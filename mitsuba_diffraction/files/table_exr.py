@@ -98,7 +98,7 @@ def _document(table: DiffractionTable) -> dict[str, Any]:
         **{name: getattr(table, name) for name in _PLAIN},
         "expansion": _given(table.expansion),
         "grid": _given(table.grid),
-        "order_0": table.order_0.astype(float).tolist(),
+        "order_0": table.order_0.tolist(),
     }
     if table.crop is not None:
         document["crop"] = table.crop
@@ -133,7 +133,7 @@ def _table(path: str | os.PathLike[str], document: dict[str, Any], part: int) ->
     grid = Grid(**{k: _tuple(v) for k, v in dict(document["grid"]).items()})
     if grid.trims and len(grid.trims) != grid.taps[1]:
         raise ValueError(f"{len(grid.trims)} trims of {grid.taps[1]} rows")
-    order_0 = np.array(document["order_0"], np.float32)
+    order_0 = np.array(document["order_0"], float)
     plain = {name: _tuple(document[name]) for name in _PLAIN}
     coefficients = _read_coefficients(path, expansion, grid, part)
     expected = (expansion.intervals, coefficients.shape[3], expansion.series_terms)

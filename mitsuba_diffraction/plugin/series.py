@@ -32,7 +32,7 @@ class Recurrence:
     def __init__(self, table: DiffractionTable) -> None:
         self._expansion = table.expansion
         self._terms = padded(table.expansion.terms)
-        self._order_0 = upload(mi.Float, pad(table.order_0, self._terms))
+        self._order_0 = upload(mi.Float, pad(table.order_0.astype(np.float32), self._terms))
         self._components = table.order_0.shape[1]
 
     def at(self, kappa: Any) -> tuple[Any, list[Any], list[Any]]:

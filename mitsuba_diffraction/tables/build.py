@@ -37,7 +37,7 @@ TRIMMED_SHARE = 0.8
 #: Half floats (rounding 2⁻¹², a few of them added) are tried from this tolerance on.
 HALF_FROM = 7e-4
 #: Below it single precision transforms would spend a share of the tolerance themselves.
-DOUBLE_BELOW = 3e-5
+DOUBLE_BELOW = 2e-4
 
 _ATTEMPTS = 8
 _SUBNORMAL, _ROUNDS = np.float32(2.0**-14), np.float32(0.75)
@@ -219,7 +219,7 @@ def _coefficients(
     expansion: Expansion,
     functions: int | None,
     done: Callable[[int], None],
-) -> tuple[NDArray[np.float32], NDArray[np.float32], Expansion]:
+) -> tuple[NDArray[np.float32], NDArray[np.float64], Expansion]:
     """Series coefficients of every bin, (intervals, ny, nx, components, terms), and of order 0.
 
     functions : how many functions of basis "svd" the Chebyshev series is made into, if it is; the
@@ -230,7 +230,7 @@ def _coefficients(
     components = 1 if expansion.kind == "power" else 2
     terms = functions or expansion.terms
     result = np.empty((expansion.intervals, ny, nx, components, terms), np.float32)
-    order_0 = np.empty((expansion.intervals, components, expansion.terms), np.float32)
+    order_0 = np.empty((expansion.intervals, components, expansion.terms))
     if expansion.basis == "taylor":
         inner = _inner(spectra[0], grid)
         for n in range(1, expansion.terms + 1):
@@ -249,12 +249,12 @@ def _coefficients(
     near = _near(grid, components)
     found = []
     for interval in range(expansion.intervals):
+        powers = []
         for n, kappa in enumerate(expansion.nodes(interval)):
-            _values_at(kappa, spectra, grid, expansion, interval, values[n])
+            powers.append(_values_at(kappa, spectra, grid, expansion, interval, values[n]))
             done(interval * expansion.terms + n + 1)
         fit = expansion.fit(interval)
-        order_0[interval] = values[:, *centre].T @ fit
-        values[:, *centre] = 0.0
+        order_0[interval] = np.transpose(powers) @ fit
         if functions is not None:
             fit, series = principal_functions(flat, expansion, interval, functions, near)
             found.append(series)
@@ -282,25 +282,36 @@ def _values_at(
     expansion: Expansion,
     interval: int,
     values: NDArray[np.float32],
-) -> None:
-    """What is expanded, of all bins (ny, nx, components) at one κ, written to `values`."""
+) -> list[float]:
+    """What is expanded, of all bins (ny, nx, components) at one κ, written to `values`.
+
+    Returns
+    -------
+    that of order 0, whose bin is left empty: a grating may put it out nearly altogether, so that it
+    takes double precision.
+    """
     centre = (grid.last[1], grid.last[0])
     specular = float(expansion.specular(interval))
     values[...] = 0.0
-    # The transform is of exp(iκh) − 1, so what is left of order 0 here is a_0 − 1
+    order_0 = np.zeros(values.shape[-1])
     for spectrum in spectra:
+        # The transform is of exp(iκh) − 1, so this is a_0 − 1
         amplitude = spectrum.of_phase(kappa, minus_one=True)[_inner(spectrum, grid)]
+        less = complex(amplitude[centre])
+        amplitude[centre] = 0.0
         if expansion.kind == "power":
             values[..., 0] += amplitude.real**2
             values[..., 0] += amplitude.imag**2
-            values[*centre, 0] += 2.0 * amplitude[centre].real + 1.0 - specular
+            # |a_0|² − 1 without cancellation as κ → 0, or |a_0|² without it where that vanishes
+            order_0 += abs(less) ** 2 + 2.0 * less.real if specular else abs(1.0 + less) ** 2
         else:
-            amplitude[centre] += 1.0 - specular
             if grid.coherent:
                 alternate(amplitude, grid.last)
             values[..., 0], values[..., 1] = amplitude.real, amplitude.imag
+            order_0 += less.real + 1.0 - specular, less.imag
     if len(spectra) > 1:
         values /= len(spectra)
+    return list(order_0 / len(spectra))
 
 
 def _inner(spectrum: Spectrum, grid: Grid) -> tuple[slice, slice]:

@@ -127,7 +127,7 @@ def _coefficients(
     functions: int | None,
     each: tuple[int, int],
     tell: Progress,
-) -> tuple[NDArray[np.float32], NDArray[np.float32], Expansion]:
+) -> tuple[NDArray[np.float32], NDArray[np.float64], Expansion]:
     """Series coefficients of the cells' power (intervals, ny, nx, 1, terms), and of order 0.
 
     functions : how many functions of basis "svd" the Chebyshev series is made into, if it is; the
@@ -139,7 +139,7 @@ def _coefficients(
     terms = functions or expansion.terms
     coefficients = np.empty((expansion.intervals, ny, nx, 1, terms), np.float32)
     found = []
-    order_0 = np.empty((expansion.intervals, 1, expansion.terms), np.float32)
+    order_0 = np.empty((expansion.intervals, 1, expansion.terms))
     total = expansion.intervals * expansion.terms
     for interval in range(expansion.intervals):
         cells = np.zeros((expansion.terms, ny, nx), np.float32)

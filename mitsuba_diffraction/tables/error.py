@@ -128,7 +128,7 @@ class ErrorMeter:
     def series(
         self,
         coefficients: NDArray[np.floating],
-        order_0: NDArray[np.float32],
+        order_0: NDArray[np.float64],
         kappas: NDArray[np.float64],
         scale: float = 1.0,
     ) -> Iterator[Parts]:

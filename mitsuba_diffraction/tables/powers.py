@@ -65,7 +65,7 @@ def power_series(
     table.require_whole("a list of powers is made of")
     old = table.expansion
     if old.kind == "power":
-        order_0 = table.order_0[:, 0].astype(np.float64)
+        order_0 = table.order_0[:, 0]
         return table.coefficients[:, :, :, 0], order_0, table.scale, old
     new = power_expansion(table)
     found = powers_of(table.coefficients.astype(np.float32), old, new)

@@ -32,7 +32,7 @@ class DiffractionTable:
     coefficients : (intervals, ny, nx, components, terms) float32 or float16; one component for a
         power, two (real, imaginary) for an amplitude; divided by `scale` before use. Bin (0, 0)
         is in the middle of (ny, nx), and zero.
-    order_0 : (intervals, components, expansion.series_terms) float32, the series of that bin; not
+    order_0 : (intervals, components, expansion.series_terms) float64, the series of that bin; not
         scaled.
     scale : what the coefficients were multiplied with, to suit half floats.
     expansion : which series in κ.
@@ -46,7 +46,7 @@ class DiffractionTable:
     """
 
     coefficients: NDArray[np.floating]
-    order_0: NDArray[np.float32]
+    order_0: NDArray[np.float64]
     scale: float
     expansion: Expansion
     grid: Grid
@@ -194,7 +194,7 @@ class DiffractionTable:
         interval = self.expansion.interval(kappa)
         parts: NDArray[np.float64] = np.einsum(
             "...pt,...t->...p",
-            self.order_0[interval].astype(float),
+            self.order_0[interval],
             self.expansion.series_weights(kappa),
         )
         parts[..., 0] += self.expansion.specular(interval)

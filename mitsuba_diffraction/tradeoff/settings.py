@@ -39,7 +39,7 @@ _ANY = 0.999
 def settings(quick: bool) -> Iterator[Setting]:
     """All tables that are tried, the defaults first."""
     yield Setting("default", "the defaults")
-    tolerances = (1e-2, 1e-4) if quick else (1e-2, 1e-4, 1e-5)
+    tolerances = (1e-2, 1e-4) if quick else (1e-2, 1e-4, 1e-5, 1e-6)
     for tolerance in tolerances:
         yield Setting("tolerance", f"tolerance {tolerance:.0e}", {"tolerance": tolerance})
     for basis in ("chebyshev", "taylor"):

@@ -31,7 +31,7 @@ def power_table(table: DiffractionTable) -> DiffractionTable:
     return dataclasses.replace(
         table,
         coefficients=series[:, :, :, None],
-        order_0=order_0[:, None].astype(np.float32),
+        order_0=order_0[:, None],
         scale=scale,
         expansion=expansion,
     )
