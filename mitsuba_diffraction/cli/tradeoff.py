@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..tradeoff.wavelengths import Spectral
 
 #: Pixels of the default patch, pairs of directions, calls at once, timed rounds, depths.
-_FULL, _QUICK = (1332, 400, 1 << 19, 11, 18), (400, 160, 1 << 17, 5, 9)
+_FULL, _QUICK = (1332, 240, 1 << 19, 7, 14), (400, 160, 1 << 17, 5, 9)
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -28,7 +28,7 @@ from .program import add_measured, exit_code, measured_patch
 
 #: What each method leaves out.
 APPROXIMATES = {
-    "default": "only its tolerance: short Chebyshev series in κ, summed 5 nm apart",
+    "default": "only its tolerance: short series in κ, summed 5 nm apart",
     "flss": "the spectrum by samples 5 nm apart; Taylor series, which shallow surfaces allow",
     "nmm": "the spectrum by the wavelengths that one period sends to the eye, all of one weight; "
     "white around the mirror direction",
