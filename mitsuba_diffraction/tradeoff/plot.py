@@ -41,8 +41,10 @@ def draw_trade(results: Sequence[Measured], path: Path, title: str) -> None:
         "default", (default.relative, default.error), (12, 10), textcoords="offset points",
         fontsize=8, arrowprops={"arrowstyle": "-", "lw": 0.6},
     )  # fmt: skip
+    axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_xlim(left=0.0)
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter("{x:g}")
     axes.set_xlabel("time of eval (roughconductor, Al = 1)")
     axes.set_ylabel("relative error of the diffracted power")
     axes.set_title(f"{title}; area of a mark: memory", fontsize=9)

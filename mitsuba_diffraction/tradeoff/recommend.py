@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from ..errors import DiffractionError
 from .measure import Measured
 
+_ALIKE = 1.1  # times differ by as much from one run to the next
+
 
 @dataclass(frozen=True)
 class Budget:
@@ -38,6 +40,8 @@ class Budget:
 def recommended(results: Sequence[Measured], budget: Budget) -> Measured:
     """The fastest setting that is exact enough; without a tolerance, the most exact one.
 
+    Of settings that are about as fast the smallest is taken.
+
     Only settings that compute the same thing (coherence `ensemble`) and that a user can ask for
     compete.
 
@@ -66,4 +70,6 @@ def recommended(results: Sequence[Measured], budget: Budget) -> Measured:
         )
     if budget.tolerance is None:
         return min(within, key=lambda one: one.error)
-    return min(within, key=lambda one: one.relative)
+    fastest = min(one.relative for one in within)
+    as_fast = [one for one in within if one.relative <= _ALIKE * fastest]
+    return min(as_fast, key=lambda one: one.megabytes)
