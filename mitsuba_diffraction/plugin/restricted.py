@@ -67,9 +67,14 @@ class RestrictedTable:
 
         def beyond(qx: Any, qy: Any, kappa: Any, result: Any) -> Any:
             far = dr.detach(dr.square(qx) + dr.square(qy))
-            dr.scatter_reduce(dr.ReduceOp.Add, self._count, mi.UInt32(1), mi.UInt32(0))
-            dr.scatter_reduce(dr.ReduceOp.Max, self._farthest, far, mi.UInt32(0))
-            dr.scatter_reduce(dr.ReduceOp.Max, self._deepest, dr.detach(kappa), mi.UInt32(0))
+            # Not a copy of the counters a thread, as Dr.Jit would choose for small arrays: a frozen
+            # function that is called again brings counters without them
+            direct = dr.ReduceMode.Direct
+            dr.scatter_reduce(dr.ReduceOp.Add, self._count, mi.UInt32(1), mi.UInt32(0), mode=direct)
+            dr.scatter_reduce(dr.ReduceOp.Max, self._farthest, far, mi.UInt32(0), mode=direct)
+            dr.scatter_reduce(
+                dr.ReduceOp.Max, self._deepest, dr.detach(kappa), mi.UInt32(0), mode=direct
+            )
             return self.coarse.window_sum(qx, qy, kappa)
 
         # Rare, so branched to: a kernel skips what none of its lanes needs

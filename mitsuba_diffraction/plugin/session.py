@@ -100,8 +100,9 @@ class Session:
         """Keep what a BSDF was asked and what it answered; for the BSDF to call."""
         lane = mi.UInt32(si.time)
         columns = (uv.x, uv.y, scaled_w, *value)
-        lit = dr.any(value > 0.0)
-        for buffer, column in zip(self._buffers[bsdf], columns, strict=True):
+        buffers = self._buffers[bsdf]
+        lit = dr.any(value > 0.0) & (lane < dr.width(buffers[0]))
+        for buffer, column in zip(buffers, columns, strict=True):
             dr.scatter(buffer, mi.Float(column), lane, lit)
 
     def heard(self) -> list[Recorded]:
