@@ -64,4 +64,6 @@ def read_npy(path: Path) -> RawHeights:
             f"{shown} is not a readable NPY file: {first_line(error)}"
         ) from error
     values = values.reshape(shape, order="F" if fortran_order else "C")
-    return RawHeights(values.astype(np.float64))
+    # signalling NaNs, as damage makes them; what is no number is looked for later
+    with np.errstate(invalid="ignore"):
+        return RawHeights(values.astype(np.float64))

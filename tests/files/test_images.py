@@ -170,6 +170,15 @@ HEADS = [
 ]  # fmt: skip
 
 
+def test_signalling_not_a_numbers_are_one_clear_line(tmp_path):
+    heights = np.zeros((4, 4), np.float32)
+    heights.view(np.uint32)[1, 2] = 0x7FA00000  # converting it raises the flag of an invalid value
+    np.save(tmp_path / "a.npy", heights)
+    with pytest.raises(DiffractionError) as caught:
+        HeightField.load(tmp_path / "a.npy", pixel_size=0.1)
+    assert "\n" not in str(caught.value)
+
+
 @settings(
     max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
