@@ -17,6 +17,7 @@ from ..reference import check_coherence
 from .checks import check_parameters, check_patches, check_size, check_taylor, restricted
 from .choose import (
     MAX_INTERVALS,
+    PACKET,
     chebyshev_expansion,
     svd_expansion,
     taylor_expansion,
@@ -132,6 +133,8 @@ def build_table(
             chosen_taps = (chosen_taps[0] + 1, chosen_taps[1] + 1)
         elif half:
             half = False
+        elif functions is not None and terms is None and functions < PACKET:
+            functions = PACKET  # a cut-out looked simpler than the whole patch
         else:
             expansion = _extended(expansion, functions, terms, attempt.error(), tolerance)
         found = attempt.error()
