@@ -7,14 +7,13 @@ python -m mitsuba_diffraction.figures.plan out/plan.json -o README.md docs/plan.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionError
 from . import markers
+from .program import add_pages, exit_code, from_json
 
 _PICTURE = "picture, planned against whole, same random numbers"
 
@@ -66,25 +65,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Replace the figures, and return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m mitsuba_diffraction.figures.plan")
     parser.add_argument("report", metavar="PLAN.json", type=Path, help="from plan --json")
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", type=Path, nargs="+",
-        default=[Path("README.md"), Path("docs/plan.md")],
-        help="pages, each with some of the markers; default: README.md docs/plan.md",
-    )  # fmt: skip
+    add_pages(parser, "README.md", "docs/plan.md")
     args = parser.parse_args(argv)
-    try:
-        try:
-            found = tables(json.loads(args.report.read_text(encoding="utf-8")))
-        except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
-            raise DiffractionError(
-                f"'{args.report}' is not what plan --json writes ({error}); run make plan"
-            ) from error
+
+    def work() -> None:
+        found = from_json(args.report, tables, writer="plan --json", remedy="run make plan")
         for page in args.output:
             markers.update_present(page, found)
-    except DiffractionError as error:
-        print(f"plan: error: {error}", file=sys.stderr)
-        return 1
-    return 0
+
+    return exit_code("plan", work)
 
 
 if __name__ == "__main__":

@@ -1,13 +1,18 @@
-"""What the programs of this folder have in common: a measured patch, and errors in one line."""
+"""What the programs of this folder share: a measured patch, measurements, errors in one line."""
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
 
 from ..errors import DiffractionError
 from ..heightfield import HeightField
+
+Made = TypeVar("Made")
 
 
 def add_measured(parser: argparse.ArgumentParser, what: str) -> None:
@@ -28,6 +33,35 @@ def measured_patch(args: argparse.Namespace) -> HeightField | None:
     if args.measured is None:
         return None
     return HeightField.load(args.measured, pixel_size=args.pixel_size, max_height=args.max_height)
+
+
+def add_pages(parser: argparse.ArgumentParser, *defaults: str) -> None:
+    """Declare -o, the pages that are updated."""
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", type=Path, nargs="+", default=[Path(p) for p in defaults],
+        help=f"pages, each with some of the markers; default: {' '.join(defaults)}",
+    )  # fmt: skip
+
+
+def from_json(file: Path, make: Callable[[Any], Made], *, writer: str, remedy: str) -> Made:
+    """What `make` makes of a measurement in JSON.
+
+    Parameters
+    ----------
+    make : takes the document; what it misses there shows that this is another file.
+    writer, remedy : the command that writes such files, and what to do if this is none.
+
+    Raises
+    ------
+    DiffractionError
+        If the file is missing or something else.
+    """
+    try:
+        return make(json.loads(file.read_text(encoding="utf-8")))
+    except (OSError, ValueError, LookupError, TypeError, StopIteration) as error:
+        raise DiffractionError(
+            f"'{file}' is not what {writer} writes ({error}); {remedy}"
+        ) from error
 
 
 def exit_code(name: str, work: Callable[[], None]) -> int:

@@ -8,16 +8,15 @@ python -m mitsuba_diffraction.figures.realtime out/compare/snake out/compare/pla
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from ..comparison.table import markdown, scenes_table
-from ..errors import DiffractionError
 from . import markers
 from .jpeg import write_jpeg
-from .program import exit_code
+from .program import exit_code, from_json
 
 #: Beside the README; the sheet that it shows is that of the default method.
 SHEET = Path("docs", "images", "realtime.jpg")
@@ -45,18 +44,19 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _tables(files: Sequence[Path]) -> str:
-    documents = []
-    for file in files:
-        try:
-            document = json.loads(file.read_text(encoding="utf-8"))
-            markdown(document), scenes_table([document])  # what is missing is missed here
-        except (OSError, ValueError, KeyError, TypeError, StopIteration) as error:
-            raise DiffractionError(
-                f"'{file}' is not what compare writes ({error}); run compare with the methods lut "
-                "and spectral, or all"
-            ) from error
-        documents.append(document)
+    documents = [
+        from_json(
+            file, _complete, writer="compare",
+            remedy="run compare with the methods lut and spectral, or all",
+        )
+        for file in files
+    ]  # fmt: skip
     return f"{scenes_table(documents)}\n\n{markdown(documents[0])}"
+
+
+def _complete(document: dict[str, Any]) -> dict[str, Any]:
+    markdown(document), scenes_table([document])  # what is missing is missed here
+    return document
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ python -m mitsuba_diffraction.figures.speed out/bench.json -o README.md
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from typing import Any
 
 from ..errors import DiffractionError
 from . import markers
-from .program import exit_code
+from .program import exit_code, from_json
 
 
 @dataclass(frozen=True)
@@ -121,13 +120,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = parser.parse_args(argv)
 
     def work() -> None:
-        try:
-            measured = json.loads(args.measured.read_text(encoding="utf-8"))
-            text = table(measured)
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise DiffractionError(
-                f"'{args.measured}' is not what bench --json writes ({error}); run make bench"
-            ) from error
+        text = from_json(args.measured, table, writer="bench --json", remedy="run make bench")
         markers.update(args.output, {"speed": text})
 
     return exit_code("speed", work)

@@ -7,16 +7,15 @@ python -m mitsuba_diffraction.figures.tradeoff out/tradeoff -o README.md docs/ac
 from __future__ import annotations
 
 import argparse
-import json
 import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionError
 from ..files.atomic import atomic_path
 from . import markers
+from .program import add_pages, exit_code, from_json
 
 #: What the README shows: groups, in this order.
 SHORT = ("default", "tolerance", "basis")
@@ -77,30 +76,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Replace the tables and copy the plots, and return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m mitsuba_diffraction.figures.tradeoff")
     parser.add_argument("measured", metavar="FOLDER", type=Path, help="from tradeoff -o")
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", type=Path, nargs="+",
-        default=[Path("README.md"), Path("docs/accuracy.md")],
-        help="pages, each with some of the markers; default: README.md docs/accuracy.md",
-    )  # fmt: skip
+    add_pages(parser, "README.md", "docs/accuracy.md")
     parser.add_argument("--images", metavar="FOLDER", type=Path, default=Path("docs/images"))
     args = parser.parse_args(argv)
-    try:
+
+    def work() -> None:
         file = args.measured / "tradeoff.json"
-        try:
-            found = tables(json.loads(file.read_text(encoding="utf-8")))
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise DiffractionError(
-                f"'{file}' is not what tradeoff writes ({error}); run make tradeoff"
-            ) from error
+        found = from_json(file, tables, writer="tradeoff", remedy="run make tradeoff")
         for page in args.output:
             markers.update_present(page, found)
-        for name, target in (("tradeoff.png", "tradeoff.png"), ("depth.png", "depth.png")):
-            with atomic_path(args.images / target) as temporary:
+        for name in ("tradeoff.png", "depth.png"):
+            with atomic_path(args.images / name) as temporary:
                 shutil.copyfile(args.measured / name, temporary)
-    except DiffractionError as error:
-        print(f"tradeoff: error: {error}", file=sys.stderr)
-        return 1
-    return 0
+
+    return exit_code("tradeoff", work)
 
 
 if __name__ == "__main__":
