@@ -149,7 +149,7 @@ class Diffraction(mi.BSDF):
         self.orientation = parameters.orientation
         self.layering = parameters.layering
         self.vcavity = parameters.vcavity
-        self._light = variant_light(self.table, parameters.wavelength)
+        self.light = variant_light(self.table, parameters.wavelength)
         self._energy = EnergyBound(self.table) if parameters.energy_conserving else None
         self._record = enrol(self, props.id())
         self._area_factor = 4.0 * dr.pi * self.table.sigma**2  # 4π²σ⁴ over the window's area πσ²
@@ -179,7 +179,7 @@ class Diffraction(mi.BSDF):
     def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
         """Density of `sample` per solid angle."""
         active = self._above(si, wo, active)
-        density = self._density(si, wo, active)
+        density = self.density(si, wo, active)
         if self.nested is not None:
             beneath = self.nested.pdf(ctx, si, wo, active)
             density = dr.lerp(beneath, density, self._glossy_share(si, active))
@@ -210,7 +210,7 @@ class Diffraction(mi.BSDF):
                 glossy, mi.UInt32(+mi.BSDFFlags.GlossyReflection), result.sampled_type
             )
             result.sampled_component = dr.select(glossy, 0, result.sampled_component)
-        drawn = self._draw(si, sample1, sample2, active)
+        drawn = self.draw(si, sample1, sample2, active)
         result.wo = dr.select(glossy, drawn, result.wo)
         value, density = self.eval_pdf(ctx, si, result.wo, active)
         active &= density > 0.0
@@ -239,7 +239,7 @@ class Diffraction(mi.BSDF):
         dr.make_opaque(self.height_scale)
         self.orientation.update()
         self.surface.update()
-        held = arrays_within(self._light, self._energy, self.orientation, self.surface)
+        held = arrays_within(self.light, self._energy, self.orientation, self.surface)
         self._for_freezing = held + marks(self.table, self.vcavity, str(self.layering))
 
     @property
@@ -281,7 +281,7 @@ class Diffraction(mi.BSDF):
         cos_i = dr.select(active, mi.Frame3f.cos_theta(si.wi), 1.0)
         outside = self._area_factor * dr.square(one_plus_dot / w) / cos_i
         scaled_w = w * self.height_scale
-        power = self._light.power(uv, scaled_w, si)
+        power = self.light.power(uv, scaled_w, si)
         if self._energy is not None:
             incident, outgoing = _in_patch(si.wi, rotation), _in_patch(wo, rotation)
             outside /= self._energy.divisor(incident, cos_i, outgoing, w - cos_i, self.height_scale)
@@ -295,10 +295,10 @@ class Diffraction(mi.BSDF):
             session.hear(number, si, uv, scaled_w, mi.unpolarized_spectrum(value))
         return value
 
-    def _density(self, si: Any, wo: Any, active: Any) -> Any:
-        """Density of `_draw`: that of the orders, and a little cosine."""
+    def density(self, si: Any, wo: Any, active: Any) -> Any:
+        """Density of `draw`: that of the orders, and a little cosine."""
         rotation = self.orientation.rotation(si, active)
-        orders = self._light.density(
+        orders = self.light.density(
             _in_patch(si.wi + wo, rotation),
             _in_patch(mi.Vector2f(si.wi.x, si.wi.y) + unfolded(wo), rotation),
             mi.Frame3f.cos_theta(si.wi),
@@ -308,9 +308,9 @@ class Diffraction(mi.BSDF):
         )
         return dr.lerp(orders, mi.warp.square_to_cosine_hemisphere_pdf(wo), COSINE)
 
-    def _draw(self, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
+    def draw(self, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
         """A direction, possibly below the surface (then it has no density and no value)."""
-        uv = self._light.draw(
+        uv = self.light.draw(
             mi.Frame3f.cos_theta(si.wi),
             dr.detach(self.height_scale),
             dr.maximum((sample1 - COSINE) * (1.0 / (1.0 - COSINE)), 0.0),

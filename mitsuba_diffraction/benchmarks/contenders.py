@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,12 +11,11 @@ import drjit as dr
 import mitsuba as mi
 
 from .. import gratings
-from ..errors import DiffractionWarning
 from ..heightfield import HeightField
 from ..plugin.lookup import DeviceTable, device_table
 from ..tables.table import DiffractionTable
-from .documents import TermImages
 from .plan import PIXEL, SEED, Plan
+from .saved import documents_bsdf, saved_bsdf
 
 ALUMINIUM = "roughconductor, Al"
 DEFAULT = "diffraction, the defaults"
@@ -38,12 +36,7 @@ class Tables:
 
     def bsdf(self, name: str, **parameters: Any) -> Any:
         """The plugin with one of the tables, in the current variant."""
-        with warnings.catch_warnings():
-            # the patch is there to be looked up, no matter how far the model holds for it
-            warnings.simplefilter("ignore", DiffractionWarning)
-            return mi.load_dict(
-                {"type": "diffraction", "table": str(self.paths[name]), **parameters}
-            )
+        return saved_bsdf(self.paths[name], **parameters)
 
     def load(self, name: str) -> DiffractionTable:
         """One of the tables."""
@@ -88,11 +81,6 @@ def bsdf_makers(tables: Tables) -> dict[str, Callable[[], Any]]:
     def ours(table: str, **parameters: Any) -> Callable[[], Any]:
         return lambda: tables.bsdf(table, **parameters)
 
-    def documents() -> Any:
-        bsdf = tables.bsdf("documents")
-        bsdf._light._device = TermImages(bsdf.table)
-        return bsdf
-
     return {
         ALUMINIUM: rough("Al"),
         "roughconductor, none": rough("none"),
@@ -108,7 +96,7 @@ def bsdf_makers(tables: Tables) -> dict[str, Callable[[], Any]]:
         COARSE: ours("1e-2"),
         "diffraction, tolerance 1e-4": ours("1e-4"),
         "diffraction, patch": ours("patch"),
-        DOCUMENTS: documents,
+        DOCUMENTS: lambda: documents_bsdf(tables.paths["documents"]),
         TAYLOR: ours("documents"),
     }
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import statistics
-import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -13,12 +12,12 @@ from typing import Any
 import mitsuba as mi
 
 from .. import gratings
-from ..errors import DiffractionWarning
 from ..tables.table import DiffractionTable
 from .contenders import DEFAULT, Queries, Tables, bsdf_makers
 from .figures import Row, Section
 from .plan import PIXEL, Plan
 from .rendering import ball_scene, render_seconds
+from .saved import saved_bsdf
 from .timing import kernel_seconds, ratio, rounds_of
 
 #: Numbers of one order that are tried, at a tolerance that all of them meet in enough intervals.
@@ -44,11 +43,7 @@ def measure_lookups(plan: Plan, folder: Path, progress: Progress) -> Section:
     for n, (name, table) in enumerate(tables.items()):
         file = folder / f"scaling-{n}.exr"
         table.save(file)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DiffractionWarning)
-            bsdf = mi.load_dict(
-                {"type": "diffraction", "table": str(file), "energy_conserving": False}
-            )
+        bsdf = saved_bsdf(file, energy_conserving=False)
         calls[name] = partial(kernel_seconds, partial(bsdf.eval, context, queries.si, queries.wo))
     taken = rounds_of(calls, plan.rounds, lambda done, total: progress(done, total, "scaling"))
     first = next(iter(taken.values()))

@@ -103,8 +103,8 @@ def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progr
 
 def draws_by_cosine(bsdf: Any) -> Any:
     """The same plugin, whose directions are drawn from the cosine lobe alone."""
-    bsdf._draw = lambda si, sample1, sample2, active: mi.warp.square_to_cosine_hemisphere(sample2)
-    bsdf._density = lambda si, wo, active: mi.warp.square_to_cosine_hemisphere_pdf(wo)
+    bsdf.draw = lambda si, sample1, sample2, active: mi.warp.square_to_cosine_hemisphere(sample2)
+    bsdf.density = lambda si, wo, active: mi.warp.square_to_cosine_hemisphere_pdf(wo)
     return bsdf
 
 

@@ -25,10 +25,14 @@ class Wavelengths:
     ----------
     table : the diffraction table.
     wavelength : nm, for mono variants.
+
+    Attributes
+    ----------
+    device : the table in the variant's memory.
     """
 
     def __init__(self, table: DiffractionTable, wavelength: float) -> None:
-        self._device = device_table(table)
+        self.device = device_table(table)
         self._sampler = order_sampler(table)
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
@@ -42,7 +46,7 @@ class Wavelengths:
 
         def of_wavelength(wavelength: Any) -> Any:
             k = dr.rcp(wavelength) * (2e3 * dr.pi)
-            power = self._device.window_sum(k * uv.x, k * uv.y, k * scaled_w)
+            power = self.device.window_sum(k * uv.x, k * uv.y, k * scaled_w)
             return power * dr.square(k * (0.5 / dr.pi))
 
         wavelengths = self._wavelengths(si)

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import tempfile
 import time
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionWarning
 from ..heightfield import HeightField
 from ..maps.light import Light
 from ..methods import FullSpectrum, make
@@ -73,7 +71,7 @@ def time_compiled(
     """
     import mitsuba as mi
 
-    from ..benchmarks.documents import TermImages
+    from ..benchmarks.saved import documents_bsdf, saved_bsdf
 
     common: dict[str, Any] = {
         "coherence_width": coherence_width, "tolerance": tolerance, "wavelength_range": _RANGE,
@@ -102,25 +100,8 @@ def time_compiled(
         assert isinstance(full, FullSpectrum)
         full.table.save(flss)
         mi.set_variant(f"{backend}_ad_rgb")
-        best = seconds({"colours": _bsdf(own)})
+        raw: dict[str, Any] = {"material": "none", "energy_conserving": False}
+        best = seconds({"colours": saved_bsdf(own, **raw)})
         mi.set_variant(f"{backend}_ad_spectral")
-        bsdfs = {"spectral": _bsdf(own), "flss": _bsdf(flss)}
-        bsdfs["flss"]._light._device = TermImages(full.table)
-        best |= seconds(bsdfs)
+        best |= seconds({"spectral": saved_bsdf(own, **raw), "flss": documents_bsdf(flss, **raw)})
     return Compiled(best["spectral"], best["colours"], best["flss"])
-
-
-def _bsdf(file: Path) -> Any:
-    import mitsuba as mi
-
-    with warnings.catch_warnings():
-        # said when the table was built
-        warnings.simplefilter("ignore", DiffractionWarning)
-        return mi.load_dict(
-            {
-                "type": "diffraction",
-                "table": str(file),
-                "material": "none",
-                "energy_conserving": False,
-            }
-        )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..benchmarks.contenders import Queries
+from ..benchmarks.saved import saved_bsdf
 from ..benchmarks.timing import kernel_seconds, ratio, rounds_of
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionError
 from ..heightfield import HeightField
 from ..tables.loss import power_loss
 from ..tables.table import DiffractionTable, reach_of
@@ -120,11 +120,7 @@ def measure(
         seconds = time.perf_counter() - start
         file = folder / f"{n}.exr"
         table.save(file)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DiffractionWarning)
-            bsdf = mi.load_dict(
-                {"type": "diffraction", "table": str(file), "energy_conserving": False}
-            )
+        bsdf = saved_bsdf(file, energy_conserving=False)
         calls[setting.name] = partial(bsdf.eval, context, queries.si, queries.wo)
         sample = samples[mode]
         loss = power_loss(finest[mode], table)
@@ -167,7 +163,7 @@ def _by_plugin(bsdf: Any, sample: Sample) -> NDArray[np.float64]:
     """The window sums (n,) that the plugin finds, all in single precision."""
     k = 2e3 * np.pi / sample.wavelength
     total = mi.Vector3f((sample.wi + sample.wo).T)
-    device = bsdf._light._device
+    device = bsdf.light.device
     wavenumber = mi.Float(k)
     found = device.window_sum(wavenumber * total.x, wavenumber * total.y, wavenumber * total.z)
     return np.array(found, float)
