@@ -7,11 +7,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionError
 from .arguments import number_between, path_ending_in, whole_number
 from .heights_options import add_heights_options, load_options, was_given
+from .light_options import add_direction, add_wavelengths
 from .method_map import add_method_options, refuse_contradictions, run_method
-from .output import check_writable, same_file
+from .output import check_outputs
 from .precompute import BASES, COHERENCES
 from .progress import Bar
 
@@ -60,19 +60,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _add_map_options(group: argparse._ArgumentGroup) -> None:
-    group.add_argument(
-        "--theta", metavar="DEG", type=float, default=0.0,
-        help="angle of the light from the normal, 0 to below 90; default: 0",
-    )  # fmt: skip
-    group.add_argument(
-        "--phi", metavar="DEG", type=float, default=0.0,
-        help="azimuth of the light, from the patch's x axis towards y; default: 0",
-    )  # fmt: skip
-    group.add_argument(
-        "--wavelength-range", metavar=("LOW", "HIGH"), nargs=2, type=float,
-        help="nm; default: 360 830",
-    )  # fmt: skip
-    group.add_argument("--step", metavar="NM", type=float, help="width of bands; default: 5")
+    add_direction(group)
+    add_wavelengths(group, *_FULL_RANGE, filled=False)
     group.add_argument(
         "--wavelength", metavar="NM", type=float, help="one wavelength only, in false colours"
     )
@@ -133,12 +122,7 @@ def run(args: argparse.Namespace) -> int:
     if only_png and args.spectral:
         args.parser.error(f"argument --spectral: bands need an EXR, e.g. -o {output.stem}.exr")
     written = [png] if only_png else [output, png]
-    for path in written:
-        if same_file(path, args.source):
-            raise DiffractionError(
-                f"the map would overwrite its own source '{path}'; name another with -o"
-            )
-        check_writable(path)
+    check_outputs(written, [args.source], "map")
     load_options(args)  # what does not fit is said before Mitsuba is loaded
     if args.method is not None:
         return run_method(args, _map_arguments(args), written)

@@ -11,10 +11,10 @@ from typing import Any
 from ..errors import DiffractionError, DiffractionWarning
 from .arguments import path_ending_in, whole_number
 from .heights_options import add_heights_options
+from .light_options import add_direction, add_wavelengths
 from .method_map import METHODS
-from .output import check_writable, same_file
-from .patch import load_patch
-from .precompute import COHERENCES
+from .output import check_outputs
+from .patch import add_table_options, load_patch
 from .progress import Bar
 
 _WINDOWS = 32
@@ -43,15 +43,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     _add_beam_options(parser.add_argument_group("the beam"))
     group = parser.add_argument_group("the model")
     group.add_argument("--method", choices=METHODS, default="default", help="default: default")
-    group.add_argument(
-        "--coherence-width", metavar="W", type=float, help="µm, 4σ of the window; default: 65"
+    add_table_options(
+        group, coherence="ensemble for the default method, patch for those of the documents"
     )
-    group.add_argument(
-        "--coherence", choices=COHERENCES,
-        help="default: ensemble for the default method, patch for those of the documents",
-    )  # fmt: skip
-    group.add_argument("--tolerance", metavar="E", type=float, help="of the tables; default: 1e-3")
-    group.add_argument("--terms", metavar="N", type=whole_number(1), help="of Taylor series")
     group.add_argument(
         "--windows", metavar="N", type=whole_number(0), default=_WINDOWS,
         help="window positions whose own periods are fitted, for the spread; 0 leaves them out; "
@@ -62,19 +56,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _add_beam_options(group: argparse._ArgumentGroup) -> None:
-    group.add_argument(
-        "--theta", metavar="DEG", type=float, default=75.0,
-        help="angle of the light from the normal; default: 75",
-    )  # fmt: skip
-    group.add_argument(
-        "--phi", metavar="DEG", type=float, default=0.0,
-        help="azimuth of the light, from the patch's x axis towards y; default: 0",
-    )  # fmt: skip
-    group.add_argument(
-        "--wavelength-range", metavar=("LOW", "HIGH"), nargs=2, type=float, default=(380.0, 780.0),
-        help="nm; default: 380 780",
-    )  # fmt: skip
-    group.add_argument("--step", metavar="NM", type=float, default=5.0, help="default: 5")
+    add_direction(group, theta=75.0)
+    add_wavelengths(group, 380.0, 780.0)
     group.add_argument(
         "--angles", metavar=("LOW", "HIGH"), nargs=2, type=float,
         help="viewing angles, degrees, positive on the light's side; default: from the mirror "
@@ -106,12 +89,7 @@ def run(args: argparse.Namespace) -> int:
     start = time.perf_counter()
     output = args.output or Path(f"{args.source.stem}-evaluation.png")
     written = [output.with_suffix(suffix) for suffix in (".png", ".csv", ".npz")]
-    for path in written:
-        if same_file(path, args.source):
-            raise DiffractionError(
-                f"the evaluation would overwrite its own source '{path}'; name another with -o"
-            )
-        check_writable(path)
+    check_outputs(written, [args.source], "evaluation")
     beam = Beam(args.theta, args.phi)
     if args.period is not None:
         check_period(args.period)

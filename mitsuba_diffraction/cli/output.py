@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 from ..errors import DiffractionError
@@ -36,6 +37,23 @@ def check_writable(path: Path, *, make_folder: bool = False) -> None:
         ) from error
 
 
-def same_file(a: Path, b: Path) -> bool:
-    """Whether two paths name one existing file."""
-    return a.exists() and b.exists() and a.samefile(b)
+def check_outputs(
+    outputs: Iterable[Path], sources: Iterable[Path], what: str, *, make_folder: bool = False
+) -> None:
+    """The same for all files of a command, none of which may be one that it reads.
+
+    what : is written, in a word.
+
+    Raises
+    ------
+    DiffractionError
+        As in `check_writable`, or if a source would be overwritten.
+    """
+    read = [source for source in sources if source.exists()]
+    for path in outputs:
+        for source in read:
+            if path.exists() and path.samefile(source):
+                raise DiffractionError(
+                    f"the {what} would overwrite its own source '{source}'; name another with -o"
+                )
+        check_writable(path, make_folder=make_folder)

@@ -1,4 +1,4 @@
-"""The one patch of a command that needs heights, not a table."""
+"""The one patch of a command that needs heights, not a table, and how it is tabulated."""
 
 from __future__ import annotations
 
@@ -6,12 +6,24 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
+from .arguments import whole_number
 from .heights_options import load_options
+from .precompute import COHERENCES
 
 if TYPE_CHECKING:
     from ..heightfield import HeightField
 
 _TABLE_NAMES = ("coherence_width", "coherence", "tolerance", "terms")
+
+
+def add_table_options(group: argparse._ArgumentGroup, *, coherence: str) -> None:
+    """Declare the settings that `load_patch` returns; `coherence` tells that one's default."""
+    group.add_argument(
+        "--coherence-width", metavar="W", type=float, help="µm, 4σ of the window; default: 65"
+    )
+    group.add_argument("--coherence", choices=COHERENCES, help=f"default: {coherence}")
+    group.add_argument("--tolerance", metavar="E", type=float, help="of the tables; default: 1e-3")
+    group.add_argument("--terms", metavar="N", type=whole_number(1), help="of Taylor series")
 
 
 def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:

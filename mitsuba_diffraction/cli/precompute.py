@@ -10,10 +10,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionWarning
 from .arguments import number_between, path_ending_in, whole_number
 from .heights_options import add_heights_options, load_options
-from .output import check_writable, same_file
+from .output import check_outputs
 from .progress import Bar
 
 if TYPE_CHECKING:
@@ -60,9 +60,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--coherence", choices=COHERENCES,
         help="average over window positions, or one window on the patch; default: ensemble",
     )  # fmt: skip
-    group.add_argument(
-        "--basis", choices=BASES, help="series in κ; default: auto, the cheaper that suffices"
-    )
+    group.add_argument("--basis", choices=BASES, help="series in κ; default: auto, which is svd")
     group.add_argument(
         "--tolerance", metavar="E", type=float, help="relative error that is met; default: 1e-3"
     )
@@ -122,12 +120,7 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> None:
         args.parser.error("argument -o/--output: name the one table of these files")
     by_recipe = recipe is not None and args.output is None
     output = args.output or (recipe.output if recipe else Path(f"{sources[0].stem}.exr"))
-    for file in inputs:
-        if same_file(file, output):
-            raise DiffractionError(
-                f"the table would overwrite its own source '{file}'; name another with -o"
-            )
-    check_writable(output, make_folder=by_recipe)
+    check_outputs([output], inputs, "table", make_folder=by_recipe)
     with Bar(args) as bar:
         bar(0, 0, "making heights" if recipe and recipe.generator else "reading heights")
         if recipe is not None:

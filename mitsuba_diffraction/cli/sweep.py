@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
-from .arguments import number_between, path_ending_in, whole_number
+from .arguments import number_between, path_ending_in
 from .heights_options import add_heights_options
+from .light_options import add_direction, add_wavelengths
 from .method_map import METHODS, gain_of
-from .output import check_writable, same_file
-from .patch import load_patch
-from .precompute import COHERENCES
+from .output import check_outputs
+from .patch import add_table_options, load_patch
 from .progress import Bar
 
 # Written out so that --help need not load NumPy; a test holds them against the library.
@@ -58,17 +58,8 @@ def _add_options(group: argparse._ArgumentGroup) -> None:
         "--method", choices=METHODS, default="flss",
         help="what evaluates, except in a sweep over methods; default: flss",
     )  # fmt: skip
-    group.add_argument(
-        "--theta", metavar="DEG", type=float, default=0.0, help="angle of the light; default: 0"
-    )
-    group.add_argument(
-        "--phi", metavar="DEG", type=float, default=0.0, help="azimuth of the light; default: 0"
-    )
-    group.add_argument(
-        "--wavelength-range", metavar=("LOW", "HIGH"), nargs=2, type=float, default=(380.0, 780.0),
-        help="nm; default: 380 780",
-    )  # fmt: skip
-    group.add_argument("--step", metavar="NM", type=float, default=5.0, help="default: 5")
+    add_direction(group)
+    add_wavelengths(group, 380.0, 780.0)
     group.add_argument(
         "--resolution", metavar="N", type=int, default=128, help="pixels a side; default: 128"
     )
@@ -79,12 +70,7 @@ def _add_options(group: argparse._ArgumentGroup) -> None:
         "--exposure", metavar="EV", type=number_between(-100, 100),
         help="of all maps, in stops; default: the best map's own",
     )  # fmt: skip
-    group.add_argument(
-        "--coherence-width", metavar="W", type=float, help="µm, 4σ of the window; default: 65"
-    )
-    group.add_argument("--coherence", choices=COHERENCES, help="default: patch")
-    group.add_argument("--tolerance", metavar="E", type=float, help="of the tables; default: 1e-3")
-    group.add_argument("--terms", metavar="N", type=whole_number(1), help="of Taylor series")
+    add_table_options(group, coherence="patch")
     group.add_argument("--period", metavar="D", type=float, help="µm; default: estimated")
     group.add_argument(
         "--relative",
@@ -108,12 +94,7 @@ def run(args: argparse.Namespace) -> int:
     start = time.perf_counter()
     output = args.output or Path(f"{args.source.stem}-{args.kind}.png")
     numbers = output.with_suffix(".csv")
-    for path in (output, numbers):
-        if same_file(path, args.source):
-            raise DiffractionError(
-                f"the sheet would overwrite its own source '{path}'; name another with -o"
-            )
-        check_writable(path)
+    check_outputs((output, numbers), [args.source], "sheet")
     light, values, gain = Light(args.theta, args.phi), _values(args), gain_of(args)
     if args.int_ior is not None and gain is None:
         args.parser.error("argument --int-ior: only with argument --relative")
