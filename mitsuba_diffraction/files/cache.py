@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import DiffractionError
+from ..tables import coarse
 from ..tables.colour_table import COLOUR_VERSION, ColourTable
 from ..tables.table import FORMAT_VERSION, DiffractionTable
 from .colour_npz import load_colours, save_colours
@@ -42,8 +43,10 @@ def cache_folder() -> Path:
 
 def content_key(digest: str, arguments: dict[str, Any]) -> str:
     """Name of the table of heights with this digest, built with these arguments."""
-    content = json.dumps([FORMAT_VERSION, digest, sorted(arguments.items())], default=list)
-    return hashlib.sha256(content.encode()).hexdigest()[:32]
+    content: list[Any] = [FORMAT_VERSION, digest, sorted(arguments.items())]
+    if {"crop", "kappa_max"} & arguments.keys():  # it goes on in cells that no argument tells of
+        content.append([coarse.CELL, coarse.FEWEST, coarse.STEP, coarse.TOLERANCE])
+    return hashlib.sha256(json.dumps(content, default=list).encode()).hexdigest()[:32]
 
 
 def cached_table(

@@ -95,6 +95,16 @@ def test_tables_of_another_format_are_built_anew(monkeypatch):
     assert build.built == 2
 
 
+def test_cells_of_another_width_are_another_table(monkeypatch):
+    whole, planned = Builder(), Builder(**ARGUMENTS, crop=20.0)
+    tables = [build.table() for build in (whole, planned)]
+    monkeypatch.setattr("mitsuba_diffraction.tables.coarse.FEWEST", 4)
+    again = [build.table() for build in (whole, planned)]
+    assert again[0] is tables[0]
+    assert (whole.built, planned.built) == (1, 2)
+    assert again[1].coarse.spacing > tables[1].coarse.spacing
+
+
 @pytest.mark.parametrize("content", [b"", b"half a table"])
 def test_a_damaged_file_is_replaced(folder, content):
     build = Builder()
