@@ -95,6 +95,4 @@ def warnings_as_ours() -> Iterator[None]:
 
 def _without_stamp(text: str) -> str:
     """A line of Mitsuba's log without date, level and class."""
-    return re.sub(
-        r"^[\d-]+ [\d:]+ [A-Z]+\s+(?:\[[^]]*\]\s+)?(?:(?:<module>|\w+\(\)): )?", "", text.strip()
-    )
+    return _STAMP.sub("", text.strip())

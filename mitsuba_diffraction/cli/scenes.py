@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
+from ..plugin.attributes import check_attributes
 from .mitsuba_text import plain_text
 from .scene_parameters import check_parameters
 
@@ -76,19 +77,17 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
         raise DiffractionError(f"cannot load the scene: {plain_text(error)}") from error
     if not isinstance(scene, mi.Scene):
         raise DiffractionError(f"'{file}' is not a scene; its outermost element must be <scene>")
-    _warn_of_missing_uv(scene)
+    # "Diffraction[" is found inside twosided, blendbsdf and the like, too
+    surfaces = [shape for shape in scene.shapes() if "Diffraction[" in str(shape.bsdf())]
+    for shape in surfaces:
+        check_attributes(shape)
+    _warn_of_missing_uv(surfaces)
     return scene
 
 
-def _warn_of_missing_uv(scene: Any) -> None:
+def _warn_of_missing_uv(surfaces: Iterable[Any]) -> None:
     """Name the meshes on which a patch has no direction: a BSDF itself cannot see its mesh."""
-    lacking = [
-        shape.id()
-        for shape in scene.shapes()
-        if shape.is_mesh()
-        and not shape.has_vertex_texcoords()
-        and "Diffraction[" in str(shape.bsdf())  # also inside twosided, blendbsdf and the like
-    ]
+    lacking = [s.id() for s in surfaces if s.is_mesh() and not s.has_vertex_texcoords()]
     if lacking:
         warnings.warn(
             f"no texture coordinates on {', '.join(lacking)}: the patch's direction is arbitrary "

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
+from ..plugin.attributes import check_attributes
 from .camera import Camera, read_camera
 from .lights import Lighting, read_lights
 from .materials import Map, Material, diffracts, read_material
@@ -98,7 +99,7 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
     Raises
     ------
     DiffractionError
-        If nothing in it diffracts, or there is no perspective camera.
+        If nothing in it diffracts, there is no perspective camera, or a mesh lacks an attribute.
     """
     sensors = scene.sensors()
     if not 0 <= sensor < len(sensors):
@@ -109,6 +110,7 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
         name = shape.id() if shape.id() and "unnamed" not in shape.id() else f"shape {number}"
         if shape.is_emitter():
             continue  # seen as a light
+        check_attributes(shape)
         triangles = triangles_of(shape)
         if triangles is None:
             omissions.append(f"{name} ({shape.class_name()})")

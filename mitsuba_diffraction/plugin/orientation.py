@@ -57,7 +57,7 @@ class Textured:
         """The texture looks after itself."""
 
     def __str__(self) -> str:
-        return "textured"
+        return " ".join(str(self.texture).split())
 
 
 Orientation = Constant | Textured

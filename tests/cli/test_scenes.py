@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionWarning
+from mitsuba_diffraction import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.cli.scenes import load_scene
 
 BSDF = (
@@ -16,6 +16,11 @@ BSDF = (
     '<boolean name="energy_conserving" value="false"/></bsdf>'
 )
 TWOSIDED = f'<bsdf type="twosided">{BSDF}</bsdf>'
+FOLLOWING = BSDF.replace(
+    "</bsdf>",
+    '<texture type="mesh_attribute" name="orientation"><string name="name" '
+    'value="vertex_orientation"/></texture></bsdf>',
+)
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 
 
@@ -56,3 +61,11 @@ def test_no_other_mesh_is(scene_of, mesh, bsdf):
     with warnings.catch_warnings():
         warnings.simplefilter("error", DiffractionWarning)
         load_scene(scene_of(mesh, bsdf), {})
+
+
+@pytest.mark.usefixtures("variant")
+@pytest.mark.parametrize("bsdf", [FOLLOWING, f'<bsdf type="twosided">{FOLLOWING}</bsdf>'])
+def test_a_mesh_without_the_field_that_turns_the_patch_is_refused(scene_of, bsdf):
+    """Kernels would go on with zeros, and not turn it."""
+    with pytest.raises(DiffractionError, match=r"'hide' has no attribute vertex_.* tangents MESH"):
+        load_scene(scene_of(TRIANGLE + "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n", bsdf), {})

@@ -1,0 +1,42 @@
+"""Whether a shape has the mesh attributes that its BSDF reads; the BSDF itself cannot see it."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+
+from ..errors import DiffractionError
+
+#: What `meshes.write_ply` calls a field of directions.
+ORIENTATION = "vertex_orientation"
+
+_READ = re.compile(r'MeshAttribute\[\s*name = "([^"]+)"')
+
+
+def check_attributes(shape: Any) -> None:
+    """Refuse a shape whose BSDF reads a mesh attribute that it lacks.
+
+    Mitsuba's kernels would go on with zeros, which turn no patch and colour nothing.
+
+    Parameters
+    ----------
+    shape : `mi.Shape` of the variant that is set.
+
+    Raises
+    ------
+    DiffractionError
+        Which names the attribute, and how to get one of directions.
+    """
+    for name in dict.fromkeys(_READ.findall(str(shape.bsdf()))):
+        if np.all(shape.has_attribute(name)):
+            continue
+        remedy = (
+            "make it with 'mitsuba-diffraction tangents MESH -o FIELD.ply', and use that file"
+            if name == ORIENTATION
+            else "add it to the mesh's file, or correct the name"
+        )
+        raise DiffractionError(
+            f"shape '{shape.id()}' has no attribute {name}, which its BSDF reads; {remedy}"
+        )
