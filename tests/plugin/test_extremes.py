@@ -59,7 +59,7 @@ def test_values_are_finite_and_those_of_the_table(variant, name):
     assert np.all(np.isfinite(found))
     assert np.all(found >= 0.0)
     expected = bsdf.table.brdf(wi, wo, lam) * wo[:, 2]
-    # single precision of phases, as in test_bsdf; the deepest series has functions of κ that turn
+    # single precision of phases, as in tests/bsdf; the deepest series has functions of κ that turn
     # once in 2π/κH = 1/40 of the range of κ, known to 6e-8·κH = 2e-5 of a radian
     assert np.abs(found[:, 0] - expected).sum() < 2e-4 * expected.sum()
 
