@@ -5,6 +5,8 @@ Contents
 HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
+maps               what a surface reflects in every direction, as pictures
+evaluation         a beam on a patch: maxima against the grating equation
 glsl               the realtime renderer
 web                pages that show a scene in a browser or a notebook
 reference          the BRDF straight from its integral, in double precision
@@ -19,6 +21,8 @@ from __future__ import annotations
 
 import importlib
 import sys
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 from .llvm import select_llvm
 
@@ -32,6 +36,9 @@ from .errors import DiffractionError, DiffractionWarning  # noqa: E402
 from .heightfield import HeightField  # noqa: E402
 from .tables import DiffractionTable  # noqa: E402
 
+if TYPE_CHECKING:
+    from . import evaluation, maps
+
 __version__ = "0.1.0"
 __all__ = [
     "DiffractionError",
@@ -39,11 +46,22 @@ __all__ = [
     "DiffractionWarning",
     "HeightField",
     "bsdf_dict",
+    "evaluation",
     "glsl",
     "gratings",
+    "maps",
     "reference",
     "web",
 ]
+
+# Imported when first asked for: renders need neither, nor Matplotlib, which they load.
+_ON_DEMAND = ("evaluation", "maps")
+
+
+def __getattr__(name: str) -> ModuleType:
+    if name in _ON_DEMAND:
+        return importlib.import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def _register(old: str | None, new: str | None) -> None:

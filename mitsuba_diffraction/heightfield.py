@@ -140,6 +140,27 @@ class HeightField:
         )
         return load_heights(path, options)
 
+    def treated(
+        self,
+        *,
+        level: str | None = None,
+        clip: float | str | None = None,
+        periodic: str | None = None,
+    ) -> HeightField:
+        """The same patch after treatments of its heights; parameters and order as in `load`.
+
+        Points without data are filled while loading, since a HeightField has none.
+
+        Raises
+        ------
+        DiffractionError
+            If an option does not fit, or `clip` finds nothing to measure outliers by.
+        """
+        from .files.heights import treat  # files import this module
+        from .files.options import LoadOptions
+
+        return treat(self, LoadOptions.of(level=level, clip=clip, periodic=periodic))
+
     @property
     def shape(self) -> tuple[int, int]:
         """Number of samples (ny, nx)."""

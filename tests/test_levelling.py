@@ -69,3 +69,21 @@ def test_clip_refuses_heights_without_a_deviation():
     steps[0] = 1
     with pytest.raises(DiffractionError, match="more than half"):
         clip_outliers(HeightField(steps, 0.1), 3)
+
+
+def test_a_patch_in_memory_is_treated_as_a_file_is(tmp_path):
+    heights = ROUGH + 0.003 * X + RNG.normal(size=(60, 1))
+    np.save(tmp_path / "scan.npy", heights)
+    asked = {"level": "lines", "clip": 4, "periodic": "smooth"}
+    loaded = HeightField.load(tmp_path / "scan.npy", pixel_size=0.1, **asked)
+    treated = HeightField(heights, 0.1).treated(**asked)
+    assert np.array_equal(treated.heights, loaded.heights)
+    assert treated.history == loaded.history
+    assert len(treated.history) == 3
+
+
+def test_no_treatment_changes_nothing():
+    field = HeightField(ROUGH, 0.1)
+    assert np.array_equal(field.treated().heights, field.heights)
+    with pytest.raises(DiffractionError, match="level: expected one of 'none', 'plane', 'lines'"):
+        field.treated(level="bow")

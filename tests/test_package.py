@@ -114,3 +114,20 @@ def test_the_sdist_holds_what_the_tests_need(in_sdist):
 def test_the_sdist_holds_nothing_made(in_sdist):
     assert not {n for n in in_sdist if n.startswith((".venv/", "out/", "precompute/tables/"))}
     assert not {n for n in in_sdist if n.endswith(".pyc") or n.startswith(".git/")}
+
+
+def test_everything_public_is_there():
+    for name in md.__all__:
+        assert getattr(md, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'moths'"):
+        md.moths  # noqa: B018
+
+
+def test_plotting_is_imported_on_demand():
+    code = (
+        "import sys, mitsuba_diffraction as md\n"
+        "assert 'matplotlib' not in sys.modules\n"
+        "assert md.maps.brdf_map and md.evaluation.Beam"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
