@@ -47,20 +47,6 @@ def gentle(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {"patch": str(file), "pixel_size": str(field.pixel_size[0]), "coherence_width": "10"}
 
 
-@pytest.mark.parametrize("name", STUDIO)
-def test_it_renders_a_ray_at_a_time(name: str, gentle: dict[str, str]) -> None:
-    """The scenes in a studio: compiling the kernels of all would take a minute."""
-    import mitsuba as mi
-
-    mi.set_variant("scalar_spectral")
-    if name.startswith("cd"):
-        gentle = {**gentle, "height_scale": "1"}
-    image = _render(name, **gentle, spp="4", resx="12", resy="10")
-    assert image.shape == (10, 12, 3)
-    assert np.isfinite(image).all()
-    assert 0.02 < np.median(image.mean(axis=2)) < 0.8
-
-
 @pytest.mark.parametrize("name", [*STUDIO, "plate", *SUNNY])
 def test_its_patch_is_a_recipe(name: str) -> None:
     defaults = parameters_of(SCENES / f"{name}.xml")

@@ -130,7 +130,7 @@ def build_table(
                     f"taps={taps} leave an error of {attempt.error():.2g}, more than "
                     f"tolerance={tolerance:g}; leave taps out, or raise the tolerance"
                 )
-            chosen_taps = (chosen_taps[0] + 1, chosen_taps[1] + 1)
+            chosen_taps = (_more(chosen_taps[0]), _more(chosen_taps[1]))
         elif half:
             half = False
         elif functions is not None and terms is None and functions < PACKET:
@@ -367,6 +367,11 @@ def _grid(
     last_x = min(math.ceil(radius[0]), int(nx) // 2) + taps[0]
     last_y = min(math.ceil(radius[1]), int(ny) // 2) + taps[1]
     return Grid((last_x, last_y), steps, radius, taps, coherent)
+
+
+def _more(taps: int) -> int:
+    """By one where few are read; by a sixth under a window far narrower than the patch."""
+    return taps + max(1, taps // 6)
 
 
 def _extended(

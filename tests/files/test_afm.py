@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.heightfield import HeightField
+from tests.instruments import nanoscope
 
 surface_topography = pytest.importorskip(
     "SurfaceTopography", reason="instrument files need the extra afm"
@@ -20,27 +21,9 @@ NX, NY = 6, 4
 COUNTS = np.random.default_rng(8).integers(-3000, 3000, (NY, NX)).astype("<i2")
 
 
-def nanoscope(channels=(("ZSensor", "nm"),), scan_size="3 2 ~m", length=None):
-    """A small NanoScope file: 0.5 V full scale, 100 units of height per volt."""
-    header = ["\\*File list", "\\Version: 0x05120000", "\\*Ciao scan list"]
-    header += [f"\\@Sens. {name}: V 100.0 {unit}/V" for name, unit in channels]
-    sections = []
-    for i, (name, _) in enumerate(channels):
-        sections += [
-            "\\*Ciao image list", f"\\Data offset: {4096 + i * COUNTS.nbytes}",
-            f"\\Data length: {COUNTS.nbytes}", "\\Bytes/pixel: 2", f"\\Samps/line: {NX}",
-            f"\\Number of lines: {NY}", f"\\Scan size: {scan_size}",
-            f'\\@2:Image Data: S [{name}] "{name}"',
-            f"\\@2:Z scale: V [Sens. {name}] (0.0000076 V/LSB) 0.5 V",
-        ]  # fmt: skip
-    text = "\r\n".join([*header, *sections, "\\*File list end"]) + "\r\n"
-    data = text.encode("latin-1").ljust(4096, b"\0") + COUNTS.tobytes() * len(channels)
-    return data[:length]
-
-
-def write(tmp_path, *args, name="scan.001", **kwargs):
+def write(tmp_path, *args, name="scan.001", length=None, **kwargs):
     path = tmp_path / name
-    path.write_bytes(nanoscope(*args, **kwargs))
+    path.write_bytes(nanoscope(COUNTS, *args, **kwargs)[:length])
     return path
 
 
@@ -195,8 +178,10 @@ def test_nanoscope_file_needs_no_option(shared_afm):
     assert "'ZSensor', the only height channel" in field.history[0]
 
 
-HEADS = [b"", nanoscope()[:600], b"GWYP", b"PK\3\4", b"\x89HDF\r\n\x1a\n", b"CDF\1", b"aBCR-0.0",
-         b"\\*File list\r\n", b"\5\0", b"DSS\1", b"WSxM file"]  # fmt: skip
+HEADS = [
+    *(b"", nanoscope(COUNTS)[:600], b"GWYP", b"PK\3\4", b"\x89HDF\r\n\x1a\n", b"CDF\1"),
+    *(b"aBCR-0.0", b"\\*File list\r\n", b"\5\0", b"DSS\1", b"WSxM file"),
+]
 
 
 @settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture],
@@ -215,7 +200,7 @@ def test_random_bytes_are_one_clear_line(tmp_path, head, tail):
           deadline=None)  # fmt: skip
 @given(st.data())
 def test_damaged_headers_load_or_are_one_clear_line(tmp_path, data):
-    content = bytearray(nanoscope())
+    content = bytearray(nanoscope(COUNTS))
     end = content.index(b"\0")
     for _ in range(data.draw(st.integers(1, 4))):
         content[data.draw(st.integers(0, end))] = data.draw(st.integers(0, 255))

@@ -1,0 +1,121 @@
+"""The commands that README and docs show run, in their order, on small patches and pictures.
+
+What is not run here: `make`, `pip` and `apt`, which set up what runs these tests; `view`, which
+opens a window; `bench` and `tradeoff`, which take minutes at their smallest, and are run smaller
+still by their own tests. test_docs.py checks what these would be given.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction.cli import main
+from mitsuba_diffraction.meshes.__main__ import main as make_mesh
+from tests.conftest import ROOT
+from tests.instruments import nanoscope
+from tests.test_docs import PAGES, blocks, spans, typed
+
+NOT_RUN = {"view", "bench", "tradeoff"}
+
+# as small as commands may be asked to be; the last option of a name counts
+PICTURE = ["-s", "2", "-D", "resx=12", "-D", "resy=10"]
+SMALL = {
+    "render": [*PICTURE, "-m", "scalar_spectral"],
+    "brdf-map": ["--resolution", "24", "--step", "50", "--samples", "1"],
+    "evaluate": ["--step", "50", "--angle-step", "2", "--windows", "2", "--coherence-width", "10"],
+    "sweep": ["--coherence-width", "10", "--resolution", "12", "--step", "100", "--no-compiled"],
+    "plan": ["-D", "resx=12", "-D", "resy=10", "--paths", "512"],
+    "compare": [*PICTURE, "--full-spp", "1", "--supersampling", "1", "--method", "lut"],
+    "export-viewer": ["--method", "spectral"],
+}
+# those of scenes, which would else take the scene's own patch
+WITH_PATCH = {"render", "plan", "compare", "export-viewer"}
+
+pytestmark = [
+    # heights as coarse and steep as the stand-ins' are worth a warning
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+    pytest.mark.usefixtures("some_variant"),
+]
+
+
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a clone's folder holds, and the files that commands name, small."""
+    folder = tmp_path_factory.mktemp("clone")
+    (folder / "scenes").symlink_to(ROOT / "scenes")
+    shutil.copytree(ROOT / "precompute", folder / "precompute", ignore=lambda *_: {"tables"})
+    (folder / "out").mkdir()
+    # the recipes by name, each a coarser and smaller patch of its kind
+    for recipe in folder.glob("precompute/*_like.toml"):
+        text = recipe.read_text(encoding="utf-8")
+        text = re.sub(r"extent = .*", "extent = 4.0", text)
+        text = re.sub(r"pixels = .*", "pixels = 80", text)
+        recipe.write_text(f"coherence_width = 4.0\n{text}", encoding="utf-8")
+    blazed = folder / "precompute" / "blazed.toml"
+    text = blazed.read_text(encoding="utf-8")
+    blazed.write_text(f"{text}periods = 4\nrows = 16\n", encoding="utf-8")
+    field = md.gratings.sinusoidal(period=1.6, depth=0.05, periods=4, rows=32)
+    heights = np.tile(field.heights[:1], (32, 1))
+    grey = np.round((heights - heights.min()) / np.ptp(heights) * 255).astype(np.uint8)
+    for name in ("scale.png", "elaphe.png", "a.png", "b.png"):
+        Image.fromarray(grey).save(folder / name)
+    # 32 lines of 64 samples, 8 by 4 µm, 3.9 nm high
+    wave = 512 * np.sin(2 * np.pi * np.arange(64) / 16)
+    counts = np.tile(np.int16(np.round(wave)), (32, 1))
+    (folder / "scan.spm").write_bytes(nanoscope(counts, scan_size="8 4 ~m"))
+    assert make_mesh(["knot", "-o", str(folder / "mesh.ply")]) == 0
+    return folder
+
+
+def commands(page: str) -> list[list[str]]:
+    """Words of a page's commands that are run here: those of blocks, then those of sentences."""
+    lines = [words for text in blocks(page, "sh") for words in typed(text)]
+    lines += [words for span in spans(page) for words in typed(span) if len(words) > 2]
+    return [
+        words
+        for words in lines
+        if (Path(words[0]).name == "mitsuba-diffraction" and words[1] not in NOT_RUN)
+        or (words[1:3] == ["-m", "mitsuba_diffraction.meshes"] and len(words) > 4)
+    ]
+
+
+def run(words: list[str]) -> None:
+    """Run a command, smaller than it stands there."""
+    if words[1] == "-m":
+        assert make_mesh(words[3:]) == 0
+        return
+    _, command, *rest = words
+    rest = [word.replace("$PWD", str(Path.cwd())) for word in rest]
+    rest = [*without_size(rest), *SMALL.get(command, [])]
+    if command in WITH_PATCH and not any(word.startswith("patch=") for word in rest):
+        rest += ["-D", f"patch={Path.cwd() / 'precompute' / 'elaphe_like.toml'}"]
+    if "--frames" in rest:
+        rest += ["--frames", "2"]
+    assert main([command, *rest]) == 0, words
+    if "-o" in rest:
+        output = Path(rest[rest.index("-o") + 1])
+        assert output.stat().st_size > 0
+        if command == "render" and output.suffix != ".webp":
+            with Image.open(output.with_suffix(".png")) as picture:
+                # shown as it is: neither black nor burnt out
+                assert 20 < np.median(np.asarray(picture.convert("L"))) < 235
+
+
+def without_size(rest: list[str]) -> list[str]:
+    """Arguments without -D resx=... and -D resy=..., which may be given only once."""
+    sized = {i for i, word in enumerate(rest) if word.startswith(("resx=", "resy="))}
+    return [word for i, word in enumerate(rest) if not {i, i + 1} & sized]
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if commands(page)])
+def test_the_commands_of_a_page_run(page, tree, monkeypatch):
+    monkeypatch.chdir(tree)
+    for words in commands(page):
+        run(words)
