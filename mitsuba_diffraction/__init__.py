@@ -7,7 +7,9 @@ gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
 maps               what a surface reflects in every direction, as pictures
 evaluation         a beam on a patch: maxima against the grating equation
+tradeoff           accuracy against speed and memory, setting by setting
 glsl               the realtime renderer
+comparison         how far its pictures are from path-traced ones
 web                pages that show a scene in a browser or a notebook
 reference          the BRDF straight from its integral, in double precision
 bsdf_dict          a dictionary for `mi.load_dict` from arrays
@@ -37,7 +39,7 @@ from .heightfield import HeightField  # noqa: E402
 from .tables import DiffractionTable  # noqa: E402
 
 if TYPE_CHECKING:
-    from . import evaluation, maps
+    from . import comparison, evaluation, maps, tradeoff
 
 __version__ = "0.1.0"
 __all__ = [
@@ -46,16 +48,18 @@ __all__ = [
     "DiffractionWarning",
     "HeightField",
     "bsdf_dict",
+    "comparison",
     "evaluation",
     "glsl",
     "gratings",
     "maps",
     "reference",
+    "tradeoff",
     "web",
 ]
 
 # Imported when first asked for: renders need neither, nor Matplotlib, which they load.
-_ON_DEMAND = ("evaluation", "maps")
+_ON_DEMAND = ("comparison", "evaluation", "maps", "tradeoff")
 
 
 def __getattr__(name: str) -> ModuleType:

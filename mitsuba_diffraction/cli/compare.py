@@ -75,11 +75,11 @@ def run(args: argparse.Namespace) -> int:
     every = "all" in args.method
     methods = METHODS if every else tuple(dict.fromkeys(args.method))
 
-    from ..comparison.measures import as_json, difference, exposure_of, regions
+    from ..comparison import SameLights, difference, exposure_of
+    from ..comparison.measures import as_json
     from ..comparison.sheet import write_sheet
     from ..comparison.table import markdown
-    from ..comparison.truth import box_sensor, seen, with_lights
-    from ..glsl.renderer import Renderer
+    from ..comparison.truth import box_sensor
     from ..glsl.timing import fragment_times
     from .mitsuba_text import warnings_as_ours
     from .passes import Stop
@@ -91,16 +91,8 @@ def run(args: argparse.Namespace) -> int:
         bar(0, args.spp, "loading")
         scene = load_scene(args.scene, parameters)
         sensor_of(scene, args.sensor)
-        renderer = Renderer(scene, sensor=args.sensor)
-        lights = renderer.lights
-        if not lights:
-            raise DiffractionError(
-                f"'{args.scene}' has no light with a direction or place to compare under; add a "
-                "directional or point emitter, or a sky with a sun"
-            )
-        renderer.sky = np.zeros((4, 3))
-        direct = with_lights(scene, renderer.camera, lights)
-        sees = seen(direct, lights)
+        both = SameLights(scene, sensor=args.sensor, name=f"'{args.scene}'")
+        renderer, direct = both.renderer, both.scene
         with Stop() as stop:
             halves = [
                 _traced(direct, direct.sensors()[0], args.spp // 2, seed, variant, stop, bar)
@@ -112,7 +104,6 @@ def run(args: argparse.Namespace) -> int:
                 full = _traced(scene, sensor, args.full_spp, args.seed, variant, stop, bar)
         reference = 0.5 * (halves[0] + halves[1])
         exposure = exposure_of(reference)
-        exact, diffracting = _by_shape(direct, renderer)
         _make_folder(folder)
         _write(reference, folder / "direct.exr", args, variant, args.spp)
         if full is not None:
@@ -129,7 +120,7 @@ def run(args: argparse.Namespace) -> int:
                     raise
                 say_warning(f"left out: {error}")  # it does not suit this surface
                 continue
-            areas = regions(sees, exact, diffracting, drawn[..., 3])
+            areas = both.regions(drawn)
             other = drawn[..., :3]
             errors = {
                 name: difference(reference, other, mask, exposure) for name, mask in areas.items()
@@ -155,7 +146,8 @@ def run(args: argparse.Namespace) -> int:
         "scene": str(args.scene), "parameters": parameters, "variant": variant,
         "driver": renderer.driver, "size": list(renderer.camera.size), "spp": args.spp,
         "exposure": exposure,
-        "lights": [light.name for light in lights], "not_shown": list(renderer.scene.omissions),
+        "lights": [light.name for light in renderer.lights],
+        "not_shown": list(renderer.scene.omissions),
         # two halves of the samples differ by twice what their mean is off
         "noise_delta_e_mean": 0.5 * noise.delta_e_mean,
         "full_transport": None
@@ -183,16 +175,6 @@ def _traced(scene: Any, sensor: Any, spp: int, seed: int, variant: str, stop: An
     if result.interrupted:
         raise KeyboardInterrupt
     return np.array(result.bitmap, np.float32)[..., :3]
-
-
-def _by_shape(scene: Any, renderer: Any) -> tuple[Any, Any]:
-    """Of each shape of a scene: whether all of its material is shown, whether it diffracts."""
-    known = {surface.shape.ptr: surface for surface in renderer.scene.surfaces}
-    found = [known.get(shape.ptr) for shape in scene.shapes()]
-    return (
-        np.array([s is not None and s.exact for s in found]),
-        np.array([s is not None and s.material.bsdf is not None for s in found]),
-    )
 
 
 def _make_folder(folder: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import csv
 import json
-import tempfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +17,7 @@ from .report import plain
 
 if TYPE_CHECKING:
     from ..tradeoff.depth import Depths
-    from ..tradeoff.measure import Measured
+    from ..tradeoff.measuring import Measured
     from ..tradeoff.wavelengths import Spectral
 
 #: Pixels of the default patch, pairs of directions, calls at once, timed rounds, depths.
@@ -77,13 +76,16 @@ def run(args: argparse.Namespace) -> int:
     from ..benchmarks.machine import describe_machine
     from ..benchmarks.plan import PIXEL
     from ..files.heights import load_heights
-    from ..tradeoff.depth import measure_depths
-    from ..tradeoff.measure import measure
+    from ..tradeoff import (
+        Budget,
+        measure,
+        measure_depths,
+        measure_wavelengths,
+        recommended,
+        settings,
+    )
     from ..tradeoff.plot import draw_depths, draw_trade
-    from ..tradeoff.recommend import Budget, recommended
     from ..tradeoff.sample import Sample
-    from ..tradeoff.settings import settings
-    from ..tradeoff.wavelengths import measure_wavelengths
     from .scenes import set_variant
 
     side, pairs, lanes, rounds, depths = _QUICK if args.quick else _FULL
@@ -94,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
         field = load_heights(args.heights, load_options(args))
         width = args.coherence_width or 65.0
     set_variant("llvm_ad_spectral")
-    with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder, Bar(args) as bar:
+    with Bar(args) as bar:
         results = measure(
             field,
             list(settings(args.quick)),
@@ -102,7 +104,6 @@ def run(args: argparse.Namespace) -> int:
             pairs=pairs,
             lanes=lanes,
             rounds=rounds,
-            folder=Path(folder),
             progress=bar,
         )
         best = recommended(results, Budget(*_budget(args).values()))
@@ -139,7 +140,7 @@ def _budget(args: argparse.Namespace) -> dict[str, float | None]:
 
 def _write(folder: Path, document: dict[str, Any], results: list[Measured], deep: Depths) -> None:
     from ..files.atomic import atomic_path
-    from ..tradeoff.measure import rows
+    from ..tradeoff.measuring import rows
 
     records = list(rows(results))
     document["settings"] = records

@@ -1,1 +1,16 @@
-"""How far a realtime picture is from the path-traced one of the same scene."""
+"""How far a realtime picture is from the path-traced one of the same scene.
+
+Contents
+--------
+SameLights    a scene for both renderers, under the lights that both know
+difference    how far a picture is from its reference, over some of the pixels
+Difference    what that gives
+exposure_of   the factor that makes a picture's brightest pixels white
+"""
+
+from __future__ import annotations
+
+from .measures import Difference, difference, exposure_of
+from .same_lights import SameLights
+
+__all__ = ["Difference", "SameLights", "difference", "exposure_of"]

@@ -2,11 +2,33 @@
 
 Contents
 --------
-settings     what tables are tried
-sample       directions where a patch sends light, and the exact answer there
-measure      error, colours, time and memory of each setting
-wavelengths  steps of sums over the spectrum, and how many wavelengths a ray needs
-depth        where Taylor's series breaks down, and the others do not
-recommend    the cheapest setting within a budget
-plot         the pictures
+Setting               one table to try
+settings              what `mitsuba-diffraction tradeoff` tries
+measure               error, colours, time and memory of each setting
+Measured              what that gives
+lit_pairs             directions where a patch sends light
+measure_wavelengths   steps of sums over the spectrum, and how many wavelengths a ray needs
+measure_depths        where Taylor's series breaks down, and the others do not
+Budget, recommended   the cheapest setting within a budget
 """
+
+from __future__ import annotations
+
+from .depth import measure_depths
+from .measuring import Measured, measure
+from .recommend import Budget, recommended
+from .sample import lit_pairs
+from .setting import Setting, settings
+from .wavelengths import measure_wavelengths
+
+__all__ = [
+    "Budget",
+    "Measured",
+    "Setting",
+    "lit_pairs",
+    "measure",
+    "measure_depths",
+    "measure_wavelengths",
+    "recommended",
+    "settings",
+]

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from ..files.atomic import atomic_path
 from .depth import Depths
-from .measure import Measured
+from .measuring import Measured
 
 _MARKS = "osD^vP*Xp<>h"
 

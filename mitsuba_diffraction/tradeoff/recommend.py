@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..errors import DiffractionError
-from .measure import Measured
+from .measuring import Measured
 
 _ALIKE = 1.1  # times differ by as much from one run to the next
 

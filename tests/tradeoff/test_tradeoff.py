@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError, DiffractionTable
+from mitsuba_diffraction import DiffractionError, DiffractionTable, tradeoff
 from mitsuba_diffraction.figures import tradeoff as page
 from mitsuba_diffraction.tradeoff.depth import TERMS, taylor_error
-from mitsuba_diffraction.tradeoff.measure import Measured, rows
+from mitsuba_diffraction.tradeoff.measuring import Measured, rows
 from mitsuba_diffraction.tradeoff.recommend import Budget, recommended
 from mitsuba_diffraction.tradeoff.sample import Sample
-from mitsuba_diffraction.tradeoff.settings import Setting, settings
+from mitsuba_diffraction.tradeoff.setting import Setting, settings
 from mitsuba_diffraction.tradeoff.wavelengths import measure_wavelengths
 from tests.optics import rough_patch
 
@@ -147,12 +147,11 @@ def test_the_project_s_pages_have_the_markers():
 def test_the_command_measures_and_recommends(tmp_path, monkeypatch, capsys):
     from mitsuba_diffraction.cli import tradeoff as command
     from mitsuba_diffraction.cli.main import main
-    from mitsuba_diffraction.tradeoff import settings as chosen
 
     np.save(tmp_path / "heights.npy", PATCH.heights)
     monkeypatch.setattr(command, "_QUICK", (48, 16, 256, 1, 1))
     few = (Setting("default", "the defaults"), Setting("tolerance", "1e-2", {"tolerance": 1e-2}))
-    monkeypatch.setattr(chosen, "settings", lambda quick: iter(few))
+    monkeypatch.setattr(tradeoff, "settings", lambda quick: iter(few))
     heights = [str(tmp_path / "heights.npy"), "--pixel-size", "0.1"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

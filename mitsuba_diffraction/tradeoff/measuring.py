@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +22,7 @@ from ..heightfield import HeightField
 from ..tables.loss import power_loss
 from ..tables.table import DiffractionTable, reach_of
 from .sample import Sample
-from .settings import Setting
+from .setting import Setting
 
 Progress = Callable[[int, int, str], None]
 
@@ -67,12 +68,11 @@ def measure(
     field: HeightField,
     chosen: Sequence[Setting],
     *,
-    coherence_width: float,
-    pairs: int,
-    lanes: int,
-    rounds: int,
-    folder: Path,
-    progress: Progress,
+    coherence_width: float = 65.0,
+    pairs: int = 240,
+    lanes: int = 1 << 19,
+    rounds: int = 7,
+    progress: Progress = lambda done, total, text: None,
 ) -> list[Measured]:
     """All settings for one patch, in the current (spectral) variant.
 
@@ -83,7 +83,6 @@ def measure(
     coherence_width : µm.
     pairs : of directions and wavelengths that errors are measured on.
     lanes, rounds : calls at once, and timed repetitions.
-    folder : where tables are kept meanwhile.
     progress : called as progress(done, total, text).
 
     Raises
@@ -118,9 +117,10 @@ def measure(
             results.append(Measured(setting, refused=str(error)))
             continue
         seconds = time.perf_counter() - start
-        file = folder / f"{n}.exr"
-        table.save(file)
-        bsdf = saved_bsdf(file, energy_conserving=False)
+        with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder:
+            file = Path(folder) / "table.exr"
+            table.save(file)
+            bsdf = saved_bsdf(file, energy_conserving=False)
         calls[setting.name] = partial(bsdf.eval, context, queries.si, queries.wo)
         sample = samples[mode]
         loss = power_loss(finest[mode], table)
