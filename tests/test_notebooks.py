@@ -100,13 +100,6 @@ def test_it_is_small_and_has_been_run(path):
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_links_lead_somewhere(path):
-    text = "\n".join(cell.source for cell in read(path).cells if cell.cell_type == "markdown")
-    targets = [t for t in re.findall(r"\]\(([^)\s#]+)[^)\s]*\)", text) if "://" not in t]
-    assert [t for t in targets if not (path.parent / t).exists()] == []
-
-
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_it_runs_without_a_warning_and_keeps_its_promises(path, monkeypatch):
     before = read(path)
     if reason := hindrance(before):
