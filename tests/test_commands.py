@@ -63,6 +63,7 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     blazed.write_text(f"{text}periods = 4\nrows = 16\n", encoding="utf-8")
     field = md.gratings.sinusoidal(period=1.6, depth=0.05, periods=4, rows=32)
     heights = np.tile(field.heights[:1], (32, 1))
+    np.save(folder / "grating.npy", heights)
     grey = np.round((heights - heights.min()) / np.ptp(heights) * 255).astype(np.uint8)
     for name in ("scale.png", "elaphe.png", "a.png", "b.png"):
         Image.fromarray(grey).save(folder / name)
