@@ -50,12 +50,7 @@ class Comparison:
 
     def where(self, **values: Any) -> Comparison:
         """The rows with these values, such as profile="lamellar" or theta=30.0."""
-        rows = self.solutions.rows
-        keep = np.ones(len(rows), bool)
-        for name, value in values.items():
-            wanted: Any = PROFILES.index(value) if name == "profile" else np.float32(value)
-            keep &= rows[name] == wanted
-        return self.select(keep)
+        return self.select(self.solutions.having(**values))
 
     def deviation(self, *, colours: bool = False) -> float:
         """Σ|η − η_rigorous| / Σ η_rigorous over the counted rows; NaN if there are none.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..files.atomic import atomic_path
-from .cases import MATERIALS
+from .cases import MATERIALS, PROFILES
 
 #: A row is one order of one grating at one wavelength and angle. Lengths in µm, wavelength in nm,
 #: theta in degrees; `te` and `tm` are the efficiencies (reflected power in this order, of the
@@ -92,6 +92,18 @@ class Solutions:
         worst = np.zeros(solution.max(initial=-1) + 1)
         np.maximum.at(worst, solution.ravel(), self.change)
         return np.asarray(worst[solution.ravel()] <= CONVERGED)
+
+    def where(self, **values: Any) -> Solutions:
+        """The rows with these values, such as profile="lamellar" or theta=30.0."""
+        return Solutions(self.rows[self.having(**values)], self.about)
+
+    def having(self, **values: Any) -> NDArray[np.bool_]:
+        """Which rows have these values, (n,); as in `where`."""
+        keep = np.ones(len(self.rows), bool)
+        for name, value in values.items():
+            wanted: Any = PROFILES.index(value) if name == "profile" else np.float32(value)
+            keep &= self.rows[name] == wanted
+        return keep
 
     def trusted(self) -> Solutions:
         """The rows that have converged."""

@@ -103,3 +103,12 @@ def test_measures_of_a_known_difference():
     assert more.gain() == pytest.approx(1.1)
     only_0 = Comparison("perfect", part, part.mean + 0.2 * (part.rows["order"] == 0))
     assert only_0.deviation(colours=True) == 0 < only_0.deviation()
+
+
+def test_solutions_are_chosen_before_or_after_the_comparison():
+    chosen = {"profile": "blazed", "period": 2.5, "depth": 0.05, "theta": 30.0}
+    part = shipped("keratin").where(**chosen)
+    assert 0 < len(part.rows) < len(shipped("keratin").where(profile="blazed").rows)
+    assert set(part.rows["profile"].tolist()) == {PROFILES.index("blazed")}
+    after = compare("keratin", shipped("keratin").where(profile="blazed")).where(**chosen)
+    assert np.array_equal(compare("keratin", part).model, after.model)
