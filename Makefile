@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test bench figures gallery evaluation methods sweeps tradeoff plan parameters validation realtime lint clean help
+.PHONY: setup demo test bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks validation realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -67,6 +67,9 @@ plan: setup  ## plan the snake's scene, and put the figures into README.md and d
 
 parameters: setup  ## make docs/parameters.md from the plugin's docstring
 	@$(PYTHON3) -m mitsuba_diffraction.figures.parameters -o docs/parameters.md
+
+notebooks: setup  ## run the notebooks, and keep what they show in their files
+	@$(PYTHON3) -m mitsuba_diffraction.figures.notebooks
 
 validation: setup  ## compare the model with rigorous solutions: docs/validation.md
 	@$(PYTHON3) -m mitsuba_diffraction.validation report -o docs

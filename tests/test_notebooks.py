@@ -8,11 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import nbclient
 import nbformat
 import pytest
 
 from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.figures.notebooks import execute, main
 from tests.conftest import ROOT, obstacle
 
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
@@ -32,15 +32,6 @@ def read(path: Path) -> Any:
 def code(notebook: Any) -> str:
     """The source of all its cells of code."""
     return "\n".join(cell.source for cell in notebook.cells if cell.cell_type == "code")
-
-
-def run(path: Path) -> Any:
-    """The notebook with the outputs of now."""
-    notebook = read(path)
-    folder = {"metadata": {"path": str(path.parent)}}
-    # a cell takes seconds; a machine that does ten things at once may take ten times as long
-    nbclient.NotebookClient(notebook, timeout=300, resources=folder).execute()
-    return notebook
 
 
 def streams(notebook: Any, name: str) -> str:
@@ -100,13 +91,11 @@ def test_it_is_small_and_has_been_run(path):
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
-def test_it_runs_without_a_warning_and_keeps_its_promises(path, monkeypatch):
+def test_it_runs_without_a_warning_and_keeps_its_promises(path):
     before = read(path)
     if reason := hindrance(before):
         pytest.skip(reason)
-    monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    monkeypatch.delenv("MPLBACKEND", raising=False)  # figures go into the cells, as in Jupyter
-    now = run(path)
+    now = execute(path)
     # what a notebook teaches should not need excuses
     assert streams(now, "stderr") == ""
     # whoever only reads it sees what it shows
@@ -114,3 +103,38 @@ def test_it_runs_without_a_warning_and_keeps_its_promises(path, monkeypatch):
     # its cells hold their results against what the text says
     assert re.search(r"^\s*(assert |np\.testing\.assert_)", code(now), re.M)
     SAYS.get(path.stem, len)(streams(now, "stdout"))
+
+
+def written(path: Path, *cells: str) -> Path:
+    """A notebook of these cells of code, not run."""
+    made = [nbformat.v4.new_code_cell(text) for text in cells]
+    nbformat.write(nbformat.v4.new_notebook(cells=made), path)
+    return path
+
+
+def test_what_a_notebook_shows_is_kept_in_its_file(tmp_path, capsys):
+    path = written(tmp_path / "sum.ipynb", "print(2 + 3)")
+    assert main([str(path)]) == 0
+    assert streams(read(path), "stdout") == "5\n"
+    assert "execution" not in read(path).cells[0].metadata
+    assert re.search(r"sum\.ipynb: \d+\.\d s, \d+ kB", capsys.readouterr().out)
+
+
+def test_a_cell_that_fails_is_named_and_the_file_stays(tmp_path, capsys):
+    path = written(tmp_path / "wrong.ipynb", "x = 1", "assert x == 2, 'one is not two'", "x = 3")
+    before = path.read_bytes()
+    assert main([str(path)]) == 1
+    said = capsys.readouterr().err.strip().splitlines()
+    assert said[-1] == (
+        f"notebooks: error: '{path}': cell [2] fails: AssertionError: one is not two"
+    )
+    assert path.read_bytes() == before
+
+
+def test_what_is_no_notebook_is_one_clear_line(tmp_path, capsys):
+    for path in (tmp_path / "absent.ipynb", tmp_path / "text.ipynb"):
+        if path.stem == "text":
+            path.write_text("no JSON", encoding="utf-8")
+        assert main([str(path)]) == 1
+        (line,) = capsys.readouterr().err.strip().splitlines()
+        assert f"'{path}' is not a notebook that can be read" in line
