@@ -72,6 +72,24 @@ def child(tmp_path: Path) -> Callable[..., Ran]:
 
 
 @pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder that is the current one."""
+    folder = tmp_path / "here"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+@pytest.fixture
+def scene(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The module's SCENE as room.xml, in a folder that is the current one."""
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "room.xml"
+    file.write_text(request.module.SCENE)
+    return file
+
+
+@pytest.fixture
 def heights(tmp_path: Path) -> Path:
     """A gentle grating of 6 µm with pixels of 0.08 µm, as an NPY file in a folder of its own."""
     x = np.arange(75) * 0.08

@@ -19,14 +19,11 @@ QUICK = ["--pixel-size", "0.08", "--coherence-width", "6", "--resolution", "32",
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch, working_variant):
-    """An empty folder that is the current one, and a variant that works."""
+def here(here, working_variant):
+    """The same where the variant works."""
     if working_variant != "llvm_ad_spectral":
         pytest.skip("the variant is set by name elsewhere")
-    folder = tmp_path / "here"
-    folder.mkdir()
-    monkeypatch.chdir(folder)
-    return folder
+    return here
 
 
 def channels_of(file):

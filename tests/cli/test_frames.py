@@ -34,15 +34,6 @@ LIGHT = ("--animate", "light=0:0.4")
 
 
 @pytest.fixture
-def scene(tmp_path, monkeypatch):
-    """A scene in a folder that is the current one."""
-    monkeypatch.chdir(tmp_path)
-    file = tmp_path / "room.xml"
-    file.write_text(SCENE)
-    return file
-
-
-@pytest.fixture
 def render(run, scene):
     """`render(*options)`: frames of the scene, quickly."""
     return lambda *options: run("render", scene, "-m", "scalar_rgb", *options)

@@ -29,15 +29,6 @@ def recipe(heights):
     return file
 
 
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    """An empty folder that is the current one."""
-    folder = tmp_path / "here"
-    folder.mkdir()
-    monkeypatch.chdir(folder)
-    return folder
-
-
 def test_choices_are_the_library_s():
     assert set(precompute.COHERENCES) == set(COHERENCES)
     assert set(precompute.BASES) == {"auto", *BASES}

@@ -16,12 +16,7 @@ from mitsuba_diffraction.sweeps import SWEEPS
 QUICK = ["--pixel-size", "0.08", "--coherence-width", "6", "--resolution", "24", "--step", "40"]
 
 
-@pytest.fixture(autouse=True)
-def here(tmp_path, monkeypatch):
-    folder = tmp_path / "here"
-    folder.mkdir()
-    monkeypatch.chdir(folder)
-    return folder
+pytestmark = pytest.mark.usefixtures("here")
 
 
 def test_choices_are_the_library_s():

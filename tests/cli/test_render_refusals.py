@@ -1,0 +1,101 @@
+"""`render` of what does not fit: one line, and nothing half-written."""
+
+from __future__ import annotations
+
+import os
+
+import mitsuba as mi
+import pytest
+
+from mitsuba_diffraction.cli.main import build_parser
+from tests.cli.room import QUICK, SCENE
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("$spp", "$samples", "undefined parameter: $samples"),
+        ('"diffuse"', '"velvet"', "there is no bsdf plugin 'velvet'"),
+        ('"sphere"', '"ply"', "shape 'ply'"),
+        ("</scene>", "", "line"),
+        ("$spp", "some", "could not parse"),
+        ("<scene", "<bsdf", "room.xml"),
+        ('<integrator type="path"/>', '<integrator type="path"><float name="depth" value="1"/>'
+         "</integrator>", "no such parameter"),
+    ],
+)  # fmt: skip
+def test_scenes_that_do_not_load_are_one_line(run, scene, old, new, said):
+    scene.write_text(SCENE.replace(old, new))
+    assert said in run("render", scene, *QUICK).failed_in_one_line()
+    assert os.listdir() == ["room.xml"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["-D", "ssp=3"], "did you mean spp?"),
+        (["-D", "parallel=3"], "no parameter 'parallel'"),
+        (["-D", "spp=many"], "could not parse"),
+        (["-m", "cuda_rgb"], "there is no variant 'cuda_rgb'; there are scalar_rgb"),
+        (["-o", "nowhere/a.exr"], "cannot write 'nowhere/a.exr'"),
+        (["-o", "/proc/a.png"], "cannot write '/proc/a.png'"),
+    ],
+)
+def test_arguments_that_do_not_fit_are_one_line(run, scene, arguments, said):
+    assert said in run("render", scene, *QUICK, *arguments).failed_in_one_line()
+    assert os.listdir() == ["room.xml"]
+
+
+@pytest.mark.parametrize("content", [None, "", "no scene", '<scene version="3.5.0">'])
+def test_files_that_are_no_scene_are_one_line(run, scene, content):
+    if content is None:
+        scene.unlink()
+    else:
+        scene.write_text(content)
+    assert "room.xml" in run("render", scene, *QUICK).failed_in_one_line()
+
+
+def test_a_folder_is_no_scene(run, scene):
+    assert "is a folder" in run("render", scene.parent, *QUICK).failed_in_one_line()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["-D", "spp"],
+        ["-D", "=3"],
+        ["-D", "spp=1", "-D", "spp=2"],
+        ["-s", "0"],
+        ["-s", "few"],
+        ["--seed", "-1"],
+        ["--exposure", "nan"],
+        ["-o", "a.jpg"],
+        ["-o", "folder"],
+    ],
+)
+def test_unusable_options_are_usage_errors(run, scene, arguments):
+    ran = run("render", scene, *QUICK, *arguments)
+    assert ran.code == 2
+    assert ran.err.startswith("usage: ")
+
+
+def test_the_output_is_checked_before_the_scene_is_loaded(run, scene, monkeypatch):
+    monkeypatch.setattr(mi, "load_file", lambda *_, **__: pytest.fail("loaded"))
+    (scene.parent / "a.png").mkdir()
+    assert (
+        "'a.png': it is a folder"
+        in run("render", scene, *QUICK, "-o", "a.exr").failed_in_one_line()
+    )
+
+
+@pytest.mark.parametrize("output", ["a.exr", "a.png"])
+def test_a_full_disk_is_one_line_and_leaves_nothing(child, scene, output):
+    scene.write_text(SCENE.replace('"24"', '"200"'))
+    ran = child(["render", scene, *QUICK, "-s", "1", "-o", output], limit=1000)
+    assert f"cannot write '{output}': File too large" in ran.failed_in_one_line()
+    assert os.listdir() == ["room.xml"]
+
+
+def test_definitions_may_hold_equal_signs():
+    args = build_parser().parse_args(["render", "a", "-D", "a=b=c", "-D", "d="])
+    assert args.parameters == [("a", "b=c"), ("d", "")]
