@@ -18,7 +18,8 @@ from .report import lines_of, plain
 from .scene_options import add_scene_options, scene_parameters
 
 if TYPE_CHECKING:
-    from ..planning.make import Difference, Fitted, Loaded
+    from ..planning.difference import Difference
+    from ..planning.make import Fitted, Loaded
     from ..planning.plan import Plan
 
 PATHS, TOLERANCE = 1 << 15, 1e-3
@@ -151,7 +152,7 @@ def _of_table(
     key: str, loaded: Loaded, plan: Plan, planned: dict[str, Any], seconds: dict[str, float]
 ) -> dict[str, Any]:
     from ..planning.domain import lobes_in_a_pixel, wavelengths_needed
-    from ..planning.make import evaluation_ratio
+    from ..planning.lookups import evaluation_ratio
     from ..plugin.sampling import sampler_bytes
 
     table, mine = loaded.session.tables[key], plan.tables[key]

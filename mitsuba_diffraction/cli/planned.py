@@ -56,7 +56,8 @@ def load_by_plan(
             "not make smaller; rendering without one"
         )
         return None
-    from ..planning.make import load_planned, outside_of
+    from ..planning.lookups import outside_of
+    from ..planning.make import load_planned
 
     try:
         plan, shares = _plan(args, variant, load, tell)
@@ -103,7 +104,7 @@ def _plan(
 
 def say_outside(planned: Planned, samples: int) -> None:
     """What was looked up outside the plan, a line for each table."""
-    from ..planning.make import outside_of
+    from ..planning.lookups import outside_of
 
     for key, table in planned.tables.items():
         found, mine = outside_of(table), planned.plan.tables[key]

@@ -8,16 +8,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionWarning
 from ..files.bound_cache import cached_bound
 from .camera import Camera
-from .context import Bindings, check_version, clock_of, headless_context, set_uniforms
+from .context import (
+    Bindings,
+    check_version,
+    clock_of,
+    headless_context,
+    require_moderngl,
+    set_uniforms,
+)
 from .lights import Light, light_definitions
 from .materials import Material, height_scale, pack_surface
 from .packing import pack_bounds, pack_responses
 from .prepared import Prepared, window
 from .scene import RealtimeScene, load, read_scene
 from .source import LIGHTS
+from .target import Target
 from .textures import Packed, Uniform
 
 Image = NDArray[np.float32]
@@ -134,7 +142,7 @@ class Renderer:
         scale : height scale of all patches, instead of their own; see `bound_for`.
         coherence_width : µm, instead of their own; not for `lut` and `pq`, whose tables hold it.
         """
-        moderngl = _moderngl()
+        moderngl = require_moderngl()
         camera = camera or self.camera
         prepared = self.prepared(method)
         frame.use()
@@ -232,34 +240,3 @@ class Renderer:
     def target(self, width: int, height: int) -> Target:
         """A framebuffer to draw into, to be released."""
         return Target(self.context, width, height)
-
-
-class Target:
-    """A picture in single precision, with depth.
-
-    Attributes
-    ----------
-    frame : the framebuffer.
-    """
-
-    def __init__(self, context: Any, width: int, height: int) -> None:
-        largest = context.info["GL_MAX_TEXTURE_SIZE"]
-        if max(width, height) > largest:
-            raise DiffractionError(
-                f"a picture of {width} × {height} samples is too large for the driver, which "
-                f"takes {largest}; lower the supersampling or the size"
-            )
-        self.colour = context.texture((width, height), 4, dtype="f4")
-        self.depth = context.depth_renderbuffer((width, height))
-        self.frame = context.framebuffer([self.colour], self.depth)
-
-    def release(self) -> None:
-        """Free it."""
-        for thing in (self.frame, self.colour, self.depth):
-            thing.release()
-
-
-def _moderngl() -> Any:
-    import moderngl
-
-    return moderngl

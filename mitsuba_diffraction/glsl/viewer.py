@@ -11,16 +11,15 @@ from typing import Any
 import moderngl_window
 import numpy as np
 from imgui_bundle import imgui
-from moderngl_window.integrations.imgui_bundle import ModernglWindowRenderer
 from PIL import Image
 
 from ..colour import encode_srgb
 from ..comparison.progressive import Progressive
 from ..errors import DiffractionError
 from ..files.atomic import atomic_path
-from .context import check_version
 from .documents import DOCUMENTED
 from .navigation import Orbit, dragged
+from .panel import TITLE, PanelWindow
 from .renderer import Renderer
 from .source import METHODS
 
@@ -34,11 +33,11 @@ _TURN = 0.006  # rad per pixel
 _FRAMES = 30  # that the readout averages over
 
 
-class Viewer(moderngl_window.WindowConfig):
+class Viewer(PanelWindow):
     """The window. What it shows is set on a subclass: see `show`."""
 
     gl_version = (3, 3)
-    title = "mitsuba-diffraction"
+    title = TITLE
     aspect_ratio = None
     vsync = False
     log_level = 30  # warnings
@@ -53,10 +52,6 @@ class Viewer(moderngl_window.WindowConfig):
 
     def __init__(self, **arguments: Any) -> None:
         super().__init__(**arguments)
-        check_version(self.ctx)
-        imgui.create_context()
-        imgui.get_io().set_ini_filename("")  # leave no file behind
-        self.panel = ModernglWindowRenderer(self.wnd)
         self.times: deque[float] = deque(maxlen=_FRAMES)
         self.drawn = 0
         self.message = ""
@@ -95,7 +90,7 @@ class Viewer(moderngl_window.WindowConfig):
         """Draw one frame, or do one step of loading."""
         if self._loading is not None:
             try:
-                self._panel_of(next(self._loading))
+                self.say(next(self._loading))
             except StopIteration:
                 self._loading = None
             return
@@ -133,19 +128,10 @@ class Viewer(moderngl_window.WindowConfig):
         """Mean of the last frames."""
         return 1e3 * float(np.mean(self.times)) if self.times else 0.0
 
-    def _panel_of(self, text: str) -> None:
-        """The panel with one line alone."""
-        self.wnd.fbo.clear(0.02, 0.02, 0.02)
-        imgui.new_frame()
-        imgui.begin("mitsuba-diffraction")
-        imgui.text(text)
-        imgui.end()
-        self._show_panel()
-
     def _panel(self) -> None:
         imgui.new_frame()
         imgui.set_next_window_pos((10, 10), imgui.Cond_.first_use_ever)
-        imgui.begin("mitsuba-diffraction", flags=imgui.WindowFlags_.always_auto_resize)
+        imgui.begin(TITLE, flags=imgui.WindowFlags_.always_auto_resize)
         imgui.text(f"{self.frame_ms:.1f} ms a frame, {self._ready.driver}")
         changed, index = imgui.combo("method", METHODS.index(self.method), list(METHODS))
         if changed:
@@ -160,12 +146,7 @@ class Viewer(moderngl_window.WindowConfig):
         imgui.text(HELP)
         imgui.text(self.message)
         imgui.end()
-        self._show_panel()
-
-    def _show_panel(self) -> None:
-        imgui.render()
-        self.wnd.use()
-        self.panel.render(imgui.get_draw_data())
+        self.show_panel()
 
     # ---------------------------------------------------------------- what it can do
 
@@ -259,27 +240,6 @@ class Viewer(moderngl_window.WindowConfig):
                 self._start()
         except DiffractionError as error:
             self.message = str(error)  # a full disk need not close the window
-
-    def on_mouse_position_event(self, x: int, y: int, dx: int, dy: int) -> None:
-        """For the panel."""
-        self.panel.mouse_position_event(x, y, dx, dy)
-
-    def on_mouse_press_event(self, x: int, y: int, button: int) -> None:
-        """For the panel."""
-        self.panel.mouse_press_event(x, y, button)
-
-    def on_mouse_release_event(self, x: int, y: int, button: int) -> None:
-        """For the panel."""
-        self.panel.mouse_release_event(x, y, button)
-
-    def on_unicode_char_entered(self, char: str) -> None:
-        """For the panel."""
-        self.panel.unicode_char_entered(char)
-
-    def on_resize(self, width: int, height: int) -> None:
-        """For the panel."""
-        if hasattr(self, "panel"):
-            self.panel.resize(width, height)
 
     def on_close(self) -> None:
         """Free the graphics card's memory, also of what was half loaded."""

@@ -5,6 +5,7 @@ Contents
 snake      build a coiled snake: `build`, `Snake`
 anatomy    `Anatomy`: proportions, cross-sections, conformal coordinates
 scales     `Scales`: rows, relief, overlap and keels of the scales
+pelt       a skin of scales, as one closed mesh
 spine      how the body lies
 skin       the smooth skin between spine and scales
 head       shields, mouth, eyes; the tail tip

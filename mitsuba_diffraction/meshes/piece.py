@@ -8,7 +8,8 @@ import numpy as np
 
 from .anatomy import Anatomy
 from .limits import check_limits
-from .scales import Scales, pelt
+from .pelt import pelt
+from .scales import Scales
 from .skin import Skin
 from .trimesh import TriangleMesh
 

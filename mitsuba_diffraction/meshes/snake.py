@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from . import head as ends
 from .anatomy import Anatomy
-from .scales import Scales, pelt
+from .pelt import pelt
+from .scales import Scales
 from .skin import Skin
 from .spine import coil
 from .trimesh import TriangleMesh, join

@@ -1,1 +1,11 @@
-"""What a scene asks of its diffraction tables: paths through it, and the tables that suffice."""
+"""What a scene asks of its diffraction tables: paths through it, and the tables that suffice.
+
+Contents
+--------
+paths        paths through a scene, and what its BSDFs are asked on them
+domain       from that to how much of a table it takes
+plan         `Plan`: that for all tables of a scene, as a file
+make         making one, and trying it
+difference   what it changes in the picture
+lookups      what it changes in the time of look-ups, and how many fall outside
+"""

@@ -1,24 +1,17 @@
-"""Making a plan for a scene, and what it changes: memory, time, and the picture."""
+"""Making a plan for a scene, and trying it until the picture is as it was."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
-import mitsuba as mi
-import numpy as np
-from numpy.typing import NDArray
 
-from ..colour import delta_e, linear_srgb
 from ..errors import DiffractionError
-from ..plugin.lookup import device_table
-from ..plugin.restricted import Outside, RestrictedTable
-from ..plugin.sampling import forget_sampler
 from ..plugin.session import Session
 from ..tables.table import DiffractionTable
+from .difference import Difference, difference
 from .domain import Asked, domain_for
 from .paths import Seen, trace
 from .plan import Plan, PlannedTable
@@ -32,10 +25,6 @@ WORTH = 0.8
 ATTEMPTS, TIGHTER = 3, 0.3
 #: A plan is refused where this many times its tolerance lies outside: paths differ from the last.
 MOST_OUTSIDE = 3.0
-#: Of the pictures that are compared: width at most, and samples per pixel.
-WIDTH, SPP = 160, 64
-#: That are timed: some hundredths of a second.
-LOOKUPS = 1 << 19
 
 
 @dataclass(frozen=True)
@@ -46,24 +35,6 @@ class Loaded:
     session: Session
     seen: Seen
     asked: dict[str, Asked]
-
-
-@dataclass(frozen=True)
-class Difference:
-    """Between the pictures with whole and with planned tables, of the same random numbers.
-
-    Attributes
-    ----------
-    relative : mean |ΔXYZ| over mean XYZ, all pixels.
-    delta_e_mean, delta_e_99 : ΔE2000 of the pixels that are not black, or NaN.
-    size, spp : of the pictures.
-    """
-
-    relative: float
-    delta_e_mean: float
-    delta_e_99: float
-    size: tuple[int, int]
-    spp: int
 
 
 def look(
@@ -243,40 +214,6 @@ def planned_tables(
     return tables, seconds
 
 
-def difference(
-    loaded: Loaded, load: Load, plan: Plan, sensor: Callable[[Any], Any], tell: Tell
-) -> Difference:
-    """Render both ways, small, with the same random numbers and the same directions drawn."""
-    whole = {key: loaded.session.tables[key] for key in plan.limits()}
-    session = Session(limits=plan.limits(), sample_like=whole)
-    with session:
-        scene = load()
-    try:
-        pictures = []
-        for n, other in enumerate((loaded.scene, scene)):
-            tell(n, 2, "comparing pictures")
-            pictures.append(_picture(other, sensor(other)))
-        tell(2, 2, "comparing pictures")
-    finally:
-        for table in session.tables.values():
-            forget_sampler(table)
-        session.close()
-    (first, xyz), (second, _) = pictures
-    mean = float(first.mean())
-    values = np.full(1, np.nan)
-    if xyz:
-        values = delta_e(linear_srgb(first), linear_srgb(second))
-        values = values[np.isfinite(values)]
-    height, width = first.shape[:2]
-    return Difference(
-        relative=float(np.abs(second - first).mean()) / mean if mean > 0.0 else float("nan"),
-        delta_e_mean=float(values.mean()) if values.size else float("nan"),
-        delta_e_99=float(np.percentile(values, 99.0)) if values.size else float("nan"),
-        size=(width, height),
-        spp=SPP,
-    )
-
-
 @dataclass(frozen=True)
 class Fitted:
     """A plan that was tried.
@@ -323,50 +260,9 @@ def fitted(
         plan = settled(drafted, planned)
         if not plan.limits():
             return Fitted(plan, planned, seconds, None)
-        found = Fitted(plan, planned, seconds, difference(loaded, load, plan, sensor, tell))
+        changed = difference(loaded.scene, loaded.session.tables, load, plan, sensor, tell)
+        found = Fitted(plan, planned, seconds, changed)
         if found.suits:
             return found
         share *= TIGHTER
     return replace(found, plan=given_up(plan))
-
-
-def _picture(scene: Any, sensor: Any) -> tuple[NDArray[np.float64], bool]:
-    """A small picture (height, width, channels), and whether it is in XYZ."""
-    film = sensor.film()
-    size = np.array(film.size(), int)
-    if size[0] > WIDTH:
-        parameters = mi.traverse(sensor)
-        parameters["film.size"] = [WIDTH, max(1, round(WIDTH * int(size[1]) / int(size[0])))]
-        parameters.update()
-    mi.render(scene, sensor=sensor, spp=SPP, seed=0)
-    root = dict(film.bitmap().split()).get("<root>")
-    if root is None or root.pixel_format().name not in ("RGB", "RGBA", "XYZ", "XYZA"):
-        return np.array(film.bitmap(), np.float64), False
-    kinds = mi.Bitmap.PixelFormat
-    converted = root.convert(kinds.XYZ, mi.Struct.Type.Float32, False)
-    return np.array(converted, np.float64), True
-
-
-def evaluation_ratio(asked: Asked, whole: DiffractionTable, planned: DiffractionTable) -> float:
-    """Time of a look-up in the planned table over that in the whole one, where the scene asks."""
-    rng = np.random.default_rng(0)
-    chosen = rng.integers(0, len(asked.w), LOOKUPS)
-    k = 2e3 * np.pi / asked.wavelength[chosen]
-    q = [mi.Float((k * a[chosen]).astype(np.float32)) for a in (asked.u, asked.v, asked.w)]
-    dr.eval(q)
-    seconds: dict[int, float] = {}
-    for _ in range(10):  # in turn, the first to compile
-        for n, table in enumerate((whole, planned)):
-            start = time.perf_counter()
-            dr.eval(device_table(table).window_sum(*q))
-            dr.sync_thread()
-            passed = time.perf_counter() - start
-            seconds[n] = min(seconds.get(n, passed), passed)
-    outside_of(planned)
-    return seconds[1] / seconds[0]
-
-
-def outside_of(table: DiffractionTable) -> Outside | None:
-    """Look-ups beyond a planned table since the last time, or None if it is a whole one."""
-    device = device_table(table)
-    return device.take() if isinstance(device, RestrictedTable) else None
