@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .errors import DiffractionError
+
 Array = NDArray[np.float64]
 
 #: A window of `coherence_width` spans four standard deviations of its amplitude.
@@ -14,6 +16,28 @@ WIDTHS_PER_SIGMA = 4.0
 def sigma_of(coherence_width: float) -> float:
     """Standard deviation σ (µm) of the amplitude window g(r) = exp(−r²/2σ²)."""
     return coherence_width / WIDTHS_PER_SIGMA
+
+
+def check_light(theta: float, phi: float) -> None:
+    """Refuse the direction of a light that is none.
+
+    Parameters
+    ----------
+    theta : degrees from the normal, 0 to below 90.
+    phi : azimuth in degrees, −360 to 360.
+
+    Raises
+    ------
+    DiffractionError
+        If an angle is out of range.
+    """
+    if not 0.0 <= theta < 90.0:
+        raise DiffractionError(
+            f"theta={theta:g} must be at least 0 and below 90 degrees from the normal: the light "
+            "has to be above the horizon"
+        )
+    if not -360.0 <= phi <= 360.0:
+        raise DiffractionError(f"phi={phi:g} must be from -360 to 360 degrees")
 
 
 def wavenumber(wavelength: ArrayLike) -> Array:

@@ -15,20 +15,12 @@ import numpy.typing as npt
 
 from .errors import DiffractionError
 from .lengths import LONGEST_HEIGHT, Height, PixelSize, pixel_size_of
+from .validity import validity
 
 FloatArray = npt.NDArray[np.float64]
 
 # 11585² pixels, 1 GiB of heights: beyond it no table could be built in the memory of a workstation.
 MAX_PIXELS = 2**27
-
-# RMS slopes up to which the model's orders are within 5 % and 20 % of rigorous solutions, for
-# sinusoids of a perfect conductor in light up to 45° from the normal: docs/validation.md has the
-# rule, `validation.limits` the computation, of which these are rounded down.
-GENTLE_SLOPE = 0.1
-STEEP_SLOPE = 0.35
-
-# Heights whose whole range is below a tenth of an atom's radius are usually metres taken for µm.
-SMALLEST_RANGE = 1e-5
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
@@ -232,35 +224,7 @@ class HeightField:
         list of str
             One line per cause.
         """
-        shortest = min(wavelength_range) / 1000  # µm
-        lines = []
-        if self.rms_slope > STEEP_SLOPE:
-            lines.append(
-                f"{self.name}: RMS slope {self.rms_slope:.2g} is above {STEEP_SLOPE:g}: scalar "
-                "Kirchhoff diffraction is off by more than 20 % on slopes this steep, and by up to "
-                "all of the light on steeper ones"
-            )
-        elif self.rms_slope > GENTLE_SLOPE:
-            lines.append(
-                f"{self.name}: RMS slope {self.rms_slope:.2g} is above {GENTLE_SLOPE:g}: beside "
-                "rigorous solutions, expect scalar Kirchhoff diffraction to be off by 5 to 20 % in "
-                "light up to 45° from the normal, and by more beyond"
-            )
-        coarse = max(self.pixel_size)
-        if coarse > shortest / 4:
-            # k |(u, v)| reaches 2k at grazing angles on both sides, the pixels π/dx
-            reach = shortest / (2 * coarse)
-            lines.append(
-                f"{self.name}: pixels of {coarse:.3g} µm are coarser than a quarter of the "
-                f"shortest wavelength, {shortest / 4:.3g} µm: nothing is known of directions "
-                f"with |sinθi + sinθo| above {reach:.2g} at {shortest * 1000:g} nm"
-            )
-        if 0 < self.range < SMALLEST_RANGE:
-            lines.append(
-                f"{self.name}: heights span only {self.range:.2g} µm, less than an atom: "
-                "are they in metres? Multiply them by 1e6"
-            )
-        return lines
+        return validity(self, wavelength_range)
 
     def __repr__(self) -> str:
         ny, nx = self.shape

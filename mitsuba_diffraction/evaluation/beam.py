@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
+from ..geometry import check_light
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
@@ -38,12 +39,7 @@ class Beam:
     phi: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.theta < 90.0:
-            raise DiffractionError(
-                f"theta={self.theta:g} must be at least 0 and below 90 degrees from the normal"
-            )
-        if not -360.0 <= self.phi <= 360.0:
-            raise DiffractionError(f"phi={self.phi:g} must be from -360 to 360 degrees")
+        check_light(self.theta, self.phi)
 
     @property
     def sine(self) -> float:

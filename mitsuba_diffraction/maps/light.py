@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DiffractionError
+from ..geometry import check_light
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,7 @@ class Light:
     phi: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.theta < 90.0:
-            raise DiffractionError(
-                f"theta={self.theta:g} must be at least 0 and below 90 degrees from the normal: "
-                "the light has to be above the horizon"
-            )
-        if not -360.0 <= self.phi <= 360.0:
-            raise DiffractionError(f"phi={self.phi:g} must be from -360 to 360 degrees")
+        check_light(self.theta, self.phi)
 
     @property
     def direction(self) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 from .cases import Grating
 from .compare import Comparison, angles_of, gratings_of, table_of
 
-#: Deviations that `heightfield.GENTLE_SLOPE` and `heightfield.STEEP_SLOPE` stand for.
+#: Deviations that `validity.GENTLE_SLOPE` and `validity.STEEP_SLOPE` stand for.
 GENTLE_ERROR = 0.05
 STEEP_ERROR = 0.2
 #: Largest angle of incidence of the rule, degrees.

@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from ..heightfield import GENTLE_SLOPE, STEEP_SLOPE
+from ..validity import GENTLE_SLOPE, STEEP_SLOPE
 from .cases import PROFILES, Grating
 from .compare import Comparison, angles_of, gratings_of, table_of
 from .limits import GENTLE_ERROR, STEEP_ERROR, rms_slope

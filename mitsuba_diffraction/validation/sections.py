@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..heightfield import GENTLE_SLOPE, STEEP_SLOPE
+from ..validity import GENTLE_SLOPE, STEEP_SLOPE
 from .cases import MATERIALS, PERIODS, PROBE_GRATING, PROFILES, Grating
 from .closed_forms import ANGLES, deviations
 from .compare import GRAZING, Comparison, angles_of, gratings_of, table_of

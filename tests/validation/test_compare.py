@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import fresnel
-from mitsuba_diffraction.heightfield import GENTLE_SLOPE, STEEP_SLOPE
 from mitsuba_diffraction.validation import limits
 from mitsuba_diffraction.validation.cases import PROBE_GRATING, PROFILES, Grating, order_sines
 from mitsuba_diffraction.validation.compare import Comparison, compare, gratings_of, table_of
 from mitsuba_diffraction.validation.model import order_efficiencies
 from mitsuba_diffraction.validation.solutions import Solutions, shipped
+from mitsuba_diffraction.validity import GENTLE_SLOPE, STEEP_SLOPE
 
 
 def compared(material: str, **limits_of: tuple[float, float]) -> Comparison:
