@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import DiffractionError
-from ..glsl.documents import DOCUMENTED
-from ..glsl.source import METHODS
+from ..glsl.source import DOCUMENTED, METHODS
 from .arguments import whole_number
 from .console import say_warning
 from .output import check_writable

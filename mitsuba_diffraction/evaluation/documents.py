@@ -16,9 +16,6 @@ from .beam import Array, Beam, Response, measure
 from .ridge import Fit, fit_period, ridge_of
 from .windows import moved_window
 
-#: What they report, µm.
-PUBLISHED = {"blazed": 2.5, "elaphe": 1.144}
-
 
 def documents_response(
     table: DiffractionTable, beam: Beam, wavelengths: Array, angles: Array

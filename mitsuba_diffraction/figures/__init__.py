@@ -1,1 +1,16 @@
-"""Figures of the documentation; each module is a function and a program."""
+"""Figures and generated parts of the documentation; each module is a function and a program.
+
+Contents
+--------
+patches, maps, snakes   pictures: heights and their light, BRDF maps, the scenes' snakes
+gallery                 a picture of every scene, and the pages that show them
+evaluation, sweeps      pages about the methods: the grating equation, one parameter at a time
+methods                 the README's table of methods
+speed, tradeoff         tables of what `bench` and `tradeoff` measured
+realtime, plan          tables of what `compare` and `plan` measured
+parameters              the reference of the plugin's parameters, from its own docstring
+albedo                  the plot of `info --albedo`
+markers                 parts of a page, found and replaced
+jpeg                    renderings as JPEG
+program                 what these programs share
+"""

@@ -166,7 +166,7 @@ def shown(page: str) -> str:
         title = f"## {picture.title}\n\n" if picture.title else ""
         link = picture.file.as_posix()
         label = picture.title or picture.text.rstrip(":")
-        commands = "\n".join(_as_typed(command) for command in picture.commands)
+        commands = "\n".join(as_typed(command) for command in picture.commands)
         # what is read before the picture ends with a colon
         inner = (picture.text, f"![{label}]({link})")
         body = "\n\n".join(inner if picture.text.endswith(":") else inner[::-1])
@@ -174,7 +174,7 @@ def shown(page: str) -> str:
     return "\n\n".join(parts)
 
 
-def _as_typed(command: str) -> str:
+def as_typed(command: str) -> str:
     """A command with its program, broken where it is long."""
     first, rest = command.split(" ", 1)
     line = f"{_MESHES} {rest}" if first == "meshes" else f"{_PROGRAM} {command}"

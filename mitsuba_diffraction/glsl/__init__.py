@@ -2,7 +2,23 @@
 
 Contents
 --------
-Renderer   draws a scene of Mitsuba by shaders, without a window
+Renderer     draws a scene of Mitsuba by shaders, without a window (in `renderer`)
+scene        a scene as the shaders know it, made of the next four
+shapes       triangles and their tangents
+materials    BSDFs and textures
+lights       directions, points, a smooth sky
+camera       sensors
+packing      tables as textures
+documents    the source documents' methods as textures
+textures     what a shader reads, as plain NumPy
+source       the shaders' text
+context      OpenGL without a window
+prepared     a method's tables and programs
+target       a picture to draw into
+timing       how long fragments take
+viewer       a window on a scene (extra `view`)
+panel        its panel
+navigation   the camera and the light, moved by hand
 """
 
 from __future__ import annotations

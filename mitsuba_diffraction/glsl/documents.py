@@ -14,10 +14,8 @@ from ..methods.method import Method
 from ..methods.nmm import SPECULAR_WAVELENGTH
 from ..tables.table import DiffractionTable
 from .packing import area_factor
+from .source import DOCUMENTED
 from .textures import Packed, as_half, listed, texels
-
-#: Methods of `methods` that there are shaders for.
-DOCUMENTED = ("flss", "nmm", "pq")
 
 #: As in the source documents: terms of the series, bins read along each axis, and nm.
 TERMS, TAPS, STEP = 37, 3, 5.0
@@ -30,7 +28,7 @@ def make_documented(name: str, heights: HeightField, table: DiffractionTable) ->
 
     Parameters
     ----------
-    name : one of `DOCUMENTED`.
+    name : one of `source.DOCUMENTED`.
     heights : the patch.
     table : the package's own of that patch, for its window and how positions are averaged.
 

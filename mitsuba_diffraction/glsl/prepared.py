@@ -9,11 +9,11 @@ from ..errors import DiffractionError
 from ..files.cache import cached_colours
 from ..geometry import sigma_of
 from .context import Bindings, compile_program
-from .documents import DOCUMENTED, make_documented, pack_method
+from .documents import make_documented, pack_method
 from .materials import Material
 from .packing import area_factor, pack_colours, pack_powers
 from .scene import VERTEX, RealtimeScene
-from .source import METHODS
+from .source import DOCUMENTED, METHODS
 from .textures import Packed, Uniform
 
 

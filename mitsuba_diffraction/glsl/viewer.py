@@ -17,11 +17,10 @@ from ..colour import encode_srgb
 from ..comparison.progressive import Progressive
 from ..errors import DiffractionError
 from ..files.atomic import atomic_path
-from .documents import DOCUMENTED
 from .navigation import Orbit, dragged
 from .panel import TITLE, PanelWindow
 from .renderer import Renderer
-from .source import METHODS
+from .source import DOCUMENTED, METHODS
 
 HELP = (
     "left button: turn   right: drag the light\n"
@@ -289,12 +288,23 @@ def show(
     arguments = ["--window", window]
     if window == "headless":
         arguments += ["--backend", "egl"]
-    viewer = _opened(kind, arguments)
+    viewer = open_viewer(kind, arguments)
     moderngl_window.run_window_config_instance(viewer)
     return viewer.drawn, viewer.frame_ms
 
 
-def _opened(kind: type[Viewer], arguments: list[str]) -> Viewer:
+def open_viewer(kind: type[Viewer], arguments: list[str]) -> Viewer:
+    """A window of a kind of viewer, not shown yet.
+
+    Parameters
+    ----------
+    arguments : of moderngl-window's command line.
+
+    Raises
+    ------
+    DiffractionError
+        If no window can be opened, or as `Renderer`.
+    """
     try:
         viewer: Viewer = moderngl_window.create_window_config_instance(kind, args=arguments)
     except DiffractionError:

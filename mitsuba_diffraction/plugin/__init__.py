@@ -1,1 +1,24 @@
-"""What the BSDF plugin is made of: parameters, the table on the device, reflectance (Dr.Jit)."""
+"""What the BSDF plugin is made of (Dr.Jit).
+
+Contents
+--------
+parameters      read from Mitsuba's Properties, checked
+sources         from what a scene names to a table, built once
+attributes      whether a mesh has what its BSDF reads
+session         plans to follow and records to keep while a scene loads
+light           what a variant knows of a wavelength; asks the next two
+lookup          a table inside a kernel: `DeviceTable`
+sampling        directions drawn where the orders are
+series          weights of the terms at a κ
+restricted      a planned table, and its coarse cells beyond
+scalar_lookup   one look-up at a time, in scalar variants
+rgb_light       the same in the RGB variants' colours
+rgb_lookup      a colour table inside a kernel
+energy          the bound of the albedo that conserves energy
+reflectance     of the surface itself: dielectric, conductor, mirror
+layers          how much light reaches what lies beneath
+orientation     how the patch is turned in the tangent plane
+shadowing       V-shaped grooves
+memory          arrays in the variant's memory
+frozen          what `dr.freeze` must know of a BSDF
+"""

@@ -74,7 +74,7 @@ def test_pictures_are_there_and_small(picture):
 
 def test_a_command_is_broken_between_options():
     command = "render scenes/snake.xml " + " ".join(f"-D name_{n}=value" for n in range(12))
-    lines = gallery._as_typed(command).split(" \\\n")
+    lines = gallery.as_typed(command).split(" \\\n")
     assert len(lines) > 1
     assert max(map(len, lines)) <= 106
     assert all(line.startswith("    -D ") for line in lines[1:])

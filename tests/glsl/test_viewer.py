@@ -96,7 +96,7 @@ def viewer(gl: Any, some_variant: str, table: DiffractionTable, tmp_path: Path) 
     )  # fmt: skip
     settings = {"mitsuba_scene": scene, "folder": tmp_path, "window_size": (96, 64), "spp": 8}
     kind = type("SceneViewer", (module.Viewer,), settings)
-    made = module._opened(kind, ["--window", "headless", "--backend", "egl"])
+    made = module.open_viewer(kind, ["--window", "headless", "--backend", "egl"])
     # a headless window calls all keys alike
     made.wnd.keys = types.SimpleNamespace(ACTION_PRESS="press", S="s", P="p", R="r")
     yield made
@@ -187,4 +187,4 @@ def test_no_display_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(window, "create_window_config_instance", fail)
     with pytest.raises(DiffractionError, match=r"no window could be opened \(Cannot connect to"):
-        module._opened(module.Viewer, [])
+        module.open_viewer(module.Viewer, [])
