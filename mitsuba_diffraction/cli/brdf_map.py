@@ -7,16 +7,15 @@ import time
 from pathlib import Path
 from typing import Any
 
+from ..colour import ILLUMINANTS
+from ..reference import COHERENCES
 from .arguments import number_between, path_ending_in, whole_number
 from .heights_options import add_heights_options, load_options, was_given
 from .light_options import add_direction, add_wavelengths
 from .method_map import add_method_options, refuse_contradictions, run_method
 from .output import check_outputs
-from .precompute import BASES, COHERENCES
+from .precompute import BASES
 from .progress import Bar
-
-# Written out so that --help need not load NumPy; a test holds them against the library.
-ILLUMINANTS = ("D65", "E")
 
 _FULL_RANGE = (360.0, 830.0)
 _STEP = 5.0

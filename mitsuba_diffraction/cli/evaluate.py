@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
+from ..methods import NAMES as METHODS
 from .arguments import path_ending_in, whole_number
 from .heights_options import add_heights_options
 from .light_options import add_direction, add_wavelengths
-from .method_map import METHODS
 from .output import check_outputs
 from .patch import add_table_options, load_patch
 from .progress import Bar

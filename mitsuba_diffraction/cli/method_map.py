@@ -9,11 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
+from ..methods import NAMES as METHODS
 from .patch import load_patch
 from .progress import Bar
-
-# Written out so that --help need not load NumPy; a test holds them against the library.
-METHODS = ("default", "flss", "nmm", "pq", "pq-sinc", "rainbow")
 
 # What only the renderer's BSDF knows.
 _OF_THE_BSDF = ("mode", "material", "orientation", "height_scale", "basis")

@@ -6,9 +6,9 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
+from ..reference import COHERENCES
 from .arguments import whole_number
 from .heights_options import load_options
-from .precompute import COHERENCES
 
 if TYPE_CHECKING:
     from ..heightfield import HeightField

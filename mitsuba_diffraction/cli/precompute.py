@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import DiffractionWarning
+from ..reference import COHERENCES
+from ..tables import expansion
 from .arguments import number_between, path_ending_in, whole_number
 from .heights_options import add_heights_options, load_options
 from .output import check_outputs
@@ -20,9 +22,7 @@ if TYPE_CHECKING:
     from ..heightfield import HeightField
     from ..tables import DiffractionTable
 
-# Written out so that --help need not load NumPy and SciPy; a test holds them against the library.
-COHERENCES = ("ensemble", "patch")
-BASES = ("auto", "svd", "chebyshev", "taylor")
+BASES = ("auto", *expansion.BASES)
 
 _TABLE_NAMES = (
     "coherence_width", "coherence", "basis", "tolerance", "terms", "taps", "wavelength_range",

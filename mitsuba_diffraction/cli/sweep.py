@@ -11,15 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
+from ..methods import NAMES as METHODS
 from .arguments import number_between, path_ending_in
 from .heights_options import add_heights_options
 from .light_options import add_direction, add_wavelengths
-from .method_map import METHODS, gain_of
+from .method_map import gain_of
 from .output import check_outputs
 from .patch import add_table_options, load_patch
 from .progress import Bar
 
-# Written out so that --help need not load NumPy; a test holds them against the library.
+# Written out so that --help need not load what makes maps; a test holds them against the library.
 KINDS = ("wavelength-step", "coherence-width", "terms", "light-angle", "method")
 
 _COLUMNS = ("value", "seconds", "delta_e_mean", "delta_e_95", "delta_e_own_exposure", "blueness")

@@ -10,8 +10,6 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction.cli import brdf_map
-from mitsuba_diffraction.colour import ILLUMINANTS
 from mitsuba_diffraction.maps.files import ATTRIBUTE
 
 # A map of the grating of `heights` that takes half a second.
@@ -30,10 +28,6 @@ def channels_of(file):
     """Channels of an EXR by name, and its description."""
     exr = OpenEXR.File(str(file), separate_channels=True)
     return {n: c.pixels for n, c in exr.channels().items()}, json.loads(exr.header()[ATTRIBUTE])
-
-
-def test_choices_are_the_library_s():
-    assert brdf_map.ILLUMINANTS == ILLUMINANTS
 
 
 def test_an_exr_and_a_picture_are_written_and_named(run, heights, here):

@@ -9,9 +9,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction.cli import evaluate
-from mitsuba_diffraction.methods import NAMES
-
 QUICK = [
     "--pixel-size", "0.08", "--coherence-width", "12", "--step", "40", "--angle-step", "0.5",
     "--windows", "2",
@@ -19,10 +16,6 @@ QUICK = [
 
 
 pytestmark = pytest.mark.usefixtures("here")
-
-
-def test_choices_are_the_library_s():
-    assert evaluate.METHODS == NAMES
 
 
 def test_picture_and_numbers_are_written_and_the_period_is_found(run, heights, here):

@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionTable
-from mitsuba_diffraction.cli import precompute
 from mitsuba_diffraction.cli.progress import Bar
-from mitsuba_diffraction.reference import COHERENCES
-from mitsuba_diffraction.tables.expansion import BASES
 
 # A table of 6 µm heights with these takes a tenth of a second.
 QUICK = ["--pixel-size", "0.08", "--coherence-width", "6"]
@@ -27,11 +24,6 @@ def recipe(heights):
         'tolerance = 1e-3\noutput = "tables/grating.exr"\n'
     )
     return file
-
-
-def test_choices_are_the_library_s():
-    assert set(precompute.COHERENCES) == set(COHERENCES)
-    assert set(precompute.BASES) == {"auto", *BASES}
 
 
 def test_options_reach_the_table(run, heights, here):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction.cli import method_map, sweep
+from mitsuba_diffraction.cli import sweep
 from mitsuba_diffraction.methods import NAMES
 from mitsuba_diffraction.sweeps import SWEEPS
 
@@ -21,7 +21,6 @@ pytestmark = pytest.mark.usefixtures("here")
 
 def test_choices_are_the_library_s():
     assert tuple(SWEEPS) == sweep.KINDS
-    assert method_map.METHODS == NAMES
 
 
 def test_a_sheet_and_its_numbers_are_written(run, heights, here):
