@@ -7,7 +7,10 @@ spectrum           DFT of exp(iκh) at some κ, cropped to the orders that light
 expansion          series in κ: which functions, with which weights
 choose             how many terms and intervals a tolerance takes
 window             the coherence window, cut to a few taps
-build              all of that, until the error is met
+coefficients       of the series, from transforms of the heights
+halves             these as half floats
+attempt            one try at a table, and its error
+build              tries until the tolerance is met
 error              the one error measure of the project
 checks             what cannot be built
 coarse             what a table of a restricted domain has everywhere else

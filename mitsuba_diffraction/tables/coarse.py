@@ -25,6 +25,7 @@ from ..heightfield import HeightField
 from .choose import svd_expansion
 from .error import Grid, Progress
 from .expansion import Expansion, principal_functions
+from .halves import half_scale
 from .spectrum import Spectrum
 from .table import DiffractionTable, reach_of
 from .window import taps_for
@@ -35,8 +36,6 @@ CELL, FEWEST = 16.0, 24
 STEP = 1.35
 #: Of the series in κ and of the taps: the averaging itself costs more.
 TOLERANCE = 1e-2
-
-_HALF_PEAK = 2.0**14  # largest stored half float
 
 
 def coarse_table(
@@ -79,8 +78,7 @@ def coarse_table(
         patches, grid, expansion, functions, (each[0], each[1]), progress
     )
     coefficients *= np.float32(steps[0] * steps[1] / (own[0] * own[1]))
-    largest = max(float(np.abs(coefficients).max()), 1e-30)
-    scale = 2.0 ** math.floor(math.log2(_HALF_PEAK / largest))
+    scale = half_scale(float(np.abs(coefficients).max()))
     return DiffractionTable(
         coefficients=(coefficients * np.float32(scale)).astype(np.float16),
         order_0=order_0,

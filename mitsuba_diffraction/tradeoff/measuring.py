@@ -19,6 +19,7 @@ from ..benchmarks.saved import saved_bsdf
 from ..benchmarks.timing import kernel_seconds, ratio, rounds_of
 from ..errors import DiffractionError
 from ..heightfield import HeightField
+from ..tables.halves import half_scale
 from ..tables.loss import power_loss
 from ..tables.table import DiffractionTable, reach_of
 from .sample import Sample
@@ -153,10 +154,9 @@ def _table(field: HeightField, setting: Setting, coherence_width: float) -> Diff
     if setting.stored is None:
         return table
     kind: Any = np.float16 if setting.stored == "half" else np.float32
-    largest = float(np.abs(table.coefficients).max()) or 1.0
-    scale = 2.0 ** np.floor(np.log2(2.0**14 / largest))
+    scale = half_scale(float(np.abs(table.coefficients).max()))
     coefficients = (table.coefficients.astype(np.float32) * np.float32(scale)).astype(kind)
-    return replace(table, coefficients=coefficients, scale=table.scale * float(scale))
+    return replace(table, coefficients=coefficients, scale=table.scale * scale)
 
 
 def _by_plugin(bsdf: Any, sample: Sample) -> NDArray[np.float64]:
