@@ -227,7 +227,13 @@ class Diffraction(mi.BSDF):
             callback.put("nested", self.nested, differentiable)
 
     def parameters_changed(self, keys: Any) -> None:
-        """Check what changed, and keep it out of the kernels' code."""
+        """Check what changed, and keep it out of the kernels' code.
+
+        Raises
+        ------
+        DiffractionError
+            If height_scale is beyond what the table serves.
+        """
         largest = dr.slice(dr.max(dr.detach(self.height_scale)))
         if not 0.0 < largest <= self.table.height_scale_max:
             raise DiffractionError(

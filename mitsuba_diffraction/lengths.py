@@ -23,7 +23,12 @@ Height = float | str
 def pixel_size_of(value: PixelSize | None, where: str = "pixel_size") -> tuple[float, float] | None:
     """Pixel size (dx, dy) in µm from a number, a pair, "0.05", "0.05, 0.1", or "auto".
 
-    `None` and "auto" give `None`: the file has to know. `where` names the parameter in errors.
+    `None` and "auto" give `None`: the file has to know.
+
+    Raises
+    ------
+    DiffractionError
+        If it is none of these; `where` names the parameter.
     """
     if _is_auto(value):
         return None
@@ -41,7 +46,13 @@ def pixel_size_of(value: PixelSize | None, where: str = "pixel_size") -> tuple[f
 
 
 def height_of(value: Height | None, where: str = "max_height") -> float | None:
-    """Height in µm, above 0, from a number or a numeric string; `None` and "auto" give `None`."""
+    """Height in µm, above 0, from a number or a numeric string; `None` and "auto" give `None`.
+
+    Raises
+    ------
+    DiffractionError
+        If it is no such height; `where` names the parameter.
+    """
     if _is_auto(value):
         return None
     numbers_ = _numbers_of(value)

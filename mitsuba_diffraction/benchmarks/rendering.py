@@ -70,6 +70,7 @@ def measure_snake(plan: Plan, tables: Tables, scenes: Path, progress: Progress) 
 
 
 def render_seconds(scene: Any, plan: Plan) -> float:
+    """How long one picture takes, compiling included where it is the first."""
     start = time.perf_counter()
     dr.eval(mi.render(scene, spp=plan.spp))
     dr.sync_thread()
@@ -77,6 +78,7 @@ def render_seconds(scene: Any, plan: Plan) -> float:
 
 
 def ball_scene(plan: Plan, bsdf: Any) -> Any:
+    """A ball under a lamp and an even sky."""
     look = mi.ScalarTransform4f().look_at(origin=[0, -4, 0], target=[0, 0, 0], up=[0, 0, 1])
     lamp = mi.ScalarTransform4f().look_at(origin=[2, -3, 3], target=[0, 0, 0], up=[0, 0, 1])
     return mi.load_dict(

@@ -43,6 +43,7 @@ class Frame:
 
     @property
     def exr(self) -> Path:
+        """The linear picture beside the PNG."""
         return self.png.with_suffix(".exr")
 
     def outdated(self, with_exr: bool) -> tuple[str, str] | None:

@@ -56,7 +56,13 @@ def refuse_contradictions(args: argparse.Namespace) -> None:
 
 
 def gain_of(args: argparse.Namespace) -> Any:
-    """The gain factor of --relative, or `None`."""
+    """The gain factor of --relative, or `None`.
+
+    Raises
+    ------
+    DiffractionError
+        If --int-ior is no number.
+    """
     from ..methods import Gain
 
     if not args.relative:

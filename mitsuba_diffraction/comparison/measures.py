@@ -49,7 +49,18 @@ def exposure_of(reference: Image) -> float:
 
 
 def flip_map(reference: Image, other: Image, exposure: float) -> NDArray[np.float32]:
-    """FLIP's error, 0 to 1, (height, width)."""
+    """FLIP's error, 0 to 1, (height, width).
+
+    Parameters
+    ----------
+    reference, other : (height, width, 3) linear sRGB.
+    exposure : what both are multiplied with.
+
+    Raises
+    ------
+    DiffractionError
+        If flip-evaluator is not installed.
+    """
     try:
         import flip_evaluator
     except ImportError as error:

@@ -27,7 +27,13 @@ def replaced(text: str, name: str, content: str) -> str:
 
 
 def part(text: str, name: str) -> str:
-    """What stands between the markers of that name."""
+    """What stands between the markers of that name.
+
+    Raises
+    ------
+    DiffractionError
+        If they are missing.
+    """
     begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
     if begin not in text or end not in text:
         raise DiffractionError(f"expected '{begin}' and '{end}'")

@@ -57,7 +57,13 @@ def _kept(heights: HeightField, **arguments: Any) -> DiffractionTable:
 
 
 def pack_method(method: Method) -> Packed:
-    """A method's Taylor table and settings."""
+    """A method's Taylor table and settings.
+
+    Raises
+    ------
+    DiffractionError
+        If there is no shader for the method, or its table is no Taylor series.
+    """
     if isinstance(method, OrdersOnly):
         periods = tuple(0.0 if period is None else period for period in method.periods)
         return pack_method(method.full) | Packed(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..colour import linear_srgb, response
+from ..plugin.traversal import children
 from ..tables.table import DiffractionTable
 from .packing import pack_conductor
 from .textures import Packed, Texture, Uniform, as_half
@@ -141,21 +142,6 @@ def _spectra(eta: Any, k: Any) -> tuple[Array, Array, Array]:
     colours = np.array([464.0, 549.0, 611.0])  # of sRGB's primaries
     uv = np.full((1, 2), 0.5)
     return colours, *(_evaluated(t, uv, colours)[0][::-1].astype(float) for t in (eta, k))
-
-
-def children(thing: Any) -> dict[str, Any]:
-    """The objects that one of Mitsuba's shows to `traverse`, by name."""
-    import mitsuba as mi
-
-    found: dict[str, Any] = {}
-
-    class Collector(mi.TraversalCallback):
-        def put(self, name: str, value: Any, *rest: Any) -> None:
-            if isinstance(value, mi.Object):
-                found[name] = value
-
-    thing.traverse(Collector())
-    return found
 
 
 def _is_bsdf(thing: Any) -> bool:

@@ -71,7 +71,13 @@ class RealtimeScene:
 
 
 def load(scene: Any) -> Any:
-    """A Mitsuba scene, of itself or of its file, in the variant that is set or llvm_ad_spectral."""
+    """A Mitsuba scene, of itself or of its file, in the variant that is set or llvm_ad_spectral.
+
+    Raises
+    ------
+    DiffractionError
+        If it is neither, or the file cannot be loaded.
+    """
     import mitsuba as mi
 
     if not isinstance(scene, str | os.PathLike):

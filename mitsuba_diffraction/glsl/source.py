@@ -68,7 +68,7 @@ def fragment_parts(
     dialect: Dialect = "desktop",
     main: str = "surface.frag",
 ) -> list[tuple[str, str]]:
-    """The names and texts that `fragment_source` joins."""
+    """The names and texts that `fragment_source` joins; parameters and errors as there."""
     if method not in METHODS:
         raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
     constants = {"PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1), "LIGHTS": str(LIGHTS)}

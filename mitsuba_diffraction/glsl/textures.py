@@ -75,7 +75,13 @@ class Packed:
 
 
 def listed(name: str, entries: NDArray[np.generic]) -> Texture:
-    """Entries (n, channels) as a texture with rows of `PAGE` texels: what `entry` reads."""
+    """Entries (n, channels) as a texture with rows of `PAGE` texels: what `entry` reads.
+
+    Raises
+    ------
+    DiffractionError
+        If they are too many for a texture.
+    """
     count, channels = entries.shape
     rows = -(-count // PAGE)
     if rows > 1 << 14:

@@ -66,10 +66,12 @@ class Anatomy:
 
     @property
     def head_length(self) -> float:
+        """From snout to neck, cm."""
         return self.head * self.girth_radius
 
     @property
     def head_half_width(self) -> float:
+        """At its widest, cm."""
         return 0.36 * self.head_length
 
     def _interpolate(self) -> PchipInterpolator:

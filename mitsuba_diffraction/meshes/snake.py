@@ -48,6 +48,11 @@ def build(
     anatomy, scales : proportions; None means the defaults.
     coils, squeeze, heading : how it lies, see `spine.coil`.
     head_detail : rows of cells on the head.
+
+    Raises
+    ------
+    DiffractionError
+        If a parameter is out of its range, or the body does not fit into its coils.
     """
     anatomy, scales = anatomy or Anatomy(), scales or Scales()
     if not 8 <= head_detail <= 1000:

@@ -20,5 +20,6 @@ layers          how much light reaches what lies beneath
 orientation     how the patch is turned in the tangent plane
 shadowing       V-shaped grooves
 memory          arrays in the variant's memory
+traversal       what Mitsuba's objects show of themselves
 frozen          what `dr.freeze` must know of a BSDF
 """

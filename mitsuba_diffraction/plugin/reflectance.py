@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from .traversal import children
 
 
 class Perfect:
@@ -64,7 +65,7 @@ class Conductor:
 
         wavelength : nm, where mono variants take the index; Mitsuba's is a mean over the spectrum.
         """
-        objects = _textures(_load("conductor", material=material))
+        objects = children(_load("conductor", material=material))
         if mi.is_monochromatic:
             objects = {name: _at(material, name, wavelength) for name in ("eta", "k")}
         return cls(objects["eta"], objects["k"], material)
@@ -112,16 +113,3 @@ def _at(material: str, name: str, wavelength: float) -> Any:
     file = str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd"))
     nodes, values = np.loadtxt(file).T
     return mi.load_dict({"type": "uniform", "value": float(np.interp(wavelength, nodes, values))})
-
-
-def _textures(bsdf: Any) -> dict[str, Any]:
-    """The textures that a BSDF shows to `traverse`, by name."""
-    found: dict[str, Any] = {}
-
-    class Collector(mi.TraversalCallback):
-        def put(self, name: str, value: Any, *rest: Any) -> None:
-            if isinstance(value, mi.Texture):
-                found[name] = value
-
-    bsdf.traverse(Collector())
-    return found

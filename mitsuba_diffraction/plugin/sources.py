@@ -92,7 +92,13 @@ def heights_of_file(path: Path, is_table: bool, options: LoadOptions) -> HeightF
 
 
 def heights_of_tensor(data: Any, options: LoadOptions) -> HeightField:
-    """Heights (ny, nx) in µm, given as an array."""
+    """Heights (ny, nx) in µm, given as an array.
+
+    Raises
+    ------
+    DiffractionError
+        If pixel_size is missing, max_height is given, or the array holds no heights.
+    """
     if options.max_height is not None:
         raise DiffractionError("max_height is for images; the heights in data are in µm already")
     if options.pixel_size is None:

@@ -52,7 +52,13 @@ class Grating:
     depth: float
 
     def heights(self, pixels: int = PIXELS) -> HeightField:
-        """The period as the package sees it: `pixels` samples along x, two rows of them."""
+        """The period as the package sees it: `pixels` samples along x, two rows of them.
+
+        Raises
+        ------
+        DiffractionError
+            If there is no such profile.
+        """
         lengths = (self.period, self.depth)
         if self.profile == "sinusoidal":
             return gratings.sinusoidal(*lengths, periods=1, pixels_per_period=pixels, rows=2)

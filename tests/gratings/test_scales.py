@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mitsuba_diffraction import HeightField
-from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.gratings import elaphe_like, xenopeltis_like
 from mitsuba_diffraction.spectra import frequencies, height_spectrum, order_powers, profile
 
@@ -249,28 +248,3 @@ def test_parameters_in_range_give_a_patch(make, extent, pixels, seed, depth, amo
     assert field.heights.max() <= depth
     size = extent if isinstance(extent, tuple) else (extent, extent)
     assert field.extent == pytest.approx(size)
-
-
-anything = st.one_of(
-    st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=4),
-    st.lists(st.floats(), max_size=3), st.just(np.zeros(2)),
-)  # fmt: skip
-
-
-@settings(deadline=None)
-@given(
-    make=st.sampled_from(list(MAKERS.values())),
-    name=st.sampled_from(["extent", "pixels", "seed", "depth", *PURE]),
-    value=anything,
-)
-def test_any_value_works_or_is_one_clear_line(make, name, value):
-    arguments = {"extent": 3.0, "pixels": 16, name: value}
-    if name == "pixels" and isinstance(value, int) and value > 64:
-        return  # allowed, and slow
-    try:
-        make(**arguments)
-    except DiffractionError as error:
-        text = str(error)
-        assert "\n" not in text
-        assert text.startswith((f"elaphe_like: {name}:", f"xenopeltis_like: {name}:"))
-        assert "got" in text
