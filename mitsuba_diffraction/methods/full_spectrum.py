@@ -40,7 +40,7 @@ class FullSpectrum(Method):
     4. XYZ = Σ_k step·(½ at both ends)·f(λ_k)·s̄(λ_k), where
        f = (1 + ωi·ωo)²·4πσ²·S/(λ_k² w² cosθi cosθo), or C·S for relative reflectance.
 
-    `default` reads |a_j|² (or a_j) from the table's own Chebyshev series instead.
+    `default` reads |a_j|² (or a_j) from the table's own series instead (`tables.expansion`).
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ class Repeated(Method):
 
     Parameters
     ----------
-    table : a Taylor (or Chebyshev) table with coherence="patch" and enough taps.
+    table : of any series, with coherence="patch" and enough taps; the documents' is Taylor's.
     repeats : (N₁, N₂), at least 1 each.
     interpolation : "linear" or "sinc".
     taps : bins read along each axis for "sinc".

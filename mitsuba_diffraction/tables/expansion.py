@@ -5,7 +5,7 @@ A table holds one of two things per bin j, both as a short series in κ:
 - the *power* |a_j(κ)|², real, enough for `ensemble`;
 - the *amplitude* a_j(κ), complex, needed for `patch` and by the Taylor series.
 
-Order 0, the glossy reflection, is stored apart in single precision and keeps its whole lobe, since
+Order 0, the glossy reflection, is stored apart in double precision and keeps its whole lobe, since
 next to it the colours may be a thousandth.
 
 **Chebyshev.** [0, κ_max] is cut into equal intervals, each with its own short Chebyshev series
