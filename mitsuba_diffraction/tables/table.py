@@ -147,6 +147,11 @@ class DiffractionTable:
         save_table(self, path)
 
     @property
+    def largest_error(self) -> float:
+        """The larger measured error: near order 0 or elsewhere, each at its worst κ."""
+        return float(max(self.error["near"], self.error["far"]))
+
+    @property
     def sigma(self) -> float:
         """σ of the amplitude window, µm."""
         return sigma_of(self.coherence_width)

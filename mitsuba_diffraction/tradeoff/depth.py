@@ -37,8 +37,10 @@ class Depths:
     intervals: NDArray[np.int64]
 
 
-def measure_depths(count: int, progress: Callable[[int, int, str], None]) -> Depths:
-    """From 1 nm to 20 µm, on one rough patch of many slopes."""
+def measure_depths(
+    count: int, progress: Callable[[int, int, str], None] = lambda done, total, text: None
+) -> Depths:
+    """From 1 nm to 20 µm, `count` depths, on one rough patch of many slopes."""
     shape = _rough()
     depths = np.geomspace(1e-3, 20.0, count)
     names = (
@@ -64,7 +66,7 @@ def measure_depths(count: int, progress: Callable[[int, int, str], None]) -> Dep
                 )
             except DiffractionError:
                 continue
-            errors[f"basis={basis}"][n] = max(table.error["near"], table.error["far"])
+            errors[f"basis={basis}"][n] = table.largest_error
             if basis == "svd":
                 intervals[n] = table.expansion.intervals
     progress(count, count, "depths")

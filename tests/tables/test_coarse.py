@@ -42,7 +42,7 @@ def plane(radius, step):
 
 
 def test_within_the_domain_the_tolerance_is_met(restricted):
-    assert max(restricted.error["near"], restricted.error["far"]) <= 1e-3
+    assert restricted.largest_error <= 1e-3
     full = DiffractionTable.build(
         PATCH, coherence_width=WIDTH, coherence=restricted.coherence, tolerance=1e-4
     )
