@@ -9,3 +9,9 @@ class DiffractionError(ValueError):
 
 class DiffractionWarning(UserWarning):
     """The result is usable, but outside the range where the model or the data can be trusted."""
+
+
+def quoted(value: object) -> str:
+    """A value as an error quotes it: in one line of at most 80 characters."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 80 else text[:77] + "..."

@@ -18,7 +18,7 @@ def sigma_of(coherence_width: float) -> float:
     return coherence_width / WIDTHS_PER_SIGMA
 
 
-def check_light(theta: float, phi: float) -> None:
+def check_angles(theta: float, phi: float) -> None:
     """Refuse the direction of a light that is none.
 
     Parameters

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from .errors import DiffractionError
+from .errors import DiffractionError, quoted
 
 # A pixel below the size of an atom or a height above 10 mm is a mistake of units, not a sample.
 SHORTEST_PIXEL = 1e-5
@@ -38,10 +38,10 @@ def pixel_size_of(value: PixelSize | None, where: str = "pixel_size") -> tuple[f
     )
     numbers_ = _numbers_of(value)
     if numbers_ is None or len(numbers_) not in (1, 2):
-        raise DiffractionError(f"{expected}; got {_quote(value)}")
+        raise DiffractionError(f"{expected}; got {quoted(value)}")
     for number in numbers_:
         if not SHORTEST_PIXEL <= number <= LONGEST_PIXEL:  # also refuses NaN
-            raise DiffractionError(f"{expected}; got {_quote(value)}")
+            raise DiffractionError(f"{expected}; got {quoted(value)}")
     return numbers_[0], numbers_[-1]
 
 
@@ -59,7 +59,7 @@ def height_of(value: Height | None, where: str = "max_height") -> float | None:
     if numbers_ is None or len(numbers_) != 1 or not 0 < numbers_[0] <= LONGEST_HEIGHT:
         raise DiffractionError(
             f"{where}: expected a height in µm above 0, at most {LONGEST_HEIGHT:g}, or 'auto'; "
-            f"got {_quote(value)}"
+            f"got {quoted(value)}"
         )
     return numbers_[0]
 
@@ -97,8 +97,3 @@ def _numbers_of(value: object) -> tuple[float, ...] | None:
             return None
         result.append(number)
     return tuple(result)
-
-
-def _quote(value: object) -> str:
-    text = repr(value).replace("\n", " ")
-    return text if len(text) <= 80 else text[:77] + "..."

@@ -6,12 +6,13 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError
+from ..progress import Progress
 from .figures import Goal, Row, Section
 from .plan import PIXEL, Plan
 
@@ -50,7 +51,7 @@ def cases(plan: Plan) -> Iterator[Case]:
         yield Case(f"{side}² pixels, Taylor", side, {"basis": "taylor"})
 
 
-def measure_builds(plan: Plan, folder: Path, progress: Callable[[int, int, str], None]) -> Section:
+def measure_builds(plan: Plan, folder: Path, progress: Progress) -> Section:
     """Build each of the cases once.
 
     Parameters

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,14 +14,13 @@ import numpy as np
 
 from ..colour import delta_e, linear_srgb, response
 from ..maps.light import Light
+from ..progress import Progress
 from ..tables.colour_table import ColourTable
 from .contenders import Queries, Tables
 from .figures import Goal, Row, Section
 from .plan import Plan
 from .scenes import pigment, rays, snake
 from .timing import kernel_seconds, rounds_of
-
-Progress = Callable[[int, int, str], None]
 
 #: What reflects, and whether the goals are for it.
 MATERIALS: dict[str, tuple[dict[str, Any], bool]] = {

@@ -13,6 +13,7 @@ import numpy as np
 
 from .. import reference
 from ..heightfield import HeightField
+from ..progress import Progress
 from .contenders import (
     ALUMINIUM,
     COARSE,
@@ -33,8 +34,6 @@ FLOOR = "bare gathers of the defaults"
 DIRECT = "a Fourier sum over all pixels for each direction (NumPy)"
 _TIMES = "ns/call"
 _BASELINES = {"× roughconductor": ALUMINIUM, "× defaults": DEFAULT, "× gathers": FLOOR}
-
-Progress = Callable[[int, int, str], None]
 
 
 def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:

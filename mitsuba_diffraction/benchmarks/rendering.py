@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,13 +11,12 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from ..progress import Progress
 from .contenders import ALUMINIUM, DEFAULT, DEFAULT_AL, Tables, bsdf_makers
 from .figures import Goal, Row, Section
 from .plan import Plan
 from .scenes import share_of, skin_of, snake_scene
 from .timing import ratio, rounds_of
-
-Progress = Callable[[int, int, str], None]
 
 _COLUMNS = ("ms", "ns/sample", "× roughconductor")
 _SKIN, _ROUGH = "the skin diffracts, pigment beneath", "the skin is roughconductor, Al"

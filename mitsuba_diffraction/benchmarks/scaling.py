@@ -12,6 +12,7 @@ from typing import Any
 import mitsuba as mi
 
 from .. import gratings
+from ..progress import Progress
 from ..tables.table import DiffractionTable
 from .contenders import DEFAULT, Queries, Tables, bsdf_makers
 from .figures import Row, Section
@@ -23,7 +24,6 @@ from .timing import kernel_seconds, ratio, rounds_of
 #: Numbers of one order that are tried, at a tolerance that all of them meet in enough intervals.
 TERMS = (4, 8, 16)
 
-Progress = Callable[[int, int, str], None]
 
 _EVAL, _PICTURE = ("ns/call", "× first", "MB", "taps"), ("ms", "× first", "ns/sample")
 

@@ -12,12 +12,11 @@ import mitsuba as mi
 import numpy as np
 
 from ..maps.light import Light
+from ..progress import Progress
 from .contenders import Tables
 from .figures import Goal, Row, Section
 from .plan import SEED, Plan
 from .scenes import furnace, pixels_of, snake, window
-
-Progress = Callable[[int, int, str], None]
 
 #: Angle of incidence in degrees: relative standard deviation that one sample may have.
 _GOALS = {0.0: 0.6, 45.0: 0.8, 75.0: 1.2}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Callable
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any, Self
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
+from ..progress import Progress
 from .mitsuba_text import plain_text
 
 # Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
@@ -77,7 +77,7 @@ def render_passes(
     seed: int,
     variant: str,
     stop: Stop,
-    progress: Callable[[int, int, str], None],
+    progress: Progress,
 ) -> Result:
     """Render `spp` samples per pixel as the average over passes, exactly as one pass would.
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
+from ..progress import Progress
 from .console import say, say_warning
 from .plan import planning_variant, say_if_unsuited
 from .scenes import sensor_of, set_variant
@@ -16,7 +17,6 @@ from .scenes import sensor_of, set_variant
 if TYPE_CHECKING:
     from ..planning.plan import Plan
 
-Tell = Callable[[int, int, str], None]
 #: `--plan` without a file.
 MAKE = Path()
 
@@ -40,7 +40,7 @@ class Planned:
 
 
 def load_by_plan(
-    args: argparse.Namespace, variant: str, load: Callable[[], Any], tell: Tell
+    args: argparse.Namespace, variant: str, load: Callable[[], Any], tell: Progress
 ) -> Planned | None:
     """A scene with the tables of a plan, or None where the variant has no use for one.
 
@@ -79,7 +79,7 @@ def load_by_plan(
 
 
 def _plan(
-    args: argparse.Namespace, variant: str, load: Callable[[], Any], tell: Tell
+    args: argparse.Namespace, variant: str, load: Callable[[], Any], tell: Progress
 ) -> tuple[Plan, dict[str, float]]:
     """The plan, and the shares of light outside; in the variant that paths are traced in."""
     from ..planning.make import check_light, fitted, look

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
-from ..geometry import check_light
+from ..geometry import check_angles
+from ..progress import Progress
 
 Array = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
 #: brdf(wi, wo, wavelength) in 1/sr for (n, 3), (n, 3) and (n,) nm.
 Brdf = Callable[[Array, Array, Array], Array]
 
@@ -39,7 +39,7 @@ class Beam:
     phi: float = 0.0
 
     def __post_init__(self) -> None:
-        check_light(self.theta, self.phi)
+        check_angles(self.theta, self.phi)
 
     @property
     def sine(self) -> float:

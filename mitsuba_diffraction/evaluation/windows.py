@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
+from ..progress import Progress
 from ..tables.table import DiffractionTable
-from .beam import Array, Beam, Progress, measure
+from .beam import Array, Beam, measure
 from .ridge import Fit, fit_period, ridge_of
 
 MOST_WINDOWS = 4096

@@ -6,7 +6,7 @@ import numbers
 from collections.abc import Sequence
 from typing import Any
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, quoted
 
 Lengths = float | Sequence[float]
 Counts = int | Sequence[int]
@@ -21,7 +21,7 @@ def number_between(value: float, where: str, least: float, most: float, unit: st
     if not ok or not least <= float(value) <= most:  # NaN fails too
         raise DiffractionError(
             f"{where}: expected a number{unit and ' in'}{unit} from {least:g} to {most:g}, "
-            f"got {_quote(value)}"
+            f"got {quoted(value)}"
         )
     return float(value)
 
@@ -31,7 +31,7 @@ def count_between(value: int, where: str, least: int, most: int) -> int:
     ok = isinstance(value, numbers.Integral) and not isinstance(value, bool)
     if not ok or not least <= int(value) <= most:
         raise DiffractionError(
-            f"{where}: expected a whole number from {least} to {most}, got {_quote(value)}"
+            f"{where}: expected a whole number from {least} to {most}, got {quoted(value)}"
         )
     return int(value)
 
@@ -61,11 +61,6 @@ def _pair(value: object, where: str) -> tuple[Any, Any]:
         return value, value
     if len(value) != 2:
         raise DiffractionError(
-            f"{where}: expected one number or a pair (along x, along y), got {_quote(value)}"
+            f"{where}: expected one number or a pair (along x, along y), got {quoted(value)}"
         )
     return value[0], value[1]
-
-
-def _quote(value: object) -> str:
-    text = " ".join(repr(value).split())
-    return text if len(text) <= 80 else text[:77] + "..."

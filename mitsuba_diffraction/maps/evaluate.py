@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
@@ -14,13 +13,12 @@ from ..colour import LONGEST, SHORTEST, check_illuminant, linear_srgb, response
 from ..errors import DiffractionError
 from ..geometry import wavenumber
 from ..llvm import require_loaded_llvm
+from ..progress import Progress
 from ..tables.error import NEAR
 from . import hemisphere
 from .bands import Bands
 from .light import Light
 from .result import BrdfMap
-
-Progress = Callable[[int, int, str], None]
 
 # Pixels at a time: enough for a GPU, and their sums stay within some tens of megabytes.
 _PIXELS = 1 << 20

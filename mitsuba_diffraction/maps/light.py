@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry import check_light
+from ..geometry import check_angles
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Light:
     phi: float = 0.0
 
     def __post_init__(self) -> None:
-        check_light(self.theta, self.phi)
+        check_angles(self.theta, self.phi)
 
     @property
     def direction(self) -> NDArray[np.float64]:

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from ..geometry import wavenumber
 from ..methods.gain import Gain
 from ..methods.method import Method
+from ..progress import Progress
 from ..tables.error import NEAR
 from . import hemisphere
 from .bands import Bands
 from .light import Light
 from .result import BrdfMap
-
-Progress = Callable[[int, int, str], None]
 
 
 def method_map(

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 
 from ..errors import DiffractionError
 from ..heightfield import HeightField
+from ..progress import Progress
 from ..tables.build import TAPS_SHARE
 from ..tables.table import DiffractionTable
 from ..tables.window import taps_for
 from .full_spectrum import FullSpectrum, trapezoid_rule
-from .method import Method, Progress
+from .method import Method
 from .nmm import OrdersOnly
 from .period import check_period, estimate_periods, required_period
 from .pq import Repeated

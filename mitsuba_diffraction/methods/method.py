@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -14,10 +14,10 @@ from scipy.integrate import trapezoid
 from ..colour import linear_srgb, response
 from ..errors import DiffractionError
 from ..geometry import kirchhoff_factor
+from ..progress import Progress
 from .gain import Gain
 
 Array = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
 
 _PAIRS = 4096  # direction pairs at a time, per thread
 

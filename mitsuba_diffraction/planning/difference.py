@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..colour import delta_e, linear_srgb
 from ..plugin.sampling import forget_sampler
 from ..plugin.session import Session
+from ..progress import Progress
 from ..tables.table import DiffractionTable
 from .plan import Plan
 
@@ -44,7 +45,7 @@ def difference(
     load: Callable[[], Any],
     plan: Plan,
     sensor: Callable[[Any], Any],
-    tell: Callable[[int, int, str], None],
+    tell: Progress,
 ) -> Difference:
     """Render both ways, small, with the same random numbers and the same directions drawn.
 

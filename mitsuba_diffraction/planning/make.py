@@ -10,6 +10,7 @@ import drjit as dr
 
 from ..errors import DiffractionError
 from ..plugin.session import Session
+from ..progress import Progress
 from ..tables.table import DiffractionTable
 from .difference import Difference, difference
 from .domain import Asked, domain_for
@@ -17,7 +18,6 @@ from .paths import Seen, trace
 from .plan import Plan, PlannedTable
 
 Load = Callable[[], Any]
-Tell = Callable[[int, int, str], None]
 
 #: A planned table that is not smaller than this share of the whole one is not worth it.
 WORTH = 0.8
@@ -243,7 +243,7 @@ def fitted(
     load: Load,
     sensor: Callable[[Any], Any],
     tolerance: float,
-    tell: Tell,
+    tell: Progress,
     *,
     timing: bool = False,
 ) -> Fitted:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,9 +11,8 @@ from typing import Any
 from ..heightfield import HeightField
 from ..maps.light import Light
 from ..methods import FullSpectrum, make
+from ..progress import Progress
 from ..tables.table import DiffractionTable
-
-Progress = Callable[[int, int, str], None]
 
 #: Each is timed so often, in turns; the first of them only warms up.
 _ROUNDS = 3

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,9 +16,8 @@ from ..maps.light import Light
 from ..maps.methods import method_map
 from ..maps.result import BrdfMap
 from ..methods import NAMES, FullSpectrum, Gain, Method, make, make_all
+from ..progress import Progress
 from ..tables.table import DiffractionTable
-
-Progress = Callable[[int, int, str], None]
 
 _MOST_VALUES = 24
 # Pixels of the reference this much darker than the brightest away from the mirror are unlit.

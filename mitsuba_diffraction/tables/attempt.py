@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..heightfield import HeightField
+from ..progress import Progress
 from .checks import check_size
 from .coefficients import coefficients_of
-from .error import FLOOR, ErrorMeter, Grid, Parts, Progress, worst
+from .error import FLOOR, ErrorMeter, Grid, Parts, worst
 from .expansion import Expansion
 from .halves import halved
 from .spectrum import Spectrum

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..geometry import sigma_of
 from ..heightfield import HeightField
+from ..progress import Progress, silent
 from ..reference import check_coherence
 from .attempt import Attempt
 from .checks import check_parameters, check_patches, check_taylor, restricted
@@ -23,7 +24,7 @@ from .choose import (
 )
 from .coarse import coarse_table
 from .describe import describe
-from .error import Grid, Progress
+from .error import Grid
 from .expansion import Expansion
 from .table import DiffractionTable, reach_of, refuse
 from .window import MAX_TAPS, reach_error, taps_for, trims_for
@@ -84,7 +85,7 @@ def build_table(
 
     if basis == "taylor":
         check_taylor(deepest, expansion, tolerance)
-    tell = progress or (lambda done, total, text: None)
+    tell = progress or silent
 
     half = expansion.basis == "chebyshev" and tolerance >= HALF_FROM
     for _ in range(_ATTEMPTS):

@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 
 from ..geometry import sigma_of
 from ..heightfield import HeightField
+from ..progress import Progress
 from .choose import svd_expansion
-from .error import Grid, Progress
+from .error import Grid
 from .expansion import Expansion, principal_functions
 from .halves import half_scale
 from .spectrum import Spectrum

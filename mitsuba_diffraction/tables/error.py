@@ -14,7 +14,7 @@ of the largest value that this part has at any κ.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
@@ -245,7 +245,3 @@ def alternate(amplitude: NDArray[Any], last: tuple[int, int]) -> None:
 
 def _power(amplitude: NDArray[Any]) -> NDArray[np.floating]:
     return amplitude.real**2 + amplitude.imag**2
-
-
-Progress = Callable[[int, int, str], None]
-"""Called as progress(steps done, steps in all, what is being done)."""

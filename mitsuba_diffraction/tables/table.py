@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import DiffractionError
 from ..geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
 from ..heightfield import HeightField
-from .error import Grid, Progress
+from ..progress import Progress
+from .error import Grid
 from .expansion import Expansion
 from .lookup import window_sum
 

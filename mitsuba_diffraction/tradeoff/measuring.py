@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -19,13 +19,12 @@ from ..benchmarks.saved import saved_bsdf
 from ..benchmarks.timing import kernel_seconds, ratio, rounds_of
 from ..errors import DiffractionError
 from ..heightfield import HeightField
+from ..progress import Progress, silent
 from ..tables.halves import half_scale
 from ..tables.loss import power_loss
 from ..tables.table import DiffractionTable, reach_of
 from .sample import Sample
 from .setting import Setting
-
-Progress = Callable[[int, int, str], None]
 
 #: What colours are compared with: an error so small that nobody sees it.
 FINEST = 1e-5
@@ -73,7 +72,7 @@ def measure(
     pairs: int = 240,
     lanes: int = 1 << 19,
     rounds: int = 7,
-    progress: Progress = lambda done, total, text: None,
+    progress: Progress = silent,
 ) -> list[Measured]:
     """All settings for one patch, in the current (spectral) variant.
 

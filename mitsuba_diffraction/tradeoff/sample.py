@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..geometry import diffraction_coordinates, sigma_of, wavenumber
 from ..heightfield import HeightField
+from ..progress import Progress
 from ..reference import window_power
 from ..tables.table import DiffractionTable
 
@@ -41,7 +41,7 @@ class Sample:
         coherence_width: float,
         coherence: str,
         n: int,
-        progress: Callable[[int, int, str], None],
+        progress: Progress,
     ) -> Sample:
         """n pairs for a patch, by Riemann sums over all of its pixels: slow, and plain."""
         sigma = sigma_of(coherence_width)

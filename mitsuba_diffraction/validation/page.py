@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..files.atomic import atomic_path
-from ..tables.error import Progress
+from ..progress import Progress, silent
 from . import plots, sections, statistics
 from .cases import FEW_WAVELENGTHS, MATERIALS, PROBE_GRATING, Grating
 from .compare import Comparison, compare
@@ -35,7 +35,7 @@ def write_report(folder: Path, *, quick: bool = False, progress: Progress | None
     -------
     The page.
     """
-    tell = progress or (lambda done, total, text: None)
+    tell = progress or silent
     images = folder / "images"
     images.mkdir(parents=True, exist_ok=True)
     comparisons: dict[str, Comparison] = {}

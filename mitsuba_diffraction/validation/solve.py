@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
-from ..tables.error import Progress
+from ..progress import Progress
 from . import coupled_wave, integral
 from .cases import ALUMINIUM, KERATIN, PROFILES, Scan, order_sines, scans
 from .solutions import ROW, Solutions

@@ -16,8 +16,9 @@ from typing import Any
 from ..errors import DiffractionError
 from ..files.atomic import atomic_path
 from ..glsl.scene import load, read_scene
+from ..progress import Progress, silent
 from .scene import MAX_BYTES, WebScene, web_scene
-from .tables import WEB_METHODS, Progress
+from .tables import WEB_METHODS
 
 _SCRIPTS = (
     "vectors.js", "data.js", "mesh.js", "camera.js", "light.js", "drawing.js", "viewer.js",
@@ -49,7 +50,7 @@ def make_page(
     title: str | None = None,
     methods: Sequence[str] = WEB_METHODS,
     sensor: int = 0,
-    progress: Progress = lambda done, total, text: None,
+    progress: Progress = silent,
 ) -> Page:
     """The page of a scene.
 

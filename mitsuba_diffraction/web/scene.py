@@ -19,10 +19,11 @@ from ..glsl.packing import pack_bounds, pack_responses
 from ..glsl.scene import RealtimeScene
 from ..glsl.source import fragment_source, vertex_source
 from ..glsl.textures import Packed, Texture
+from ..progress import Progress
 from ..tables.table import DiffractionTable
 from .geometry import packed_mesh, sections_of
 from .sections import Sections, packed_array, packed_file
-from .tables import Progress, as_columns, fitting_tables
+from .tables import as_columns, fitting_tables
 
 #: Largest page, bytes.
 MAX_BYTES = 25_000_000

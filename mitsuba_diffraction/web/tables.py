@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ import numpy as np
 from ..files.cache import cached_colours
 from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.textures import Packed
+from ..progress import Progress
 from ..tables.loss import colour_loss, power_loss
 from ..tables.table import DiffractionTable
 from .rounding import power_table, rounded_colours, rounded_table
@@ -23,7 +24,6 @@ WEB_METHODS = ("lut", "spectral")
 DIGITS = (9, 8, 7, 6)
 
 _LARGE = 1 << 20  # entries of the textures that are rounded
-Progress = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True)

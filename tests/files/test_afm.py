@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.heightfield import HeightField
+from tests.files.refusals import refusal
 from tests.instruments import nanoscope
 
 surface_topography = pytest.importorskip(
@@ -25,13 +26,6 @@ def write(tmp_path, *args, name="scan.001", length=None, **kwargs):
     path = tmp_path / name
     path.write_bytes(nanoscope(COUNTS, *args, **kwargs)[:length])
     return path
-
-
-def refusal(path, **options):
-    with pytest.raises(DiffractionError) as caught:
-        HeightField.load(path, **options)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
 
 
 def test_heights_and_size_come_in_the_units_of_the_file(tmp_path):

@@ -11,6 +11,7 @@ from PIL import Image
 
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heightfield import HeightField
+from tests.files.refusals import refusal
 
 RNG = np.random.default_rng(5)
 BYTES = RNG.integers(0, 256, (5, 7), dtype=np.uint8)
@@ -83,13 +84,6 @@ def test_a_large_image_is_not_a_bomb(tmp_path):
         warnings.simplefilter("error")
         field = HeightField.load(path, pixel_size=0.01, max_height=1)
     assert field.shape == (9600, 9600)
-
-
-def refusal(path, **options):
-    with pytest.raises(DiffractionError) as caught:
-        HeightField.load(path, **options)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
 
 
 SIZES = {"pixel_size": 0.1, "max_height": 0.5}

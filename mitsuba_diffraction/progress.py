@@ -1,0 +1,12 @@
+"""How work that takes a while tells how far it is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+#: Called as progress(done, total, text); a total of 0 is not known yet.
+Progress = Callable[[int, int, str], None]
+
+
+def silent(done: int, total: int, text: str) -> None:
+    """For nobody who listens."""
