@@ -7,7 +7,6 @@ import pytest
 from scipy.special import jv
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, gratings
-from mitsuba_diffraction.geometry import wavenumber
 from mitsuba_diffraction.tables.albedo import AlbedoModel
 from mitsuba_diffraction.tables.colour_table import ColourTable
 from mitsuba_diffraction.tables.powers import power_series
@@ -16,7 +15,6 @@ from tests.optics import rough_patch
 #: 19.2 µm wide: a coarse cell holds five by five orders. Nyquist's frequency is 10.5 rad/µm.
 PATCH = rough_patch((64, 64), (0.3, 0.3), 0.25, correlation=0.2)
 WIDTH, CROP, KAPPA_MAX = 18.0, 6.0, 20.0
-REACH = 2.0 * float(wavenumber(360.0))
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,83 @@
+"""What a table answers: nothing beyond its range, nothing negative; and what it knows of itself."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionTable, HeightField, reference
+from mitsuba_diffraction.geometry import kirchhoff_factor
+from tests.optics import lit_pairs, polar, rough_patch
+from tests.tables.patches import DEFAULTS, PATCH, WIDTH
+
+
+def test_a_table_does_not_guess_outside_its_range():
+    table = DiffractionTable.build(PATCH, wavelength_range=(450.0, 700.0), **DEFAULTS)
+    assert np.isnan(table.brdf(polar(0), polar(10), 440.0, height_scale=1.5))
+    assert np.isnan(table.brdf(polar(0), polar(10), 450.0, height_scale=1.52))
+    assert np.isfinite(table.brdf(polar(0), polar(0), 450.0, height_scale=1.5))
+    # towards grazing the spatial frequency is what runs out: 2k of the shortest wavelength
+    assert np.isnan(table.brdf(polar(89.9), polar(89.9), 440.0))
+    assert np.isfinite(table.brdf(polar(89.9), polar(89.9), 450.0))
+    assert table.brdf(polar(0), polar(120), 100.0) == 0.0  # below the surface there is nothing
+
+
+def test_tables_are_symmetric_and_one_sided():
+    table = DiffractionTable.build(PATCH, **DEFAULTS)
+    wi, wo, lam, _ = lit_pairs(PATCH, table.sigma, 100, seed=4)
+    # wi + wo is all that enters: rounding in the factor only
+    assert table.brdf(wi, wo, lam) == pytest.approx(table.brdf(wo, wi, lam), rel=1e-14)
+    below = wo * [1, 1, -1]
+    assert np.array_equal(table.brdf(wi, below, lam), np.zeros(100))
+    assert np.array_equal(table.brdf(below, wi, lam), np.zeros(100))
+
+
+def test_no_value_is_negative_though_series_ripple():
+    table = DiffractionTable.build(PATCH, tolerance=1e-2, **DEFAULTS)
+    rng = np.random.default_rng(6)
+    q = rng.uniform(-1.0, 1.0, (2, 20000)) * table.reach / np.sqrt(2)
+    values = table.window_sum(*q, rng.uniform(0.0, table.expansion.kappa_max, 20000))
+    assert values.min() >= 0.0
+
+
+def test_light_fades_as_kappa_squared_towards_a_flat_surface():
+    table = DiffractionTable.build(PATCH, **DEFAULTS)
+    q = 6 * table.spacing[0]  # where the mirror's own lobe is down to exp(−70)
+    shallow = table.window_sum(q, 0.0, [1e-4, 1e-3, 1e-2])
+    # the first interval's factor κ̂² is exact, what is left changes by κh = 1e-3
+    assert shallow[1:] / shallow[:-1] == pytest.approx(100.0, rel=1e-2)
+
+
+def test_height_scale_is_a_factor_on_the_heights():
+    table = DiffractionTable.build(PATCH, tolerance=1e-4, height_scale_max=2.0, **DEFAULTS)
+    for scale in (0.3, 1.0, 2.0):
+        scaled = HeightField(scale * PATCH.heights, PATCH.pixel_size)
+        wi, wo, lam, _ = lit_pairs(scaled, table.sigma, 200, seed=3)
+        exact = reference.brdf(scaled, wi, wo, lam, coherence_width=WIDTH)
+        factor = kirchhoff_factor(wi, wo, lam, table.sigma)
+        value = table.brdf(wi, wo, lam, height_scale=scale)
+        assert np.sum(np.abs(value - exact) / factor) <= 1e-4 * np.sum(exact / factor)
+
+
+def test_a_table_remembers_its_source_and_its_warnings():
+    coarse = HeightField(PATCH.heights, 0.2, name="coarse.png")
+    table = DiffractionTable.build(coarse, coherence_width=65.0, tolerance=1e-2)
+    assert table.source["digest"] == coarse.digest()
+    assert table.source["shape"] == [64, 63]
+    warnings = table.source["warnings"]
+    assert any("smaller than the coherence width of 65 µm" in line for line in warnings)
+    assert any("pixel" in line for line in warnings)
+    assert all("coarse.png" in line and "\n" not in line for line in warnings)
+    gentle = rough_patch((64, 64), (0.08, 0.08), 0.05)
+    assert DiffractionTable.build(gentle, **DEFAULTS).source["warnings"] == []
+
+
+def test_the_summary_is_plain_data():
+    table = DiffractionTable.build(PATCH, **DEFAULTS)
+    summary = json.loads(json.dumps(table.summary()))
+    assert summary["basis"] == "svd"
+    assert summary["measured_error"]["colours (all other orders)"] == table.error["far"]
+    assert summary["source"]["name"] == "rough patch"
+    assert "svd power, ensemble" in repr(table)
