@@ -14,6 +14,7 @@ from .. import gratings
 from ..heightfield import HeightField
 from ..plugin.lookup import DeviceTable, device_table
 from ..tables.table import DiffractionTable
+from .measured_file import write_measured
 from .plan import PIXEL, SEED, Plan
 from .saved import documents_bsdf, saved_bsdf
 
@@ -81,6 +82,12 @@ def bsdf_makers(tables: Tables) -> dict[str, Callable[[], Any]]:
     def ours(table: str, **parameters: Any) -> Callable[[], Any]:
         return lambda: tables.bsdf(table, **parameters)
 
+    def measured() -> Any:
+        file = tables.folder / "even.bsdf"
+        if not file.exists():
+            write_measured(file)
+        return mi.load_dict({"type": "measured", "filename": str(file)})
+
     return {
         ALUMINIUM: rough("Al"),
         "roughconductor, none": rough("none"),
@@ -90,6 +97,7 @@ def bsdf_makers(tables: Tables) -> dict[str, Callable[[], Any]]:
         "principled, metal beneath a coat": lambda: mi.load_dict(
             {"type": "principled", "metallic": 1.0, "roughness": 0.3, "clearcoat": 1.0}
         ),
+        "measured": measured,
         DEFAULT: ours("default"),
         DEFAULT_AL: ours("default", material="Al"),
         "diffraction, none": ours("default", material="none"),

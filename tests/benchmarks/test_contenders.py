@@ -65,6 +65,11 @@ def test_bare_gathers_read_what_a_look_up_reads(makers, queries):
     assert off.mean() < 0.01
 
 
+def test_the_measured_surface_reflects_what_its_file_says(makers, queries):
+    values = np.array(makers["measured"]().eval(mi.BSDFContext(), queries.si, queries.wo))
+    np.testing.assert_allclose(values, 1.0, rtol=1e-6)  # single precision
+
+
 def test_queries_do_not_change(queries):
     again = Queries.random(500)
     assert dr.all(again.wo == queries.wo, axis=None)
