@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks validation realtime lint clean help
+.PHONY: setup demo test package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks validation realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -33,6 +33,9 @@ demo: setup  ## tabulate a snake scale, render three scenes with it, the snake i
 
 test: setup .venv/browser  ## run the tests
 	@$(PYTHON3) -m pytest -n 2
+
+package: setup .venv/browser  ## build wheel and sdist, and test them in an empty environment
+	@.ci/package
 
 # with a patch of your own: make bench MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"
 bench: setup  ## measure speed and noise, and put the figures into README.md

@@ -14,11 +14,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import mitsuba_diffraction as md
 from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.cli.scene_parameters import parameters_of
 from mitsuba_diffraction.meshes.__main__ import _parser as meshes_parser
 
 ROOT = Path(__file__).parents[1]
+PACKAGE = Path(md.__file__).parent
 PAGES = {
     path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
     for path in (
@@ -116,7 +118,7 @@ def test_every_option_in_a_sentence_is_one_of_some_command():
     # those of the programs that make documents
     own = {
         option
-        for path in (ROOT / "mitsuba_diffraction").rglob("*.py")
+        for path in PACKAGE.rglob("*.py")
         for option in re.findall(r'add_argument\([^)]*?"(--[\w-]+)"', path.read_text("utf-8"))
     }
     for page in PAGES:
@@ -174,10 +176,9 @@ def test_no_code_block_escapes():
 
 
 def test_architecture_names_modules_that_exist():
-    package = ROOT / "mitsuba_diffraction"
     modules = set(re.findall(r"[\w/]+\.py\b", PAGES["ARCHITECTURE.md"]))
     assert len(modules) > 5
-    assert {name for name in modules if not (package / name).is_file()} == set()
+    assert {name for name in modules if not (PACKAGE / name).is_file()} == set()
 
 
 @pytest.mark.parametrize(
