@@ -88,9 +88,11 @@ def clip_outliers(field: HeightField, sigmas: float) -> tuple[HeightField, Chang
     heights = np.clip(field.heights, low, high)
     moved = np.abs(heights - field.heights)
     points, largest = int(np.count_nonzero(moved)), float(moved.max())
+    limit = f"{sigmas:g} robust standard deviations of {sigma:.3g} µm"
     what = (
-        f"{points} of {heights.size} points clipped to {sigmas:g} robust standard deviations "
-        f"of {sigma:.3g} µm, the furthest by {largest:.3g} µm"
+        f"{points} of {heights.size} points clipped to {limit}, the furthest by {largest:.3g} µm"
+        if points
+        else f"nothing to clip: all points are within {limit}"
     )
     return changed(field, heights, what, points=points, low=low, high=high, largest=largest)
 

@@ -71,11 +71,13 @@ def seam_step(field: HeightField) -> float:
 
 
 def cross_share(field: HeightField) -> float:
-    """Share of the mean-square slope, seams included, that lies where q_x = 0 or q_y = 0.
+    """Share of the mean-square slope, seams included, at frequencies with q_x or q_y near 0.
 
     Steps at the seams fill these axes of the spectrum evenly, the cross of a patch that does not
-    fit itself: their heights' power falls as 1/q², which the slope's q² undoes. Isotropic roughness
-    leaves about 1/nx + 1/ny there, scan-line offsets more. A flat patch has 0.
+    fit itself: their heights' power falls as 1/q², which the slope's q² undoes. The frequencies
+    next to the axes count as well: a step that varies along the seam, as on a levelled scan, is
+    there. Isotropic roughness leaves about 3/nx + 3/ny in all of them, scan-line offsets more. A
+    flat patch has 0.
     """
     ny, nx = field.shape
     wx, wy = _axis_weights(field)
@@ -84,8 +86,9 @@ def cross_share(field: HeightField) -> float:
     # rfft2 holds one half of the spectrum: all columns but the first (and Nyquist's) count twice
     power[:, 1 : (nx + 1) // 2] *= 2
     total = float(power.sum())
-    on_axes = float(power[:, 0].sum() + power[0, 1:].sum())
-    return on_axes / total if total > 0 else 0.0
+    rows, columns = np.rint(np.fft.fftfreq(ny) * ny), np.arange(nx // 2 + 1)
+    cross = (np.abs(rows)[:, None] <= 1) | (columns <= 1)
+    return float(power[cross].sum()) / total if total > 0 else 0.0
 
 
 def _reported(before: HeightField, heights: FloatArray, what: str) -> tuple[HeightField, Change]:
@@ -98,7 +101,7 @@ def _reported(before: HeightField, heights: FloatArray, what: str) -> tuple[Heig
     }
     line = (
         f"{what}: RMS step at the seams {figures['seam_before']:.3g} -> "
-        f"{figures['seam_after']:.3g} µm, share of the slope spectrum on its "
+        f"{figures['seam_after']:.3g} µm, share of the slope spectrum along its "
         f"axes {figures['cross_before']:.2%} -> {figures['cross_after']:.2%}"
     )
     return changed(before, after.heights, line, **figures)

@@ -53,9 +53,12 @@ def test_dust_is_clipped_and_counted():
     assert change.figures["largest"] == pytest.approx(1.4, rel=0.02)
 
 
-def test_nothing_to_clip_changes_nothing():
-    flat = HeightField(np.zeros((4, 4)), 0.1)
-    assert clip_outliers(flat, 3)[1].figures["points"] == 0
+def test_nothing_to_clip_changes_nothing_and_says_so():
+    for heights in (np.zeros((4, 4)), ROUGH):
+        same, change = clip_outliers(HeightField(heights, 0.1), 8)
+        assert change.figures["points"] == 0
+        assert np.array_equal(same.heights, heights)
+        assert change.line.startswith("nothing to clip: all points are within 8 robust")
 
 
 @pytest.mark.parametrize("sigmas", [0, -1, 0.5, float("nan"), float("inf")])
