@@ -148,6 +148,9 @@ def test_linked_files_exist(page):
             continue
         name, _, anchor = target.partition("#")
         file = ((ROOT / page).parent / name) if name else ROOT / page
+        inside = file.resolve().relative_to(ROOT)
+        if inside.parts[0] == PACKAGE.name:  # wherever it is installed
+            file = PACKAGE.joinpath(*inside.parts[1:])
         if not file.exists():
             absent.append(target)
         elif anchor:

@@ -112,7 +112,14 @@ def test_the_sdist_holds_what_the_tests_need(in_sdist):
         needed = tracked(folder) - made
         assert needed, folder
         assert {n for n in needed - in_sdist if ".ipynb_checkpoints" not in n} == set()
-    assert {"README.md", "CHANGELOG.md", "LICENSE", "CITATION.cff", "Makefile", ".ci/setup"} <= in_sdist
+    assert {
+        "README.md",
+        "CHANGELOG.md",
+        "LICENSE",
+        "CITATION.cff",
+        "Makefile",
+        ".ci/setup",
+    } <= in_sdist
 
 
 def test_the_sdist_holds_nothing_made(in_sdist):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ def write_measured(path: Path) -> None:
     def ones(*shape: int) -> NDArray[np.float32]:
         return np.ones(shape, np.float32)
 
-    fields = {
+    fields: dict[str, NDArray[Any]] = {
         "description": np.frombuffer(b"even", np.uint8),
         "theta_i": np.linspace(0.0, 1.5, ANGLES, dtype=np.float32),
         "phi_i": np.linspace(-np.pi, np.pi, AZIMUTHS, dtype=np.float32),
