@@ -37,7 +37,7 @@ class Attempt:
 
     Attributes
     ----------
-    coefficients, order_0, scale, expansion : of the table.
+    coefficients, order_0, scale, expansion, grid : of the table.
     measured : the error last measured, see `tables.error.worst`.
     """
 
@@ -59,7 +59,7 @@ class Attempt:
         self._checks = [expansion.extrema(interval) for interval in range(expansion.intervals)]
         self._transforms = expansion.intervals * expansion.series_terms
         self._total = self._transforms + sum(map(len, self._checks))
-        self._tell, self._grid = tell, grid
+        self._tell, self.grid = tell, grid
         self.measured: dict[str, float] = {}
         self._parts: list[Parts] = []
         self._trims: tuple[int, ...] | None = None
@@ -78,9 +78,7 @@ class Attempt:
     def error(self, trims: tuple[int, ...] = ()) -> float:
         """The larger of both errors, with some taps left out."""
         if trims != self._trims:
-            self._meter = ErrorMeter(
-                self._spectra, replace(self._grid, trims=trims), self.expansion
-            )
+            self._meter = ErrorMeter(self._spectra, replace(self.grid, trims=trims), self.expansion)
             self._parts = []
             for values, centre, kappas in zip(
                 self.coefficients, self.order_0, self._checks, strict=True

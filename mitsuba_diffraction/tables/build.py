@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,8 +36,67 @@ TRIMMED_SHARE = 0.8
 #: Half floats (rounding 2⁻¹², a few of them added) are tried from this tolerance on.
 HALF_FROM = 7e-4
 
-
 _ATTEMPTS = 8
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """What is asked for, and what follows from it at once."""
+
+    patches: Sequence[HeightField]
+    coherence_width: float
+    coherence: str
+    basis: str
+    tolerance: float
+    terms: int | None
+    wavelength_range: tuple[float, float]
+    height_scale_max: float
+    taps: int | None
+    radii: tuple[float, float]
+    kappa_max: float
+
+    @property
+    def deepest(self) -> HeightField:
+        return max(self.patches, key=lambda patch: patch.range)
+
+    @property
+    def spacing(self) -> tuple[float, float]:
+        """rad/µm between bins."""
+        extent = self.patches[0].extent
+        return (2 * np.pi / extent[0], 2 * np.pi / extent[1])
+
+    @property
+    def steps(self) -> tuple[float, float]:
+        """The same in units of 1/σ."""
+        sigma = sigma_of(self.coherence_width)
+        return (sigma * self.spacing[0], sigma * self.spacing[1])
+
+    @property
+    def coherent(self) -> bool:
+        return self.coherence == "patch"
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether all frequencies are wanted that light can probe."""
+        reach = reach_of(self.wavelength_range)
+        return self.radii == (reach, reach)
+
+    @property
+    def whole(self) -> bool:
+        """And all κ."""
+        reach = reach_of(self.wavelength_range)
+        return self.everywhere and self.kappa_max == reach * self.height_scale_max
+
+
+@dataclass(frozen=True)
+class _Setting:
+    """What is tried: a series, the bins that a look-up reads, and what it leaves out of them."""
+
+    expansion: Expansion
+    functions: int | None
+    half: bool
+    taps: tuple[int, int]
+    trims: tuple[int, ...]
 
 
 def build_table(
@@ -60,94 +119,114 @@ def build_table(
     check_parameters(basis, tolerance, terms, wavelength_range, height_scale_max, taps)
     patches = [heights] if isinstance(heights, HeightField) else list(heights)
     check_patches(patches, coherence, basis)
-    deepest = max(patches, key=lambda patch: patch.range)
-    extent = patches[0].extent
-    spacing = (2 * np.pi / extent[0], 2 * np.pi / extent[1])
-    sigma = sigma_of(coherence_width)
-    steps = (sigma * spacing[0], sigma * spacing[1])
-    coherent = coherence == "patch"
     reach = reach_of(wavelength_range)
     radii, kappa_max = restricted(crop, kappa_max, reach, reach * height_scale_max)
-    everywhere = radii == (reach, reach)
-    whole = everywhere and kappa_max == reach * height_scale_max
-    chosen_taps = (taps, taps) if taps else taps_for(steps, tolerance * TAPS_SHARE, coherent)
-    spare = tolerance - reach_error(steps, chosen_taps, coherent)
-    budget = SERIES_SHARE * max(spare, tolerance * TAPS_SHARE)
-    functions = None
-    if basis in ("auto", "svd"):
-        expansion, functions = svd_expansion(deepest, coherence, kappa_max, budget, terms)
-    else:
-        choose = taylor_expansion if basis == "taylor" else chebyshev_expansion
-        expansion = choose(deepest, coherence, kappa_max, budget, terms)
-    trims: tuple[int, ...] = ()
-    if taps is None:
-        trims = trims_for(steps, chosen_taps, tolerance * TRIMMED_SHARE, coherent)
-
-    if basis == "taylor":
-        check_taylor(deepest, expansion, tolerance)
+    wanted = _Wanted(
+        patches, coherence_width, coherence, basis, tolerance, terms, wavelength_range,
+        height_scale_max, taps, radii, kappa_max,
+    )  # fmt: skip
     tell = progress or silent
-
-    half = expansion.basis == "chebyshev" and tolerance >= HALF_FROM
+    setting = _first(wanted)
     for _ in range(_ATTEMPTS):
-        grid = _grid(spacing, steps, radii, chosen_taps, coherent, patches)
-        attempt = Attempt(patches, grid, expansion, functions, half, tolerance, tell)
-        if trims and attempt.error(trims) > tolerance:
-            trims = ()
-        if attempt.error(trims) <= tolerance:
-            return DiffractionTable(
-                coefficients=attempt.coefficients,
-                order_0=attempt.order_0,
-                scale=attempt.scale,
-                expansion=attempt.expansion,
-                grid=replace(grid, trims=trims),
-                spacing=spacing,
-                coherence_width=float(coherence_width),
-                coherence=coherence,
-                tolerance=float(tolerance),
-                wavelength_range=(float(wavelength_range[0]), float(wavelength_range[1])),
-                height_scale_max=float(height_scale_max),
-                error=attempt.measured,
-                source=describe(patches, coherence_width, wavelength_range, chosen_taps),
-                crop=None if everywhere else radii,
-                coarse=None
-                if whole
-                else coarse_table(
-                    patches,
-                    coherence_width=coherence_width,
-                    wavelength_range=wavelength_range,
-                    height_scale_max=height_scale_max,
-                    progress=tell,
-                ),
-            )
-        if attempt.taps_error() > TAPS_SHARE * tolerance:
-            if taps is not None:
-                raise refuse(
-                    f"taps={taps} leave an error of {attempt.error():.2g}, more than "
-                    f"tolerance={tolerance:g}; leave taps out, or raise the tolerance"
-                )
-            chosen_taps = (_more(chosen_taps[0]), _more(chosen_taps[1]))
-        elif half:
-            half = False
-        elif functions is not None and terms is None and functions < PACKET:
-            functions = PACKET  # a cut-out looked simpler than the whole patch
-        else:
-            expansion = _extended(expansion, functions, terms, attempt.error(), tolerance)
+        grid, expansion = _grid(wanted, setting.taps), setting.expansion
+        attempt = Attempt(
+            patches, grid, expansion, setting.functions, setting.half, tolerance, tell
+        )
+        if setting.trims and attempt.error(setting.trims) > tolerance:
+            setting = replace(setting, trims=())
+        if attempt.error(setting.trims) <= tolerance:
+            return _table(wanted, setting, attempt, tell)
+        setting = _next(wanted, setting, attempt)
         found = attempt.error()
-        del attempt
+        del attempt  # before the next one takes as much memory
+    expansion, functions = setting.expansion, setting.functions
     raise refuse(
         f"the error is still {found:.2g} with {expansion.intervals}×{functions or expansion.terms} "
-        f"terms and {chosen_taps[0]}×{chosen_taps[1]} taps; raise tolerance={tolerance:g}"
+        f"terms and {setting.taps[0]}×{setting.taps[1]} taps; raise tolerance={tolerance:g}"
     )
 
 
-def _grid(
-    spacing: tuple[float, float],
-    steps: tuple[float, float],
-    radii: tuple[float, float],
-    taps: tuple[int, int],
-    coherent: bool,
-    patches: Sequence[HeightField],
-) -> Grid:
+def _first(wanted: _Wanted) -> _Setting:
+    """The setting that should do, as trials on a cut-out of the patch have it."""
+    tolerance, steps, coherent = wanted.tolerance, wanted.steps, wanted.coherent
+    trims: tuple[int, ...] = ()
+    if wanted.taps:
+        taps = (wanted.taps, wanted.taps)
+    else:
+        taps = taps_for(steps, tolerance * TAPS_SHARE, coherent)
+        trims = trims_for(steps, taps, tolerance * TRIMMED_SHARE, coherent)
+    spare = tolerance - reach_error(steps, taps, coherent)
+    budget = SERIES_SHARE * max(spare, tolerance * TAPS_SHARE)
+    asked = (wanted.deepest, wanted.coherence, wanted.kappa_max, budget, wanted.terms)
+    functions = None
+    if wanted.basis == "taylor":
+        expansion = taylor_expansion(*asked)
+        check_taylor(wanted.deepest, expansion, tolerance)
+    elif wanted.basis == "chebyshev":
+        expansion = chebyshev_expansion(*asked)
+    else:
+        expansion, functions = svd_expansion(*asked)
+    half = expansion.basis == "chebyshev" and tolerance >= HALF_FROM
+    return _Setting(expansion, functions, half, taps, trims)
+
+
+def _next(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> _Setting:
+    """What to try after an attempt that leaves too much; an error where the user forbids it."""
+    tolerance = wanted.tolerance
+    if attempt.taps_error() > TAPS_SHARE * tolerance:
+        if wanted.taps is not None:
+            raise refuse(
+                f"taps={wanted.taps} leave an error of {attempt.error():.2g}, more than "
+                f"tolerance={tolerance:g}; leave taps out, or raise the tolerance"
+            )
+        return replace(setting, taps=(_more(setting.taps[0]), _more(setting.taps[1])))
+    if setting.half:
+        return replace(setting, half=False)
+    functions = setting.functions
+    if functions is not None and wanted.terms is None and functions < PACKET:
+        return replace(setting, functions=PACKET)  # a cut-out looked simpler than the whole patch
+    longer = _extended(setting.expansion, functions, wanted.terms, attempt.error(), tolerance)
+    return replace(setting, expansion=longer)
+
+
+def _table(
+    wanted: _Wanted, setting: _Setting, attempt: Attempt, tell: Progress
+) -> DiffractionTable:
+    """What an attempt made, with all that a table knows of itself."""
+    low, high = wanted.wavelength_range
+    coarse = None
+    if not wanted.whole:
+        coarse = coarse_table(
+            wanted.patches,
+            coherence_width=wanted.coherence_width,
+            wavelength_range=wanted.wavelength_range,
+            height_scale_max=wanted.height_scale_max,
+            progress=tell,
+        )
+    return DiffractionTable(
+        coefficients=attempt.coefficients,
+        order_0=attempt.order_0,
+        scale=attempt.scale,
+        expansion=attempt.expansion,
+        grid=replace(attempt.grid, trims=setting.trims),
+        spacing=wanted.spacing,
+        coherence_width=float(wanted.coherence_width),
+        coherence=wanted.coherence,
+        tolerance=float(wanted.tolerance),
+        wavelength_range=(float(low), float(high)),
+        height_scale_max=float(wanted.height_scale_max),
+        error=attempt.measured,
+        source=describe(
+            wanted.patches, wanted.coherence_width, wanted.wavelength_range, setting.taps
+        ),
+        crop=None if wanted.everywhere else wanted.radii,
+        coarse=coarse,
+    )
+
+
+def _grid(wanted: _Wanted, taps: tuple[int, int]) -> Grid:
+    """The bins that these taps can read."""
+    patches, radii, spacing = wanted.patches, wanted.radii, wanted.spacing
     if max(taps) > MAX_TAPS:
         raise refuse(
             f"the patch is {max(patches[0].extent):.4g} µm wide, so much more than the coherence "
@@ -159,7 +238,7 @@ def _grid(
     # A margin as wide as the taps: see tables.lookup
     last_x = min(math.ceil(radius[0]), int(nx) // 2) + taps[0]
     last_y = min(math.ceil(radius[1]), int(ny) // 2) + taps[1]
-    return Grid((last_x, last_y), steps, radius, taps, coherent)
+    return Grid((last_x, last_y), wanted.steps, radius, taps, wanted.coherent)
 
 
 def _more(taps: int) -> int:
