@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from .console import say_warning
 from .output import check_writable
 from .progress import Bar
 from .scene_options import add_scene_options, scene_parameters
+
+if TYPE_CHECKING:
+    from ..comparison import SameLights
 
 #: Samples along either side of a pixel for the slow methods, whose own errors are far larger.
 _FEWER = 2
@@ -71,17 +75,12 @@ def run(args: argparse.Namespace) -> int:
     if folder.exists() and not folder.is_dir():
         raise DiffractionError(f"-o {folder}: it is a file; name a folder")
     check_writable(folder / "compare.json", make_folder=True)
-    every = "all" in args.method
-    methods = METHODS if every else tuple(dict.fromkeys(args.method))
 
     from ..comparison import SameLights, difference, exposure_of
     from ..comparison.measures import as_json
-    from ..comparison.sheet import write_sheet
     from ..comparison.table import markdown
-    from ..comparison.truth import box_sensor
-    from ..glsl.timing import fragment_times
+    from ..files.atomic import atomic_path
     from .mitsuba_text import warnings_as_ours
-    from .passes import Stop
     from .scenes import load_scene, sensor_of, set_variant
 
     start = time.perf_counter()
@@ -91,77 +90,125 @@ def run(args: argparse.Namespace) -> int:
         scene = load_scene(args.scene, parameters)
         sensor_of(scene, args.sensor)
         both = SameLights(scene, sensor=args.sensor, name=f"'{args.scene}'")
-        renderer, direct = both.renderer, both.scene
-        with Stop() as stop:
-            halves = [
-                _traced(direct, direct.sensors()[0], args.spp // 2, seed, variant, stop, bar)
-                for seed in (2 * args.seed, 2 * args.seed + 1)
-            ]
-            full = None
-            if args.full_spp:
-                sensor = box_sensor(renderer.camera)
-                full = _traced(scene, sensor, args.full_spp, args.seed, variant, stop, bar)
+        renderer = both.renderer
+        halves, full = _path_traced(args, scene, both, variant, bar)
         reference = 0.5 * (halves[0] + halves[1])
-        exposure = exposure_of(reference)
         _make_folder(folder)
         _write(reference, folder / "direct.exr", args, variant, args.spp)
         if full is not None:
             _write(full, folder / "full.exr", args, variant, args.full_spp)
-        table: dict[str, Any] = {}
-        areas: dict[str, Any] = {}
-        for n, method in enumerate(methods):
-            bar(n, len(methods), f"drawing with {method}")
-            try:
-                samples = min(args.supersampling, _FEWER if method in DOCUMENTED else 64)
-                drawn = renderer.render(method, supersampling=samples)
-            except DiffractionError as error:
-                if not every:
-                    raise
-                say_warning(f"left out: {error}")  # it does not suit this surface
-                continue
-            areas = both.regions(drawn)
-            other = drawn[..., :3]
-            errors = {
-                name: difference(reference, other, mask, exposure) for name, mask in areas.items()
-            }
-            seconds = renderer.frame_time(method, frames=1 if method in DOCUMENTED else 3)
-            _write(other, folder / f"{method}.exr", args, variant, samples**2)
-            write_sheet(
-                folder / f"{method}.png", reference, other, full, method=method,
-                found=errors["diffracting"], compared=areas["both"], exposure=exposure,
-            )  # fmt: skip
-            table[method] = {
-                "supersampling": samples,
-                "frame_ms": 1e3 * seconds,
-                "texture_bytes": renderer.texture_bytes(method),
-                **errors,
-            }
-        bar(0, 1, "timing fragments")
-        for method, times in fragment_times(renderer, tuple(table)).items():
-            table[method]["fragment_ns"] = 1e9 * times["whole"]
-            table[method]["look_up_ns"] = 1e9 * times["look_up"]
-    noise = difference(halves[0], halves[1], areas["both"], exposure)
+        pictures = _Pictures(args, variant, folder, both, reference, full, exposure_of(reference))
+        table = _drawn(pictures, bar)
+    noise = difference(halves[0], halves[1], pictures.compared, pictures.exposure)
+    everywhere = np.ones(reference.shape[:2], bool)
     document = {
         "scene": str(args.scene), "parameters": parameters, "variant": variant,
         "driver": renderer.driver, "size": list(renderer.camera.size), "spp": args.spp,
-        "exposure": exposure,
+        "exposure": pictures.exposure,
         "lights": [light.name for light in renderer.lights],
         "not_shown": list(renderer.scene.omissions),
         # two halves of the samples differ by twice what their mean is off
         "noise_delta_e_mean": 0.5 * noise.delta_e_mean,
         "full_transport": None
         if full is None
-        else difference(full, reference, np.ones(full.shape[:2], bool), exposure),
+        else difference(full, reference, everywhere, pictures.exposure),
         "methods": table,
     }  # fmt: skip
-    from ..files.atomic import atomic_path
-
     text = as_json(document)
     with atomic_path(folder / "compare.json") as path:
         path.write_text(text, encoding="utf-8")
     print(markdown(json.loads(text)))
     print(f"{folder}: pictures, sheets and compare.json, {time.perf_counter() - start:.0f} s")
     return 0
+
+
+@dataclass
+class _Pictures:
+    """What the methods' pictures are held against, and where they go.
+
+    Attributes
+    ----------
+    both : the scene for both renderers.
+    reference, full : (height, width, 3) path-traced under the shaders' lights, and as it is.
+    compared : (height, width) pixels that both see lit, of the last method.
+    """
+
+    args: argparse.Namespace
+    variant: str
+    folder: Path
+    both: SameLights
+    reference: Any
+    full: Any
+    exposure: float
+    compared: Any = None
+
+
+def _path_traced(
+    args: argparse.Namespace, scene: Any, both: SameLights, variant: str, bar: Bar
+) -> tuple[list[Any], Any]:
+    """Two halves of the samples of direct light, and full transport if it is asked for."""
+    from ..comparison.truth import box_sensor
+    from .passes import Stop
+
+    direct, full = both.scene, None
+    with Stop() as stop:
+        halves = [
+            _traced(direct, direct.sensors()[0], args.spp // 2, seed, variant, stop, bar)
+            for seed in (2 * args.seed, 2 * args.seed + 1)
+        ]
+        if args.full_spp:
+            sensor = box_sensor(both.renderer.camera)
+            full = _traced(scene, sensor, args.full_spp, args.seed, variant, stop, bar)
+    return halves, full
+
+
+def _drawn(pictures: _Pictures, bar: Bar) -> dict[str, dict[str, Any]]:
+    """Draw with all methods that were asked for, and measure them."""
+    from ..glsl.timing import fragment_times
+
+    args, table = pictures.args, {}
+    every = "all" in args.method
+    methods = METHODS if every else tuple(dict.fromkeys(args.method))
+    for n, method in enumerate(methods):
+        bar(n, len(methods), f"drawing with {method}")
+        samples = min(args.supersampling, _FEWER if method in DOCUMENTED else 64)
+        try:
+            drawn = pictures.both.renderer.render(method, supersampling=samples)
+        except DiffractionError as error:
+            if not every:
+                raise
+            say_warning(f"left out: {error}")  # it does not suit this surface
+            continue
+        table[method] = _compared(pictures, method, drawn, samples)
+    bar(0, 1, "timing fragments")
+    for method, times in fragment_times(pictures.both.renderer, tuple(table)).items():
+        table[method]["fragment_ns"] = 1e9 * times["whole"]
+        table[method]["look_up_ns"] = 1e9 * times["look_up"]
+    return table
+
+
+def _compared(pictures: _Pictures, method: str, drawn: Any, samples: int) -> dict[str, Any]:
+    """Write a method's picture and sheet; its errors, time and memory."""
+    from ..comparison import difference
+    from ..comparison.sheet import write_sheet
+
+    renderer, reference = pictures.both.renderer, pictures.reference
+    folder, exposure = pictures.folder, pictures.exposure
+    areas = pictures.both.regions(drawn)
+    pictures.compared, other = areas["both"], drawn[..., :3]
+    errors = {name: difference(reference, other, mask, exposure) for name, mask in areas.items()}
+    seconds = renderer.frame_time(method, frames=1 if method in DOCUMENTED else 3)
+    _write(other, folder / f"{method}.exr", pictures.args, pictures.variant, samples**2)
+    write_sheet(
+        folder / f"{method}.png", reference, other, pictures.full, method=method,
+        found=errors["diffracting"], compared=areas["both"], exposure=exposure,
+    )  # fmt: skip
+    return {
+        "supersampling": samples,
+        "frame_ms": 1e3 * seconds,
+        "texture_bytes": renderer.texture_bytes(method),
+        **errors,
+    }
 
 
 def _traced(scene: Any, sensor: Any, spp: int, seed: int, variant: str, stop: Any, bar: Bar) -> Any:
