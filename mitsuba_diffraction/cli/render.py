@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
 from .animation import change
@@ -16,6 +16,9 @@ from .plan import add_plan_options, plan_or_json
 from .planned import MAKE, check_plan_options, load_by_plan, say_outside
 from .progress import Bar
 from .scene_options import add_scene_options, scene_parameters
+
+if TYPE_CHECKING:
+    from .passes import Result
 
 _INTERRUPTED = 130
 
@@ -117,7 +120,6 @@ def _run_one(args: argparse.Namespace) -> int:
 
     from .mitsuba_text import warnings_as_ours
     from .passes import Stop, render_passes
-    from .pictures import colours_of, count_bad, write_exr, write_png
     from .scenes import load_scene, preview_samples, sensor_of, set_variant, shrink
 
     start = time.perf_counter()
@@ -154,20 +156,7 @@ def _run_one(args: argparse.Namespace) -> int:
         if planned is not None:
             width, height = result.bitmap.size()
             say_outside(planned, width * height * result.spp)
-        bad = count_bad(result.bitmap)
-        if bad:
-            say_warning(f"{bad} pixels are not finite (NaN or infinite); they are black in a PNG")
-        written = []
-        if not only_png:
-            origin = {"scene": str(args.scene), "variant": variant, "seed": args.seed}
-            write_exr(result.bitmap, output, {**origin, "spp": result.spp})
-            written.append(output)
-        colours = colours_of(result.bitmap)
-        if colours is None:
-            say_warning("the film holds no colours that a PNG could show; only the EXR was written")
-        else:
-            write_png(colours, png, args.exposure)
-            written.append(png)
+        written = _written(result, args, None if only_png else output, png, variant)
     width, height = result.bitmap.size()
     samples = "1 sample" if result.spp == 1 else f"{result.spp} samples"
     print(
@@ -178,6 +167,29 @@ def _run_one(args: argparse.Namespace) -> int:
         say(f"interrupted; the picture has {result.spp} of {spp} samples per pixel")
         return _INTERRUPTED
     return 0
+
+
+def _written(
+    result: Result, args: argparse.Namespace, exr: Path | None, png: Path, variant: str
+) -> list[Path]:
+    """Write the picture, with warnings of what it lacks; the files."""
+    from .pictures import colours_of, count_bad, write_exr, write_png
+
+    bad = count_bad(result.bitmap)
+    if bad:
+        say_warning(f"{bad} pixels are not finite (NaN or infinite); they are black in a PNG")
+    written = []
+    if exr is not None:
+        origin = {"scene": str(args.scene), "variant": variant, "seed": args.seed}
+        write_exr(result.bitmap, exr, {**origin, "spp": result.spp})
+        written.append(exr)
+    colours = colours_of(result.bitmap)
+    if colours is None:
+        say_warning("the film holds no colours that a PNG could show; only the EXR was written")
+    else:
+        write_png(colours, png, args.exposure)
+        written.append(png)
+    return written
 
 
 def _shows_colours(scene: object, sensor: object) -> bool:
