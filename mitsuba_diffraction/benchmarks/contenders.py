@@ -13,6 +13,7 @@ import mitsuba as mi
 from .. import gratings
 from ..heightfield import HeightField
 from ..plugin.lookup import DeviceTable, device_table
+from ..progress import Progress
 from ..tables.table import DiffractionTable
 from .measured_file import write_measured
 from .plan import PIXEL, SEED, Plan
@@ -47,7 +48,7 @@ class Tables:
 def build_tables(
     plan: Plan,
     folder: Path,
-    progress: Callable[[int, int, str], None],
+    progress: Progress,
     patch: HeightField | None = None,
 ) -> Tables:
     """Build and save them, of `elaphe_like` if no patch is given."""
