@@ -9,6 +9,7 @@ methods                 the README's table of methods
 speed, tradeoff         tables of what `bench` and `tradeoff` measured
 realtime, plan          tables of what `compare` and `plan` measured
 parameters              the reference of the plugin's parameters, from its own docstring
+notebooks               notebooks, run anew
 albedo                  the plot of `info --albedo`
 markers                 parts of a page, found and replaced
 jpeg                    renderings as JPEG

@@ -2,22 +2,23 @@
 
 Contents
 --------
-snake      build a coiled snake: `build`, `Snake`
-anatomy    `Anatomy`: proportions, cross-sections, conformal coordinates
-scales     `Scales`: rows, relief, overlap and keels of the scales
-pelt       a skin of scales, as one closed mesh
-spine      how the body lies
-skin       the smooth skin between spine and scales
-head       shields, mouth, eyes; the tail tip
-piece      `piece`: a few scales for close views
-pigment    images of what lies under the skin, and of the ground
-disc       `disc`: a ring whose patch follows the radius
-knot       `knot`: a mesh without texture coordinates
-tangents   whether a mesh has the tangents that a patch needs
-directions `direction_field`: a smooth field of directions on any mesh
-oriented   `oriented_mesh`: a mesh whose patch follows such a field
-options    the parameters as options of the command line
-trimesh    `TriangleMesh`, `write_ply`
+snake        build a coiled snake: `build`, `Snake`
+anatomy      `Anatomy`: proportions, cross-sections, conformal coordinates
+scales       `Scales`: rows, relief, overlap and keels of the scales
+pelt         a skin of scales, as one closed mesh
+spine        how the body lies
+skin         the smooth skin between spine and scales
+head         shields, mouth, eyes; the tail tip
+piece        `piece`: a few scales for close views
+pigment      images of what lies under the skin, and of the ground
+disc         `disc`: a ring whose patch follows the radius
+knot         `knot`: a mesh without texture coordinates
+tangents     whether a mesh has the tangents that a patch needs
+directions   `direction_field`: a smooth field of directions on any mesh
+oriented     `oriented_mesh`: a mesh whose patch follows such a field
+options      the parameters as options of the command line
+limits       one check for them
+trimesh      `TriangleMesh`, `write_ply`
 
 `python -m mitsuba_diffraction.meshes scenes` writes what the scenes use; `snake`, `piece` and
 `disc` write one's own.

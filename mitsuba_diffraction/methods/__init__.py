@@ -5,16 +5,16 @@ reflectance, `xyz` and `linear_srgb` under D65, all for arrays of direction pair
 
 Contents
 --------
-make             a method by name, for a height field
-make_all         several of them, which share what they tabulate
-NAMES            their names
-Method           what each of them is
-FullSpectrum     default and flss: uniform sampling of the whole spectrum
-OrdersOnly       nmm: only the wavelengths whose orders reach the view direction
-Repeated         pq: the patch repeated, with linear or sinc interpolation
-Rainbow          rainbow: the grating equation alone
-Gain             the documents' gain factor C
-estimate_periods the period of a patch, with its confidence
+make               a method by name, for a height field
+make_all           several of them, which share what they tabulate
+NAMES              their names
+Method             what each of them is
+FullSpectrum       default and flss: uniform sampling of the whole spectrum
+OrdersOnly         nmm: only the wavelengths whose orders reach the view direction
+Repeated           pq: the patch repeated, with linear or sinc interpolation
+Rainbow            rainbow: the grating equation alone
+Gain               the documents' gain factor C
+estimate_periods   the period of a patch, with its confidence
 """
 
 from __future__ import annotations
