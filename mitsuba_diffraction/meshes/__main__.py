@@ -30,7 +30,6 @@ from .scales import Scales
 from .snake import Snake, build
 from .trimesh import TriangleMesh, write_ply
 
-SCENES = Path(__file__).resolve().parents[2] / "scenes"
 UNITS = "lengths in cm, z up"
 #: Of the compact disc in `scenes/cd.xml`: name, inner and outer radius.
 CD = (("hub", 0.75, 1.9), ("band", 1.9, 2.3), ("data", 2.3, 5.8), ("rim", 5.8, 6.0))
@@ -149,7 +148,8 @@ def _parser() -> argparse.ArgumentParser:
         )  # fmt: skip
 
     scenes = command("scenes", "all meshes and textures of the scenes")
-    scenes.add_argument("-o", "--output", type=Path, default=SCENES, help="folder of the scenes")
+    scenes.add_argument("-o", "--output", type=Path, default=Path("scenes"),
+                        help="folder of the scenes; default: scenes")  # fmt: skip
     scenes.set_defaults(write=lambda args: write_scenes(args.output))
 
     snake = command("snake", "a coiled snake")

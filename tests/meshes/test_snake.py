@@ -15,9 +15,10 @@ from scipy.spatial import cKDTree
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.meshes import Anatomy, Scales, Snake, build, load_mesh
-from mitsuba_diffraction.meshes.__main__ import SCENES, elaphe, main, xenopeltis
+from mitsuba_diffraction.meshes.__main__ import elaphe, main, xenopeltis
 from mitsuba_diffraction.meshes.spine import coil
 from mitsuba_diffraction.meshes.tangents import tangents
+from tests.conftest import ROOT
 
 
 @pytest.fixture(scope="module", params=["keeled", "smooth", "hose"])
@@ -145,7 +146,7 @@ def test_building_twice_gives_the_same_mesh() -> None:
 
 def test_the_scenes_hold_what_the_generator_makes(committed: tuple[str, Snake]) -> None:
     name, snake = committed
-    positions, normals, uv, faces = load_mesh(SCENES / "meshes" / f"{name}.ply")
+    positions, normals, uv, faces = load_mesh(ROOT / "scenes" / "meshes" / f"{name}.ply")
     np.testing.assert_array_equal(faces, snake.body.faces)
     # single precision, and other versions of SciPy's splines
     np.testing.assert_allclose(positions, snake.body.positions, atol=1e-3)
@@ -157,7 +158,7 @@ def test_the_scenes_hold_what_the_generator_makes(committed: tuple[str, Snake]) 
 def test_pigment_covers_the_whole_body(committed: tuple[str, Snake]) -> None:
     name, snake = committed
     scene = {"elaphe": "snake.xml", "xenopeltis": "xenopeltis.xml"}[name]
-    text = (SCENES / scene).read_text()
+    text = (ROOT / "scenes" / scene).read_text()
     scale = float(re.search(r'"pigment_scale" value="([^"]+)"', text)[1])
     # a thousandth of the length is a millimetre of tail tip
     assert scale * snake.skin.u_max == pytest.approx(1, abs=1e-3)

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.meshes import TriangleMesh, check_tangents, load_mesh, write_ply
-from mitsuba_diffraction.meshes.__main__ import SCENES
 from mitsuba_diffraction.meshes.trimesh import grid_faces
+from tests.conftest import ROOT
 
 PLY = b"""ply
 format binary_little_endian 1.0
@@ -96,7 +96,7 @@ def test_stretch_is_the_ratio_of_the_tangents() -> None:
 
 @pytest.mark.parametrize("name", ["elaphe", "xenopeltis"])
 def test_the_snakes_are_usable(name: str) -> None:
-    report = check_tangents(*load_mesh(SCENES / "meshes" / f"{name}.ply"))
+    report = check_tangents(*load_mesh(ROOT / "scenes" / "meshes" / f"{name}.ply"))
     assert report.usable
     assert report.problems() == []
 
