@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -17,7 +16,7 @@ from .console import say_warning
 from .heights_options import add_heights_options, load_options, was_given
 from .output import check_writable
 from .progress import Bar
-from .report import plain
+from .report import save_json
 
 if TYPE_CHECKING:
     from ..benchmarks.figures import Section
@@ -78,7 +77,6 @@ def run(args: argparse.Namespace) -> int:
 
     from ..benchmarks import plan
     from ..benchmarks.machine import describe_machine
-    from ..files.atomic import atomic_path
 
     chosen = plan.QUICK if args.quick else plan.FULL
     machine = describe_machine()
@@ -103,8 +101,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"\nnow / {args.against}")
         print("\n".join(compared(earlier, data)))
     if args.json is not None:
-        with atomic_path(args.json) as path:
-            path.write_text(json.dumps(plain(data), indent=1, ensure_ascii=False), encoding="utf-8")
+        save_json(args.json, data)
     return 0
 
 

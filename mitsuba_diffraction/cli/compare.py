@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from .arguments import whole_number
 from .console import say_warning
 from .output import check_writable
 from .progress import Bar
+from .report import plain, save_json
 from .scene_options import add_scene_options, scene_parameters
 
 if TYPE_CHECKING:
@@ -77,9 +77,7 @@ def run(args: argparse.Namespace) -> int:
     check_writable(folder / "compare.json", make_folder=True)
 
     from ..comparison import SameLights, difference, exposure_of
-    from ..comparison.measures import as_json
     from ..comparison.table import markdown
-    from ..files.atomic import atomic_path
     from .mitsuba_text import warnings_as_ours
     from .scenes import load_scene, sensor_of, set_variant
 
@@ -114,10 +112,8 @@ def run(args: argparse.Namespace) -> int:
         else difference(full, reference, everywhere, pictures.exposure),
         "methods": table,
     }  # fmt: skip
-    text = as_json(document)
-    with atomic_path(folder / "compare.json") as path:
-        path.write_text(text, encoding="utf-8")
-    print(markdown(json.loads(text)))
+    save_json(folder / "compare.json", document)
+    print(markdown(plain(document)))
     print(f"{folder}: pictures, sheets and compare.json, {time.perf_counter() - start:.0f} s")
     return 0
 

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
-from ..files.atomic import atomic_path
 from .arguments import number_between, path_ending_in, whole_number
 from .console import say_warning
 from .output import check_writable
 from .progress import Bar
-from .report import lines_of, plain
+from .report import lines_of, save_json
 from .scene_options import add_scene_options, scene_parameters
 
 if TYPE_CHECKING:
@@ -121,9 +119,7 @@ def run(args: argparse.Namespace) -> int:
     for line in lines_of(report):
         print(line)
     if args.json is not None:
-        with atomic_path(args.json) as temporary:
-            text = json.dumps(plain(report), indent=1, ensure_ascii=False)
-            temporary.write_text(text + "\n", encoding="utf-8")
+        save_json(args.json, report)
     if args.output is not None:
         plan.save(args.output)
         print(f"{args.output}: for mitsuba-diffraction render {args.scene} --plan {args.output}")

@@ -1,11 +1,16 @@
-"""Nested plain data (what `summary()` methods return) as text for people."""
+"""Nested plain data (what `summary()` methods return) as text for people, and as JSON."""
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict, is_dataclass
 from numbers import Real
+from pathlib import Path
 from typing import Any
+
+from ..files.atomic import atomic_path
 
 # Keys of height-field summaries, which are in µm throughout, and suffixes of keys that say so.
 _UNITS = {"pixel_size": "µm", "extent": "µm", "range": "µm", "rms_height": "µm"}
@@ -33,6 +38,8 @@ def lines_of(data: Mapping[str, Any], depth: int = 0) -> Iterator[str]:
 
 def plain(value: Any) -> Any:
     """The same data for JSON, which has neither NaN nor infinity: they become null."""
+    if is_dataclass(value) and not isinstance(value, type):
+        value = asdict(value)
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -44,6 +51,19 @@ def plain(value: Any) -> Any:
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     return str(value)
+
+
+def save_json(path: Path, data: Mapping[str, Any]) -> None:
+    """Write `plain` data.
+
+    Raises
+    ------
+    DiffractionError
+        If the file cannot be written.
+    """
+    with atomic_path(path) as temporary:
+        text = json.dumps(plain(data), indent=1, ensure_ascii=False)
+        temporary.write_text(text + "\n", encoding="utf-8")
 
 
 def _label(key: str) -> tuple[str, str]:

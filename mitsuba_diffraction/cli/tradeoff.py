@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ from .arguments import number_between
 from .heights_options import add_heights_options, load_options, was_given
 from .output import check_writable
 from .progress import Bar
-from .report import plain
+from .report import save_json
 
 if TYPE_CHECKING:
     from ..tradeoff.depth import Depths
@@ -149,8 +148,7 @@ def _write(folder: Path, document: dict[str, Any], results: list[Measured], deep
         "errors": {name: values.tolist() for name, values in deep.errors.items()},
         "intervals": deep.intervals.tolist(),
     }
-    with atomic_path(folder / "tradeoff.json") as path:
-        path.write_text(json.dumps(plain(document), indent=1, ensure_ascii=False), "utf-8")
+    save_json(folder / "tradeoff.json", document)
     with (
         atomic_path(folder / "tradeoff.csv") as path,
         path.open("w", newline="", encoding="utf-8") as file,

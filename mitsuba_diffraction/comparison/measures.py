@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -144,20 +143,3 @@ def regions(
         "other": other,
         "edge": ~(both | shadow | other | background),
     }
-
-
-def as_json(document: Any) -> str:
-    """JSON, with null for NaN."""
-
-    def plain(value: Any) -> Any:
-        if isinstance(value, Difference):
-            return plain(asdict(value))
-        if isinstance(value, dict):
-            return {key: plain(item) for key, item in value.items()}
-        if isinstance(value, list | tuple):
-            return [plain(item) for item in value]
-        if isinstance(value, float) and not math.isfinite(value):
-            return None
-        return value
-
-    return json.dumps(plain(document), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
