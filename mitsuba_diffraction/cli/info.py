@@ -12,7 +12,6 @@ from .heights_options import add_heights_options, load_options, was_given
 from .progress import Bar
 from .report import lines_of, plain
 
-_EXR = b"\x76\x2f\x31\x01"
 _MESHES = (".ply", ".obj", ".serialized")
 
 
@@ -54,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
 def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     from ..files.heights import is_recipe
     from ..files.raw import existing_file
+    from ..files.table_exr import is_table
 
     existing_file(file)
     if is_recipe(file):
@@ -61,20 +61,10 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     if file.suffix.lower() in _MESHES:
         _refuse_heights_options(args, "a mesh")
         return _mesh(file)
-    if _is_table(file):
+    if is_table(file):
         _refuse_heights_options(args, "a table")
         return _table(file)
     return _heights(file, args)
-
-
-def _is_table(file: Path) -> bool:
-    """Whether the file is an EXR with a table's attribute, of any version, damaged or not."""
-    from ..files.table_exr import read_document
-
-    with file.open("rb") as stream:
-        if stream.read(4) != _EXR:
-            return False
-    return read_document(file) is not None
 
 
 def _refuse_heights_options(args: argparse.Namespace, what: str) -> None:

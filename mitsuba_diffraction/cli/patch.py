@@ -36,11 +36,11 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
     """
     from ..files.heights import is_recipe, load_heights
     from ..files.recipes import Recipe
-    from ..files.table_exr import read_document
+    from ..files.table_exr import is_table
 
     options = load_options(args)
     source = args.source
-    if source.suffix.lower() == ".exr" and source.is_file() and read_document(source) is not None:
+    if is_table(source):
         raise DiffractionError(
             f"'{source}' is a table; this needs the heights it was made of, or their recipe"
         )

@@ -77,6 +77,7 @@ def files_of(scene: Path, given: Mapping[str, str] | None = None) -> list[Path]:
     scene : an XML file.
     given : values that are set.
     """
+    from ..files.heights import is_recipe
     from ..files.recipes import Recipe
 
     values = {name: value or "" for name, value in (parameters_of(scene, given) or {}).items()}
@@ -88,7 +89,7 @@ def files_of(scene: Path, given: Mapping[str, str] | None = None) -> list[Path]:
         if file in found or not file.is_file():
             continue
         found[file] = None
-        if file.suffix.lower() == ".toml":
+        if is_recipe(file):
             waiting += Recipe.load(file).sources
         if file.suffix.lower() != ".xml":
             continue

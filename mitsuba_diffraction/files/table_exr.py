@@ -27,6 +27,8 @@ from ..tables.table import FORMAT_VERSION, DiffractionTable
 from .atomic import atomic_path
 from .native import native_messages
 
+#: What every EXR begins with.
+EXR_BEGINS = b"\x76\x2f\x31\x01"
 #: The attribute with everything but the coefficients. One string: OpenEXR keeps numbers as floats.
 ATTRIBUTE = "mitsuba_diffraction"
 
@@ -149,6 +151,17 @@ def _table(path: str | os.PathLike[str], document: dict[str, Any], part: int) ->
         crop=_tuple(document.get("crop")),
         **plain,
     )
+
+
+def is_table(path: str | os.PathLike[str]) -> bool:
+    """Whether a file is an EXR with a table's attribute, of any version, damaged or not."""
+    try:
+        with open(path, "rb") as stream:
+            if stream.read(len(EXR_BEGINS)) != EXR_BEGINS:
+                return False
+    except (OSError, ValueError):
+        return False  # whoever reads it says why it cannot be
+    return read_document(path) is not None
 
 
 def read_document(path: str | os.PathLike[str]) -> dict[str, Any] | None:

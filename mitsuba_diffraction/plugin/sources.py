@@ -14,11 +14,11 @@ import numpy as np
 from .. import gratings
 from ..errors import DiffractionError, DiffractionWarning
 from ..files.cache import cached_table, content_key, loaded_table
-from ..files.heights import load_heights
+from ..files.heights import is_recipe, load_heights
 from ..files.options import LoadOptions
 from ..files.raw import existing_file
 from ..files.recipes import Recipe
-from ..files.table_exr import read_document
+from ..files.table_exr import is_table
 from ..heightfield import HeightField
 from ..tables.table import DiffractionTable
 from .session import note_table, restricted_arguments, timed
@@ -46,7 +46,7 @@ def table_of_file(
     asked : parameters of `DiffractionTable.build` that the scene sets.
     height_scale : the largest factor on the heights that is asked for.
     """
-    if must_be_table or (path.suffix.lower() == ".exr" and _is_table(path)):
+    if must_be_table or is_table(path):
         table = loaded_table(path)
         _check_agreement(path, table, options, asked)
         if height_scale > table.height_scale_max:
@@ -54,7 +54,7 @@ def table_of_file(
                 f"height_scale={height_scale:g} is beyond the table's "
                 f"{table.height_scale_max:g}; give the height field instead of the table"
             )
-    elif path.suffix.lower() == ".toml":
+    elif is_recipe(path):
         recipe = Recipe.load(path)
         table = _built(
             _recipe_digest(recipe, options),
@@ -73,7 +73,7 @@ def table_of_file(
     return table
 
 
-def heights_of_file(path: Path, is_table: bool, options: LoadOptions) -> HeightField:
+def heights_of_file(path: Path, must_be_table: bool, options: LoadOptions) -> HeightField:
     """The heights that a scene names; the first of a recipe's several.
 
     Raises
@@ -81,12 +81,12 @@ def heights_of_file(path: Path, is_table: bool, options: LoadOptions) -> HeightF
     DiffractionError
         If it names a table, which does not hold them.
     """
-    if is_table or (path.suffix.lower() == ".exr" and _is_table(path)):
+    if must_be_table or is_table(path):
         raise DiffractionError(
             f"'{path}' is a table and does not hold the heights that it was made of; give the "
             "scene the height field instead"
         )
-    if path.suffix.lower() == ".toml":
+    if is_recipe(path):
         return Recipe.load(path).fields(options)[0]
     return load_heights(path, options)
 
@@ -141,10 +141,6 @@ def _built(
 def _warn(table: DiffractionTable) -> None:
     for line in table.source.get("warnings", ()):
         warnings.warn(line, DiffractionWarning, stacklevel=2)
-
-
-def _is_table(path: Path) -> bool:
-    return read_document(path) is not None
 
 
 def _file_digest(path: Path, options: LoadOptions) -> str:
