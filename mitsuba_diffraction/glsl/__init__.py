@@ -18,6 +18,7 @@ target       a picture to draw into
 timing       how long fragments take
 viewer       a window on a scene (extra `view`)
 panel        its panel
+screenshots  numbered files of what it shows
 navigation   the camera and the light, moved by hand
 """
 

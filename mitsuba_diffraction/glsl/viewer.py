@@ -11,15 +11,14 @@ from typing import Any
 import moderngl_window
 import numpy as np
 from imgui_bundle import imgui
-from PIL import Image
 
 from ..colour import encode_srgb
 from ..comparison.progressive import Progressive
 from ..errors import DiffractionError
-from ..files.atomic import atomic_path
 from .navigation import Orbit, dragged
 from .panel import TITLE, PanelWindow
 from .renderer import Renderer
+from .screenshots import write_screenshot
 from .source import DOCUMENTED, METHODS
 
 HELP = (
@@ -170,8 +169,7 @@ class Viewer(PanelWindow):
         finally:
             target.release()
         width, height = self.wnd.fbo.size
-        path = self._free("view", ".png")
-        _write_png(found.reshape(height, width, 3)[::-1], path)
+        path = write_screenshot(found.reshape(height, width, 3)[::-1], self.folder, "view")
         self.message = f"written: {path}"
         return path
 
@@ -190,15 +188,9 @@ class Viewer(PanelWindow):
         self.message = f"path tracing: {tracing.done} of {tracing.spp} samples"
         if tracing.finished:
             self.tracing = None
-            path = self._free("view_path", ".png")
-            _write_png(encode_srgb(tracing.image * 2.0**self.stops), path)
+            shown = encode_srgb(tracing.image * 2.0**self.stops)
+            path = write_screenshot(shown, self.folder, "view_path")
             self.message = f"written: {path} (direct light, {tracing.spp} samples)"
-
-    def _free(self, stem: str, suffix: str) -> Path:
-        number = 0
-        while (path := self.folder / f"{stem}_{number:03d}{suffix}").exists():
-            number += 1
-        return path
 
     # ---------------------------------------------------------------- events
 
@@ -316,9 +308,3 @@ def open_viewer(kind: type[Viewer], arguments: list[str]) -> Viewer:
             "use ssh -X, or render pictures with 'compare'"
         ) from error
     return viewer
-
-
-def _write_png(shown: Any, path: Path) -> None:
-    eight_bits = (np.clip(shown, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
-    with atomic_path(path) as temporary:
-        Image.fromarray(eight_bits).save(temporary)
