@@ -11,7 +11,7 @@ from mitsuba_diffraction.cli.scene_parameters import parameters_of
 from mitsuba_diffraction.files.recipes import Recipe
 
 SCENES = Path(__file__).resolve().parent.parent / "scenes"
-SUNNY = ("sphere", "snake", "xenopeltis")
+LARGE = ("sphere", "snake", "xenopeltis")
 STUDIO = ("cd", "cd_window", "grating", "grating_window", "material_ball", "own_mesh", "scales")
 SMALL = {"spp": "4", "resx": "48", "resy": "40"}
 
@@ -26,7 +26,7 @@ def _render(name: str, **parameters: str) -> np.ndarray:
     return np.array(mi.render(scene, seed=1))
 
 
-@pytest.mark.parametrize("name", ["plate", *SUNNY])
+@pytest.mark.parametrize("name", ["plate", *LARGE])
 @pytest.mark.usefixtures("variant")
 def test_it_renders_at_its_defaults(name: str) -> None:
     image = _render(name)
@@ -47,7 +47,7 @@ def gentle(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {"patch": str(file), "pixel_size": str(field.pixel_size[0]), "coherence_width": "10"}
 
 
-@pytest.mark.parametrize("name", [*STUDIO, "plate", *SUNNY])
+@pytest.mark.parametrize("name", [*STUDIO, "plate", *LARGE])
 def test_its_patch_is_a_recipe(name: str) -> None:
     defaults = parameters_of(SCENES / f"{name}.xml")
     assert defaults is not None

@@ -70,12 +70,13 @@ PICTURES = (
     ),
     _scene(
         "xenopeltis", "A sunbeam snake",
-        "*Xenopeltis unicolor*: few large smooth scales over dark pigment.",
+        "*Xenopeltis unicolor*: few large smooth scales over dark pigment. A large light, here a "
+        "window, makes a sheen along the whole body.",
     ),
     _scene(
-        "xenopeltis_room", "The sunbeam snake under a window",
-        "A large light makes a sheen along the whole body of what the sun shows as spots.",
-        "-D light=room.xml", "xenopeltis",
+        "xenopeltis_sun", "The sunbeam snake in the sun",
+        "The same scales, lit from one direction: colours shrink to spots.",
+        "-D light=daylight.xml", "xenopeltis",
     ),
     Picture(
         "gallery", "turning", "The snake turns",

@@ -56,7 +56,12 @@ def render_snakes(
         output = folder / f"{name}.jpg"
         with tempfile.TemporaryDirectory() as temporary:
             png = Path(temporary, "picture.png")
-            values = {"sun_azimuth": azimuth, "resx": size[0], "resy": size[1]}
+            values = {
+                "light": "daylight.xml",
+                "sun_azimuth": azimuth,
+                "resx": size[0],
+                "resy": size[1],
+            }
             defined = [part for key, value in values.items() for part in ("-D", f"{key}={value}")]
             with contextlib.redirect_stdout(io.StringIO()):  # it would name the temporary file
                 code = command(["render", str(file), "-o", str(png), "-s", str(spp), *defined])

@@ -12,7 +12,7 @@ from mitsuba_diffraction.figures import snakes
 
 # Takes the parameters that the snakes' scenes have; a white sky all around.
 SCENE = """<scene version="3.0.0">
-  <default name="sun_azimuth" value="0"/>
+  <default name="sun_azimuth" value="0"/><default name="light" value="it"/>
   <default name="resx" value="64"/><default name="resy" value="64"/>
   <integrator type="path"/>
   <sensor type="perspective">
@@ -21,7 +21,8 @@ SCENE = """<scene version="3.0.0">
     </film>
   </sensor>
   <emitter type="constant"><spectrum name="radiance" value="1"/></emitter>
-  <shape type="sphere"><transform name="to_world"><rotate z="1" angle="$sun_azimuth"/></transform>
+  <shape type="sphere" id="$light">
+    <transform name="to_world"><rotate z="1" angle="$sun_azimuth"/></transform>
   </shape>
 </scene>
 """
