@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..colour import linear_srgb, response
+from ..files.bound_cache import cached_bound
 from ..plugin.traversal import children
 from ..tables.table import DiffractionTable
-from .packing import pack_conductor
+from .packing import pack_bounds, pack_conductor
 from .textures import Packed, Texture, Uniform, as_half
 
 Array = NDArray[np.float64]
@@ -86,6 +88,14 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
             pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)
         return Material(pigment, two_sided, bsdf, _axis(bsdf.orientation))
     return Material(_diffuse(bsdf, omissions, name, light), two_sided)
+
+
+def pack_albedo_bounds(material: Material, factors: Sequence[float] = (1.0,)) -> Packed:
+    """The bounds that conserve its energy, at its height scale times these factors."""
+    if material.bsdf is None or not material.bsdf.energy_conserving:
+        return pack_bounds(None)
+    own = height_scale(material)
+    return pack_bounds([cached_bound(material.table, own * factor) for factor in factors])
 
 
 def pack_surface(material: Material) -> Packed:

@@ -140,8 +140,10 @@ def pack_responses(lights: Sequence[tuple[NDArray[np.float64], NDArray[np.float6
     Parameters
     ----------
     lights : of each, wavelengths (n,) in nm and its spectrum relative to D65 of luminance 1 there,
-        (n,) or, from a renderer that knows three colours only, (n, 3).
+        (n,) or, from a renderer that knows three colours only, (n, 3). Without lights there is
+        one that is dark.
     """
+    lights = lights or [(np.array([360.0, 830.0]), np.zeros(2))]
     k = np.linspace(*WAVENUMBERS, _RESPONSES)
     lam = 2e3 * np.pi / k
     # per nm to per µm; the loop's variable is k, and s̄/λ² dλ = s̄/2π dk

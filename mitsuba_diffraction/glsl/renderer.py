@@ -20,7 +20,7 @@ from .context import (
     set_uniforms,
 )
 from .lights import Light, light_definitions
-from .materials import Material, height_scale, pack_surface
+from .materials import Material, height_scale, pack_albedo_bounds, pack_surface
 from .packing import pack_bounds, pack_responses
 from .prepared import Prepared, window
 from .scene import RealtimeScene, load, read_scene
@@ -202,12 +202,7 @@ class Renderer:
             self.context.release()
 
     def _common(self, material: Material) -> Packed:
-        packed = pack_surface(material)
-        if material.bsdf is None:
-            return packed | pack_bounds(None)
-        if not material.bsdf.energy_conserving:
-            return packed | pack_bounds(None)
-        return packed | pack_bounds([cached_bound(material.table, height_scale(material))])
+        return pack_surface(material) | pack_albedo_bounds(material)
 
     def prepared(self, method: str) -> Prepared:
         """A method's tables and programs, uploaded when it is first wanted.
@@ -232,8 +227,7 @@ class Renderer:
             if self._responses is not None:
                 self._responses.release()
             pairs = [(light.wavelengths, light.spectrum) for light in self.lights]
-            none = (np.array([360.0, 830.0]), np.zeros(2))
-            self._responses = Bindings(self.context, pack_responses(pairs or [none]))
+            self._responses = Bindings(self.context, pack_responses(pairs))
             self._lit_by = lit_by
         self._responses.use(program, unit)
 

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from ..colour import encode_srgb
 from ..errors import DiffractionError
-from ..files.bound_cache import cached_bound
 from ..glsl.lights import light_definitions
-from ..glsl.materials import Material, height_scale, pack_surface
-from ..glsl.packing import pack_bounds, pack_responses
+from ..glsl.materials import height_scale, pack_albedo_bounds, pack_surface
+from ..glsl.packing import pack_responses
 from ..glsl.scene import RealtimeScene
 from ..glsl.source import fragment_source, vertex_source
 from ..glsl.textures import Packed, Texture
@@ -76,7 +75,8 @@ def web_scene(
     for number, surface in enumerate(scene.surfaces):
         progress(number, len(scene.surfaces), f"packing {surface.name}")
         material = surface.material
-        common = pack_surface(material) | _bounds(material)
+        # at all height scales that the slider offers
+        common = pack_surface(material) | pack_albedo_bounds(material, [2.0**n for n in OCTAVES])
         entry: dict[str, Any] = {
             "name": surface.name,
             "mesh": sections_of(packed_mesh(surface.vertices), sections.add),
@@ -89,9 +89,8 @@ def web_scene(
             entry["table"] = next(n for n, t in enumerate(tables) if t is material.table)
         surfaces.append((entry, common))
     lights = scene.lighting.lights
-    none = (np.array([360.0, 830.0]), np.zeros(2))
     pairs = [(light.wavelengths, light.spectrum) for light in lights]
-    responses = _parts(pack_responses(pairs or [none]), sections)
+    responses = _parts(pack_responses(pairs), sections)
 
     room = (MAX_BYTES - _HEADER) // 4 * 3 - sections.nbytes
     shown, packed, left_out = _fitted(methods, tables, room, progress)
@@ -159,14 +158,6 @@ def _fitted(
 
 def _worst(losses: Sequence[tuple[float, float]]) -> tuple[float, float]:
     return max(mean for mean, _ in losses), max(most for _, most in losses)
-
-
-def _bounds(material: Material) -> Packed:
-    """Bounds of the albedo at all height scales that the slider offers."""
-    if material.bsdf is None or not material.bsdf.energy_conserving:
-        return pack_bounds(None)
-    own = height_scale(material)
-    return pack_bounds([cached_bound(material.table, own * 2.0**n) for n in OCTAVES])
 
 
 def _parts(packed: Packed, sections: Sections, done: Any = None) -> dict[str, Any]:
