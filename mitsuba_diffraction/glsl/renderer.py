@@ -20,13 +20,13 @@ from .context import (
     set_uniforms,
 )
 from .lights import Light, light_definitions
-from .materials import Material, height_scale, pack_albedo_bounds, pack_surface
+from .materials import height_scale, pack_albedo_bounds, pack_surface
 from .packing import pack_bounds, pack_responses
 from .prepared import Prepared, window
 from .scene import RealtimeScene, load, read_scene
 from .source import LIGHTS
 from .target import Target
-from .textures import Packed, Uniform
+from .textures import Uniform
 
 Image = NDArray[np.float32]
 
@@ -65,7 +65,8 @@ class Renderer:
         check_version(self.context)
         self._buffers = [self.context.buffer(s.vertices.tobytes()) for s in self.scene.surfaces]
         self.bindings = [
-            Bindings(self.context, self._common(s.material)) for s in self.scene.surfaces
+            Bindings(self.context, pack_surface(s.material) | pack_albedo_bounds(s.material))
+            for s in self.scene.surfaces
         ]
         self._methods: dict[str, Prepared] = {}
         self._responses: Bindings | None = None
@@ -200,9 +201,6 @@ class Renderer:
             self._responses.release()
         if self._own_context:
             self.context.release()
-
-    def _common(self, material: Material) -> Packed:
-        return pack_surface(material) | pack_albedo_bounds(material)
 
     def prepared(self, method: str) -> Prepared:
         """A method's tables and programs, uploaded when it is first wanted.
