@@ -74,18 +74,7 @@ def brdf_map(
     bands = Bands.of(wavelength_range, step, wavelength)
     check_illuminant(illuminant)
     check_map(bands, resolution, samples, spectral)
-    if not (mi.is_spectral or mi.is_rgb) or mi.is_polarized or "scalar" in mi.variant():
-        raise DiffractionError(
-            f"variant '{mi.variant()}' cannot make a map; use llvm_ad_spectral, llvm_ad_rgb, "
-            "cuda_ad_spectral or cuda_ad_rgb"
-        )
-    if mi.is_rgb and (
-        (bands.low, bands.high) != (SHORTEST, LONGEST) or spectral or illuminant != "D65"
-    ):
-        raise DiffractionError(
-            f"variant '{mi.variant()}' knows only the colours of the whole spectrum in daylight; "
-            "leave wavelengths, bands and illuminant out, or use llvm_ad_spectral"
-        )
+    _check_variant(bands, illuminant, spectral)
     require_loaded_llvm()
     table = getattr(bsdf, "table", None)
     if table is not None and bands.low < table.wavelength_range[0]:
@@ -117,6 +106,22 @@ def brdf_map(
         samples=samples,
         lobe=0.0 if table is None else NEAR / (table.sigma * float(wavenumber(bands.high))),
     )
+
+
+def _check_variant(bands: Bands, illuminant: str, spectral: bool) -> None:
+    """Refuse a variant that cannot make such a map."""
+    if not (mi.is_spectral or mi.is_rgb) or mi.is_polarized or "scalar" in mi.variant():
+        raise DiffractionError(
+            f"variant '{mi.variant()}' cannot make a map; use llvm_ad_spectral, llvm_ad_rgb, "
+            "cuda_ad_spectral or cuda_ad_rgb"
+        )
+    if mi.is_rgb and (
+        (bands.low, bands.high) != (SHORTEST, LONGEST) or spectral or illuminant != "D65"
+    ):
+        raise DiffractionError(
+            f"variant '{mi.variant()}' knows only the colours of the whole spectrum in daylight; "
+            "leave wavelengths, bands and illuminant out, or use llvm_ad_spectral"
+        )
 
 
 def check_map(bands: Bands, resolution: int, samples: int | None, spectral: bool) -> None:
