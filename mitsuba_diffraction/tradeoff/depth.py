@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..heightfield import HeightField
+from ..progress import Progress, silent
 from ..tables.table import DiffractionTable, reach_of
 
 #: Terms of the source documents' shaders.
@@ -37,9 +37,7 @@ class Depths:
     intervals: NDArray[np.int64]
 
 
-def measure_depths(
-    count: int, progress: Callable[[int, int, str], None] = lambda done, total, text: None
-) -> Depths:
+def measure_depths(count: int, progress: Progress = silent) -> Depths:
     """From 1 nm to 20 µm, `count` depths, on one rough patch of many slopes."""
     shape = _rough()
     depths = np.geomspace(1e-3, 20.0, count)
