@@ -6,6 +6,7 @@ aligned, so that one packet load fetches them: this alignment alone is worth a f
 
 from __future__ import annotations
 
+import math
 import weakref
 from typing import Any
 
@@ -23,6 +24,10 @@ from .series import inner, packet_size, packets, pad, padded, series_of
 
 #: Look-ups of more taps run through their rows in a loop instead of one long program.
 _UNROLLED_TAPS = 36
+#: Taps on an axis whose Gaussians follow from each other; more may run through a loop, as functions.
+_LONGEST_RATIOS = 6
+#: Exponents up to which the first of them is far from the smallest number there is.
+_SHALLOW = 30.0
 #: Dr.Jit's indices are 32 bits wide.
 _MOST_PACKETS = 2**31
 
@@ -187,7 +192,15 @@ def _taps(position: Any, last: int, taps: int, exponent: float) -> tuple[Any, An
     # Frequencies beyond the bins see the zeros at the margin, which is as wide as the taps
     index = mi.UInt32(index_between(first + last, 0.0, 2.0 * last + 1 - taps))
     offset = position - first
-    return index, lambda n: dr.exp2(_log2(exponent) * dr.square(offset - n))
+    if taps > _LONGEST_RATIOS or exponent * (0.5 * taps) ** 2 > _SHALLOW:
+        return index, lambda n: dr.exp2(_log2(exponent) * dr.square(offset - n))
+    # exp(−e(Δ − n)²) of n, n + 1, …: their ratios are a geometric series
+    weights = [dr.exp2(_log2(exponent) * dr.square(offset))]
+    ratio = dr.exp2(_log2(exponent) * dr.fma(-2.0, offset, 1.0))
+    while len(weights) < taps:
+        weights.append(weights[-1] * ratio)
+        ratio = ratio * math.exp(-2.0 * exponent)
+    return index, weights.__getitem__
 
 
 def _log2(exponent: float) -> float:

@@ -69,10 +69,11 @@ class Tabulated:
         parabola = np.linalg.inv(t[:, None] ** np.arange(3))
         # Without the factor they fade with as κ → 0, where a parabola would lose it
         plain = expansion.weights(kappa) / expansion.fading(kappa)[..., None]
-        functions = np.einsum("pn,cnt->cpt", parabola, plain)
-        order_0 = np.einsum("pn,cnk->cpk", parabola, table.centre(kappa))
-        self._functions = upload(mi.Float, pad(functions.astype(np.float32), self._terms))
-        self._order_0 = upload(mi.Float, pad(order_0.astype(np.float32), padded(self._components)))
+        # one record a cell, so that few packets fetch all of it
+        both = np.concatenate([plain, table.centre(kappa)], axis=-1)
+        record = np.einsum("pn,cnt->cpt", parabola, both).reshape(len(start), -1)
+        self._floats = -(-record.shape[1] // PACKET) * PACKET
+        self._record = upload(mi.Float, pad(record.astype(np.float32), self._floats))
 
     def at(self, kappa: Any) -> tuple[Any, list[Any], list[Any]]:
         """Interval, weights of a bin's terms, and order 0: its power, or the parts of a_0."""
@@ -81,20 +82,19 @@ class Tabulated:
         lower = index_between(dr.floor(position), 0.0, last)
         t = dr.clip(position - lower, 0.0, 1.0)
         cell = mi.UInt32(lower)
-        weights = self._parabolas(self._functions, cell, t, self._terms)
-        centre = self._parabolas(self._order_0, cell, t, padded(self._components))
+        values = load(self._record, cell, mi.ArrayXf, self._floats)
+        count = self._expansion.terms + self._components
+        a, b, c = (values[n * count : (n + 1) * count] for n in range(3))
+        found = [dr.fma(dr.fma(z, t, y), t, x) for x, y, z in zip(a, b, c, strict=True)]
+        weights, centre = found[: -self._components], found[-self._components :]
         offset = dr.minimum(kappa * (1.0 / self._expansion.length), 1.0)
         factor = offset if self._expansion.kind == "amplitude" else dr.square(offset)
         interval = mi.UInt32(0)
         if self._expansion.intervals > 1:
             interval = cell // self._cells
             factor = dr.select(interval == 0, factor, 1.0)
-        return interval, [w * factor for w in weights], centre[: self._components]
-
-    def _parabolas(self, source: Any, cell: Any, t: Any, count: int) -> list[Any]:
-        values = load(source, cell, mi.ArrayXf, 3 * count)
-        a, b, c = (values[n * count : (n + 1) * count] for n in range(3))
-        return [dr.fma(dr.fma(z, t, y), t, x) for x, y, z in zip(a, b, c, strict=True)]
+        weights = [w * factor for w in weights]
+        return interval, weights + [mi.Float(0.0)] * (self._terms - len(weights)), centre
 
 
 def series_of(table: DiffractionTable) -> Recurrence | Tabulated:
