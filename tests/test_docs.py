@@ -17,7 +17,7 @@ from PIL import Image
 import mitsuba_diffraction as md
 from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.cli.scene_parameters import parameters_of
-from mitsuba_diffraction.meshes.__main__ import _parser as meshes_parser
+from mitsuba_diffraction.meshes.__main__ import build_parser as meshes_parser
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = Path(md.__file__).parent

@@ -135,7 +135,7 @@ def _write_png(path: Path, colours: NDArray[np.float64]) -> None:
         Image.fromarray(np.round(colours * 255).astype(np.uint8)).save(temporary, optimize=True)
 
 
-def _parser() -> argparse.ArgumentParser:
+def build_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="python -m mitsuba_diffraction.meshes", description=__doc__
     )
@@ -193,7 +193,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    args = _parser().parse_args(arguments)
+    args = build_parser().parse_args(arguments)
     try:
         args.write(args)
     except DiffractionError as error:

@@ -24,7 +24,7 @@ from .series import inner, packet_size, packets, pad, padded, series_of
 
 #: Look-ups of more taps run through their rows in a loop instead of one long program.
 _UNROLLED_TAPS = 36
-#: Taps on an axis whose Gaussians follow from each other; more may run through a loop, as functions.
+#: Taps on an axis whose Gaussians follow from each other; more may run in a loop, as functions.
 _LONGEST_RATIOS = 6
 #: Exponents up to which the first of them is far from the smallest number there is.
 _SHALLOW = 30.0

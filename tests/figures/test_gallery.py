@@ -14,7 +14,7 @@ from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.cli.scene_parameters import parameters_of
 from mitsuba_diffraction.figures import gallery, markers
 from mitsuba_diffraction.figures.jpeg import write_jpeg
-from mitsuba_diffraction.meshes.__main__ import _parser as meshes_parser
+from mitsuba_diffraction.meshes.__main__ import build_parser as meshes_parser
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
