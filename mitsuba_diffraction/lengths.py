@@ -30,7 +30,7 @@ def pixel_size_of(value: PixelSize | None, where: str = "pixel_size") -> tuple[f
     DiffractionError
         If it is none of these; `where` names the parameter.
     """
-    if _is_auto(value):
+    if is_auto(value):
         return None
     expected = (
         f"{where}: expected one length or a pair (dx, dy) in µm, each from {SHORTEST_PIXEL:g} "
@@ -53,7 +53,7 @@ def height_of(value: Height | None, where: str = "max_height") -> float | None:
     DiffractionError
         If it is no such height; `where` names the parameter.
     """
-    if _is_auto(value):
+    if is_auto(value):
         return None
     numbers_ = _numbers_of(value)
     if numbers_ is None or len(numbers_) != 1 or not 0 < numbers_[0] <= LONGEST_HEIGHT:
@@ -64,7 +64,8 @@ def height_of(value: Height | None, where: str = "max_height") -> float | None:
     return numbers_[0]
 
 
-def _is_auto(value: object) -> bool:
+def is_auto(value: object) -> bool:
+    """Whether a value is left to the file."""
     return value is None or (isinstance(value, str) and value.strip().lower() == "auto")
 
 

@@ -217,3 +217,48 @@ def test_python_blocks_run(page, inputs, monkeypatch, some_variant):
     monkeypatch.chdir(inputs)
     for text in blocks(page, "python"):
         exec(text, {})
+
+
+def test_patches_lie_on_shapes_as_the_page_says():
+    import mitsuba as mi
+
+    mi.set_variant("scalar_rgb")
+
+    def tangent(shape: str, outside: list[float]) -> np.ndarray:
+        scene = mi.load_dict({"type": "scene", "shape": {"type": shape}})
+        towards = -np.sign(outside) * (np.abs(outside) > 1)  # along the axis that is far away
+        along = np.array(scene.ray_intersect(mi.Ray3f(outside, list(towards))).dp_du)
+        return along / np.linalg.norm(along)
+
+    rows = {
+        cells[1].strip(): cells[2] for row in PAGES["docs/own-scene.md"].splitlines()
+        if len(cells := row.split("|")) == 4
+    }  # fmt: skip
+    faces = {
+        "+y on top (+z)": ([0.1, 0.2, 3], [0, 1, 0]),
+        "on the side +x": ([3, 0.1, 0.2], [0, 1, 0]),
+        "and −x": ([-3, 0.1, 0.2], [0, 1, 0]),
+        "−y below (−z)": ([0.1, 0.2, -3], [0, -1, 0]),
+        "−x on the side +y": ([0.1, 3, 0.2], [-1, 0, 0]),
+        "+z on the side −y": ([0.1, -3, 0.2], [0, 0, 1]),
+    }
+    for words, (outside, expected) in faces.items():
+        assert words in rows["`cube`"]
+        np.testing.assert_allclose(tangent("cube", outside), expected, atol=1e-5)
+    assert rows["`rectangle`"].strip() == "+x"
+    np.testing.assert_allclose(tangent("rectangle", [0.3, 0.2, 3]), [1, 0, 0], atol=1e-5)
+    assert "outwards" in rows["`disk`"]
+    np.testing.assert_allclose(tangent("disk", [0.3, 0.4, 3]), [0.6, 0.8, 0], atol=1e-5)
+    assert "around the z axis, eastwards" in rows["`sphere`"]
+    np.testing.assert_allclose(tangent("sphere", [3, 0, 0.5]), [0, 1, 0], atol=1e-5)
+    assert "around" in rows["`cylinder`"]
+    np.testing.assert_allclose(tangent("cylinder", [3, 0, 0.5]), [0, 1, 0], atol=1e-5)
+
+
+def test_keys_of_recipes_are_listed():
+    from mitsuba_diffraction.files import recipes
+
+    text = PAGES["docs/own-scene.md"]
+    rows = text[text.index("## Recipes") : text.index("## When")].splitlines()
+    named = {key for row in rows if "|" in row for key in re.findall(r"`(\w+)`", row.split("|")[1])}
+    assert named - {"arguments"} == {*recipes._KEYS} - {"arguments"}

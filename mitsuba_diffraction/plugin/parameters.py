@@ -14,6 +14,7 @@ import mitsuba as mi
 from ..errors import DiffractionError
 from ..files.options import LoadOptions
 from ..heightfield import HeightField
+from ..lengths import is_auto
 from ..tables.table import DiffractionTable
 from .layers import LAYERINGS, Blend, Layering, Transmission
 from .orientation import Constant, Orientation, Textured
@@ -121,6 +122,8 @@ def _table(props: Any, height_scale: float) -> tuple[DiffractionTable, Callable[
             f"give exactly one of {', '.join(SOURCES)}; got {' and '.join(given) or 'none'}"
         )
     asked = {name: props.get(name) for name in TABLE_PARAMETERS if name in props}
+    if is_auto(asked.get("coherence_width", 0.0)):
+        del asked["coherence_width"]
     for name in ("coherence_width", "tolerance"):
         if name in asked:
             asked[name] = _number(props, name, 0.0)

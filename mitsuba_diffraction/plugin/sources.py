@@ -161,6 +161,12 @@ def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
     return content.hexdigest()
 
 
+def _remedy(name: str) -> str:
+    if name == "coherence_width":  # which scenes have as a parameter of their own
+        return "leave it out, or say 'auto' (to a scene: -D coherence_width=auto)"
+    return "leave it out"
+
+
 def _check_agreement(
     path: Path, table: DiffractionTable, options: LoadOptions, asked: Mapping[str, Any]
 ) -> None:
@@ -176,7 +182,7 @@ def _check_agreement(
         if value != own[name] and not (name == "basis" and value == "auto"):
             raise DiffractionError(
                 f"{name}={value} contradicts the table '{path}', which has {name}={own[name]}; "
-                "leave it out, or build another table with 'mitsuba-diffraction precompute'"
+                f"{_remedy(name)}, or build another table with 'mitsuba-diffraction precompute'"
             )
     for name, value in options.given().items():
         raise DiffractionError(

@@ -226,16 +226,24 @@ def test_what_contradicts_a_table_is_refused(some_variant, table_file, parameter
         )
 
 
-def test_what_agrees_with_a_table_is_fine(some_variant, table_file):
+@pytest.mark.parametrize("width", [2.4, "2.4", "auto"])
+def test_what_agrees_with_a_table_is_fine(some_variant, table_file, width):
     loads(
         table=str(table_file),
-        coherence_width=2.4,
+        coherence_width=width,
         coherence="ensemble",
         basis="auto",
         tolerance=1e-3,
         height_scale=1.5,
         pixel_size="auto",
     )()
+
+
+def test_an_automatic_coherence_width_is_the_recipe_s(some_variant, png, tmp_path):
+    recipe = tmp_path / "narrow.toml"
+    lengths = "pixel_size = 0.08\nmax_height = 0.2\n"
+    recipe.write_text(f'source = "{png}"\n{lengths}coherence_width = 2.0\n')
+    assert loads(heightfield=str(recipe), coherence_width="auto")().table.coherence_width == 2.0
 
 
 def test_a_table_for_fewer_wavelengths_than_mitsuba_s_is_refused(some_variant, tmp_path):
