@@ -51,6 +51,7 @@ FIGURES = (
     Figure("eval", _DEFAULT, "`eval` / `roughconductor` (Al)", _ROUGH, "{:.1f}", 0),
     Figure("eval", "diffraction, tolerance 1e-2", "the same, tolerance 1e-2", _ROUGH, "{:.1f}", 0),
     Figure("eval", "principled, metal", "`principled` / `roughconductor`", _ROUGH, "{:.1f}"),
+    Figure("eval", "measured", "`measured` / `roughconductor`", _ROUGH, "{:.0f}"),
     Figure("eval", _DEFAULT, "`eval` / bare gathers of its memory", "× gathers", "{:.2f}", 1),
     Figure("eval", "documents", "the thesis' look-up / `eval`", "× defaults", "{:.0f}", 0),
     Figure("sample", _DEFAULT, "`sample` / `roughconductor` (Al)", _ROUGH, "{:.1f}"),
