@@ -31,6 +31,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--albedo", metavar="OUT", type=path_ending_in(".png", ".pdf", ".svg"),
         help="of a table: plot its raw directional albedo against angle and azimuth",
     )  # fmt: skip
+    parser.add_argument(
+        "--picture", metavar="OUT", type=path_ending_in(".png", ".pdf", ".svg"),
+        help="of heights or a recipe: draw them, their distribution and spectrum, and the light "
+        "that they throw",
+    )  # fmt: skip
     add_heights_options(parser)
     parser.set_defaults(run=run, parser=parser)
 
@@ -43,6 +48,11 @@ def run(args: argparse.Namespace) -> int:
             args.parser.error(f"argument --albedo: '{args.file}' is a {data['kind']}, not a table")
         _plot_albedo(args.file, args.albedo)
         data["albedo plot"] = str(args.albedo)
+    if args.picture is not None:
+        if data["kind"] not in ("height field", "recipe"):
+            args.parser.error(f"argument --picture: '{args.file}' is a {data['kind']}, not heights")
+        _draw(args)
+        data["picture"] = str(args.picture)
     if args.json:
         print(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
     else:
@@ -86,6 +96,21 @@ def _plot_albedo(file: Path, output: Path) -> None:
 
     with atomic_path(output) as temporary:
         albedo_figure(DiffractionTable.load(file)).savefig(temporary, dpi=100)
+
+
+def _draw(args: argparse.Namespace) -> None:
+    from ..figures.patches import patches_figure
+    from ..files.atomic import atomic_path
+    from ..files.heights import is_recipe, load_heights
+    from ..files.recipes import Recipe
+
+    options = load_options(args)
+    if is_recipe(args.file):
+        fields = Recipe.load(args.file).fields(options)
+    else:
+        fields = [load_heights(args.file, options)]
+    with atomic_path(args.picture) as temporary:
+        patches_figure(fields).savefig(temporary, dpi=80)
 
 
 def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:

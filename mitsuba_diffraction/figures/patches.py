@@ -26,8 +26,12 @@ LOOKALIKES = (elaphe_like, xenopeltis_like, cd, dvd)
 
 RED, GREEN, BLUE = 650.0, 550.0, 450.0  # nm
 
-# Width of the second picture, µm: fingers and pits are a few µm long.
+# Width of the second picture, µm, at most: fingers and pits are a few µm long.
 _DETAIL = 16.0
+# Spectral density of a flat patch, below the axes, µm⁴.
+_NOTHING = 1e-12
+# Heights (nm) on either side of the mean, and density (µm⁴), that the axes show at least.
+_HEIGHTS, _DENSITY = 200.0, 1.0
 
 # Light per unit of (u, v) that is drawn black and white: six decades below the mirror's order.
 _DARKEST, _BRIGHTEST = 2e-3, 4.0
@@ -47,7 +51,7 @@ def patches_figure(fields: Sequence[HeightField]) -> Figure:
         others = fields[:1] if field is not fields[0] else []
         _heights(row[0], field, max(field.extent))
         row[0].set_title(field.name, loc="left", fontweight="bold")
-        _heights(row[1], field, _DETAIL)
+        _heights(row[1], field, min(_DETAIL, 0.25 * max(field.extent)))
         _distribution(row[2], field, others)
         _spectrum(row[3], field, others)
         _light(row[4], field)
@@ -70,9 +74,11 @@ def _heights(axes: Axes, field: HeightField, width: float) -> None:
 
 
 def _distribution(axes: Axes, field: HeightField, others: Sequence[HeightField]) -> None:
+    furthest = 1000 * float(np.abs(field.heights - field.heights.mean()).max())
+    limit = max(_HEIGHTS, 1.05 * furthest)
     for one, style in _drawn(field, others):
         heights = (one.heights - one.heights.mean()) * 1000
-        share, edges = np.histogram(heights, bins=68, range=(-200, 200), density=True)
+        share, edges = np.histogram(heights, bins=68, range=(-limit, limit), density=True)
         axes.semilogy((edges[1:] + edges[:-1]) / 2, share, **style)
     axes.set(xlabel="height above the mean (nm)", ylabel="density (1/nm)", ylim=(1e-6, 0.1))
     text = f"rms height {field.rms_height * 1000:.1f} nm\nrms slope {field.rms_slope:.3f}"
@@ -88,8 +94,11 @@ def _spectrum(axes: Axes, field: HeightField, others: Sequence[HeightField]) -> 
             curve = profile(density, one, edges, direction)  # type: ignore[arg-type]
             label = f"along {direction}" if one is field else None
             seen = np.isfinite(curve)
-            axes.loglog(middle[seen], curve[seen], dashes, label=label, **style)
-    axes.set(xlabel="frequency (1/µm)", ylabel="spectral density (µm⁴)", ylim=(1e-9, 1))
+            axes.loglog(
+                middle[seen], np.maximum(curve[seen], _NOTHING), dashes, label=label, **style
+            )
+    axes.set(xlabel="frequency (1/µm)", ylabel="spectral density (µm⁴)", ylim=(1e-9, None))
+    axes.set_ylim(top=max(_DENSITY, axes.get_ylim()[1]))
     axes.legend(fontsize=8, loc="lower left", title=f"{others[0].name} grey" if others else None)
 
 

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from mitsuba_diffraction import DiffractionTable, HeightField
 
@@ -139,6 +140,28 @@ def test_the_albedo_is_plotted(run, table, tmp_path):
     assert ran.code == 0
     assert str(picture) in ran.out
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("depth", [1.0, 0.0], ids=["rough", "flat"])
+def test_heights_are_drawn(run, heights, tmp_path, depth):
+    np.save(heights, depth * np.load(heights))
+    picture = tmp_path / "heights.png"
+    ran = run("info", heights, "--pixel-size", "0.08", "--picture", picture)
+    assert ran.code == 0
+    assert f"picture: {picture}" in " ".join(ran.out.split())
+    with Image.open(picture) as image:
+        assert image.width > 3 * image.height  # a row of panels
+
+
+def test_a_recipe_is_drawn_and_a_table_is_not(run, table, tmp_path):
+    recipe = tmp_path / "grating.toml"
+    text = 'generator = "sinusoidal"\n[arguments]\nperiod = 1.6\ndepth = 0.05\nperiods = 3\n'
+    recipe.write_text(text)
+    assert run("info", recipe, "--picture", tmp_path / "recipe.pdf").code == 0
+    assert (tmp_path / "recipe.pdf").stat().st_size > 1000
+    ran = run("info", table, "--picture", tmp_path / "table.png")
+    assert ran.code == 2
+    assert "is a table, not heights" in ran.err
 
 
 def test_only_a_table_has_an_albedo(run, heights, tmp_path):
