@@ -221,9 +221,9 @@ def test_what_contradicts_a_table_is_refused(some_variant, table_file, parameter
     assert message in text
     (name,) = parameters
     if name in TABLE_PARAMETERS:
-        assert text.endswith(
-            "leave it out, or build another table with 'mitsuba-diffraction precompute'"
-        )
+        assert "; leave it out, or " in text
+        assert text.endswith("or build another table with 'mitsuba-diffraction precompute'")
+        assert ("-D coherence_width=auto" in text) == (name == "coherence_width")
 
 
 @pytest.mark.parametrize("width", [2.4, "2.4", "auto"])
@@ -241,7 +241,7 @@ def test_what_agrees_with_a_table_is_fine(some_variant, table_file, width):
 
 def test_an_automatic_coherence_width_is_the_recipe_s(some_variant, png, tmp_path):
     recipe = tmp_path / "narrow.toml"
-    lengths = "pixel_size = 0.08\nmax_height = 0.2\n"
+    lengths = "pixel_size = 0.08\nmax_height = 0.02\n"
     recipe.write_text(f'source = "{png}"\n{lengths}coherence_width = 2.0\n')
     assert loads(heightfield=str(recipe), coherence_width="auto")().table.coherence_width == 2.0
 
