@@ -7,12 +7,15 @@ import json
 from pathlib import Path
 from typing import Any
 
+from ..errors import DiffractionError
 from .arguments import path_ending_in
 from .heights_options import add_heights_options, load_options, was_given
 from .progress import Bar
 from .report import lines_of, plain
 
 _MESHES = (".ply", ".obj", ".serialized")
+#: Meshes that have to be converted first, to say so instead of looking for heights in them.
+_OTHER_MESHES = (".stl", ".glb", ".gltf", ".fbx", ".dae", ".3ds", ".3mf", ".off", ".blend")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -68,9 +71,15 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     existing_file(file)
     if is_recipe(file):
         return _recipe(file, args)
-    if file.suffix.lower() in _MESHES:
+    if file.suffix.lower() in (*_MESHES, *_OTHER_MESHES):
         _refuse_heights_options(args, "a mesh")
         return _mesh(file)
+    if file.suffix.lower() == ".xml":
+        raise DiffractionError(
+            f"'{file}' is a scene, which `mitsuba-diffraction render` renders; info describes what "
+            "a scene names: tables, heights (images, NPY, text, instrument files), recipes (TOML) "
+            f"and meshes ({', '.join(_MESHES)})"
+        )
     if is_table(file):
         _refuse_heights_options(args, "a table")
         return _table(file)
@@ -145,11 +154,11 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
 def _mesh(file: Path) -> dict[str, Any]:
     import mitsuba as mi
 
-    from ..meshes.tangents import check_tangents, load_mesh
+    from ..meshes.tangents import check_tangents, load_mesh, load_orientation
     from .mitsuba_text import warnings_as_ours
 
     if mi.variant() is None:
         mi.set_variant("scalar_rgb")  # any reads meshes; this one needs neither GPU nor LLVM
     with warnings_as_ours():
-        report = check_tangents(*load_mesh(file))
+        report = check_tangents(*load_mesh(file), load_orientation(file))
     return {"kind": "mesh", **report.summary()}

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from .arguments import number_between, path_ending_in
 from .console import say_warning
 from .output import check_writable
 from .progress import Bar
+
+if TYPE_CHECKING:
+    from ..meshes import TangentReport
 
 _GUIDES = ("smooth", "x", "y", "z", "body")
 _NAMED = 6  # singular points that are named
@@ -53,6 +57,7 @@ def run(args: argparse.Namespace) -> int:
     """Write the mesh, say where its field is singular, and return the exit code."""
     check_writable(args.output)
     from ..meshes import check_tangents, load_mesh, oriented_mesh, write_ply
+    from ..meshes.breaks import BREAK
     from ..meshes.directions import direction_field, turned
     from ..meshes.trimesh import vertex_normals
     from .mitsuba_text import warnings_as_ours
@@ -72,27 +77,39 @@ def run(args: argparse.Namespace) -> int:
         f"{args.output}: {len(mesh.faces)} triangles, patch along {args.along}, "
         f"{'texture coordinates kept' if uv is not None else 'had no texture coordinates'}"
     )
-    print(_places(field.singular, field.indices))
+    report = check_tangents(mesh.positions, mesh.normals, mesh.uv, mesh.faces, mesh.orientation)
+    print(_places(field.singular, field.indices, report))
     print(
         'in the scene: <texture type="mesh_attribute" name="orientation"><string name="name" '
         'value="vertex_orientation"/></texture> within the diffraction BSDF'
     )
-    if uv is None:
-        report = check_tangents(mesh.positions, mesh.normals, mesh.uv, mesh.faces)
-        if not report.usable:
-            say_warning(
-                f"the field turns by over 30 degrees between neighbours on {report.turning:.0%} of "
-                "the surface: use a finer mesh, or another --along"
-            )
+    if report.breaks:
+        say_warning(f"the field {report.breaking()}: {_todo(args.along, report)}")
+    elif report.turns_fast:
+        say_warning(
+            f"the field turns by over {BREAK:g} degrees within triangles on {report.turning:.0%} "
+            "of the surface: use a finer mesh, or another --along"
+        )
     return 0
 
 
-def _places(places: object, indices: object) -> str:
-    """The singular points in one line."""
+def _todo(along: str, report: TangentReport) -> str:
+    """What to do about a field that breaks."""
+    others = " or ".join(guide for guide in ("smooth", "body") if guide != along)
+    todo = f"choose another guide, --along {others}"
+    if report.turns_fast:  # triangles are large beside what the field must turn
+        todo = f"use a finer mesh, or {todo}"
+    return f"colours will show seams there; {todo}"
+
+
+def _places(places: object, indices: object, report: TangentReport) -> str:
+    """The singular points in one line, or that the field has none."""
     import numpy as np
 
     points, turns = np.asarray(places), np.asarray(indices)
     if not len(points):
+        if report.broken > 0:
+            return f"the field has no singular points, but {report.breaking()}"
         return "the field is smooth everywhere"
     named = [
         f"({', '.join(f'{value:.3g}' for value in point)}) {turn:+d}"

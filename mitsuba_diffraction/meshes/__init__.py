@@ -14,6 +14,7 @@ pigment      images of what lies under the skin, and of the ground
 disc         `disc`: a ring whose patch follows the radius
 knot         `knot`: a mesh without texture coordinates
 tangents     whether a mesh has the tangents that a patch needs
+breaks       along how long lines a field of directions breaks
 directions   `direction_field`: a smooth field of directions on any mesh
 oriented     `oriented_mesh`: a mesh whose patch follows such a field
 options      the parameters as options of the command line
@@ -32,7 +33,7 @@ from .oriented import oriented_mesh
 from .piece import piece
 from .scales import Scales
 from .snake import Snake, build
-from .tangents import TangentReport, check_tangents, load_mesh
+from .tangents import TangentReport, check_tangents, load_mesh, load_orientation
 from .trimesh import TriangleMesh, write_ply
 
 __all__ = [
@@ -48,6 +49,7 @@ __all__ = [
     "disc",
     "knot",
     "load_mesh",
+    "load_orientation",
     "oriented_mesh",
     "piece",
     "write_ply",

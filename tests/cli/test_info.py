@@ -134,6 +134,19 @@ def test_a_file_that_is_no_mesh_is_one_line(run, tmp_path, content):
     assert str(file) in run("info", file).failed_in_one_line()
 
 
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("a.stl", "must end in .ply, .obj, .serialized; convert it to PLY or OBJ"),
+        ("a.GLB", "convert it to PLY or OBJ"),
+        ("a.xml", "is a scene, which `mitsuba-diffraction render` renders; info describes"),
+    ],
+)
+def test_files_of_other_kinds_are_answered_with_what_to_do(run, tmp_path, name, said):
+    (tmp_path / name).write_bytes(b"solid")
+    assert said in run("info", tmp_path / name).failed_in_one_line()
+
+
 def test_the_albedo_is_plotted(run, table, tmp_path):
     picture = tmp_path / "albedo.png"
     ran = run("info", table, "--albedo", picture)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 
 import mitsuba as mi
@@ -11,7 +12,7 @@ import pytest
 from mitsuba_diffraction.cli.tangents import _GUIDES
 from mitsuba_diffraction.meshes import TriangleMesh, knot, load_mesh, write_ply
 from mitsuba_diffraction.meshes.directions import GUIDES
-from mitsuba_diffraction.meshes.trimesh import vertex_normals
+from mitsuba_diffraction.meshes.trimesh import grid_faces, vertex_normals
 
 
 def obj_of(path, positions, faces):
@@ -19,6 +20,15 @@ def obj_of(path, positions, faces):
     lines = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in positions]
     lines += [f"f {a} {b} {c}" for a, b, c in faces + 1]
     path.write_text("\n".join(lines))
+
+
+def ring(n, m):
+    """A torus around z of radii 1 and 0.4, without texture coordinates, and its triangles."""
+    i, j = (k.ravel() for k in np.indices((n, m)))
+    out, up = 1 + 0.4 * np.cos(2 * np.pi * j / m), 0.4 * np.sin(2 * np.pi * j / m)
+    places = np.stack([out * np.cos(2 * np.pi * i / n), out * np.sin(2 * np.pi * i / n), up], 1)
+    number = np.pad(np.arange(n * m).reshape(n, m), ((0, 1), (0, 1)), mode="wrap")
+    return places, grid_faces(number)
 
 
 @pytest.fixture
@@ -94,8 +104,6 @@ def test_a_turn_is_counter_clockwise_from_outside(run, ball):
 def test_texture_coordinates_are_kept(run, tmp_path):
     x, y = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 5))
     positions = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
-    from mitsuba_diffraction.meshes.trimesh import grid_faces
-
     faces = grid_faces(np.arange(25).reshape(5, 5))[:, ::-1]
     uv = positions[:, 1::-1] * 3  # u runs along y
     normals = vertex_normals(positions, faces)
@@ -109,6 +117,43 @@ def test_texture_coordinates_are_kept(run, tmp_path):
     turn = np.array(mi.traverse(mesh)["vertex_orientation"]).reshape(-1, 3)
     # from y, where dp/du points, to x
     np.testing.assert_allclose(turn, np.tile([0, -1, 0], (len(turn), 1)), atol=1e-6)
+
+
+def test_a_field_that_breaks_along_lines_is_said_with_their_length(run, here):
+    """Along z, a ring breaks along its top and its bottom, 2 · 2π in all; its size is 2.8."""
+    obj_of(here / "ring.obj", *ring(48, 24))
+    ran = run("tangents", "ring.obj", "-o", "field.ply", "--along", "z")
+    assert ran.code == 0
+    assert "smooth everywhere" not in ran.out
+    assert "no singular points, but breaks (turns by over 60 degrees) along lines of 1" in ran.out
+    assert "warning: the field breaks" in ran.err
+    assert "another guide, --along smooth or body" in ran.err
+    data = json.loads(run("info", "field.ply", "--json").out)
+    assert not data["usable"]
+    # half a cell of 2π · 0.4 / 24 beside the circle of radius 1
+    lines = data["lines along which the direction breaks"]
+    assert lines["length"] == pytest.approx(4 * np.pi, rel=0.06)
+    assert lines["length / mesh size"] == pytest.approx(lines["length"] / 2.8, rel=0.01)
+    assert "breaks" in data["problems"][0]
+    smooth = run("tangents", "ring.obj", "-o", "field.ply")
+    assert "the field is smooth everywhere" in smooth.out
+    assert not smooth.err
+    assert json.loads(run("info", "field.ply", "--json").out)["usable"]
+
+
+def test_triangles_too_coarse_for_a_field_are_said(run, here):
+    """On each end of this cylinder the field runs outwards, within one ring of triangles."""
+    angle = 2 * np.pi * np.arange(24) / 24
+    circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    places = np.concatenate([circle, circle + np.array([0, 0, 2]), [[0, 0, 0], [0, 0, 2]]])
+    here_, there = np.arange(24), (np.arange(24) + 1) % 24
+    faces = [(here_, there, there + 24), (here_, there + 24, here_ + 24),
+             (there, here_, 0 * here_ + 48), (here_ + 24, there + 24, 0 * here_ + 49)]  # fmt: skip
+    obj_of(here / "can.obj", places, np.concatenate([np.stack(f, 1) for f in faces]))
+    ran = run("tangents", "can.obj", "-o", "field.ply", "--along", "z")
+    assert "warning: the field breaks" in ran.err
+    assert "use a finer mesh, or choose another guide" in ran.err
+    assert not json.loads(run("info", "field.ply", "--json").out)["usable"]
 
 
 @pytest.mark.parametrize(
