@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
 from ..plugin.attributes import check_attributes
+from ..plugin.names import name_of
 from .mitsuba_text import plain_text
 from .scene_parameters import check_parameters
 
@@ -78,19 +79,27 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
     if not isinstance(scene, mi.Scene):
         raise DiffractionError(f"'{file}' is not a scene; its outermost element must be <scene>")
     # "Diffraction[" is found inside twosided, blendbsdf and the like, too
-    surfaces = [shape for shape in scene.shapes() if "Diffraction[" in str(shape.bsdf())]
-    for shape in surfaces:
-        check_attributes(shape)
+    surfaces = {
+        number: shape
+        for number, shape in enumerate(scene.shapes())
+        if "Diffraction[" in str(shape.bsdf())
+    }
+    for number, shape in surfaces.items():
+        check_attributes(shape, number)
     _warn_of_missing_uv(surfaces)
     return scene
 
 
-def _warn_of_missing_uv(surfaces: Iterable[Any]) -> None:
+def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
     """Name the meshes on which a patch has no direction: a BSDF itself cannot see its mesh."""
-    lacking = [s.id() for s in surfaces if s.is_mesh() and not s.has_vertex_texcoords()]
+    lacking = [
+        name_of(shape, number)
+        for number, shape in surfaces.items()
+        if shape.is_mesh() and not shape.has_vertex_texcoords()
+    ]
     if lacking:
         warnings.warn(
-            f"no texture coordinates on {', '.join(lacking)}: the patch's direction is arbitrary "
+            f"no texture coordinates on {'; '.join(lacking)}: the patch's direction is arbitrary "
             "there and turns from triangle to triangle; give the mesh directions with "
             "'mitsuba-diffraction tangents', or unwrap it so that u runs the way the patch's x "
             "axis shall",

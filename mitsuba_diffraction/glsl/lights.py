@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..colour import daylight
+from ..plugin.names import name_of
 from .packing import daylight_colour
 
 Array = NDArray[np.float64]
@@ -106,7 +107,7 @@ def _add(found: Lighting, emitter: Any, middle: Array) -> None:
     import mitsuba as mi
 
     kind, parameters = emitter.class_name(), mi.traverse(emitter)
-    name = emitter.id() or kind
+    name = name_of(emitter)
     if kind == "DirectionalEmitter":
         wavelengths, spectrum, towards, _ = _sampled(emitter, middle, 1)
         found.lights.append(Light(name, np.append(towards, 0.0), wavelengths, spectrum))

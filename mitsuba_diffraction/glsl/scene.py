@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..plugin.attributes import check_attributes
+from ..plugin.names import name_of
 from .camera import Camera, read_camera
 from .lights import Lighting, read_lights
 from .materials import Map, Material, diffracts, read_material
@@ -113,10 +114,10 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
     camera, omissions = read_camera(sensors[sensor])
     shown = []
     for number, shape in enumerate(scene.shapes()):
-        name = shape.id() if shape.id() and "unnamed" not in shape.id() else f"shape {number}"
+        name = name_of(shape, number)
         if shape.is_emitter():
             continue  # seen as a light
-        check_attributes(shape)
+        check_attributes(shape, number)
         triangles = triangles_of(shape)
         if triangles is None:
             omissions.append(f"{name} ({shape.class_name()})")

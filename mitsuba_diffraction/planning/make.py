@@ -72,14 +72,14 @@ def look(
     if plan is not None:
         _check_match(session, plan)
     elif not session.tables:
-        names = ", ".join(sorted(name for name, _ in session.bsdfs))
+        names = ", ".join(sorted({name for name, _ in session.bsdfs}))
         raise DiffractionError(
             f"the tables of {names} come from files and stay as they are; give the scene the "
             "height field, or its recipe, to have smaller ones planned"
         )
     seen = trace(scene, sensor(scene), session, paths, seed)
     if not len(seen.light):
-        names = ", ".join(sorted(name for name, _ in session.bsdfs))
+        names = ", ".join(sorted({name for name, _ in session.bsdfs}))
         raise DiffractionError(
             f"none of {paths} paths carries light of a surface that diffracts ({names}): the "
             "camera does not see it lit; check camera and lights, or raise --paths"
@@ -116,7 +116,7 @@ def draft(name: str, loaded: Loaded, tolerance: float, share: float | None = Non
             scale = max(float(dr.slice(dr.max(bsdf.height_scale))) for _, bsdf in mine)
             domain = domain_for(asked, table, scale, share or tolerance)
         tables[key] = PlannedTable(
-            surfaces=sorted(name for name, _ in mine),
+            surfaces=sorted({name for name, _ in mine}),
             name=str(table.source.get("name", "")),
             digest=str(table.source.get("digest", "")),
             domain=domain,
@@ -166,7 +166,9 @@ def load_planned(load: Load, plan: Plan, *, timing: bool = False) -> tuple[Any, 
 def _check_match(session: Session, plan: Plan) -> None:
     if session.tables and set(session.tables) <= set(plan.tables):
         return
-    names = sorted(n for n, bsdf in session.bsdfs if session.key_of(bsdf.table) not in plan.tables)
+    names = sorted(
+        {n for n, bsdf in session.bsdfs if session.key_of(bsdf.table) not in plan.tables}
+    )
     session.close()
     theirs = ", ".join(sorted({t.name for t in plan.tables.values()})) or "nothing"
     raise DiffractionError(

@@ -5,6 +5,7 @@ Contents
 parameters      read from Mitsuba's Properties, checked
 sources         from what a scene names to a table, built once
 attributes      whether a mesh has what its BSDF reads
+names           what messages call an element of a scene
 session         plans to follow and records to keep while a scene loads
 light           what a variant knows of a wavelength; asks the next two
 lookup          a table inside a kernel: `DeviceTable`

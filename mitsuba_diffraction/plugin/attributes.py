@@ -8,14 +8,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import DiffractionError
+from .names import name_of
 
 #: What `meshes.write_ply` calls a field of directions.
 ORIENTATION = "vertex_orientation"
 
+_MADE = "make it with 'mitsuba-diffraction tangents MESH -o FIELD.ply', and use that file"
 _READ = re.compile(r'MeshAttribute\[\s*name = "([^"]+)"')
 
 
-def check_attributes(shape: Any) -> None:
+def check_attributes(shape: Any, number: int | None = None) -> None:
     """Refuse a shape whose BSDF reads a mesh attribute that it lacks.
 
     Mitsuba's kernels would go on with zeros, which turn no patch and colour nothing.
@@ -23,6 +25,7 @@ def check_attributes(shape: Any) -> None:
     Parameters
     ----------
     shape : `mi.Shape` of the variant that is set.
+    number : its place among the scene's shapes, counted from 0, to name one without an id.
 
     Raises
     ------
@@ -32,11 +35,11 @@ def check_attributes(shape: Any) -> None:
     for name in dict.fromkeys(_READ.findall(str(shape.bsdf()))):
         if np.all(shape.has_attribute(name)):
             continue
-        remedy = (
-            "make it with 'mitsuba-diffraction tangents MESH -o FIELD.ply', and use that file"
-            if name == ORIENTATION
-            else "add it to the mesh's file, or correct the name"
-        )
+        if not shape.is_mesh():
+            remedy = "only meshes have any: leave the texture out, or use a mesh"
+        else:
+            added = "add it to the mesh's file, or correct the name"
+            remedy = _MADE if name == ORIENTATION else added
         raise DiffractionError(
-            f"shape '{shape.id()}' has no attribute {name}, which its BSDF reads; {remedy}"
+            f"{name_of(shape, number)} has no attribute {name}, which its BSDF reads; {remedy}"
         )

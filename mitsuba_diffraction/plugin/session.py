@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..tables.table import DiffractionTable
+from .names import own_id
 from .sampling import share_sampler
 
 
@@ -59,7 +60,7 @@ class Session:
     ----------
     tables : key of every table that was built from heights, in the order of loading.
     seconds : that each took to build, with `timing`.
-    bsdfs : every `diffraction` BSDF that was loaded, with its id.
+    bsdfs : every `diffraction` BSDF that was loaded, with its name for people.
     listening : whether calls are recorded at the moment.
     """
 
@@ -152,9 +153,11 @@ def note_table(key: str, table: DiffractionTable) -> None:
             share_sampler(table, _open.sample_like[key])
 
 
-def enrol(bsdf: Any, name: str) -> tuple[Session, int] | None:
-    """Tell the open session of a BSDF; what it records with, if it is to."""
+def enrol(bsdf: Any, given: str) -> tuple[Session, int] | None:
+    """Tell the open session of a BSDF, by its id or else by its heights; what it records with."""
     if _open is None:
         return None
+    heights = bsdf.table.source.get("name") or "heights without a name"
+    name = own_id(given) or f"a diffraction BSDF without id (of {heights})"
     _open.bsdfs.append((name, bsdf))
     return (_open, len(_open.bsdfs) - 1) if _open.recording else None

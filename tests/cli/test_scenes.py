@@ -50,6 +50,24 @@ def test_a_mesh_without_texture_coordinates_is_named(scene_of, bsdf):
 
 
 @pytest.mark.usefixtures("variant")
+def test_shapes_without_id_are_named_by_file_or_place(scene_of):
+    file = scene_of(TRIANGLE + "f 1 2 3\n", BSDF)
+    file.write_text(file.read_text().replace(' id="hide"', ""))
+    with pytest.warns(
+        DiffractionWarning, match=r"coordinates on shape 1 \(the mesh mesh\.obj\): the"
+    ):
+        load_scene(file, {})
+    file.write_text(
+        f'<scene version="3.0.0"><shape type="sphere"/><shape type="sphere">{FOLLOWING}</shape>'
+        "</scene>"
+    )
+    with pytest.raises(
+        DiffractionError, match=r"^shape 2 \(a sphere without id\) has no attribute"
+    ):
+        load_scene(file, {})
+
+
+@pytest.mark.usefixtures("variant")
 @pytest.mark.parametrize(
     ("mesh", "bsdf"),
     [
@@ -67,5 +85,5 @@ def test_no_other_mesh_is(scene_of, mesh, bsdf):
 @pytest.mark.parametrize("bsdf", [FOLLOWING, f'<bsdf type="twosided">{FOLLOWING}</bsdf>'])
 def test_a_mesh_without_the_field_that_turns_the_patch_is_refused(scene_of, bsdf):
     """Kernels would go on with zeros, and not turn it."""
-    with pytest.raises(DiffractionError, match=r"'hide' has no attribute vertex_.* tangents MESH"):
+    with pytest.raises(DiffractionError, match=r"hide has no attribute vertex_.* tangents MESH"):
         load_scene(scene_of(TRIANGLE + "vt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n", bsdf), {})
