@@ -80,7 +80,6 @@ def run_frames(args: argparse.Namespace) -> int:
     _say_why(reasons)
 
     start = time.perf_counter()
-    folder.mkdir(parents=True, exist_ok=True)
     done = 0
     with Bar(args, unit=" spp", delay=0) as bar:
         for _ in _rendered(args, to_do, bar):
@@ -130,11 +129,17 @@ def _outputs(args: argparse.Namespace) -> tuple[Path, Path | None]:
 
 def _frames(args: argparse.Namespace, folder: Path) -> list[Frame]:
     given = scene_parameters(args)
-    twice = [*given, *(one.name for one in args.animate)]
-    names = [one.name for one in args.animate] + args.turn
+    animated = [one.name for one in args.animate]
+    names = animated + args.turn
     for name in names:
-        if names.count(name) > 1 or (name in given and name in twice[len(given) :]):
-            args.parser.error(f"{name!r} is set more than once")
+        if names.count(name) > 1:
+            args.parser.error(f"{name!r} is set more than once; keep one --animate or --turn of it")
+    for name in animated:
+        if name in given:
+            args.parser.error(
+                f"argument -D: --animate {name}= says its value in every frame; leave "
+                f"-D {name}={given[name]} out"
+            )
     every = values_of_frames(args.scene, given, args.frames, args.animate, args.turn)
     content = _digest(args.scene, given)
     frames = []
@@ -193,6 +198,7 @@ def _rendered(args: argparse.Namespace, frames: list[Frame], bar: Bar) -> Iterat
             bad = count_bad(result.bitmap)
             if bad:
                 say_warning(f"{frame.png}: {bad} pixels are not finite and black")
+            frame.png.parent.mkdir(parents=True, exist_ok=True)  # not for a scene that fails
             if args.exr:
                 write_exr(result.bitmap, frame.exr, {"scene": str(args.scene), "variant": variant})
             # the PNG says that the frame is done

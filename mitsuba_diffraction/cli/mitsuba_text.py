@@ -13,6 +13,7 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Iterator
+from pathlib import PurePath
 
 from .console import one_line, saying_once
 
@@ -26,6 +27,10 @@ _TRACEBACK = re.compile(r"Traceback \(most recent call last\):\n(?:[ \t].*\n)*(?
 _UNREAD = re.compile(
     r'Found \d+ unreferenced (?:property|properties) in (\w+) plugin of type "([^"]+)":'
 )
+_NO_PLY = re.compile(
+    r'Error while loading PLY file "(?P<file>[^"]+)": (?:"[^"]+": )?(?P<why>invalid PLY .*)'
+)
+_UNUSED = re.compile(r"Found unused parameters?: (?P<list>.*)")
 _PLUGIN = re.compile(r"\[[A-Z]\w+\] ")
 
 # date, time, level, then the class, or the line of Python and its function
@@ -50,13 +55,38 @@ def plain_text(error: BaseException) -> str:
         text,
     )
     text = _UNREAD.sub(lambda m: f"{m[1]} {m[2]!r} has no such parameter:", text)
+    text = _NO_PLY.sub(_no_ply, text)
     text = re.sub(r"\n\s*- ", " ", text)  # lists
+    text = _UNUSED.sub(_unused, text)
     text = _INSTANTIATE.sub(lambda m: f"{m['kind']} {m['type']!r}: ", text)
     text = one_line(_PLUGIN.sub("", text)).rstrip(" .!")
     if places:
         file, line = places[-1]
         text = f"'{file}', {line}: {text}"
     return text
+
+
+def _no_ply(found: re.Match[str]) -> str:
+    """A mesh of another format where a PLY is expected, with what to do about it."""
+    file = PurePath(found["file"])
+    if file.suffix.lower() in (".ply", ""):
+        return f"'{file}' is no undamaged PLY: {found['why']}; export the mesh again"
+    todo = f"run 'mitsuba-diffraction tangents {file} -o mesh.ply' first, and use mesh.ply"
+    if file.suffix.lower() not in (".obj", ".serialized"):
+        todo = "convert it to PLY or OBJ"
+    return f"'{file}' is no PLY mesh, which the scene expects: {todo}"
+
+
+def _unused(found: re.Match[str]) -> str:
+    """Parameters that are given and that nothing in the scene reads."""
+    names = re.findall(r"\$(\w+)=", found["list"])
+    if not names:
+        return found[0]
+    return (
+        f"nothing in the scene uses {', '.join('$' + name for name in names)}, although it "
+        f"declares it: write ${names[0]} where its value is to go, or leave "
+        f"{', '.join(names)} out of -D, --animate and --turn"
+    )
 
 
 @contextlib.contextmanager

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from pathlib import Path
 from typing import Any
 
 import drjit as dr
@@ -102,10 +104,34 @@ def _load(plugin: str, **parameters: Any) -> Any:
     except Exception as error:  # Mitsuba throws RuntimeError, over several lines
         given = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
         reason = " ".join(str(error).split())
+        if plugin == "conductor":
+            raise DiffractionError(_unknown_conductor(str(parameters["material"]))) from error
         raise DiffractionError(
             f"{given} is no material that Mitsuba knows ({reason[:200]}); give a number, a name "
             "from Mitsuba's table of materials, or eta and k"
         ) from error
+
+
+def _unknown_conductor(material: str) -> str:
+    """That there is no such conductor, and which there are."""
+    names = _conductors()
+    close = difflib.get_close_matches(material.lower(), [name.lower() for name in names], 3, 0.6)
+    listed = [name for name in names if name.lower() in close] or names
+    hint = f"; did you mean {' or '.join(listed)}?" if close else f"; there are {', '.join(names)}"
+    return (
+        f"material={material!r} is no conductor that Mitsuba knows{hint if names else ''} "
+        "(all: Mitsuba's documentation of roughconductor); or give eta and k, or none for R = 1"
+    )
+
+
+def _conductors() -> list[str]:
+    """Names of the tabulated conductors, without those that are another's in Palik's table."""
+    folder = Path(str(mi.file_resolver().resolve("data/ior")))
+    found = {file.name.removesuffix(".eta.spd") for file in folder.glob("*.eta.spd")}
+    return sorted(
+        (name for name in found if name.removesuffix("_palik") not in found - {name}),
+        key=str.lower,
+    )
 
 
 def _at(material: str, name: str, wavelength: float) -> Any:

@@ -178,7 +178,7 @@ def test_a_preview_is_half_as_wide_and_quick(render):
         (["--frames", "2", "--animate", "light=a:b"], "expected numbers"),
         (["--frames", "2", "--animate", "light=1,2:3"], "as many before as after"),
         (["--frames", "2", "--animate", "light=nan:1"], "expected numbers"),
-        (["--frames", "2", *LIGHT, "-D", "light=1"], "'light' is set more than once"),
+        (["--frames", "2", *LIGHT, "-D", "light=1"], "leave -D light=1 out"),
         (["--frames", "2", *LIGHT, "--turn", "light"], "'light' is set more than once"),
         (["--frames", "2", *LIGHT, "-o", "a.mp4"], "a film ending in .webp or .gif"),
     ],
@@ -204,6 +204,15 @@ def test_parameters_that_do_not_fit_are_one_line(render, options, said):
         assert ran.code == 0  # folders are made
     else:
         assert said in ran.failed_in_one_line()
+
+
+@pytest.mark.parametrize("option", ["--turn", "-D"])
+def test_what_the_scene_does_not_use_is_said_and_leaves_no_folder(render, scene, option):
+    scene.write_text(SCENE.replace('"word"/>', '"word"/><default name="idle" value="3"/>'))
+    more = ("--turn", "idle") if option == "--turn" else ("-D", "idle=1", *LIGHT)
+    line = render("--frames", "2", *more, "-o", "deep/out").failed_in_one_line()
+    assert "nothing in the scene uses $idle, although it declares it: write $idle where" in line
+    assert os.listdir() == ["room.xml"]
 
 
 def test_what_is_no_picture_is_no_frame(tmp_path):

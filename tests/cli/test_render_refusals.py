@@ -46,6 +46,21 @@ def test_arguments_that_do_not_fit_are_one_line(run, scene, arguments, said):
     assert os.listdir() == ["room.xml"]
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("a.obj", "# of a modeller\nv 0 0 0\n", "tangents a.obj -o mesh.ply' first"),
+        ("a.stl", "solid a\n", "'a.stl' is no PLY mesh, which the scene expects: convert it"),
+        ("a.ply", "ply\n#\n", "'a.ply' is no undamaged PLY"),
+    ],
+)  # fmt: skip
+def test_a_mesh_of_another_format_is_answered_with_what_to_do(run, scene, name, content, said):
+    (scene.parent / name).write_text(content)
+    mesh = f'type="ply"><string name="filename" value="{name}"/>'
+    scene.write_text(SCENE.replace('type="sphere">', mesh))
+    assert said in run("render", scene, *QUICK).failed_in_one_line()
+
+
 @pytest.mark.parametrize("content", [None, "", "no scene", '<scene version="3.5.0">'])
 def test_files_that_are_no_scene_are_one_line(run, scene, content):
     if content is None:
