@@ -62,7 +62,7 @@ def test_shapes_without_id_are_named_by_file_or_place(scene_of):
         "</scene>"
     )
     with pytest.raises(
-        DiffractionError, match=r"^shape 2 \(a sphere without id\) has no attribute"
+        DiffractionError, match=r"^shape 2 \(a sphere without id\) has no .* or use a mesh$"
     ):
         load_scene(file, {})
 
