@@ -31,8 +31,9 @@ demo: setup  ## tabulate a snake scale, render three scenes with it, the snake i
 	@$(RENDER) scenes/snake.xml -s 32 -D sun_azimuth=60 -o out/snake_other_light.exr
 	@echo "Compare out/snake.png and out/snake_other_light.png: the colours move with the sun."
 
+# one thread for linear algebra in each of the two processes
 test: setup .venv/browser  ## run the tests
-	@$(PYTHON3) -m pytest -n 2
+	@OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest -n 2
 
 package: setup .venv/browser  ## build wheel and sdist, and test them in an empty environment
 	@.ci/package
