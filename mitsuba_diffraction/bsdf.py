@@ -18,6 +18,8 @@ max_height : float or string [from the file]
     Height of white in an integer image, µm, or "auto".
 channel : string or integer [the heights]
     Which channel of an instrument file: its name or index; of an EXR image, its name.
+crop : float or string [none]
+    Keeps the middle of the patch only, so wide in µm: one number for a square, or "width, height".
 fill : string [none]
     How points without data are filled: `none` (they are refused), `nearest` (the nearest height)
     or `harmonic` (a membrane spanned over the gap).
@@ -28,7 +30,7 @@ clip : float [none]
 periodic : string [none]
     How opposite edges are made to meet, since the patch tiles the surface: `smooth` (its periodic
     component, Moisan 2011) or `taper` (heights fade towards the edges); `none`. The
-    treatments are applied in the order fill, level, clip, periodic.
+    treatments are applied in the order crop, fill, level, clip, periodic.
 orientation : float or texture ∂ [0]
     Degrees that the patch's x axis is turned by from the first tangent; or a texture (raw, in a
     float format) or mesh attribute of three channels, the first two of which are (cos, sin) of that

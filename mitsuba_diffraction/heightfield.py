@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .errors import DiffractionError
-from .lengths import LONGEST_HEIGHT, Height, PixelSize, pixel_size_of
+from .lengths import LONGEST_HEIGHT, Crop, Height, PixelSize, pixel_size_of
 from .validity import validity
 
 FloatArray = npt.NDArray[np.float64]
@@ -38,6 +38,9 @@ class HeightField:
         What to call the patch in messages, for instance its file.
     history
         One line per treatment that the heights have had (levelling, filling, ...), oldest first.
+    cut_out
+        The patch is a part of a larger surface, as a file's or a cropped one: opposite edges need
+        not meet, and `validity` says if they do not.
 
     Raises
     ------
@@ -50,6 +53,7 @@ class HeightField:
     pixel_size: tuple[float, float]
     name: str = field(default="height field", kw_only=True)
     history: tuple[str, ...] = field(default=(), kw_only=True)
+    cut_out: bool = field(default=False, kw_only=True)
 
     def __init__(
         self,
@@ -58,6 +62,7 @@ class HeightField:
         *,
         name: str = "height field",
         history: Iterable[str] = (),
+        cut_out: bool = False,
     ) -> None:
         size = pixel_size_of(pixel_size, f"{name}: pixel_size")
         if size is None:
@@ -69,6 +74,7 @@ class HeightField:
         object.__setattr__(self, "pixel_size", size)
         object.__setattr__(self, "name", " ".join(str(name).split()))
         object.__setattr__(self, "history", tuple(history))
+        object.__setattr__(self, "cut_out", bool(cut_out))
 
     @classmethod
     def load(
@@ -78,6 +84,7 @@ class HeightField:
         pixel_size: PixelSize | None = None,
         max_height: Height | None = None,
         channel: str | int | None = None,
+        crop: Crop | None = None,
         fill: str | None = None,
         level: str | None = None,
         clip: float | str | None = None,
@@ -100,6 +107,9 @@ class HeightField:
         channel
             Name or index of the channel of an instrument file (name for an EXR); by default the
             one that holds heights.
+        crop
+            Keep the middle of the patch only, so wide in µm: one number for a square, a pair
+            (width, height), or a string of either.
         fill
             What becomes of points without data: "nearest" or "harmonic" (see `missing`); by
             default they are refused.
@@ -109,8 +119,8 @@ class HeightField:
             Cut heights off beyond this many robust standard deviations; default not at all.
         periodic
             "smooth" or "taper" make the patch fit itself at the seams; default "none". The
-            treatments are applied in the order fill, level, clip, periodic, and each leaves a line
-            in `history`.
+            treatments are applied in the order crop, fill, level, clip, periodic, and each leaves a
+            line in `history`.
 
         Raises
         ------
@@ -125,6 +135,7 @@ class HeightField:
             pixel_size=pixel_size,
             max_height=max_height,
             channel=channel,
+            crop=crop,
             fill=fill,
             level=level,
             clip=clip,
@@ -135,6 +146,7 @@ class HeightField:
     def treated(
         self,
         *,
+        crop: Crop | None = None,
         level: str | None = None,
         clip: float | str | None = None,
         periodic: str | None = None,
@@ -151,7 +163,7 @@ class HeightField:
         from .files.heights import treat  # files import this module
         from .files.options import LoadOptions
 
-        return treat(self, LoadOptions.of(level=level, clip=clip, periodic=periodic))
+        return treat(self, LoadOptions.of(crop=crop, level=level, clip=clip, periodic=periodic))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -245,7 +257,7 @@ def check_pixel_count(ny: int, nx: int, name: str) -> None:
     if ny * nx > MAX_PIXELS:
         raise DiffractionError(
             f"{name}: {nx} x {ny} pixels are more than the {MAX_PIXELS} supported "
-            f"(about {math.isqrt(MAX_PIXELS)}²); crop the patch or use coarser pixels"
+            f"(about {math.isqrt(MAX_PIXELS)}²); crop the file or use coarser pixels"
         )
 
 

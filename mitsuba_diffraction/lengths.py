@@ -17,6 +17,7 @@ LONGEST_PIXEL = 1e3
 LONGEST_HEIGHT = 1e4
 
 PixelSize = float | str | Iterable[float]
+Crop = PixelSize
 Height = float | str
 
 
@@ -62,6 +63,27 @@ def height_of(value: Height | None, where: str = "max_height") -> float | None:
             f"got {quoted(value)}"
         )
     return numbers_[0]
+
+
+def crop_of(value: Crop | None, where: str = "crop") -> tuple[float, float] | None:
+    """Size (width, height) in µm from a number, a pair, "20" or "20, 10".
+
+    `None` and "none" give `None`: all of the patch.
+
+    Raises
+    ------
+    DiffractionError
+        If it is none of these; `where` names the parameter.
+    """
+    if value is None or (isinstance(value, str) and value.strip() == "none"):
+        return None
+    numbers_ = _numbers_of(value)
+    if numbers_ is None or len(numbers_) not in (1, 2) or min(numbers_) <= 0:
+        raise DiffractionError(
+            f"{where}: expected a width or a pair (width, height) in µm, above 0, or 'none'; "
+            f"got {quoted(value)}"
+        )
+    return numbers_[0], numbers_[-1]
 
 
 def is_auto(value: object) -> bool:

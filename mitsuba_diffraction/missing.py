@@ -50,7 +50,7 @@ def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[Fl
     if method is None:
         raise DiffractionError(
             f"{name}: {share} have no height (NaN or masked); choose how to fill them with fill, "
-            f"one of {', '.join(METHODS)}, or crop them"
+            f"one of {', '.join(METHODS)}, or keep the middle without them with crop"
         )
     if count > LARGEST_SHARE * heights.size:
         raise DiffractionError(f"{name}: {share} have no height, too many to fill; crop the patch")

@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from .edges import seam_share
 from .heightfield import HeightField
 from .treatment import Change, changed
 
@@ -96,13 +97,15 @@ def _reported(before: HeightField, heights: FloatArray, what: str) -> tuple[Heig
     figures = {
         "seam_before": seam_step(before),
         "seam_after": seam_step(after),
+        "share_before": seam_share(before),
+        "share_after": seam_share(after),
         "cross_before": cross_share(before),
         "cross_after": cross_share(after),
     }
     line = (
         f"{what}: RMS step at the seams {figures['seam_before']:.3g} -> "
-        f"{figures['seam_after']:.3g} µm, share of the slope spectrum along its "
-        f"axes {figures['cross_before']:.2%} -> {figures['cross_after']:.2%}"
+        f"{figures['seam_after']:.3g} µm, {figures['share_before']:.2g} -> "
+        f"{figures['share_after']:.2g} of the mean-square slope"
     )
     return changed(before, after.heights, line, **figures)
 

@@ -40,6 +40,10 @@ def changed(
     rms = float((heights - before.heights).std())
     line = f"{what}; RMS change {rms:.3g} µm"
     treated = HeightField(
-        heights, before.pixel_size, name=before.name, history=(*before.history, line)
+        heights,
+        before.pixel_size,
+        name=before.name,
+        history=(*before.history, line),
+        cut_out=before.cut_out,
     )
     return treated, Change(line, rms, figures)

@@ -100,6 +100,8 @@ def test_gentle_well_sampled_patch_is_valid():
         (0.02 * np.arange(8), 0.05, "more than 20 %"),
         (0.002 * np.arange(8), 0.0901, "coarser than a quarter"),  # λ/4 = 0.09 µm
         (2e-9 * np.arange(8), 0.05, "metres"),
+        (0.002 * np.arange(8), 48.8, "is the pixel size of 48.8 µm in nm?"),
+        (4.0 * np.arange(8), 0.05, "are the heights, with a range of 28 µm"),
     ],
 )
 def test_each_cause_of_doubt_is_one_line(heights, pixel, word):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ..files.options import LoadOptions
 
-_NAMES = ("pixel_size", "max_height", "channel", "fill", "level", "clip", "periodic")
+_NAMES = ("pixel_size", "max_height", "channel", "crop", "fill", "level", "clip", "periodic")
 
 
 def add_heights_options(parser: argparse.ArgumentParser) -> None:
@@ -21,6 +21,9 @@ def add_heights_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--max-height", metavar="H", help="µm, height of white in an image")
     group.add_argument(
         "--channel", metavar="C", help="name or index of the channel; default: the heights"
+    )
+    group.add_argument(
+        "--crop", metavar="W[,H]", help="µm, keep the middle of the patch only; default: all of it"
     )
     group.add_argument(
         "--fill", metavar="METHOD",

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
+from ..validity import window_line
 from .arguments import path_ending_in
 from .heights_options import add_heights_options, load_options, was_given
 from .progress import Bar
 from .report import lines_of, plain
+
+if TYPE_CHECKING:
+    from ..heightfield import HeightField
 
 _MESHES = (".ply", ".obj", ".serialized")
 #: Meshes that have to be converted first, to say so instead of looking for heights in them.
@@ -126,7 +131,15 @@ def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     from ..files.heights import load_heights
 
     field = load_heights(file, load_options(args))
-    return {"kind": "height field", **field.summary(), "warnings": field.validity()}
+    return {"kind": "height field", **field.summary(), "warnings": _doubts(field)}
+
+
+def _doubts(
+    field: HeightField, coherence_width: float = 65.0, **asked: Sequence[float]
+) -> list[str]:
+    """What a table of these heights will be warned of."""
+    small = window_line(field, coherence_width)
+    return [*field.validity(**asked), *([small] if small else [])]
 
 
 def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
@@ -137,8 +150,9 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     with Bar(args) as bar:
         bar(0, 0, "making heights")
         fields = recipe.fields(load_options(args))
-    asked = {name: table[name] for name in ("wavelength_range",) if name in table}
-    warnings = [line for field in fields for line in field.validity(**asked)]
+    names = ("wavelength_range", "coherence_width")
+    asked = {name: table[name] for name in names if name in table}
+    warnings = [line for field in fields for line in _doubts(field, **asked)]
     return {
         "kind": "recipe",
         **({"generator": recipe.generator} if recipe.generator else {}),

@@ -47,7 +47,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )  # fmt: skip
     parser.add_argument(
         "-o", "--output", metavar="OUT", type=path_ending_in(".exr"),
-        help="the table; default: where the recipe says, or SOURCE's name with .exr in the "
+        help="the table; default: where the recipe says, or else SOURCE's name with .exr in the "
         "current folder",
     )  # fmt: skip
     add_heights_options(parser)

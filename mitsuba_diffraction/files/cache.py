@@ -17,6 +17,7 @@ from ..errors import DiffractionError
 from ..tables import coarse
 from ..tables.colour_table import COLOUR_VERSION, ColourTable
 from ..tables.table import FORMAT_VERSION, DiffractionTable
+from ..validity import TEXTS_VERSION
 from .colour_npz import load_colours, save_colours
 
 #: Environment variable that moves the cache, e.g. to a larger disk.
@@ -57,7 +58,7 @@ def cached_table(
     A cache that cannot be written is no reason to fail: the table is then built every time.
     """
     key = content_key(digest, arguments)
-    path = cache_folder() / f"{key}.exr"
+    path = cache_folder() / f"{key}-{TEXTS_VERSION}.exr"
     with _lock:
         table = _open_tables.get(key)
         if table is None and path.is_file():

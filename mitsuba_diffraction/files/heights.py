@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import math
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from ..cropping import crop, crop_line, middle
+from ..edges import plane_rise
 from ..errors import DiffractionError
 from ..heightfield import HeightField
-from ..levelling import clip_outliers, level_lines, level_plane, plane_of
+from ..levelling import clip_outliers, level_lines, level_plane
 from ..missing import fill_missing
 from ..periodic import periodic_smooth, periodic_taper
 from .afm import read_instrument
@@ -27,6 +29,7 @@ _MAGIC = (
     (b"MM\0*", "tiff"),
     (b"\x76\x2f\x31\x01", "exr"),
     (b"\x93NUMPY", "npy"),
+    (b"\xff\xd8\xff", "jpeg"),
 )
 _SUFFIX = {
     ".png": "image", ".bmp": "image", ".tif": "image", ".tiff": "image", ".exr": "exr",
@@ -49,7 +52,7 @@ def load_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightFi
     field = _settle(raw, file, options)
     if measured and options.level in (None, "none"):
         field = _noting_tilt(field)
-    return treat(field, options)
+    return treat(field, replace(options, crop=None))  # cropped before gaps were filled
 
 
 def is_recipe(path: str | os.PathLike[str]) -> bool:
@@ -71,6 +74,11 @@ def _kind(file: Path) -> str:
 def _read(file: Path, channel: str | int | None) -> tuple[RawHeights, bool]:
     """Heights of a file, and whether an instrument wrote it."""
     kind = _kind(file)
+    if kind == "jpeg":
+        raise DiffractionError(
+            f"{str(file)!r} is a JPEG, whose compression changes heights; export PNG or TIFF "
+            "(8- or 16-bit grey) or numbers instead"
+        )
     if kind == "instrument":
         return read_instrument(file, channel), True
     if kind == "exr":
@@ -90,10 +98,7 @@ def _settle(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
     values = raw.values
     if raw.relative:
         if max_height is None:
-            raise DiffractionError(
-                f"{shown} is an image of grey levels; max_height, the height of white in µm, is "
-                "missing: give it as max_height (--max-height)"
-            )
+            raise _missing_lengths(shown, True, pixel_size is None and raw.pixel_size is None)
         values = values * np.float64(max_height)
     elif max_height is not None:
         raise DiffractionError(
@@ -109,20 +114,48 @@ def _settle(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
             f"pixel_size {pixel_size[0]:g}, {pixel_size[1]:g} contradicts it: leave it out"
         )
     if pixel_size is None:
-        raise DiffractionError(
-            f"{shown} does not say how large a pixel is; give pixel_size (--pixel-size) in µm"
-        )
+        raise _missing_lengths(shown, False, True)
+    notes = raw.notes
+    if options.crop is not None:
+        before = (values.shape[0], values.shape[1])
+        values = values[middle(before, pixel_size, options.crop, shown)]
+        if values.shape != before:
+            after = (values.shape[0], values.shape[1])
+            notes = (*notes, crop_line(before, after, pixel_size))
     heights = np.ascontiguousarray(values, dtype=np.float64)
     method = None if options.fill == "none" else options.fill
     heights, note = fill_missing(heights, method, shown)
     if heights.base is None and heights is not raw.values:
         heights.setflags(write=False)  # ours alone: HeightField need not copy it
-    history = (*raw.notes, note) if note else raw.notes
-    return HeightField(heights, pixel_size, name=file.name, history=history)
+    history = (*notes, note) if note else notes
+    return HeightField(heights, pixel_size, name=file.name, history=history, cut_out=True)
+
+
+def _missing_lengths(shown: str, height: bool, pixel: bool) -> DiffractionError:
+    """What to say of an image that lacks the height of white, or of heights without pixel size."""
+    lacks, names, options, parameters = [], [], [], []
+    if height:
+        lacks.append("how high white is")
+        names.append("max_height")
+        options.append("--max-height 0.375")
+        parameters.append("-D max_height=0.375")
+    if pixel:
+        lacks.append("how large a pixel is")
+        names.append("pixel_size")
+        options.append("--pixel-size 0.05")
+        parameters.append("-D pixel_size=0.05")
+    what = " is an image of grey levels and" if height else ""
+    return DiffractionError(
+        f"{shown}{what} does not say {' nor '.join(lacks)}; give {' and '.join(names)} in µm, for "
+        f"instance {' '.join(options)} (for a scene that has them as parameters, "
+        f"{' '.join(parameters)})"
+    )
 
 
 def treat(field: HeightField, options: LoadOptions) -> HeightField:
-    """Level, clip and make periodic, in this order: dust stands out from a level surface only."""
+    """Crop, level, clip and make periodic: dust stands out from a level surface only."""
+    if options.crop is not None:
+        field, _ = crop(field, options.crop)
     if options.level == "plane":
         field, _ = level_plane(field)
     elif options.level == "lines":
@@ -138,9 +171,11 @@ def treat(field: HeightField, options: LoadOptions) -> HeightField:
 
 def _noting_tilt(field: HeightField) -> HeightField:
     """Say in the history how tilted a scan is that was not levelled: seams repeat the tilt."""
-    slope_x, slope_y = plane_of(field)
-    rise = math.hypot(slope_x * field.extent[0], slope_y * field.extent[1])
-    line = f"not levelled: the best plane rises {rise:.3g} µm across the patch"
+    line = f"not levelled: the best plane rises {plane_rise(field):.3g} µm across the patch"
     return HeightField(
-        field.heights, field.pixel_size, name=field.name, history=(*field.history, line)
+        field.heights,
+        field.pixel_size,
+        name=field.name,
+        history=(*field.history, line),
+        cut_out=field.cut_out,
     )

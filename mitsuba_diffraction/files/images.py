@@ -8,6 +8,7 @@ import zlib
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import OpenEXR
 from PIL import Image, UnidentifiedImageError
 
@@ -38,6 +39,8 @@ _PARK_TAG = 50432
 
 def read_image(path: Path) -> RawHeights:
     """Read a grey PNG, BMP or TIFF of 1, 8 or 16 bits (relative) or 32-bit float (µm).
+
+    Eight-bit colours are read where red, green and blue are alike and nothing is transparent.
 
     The image's top row is the largest y, so rows are flipped.
 
@@ -87,10 +90,7 @@ def _heights_of(image: Image.Image, shown: str) -> RawHeights:
     if getattr(image, "n_frames", 1) != 1:
         raise DiffractionError(f"{shown} has {image.n_frames} pages; save the height image alone")  # type: ignore[attr-defined]
     if mode in _COLOUR:
-        raise DiffractionError(
-            f"{shown} has {_COLOUR[mode]}; heights are one grey channel: convert it to "
-            "8- or 16-bit greyscale"
-        )
+        return RawHeights(_grey_levels(image, shown)[::-1] / np.float64(255), relative=True)
     if mode == "F":
         return RawHeights(np.asarray(image, dtype=np.float64)[::-1])
     if mode not in _FULL_SCALE:
@@ -100,6 +100,30 @@ def _heights_of(image: Image.Image, shown: str) -> RawHeights:
         )
     values = np.asarray(image)[::-1] / np.float64(_FULL_SCALE[mode])
     return RawHeights(values, relative=True)
+
+
+def _grey_levels(image: Image.Image, shown: str) -> npt.NDArray[np.uint8]:
+    """Levels of a picture that holds grey as colours, as screenshots do: red, green, blue alike."""
+    what = _COLOUR[image.mode]
+    deep = ";16" in repr(getattr(image, "tile", ""))  # Pillow keeps eight bits of them
+    colours = np.asarray(image.convert("RGBA"))
+    grey = colours[..., 0]
+    alike = np.array_equal(grey, colours[..., 1]) and np.array_equal(grey, colours[..., 2])
+    opaque = bool((colours[..., 3] == 255).all())
+    if alike and opaque and not deep:
+        return grey
+    why = (
+        "they differ, as in a false-colour picture"
+        if not alike
+        else "part of it is transparent"
+        if not opaque
+        else "of 16 bits each, of which 8 would be read"
+    )
+    raise DiffractionError(
+        f"{shown} has {what}, and heights are one grey channel: {why}; export the heights "
+        "themselves as 8- or 16-bit greyscale or as numbers, or, if it is grey but for a tint, "
+        "convert it, in Python: PIL.Image.open(...).convert('L').save('grey.png')"
+    )
 
 
 def read_exr(path: Path, channel: str | None = None) -> RawHeights:

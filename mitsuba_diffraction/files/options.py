@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from ..errors import DiffractionError
-from ..lengths import Height, PixelSize, height_of, pixel_size_of
+from ..lengths import Crop, Height, PixelSize, crop_of, height_of, pixel_size_of
 from ..missing import METHODS as FILLS
 
 LEVELS = ("none", "plane", "lines")
@@ -26,6 +26,7 @@ class LoadOptions:
     pixel_size: tuple[float, float] | None = None
     max_height: float | None = None
     channel: str | int | None = None
+    crop: tuple[float, float] | None = None
     fill: str | None = None
     level: str | None = None
     clip: float | None = None
@@ -38,6 +39,7 @@ class LoadOptions:
         pixel_size: PixelSize | None = None,
         max_height: Height | None = None,
         channel: str | int | None = None,
+        crop: Crop | None = None,
         fill: str | None = None,
         level: str | None = None,
         clip: float | str | None = None,
@@ -50,6 +52,7 @@ class LoadOptions:
             pixel_size=pixel_size_of(pixel_size),
             max_height=height_of(max_height),
             channel=channel,
+            crop=crop_of(crop),
             fill=_choice(fill, "fill", ("none", *FILLS)),
             level=_choice(level, "level", LEVELS),
             clip=_sigmas(clip),

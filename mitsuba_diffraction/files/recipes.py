@@ -3,7 +3,7 @@
     source = "../scans/elaphe.png"      # or generator = "blazed" with [arguments]
     pixel_size = 0.0488                 # µm, where the source does not say; or [dx, dy]
     max_height = 0.375                  # µm, white of an image
-    level = "plane"                     # and channel, fill, clip, periodic as in HeightField.load
+    level = "plane"                     # and channel, crop, ... as in HeightField.load
     tolerance = 1e-3                    # and other parameters of DiffractionTable.build
     output = "tables/elaphe.exr"
 
@@ -13,6 +13,7 @@ Several patches of one surface, whose powers one table averages, are a list of s
 
 from __future__ import annotations
 
+import difflib
 import inspect
 import os
 import tomllib
@@ -58,7 +59,7 @@ class Recipe:
     table
         Parameters of `DiffractionTable.build`, those that the recipe sets.
     output
-        Where the table goes; by default tables/NAME.exr beside the recipe.
+        Where the table goes; by default the recipe's name with .exr in the current folder.
     """
 
     path: Path
@@ -84,8 +85,10 @@ class Recipe:
         content = _parse(file, shown)
         for key in content:
             if key not in _KEYS:
+                near = difflib.get_close_matches(key, _KEYS, 1)
+                hint = f"did you mean {near[0]}? " if near else ""
                 raise DiffractionError(
-                    f"{shown}: unknown key {key!r}; known are {', '.join(_KEYS)}"
+                    f"{shown}: unknown key {key!r}; {hint}Known are {', '.join(_KEYS)}"
                 )
         if ("source" in content) == ("generator" in content):
             raise DiffractionError(
@@ -251,7 +254,9 @@ def _table(content: Mapping[str, Any], shown: str) -> dict[str, Any]:
 
 
 def _output(content: Mapping[str, Any], file: Path, shown: str) -> Path:
-    output = content.get("output", f"tables/{file.stem}.exr")
+    if "output" not in content:
+        return Path(f"{file.stem}.exr")
+    output = content["output"]
     if not isinstance(output, str) or Path(output).suffix.lower() != ".exr":
         raise DiffractionError(
             f"{shown}: output: expected a path that ends in .exr, got {output!r}"

@@ -136,9 +136,29 @@ def _table(props: Any, height_scale: float) -> tuple[DiffractionTable, Callable[
         return table_of_heights(heights, asked, height_scale), lambda: heights
     if not isinstance(value, str):
         raise DiffractionError(f"{given[0]}={value!r} must be the name of a file")
-    path = Path(str(mi.file_resolver().resolve(value)))
+    path = _found(value, given[0])
     table = table_of_file(path, given[0] == "table", options, asked, height_scale)
     return table, lambda: heights_of_file(path, given[0] == "table", options)
+
+
+def _found(name: str, parameter: str) -> Path:
+    """The file of this name: as it is, or in a folder where Mitsuba looks for files.
+
+    Raises
+    ------
+    DiffractionError
+        If there is none, with the folders.
+    """
+    resolver = mi.file_resolver()
+    path = Path(str(resolver.resolve(name)))
+    if path.exists() or path.is_absolute():
+        return path  # what is not there is told by who opens it
+    folders = dict.fromkeys(str(Path(str(folder)).resolve()) for folder in resolver)
+    looked = ", ".join(repr(folder) for folder in folders)
+    raise DiffractionError(
+        f"{parameter}: '{name}' does not exist; looked for it in {looked}; give its whole path, "
+        "or put it there"
+    )
 
 
 def _wavelength(props: Any, table: DiffractionTable) -> float:

@@ -12,9 +12,10 @@ import mitsuba as mi
 import numpy as np
 
 from .. import gratings
+from ..dictionary import as_given
 from ..errors import DiffractionError, DiffractionWarning
 from ..files.cache import cached_table, content_key, loaded_table
-from ..files.heights import is_recipe, load_heights
+from ..files.heights import is_recipe, load_heights, treat
 from ..files.options import LoadOptions
 from ..files.raw import existing_file
 from ..files.recipes import Recipe
@@ -106,15 +107,16 @@ def heights_of_tensor(data: Any, options: LoadOptions) -> HeightField:
     values = np.array(data, np.float64)
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[..., 0]
-    return HeightField(values, options.pixel_size, name="data")
+    return treat(as_given(HeightField(values, options.pixel_size, name="data")), options)
 
 
 def table_of_heights(
     heights: HeightField, asked: Mapping[str, Any], height_scale: float
 ) -> DiffractionTable:
     """The table of a height field."""
-    table = _built(heights.digest(), lambda: [heights], asked, height_scale)
-    _warn(table)
+    digest = heights.digest() + (" cut out" if heights.cut_out else "")  # warned of otherwise
+    table = _built(digest, lambda: [heights], asked, height_scale)
+    _warn(table, heights.name)
     return table
 
 
@@ -138,8 +140,12 @@ def _built(
     return table
 
 
-def _warn(table: DiffractionTable) -> None:
+def _warn(table: DiffractionTable, name: str | None = None) -> None:
+    """Say what a table remembers; of heights called `name`, whoever had it built."""
     for line in table.source.get("warnings", ()):
+        own = f"{table.source['name']}: "
+        if name is not None and line.startswith(own):
+            line = f"{name}: {line.removeprefix(own)}"
         warnings.warn(line, DiffractionWarning, stacklevel=2)
 
 

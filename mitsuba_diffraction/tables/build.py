@@ -8,12 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..errors import DiffractionError
 from ..geometry import sigma_of
 from ..heightfield import HeightField
 from ..progress import Progress, silent
 from ..reference import check_coherence
+from ..validity import units_question
 from .attempt import Attempt
-from .checks import check_parameters, check_patches, check_taylor, restricted
+from .checks import check_parameters, check_patches, check_taylor, check_units, restricted
 from .choose import (
     MAX_INTERVALS,
     PACKET,
@@ -119,13 +121,25 @@ def build_table(
     check_parameters(basis, tolerance, terms, wavelength_range, height_scale_max, taps)
     patches = [heights] if isinstance(heights, HeightField) else list(heights)
     check_patches(patches, coherence, basis)
+    check_units(patches)
     reach = reach_of(wavelength_range)
     radii, kappa_max = restricted(crop, kappa_max, reach, reach * height_scale_max)
     wanted = _Wanted(
         patches, coherence_width, coherence, basis, tolerance, terms, wavelength_range,
         height_scale_max, taps, radii, kappa_max,
     )  # fmt: skip
-    tell = progress or silent
+    try:
+        return _built(wanted, progress or silent)
+    except DiffractionError as error:
+        questions = [question for patch in patches if (question := units_question(patch))]
+        if not questions:
+            raise
+        raise DiffractionError(f"{error}; or {questions[0]}") from error
+
+
+def _built(wanted: _Wanted, tell: Progress) -> DiffractionTable:
+    """The first attempt that meets the tolerance."""
+    patches, tolerance = wanted.patches, wanted.tolerance
     setting = _first(wanted)
     for _ in range(_ATTEMPTS):
         grid, expansion = _grid(wanted, setting.taps), setting.expansion
@@ -230,7 +244,8 @@ def _grid(wanted: _Wanted, taps: tuple[int, int]) -> Grid:
     if max(taps) > MAX_TAPS:
         raise refuse(
             f"the patch is {max(patches[0].extent):.4g} µm wide, so much more than the coherence "
-            f"window that a look-up would read {taps[0]}×{taps[1]} orders; crop the patch, or "
+            f"window that a look-up would read {taps[0]}×{taps[1]} orders; crop the patch, for "
+            f"instance crop={wanted.coherence_width:g} (--crop {wanted.coherence_width:g}), or "
             "raise coherence_width or tolerance"
         )
     radius = (radii[0] / spacing[0], radii[1] / spacing[1])

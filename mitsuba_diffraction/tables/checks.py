@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import DiffractionError
 from ..heightfield import HeightField
+from ..validity import units_question
 from .choose import taylor_rounding, taylor_truncation
 from .error import Grid
 from .expansion import BASES, Expansion
@@ -16,6 +17,9 @@ from .window import MAX_TAPS
 
 #: Largest table, bytes: beyond it no renderer would want it.
 MAX_BYTES = 4 << 30
+
+#: Heights of both, a slope of 89.4° and a range in µm, are some hundred nm taken for µm.
+HOPELESS_SLOPE, HOPELESS_RANGE = 100.0, 50.0
 
 
 def check_parameters(
@@ -82,7 +86,17 @@ def check_patches(patches: Sequence[HeightField], coherence: str, basis: str) ->
             raise refuse(
                 f"'{patch.name}' is {patch.extent[0]:.6g} × {patch.extent[1]:.6g} µm, but "
                 f"'{patches[0].name}' is {patches[0].extent[0]:.6g} × {patches[0].extent[1]:.6g} "
-                "µm; crop them to one size"
+                "µm; crop them to one size (crop, --crop)"
+            )
+
+
+def check_units(patches: Sequence[HeightField]) -> None:
+    """Refuse heights that are nanometres beyond doubt, on which minutes would be spent."""
+    for patch in patches:
+        if patch.rms_slope > HOPELESS_SLOPE and patch.range > HOPELESS_RANGE:
+            raise refuse(
+                f"'{patch.name}' has an RMS slope of {patch.rms_slope:.3g}, as no surface has: "
+                f"{units_question(patch)}"
             )
 
 
@@ -113,6 +127,6 @@ def check_size(grid: Grid, expansion: Expansion, functions: int | None) -> None:
     if size > MAX_BYTES:
         raise refuse(
             f"it would take {size / 1e9:.1f} GB ({bins:.3g} orders of {expansion.intervals}×"
-            f"{terms} terms); use a smaller or shallower patch, a larger tolerance, or "
-            "a longer shortest wavelength"
+            f"{terms} terms); use a smaller or shallower patch (crop, --crop), a larger tolerance, "
+            "or a longer shortest wavelength"
         )

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..geometry import wavenumber
 from ..heightfield import HeightField
+from ..validity import window_line
 from .spectrum import Spectrum
 
-_SMALLER = 0.9  # a patch this much smaller than the coherence width is worth a warning
 _SLOW = 150  # orders read in a look-up; 16 are usual
 _GREEN = 550.0  # nm, where the variation between patches is stated
 
@@ -29,17 +29,15 @@ def describe(
     """
     first = patches[0]
     warnings = [line for patch in patches for line in patch.validity(wavelength_range)]
-    if min(first.extent) < _SMALLER * coherence_width:
-        warnings.append(
-            f"{first.name}: the patch of {first.extent[0]:.4g} × {first.extent[1]:.4g} µm is "
-            f"smaller than the coherence width of {coherence_width:g} µm: it is tiled, and its "
-            "repetition shows as a grating of its own"
-        )
+    small = window_line(first, coherence_width)
+    if small:
+        warnings.append(small)
     if taps[0] * taps[1] > _SLOW:
         warnings.append(
             f"{first.name}: the patch of {first.extent[0]:.4g} × {first.extent[1]:.4g} µm is so "
             f"much larger than the coherence width of {coherence_width:g} µm that every look-up "
-            f"reads {taps[0]}×{taps[1]} orders: rendering will be slow; crop the patch"
+            f"reads {taps[0]}×{taps[1]} orders: rendering will be slow; crop the "
+            f"patch, for instance crop={coherence_width:g} (--crop {coherence_width:g})"
         )
     source = first.summary() | {"digest": first.digest(), "warnings": warnings}
     if len(patches) > 1:

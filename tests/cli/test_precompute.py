@@ -60,6 +60,29 @@ def test_a_recipe_says_where_its_table_goes(run, recipe, here):
     assert table.coherence_width == 6
 
 
+def test_a_recipe_that_does_not_say_puts_its_table_into_the_current_folder(run, recipe, here):
+    recipe.write_text("".join(recipe.read_text().splitlines(True)[:-1]))
+    assert run("precompute", recipe).code == 0
+    assert os.listdir(here) == ["grating.exr"]
+
+
+def test_lengths_in_nanometres_are_asked_about(run, heights, here):
+    options = ("--coherence-width", "6", "-o", "a.exr")
+    line = run("precompute", heights, "--pixel-size", "80", *options).failed_in_one_line()
+    assert "is the pixel size of 80 µm in nm? Then divide it by 1000" in line
+    np.save("nm.npy", 1e4 * np.load(heights))
+    line = run("precompute", "nm.npy", "--pixel-size", "0.08", *options).failed_in_one_line()
+    assert "are the heights, with a range of 399.9 µm, in nm?" in line
+
+
+def test_what_is_cut_off_is_reported(run, heights, here):
+    ran = run("precompute", heights, *QUICK[:2], "--coherence-width", "3", "--crop", "3,4.8")
+    assert ran.code == 0
+    assert "cropped to the middle 3.04 x 4.8 µm of 6 x 6 µm (38 x 60 of 75 x 75 pixels)" in ran.out
+    line = run("precompute", heights, *QUICK, "--crop", "7").failed_in_one_line()
+    assert "crop to 7 x 7 µm is larger than the patch" in line
+
+
 def test_options_override_a_recipe(run, recipe, here):
     assert run("precompute", recipe, "--coherence-width", "5", "-o", "a.exr").code == 0
     assert DiffractionTable.load("a.exr").coherence_width == 5
@@ -133,7 +156,8 @@ def test_an_image_without_its_lengths_is_one_line(run, here):
 
     Image.fromarray(np.arange(256, dtype=np.uint8).reshape(16, 16)).save("a.png")
     line = run("precompute", "a.png", "--pixel-size", "0.1").failed_in_one_line()
-    assert "--max-height" in line
+    assert "--max-height 0.375" in line
+    assert "--pixel-size" not in line
     line = run("precompute", "a.png", "--max-height", "0.1").failed_in_one_line()
     assert "--pixel-size" in line
 

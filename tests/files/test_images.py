@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
+
 import numpy as np
 import OpenEXR
 import pytest
@@ -93,8 +96,43 @@ SIZES = {"pixel_size": 0.1, "max_height": 0.5}
     ("mode", "word"), [("RGB", "colours"), ("RGBA", "colours"), ("P", "palette"), ("LA", "transp")]
 )
 def test_colours_are_refused(tmp_path, mode, word):
-    Image.new(mode, (8, 8)).save(tmp_path / "a.png")
-    assert word in refusal(tmp_path / "a.png", **SIZES)
+    picture = Image.new("RGBA", (8, 8))
+    picture.putpixel((2, 3), (90, 60, 30, 255) if word != "transp" else (90, 90, 90, 128))
+    picture.convert(mode).save(tmp_path / "a.png")
+    line = refusal(tmp_path / "a.png", **SIZES)
+    assert word in line
+    assert "8- or 16-bit greyscale" in line
+
+
+@pytest.mark.parametrize("mode", ["RGB", "RGBA", "P", "LA"])
+def test_grey_that_is_kept_as_colours_is_grey(tmp_path, mode):
+    Image.fromarray(BYTES).convert(mode).save(tmp_path / "a.png")
+    with Image.open(tmp_path / "a.png") as picture:
+        assert picture.mode == mode
+    field = HeightField.load(tmp_path / "a.png", **SIZES)
+    assert np.array_equal(field.heights, BYTES[::-1] / 255 * 0.5)
+
+
+def test_sixteen_bits_of_colour_are_not_read_as_eight(tmp_path):
+    grey = np.dstack([SHORTS] * 3).astype(">u2")
+    rows = b"".join(b"\0" + row.tobytes() for row in grey)
+
+    def chunk(kind, content):
+        body = kind + content
+        return struct.pack(">I", len(content)) + body + struct.pack(">I", zlib.crc32(body))
+
+    (tmp_path / "a.png").write_bytes(
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", struct.pack(">IIBBBBB", 7, 5, 16, 2, 0, 0, 0))
+        + chunk(b"IDAT", zlib.compress(rows))
+        + chunk(b"IEND", b"")
+    )
+    assert "16 bits each" in refusal(tmp_path / "a.png", **SIZES)
+
+
+def test_a_jpeg_is_refused_for_what_it_is(tmp_path):
+    Image.fromarray(BYTES).save(tmp_path / "a.png", format="JPEG")
+    assert "is a JPEG, whose compression changes heights" in refusal(tmp_path / "a.png", **SIZES)
 
 
 def test_lengths_that_an_image_lacks_are_asked_for(tmp_path):
@@ -103,6 +141,9 @@ def test_lengths_that_an_image_lacks_are_asked_for(tmp_path):
     assert "max_height" in refusal(path, pixel_size=0.1)
     assert "max_height" in refusal(path, pixel_size=0.1, max_height="auto")
     assert "pixel_size" in refusal(path, max_height=0.1)
+    both = refusal(path)
+    assert "--max-height 0.375 --pixel-size 0.05" in both
+    assert "-D max_height=0.375 -D pixel_size=0.05" in both
 
 
 def test_max_height_contradicts_heights_in_micrometres(tmp_path):

@@ -83,7 +83,9 @@ output = "../out/x.exr"
         "wavelength_range": (400, 700),
     }
     assert recipe.output == folder / "../out/x.exr"
-    assert Recipe.load(write(folder, 'source = "a.npy"')).table_arguments() == {}
+    plain = Recipe.load(write(folder, 'source = "a.npy"'))
+    assert plain.table_arguments() == {}
+    assert plain.output == Path("patch.exr")  # in the current folder
 
 
 def test_several_sources_are_several_patches(folder):
@@ -105,7 +107,10 @@ def test_seeds_are_several_patches(folder):
     [
         ("# nothing", ["source", "generator"]),
         ('source = "a.npy"\ngenerator = "blazed"', ["either"]),
-        ('source = "a.npy"\ncoherence_widht = 3', ["'coherence_widht'", "coherence_width,"]),
+        (
+            'source = "a.npy"\ncoherence_widht = 3',
+            ["'coherence_widht'", "did you mean coherence_width?"],
+        ),
         ("source = 3", ["source", "3"]),
         ("source = []", ["source", "[]"]),
         ('source = ""', ["source"]),

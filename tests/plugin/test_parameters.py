@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -116,6 +118,45 @@ def test_each_cause_for_concern_is_one_warning(some_variant, times):
         assert all("\n" not in line for line in lines)
 
 
+def test_a_patch_in_memory_keeps_its_name_in_warnings(some_variant):
+    for name in ("first", "second"):  # the second has the first one's table, from the cache
+        field = md.HeightField(PATCH.heights, 0.15, name=name)
+        with pytest.warns(md.DiffractionWarning, match=f"^{name}: pixels of 0.15 µm"):
+            load(field, coherence_width=4.0)
+
+
+def test_tilt_of_a_file_is_said_and_can_be_treated_in_the_scene(some_variant, tmp_path):
+    tilted = PATCH.heights + 0.004 * np.arange(PATCH.shape[1])
+    np.save(tmp_path / "tilted.npy", tilted)
+    given = {"heightfield": str(tmp_path / "tilted.npy"), "pixel_size": 0.08, **SMALL}
+    said = r"^tilted\.npy: not levelled: .* try level=plane \(--level plane\)$"
+    with pytest.warns(md.DiffractionWarning, match=said) as caught:
+        loads(**given)()
+    assert sum("not levelled" in str(w.message) for w in caught) == 1
+    field = md.HeightField.load(tmp_path / "tilted.npy", pixel_size=0.08)
+    with pytest.warns(md.DiffractionWarning, match=said):
+        load(field)  # as an array, too
+    level = loads(**given, level="plane", periodic="smooth")()  # nothing to warn of
+    again = load(field, level="plane", periodic="smooth")
+    wo = [polar(25, phi) for phi in range(0, 360, 30)]
+    values = [evaluated(bsdf, polar(10), wo, 500.0) for bsdf in (level, again)]
+    # single precision of the array's heights
+    assert values[0] == pytest.approx(values[1], rel=1e-3, abs=1e-4 * values[0].max())
+
+
+def test_a_patch_is_cropped_in_the_scene(some_variant, png):
+    given = {"heightfield": str(png), "pixel_size": 0.08, "max_height": PATCH.range}
+    bsdf = loads(**given, crop="1.6, 2.4", periodic="smooth", coherence_width=1.6)()
+    assert bsdf.table.source["shape"] == [30, 20]
+
+
+def test_a_path_makes_a_dictionary_too(some_variant, png):
+    given = md.bsdf_dict(png, pixel_size=0.08, max_height=0.03)
+    assert given["heightfield"] == str(png)
+    with pytest.raises(md.DiffractionError, match="expected a HeightField or the path of a file"):
+        md.bsdf_dict(PATCH.heights)
+
+
 # ------------------------------------------------------------------------ refusals
 
 
@@ -198,6 +239,9 @@ def test_files_that_are_not_there_or_not_heights(some_variant, tmp_path):
     assert "empty.png" in refusal(loads(heightfield=str(tmp_path / "empty.png"), pixel_size=0.1))
     assert str(tmp_path) in refusal(loads(heightfield=str(tmp_path)))
     assert "no such file" in refusal(loads(table=str(tmp_path / "no.exr")))
+    text = refusal(loads(heightfield="none.exr"))
+    assert "heightfield: 'none.exr' does not exist; looked for it in '" in text
+    assert repr(str(Path.cwd())) in text
 
 
 def test_an_image_needs_its_lengths(some_variant, png):
