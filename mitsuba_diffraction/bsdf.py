@@ -41,9 +41,9 @@ height_scale : float ∂ [1]
 
 The table
 ---------
-coherence_width : float or string [auto]
-    4σ of the Gaussian amplitude window, µm: the width over which light is coherent. `auto` is that
-    of the table or the recipe, else 65.
+coherence_width : float or string [65]
+    4σ of the Gaussian amplitude window, µm: the width over which light is coherent. `auto`, as
+    without it: that of the table or the recipe, else 65.
 coherence : string [ensemble]
     `ensemble`: what a pixel sees that covers many coherence areas; `patch`: one window's speckle.
 basis : string [auto]
