@@ -12,11 +12,13 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from ..files.bound_cache import BoundsAround, bounds_around
 from ..tables.bound import AZIMUTHAL, LAST_ANGLE, POLAR, SHARE
 from ..tables.table import DiffractionTable
 from .memory import index_between, read, upload
+from .series import load
 
 
 class EnergyBound:
@@ -35,7 +37,7 @@ class EnergyBound:
         if height_scale == self._height_scale and not differentiable:
             return
         around = bounds_around(self._table, height_scale, interval=differentiable)
-        low, high = (np.maximum(bound.values, np.float32(1.0)) for bound in around.bounds)
+        low, high = (_cells(np.maximum(bound.values, np.float32(1.0))) for bound in around.bounds)
         if self._around is None or around.scales != self._around.scales:
             self._around = around
             self._ends = upload(mi.Float, low), upload(mi.Float, high)
@@ -59,12 +61,12 @@ class EnergyBound:
             share = (height_scale - self._low) * self._slope
         return dr.maximum(self._bound(incident, cos_i, share), self._bound(outgoing, cos_o, share))
 
-    def _read(self, index: Any, share: Any | None) -> Any:
-        """The bound at a vertex; interpolated here only where its derivative is wanted."""
+    def _corners(self, cell: Any, share: Any | None) -> list[Any]:
+        """The bound at a cell's corners; interpolated here only where its derivative is wanted."""
         if share is None:
-            return read(mi.Float, self._values, index)
-        low, high = (read(mi.Float, end, index) for end in self._ends)
-        return dr.lerp(low, high, share)
+            return _read(self._values, cell)
+        low, high = (_read(end, cell) for end in self._ends)
+        return [dr.lerp(*ends, share) for ends in zip(low, high, strict=True)]
 
     def _bound(self, tangential: Any, cosine: Any, share: Any | None) -> Any:
         """max(1, a): bilinear in (θ, φ), like `AlbedoBound`."""
@@ -75,13 +77,21 @@ class EnergyBound:
         i = mi.UInt32(index_between(row, 0.0, POLAR - 1.0))
         j = mi.UInt32(index_between(column, 0.0, AZIMUTHAL - 1.0))
         s, t = dr.clip(row - i, 0.0, 1.0), dr.clip(column - j, 0.0, 1.0)
-        index = i * (AZIMUTHAL + 1) + j
-
-        def along(start: Any) -> Any:
-            values = (self._read(start + n, share) for n in (0, 1))
-            return dr.lerp(*values, t)
-
-        bound = dr.lerp(along(index), along(index + (AZIMUTHAL + 1)), s)
+        corners = self._corners(i * AZIMUTHAL + j, share)
+        bound = dr.lerp(dr.lerp(*corners[:2], t), dr.lerp(*corners[2:], t), s)
         # Towards the horizon the albedo grows with 1/cos²θ
         beyond = dr.maximum(math.cos(LAST_ANGLE) * dr.rcp(dr.maximum(cosine, 1e-6)), 1.0)
         return bound * dr.square(beyond)
+
+
+def _cells(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """All four corners of each cell together: (rows, columns) → (rows − 1, columns − 1, 4)."""
+    corners = (values[:-1, :-1], values[:-1, 1:], values[1:, :-1], values[1:, 1:])
+    return np.stack(corners, axis=-1)
+
+
+def _read(source: Any, cell: Any) -> list[Any]:
+    """The four corners of a cell."""
+    if not dr.is_jit_v(mi.Float):
+        return [read(mi.Float, source, 4 * cell + n) for n in range(4)]
+    return load(source, cell, mi.ArrayXf, 4)
