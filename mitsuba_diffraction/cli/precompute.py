@@ -102,6 +102,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> None:
     """One table, of a recipe or of one or several files."""
+    from ..edges import edge_lines
     from ..files.heights import is_recipe, load_heights
     from ..files.recipes import Recipe
     from ..tables import DiffractionTable
@@ -127,6 +128,13 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> None:
             fields = recipe.fields(options)
         else:
             fields = [load_heights(source, options) for source in sources]
+    # Before the table is waited for: whoever treats the heights will not want this one
+    shortest = min(table_options.get("wavelength_range", (360.0,))) / 1000
+    cut_out = (field for field in fields if field.cut_out)
+    said = [line for field in cut_out for line in edge_lines(field, shortest)]
+    for line in said:
+        warnings.warn(line, DiffractionWarning, stacklevel=1)
+    with Bar(args) as bar:
         table = DiffractionTable.build(
             fields[0] if len(fields) == 1 else fields, progress=bar, **table_options
         )
@@ -134,7 +142,8 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> None:
             output.parent.mkdir(parents=True, exist_ok=True)
         table.save(output)
     for line in table.source.get("warnings", ()):
-        warnings.warn(line, DiffractionWarning, stacklevel=1)
+        if line not in said:
+            warnings.warn(line, DiffractionWarning, stacklevel=1)
     print(f"{', '.join(map(str, sources))} -> {output}")
     for label, text in _report(fields, table, output, time.perf_counter() - start):
         print(f"  {label:<6} {text}")

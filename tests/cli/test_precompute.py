@@ -8,7 +8,7 @@ import shutil
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionTable
+from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.cli.progress import Bar
 
 # A table of 6 µm heights with these takes a tenth of a second.
@@ -73,6 +73,20 @@ def test_lengths_in_nanometres_are_asked_about(run, heights, here):
     np.save("nm.npy", 1e4 * np.load(heights))
     line = run("precompute", "nm.npy", "--pixel-size", "0.08", *options).failed_in_one_line()
     assert "are the heights, with a range of 399.9 µm, in nm?" in line
+
+
+def test_tilt_is_said_before_the_work_and_once(run, heights, here, monkeypatch):
+    np.save("tilted.npy", np.load(heights) + 0.003 * np.arange(75))
+    ran = run("precompute", "tilted.npy", *QUICK)
+    assert ran.code == 0
+    (line,) = [line for line in ran.err.splitlines() if "not levelled" in line]
+    assert line.endswith("try level=plane (--level plane)")
+
+    def build(*_, **__):
+        raise DiffractionError("none")
+
+    monkeypatch.setattr(DiffractionTable, "build", build)
+    assert line in run("precompute", "tilted.npy", *QUICK).err
 
 
 def test_what_is_cut_off_is_reported(run, heights, here):
