@@ -113,7 +113,7 @@ def _grey_levels(image: Image.Image, shown: str) -> npt.NDArray[np.uint8]:
     if alike and opaque and not deep:
         return grey
     why = (
-        "they differ, as in a false-colour picture"
+        "its red, green and blue differ, as in a false-colour picture"
         if not alike
         else "part of it is transparent"
         if not opaque
