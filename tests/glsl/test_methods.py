@@ -260,14 +260,13 @@ def test_the_documents_tables_are_built_once(
 ) -> None:
     monkeypatch.setenv("MITSUBA_DIFFRACTION_CACHE", str(tmp_path))
     first = make_documented("flss", patch, table)
-    kept = [path.stem for path in tmp_path.glob("*.exr")]
-    assert len(kept) == 1
+    assert len([*tmp_path.glob("*.exr")]) == 1
 
     def build(*_: object, **__: object) -> DiffractionTable:
         raise AssertionError("built again")
 
     monkeypatch.setattr(DiffractionTable, "build", build)
-    del cache._open_tables[kept[0]]  # as in the next process
+    monkeypatch.setattr(cache, "_open_tables", {})  # as in the next process
     second = make_documented("flss", patch, table)
     np.testing.assert_array_equal(second.table.coefficients, first.table.coefficients)
     with pytest.raises(AssertionError, match="built again"):
