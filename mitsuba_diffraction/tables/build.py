@@ -198,7 +198,10 @@ def _next(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> _Setting:
         return replace(setting, half=False)
     functions = setting.functions
     if functions is not None and wanted.terms is None and functions < PACKET:
-        return replace(setting, functions=PACKET)  # a cut-out looked simpler than the whole patch
+        # A cut-out looked simpler than the whole patch; series are longer than functions are many
+        terms = max(setting.expansion.terms, PACKET + 2)
+        longer = replace(setting.expansion, terms=terms)
+        return replace(setting, functions=PACKET, expansion=longer)
     longer = _extended(setting.expansion, functions, wanted.terms, attempt.error(), tolerance)
     return replace(setting, expansion=longer)
 
