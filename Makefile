@@ -42,48 +42,48 @@ package: setup .venv/browser  ## build wheel and sdist, and test them in an empt
 bench: setup  ## measure speed and noise, and put the figures into README.md
 	@mkdir -p out
 	@$(RUN) bench $(MEASURED) --json out/bench.json
-	@$(PYTHON3) -m mitsuba_diffraction.figures.speed out/bench.json -o README.md
+	@$(PYTHON3) -m docs.make.figures.speed out/bench.json -o README.md
 
 # a measured patch beside the look-alikes: make figures MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"
 figures: setup  ## make the pictures in docs/images
-	@$(PYTHON3) -m mitsuba_diffraction.figures -o docs/images $(if $(MEASURED),--measured $(MEASURED))
+	@$(PYTHON3) -m docs.make.figures -o docs/images $(if $(MEASURED),--measured $(MEASURED))
 
 gallery: setup  ## make docs/gallery.md and the pictures of docs/meshes.md
-	@$(PYTHON3) -m mitsuba_diffraction.figures.gallery -o docs
+	@$(PYTHON3) -m docs.make.figures.gallery -o docs
 
 evaluation: setup  ## make docs/evaluation.md: ridges, grating equation, fitted periods
-	@$(PYTHON3) -m mitsuba_diffraction.figures.evaluation -o docs/evaluation.md $(if $(MEASURED),--measured $(MEASURED))
+	@$(PYTHON3) -m docs.make.figures.evaluation -o docs/evaluation.md $(if $(MEASURED),--measured $(MEASURED))
 
 sweeps: setup  ## make docs/sweeps.md: contact sheets of BRDF maps
-	@$(PYTHON3) -m mitsuba_diffraction.figures.sweeps -o docs/sweeps.md $(if $(MEASURED),--measured $(MEASURED))
+	@$(PYTHON3) -m docs.make.figures.sweeps -o docs/sweeps.md $(if $(MEASURED),--measured $(MEASURED))
 
 methods: setup  ## measure the methods, and put the table into the README
-	@$(PYTHON3) -m mitsuba_diffraction.figures.methods -o README.md $(if $(MEASURED),--measured $(MEASURED))
+	@$(PYTHON3) -m docs.make.figures.methods -o README.md $(if $(MEASURED),--measured $(MEASURED))
 
 tradeoff: setup  ## measure accuracy against speed and memory: README.md and docs/accuracy.md
 	@$(RUN) tradeoff $(MEASURED) -o out/tradeoff
-	@$(PYTHON3) -m mitsuba_diffraction.figures.tradeoff out/tradeoff
+	@$(PYTHON3) -m docs.make.figures.tradeoff out/tradeoff
 
 plan: setup  ## plan the snake's scene, and put the figures into README.md and docs/plan.md
 	@mkdir -p out
 	@$(RUN) plan scenes/snake.xml --json out/plan.json
-	@$(PYTHON3) -m mitsuba_diffraction.figures.plan out/plan.json
+	@$(PYTHON3) -m docs.make.figures.plan out/plan.json
 
 parameters: setup  ## make docs/parameters.md from the plugin's docstring
-	@$(PYTHON3) -m mitsuba_diffraction.figures.parameters -o docs/parameters.md
+	@$(PYTHON3) -m docs.make.figures.parameters -o docs/parameters.md
 
 notebooks: setup  ## run the notebooks, and keep what they show in their files
-	@$(PYTHON3) -m mitsuba_diffraction.figures.notebooks
+	@$(PYTHON3) -m docs.make.figures.notebooks
 
 validation: setup  ## compare the model with rigorous solutions: docs/validation.md
-	@$(PYTHON3) -m mitsuba_diffraction.validation report -o docs
+	@$(PYTHON3) -m docs.make.validation report -o docs
 
 COMPARE := $(RUN) compare
 realtime: setup  ## compare the shaders with the path tracer, and put sheet and tables into README.md
 	@$(COMPARE) scenes/snake.xml --method all -s 768 --full-spp 48 -o out/compare/snake
 	@$(COMPARE) scenes/plate.xml --method lut spectral -s 2048 --full-spp 0 -D resx=240 -D resy=200 -o out/compare/plate
 	@$(COMPARE) scenes/sphere.xml --method lut spectral -s 1024 --full-spp 0 -D resx=240 -D resy=200 -o out/compare/sphere
-	@$(PYTHON3) -m mitsuba_diffraction.figures.realtime $(addprefix out/compare/,snake plate sphere) -o README.md
+	@$(PYTHON3) -m docs.make.figures.realtime $(addprefix out/compare/,snake plate sphere) -o README.md
 
 lint: setup  ## check style and types
 	@$(PYTHON3) -m ruff check

@@ -22,26 +22,28 @@ in every variant that is set later.
 from __future__ import annotations
 
 import importlib
-import sys
+from importlib.metadata import version
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from .llvm import select_llvm
+from .plugin.llvm import select_llvm
 
 select_llvm()  # before Dr.Jit picks a library by itself: some would end the process
 
-import mitsuba as mi  # noqa: E402
-
-from . import glsl, gratings, reference, web  # noqa: E402
-from .dictionary import bsdf_dict  # noqa: E402
+from . import reference  # noqa: E402
 from .errors import DiffractionError, DiffractionWarning  # noqa: E402
-from .heightfield import HeightField  # noqa: E402
+from .heights import HeightField, gratings  # noqa: E402
+from .plugin import registration as _registration  # noqa: E402, F401  registers the plugin
+from .plugin.dictionary import bsdf_dict  # noqa: E402
+from .realtime import glsl, web  # noqa: E402
 from .tables import DiffractionTable  # noqa: E402
 
 if TYPE_CHECKING:
-    from . import comparison, evaluation, maps, tradeoff
+    from .analysis import maps, tradeoff
+    from .realtime import comparison
+    from .thesis import evaluation
 
-__version__ = "0.1.0"
+__version__ = version(__name__)
 __all__ = [
     "DiffractionError",
     "DiffractionTable",
@@ -59,26 +61,15 @@ __all__ = [
 ]
 
 # Imported when first asked for: renders need neither, nor Matplotlib, which they load.
-_ON_DEMAND = ("comparison", "evaluation", "maps", "tradeoff")
+_ON_DEMAND = {
+    "comparison": "realtime.comparison",
+    "evaluation": "thesis.evaluation",
+    "maps": "analysis.maps",
+    "tradeoff": "analysis.tradeoff",
+}
 
 
 def __getattr__(name: str) -> ModuleType:
     if name in _ON_DEMAND:
-        return importlib.import_module(f"{__name__}.{name}")
+        return importlib.import_module(f"{__name__}.{_ON_DEMAND[name]}")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def _register(old: str | None, new: str | None) -> None:
-    """Define the plugin for the variant just set: its base class is another in each."""
-    name = f"{__name__}.bsdf"
-    if new is None:
-        return
-    if name in sys.modules:
-        importlib.reload(sys.modules[name])
-    else:
-        importlib.import_module(name)
-
-
-mi.detail.add_variant_callback(_register)
-if mi.variant() is not None:
-    _register(None, mi.variant())

@@ -11,7 +11,12 @@ class DiffractionWarning(UserWarning):
     """The result is usable, but outside the range where the model or the data can be trusted."""
 
 
+def one_line(text: str) -> str:
+    """The text with every run of white space, line ends included, made one blank."""
+    return " ".join(text.split())
+
+
 def quoted(value: object) -> str:
     """A value as an error quotes it: in one line of at most 80 characters."""
-    text = " ".join(repr(value).split())
+    text = one_line(repr(value))
     return text if len(text) <= 80 else text[:77] + "..."

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import DiffractionError
-from .geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
-from .heightfield import HeightField
+from .heights.field import HeightField
+from .optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
 
 COHERENCES = ("ensemble", "patch")
 

@@ -17,7 +17,7 @@ from PIL import Image
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.cli import main
-from mitsuba_diffraction.meshes.__main__ import main as make_mesh
+from scenes.make.__main__ import main as make_mesh
 from tests.conftest import ROOT
 from tests.instruments import nanoscope
 from tests.test_docs import PAGES, blocks, spans, typed
@@ -83,7 +83,7 @@ def commands(page: str) -> list[list[str]]:
         words
         for words in lines
         if (Path(words[0]).name == "mitsuba-diffraction" and words[1] not in NOT_RUN)
-        or (words[1:3] == ["-m", "mitsuba_diffraction.meshes"] and len(words) > 4)
+        or (words[1:3] == ["-m", "scenes.make"] and len(words) > 4)
     ]
 
 

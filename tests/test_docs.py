@@ -16,8 +16,8 @@ from PIL import Image
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.cli.main import build_parser
-from mitsuba_diffraction.cli.scene_parameters import parameters_of
-from mitsuba_diffraction.meshes.__main__ import build_parser as meshes_parser
+from mitsuba_diffraction.scene.parameters import parameters_of
+from scenes.make.__main__ import build_parser as meshes_parser
 
 ROOT = Path(__file__).parents[1]
 PACKAGE = Path(md.__file__).parent
@@ -77,7 +77,7 @@ def test_a_documented_command_is_one(words):
     match Path(program).name, rest:
         case "mitsuba-diffraction", _:
             check_command(rest)
-        case "python", ["-m", "mitsuba_diffraction.meshes", _, _, *_]:
+        case "python", ["-m", "scenes.make", _, _, *_]:
             meshes_parser().parse_args(rest[2:])
         case "python", ["-m", module, *_]:
             assert importlib.util.find_spec(module) is not None
@@ -256,7 +256,7 @@ def test_patches_lie_on_shapes_as_the_page_says():
 
 
 def test_keys_of_recipes_are_listed():
-    from mitsuba_diffraction.files import recipes
+    from mitsuba_diffraction.heights import recipes
 
     text = PAGES["docs/own-scene.md"]
     rows = text[text.index("## Recipes") : text.index("## When")].splitlines()

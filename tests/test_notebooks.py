@@ -12,8 +12,9 @@ import nbformat
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError, gratings
-from mitsuba_diffraction.figures.notebooks import execute, main
+from docs.make.figures.notebooks import execute, main
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.heights import gratings
 from tests.conftest import ROOT, obstacle
 from tests.instruments import nanoscope
 
@@ -60,7 +61,7 @@ def hindrance(notebook: Any) -> str | None:
     if "SurfaceTopography" in source and not importlib.util.find_spec("SurfaceTopography"):
         return "SurfaceTopography (extra afm) is not installed"
     if "md.glsl" in source:
-        from mitsuba_diffraction.glsl.context import headless_context
+        from mitsuba_diffraction.realtime.glsl.context import headless_context
 
         try:
             headless_context().release()

@@ -83,7 +83,7 @@ def test_the_wheel_declares_command_and_plugin(wheel):
         entry_points = archive.read(f"{name}entry_points.txt").decode()
         metadata = archive.read(f"{name}METADATA").decode()
     assert "mitsuba-diffraction = mitsuba_diffraction.cli:main" in entry_points
-    assert "diffraction = mitsuba_diffraction.bsdf" in entry_points
+    assert "diffraction = mitsuba_diffraction.plugin.bsdf" in entry_points
     assert f"\nVersion: {md.__version__}\n" in metadata
     for extra in ("afm", "gl", "view", "notebooks"):
         assert f"\nProvides-Extra: {extra}\n" in metadata
@@ -94,7 +94,7 @@ def test_the_wheel_imports_and_answers_from_elsewhere(wheel, tmp_path):
         archive.extractall(tmp_path)
     code = (
         "import sys; sys.path.insert(0, '.')\n"
-        "import mitsuba_diffraction.cli, mitsuba_diffraction.glsl.source as source\n"
+        "import mitsuba_diffraction.cli, mitsuba_diffraction.realtime.glsl.source as source\n"
         "assert mitsuba_diffraction.cli.__file__.startswith(sys.argv[1])\n"
         "sys.exit(mitsuba_diffraction.cli.main(['--version']))"
     )

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy.special import jv
 
-from mitsuba_diffraction import HeightField, gratings, reference
+from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.geometry import kirchhoff_factor, sigma_of, wavenumber
+from mitsuba_diffraction.heights import gratings
+from mitsuba_diffraction.optics.geometry import kirchhoff_factor, sigma_of, wavenumber
 from mitsuba_diffraction.reference import screen_power
-from tests.optics import polar, riemann_power, rough_patch, uniform_directions
+from tests.directions import polar, riemann_power, rough_patch, uniform_directions
 
 FLAT = HeightField(np.zeros((32, 32)), 0.08)
 #: Odd and even numbers of pixels, not square, nor are the pixels; 1.95 × 1.8 µm.

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.cli.scene_parameters import parameters_of
-from mitsuba_diffraction.files.recipes import Recipe
+from mitsuba_diffraction.heights.recipes import Recipe
+from mitsuba_diffraction.scene.parameters import parameters_of
 
 SCENES = Path(__file__).resolve().parent.parent / "scenes"
 LARGE = ("sphere", "snake", "xenopeltis")
@@ -39,7 +39,7 @@ def test_it_renders_at_its_defaults(name: str) -> None:
 @pytest.fixture(scope="module")
 def gentle(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Parameters of any scene: a grating whose table and bound take a second."""
-    from mitsuba_diffraction import gratings
+    from mitsuba_diffraction.heights import gratings
 
     field = gratings.sinusoidal(period=1.6, depth=0.05, periods=4, rows=4)
     file = tmp_path_factory.mktemp("patch") / "gentle.npy"
@@ -147,7 +147,7 @@ def test_colours_move_with_the_lamp() -> None:
 
 @pytest.mark.usefixtures("variant")
 def test_a_patch_of_the_user_replaces_the_default(tmp_path: Path) -> None:
-    from mitsuba_diffraction import gratings
+    from mitsuba_diffraction.heights import gratings
 
     field = gratings.sinusoidal(period=1.0, depth=0.2)
     np.save(tmp_path / "patch.npy", field.heights)

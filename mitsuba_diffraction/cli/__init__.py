@@ -9,14 +9,11 @@ render                 a scene to a picture
 animation, frames      `render --frames`: what changes, and pictures of it
 planned, plan          `render --plan`, and what a plan says
 brdf_map, method_map   the hemisphere of view directions, by the BSDF or by a method
-evaluate, sweep        the methods of the source documents
+evaluate, sweep        the methods of the thesis
 view, compare          a scene in real time, and beside the path tracer
 export_viewer          a scene as a page for a browser
 tangents               a patch laid smoothly over any mesh
 tradeoff, bench        accuracy, speed and memory
-passes, pictures       rendering in passes; EXR and PNG of it
-scenes                 a variant set and a scene loaded
-scene_parameters       names that -D may set
 patch                  the one patch of a command that needs heights
 heights_options        options shared by commands: how heights are read,
 light_options          which light a patch is looked at in,
@@ -24,8 +21,7 @@ scene_options          which scene, variant and sensor
 arguments              types of arguments
 output                 where results go, checked before the work
 progress               bars
-console                lines on stderr
-mitsuba_text           what Mitsuba says, as such lines
+console                lines on stderr, Mitsuba's among them
 report                 nested plain data as text
 """
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import DiffractionError
-from .scene_parameters import parameters_of
+from ..scene.parameters import parameters_of
 
 Numbers = tuple[float, ...]
 

@@ -19,8 +19,8 @@ from .progress import Bar
 from .report import save_json
 
 if TYPE_CHECKING:
-    from ..benchmarks.figures import Section
-    from ..benchmarks.plan import Plan
+    from ..analysis.bench.figures import Section
+    from ..analysis.bench.plan import Plan
 
 PARTS = ("build", "eval", "sample", "render", "snake", "noise", "efficiency", "colours", "scaling")
 
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         check_writable(args.json)
     if args.heights is None and was_given(args):
         args.parser.error(f"{was_given(args)[0]} needs a file of heights")
-    from ..benchmarks.history import compared, read_run
+    from ..analysis.bench.history import compared, read_run
 
     earlier = read_run(args.against) if args.against is not None else None
     parts = (args.only,) if args.only else PARTS
@@ -75,8 +75,8 @@ def run(args: argparse.Namespace) -> int:
         _check_scenes(args.scenes)
     from tqdm import tqdm
 
-    from ..benchmarks import plan
-    from ..benchmarks.machine import describe_machine
+    from ..analysis.bench import plan
+    from ..analysis.bench.machine import describe_machine
 
     chosen = plan.QUICK if args.quick else plan.FULL
     machine = describe_machine()
@@ -120,21 +120,21 @@ def _sections(
 ) -> Iterator[Section]:
     """Everything that is asked for, one after the other."""
     if "build" in parts:
-        from ..benchmarks.build import measure_builds
+        from ..analysis.bench.build import measure_builds
 
         yield measure_builds(plan, folder, bar)
     if set(parts) <= {"build"}:
         return
     import drjit as dr
 
-    from ..benchmarks.colours import measure_colours
-    from ..benchmarks.contenders import build_tables
-    from ..benchmarks.evaluation import measure_eval, measure_sampling
-    from ..benchmarks.rendering import measure_rendering, measure_snake
-    from ..benchmarks.scaling import measure_lookups, measure_pictures
-    from ..benchmarks.variance import measure_efficiency, measure_noise
-    from ..files.heights import load_heights
-    from .scenes import set_variant
+    from ..analysis.bench.colours import measure_colours
+    from ..analysis.bench.contenders import build_tables
+    from ..analysis.bench.evaluation import measure_eval, measure_sampling
+    from ..analysis.bench.rendering import measure_rendering, measure_snake
+    from ..analysis.bench.scaling import measure_lookups, measure_pictures
+    from ..analysis.bench.variance import measure_efficiency, measure_noise
+    from ..heights.load import load_heights
+    from ..scene.load import set_variant
 
     patch = None
     if args.heights is not None:

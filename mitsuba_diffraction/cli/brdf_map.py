@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from ..colour import ILLUMINANTS
+from ..optics.colour import ILLUMINANTS
 from ..reference import COHERENCES
 from .arguments import number_between, path_ending_in, whole_number
 from .heights_options import add_heights_options, load_options, was_given
@@ -126,9 +126,9 @@ def run(args: argparse.Namespace) -> int:
     if args.method is not None:
         return run_method(args, _map_arguments(args), written)
 
-    from ..maps import Bands, Light, brdf_map, check_map, save_exr, save_png
-    from .mitsuba_text import warnings_as_ours
-    from .scenes import set_variant
+    from ..analysis.maps import Bands, Light, brdf_map, check_map, save_exr, save_png
+    from ..scene.load import set_variant
+    from .console import warnings_as_ours
 
     arguments = _map_arguments(args)
     light = Light(args.theta, args.phi)
@@ -185,7 +185,7 @@ def _bsdf(args: argparse.Namespace) -> Any:
     """The plugin for what the command line says, in the variant that is set."""
     import mitsuba as mi
 
-    from ..bsdf import Diffraction
+    from ..plugin.bsdf import Diffraction
 
     parameters = {
         name: getattr(args, name) for name in _BSDF_NAMES if getattr(args, name) is not None

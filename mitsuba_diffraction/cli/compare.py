@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import DiffractionError
-from ..glsl.source import DOCUMENTED, METHODS
+from ..realtime.glsl.source import DOCUMENTED, METHODS
 from .arguments import whole_number
 from .console import say_warning
 from .output import check_writable
@@ -20,7 +20,7 @@ from .report import plain, save_json
 from .scene_options import add_scene_options, scene_parameters
 
 if TYPE_CHECKING:
-    from ..comparison import SameLights
+    from ..realtime.comparison import SameLights
 
 #: Samples along either side of a pixel for the slow methods, whose own errors are far larger.
 _FEWER = 2
@@ -76,10 +76,10 @@ def run(args: argparse.Namespace) -> int:
         raise DiffractionError(f"-o {folder}: it is a file; name a folder")
     check_writable(folder / "compare.json", make_folder=True)
 
-    from ..comparison import SameLights, difference, exposure_of
-    from ..comparison.table import markdown
-    from .mitsuba_text import warnings_as_ours
-    from .scenes import load_scene, sensor_of, set_variant
+    from ..realtime.comparison import SameLights, difference, exposure_of
+    from ..realtime.comparison.table import markdown
+    from ..scene.load import load_scene, sensor_of, set_variant
+    from .console import warnings_as_ours
 
     start = time.perf_counter()
     variant = set_variant(args.mode)
@@ -143,8 +143,8 @@ def _path_traced(
     args: argparse.Namespace, scene: Any, both: SameLights, variant: str, bar: Bar
 ) -> tuple[list[Any], Any]:
     """Two halves of the samples of direct light, and full transport if it is asked for."""
-    from ..comparison.truth import box_sensor
-    from .passes import Stop
+    from ..realtime.comparison.truth import box_sensor
+    from ..scene.passes import Stop
 
     direct, full = both.scene, None
     with Stop() as stop:
@@ -160,7 +160,7 @@ def _path_traced(
 
 def _drawn(pictures: _Pictures, bar: Bar) -> dict[str, dict[str, Any]]:
     """Draw with all methods that were asked for, and measure them."""
-    from ..glsl.timing import fragment_times
+    from ..realtime.glsl.timing import fragment_times
 
     args, table = pictures.args, {}
     every = "all" in args.method
@@ -185,8 +185,8 @@ def _drawn(pictures: _Pictures, bar: Bar) -> dict[str, dict[str, Any]]:
 
 def _compared(pictures: _Pictures, method: str, drawn: Any, samples: int) -> dict[str, Any]:
     """Write a method's picture and sheet; its errors, time and memory."""
-    from ..comparison import difference
-    from ..comparison.sheet import write_sheet
+    from ..realtime.comparison import difference
+    from ..realtime.comparison.sheet import write_sheet
 
     renderer, reference = pictures.both.renderer, pictures.reference
     folder, exposure = pictures.folder, pictures.exposure
@@ -209,7 +209,7 @@ def _compared(pictures: _Pictures, method: str, drawn: Any, samples: int) -> dic
 
 def _traced(scene: Any, sensor: Any, spp: int, seed: int, variant: str, stop: Any, bar: Bar) -> Any:
     """A path-traced picture (height, width, 3); half a picture is no use here."""
-    from .passes import render_passes
+    from ..scene.passes import render_passes
 
     result = render_passes(
         scene, sensor, spp=spp, seed=seed, variant=variant, stop=stop, progress=bar
@@ -231,7 +231,7 @@ def _make_folder(folder: Path) -> None:
 def _write(image: Any, path: Path, args: argparse.Namespace, variant: str, samples: int) -> None:
     import mitsuba as mi
 
-    from .pictures import write_exr
+    from ..scene.pictures import write_exr
 
     origin: dict[str, str | int] = {"scene": str(args.scene), "variant": variant, "spp": samples}
     bitmap = mi.Bitmap(np.ascontiguousarray(image, np.float32), mi.Bitmap.PixelFormat.RGB)

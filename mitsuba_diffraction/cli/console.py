@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator
 
-from ..errors import DiffractionWarning
+from ..errors import DiffractionWarning, one_line
 
 PROGRAM = "mitsuba-diffraction"
 
-
-def one_line(text: str) -> str:
-    """The text with every run of white space, line ends included, made one blank."""
-    return " ".join(text.split())
+# date, time, level, then the class, or the line of Python and its function
+_STAMP = re.compile(r"^[\d-]+ [\d:]+ [A-Z]+\s+(?:\[[^]]*\]\s+)?(?:(?:<module>|\w+\(\)): )?")
+# Mitsuba catches SIGINT while it renders, says so, and then lets Python have it.
+_INTERRUPTED = "Received interrupt signal"
 
 
 def say(text: str) -> None:
@@ -63,3 +64,42 @@ def saying_once() -> Callable[[str], None]:
             say_warning(text)
 
     return say
+
+
+@contextlib.contextmanager
+def warnings_as_ours() -> Iterator[None]:
+    """Inside, Mitsuba's warnings are printed like this program's, each once.
+
+    A variant must be set.
+    """
+    import mitsuba as mi
+
+    say = saying_once()
+
+    class Lines(mi.Appender):
+        def append(self, level: object, text: str) -> None:
+            line = _without_stamp(text)
+            if not line.startswith(_INTERRUPTED):  # whoever pressed Ctrl-C knows
+                say(line)
+
+        def log_progress(self, *_: object) -> None:
+            pass  # scalar variants draw bars of their own
+
+    logger = mi.logger()
+    before = [logger.appender(n) for n in range(logger.appender_count())]
+    level = logger.log_level()
+    logger.clear_appenders()
+    logger.add_appender(Lines())
+    logger.set_log_level(mi.LogLevel.Warn)
+    try:
+        yield
+    finally:
+        logger.clear_appenders()
+        for appender in before:
+            logger.add_appender(appender)
+        logger.set_log_level(level)
+
+
+def _without_stamp(text: str) -> str:
+    """A line of Mitsuba's log without date, level and class."""
+    return _STAMP.sub("", text.strip())

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
-from ..methods import NAMES as METHODS
+from ..thesis.methods import NAMES as METHODS
 from .arguments import path_ending_in, whole_number
 from .heights_options import add_heights_options
 from .light_options import add_direction, add_wavelengths
@@ -77,14 +77,14 @@ def run(args: argparse.Namespace) -> int:
     """Measure, fit, draw, and return the exit code."""
     import numpy as np
 
-    from ..evaluation import Beam, fit_period, measure, ridge_of
-    from ..evaluation.beam import check_axes
-    from ..evaluation.files import save_csv, save_npz
-    from ..evaluation.plot import figure
-    from ..files.atomic import atomic_path
-    from ..methods import make
-    from ..methods.full_spectrum import trapezoid_rule
-    from ..methods.period import check_period
+    from ..atomic import atomic_path
+    from ..thesis.evaluation import Beam, fit_period, measure, ridge_of
+    from ..thesis.evaluation.beam import check_axes
+    from ..thesis.evaluation.files import save_csv, save_npz
+    from ..thesis.evaluation.plot import figure
+    from ..thesis.methods import make
+    from ..thesis.methods.full_spectrum import trapezoid_rule
+    from ..thesis.methods.period import check_period
 
     start = time.perf_counter()
     output = args.output or Path(f"{args.source.stem}-evaluation.png")
@@ -166,8 +166,8 @@ def _windows(
     """What single windows show, and the documents' procedure: lines, and entries of the NPZ."""
     if args.windows == 0:
         return [], {}
-    from ..evaluation import documents_fit, window_fits
-    from ..methods import make
+    from ..thesis.evaluation import documents_fit, window_fits
+    from ..thesis.methods import make
 
     few = wavelengths[:: max(1, wavelengths.size // _FEW)]
     # the look-up in the package's own series: a single window's amplitudes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 
-from ..web.tables import WEB_METHODS
+from ..realtime.web.tables import WEB_METHODS
 from .arguments import path_ending_in
 from .console import say_warning
 from .output import check_writable
@@ -40,9 +40,9 @@ def run(args: argparse.Namespace) -> int:
     parameters = scene_parameters(args)
     check_writable(args.output)
 
-    from ..web import export_viewer
-    from .mitsuba_text import warnings_as_ours
-    from .scenes import load_scene, sensor_of, set_variant
+    from ..realtime.web import export_viewer
+    from ..scene.load import load_scene, sensor_of, set_variant
+    from .console import warnings_as_ours
 
     start = time.perf_counter()
     set_variant(args.mode)

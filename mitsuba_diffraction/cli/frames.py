@@ -10,18 +10,18 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
+from ..atomic import atomic_path
 from ..errors import DiffractionError
-from ..files.atomic import atomic_path
+from ..scene.parameters import files_of
 from .animation import values_of_frames
 from .console import say, say_warning
 from .output import check_writable
 from .progress import Bar
 from .scene_options import scene_parameters
-from .scene_parameters import files_of
 
 #: Suffixes of films, and what Pillow needs to know about each.
 FILMS: dict[str, dict[str, Any]] = {
@@ -153,7 +153,7 @@ def _frames(args: argparse.Namespace, folder: Path) -> list[Frame]:
             "sensor": args.sensor,
             "exposure": args.exposure,
             "preview": args.preview,
-            "version": __version__,
+            "version": version("mitsuba_diffraction"),
         }
         frames.append(Frame(folder / f"frame_{n:04d}.png", values, settings))
     return frames
@@ -161,10 +161,10 @@ def _frames(args: argparse.Namespace, folder: Path) -> list[Frame]:
 
 def _rendered(args: argparse.Namespace, frames: list[Frame], bar: Bar) -> Iterator[Frame]:
     """Render and write frame after frame; ends early after Ctrl-C."""
-    from .mitsuba_text import warnings_as_ours
-    from .passes import Stop, render_passes
-    from .pictures import colours_of, count_bad, write_exr, write_png
-    from .scenes import load_scene, preview_samples, sensor_of, set_variant, shrink
+    from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink
+    from ..scene.passes import Stop, render_passes
+    from ..scene.pictures import colours_of, count_bad, write_exr, write_png
+    from .console import warnings_as_ours
 
     if not frames:
         return

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..files.options import LoadOptions
+    from ..heights.options import LoadOptions
 
 _NAMES = ("pixel_size", "max_height", "channel", "crop", "fill", "level", "clip", "periodic")
 
@@ -50,7 +50,7 @@ def load_options(args: argparse.Namespace) -> LoadOptions:
     DiffractionError
         If a value does not fit.
     """
-    from ..files.options import LoadOptions
+    from ..heights.options import LoadOptions
 
     return LoadOptions.of(**{name: getattr(args, name) for name in _NAMES})
 

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
-from ..validity import window_line
+from ..heights.validity import window_line
 from .arguments import path_ending_in
 from .heights_options import add_heights_options, load_options, was_given
 from .progress import Bar
 from .report import lines_of, plain
 
 if TYPE_CHECKING:
-    from ..heightfield import HeightField
+    from ..heights.field import HeightField
 
 _MESHES = (".ply", ".obj", ".serialized")
 #: Meshes that have to be converted first, to say so instead of looking for heights in them.
@@ -69,9 +69,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
-    from ..files.heights import is_recipe
-    from ..files.raw import existing_file
-    from ..files.table_exr import is_table
+    from ..heights.formats.raw import existing_file
+    from ..heights.read import is_recipe
+    from ..tables.exr import is_table
 
     existing_file(file)
     if is_recipe(file):
@@ -104,8 +104,8 @@ def _table(file: Path) -> dict[str, Any]:
 
 
 def _plot_albedo(file: Path, output: Path) -> None:
-    from ..figures.albedo import albedo_figure
-    from ..files.atomic import atomic_path
+    from ..analysis.pictures.albedo import albedo_figure
+    from ..atomic import atomic_path
     from ..tables import DiffractionTable
 
     with atomic_path(output) as temporary:
@@ -113,10 +113,11 @@ def _plot_albedo(file: Path, output: Path) -> None:
 
 
 def _draw(args: argparse.Namespace) -> None:
-    from ..figures.patches import patches_figure
-    from ..files.atomic import atomic_path
-    from ..files.heights import is_recipe, load_heights
-    from ..files.recipes import Recipe
+    from ..analysis.pictures.patches import patches_figure
+    from ..atomic import atomic_path
+    from ..heights.load import load_heights
+    from ..heights.read import is_recipe
+    from ..heights.recipes import Recipe
 
     options = load_options(args)
     if is_recipe(args.file):
@@ -128,7 +129,7 @@ def _draw(args: argparse.Namespace) -> None:
 
 
 def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
-    from ..files.heights import load_heights
+    from ..heights.load import load_heights
 
     field = load_heights(file, load_options(args))
     return {"kind": "height field", **field.summary(), "warnings": _doubts(field)}
@@ -143,7 +144,7 @@ def _doubts(
 
 
 def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
-    from ..files.recipes import Recipe
+    from ..heights.recipes import Recipe
 
     recipe = Recipe.load(file)
     table = recipe.table_arguments()
@@ -168,8 +169,8 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
 def _mesh(file: Path) -> dict[str, Any]:
     import mitsuba as mi
 
-    from ..meshes.tangents import check_tangents, load_mesh, load_orientation
-    from .mitsuba_text import warnings_as_ours
+    from ..scene.orientation.tangents import check_tangents, load_mesh, load_orientation
+    from .console import warnings_as_ours
 
     if mi.variant() is None:
         mi.set_variant("scalar_rgb")  # any reads meshes; this one needs neither GPU nor LLVM

@@ -15,8 +15,8 @@ import sys
 import threading
 import traceback
 from collections.abc import Iterator, Sequence
+from importlib.metadata import version
 
-from .. import __version__
 from ..errors import DiffractionError
 from . import (
     bench,
@@ -63,7 +63,9 @@ def build_parser() -> argparse.ArgumentParser:
     )
     _add_common(parser)
     parser.set_defaults(debug=False, progress=None)
-    parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
+    parser.add_argument(
+        "--version", action="version", version=f"{PROGRAM} {version('mitsuba_diffraction')}"
+    )
     subparsers = parser.add_subparsers(
         title="commands", metavar="COMMAND", dest="command", required=True
     )

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
-from ..methods import NAMES as METHODS
+from ..thesis.methods import NAMES as METHODS
 from .patch import load_patch
 from .progress import Bar
 
@@ -63,7 +63,7 @@ def gain_of(args: argparse.Namespace) -> Any:
     DiffractionError
         If --int-ior is no number.
     """
-    from ..methods import Gain
+    from ..thesis.methods import Gain
 
     if not args.relative:
         return None
@@ -86,9 +86,9 @@ def run_method(args: argparse.Namespace, map_arguments: dict[str, Any], written:
     map_arguments : wavelength_range, step and wavelength.
     written : EXR and PNG, or only the PNG.
     """
-    from ..maps import Bands, Light, check_map, save_exr, save_png
-    from ..maps.methods import method_map
-    from ..methods import make
+    from ..analysis.maps import Bands, Light, check_map, save_exr, save_png
+    from ..thesis.methods import make
+    from ..thesis.methods.maps import method_map
 
     start = time.perf_counter()
     light = Light(args.theta, args.phi)

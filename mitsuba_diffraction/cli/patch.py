@@ -11,7 +11,7 @@ from .arguments import whole_number
 from .heights_options import load_options
 
 if TYPE_CHECKING:
-    from ..heightfield import HeightField
+    from ..heights.field import HeightField
 
 _TABLE_NAMES = ("coherence_width", "coherence", "tolerance", "terms")
 
@@ -34,9 +34,10 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
     DiffractionError
         If the source is a table or no heights, or an option does not fit.
     """
-    from ..files.heights import is_recipe, load_heights
-    from ..files.recipes import Recipe
-    from ..files.table_exr import is_table
+    from ..heights.load import load_heights
+    from ..heights.read import is_recipe
+    from ..heights.recipes import Recipe
+    from ..tables.exr import is_table
 
     options = load_options(args)
     source = args.source

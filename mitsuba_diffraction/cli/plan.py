@@ -16,9 +16,9 @@ from .report import lines_of, save_json
 from .scene_options import add_scene_options, scene_parameters
 
 if TYPE_CHECKING:
-    from ..planning.difference import Difference
-    from ..planning.make import Fitted, Loaded
-    from ..planning.plan import Plan
+    from ..scene.planning.difference import Difference
+    from ..scene.planning.make import Fitted, Loaded
+    from ..scene.planning.plan import Plan
 
 PATHS, TOLERANCE = 1 << 15, 1e-3
 _MOST_PATHS = 1 << 22  # lanes are counted in single precision
@@ -67,7 +67,7 @@ def planning_variant(asked: str | None) -> str:
     DiffractionError
         If a plan would say nothing about the asked one.
     """
-    from .scenes import set_variant
+    from ..scene.load import set_variant
 
     name = set_variant(asked)
     if "spectral" not in name:
@@ -87,9 +87,9 @@ def run(args: argparse.Namespace) -> int:
     if args.paths > _MOST_PATHS:
         args.parser.error(f"argument --paths: at most {_MOST_PATHS}, got {args.paths}")
 
-    from ..planning.make import fitted, look
-    from .mitsuba_text import warnings_as_ours
-    from .scenes import load_scene, sensor_of
+    from ..scene.load import load_scene, sensor_of
+    from ..scene.planning.make import fitted, look
+    from .console import warnings_as_ours
 
     variant = planning_variant(args.mode)
     tolerance: float = args.plan_tolerance
@@ -147,9 +147,9 @@ def plan_or_json(text: str) -> Path:
 def _of_table(
     key: str, loaded: Loaded, plan: Plan, planned: dict[str, Any], seconds: dict[str, float]
 ) -> dict[str, Any]:
-    from ..planning.domain import lobes_in_a_pixel, wavelengths_needed
-    from ..planning.lookups import evaluation_ratio
     from ..plugin.sampling import sampler_bytes
+    from ..scene.planning.domain import lobes_in_a_pixel, wavelengths_needed
+    from ..scene.planning.lookups import evaluation_ratio
 
     table, mine = loaded.session.tables[key], plan.tables[key]
     result: dict[str, Any] = {"surfaces": ", ".join(mine.surfaces), "heights": mine.name}
@@ -209,7 +209,7 @@ def _of_table(
 
 def _shares(values: Any, light: Any, name: str = "", limit: float = 0.0) -> dict[str, float]:
     """Below which values there are these shares of the light, and the largest that could be."""
-    from ..planning.domain import quantiles
+    from ..scene.planning.domain import quantiles
 
     below = [0.5, 0.99, 0.999]
     found = {

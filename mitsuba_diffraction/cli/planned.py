@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
 from ..progress import Progress
+from ..scene.load import sensor_of, set_variant
 from .console import say, say_warning
 from .plan import planning_variant, say_if_unsuited
-from .scenes import sensor_of, set_variant
 
 if TYPE_CHECKING:
-    from ..planning.plan import Plan
+    from ..scene.planning.plan import Plan
 
 #: `--plan` without a file.
 MAKE = Path()
@@ -56,8 +56,8 @@ def load_by_plan(
             "not make smaller; rendering without one"
         )
         return None
-    from ..planning.lookups import outside_of
-    from ..planning.make import load_planned
+    from ..scene.planning.lookups import outside_of
+    from ..scene.planning.make import load_planned
 
     try:
         plan, shares = _plan(args, variant, load, tell)
@@ -82,8 +82,8 @@ def _plan(
     args: argparse.Namespace, variant: str, load: Callable[[], Any], tell: Progress
 ) -> tuple[Plan, dict[str, float]]:
     """The plan, and the shares of light outside; in the variant that paths are traced in."""
-    from ..planning.make import check_light, fitted, look
-    from ..planning.plan import Plan
+    from ..scene.planning.make import check_light, fitted, look
+    from ..scene.planning.plan import Plan
 
     def sensor(scene: Any) -> Any:
         return sensor_of(scene, args.sensor)
@@ -104,7 +104,7 @@ def _plan(
 
 def say_outside(planned: Planned, samples: int) -> None:
     """What was looked up outside the plan, a line for each table."""
-    from ..planning.lookups import outside_of
+    from ..scene.planning.lookups import outside_of
 
     for key, table in planned.tables.items():
         found, mine = outside_of(table), planned.plan.tables[key]

@@ -19,7 +19,7 @@ from .output import check_outputs
 from .progress import Bar
 
 if TYPE_CHECKING:
-    from ..heightfield import HeightField
+    from ..heights.field import HeightField
     from ..tables import DiffractionTable
 
 BASES = ("auto", *expansion.BASES)
@@ -85,7 +85,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """Build one table, or those of several recipes, and return the exit code."""
-    from ..files.heights import is_recipe
+    from ..heights.read import is_recipe
 
     recipes = [source for source in args.sources if is_recipe(source)]
     if not recipes:
@@ -102,9 +102,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> None:
     """One table, of a recipe or of one or several files."""
-    from ..edges import edge_lines
-    from ..files.heights import is_recipe, load_heights
-    from ..files.recipes import Recipe
+    from ..heights.load import load_heights
+    from ..heights.preprocess.edges import edge_lines
+    from ..heights.read import is_recipe
+    from ..heights.recipes import Recipe
     from ..tables import DiffractionTable
 
     start = time.perf_counter()

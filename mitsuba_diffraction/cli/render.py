@@ -18,7 +18,7 @@ from .progress import Bar
 from .scene_options import add_scene_options, scene_parameters
 
 if TYPE_CHECKING:
-    from .passes import Result
+    from ..scene.passes import Result
 
 _INTERRUPTED = 130
 
@@ -118,9 +118,9 @@ def _run_one(args: argparse.Namespace) -> int:
     for path in dict.fromkeys((output, png)):
         check_writable(path)
 
-    from .mitsuba_text import warnings_as_ours
-    from .passes import Stop, render_passes
-    from .scenes import load_scene, preview_samples, sensor_of, set_variant, shrink
+    from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink
+    from ..scene.passes import Stop, render_passes
+    from .console import warnings_as_ours
 
     start = time.perf_counter()
     variant = set_variant(args.mode)
@@ -173,7 +173,7 @@ def _written(
     result: Result, args: argparse.Namespace, exr: Path | None, png: Path, variant: str
 ) -> list[Path]:
     """Write the picture, with warnings of what it lacks; the files."""
-    from .pictures import colours_of, count_bad, write_exr, write_png
+    from ..scene.pictures import colours_of, count_bad, write_exr, write_png
 
     bad = count_bad(result.bitmap)
     if bad:
@@ -194,7 +194,7 @@ def _written(
 
 def _shows_colours(scene: object, sensor: object) -> bool:
     """Whether the film will hold something for a PNG, asked before the work is done."""
-    from .pictures import colours_of
+    from ..scene.pictures import colours_of
 
     film = sensor.film()  # type: ignore[attr-defined]
     film.prepare(scene.integrator().aov_names())  # type: ignore[attr-defined]

@@ -10,7 +10,7 @@ from numbers import Real
 from pathlib import Path
 from typing import Any
 
-from ..files.atomic import atomic_path
+from ..atomic import atomic_path
 
 # Keys of height-field summaries, which are in µm throughout, and suffixes of keys that say so.
 _UNITS = {"pixel_size": "µm", "extent": "µm", "range": "µm", "rms_height": "µm"}

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
-from ..methods import NAMES as METHODS
+from ..thesis.methods import NAMES as METHODS
 from .arguments import number_between, path_ending_in
 from .heights_options import add_heights_options
 from .light_options import add_direction, add_wavelengths
@@ -87,10 +87,10 @@ def _add_options(group: argparse._ArgumentGroup) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Evaluate all maps, compare, draw, and return the exit code."""
-    from ..files.atomic import atomic_path
-    from ..maps import Light
-    from ..maps.sheet import contact_sheet
-    from ..sweeps import sweep
+    from ..analysis.maps import Light
+    from ..analysis.maps.sheet import contact_sheet
+    from ..atomic import atomic_path
+    from ..thesis.sweeps import sweep
 
     start = time.perf_counter()
     output = args.output or Path(f"{args.source.stem}-{args.kind}.png")
@@ -144,8 +144,8 @@ def _compiled(
 ) -> list[str]:
     if args.kind != "method" or not args.compiled:
         return []
-    from ..sweeps.compiled import time_compiled
-    from .scenes import set_variant
+    from ..scene.load import set_variant
+    from ..thesis.sweeps.compiled import time_compiled
 
     variant = set_variant(None)
     tables = {k: settings[k] for k in ("coherence_width", "tolerance") if k in settings}
@@ -186,7 +186,7 @@ def _lines(result: Any) -> list[str]:
 
 
 def _save(path: Path, result: Any) -> None:
-    from ..files.atomic import atomic_path
+    from ..atomic import atomic_path
 
     with (
         atomic_path(path) as temporary,

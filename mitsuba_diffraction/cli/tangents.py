@@ -12,7 +12,7 @@ from .output import check_writable
 from .progress import Bar
 
 if TYPE_CHECKING:
-    from ..meshes import TangentReport
+    from ..scene.orientation.tangents import TangentReport
 
 _GUIDES = ("smooth", "x", "y", "z", "body")
 _NAMED = 6  # singular points that are named
@@ -56,11 +56,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Write the mesh, say where its field is singular, and return the exit code."""
     check_writable(args.output)
-    from ..meshes import check_tangents, load_mesh, oriented_mesh, write_ply
-    from ..meshes.breaks import BREAK
-    from ..meshes.directions import direction_field, turned
-    from ..meshes.trimesh import vertex_normals
-    from .mitsuba_text import warnings_as_ours
+    from ..scene.orientation.breaks import BREAK
+    from ..scene.orientation.directions import direction_field, turned
+    from ..scene.orientation.oriented import oriented_mesh
+    from ..scene.orientation.tangents import check_tangents, load_mesh
+    from ..scene.orientation.trimesh import vertex_normals, write_ply
+    from .console import warnings_as_ours
 
     with Bar(args) as bar, warnings_as_ours():
         bar(0, 0, "reading")

@@ -15,9 +15,9 @@ from .progress import Bar
 from .report import save_json
 
 if TYPE_CHECKING:
-    from ..tradeoff.depth import Depths
-    from ..tradeoff.measuring import Measured
-    from ..tradeoff.wavelengths import Spectral
+    from ..analysis.tradeoff.depth import Depths
+    from ..analysis.tradeoff.measuring import Measured
+    from ..analysis.tradeoff.wavelengths import Spectral
 
 #: Pixels of the default patch, pairs of directions, calls at once, timed rounds, depths.
 _FULL, _QUICK = (1332, 240, 1 << 19, 7, 14), (400, 160, 1 << 17, 5, 9)
@@ -71,11 +71,9 @@ def run(args: argparse.Namespace) -> int:
     if args.heights is None and was_given(args):
         args.parser.error(f"{was_given(args)[0]} needs a file of heights")
     check_writable(args.output / "tradeoff.json", make_folder=True)
-    from .. import gratings
-    from ..benchmarks.machine import describe_machine
-    from ..benchmarks.plan import PIXEL
-    from ..files.heights import load_heights
-    from ..tradeoff import (
+    from ..analysis.bench.machine import describe_machine
+    from ..analysis.bench.plan import PIXEL
+    from ..analysis.tradeoff import (
         Budget,
         measure,
         measure_depths,
@@ -83,9 +81,11 @@ def run(args: argparse.Namespace) -> int:
         recommended,
         settings,
     )
-    from ..tradeoff.plot import draw_depths, draw_trade
-    from ..tradeoff.sample import Sample
-    from .scenes import set_variant
+    from ..analysis.tradeoff.plot import draw_depths, draw_trade
+    from ..analysis.tradeoff.sample import Sample
+    from ..heights import gratings
+    from ..heights.load import load_heights
+    from ..scene.load import set_variant
 
     side, pairs, lanes, rounds, depths = _QUICK if args.quick else _FULL
     if args.heights is None:
@@ -138,8 +138,8 @@ def _budget(args: argparse.Namespace) -> dict[str, float | None]:
 
 
 def _write(folder: Path, document: dict[str, Any], results: list[Measured], deep: Depths) -> None:
-    from ..files.atomic import atomic_path
-    from ..tradeoff.measuring import rows
+    from ..analysis.tradeoff.measuring import rows
+    from ..atomic import atomic_path
 
     records = list(rows(results))
     document["settings"] = records

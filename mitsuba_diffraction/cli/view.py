@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from ..errors import DiffractionError
-from ..glsl.source import METHODS
+from ..realtime.glsl.source import METHODS
 from .arguments import number_between, whole_number
 from .output import check_writable
 from .scene_options import add_scene_options, scene_parameters
@@ -54,13 +54,13 @@ def run(args: argparse.Namespace) -> int:
     parameters = scene_parameters(args)
     check_writable(args.output / "view_000.png")
     try:
-        from ..glsl.viewer import show
+        from ..realtime.glsl.viewer import show
     except ImportError as error:
         raise DiffractionError(
             f"view needs {error.name}: pip install 'mitsuba-diffraction[view]'"
         ) from error
-    from .mitsuba_text import warnings_as_ours
-    from .scenes import load_scene, sensor_of, set_variant
+    from ..scene.load import load_scene, sensor_of, set_variant
+    from .console import warnings_as_ours
 
     set_variant(args.mode)
     with warnings_as_ours():

@@ -2,18 +2,22 @@
 
 Contents
 --------
+bsdf            `Diffraction`, the plugin; its docstring is docs/parameters.md
+registration    it is registered in every variant
+dictionary      `bsdf_dict`: from arrays
+llvm            an LLVM that Dr.Jit survives
 parameters      read from Mitsuba's Properties, checked
 sources         from what a scene names to a table, built once
 attributes      whether a mesh has what its BSDF reads
 names           what messages call an element of a scene
 session         plans to follow and records to keep while a scene loads
-light           what a variant knows of a wavelength; asks the next two
+power           the diffracted power at single wavelengths; asks the next two
 lookup          a table inside a kernel: `DeviceTable`
 sampling        directions drawn where the orders are
 series          weights of the terms at a κ
 restricted      a planned table, and its coarse cells beyond
 scalar_lookup   one look-up at a time, in scalar variants
-rgb_light       the same in the RGB variants' colours
+rgb_power       the same in the RGB variants' colours
 rgb_lookup      a colour table inside a kernel
 energy          the bound of the albedo that conserves energy
 reflectance     of the surface itself: dielectric, conductor, mirror

@@ -14,8 +14,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files.bound_cache import BoundsAround, bounds_around
-from ..tables.bound import AZIMUTHAL, LAST_ANGLE, POLAR, SHARE
+from ..tables.energy.bound import AZIMUTHAL, LAST_ANGLE, POLAR, SHARE
+from ..tables.store.bounds import BoundsAround, bounds_around
 from ..tables.table import DiffractionTable
 from .memory import index_between, read, upload
 from .series import load

@@ -12,9 +12,9 @@ from typing import Any
 import mitsuba as mi
 
 from ..errors import DiffractionError
-from ..files.options import LoadOptions
-from ..heightfield import HeightField
-from ..lengths import is_auto
+from ..heights.field import HeightField
+from ..heights.lengths import is_auto
+from ..heights.options import LoadOptions
 from ..tables.table import DiffractionTable
 from .layers import LAYERINGS, Blend, Layering, Transmission
 from .orientation import Constant, Orientation, Textured

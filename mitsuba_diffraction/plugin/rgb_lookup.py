@@ -12,7 +12,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..tables.colour_table import PACKET, TERMS, ColourTable
+from ..tables.colour.table import PACKET, TERMS, ColourTable
 from .memory import read, upload
 from .series import series_interval, series_weights
 

@@ -22,7 +22,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..tables.proposals import BANDED, BANDS, proposals
+from ..tables.sampling.proposals import BANDED, BANDS, proposals
 from ..tables.table import DiffractionTable
 from .lookup import device_table
 from .memory import index_between, read, upload

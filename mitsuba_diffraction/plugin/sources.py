@@ -11,17 +11,18 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from .. import gratings
-from ..dictionary import as_given
 from ..errors import DiffractionError, DiffractionWarning
-from ..files.cache import cached_table, content_key, loaded_table
-from ..files.heights import is_recipe, load_heights, treat
-from ..files.options import LoadOptions
-from ..files.raw import existing_file
-from ..files.recipes import Recipe
-from ..files.table_exr import is_table
-from ..heightfield import HeightField
+from ..heights import gratings
+from ..heights.field import HeightField
+from ..heights.formats.raw import existing_file
+from ..heights.load import load_heights
+from ..heights.options import LoadOptions
+from ..heights.read import is_recipe, treat
+from ..heights.recipes import Recipe
+from ..tables.exr import is_table
+from ..tables.store.cache import cached_table, content_key, loaded_table
 from ..tables.table import DiffractionTable
+from .dictionary import as_given
 from .session import note_table, restricted_arguments, timed
 
 #: A table serves heights scaled by up to this times max(1, height_scale).

@@ -3,33 +3,29 @@
 Contents
 --------
 DiffractionTable   a table: `build`, `load`, `save`, `brdf` (in `table`)
-spectrum           DFT of exp(iκh) at some κ, cropped to the orders that light can reach
+build              from heights to a table of a given tolerance
 expansion          series in κ: which functions, with which weights
-choose             how many terms and intervals a tolerance takes
 window             the coherence window, cut to a few taps
-coefficients       of the series, from transforms of the heights
-halves             these as half floats
-attempt            one try at a table, and its error
-build              tries until the tolerance is met
-error              the one error measure of the project
-checks             what cannot be built
-coarse             what a table of a restricted domain has everywhere else
-describe           what a table remembers of its heights
 lookup             the NumPy twin of the renderer's look-up
-powers             powers of the orders as series in κ
-proposals          densities in spatial frequency to draw directions from
-atoms              the orders as a few strong ones and a density
-albedo             the directional albedo of the raw model
-bound              an upper bound of it on a grid of directions
-colour_table       the sum over daylight's wavelengths: `ColourTable`
-colour_build       how it is summed
-colour_proposals   densities to draw directions from, by brightness
-polar              the grid of a colour table
-loss               how much colours change from one table to another
+exr                tables as EXR files
+energy             the directional albedo and its bound
+sampling           densities to draw directions from
+colour             the sum over daylight's spectrum
+store              the cache of all of these
 """
 
 from __future__ import annotations
 
+from .build.build import build_table
+from .exr import load_table, save_table
+from .lookup import brdf, window_sum
 from .table import DiffractionTable
 
 __all__ = ["DiffractionTable"]
+
+# Modules that build on the class; it shall not import them
+DiffractionTable.build = staticmethod(build_table)
+DiffractionTable.load = staticmethod(load_table)
+DiffractionTable.save = save_table
+DiffractionTable.window_sum = window_sum
+DiffractionTable.brdf = brdf

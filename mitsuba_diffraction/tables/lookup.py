@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..optics.geometry import diffraction_coordinates, kirchhoff_factor, wavenumber
+from .table import DiffractionTable
 from .window import base_bin, first_tap
-
-if TYPE_CHECKING:
-    from .table import DiffractionTable
 
 #: A bin's weight by its distance in bins, element by element.
 Kernel = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -46,6 +44,23 @@ def window_sum(
         part = slice(start, start + _CHUNK)
         result[part] = _window_sum(table, *(a[part] for a in flat))
     return result.reshape(qx.shape)
+
+
+def brdf(
+    table: DiffractionTable,
+    wi: ArrayLike,
+    wo: ArrayLike,
+    wavelength: ArrayLike,
+    *,
+    height_scale: float = 1.0,
+) -> NDArray[np.float64]:
+    """The BRDF for R = 1 from the table, 1/sr: the twin of `reference.brdf`, same shapes."""
+    k = wavenumber(wavelength)
+    u, v, w = diffraction_coordinates(wi, wo)
+    above = (np.asarray(wi)[..., 2] > 0) & (np.asarray(wo)[..., 2] > 0)
+    u, v, w = (np.where(above, c, 0.0) for c in (u, v, w))
+    power = 4 * np.pi**2 * table.sigma**4 * window_sum(table, k * u, k * v, k * w * height_scale)
+    return kirchhoff_factor(wi, wo, wavelength, table.sigma) * power
 
 
 def _window_sum(

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
-from ..geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
-from ..heightfield import HeightField
-from ..progress import Progress
-from .error import Grid
+from ..optics.geometry import sigma_of, wavenumber
+from .build.error import Grid
 from .expansion import Expansion
-from .lookup import window_sum
 
 #: Raised whenever what the coefficients mean changes; tables of another version are refused.
 FORMAT_VERSION = 2
@@ -62,90 +58,12 @@ class DiffractionTable:
     crop: tuple[float, float] | None = None
     coarse: DiffractionTable | None = None
 
-    @classmethod
-    def build(
-        cls,
-        heights: HeightField | Sequence[HeightField],
-        *,
-        coherence_width: float = 65.0,
-        coherence: str = "ensemble",
-        basis: str = "auto",
-        tolerance: float = 1e-3,
-        terms: int | None = None,
-        wavelength_range: tuple[float, float] = (360.0, 830.0),
-        height_scale_max: float = 1.5,
-        taps: int | None = None,
-        crop: float | tuple[float, float] | None = None,
-        kappa_max: float | None = None,
-        progress: Progress | None = None,
-    ) -> DiffractionTable:
-        """Tabulate a height field to a tolerance, and measure that it is met.
-
-        Parameters
-        ----------
-        heights : the patch, which tiles the plane; or several of one size, whose powers are
-            averaged (`ensemble` only).
-        coherence_width : 4σ of the Gaussian amplitude window, µm.
-        coherence : "ensemble" (window power averaged over its position) or "patch" (one window).
-        basis : "svd" (also as "auto"), "chebyshev" or "taylor"; see `tables.expansion`.
-        tolerance : relative error of ⟨|P|²⟩ at the worst κ, as `tables.error` measures it.
-        terms : coefficients of a series; by default as many as the tolerance takes.
-        wavelength_range : nm; the shortest sets how far the table reaches.
-        height_scale_max : largest factor on the heights that the table serves.
-        taps : bins read in each direction; by default as many as the tolerance takes.
-        crop : largest spatial frequency k·|(u, v)| that is tabulated, rad/µm, or half axes of an
-            ellipse along x and y; by default all that light of the shortest wavelength can probe.
-        kappa_max : largest k·w·height_scale that is, rad/µm; by default likewise. Beyond either, a
-            table of coarse cells answers, which is right on average (`tables.coarse`).
-        progress : called as progress(done, total, text) while it works.
-
-        Raises
-        ------
-        DiffractionError
-            If a parameter is out of range, or the tolerance cannot be met: the text names the
-            error to expect and what would meet it.
-        """
-        from .build import build_table  # the builder makes instances of this class
-
-        return build_table(
-            heights,
-            coherence_width=coherence_width,
-            coherence=coherence,
-            basis=basis,
-            tolerance=tolerance,
-            terms=terms,
-            wavelength_range=wavelength_range,
-            height_scale_max=height_scale_max,
-            taps=taps,
-            crop=crop,
-            kappa_max=kappa_max,
-            progress=progress,
-        )
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> DiffractionTable:
-        """Read a table that `save` wrote.
-
-        Raises
-        ------
-        DiffractionError
-            If the file is missing, no table, damaged, or of another format version.
-        """
-        from ..files.table_exr import load_table
-
-        return load_table(path)
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an EXR file: named float channels and one JSON attribute with all the rest.
-
-        Raises
-        ------
-        DiffractionError
-            If it cannot be written; nothing half-written is left.
-        """
-        from ..files.table_exr import save_table
-
-        save_table(self, path)
+    # Set by the package `tables`, since what they do builds on this class
+    build: ClassVar[Callable[..., DiffractionTable]]  #: from heights: `build.build.build_table`
+    load: ClassVar[Callable[..., DiffractionTable]]  #: from a file: `exr.load_table`
+    save: ClassVar[Callable[..., None]]  #: to a file: `exr.save_table`
+    window_sum: ClassVar[Callable[..., NDArray[np.float64]]]  #: ⟨|P|²⟩: `lookup.window_sum`
+    brdf: ClassVar[Callable[..., NDArray[np.float64]]]  #: the model for R = 1: `lookup.brdf`
 
     @property
     def largest_error(self) -> float:
@@ -205,21 +123,6 @@ class DiffractionTable:
         )
         parts[..., 0] += self.expansion.specular(interval)
         return parts
-
-    def window_sum(self, qx: ArrayLike, qy: ArrayLike, kappa: ArrayLike) -> NDArray[np.float64]:
-        """⟨|P|²⟩ / 4π²σ⁴ at spatial frequencies (rad/µm) and κ (rad/µm); see `tables.lookup`."""
-        return window_sum(self, qx, qy, kappa)
-
-    def brdf(
-        self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, *, height_scale: float = 1.0
-    ) -> NDArray[np.float64]:
-        """The BRDF for R = 1 from the table, 1/sr: the twin of `reference.brdf`, same shapes."""
-        k = wavenumber(wavelength)
-        u, v, w = diffraction_coordinates(wi, wo)
-        above = (np.asarray(wi)[..., 2] > 0) & (np.asarray(wo)[..., 2] > 0)
-        u, v, w = (np.where(above, c, 0.0) for c in (u, v, w))
-        power = 4 * np.pi**2 * self.sigma**4 * self.window_sum(k * u, k * v, k * w * height_scale)
-        return kirchhoff_factor(wi, wo, wavelength, self.sigma) * power
 
     def summary(self) -> dict[str, Any]:
         """Plain numbers and strings for people and for JSON."""

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.benchmarks import colours, plan, scaling
-from mitsuba_diffraction.benchmarks.figures import Goal, Row, Section
-from mitsuba_diffraction.benchmarks.plan import Plan
-from mitsuba_diffraction.benchmarks.timing import ratio, rounds_of
-from tests.optics import rough_patch
+from mitsuba_diffraction.analysis.bench import colours, plan, scaling
+from mitsuba_diffraction.analysis.bench.figures import Goal, Row, Section
+from mitsuba_diffraction.analysis.bench.plan import Plan
+from mitsuba_diffraction.analysis.bench.timing import ratio, rounds_of
+from tests.directions import rough_patch
 
 # 96 pixels are 4.7 µm, 1/14 of the coherence window: wide taps, but no time to speak of
 TINY = Plan(

@@ -10,7 +10,7 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction.maps.files import ATTRIBUTE
+from mitsuba_diffraction.analysis.maps.files import ATTRIBUTE
 
 # A map of the grating of `heights` that takes half a second.
 QUICK = ["--pixel-size", "0.08", "--coherence-width", "6", "--resolution", "32", "--step", "47"]

@@ -8,7 +8,8 @@ from pathlib import Path
 import OpenEXR
 import pytest
 
-from mitsuba_diffraction import DiffractionTable, gratings
+from mitsuba_diffraction import DiffractionTable
+from mitsuba_diffraction.heights import gratings
 
 SCENE = """<scene version="3.5.0">
   <sensor type="perspective"><float name="fov" value="30"/>
@@ -94,7 +95,7 @@ def test_an_unwritable_folder_is_refused_before_any_work(run, scene):
 @pytest.fixture
 def gl_works():
     from mitsuba_diffraction import DiffractionError
-    from mitsuba_diffraction.glsl.context import headless_context
+    from mitsuba_diffraction.realtime.glsl.context import headless_context
 
     try:
         headless_context().release()

@@ -8,7 +8,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from tests.optics import rough_patch
+from tests.directions import rough_patch
 
 # A plate seen from above in light from 20°, with next to no sky.
 SCENE = """<scene version="3.5.0">
@@ -117,7 +117,7 @@ def test_a_plan_is_made_and_tried_before_rendering(run, folder, planned):
 
 
 def test_a_picture_that_no_plan_keeps_has_whole_tables(run, folder, planned, monkeypatch):
-    from mitsuba_diffraction.planning import make
+    from mitsuba_diffraction.scene.planning import make
 
     # as between the orders of a grating, where cells have light and the whole table has none
     far = make.Difference(0.02, 0.5, 2.0, (12, 8), 64)

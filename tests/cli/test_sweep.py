@@ -10,8 +10,8 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction.cli import sweep
-from mitsuba_diffraction.methods import NAMES
-from mitsuba_diffraction.sweeps import SWEEPS
+from mitsuba_diffraction.thesis.methods import NAMES
+from mitsuba_diffraction.thesis.sweeps import SWEEPS
 
 QUICK = ["--pixel-size", "0.08", "--coherence-width", "6", "--resolution", "24", "--step", "40"]
 

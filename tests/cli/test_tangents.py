@@ -10,9 +10,15 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.cli.tangents import _GUIDES
-from mitsuba_diffraction.meshes import TriangleMesh, knot, load_mesh, write_ply
-from mitsuba_diffraction.meshes.directions import GUIDES
-from mitsuba_diffraction.meshes.trimesh import grid_faces, vertex_normals
+from mitsuba_diffraction.scene.orientation.directions import GUIDES
+from mitsuba_diffraction.scene.orientation.tangents import load_mesh
+from mitsuba_diffraction.scene.orientation.trimesh import (
+    TriangleMesh,
+    grid_faces,
+    vertex_normals,
+    write_ply,
+)
+from scenes.make import knot
 
 
 def obj_of(path, positions, faces):
@@ -90,7 +96,7 @@ def test_a_turn_is_counter_clockwise_from_outside(run, ball):
     positions, _, uv, faces = load_mesh(out)
     sides = positions[faces[:, 1:]] - positions[faces[:, :1]]
     uv_sides = uv[faces[:, 1:]] - uv[faces[:, :1]]
-    from mitsuba_diffraction.meshes.tangents import tangents
+    from mitsuba_diffraction.scene.orientation.tangents import tangents
 
     along = tangents(sides, uv_sides)[0]
     middle = positions[faces].mean(axis=1)

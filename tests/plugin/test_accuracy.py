@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.geometry import kirchhoff_factor, sigma_of
+from mitsuba_diffraction.optics.geometry import kirchhoff_factor, sigma_of
+from tests.directions import lit_pairs, rough_patch
 from tests.lanes import brdf_values
-from tests.optics import lit_pairs, rough_patch
 
 # measured and made surfaces alike may be steeper than the model likes; that is not the point here
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")

@@ -6,8 +6,8 @@ import mitsuba as mi
 import pytest
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.glsl.scene import read_scene
 from mitsuba_diffraction.plugin.attributes import check_attributes
+from mitsuba_diffraction.realtime.glsl.scene import read_scene
 
 pytestmark = pytest.mark.usefixtures("variant")
 

@@ -26,8 +26,8 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from tests.directions import polar, rough_patch
 from tests.lanes import interaction
-from tests.optics import polar, rough_patch
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from tests.directions import Array, uniform_directions
 from tests.lanes import interaction, spectra, vectors
-from tests.optics import Array, uniform_directions
 
 # a steep grating bends light further than the model likes; that is not the point here
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md  # before Mitsuba: it chooses Dr.Jit's LLVM
-from tests.optics import polar
+from tests.directions import polar
 
 import mitsuba as mi  # isort: skip
 import drjit as dr  # isort: skip
@@ -190,8 +190,8 @@ def test_the_bound_follows_height_scale():
 
 
 def test_kernels_twin_agrees_with_numpy():
-    from mitsuba_diffraction.files.bound_cache import cached_bound
     from mitsuba_diffraction.plugin.energy import EnergyBound
+    from mitsuba_diffraction.tables.store.bounds import cached_bound
 
     table = bsdf("sinusoid").table
     bound = EnergyBound(table)

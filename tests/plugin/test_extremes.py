@@ -8,8 +8,8 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import HeightField
+from tests.directions import as_single, rough_patch
 from tests.lanes import evaluated
-from tests.optics import as_single, rough_patch
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
 

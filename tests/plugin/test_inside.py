@@ -9,8 +9,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from tests.directions import as_single, polar
 from tests.lanes import evaluated, interaction, spectra, vectors
-from tests.optics import as_single, polar
 from tests.plugin.plates import (
     OTHER,
     PATCH,

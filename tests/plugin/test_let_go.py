@@ -11,13 +11,8 @@ import drjit as dr
 import mitsuba as mi
 import pytest
 
-from tests.optics import rough_patch
-from tests.plugin.plates import (
-    diffraction,
-    plate,
-    rendered,
-    scene,
-)
+from tests.directions import rough_patch
+from tests.plugin.plates import diffraction, plate, rendered, scene
 
 # coarse pixels keep the tables small; that is not the point here
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")

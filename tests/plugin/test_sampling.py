@@ -13,8 +13,8 @@ import pytest
 from scipy import stats
 
 import mitsuba_diffraction as md
+from tests.directions import polar, rough_patch
 from tests.lanes import interaction, spectra, vectors
-from tests.optics import polar, rough_patch
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
 

@@ -11,8 +11,8 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionTable
-from mitsuba_diffraction.tables.colour_table import ColourTable
-from tests.optics import Array, as_single, rough_patch, uniform_directions
+from mitsuba_diffraction.tables.colour.table import ColourTable
+from tests.directions import Array, as_single, rough_patch, uniform_directions
 
 WIDTH = 8.0  # µm
 HEIGHTS = rough_patch((90, 100), (0.085, 0.09), 0.2, 0.9)

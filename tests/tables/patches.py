@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mitsuba_diffraction import reference
-from mitsuba_diffraction.geometry import kirchhoff_factor
-from tests.optics import lit_pairs, rough_patch
+from mitsuba_diffraction.optics.geometry import kirchhoff_factor
+from tests.directions import lit_pairs, rough_patch
 
 #: 5.04 × 4.8 µm; WIDTH is nearly that wide.
 PATCH = rough_patch((64, 63), (0.08, 0.075), 0.25)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionTable, HeightField, reference
-from mitsuba_diffraction.geometry import kirchhoff_factor
-from tests.optics import lit_pairs, polar, rough_patch
+from mitsuba_diffraction.optics.geometry import kirchhoff_factor
+from tests.directions import lit_pairs, polar, rough_patch
 from tests.tables.patches import DEFAULTS, PATCH, WIDTH
 
 

@@ -1,0 +1,245 @@
+"""The page on the grating equation: every method on every patch, in pictures and numbers.
+
+    python -m docs.make.figures.evaluation -o docs/evaluation.md \\
+        --measured elaphe.png --pixel-size 0.0488 --max-height 0.375
+
+The picture goes to `images/evaluation.png` beside the page, the numbers between its markers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from mitsuba_diffraction.atomic import atomic_path
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.heights.field import HeightField
+from mitsuba_diffraction.heights.gratings import blazed, elaphe_like, sinusoidal, xenopeltis_like
+from mitsuba_diffraction.thesis.evaluation import (
+    Beam,
+    Fit,
+    Response,
+    Ridge,
+    documents_fit,
+    fit_period,
+    measure,
+    ridge_of,
+    window_fits,
+)
+from mitsuba_diffraction.thesis.evaluation.plot import draw
+from mitsuba_diffraction.thesis.methods import FullSpectrum, make, make_all
+
+from . import markers
+from .program import add_measured, exit_code, measured_patch
+
+METHODS = ("default", "flss", "nmm", "pq", "pq-sinc")
+
+_DPI = 85
+_STEP = 5.0  # nm
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """One method on one patch."""
+
+    response: Response
+    ridge: Ridge
+    fit: Fit
+
+
+@dataclass(frozen=True)
+class Periods:
+    """Periods of one patch.
+
+    Attributes
+    ----------
+    name : of the patch.
+    by_method : the methods' responses and fits.
+    given : period that it is made with, µm, or `None`.
+    windows : mean, spread, smallest and largest period of single windows, µm.
+    count : number of those windows.
+    documents : period that the documents' procedure finds, µm; NaN if none.
+    """
+
+    name: str
+    by_method: dict[str, Evaluated]
+    given: float | None
+    windows: tuple[float, float, float, float]
+    count: int
+    documents: float
+
+
+def exact_gratings() -> list[tuple[HeightField, float | None]]:
+    """Gratings, with the period that they are made with."""
+    return [
+        (blazed(2.5, 0.25, pixels_per_period=60, rows=2), 2.5),
+        (sinusoidal(1.6, 0.1, rows=2), 1.6),
+    ]
+
+
+def evaluate_patch(
+    patch: HeightField,
+    given: float | None,
+    *,
+    wavelengths: Array,
+    angles: Array,
+    windows: int,
+    methods: Sequence[str] = METHODS,
+    coherence_width: float = 65.0,
+) -> Periods:
+    """Every method, and single windows, under a beam at 75°."""
+    beam = Beam()
+    made = make_all(methods, patch, coherence_width=coherence_width)
+    results = {}
+    for name, method in made.items():
+        response = measure(method.brdf, beam, wavelengths, angles, sigma=method.sigma, label=name)
+        ridge = ridge_of(response)
+        results[name] = Evaluated(response, ridge, fit_period(ridge))
+    single = make("default", patch, coherence="patch", coherence_width=coherence_width)
+    assert isinstance(single, FullSpectrum)
+    few = wavelengths[:: max(1, wavelengths.size // 20)]
+    found = window_fits(single.table, beam, few, angles, count=windows)
+    try:
+        documents = documents_fit(single.table, beam, wavelengths, angles).period
+    except DiffractionError:
+        documents = float("nan")
+    return Periods(
+        patch.name, results, given,
+        (found.mean, found.spread, float(found.periods.min()), float(found.periods.max())),
+        windows, documents,
+    )  # fmt: skip
+
+
+def evaluation_figure(patches: Sequence[Periods]) -> Figure:
+    """A row for each patch, a column for each method; one colour bar a row."""
+    names = list(patches[0].by_method)
+    figure = Figure(
+        figsize=(3.0 * len(names) + 1.0, 2.7 * len(patches)), dpi=_DPI, layout="constrained"
+    )
+    FigureCanvasAgg(figure)
+    grid = figure.subplots(len(patches), len(names), sharex=True, squeeze=False)
+    for row, patch in enumerate(patches):
+        largest = max(float(e.response.values.max()) for e in patch.by_method.values())
+        for column, name in enumerate(names):
+            axes, result = grid[row][column], patch.by_method[name]
+            period = patch.given or result.fit.period
+            shown = draw(axes, result.response, result.ridge, period, largest=largest)
+            axes.set_title(f"{patch.name}, {name}", fontsize=9)
+            axes.tick_params(labelsize=8)
+            if row == len(patches) - 1:
+                axes.set_xlabel("wavelength  [nm]", fontsize=8)
+            if column == 0:
+                axes.set_ylabel("viewing angle θₒ  [°]", fontsize=8)
+            if column == len(names) - 1:
+                bar = figure.colorbar(shown, ax=axes)
+                bar.set_label("f·cos θₒ  [1/sr]", fontsize=8)
+                bar.ax.tick_params(labelsize=7)
+    return figure
+
+
+def period_table(patches: Sequence[Periods]) -> str:
+    """Fitted periods, in nm, as a Markdown table."""
+    names = list(patches[0].by_method)
+    header = ("patch", "made with", *names)
+    rows = []
+    for patch in patches:
+        made = "" if patch.given is None else f"{1e3 * patch.given:.4g}"
+        fits = (patch.by_method[name].fit for name in names)
+        cells = [f"{1e3 * fit.period:.5g} ({_short(fit.residual)}°)" for fit in fits]
+        rows.append((patch.name, made, *cells))
+    return markers.table(header, rows)
+
+
+def difference_table(patches: Sequence[Periods]) -> str:
+    """Largest angle between ridge and grating equation, for patches of a known period."""
+    names = list(patches[0].by_method)
+    rows = []
+    for patch in patches:
+        if patch.given is None:
+            continue
+        cells = []
+        for name in names:
+            response, ridge = patch.by_method[name].response, patch.by_method[name].ridge
+            expected = response.beam.grating_angles(response.wavelengths, patch.given, 1)
+            cells.append(f"{_short(float(np.nanmax(np.abs(ridge.angles - expected))))}°")
+        rows.append((patch.name, f"{1e3 * patch.given:.4g}", *cells))
+    return markers.table(("patch", "period, nm", *names), rows)
+
+
+def window_table(patches: Sequence[Periods]) -> str:
+    """Periods of single windows and of the documents' procedure, in nm, as a Markdown table."""
+    rows = []
+    for patch in patches:
+        mean, spread, least, most = (1e3 * value for value in patch.windows)
+        ensemble = 1e3 * patch.by_method["default"].fit.period
+        spread_text = f"± {spread:.2g}" if spread >= 0.01 else "± 0"
+        documents = "" if np.isnan(patch.documents) else f"{1e3 * patch.documents:.5g}"
+        ends = f"{least:.5g} – {most:.5g}"
+        rows.append((patch.name, f"{ensemble:.5g}", f"{mean:.5g} {spread_text}", ends, documents))
+    count = patches[0].count
+    header = (
+        "patch", "ensemble", f"{count} single windows", "smallest – largest",
+        "documents' procedure",
+    )  # fmt: skip
+    return markers.table(header, rows)
+
+
+def _short(value: float) -> str:
+    """Two digits, without a power of ten."""
+    return f"{value:.4f}" if value < 0.01 else f"{value:.2g}"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Make the picture and the tables."""
+    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.evaluation")
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs/evaluation.md"))
+    add_measured(parser, "height field that is evaluated, too")
+    parser.add_argument("--windows", type=int, default=64)
+    parser.add_argument("--angle-step", type=float, default=0.05, help="degrees")
+    parser.add_argument("--small", action="store_true", help="gratings only, coarsely: a check")
+    args = parser.parse_args(argv)
+
+    def work() -> None:
+        patches = exact_gratings()
+        measured = measured_patch(args)
+        if measured is not None:
+            patches.append((measured, None))
+        if not args.small:
+            patches += [(elaphe_like(), None), (xenopeltis_like(), None)]
+        wavelengths = np.arange(380.0, 780.5, 40.0 if args.small else _STEP)
+        angles = np.linspace(-75.0, 30.0, round(105.0 / args.angle_step) + 1)
+        results = []
+        for patch, given in patches:
+            print(f"evaluating {patch.name}", flush=True)
+            results.append(
+                evaluate_patch(
+                    patch, given, wavelengths=wavelengths, angles=angles, windows=args.windows
+                )
+            )
+        markers.update(
+            args.output,
+            {
+                "periods": period_table(results),
+                "differences": difference_table(results),
+                "windows": window_table(results),
+            },
+        )
+        with atomic_path(args.output.parent / "images" / "evaluation.png") as path:
+            evaluation_figure(results).savefig(path, format="png")
+
+    return exit_code("evaluation", work)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

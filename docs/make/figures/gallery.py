@@ -1,0 +1,263 @@
+"""The gallery, and the pictures of the page on meshes: each with the commands that make it.
+
+    python -m docs.make.figures.gallery -o docs [--only cd]
+
+What the pages show between their markers is what `shown` says, so a test sees when they disagree.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import shlex
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mitsuba_diffraction.atomic import atomic_path
+from mitsuba_diffraction.cli.main import main as program
+from mitsuba_diffraction.errors import DiffractionError
+from scenes.make.__main__ import main as meshes
+
+from . import markers
+from .jpeg import write_jpeg
+from .program import exit_code
+
+FOLDER = Path("images", "gallery")  # beside the pages
+_MOST = 250_000  # bytes of a picture
+_PROGRAM = ".venv/bin/mitsuba-diffraction"
+_MESHES = ".venv/bin/python -m scenes.make"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of a page.
+
+    Attributes
+    ----------
+    page : the page's name, and that of its markers.
+    name : of the picture's file.
+    title, text : what it shows.
+    commands : what makes it, the last one writing it; files are made in `out`.
+    """
+
+    page: str
+    name: str
+    title: str
+    text: str
+    commands: tuple[str, ...]
+
+    @property
+    def file(self) -> Path:
+        """Where it is, seen from the pages."""
+        film = self.commands[-1].endswith(".webp")
+        return FOLDER / f"{self.name}{'.webp' if film else '.jpg'}"
+
+
+def _scene(name: str, title: str, text: str, options: str = "", scene: str = "") -> Picture:
+    command = f"render scenes/{scene or name}.xml {options}".strip()
+    return Picture("gallery", name, title, text, (f"{command} -o out/{name}.png",))
+
+
+PICTURES = (
+    _scene(
+        "snake", "A corn snake",
+        "Its scales are those of a look-alike of *Elaphe guttata*; sun and clear sky.",
+    ),
+    _scene(
+        "xenopeltis", "A sunbeam snake",
+        "*Xenopeltis unicolor*: few large smooth scales over dark pigment. A large light, here a "
+        "window, makes a sheen along the whole body.",
+    ),
+    _scene(
+        "xenopeltis_sun", "The sunbeam snake in the sun",
+        "The same scales, lit from one direction: colours shrink to spots.",
+        "-D light=daylight.xml", "xenopeltis",
+    ),
+    Picture(
+        "gallery", "turning", "The snake turns",
+        "Every frame is path-traced; tables are loaded once. `--turn sun_azimuth` turns the light "
+        "instead.",
+        ("render scenes/snake.xml -D resx=240 -D resy=150 -s 24 --frames 16 --turn turn --fps 8 "
+         "-o out/turning.webp",),
+    ),
+    _scene(
+        "scales", "Some scales from close by",
+        "A small lamp: on each scale its mirror image, white along the keel, and on both sides "
+        "the orders of the fingers.",
+    ),
+    _scene(
+        "cd", "A compact disc under a lamp",
+        "Colours lie where the tracks run across the plane of lamp and camera.",
+    ),
+    _scene(
+        "cd_window", "The disc under a window",
+        "The same disc: each pane spreads its own fan.",
+    ),
+    _scene(
+        "grating", "A blazed grating under a lamp",
+        "400 lines a millimetre; the first order is the lamp's spectrum, the second begins above "
+        "it.",
+    ),
+    _scene(
+        "grating_window", "The grating under a window",
+        "The panes' spectra overlap; only beside the mullion and the frame are colours pure.",
+    ),
+    _scene(
+        "material_ball", "A ball of any material",
+        "To look at a patch of your own: `-D patch=\"$PWD/scale.exr\" -D material=Cr`. Here the "
+        "sunbeam snake's relief in aluminium.",
+    ),
+    _scene(
+        "material_ball_cd", "The tracks of a CD on gold",
+        "The same scene with another patch and metal.",
+        "-D patch=../precompute/cd.toml -D material=Au", "material_ball",
+    ),
+    _scene(
+        "own_mesh", "A mesh of your own",
+        "A knot that came without texture coordinates; see [meshes](meshes.md).",
+    ),
+    _scene(
+        "plate", "A flat sample",
+        "Five centimetres of corn snake's relief under a small lamp.",
+    ),
+    _scene(
+        "sphere", "A ball in the sun",
+        "The same relief around a ball of dark material.",
+    ),
+    Picture(
+        "meshes", "snake_short", "",
+        "A short, thick snake with few large and strongly keeled scales that overlap far:",
+        ("meshes snake -o out/short.ply --eyes out/short_eyes.ply --length 64 --girth-radius 2.1 "
+         "--coils 0.9 --rows 13 --keel 1 --relief 0.1 --overlap 0.35 --aspect 1.4",
+         "render scenes/snake.xml -D mesh=$PWD/out/short.ply -D eyes=$PWD/out/short_eyes.ply "
+         "-D pigment_scale=0.124569 -D fov=40 -D resx=480 -D resy=300 -s 48 "
+         "-o out/snake_short.png"),
+    ),
+    Picture(
+        "meshes", "snake_slender", "",
+        "A slender one with many small smooth scales:",
+        ("meshes snake -o out/slender.ply --eyes out/slender_eyes.ply --length 150 "
+         "--girth-radius 1.15 --coils 3.2 --rows 27 --keel 0 --relief 0.05 --overlap 0.15 "
+         "--detail 3",
+         "render scenes/snake.xml -D mesh=$PWD/out/slender.ply -D eyes=$PWD/out/slender_eyes.ply "
+         "-D pigment_scale=0.030420 -D resx=480 -D resy=300 -s 48 -o out/snake_slender.png"),
+    ),
+    Picture(
+        "meshes-field", "knot_field", "",
+        "A closed tube in a knot, which came without texture coordinates:",
+        ("meshes knot -o out/bare.ply",
+         "tangents out/bare.ply -o out/knot.ply",
+         "render scenes/own_mesh.xml -D mesh=$PWD/out/knot.ply -D resx=400 -D resy=360 -s 64 "
+         "-o out/knot_field.png"),
+    ),
+)  # fmt: skip
+
+
+def shown(page: str) -> str:
+    """What stands between a page's markers, as Markdown."""
+    parts = []
+    for picture in PICTURES:
+        if picture.page != page:
+            continue
+        title = f"## {picture.title}\n\n" if picture.title else ""
+        link = picture.file.as_posix()
+        label = picture.title or picture.text.rstrip(":")
+        commands = "\n".join(as_typed(command) for command in picture.commands)
+        # what is read before the picture ends with a colon
+        inner = (picture.text, f"![{label}]({link})")
+        body = "\n\n".join(inner if picture.text.endswith(":") else inner[::-1])
+        parts.append(f"{title}{body}\n\n```sh\n{commands}\n```")
+    return "\n\n".join(parts)
+
+
+def as_typed(command: str) -> str:
+    """A command with its program, broken where it is long."""
+    first, rest = command.split(" ", 1)
+    line = f"{_MESHES} {rest}" if first == "meshes" else f"{_PROGRAM} {command}"
+    if len(line) <= 110:
+        return line
+    lines, current = [], ""
+    for word in line.split(" "):
+        if current and len(current) + len(word) > 100 and word.startswith("-"):
+            lines.append(current)
+            current = "    "
+        current += ("" if current.strip() == "" else " ") + word
+    return " \\\n".join([*lines, current])
+
+
+def make(picture: Picture, target: Path, scenes: Path) -> None:
+    """Run a picture's commands, and write it.
+
+    Parameters
+    ----------
+    target : the file to write.
+    scenes : folder of the scenes.
+
+    Raises
+    ------
+    DiffractionError
+        If a command fails, or the picture cannot be written or is too large.
+    """
+    with tempfile.TemporaryDirectory() as temporary:
+        for command in picture.commands:
+            words = [
+                _moved(word, Path(temporary), scenes)
+                for word in shlex.split(command.replace("$PWD/", ""))
+            ]
+            with contextlib.redirect_stdout(io.StringIO()):  # it would name temporary files
+                code = meshes(words[1:]) if words[0] == "meshes" else program(words)
+            if code != 0:
+                raise DiffractionError(f"{picture.name}: '{command}' failed; see above")
+        made = Path(words[-1])
+        if target.suffix == ".jpg":
+            write_jpeg(made, target, most=_MOST)
+            return
+        if made.stat().st_size > _MOST:
+            raise DiffractionError(f"{picture.name}: the film has {made.stat().st_size} bytes")
+        with atomic_path(target) as path:
+            shutil.copyfile(made, path)
+
+
+def _moved(word: str, out: Path, scenes: Path) -> str:
+    """A word of a command with its files where they are to be."""
+    head, equals, value = word.rpartition("=")
+    if value.startswith("out/"):
+        return f"{head}{equals}{out / value.removeprefix('out/')}"
+    if value.startswith("scenes/"):
+        return f"{head}{equals}{scenes / value.removeprefix('scenes/')}"
+    return word
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Make the pictures and write the pages."""
+    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.gallery")
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs"), help="of the pages")
+    parser.add_argument("--scenes", type=Path, default=Path("scenes"))
+    parser.add_argument(
+        "--only", metavar="NAME", action="append", choices=[p.name for p in PICTURES],
+        help="make one picture; may be given several times",
+    )  # fmt: skip
+    args = parser.parse_args(argv)
+
+    def work() -> None:
+        (args.output / FOLDER).mkdir(parents=True, exist_ok=True)
+        for picture in PICTURES:
+            if args.only is None or picture.name in args.only:
+                start = time.perf_counter()
+                make(picture, args.output / picture.file, args.scenes)
+                print(f"{picture.name}: {time.perf_counter() - start:.1f} s", flush=True)
+        markers.update(args.output / "gallery.md", {"gallery": shown("gallery")})
+        parts = {name: shown(name) for name in ("meshes", "meshes-field")}
+        markers.update(args.output / "meshes.md", parts)
+
+    return exit_code("gallery", work)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,148 @@
+"""The reference of the plugin's parameters, made of the plugin's own docstring.
+
+python -m docs.make.figures.parameters -o docs/parameters.md
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import re
+import sys
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mitsuba_diffraction.atomic import atomic_path
+from mitsuba_diffraction.errors import DiffractionError
+
+from . import markers
+from .program import exit_code
+
+#: Read, not imported: that would take a variant of Mitsuba.
+PLUGIN = ROOT / "mitsuba_diffraction/plugin/bsdf.py"
+
+_GROUP = re.compile(r"^(\w[\w ]*)\n-{3,}\n", re.M)
+_ENTRY = re.compile(
+    r"^(?P<names>[\w(), ]+) : (?P<type>[^\[\n∂]+?)(?P<d> ∂)?(?: \[(?P<default>.+)\])?$"
+)
+_MODEL, _EXAMPLE = "\nThe model is ", "\nXML and the same in Python:\n"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One entry: usually one parameter, sometimes two that belong together.
+
+    Attributes
+    ----------
+    names : of the parameters; "(nested)" for an object of any name.
+    type, default, text : as the docstring has them; the default is empty if there is none.
+    differentiable : whether all of them are.
+    """
+
+    names: tuple[str, ...]
+    type: str
+    default: str
+    differentiable: bool
+    text: str
+
+
+def docstring() -> str:
+    """That of the plugin."""
+    return ast.get_docstring(ast.parse(PLUGIN.read_text(encoding="utf-8"))) or ""
+
+
+def groups(text: str) -> dict[str, list[Parameter]]:
+    """The parameters that a docstring describes, by the heading above them.
+
+    Raises
+    ------
+    DiffractionError
+        If a line within a group is no part of an entry.
+    """
+    _, *parts = _GROUP.split(text.partition(_MODEL)[0])
+    return {heading: _entries(body) for heading, body in zip(parts[::2], parts[1::2], strict=True)}
+
+
+def _entries(body: str) -> list[Parameter]:
+    found = []
+    for entry in re.split(r"\n(?=\S)", body.strip()):
+        head, _, rest = entry.partition("\n")
+        match = _ENTRY.match(head)
+        if match is None or not rest.strip():
+            raise DiffractionError(
+                f"'{PLUGIN}': expected 'name : type [default]' and text below it, got '{head}'"
+            )
+        found.append(
+            Parameter(
+                tuple(match["names"].split(", ")),
+                match["type"],
+                match["default"] or "",
+                match["d"] is not None,
+                " ".join(rest.split()),
+            )
+        )
+    return found
+
+
+def page(text: str) -> str:
+    """The reference in Markdown, of the plugin's docstring."""
+    model, _, example = text.partition(_MODEL)[2].partition(_EXAMPLE)
+    xml, _, python = textwrap.dedent(example).strip().partition("\n\n")
+    sections = [
+        "# Parameters of `diffraction`",
+        "Made by `make parameters` of the text at the top of "
+        "[bsdf.py](../mitsuba_diffraction/bsdf.py). ∂: differentiable, a parameter of "
+        "`mi.traverse`. Lengths are in µm, wavelengths in nm. In an image file the top row is the "
+        "largest y.",
+    ]
+    for heading, entries in groups(text).items():
+        sections += [f"## {heading}", markers.table(_HEADER, [_row(entry) for entry in entries])]
+    sections += [
+        "## The model",
+        _prose(f"The model is {model}"),
+        "[theory.md](theory.md) has all of it, symbol by symbol.",
+        "## An example",
+        f"```xml\n{xml}\n```",
+        f"```python\n{python}\n```",
+    ]
+    return "\n\n".join(sections) + "\n"
+
+
+_HEADER = ("parameter", "type", "default", "meaning")
+
+
+def _row(entry: Parameter) -> tuple[str, ...]:
+    names = ", ".join(name[1:-1] if name.startswith("(") else f"`{name}`" for name in entry.names)
+    cells = (names, entry.type + (" ∂" if entry.differentiable else ""), entry.default, entry.text)
+    return tuple(cell.replace("|", r"\|") for cell in cells)
+
+
+def _prose(text: str) -> str:
+    """Paragraphs on one line each, and what is indented as code."""
+    shown = []
+    for paragraph in re.split(r"\n\n+", text.strip()):
+        indented = paragraph.startswith("    ")
+        shown.append(paragraph if indented else " ".join(paragraph.split()))
+    return "\n\n".join(shown)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Write the page, and return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.parameters")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", type=Path, default=Path("docs/parameters.md"),
+        help="page to write; default: docs/parameters.md",
+    )  # fmt: skip
+    args = parser.parse_args(argv)
+
+    def work() -> None:
+        with atomic_path(args.output) as temporary:
+            temporary.write_text(page(docstring()), encoding="utf-8")
+
+    return exit_code("parameters", work)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,64 @@
+"""The README's sheet and tables of the shaders, from what `compare` measured.
+
+mitsuba-diffraction compare scenes/snake.xml --method all -o out/compare/snake
+mitsuba-diffraction compare scenes/plate.xml --method lut spectral -o out/compare/plate
+python -m docs.make.figures.realtime out/compare/snake out/compare/plate -o README.md
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from mitsuba_diffraction.realtime.comparison.table import markdown, scenes_table
+
+from . import markers
+from .jpeg import write_jpeg
+from .program import exit_code, from_json
+
+#: Beside the README; the sheet that it shows is that of the default method.
+SHEET = Path("docs", "images", "realtime.jpg")
+
+_METHOD, _WIDTH = "lut", 1600
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Replace them, and return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.realtime")
+    parser.add_argument(
+        "compared", metavar="FOLDER", type=Path, nargs="+",
+        help="written by compare; of the first the sheet and all methods are shown",
+    )  # fmt: skip
+    parser.add_argument("-o", "--output", metavar="FILE", type=Path, default=Path("README.md"))
+    args = parser.parse_args(argv)
+
+    def work() -> None:
+        text = _tables([folder / "compare.json" for folder in args.compared])
+        sheet = args.output.parent / SHEET
+        write_jpeg(args.compared[0] / f"{_METHOD}.png", sheet, width=_WIDTH)
+        markers.update(args.output, {"realtime": text})
+
+    return exit_code("realtime", work)
+
+
+def _tables(files: Sequence[Path]) -> str:
+    documents = [
+        from_json(
+            file, _complete, writer="compare",
+            remedy="run compare with the methods lut and spectral, or all",
+        )
+        for file in files
+    ]  # fmt: skip
+    return f"{scenes_table(documents)}\n\n{markdown(documents[0])}"
+
+
+def _complete(document: dict[str, Any]) -> dict[str, Any]:
+    markdown(document), scenes_table([document])  # what is missing is missed here
+    return document
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,25 @@
+"""How far the model can be trusted: rigorous solutions, closed forms and statistics beside it.
+
+Not needed to use the package. `python -m docs.make.validation report` writes
+docs/validation.md from the solutions that come with the package; `solve` makes those anew, which
+needs the extra `validation`.
+
+Contents
+--------
+cases          which gratings, lights and materials
+integral       a rigorous solver: boundary integrals
+coupled_wave   another: coupled waves in layers
+solve          solutions of all cases, by both
+solutions      files of solutions
+second         the two solvers beside each other
+model          what the package says of the same gratings
+compare        how far apart they are
+limits         up to which slopes that is little
+closed_forms   ideal gratings
+roughness      random surfaces of known mean diffraction
+statistics     checks with them, and windows at random places
+page           the page as a whole
+sections       its sections
+plots          its pictures
+markdown       its tables and numbers
+"""

@@ -1,0 +1,94 @@
+"""Rigorous solutions, and the page that compares the model with them.
+
+python -m docs.make.validation report -o docs
+python -m docs.make.validation solve perfect      # minutes to an hour; extra `validation`
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from mitsuba_diffraction.cli.console import say_error
+from mitsuba_diffraction.cli.output import check_writable
+from mitsuba_diffraction.cli.progress import Bar
+from mitsuba_diffraction.errors import DiffractionError
+
+from .cases import MATERIALS
+
+# where the package keeps them
+_DATA = Path(__file__).parent / "data"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one of the two commands, and return the exit code: 0, 1 (failed) or 2 (usage)."""
+    parser = argparse.ArgumentParser(
+        prog="python -m docs.make.validation", description=__doc__.split("\n")[0]
+    )
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    report = commands.add_parser("report", help="write validation.md and its pictures")
+    report.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=Path("docs"))
+    report.add_argument("--quick", action="store_true", help="a small version, for tests")
+    report.set_defaults(run=_report)
+    solve = commands.add_parser("solve", help="make the rigorous solutions anew")
+    solve.add_argument("material", choices=MATERIALS)
+    solve.add_argument("--solver", choices=("integral", "coupled_wave"), default="integral")
+    solve.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
+    solve.add_argument("-j", "--jobs", metavar="N", type=_jobs, help="processes; all processors")
+    solve.set_defaults(run=_solve)
+    for command in (report, solve):
+        command.add_argument(
+            "--progress", action=argparse.BooleanOptionalAction, default=None,
+            help="show progress bars; by default on a terminal",
+        )  # fmt: skip
+    args = parser.parse_args(argv)
+    try:
+        return int(args.run(args))
+    except DiffractionError as error:
+        say_error(str(error))
+        return 1
+    except KeyboardInterrupt:
+        say_error("interrupted; nothing was left half written")
+        return 130
+
+
+def _report(args: argparse.Namespace) -> int:
+    from .page import write_report
+
+    check_writable(args.output / "validation.md", make_folder=True)
+    with Bar(args) as bar:
+        print(f"wrote {write_report(args.output, quick=args.quick, progress=bar)}")
+    return 0
+
+
+def _solve(args: argparse.Namespace) -> int:
+    from .solutions import file_name, save
+    from .solve import solve_material
+
+    path = args.output / file_name(args.material, args.solver)
+    check_writable(path)
+    with Bar(args, unit=" scans") as bar:
+        found = solve_material(args.material, args.solver, processes=args.jobs, progress=bar)
+    save(found, path)
+    print(
+        f"wrote {os.fspath(path)}: {len(found.rows)} orders; the last refinement changed them by "
+        f"{found.change.max():.1g} at most"
+    )
+    return 0
+
+
+def _jobs(text: str) -> int:
+    try:
+        count = int(text)
+    except ValueError:
+        count = 0
+    if count < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1, got '{text}'")
+    return count
+
+
+if __name__ == "__main__":
+    sys.exit(main())

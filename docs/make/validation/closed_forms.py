@@ -1,0 +1,83 @@
+"""Orders of ideal gratings in closed form, and how closely the package reproduces them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import jv
+
+from mitsuba_diffraction.optics.geometry import kirchhoff_factor, wavenumber
+from mitsuba_diffraction.tables.lookup import window_sum
+from mitsuba_diffraction.tables.table import DiffractionTable
+
+from .cases import WAVELENGTHS, Grating, order_sines
+from .model import in_plane, lobe_peaks, lobe_sigma
+
+#: Angles of incidence, and the largest angle of an order, degrees.
+ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0)
+#: Table tolerance: relative to the sum over orders, which is 1.
+TABLE_TOLERANCE = 3e-5
+
+
+def order_power(grating: Grating, order: ArrayLike, kappa: ArrayLike) -> NDArray[np.float64]:
+    """|a_m|² of the ideal grating (Goodman, Introduction to Fourier Optics, section 4.4).
+
+    With φ = κ·depth: J_m²(φ/2) for a sinusoid; for a lamellar grating, half high, cos²(φ/2) at
+    m = 0, 4/(πm)²·sin²(φ/2) at odd m and nothing at even m; sinc²(m + φ/2π) for a blazed one that
+    ascends towards +x.
+
+    Parameters
+    ----------
+    order : m, whole numbers, broadcast with `kappa`.
+    kappa : k·w, rad/µm.
+    """
+    m, phase = np.asarray(order, np.float64), np.asarray(kappa, np.float64) * grating.depth
+    if grating.profile == "sinusoidal":
+        return np.asarray(jv(m, phase / 2) ** 2)
+    if grating.profile == "blazed":
+        return np.asarray(np.sinc(m + phase / (2 * np.pi)) ** 2)
+    odd = np.where(m % 2 == 1, 4 / (np.pi * np.where(m == 0, 1, m)) ** 2, 0.0)
+    return np.where(m == 0, np.cos(phase / 2) ** 2, odd * np.sin(phase / 2) ** 2)
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Largest |approximate − closed form| of |a_m|² by the integral and by a table; how many."""
+
+    integral: float
+    table: float
+    orders: int
+
+
+def deviations(grating: Grating, pixels: int = 512) -> Deviations:
+    """Compare every order at all `ANGLES` and `WAVELENGTHS`.
+
+    Parameters
+    ----------
+    grating : sampled with `pixels` per period.
+    """
+    field = grating.heights(pixels)
+    sigma = lobe_sigma(grating)
+    table = DiffractionTable.build(
+        field, coherence_width=4 * sigma, tolerance=TABLE_TOLERANCE, height_scale_max=1.0
+    )
+    worst_integral, worst_table, count = 0.0, 0.0, 0
+    for wavelength in WAVELENGTHS:
+        k = float(wavenumber(wavelength))
+        for theta in ANGLES:
+            orders, sines = order_sines(grating.period, wavelength, theta)
+            keep = np.abs(sines) <= np.sin(np.radians(ANGLES[-1] + 1e-9))
+            orders, sines = orders[keep], sines[keep]
+            wi, wo = in_plane(np.sin(np.radians(theta))), in_plane(sines)
+            kappa = k * (wi[2] + wo[:, 2])
+            exact = order_power(grating, orders, kappa)
+            # the BRDF at a lobe's centre is factor · 4π²σ⁴ |a_m|²
+            scale = kirchhoff_factor(wi, wo, wavelength, sigma) * 4 * np.pi**2 * sigma**4
+            peaks = lobe_peaks(grating, wi, wo, wavelength, pixels) / scale
+            looked_up = window_sum(table, 2 * np.pi * orders / grating.period, 0.0, kappa)
+            worst_integral = max(worst_integral, float(np.max(np.abs(peaks - exact))))
+            worst_table = max(worst_table, float(np.max(np.abs(looked_up - exact))))
+            count += len(orders)
+    return Deviations(worst_integral, worst_table, count)

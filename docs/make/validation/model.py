@@ -1,0 +1,82 @@
+"""What the package says about a grating's orders, from its BRDF.
+
+Through a window much wider than the period every order is a narrow lobe of the BRDF,
+
+    f = R (1 + ωi·ωo)² / (λ² A w² cosθi cosθo) · 4π²σ⁴ |a_m|² exp(−σ²|q − q_m|²),   A = πσ²,
+
+and carries the power ∫ f cosθo dωo of a beam of unit power. With dωo = dα dβ/(k² cosθo) and
+∬ exp(−σ²|q − q_m|²) dα dβ = π/σ², all else constant across the lobe,
+
+    η_m = f(ωi, ω_m) · π/(σ²k²) = R(cosθ_half) (1 + ωi·ω_m)² / (w² cosθi cosθ_m) · |a_m(k w)|².
+
+For a mirror this is R; for m = 0 of any grating R·|a_0|².
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mitsuba_diffraction import reference
+from mitsuba_diffraction.optics import fresnel
+from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
+
+from .cases import PIXELS, Grating, index_of, order_sines
+
+# Neighbouring orders are 2π/d apart and weigh exp(−(2π·σ/d)²), 4e-18 at σ = d
+_SIGMA_PER_PERIOD = 1.0
+
+
+def order_efficiencies(
+    grating: Grating, material: str, theta: float, wavelength: float
+) -> NDArray[np.float64]:
+    """η_m of every propagating order, ordered as `cases.order_sines`, for unpolarised light.
+
+    Parameters
+    ----------
+    grating : in the plane of incidence.
+    material : of `cases.MATERIALS`.
+    theta : angle of incidence, degrees.
+    wavelength : nm.
+    """
+    _, sines = order_sines(grating.period, wavelength, theta)
+    wi, wo = in_plane(np.sin(np.radians(theta))), in_plane(sines)
+    brdf = lobe_peaks(grating, wi, wo, wavelength)
+    sigma, k = lobe_sigma(grating), float(wavenumber(wavelength))
+    index = np.inf if material == "perfect" else index_of(material, wavelength)
+    cos_half = np.sqrt(np.clip(0.5 * (1 + wo @ wi), 0, 1))
+    return fresnel.reflectance(cos_half, index) * brdf * np.pi / (sigma * k) ** 2
+
+
+def lobe_sigma(grating: Grating) -> float:
+    """Standard deviation σ (µm) of a window through which the grating's lobes are separate."""
+    return _SIGMA_PER_PERIOD * grating.period
+
+
+def lobe_peaks(
+    grating: Grating,
+    wi: NDArray[np.float64],
+    wo: NDArray[np.float64],
+    wavelength: float,
+    pixels: int = PIXELS,
+) -> NDArray[np.float64]:
+    """The BRDF (R = 1) at the centres of lobes, through a window of `lobe_sigma`.
+
+    Parameters
+    ----------
+    wi, wo : (3,) and (n, 3), unit vectors away from the surface.
+    wavelength : nm.
+    pixels : a period.
+
+    Returns
+    -------
+    (n,) in 1/sr.
+    """
+    width = WIDTHS_PER_SIGMA * lobe_sigma(grating)
+    return reference.brdf(grating.heights(pixels), wi, wo, wavelength, coherence_width=width)
+
+
+def in_plane(sine: ArrayLike) -> NDArray[np.float64]:
+    """Unit vectors (..., 3) in the x–z plane with this x component."""
+    x = np.asarray(sine, np.float64)
+    return np.stack([x, np.zeros_like(x), np.sqrt(np.maximum(1 - x * x, 0))], axis=-1)

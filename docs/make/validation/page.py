@@ -1,0 +1,95 @@
+"""docs/validation.md, written as a whole: comparisons, pictures and text."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mitsuba_diffraction.atomic import atomic_path
+from mitsuba_diffraction.progress import Progress, silent
+
+from . import plots, sections, statistics
+from .cases import FEW_WAVELENGTHS, MATERIALS, PROBE_GRATING, Grating
+from .compare import Comparison, compare
+from .solutions import Solutions, shipped
+
+#: Period and depth (µm) of the gratings that closed forms are checked for.
+_IDEAL = ((1.1, 0.4), (2.5, 0.1), (5.0, 0.4))
+
+_STEPS = 6
+_DPI = 100
+
+
+def write_report(folder: Path, *, quick: bool = False, progress: Progress | None = None) -> Path:
+    """Write validation.md and images/validation_*.png into a folder; about a minute.
+
+    Parameters
+    ----------
+    folder : made if it is missing.
+    quick : a small version for tests: two wavelengths, fewer gratings and random surfaces.
+    progress : called as progress(done, total, text).
+
+    Returns
+    -------
+    The page.
+    """
+    tell = progress or silent
+    images = folder / "images"
+    images.mkdir(parents=True, exist_ok=True)
+    comparisons: dict[str, Comparison] = {}
+    for n, material in enumerate(MATERIALS):
+        tell(n, _STEPS, f"comparing with {material}")
+        every = shipped(material)
+        comparisons[material] = compare(material, _at_few_wavelengths(every) if quick else every)
+    tell(3, _STEPS, "random surfaces")
+    measured = statistics.measure(*((15, 80) if quick else (200, 2000)))
+    perfect = comparisons["perfect"]
+
+    tell(4, _STEPS, "drawing")
+    examples = [
+        Grating(*PROBE_GRATING),
+        Grating("blazed", 2.5, 0.2),
+        Grating("sinusoidal", 1.1, 0.2),
+    ]
+    figures = {
+        "slopes": plots.slopes_figure(perfect),
+        "orders": plots.orders_figure(perfect, examples, 30.0),
+        "materials": plots.scatter_figure(list(comparisons.values())),
+        "statistics": plots.statistics_figure(measured),
+    }
+    for name, figure in figures.items():
+        _write_figure(figure, images / f"validation_{name}.png")
+
+    tell(5, _STEPS, "writing")
+    text = [
+        sections.introduction(),
+        sections.closed_forms(_IDEAL[1:2] if quick else _IDEAL),
+        sections.solutions(comparisons),
+        sections.probe(perfect),
+        sections.slopes(perfect),
+        sections.edges(perfect),
+        sections.polarisation(perfect),
+        sections.materials(comparisons),
+        sections.random_surfaces(measured),
+    ]
+    page = folder / "validation.md"
+    with atomic_path(page) as temporary:
+        temporary.write_text("\n\n".join(text) + "\n", encoding="utf-8")
+    tell(_STEPS, _STEPS, "done")
+    return page
+
+
+def _at_few_wavelengths(solutions: Solutions) -> Solutions:
+    keep = np.isin(solutions.rows["wavelength"], FEW_WAVELENGTHS)
+    return Solutions(solutions.rows[keep], solutions.about)
+
+
+def _write_figure(figure: Figure, path: Path) -> None:
+    # without the name of the software that wrote it, equal pictures are equal files
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(buffer.getvalue())

@@ -1,0 +1,171 @@
+"""Rigorous solutions, and the files that keep them: rows of numbers with what made them."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_diffraction.atomic import atomic_path
+from mitsuba_diffraction.errors import DiffractionError
+
+from .cases import MATERIALS, PROFILES
+
+#: A row is one order of one grating at one wavelength and angle. Lengths in µm, wavelength in nm,
+#: theta in degrees; `te` and `tm` are the efficiencies (reflected power in this order, of the
+#: incident), electric and magnetic field along the grooves; `te_change` and `tm_change` are how
+#: much they changed when the solver's resolution doubled to its final value, and `te_balance` and
+#: `tm_balance` by how much all orders and the absorption miss 1. NaN is what a solver cannot do.
+ROW = np.dtype(
+    [
+        ("profile", "i1"),
+        ("period", "f4"),
+        ("depth", "f4"),
+        ("theta", "f4"),
+        ("wavelength", "f4"),
+        ("order", "i2"),
+        ("te", "f4"),
+        ("tm", "f4"),
+        ("te_change", "f2"),
+        ("tm_change", "f2"),
+        ("te_balance", "f2"),
+        ("tm_balance", "f2"),
+    ]
+)
+
+#: A grating at one angle and wavelength is left out if the last doubling changed one of its orders
+#: by more than this (absolute). The next doubling changes it by about a sixth of that.
+CONVERGED = 5e-3
+
+#: What one solution is: rows that have these in common.
+KEY = ["profile", "period", "depth", "theta", "wavelength"]
+
+
+class Efficiencies:
+    """One scan as a solver returns it, by polarisation ("te", "tm").
+
+    Attributes
+    ----------
+    orders : a list with an array (orders,) for each wavelength, ordered as `cases.order_sines`.
+    balance : (wavelengths,) the sum of all orders and the absorption, minus 1; NaN where a solver
+        does not compute the absorption.
+    """
+
+    def __init__(self, wavelengths: int) -> None:
+        self.orders: dict[str, list[NDArray[np.float64]]] = {"te": [], "tm": []}
+        self.balance = {"te": np.full(wavelengths, np.nan), "tm": np.full(wavelengths, np.nan)}
+
+
+@dataclass(frozen=True)
+class Solutions:
+    """Rows (n,) of dtype `ROW`, and a description: solver, versions, settings, material."""
+
+    rows: NDArray[np.void]
+    about: Mapping[str, Any]
+
+    @property
+    def mean(self) -> NDArray[np.float64]:
+        """Efficiency for unpolarised light, (n,)."""
+        return 0.5 * (self.rows["te"].astype(float) + self.rows["tm"])
+
+    @property
+    def change(self) -> NDArray[np.float64]:
+        """How far from converged each row is: the larger change of both polarisations, (n,)."""
+        return np.fmax(self.rows["te_change"], self.rows["tm_change"]).astype(float)
+
+    @property
+    def balance(self) -> NDArray[np.float64]:
+        """Energy missing or gained, the larger of both polarisations, (n,)."""
+        te, tm = np.abs(self.rows["te_balance"]), np.abs(self.rows["tm_balance"])
+        return np.fmax(te, tm).astype(float)
+
+    @property
+    def converged(self) -> NDArray[np.bool_]:
+        """Whether a row belongs to a solution that has converged (`CONVERGED`), (n,)."""
+        _, solution = np.unique(self.rows[KEY], return_inverse=True)
+        worst = np.zeros(solution.max(initial=-1) + 1)
+        np.maximum.at(worst, solution.ravel(), self.change)
+        return np.asarray(worst[solution.ravel()] <= CONVERGED)
+
+    def where(self, **values: Any) -> Solutions:
+        """The rows with these values, such as profile="lamellar" or theta=30.0."""
+        return Solutions(self.rows[self.having(**values)], self.about)
+
+    def having(self, **values: Any) -> NDArray[np.bool_]:
+        """Which rows have these values, (n,); as in `where`."""
+        keep = np.ones(len(self.rows), bool)
+        for name, value in values.items():
+            wanted: Any = PROFILES.index(value) if name == "profile" else np.float32(value)
+            keep &= self.rows[name] == wanted
+        return keep
+
+    def trusted(self) -> Solutions:
+        """The rows that have converged."""
+        return Solutions(self.rows[self.converged], self.about)
+
+
+def save(solutions: Solutions, path: str | os.PathLike[str]) -> None:
+    """Write an .npz file, atomically.
+
+    Raises
+    ------
+    DiffractionError
+        If it cannot be written.
+    """
+    about = json.dumps(dict(solutions.about), indent=1, ensure_ascii=False)
+    columns = {name: solutions.rows[name] for name in ROW.names or ()}
+    with atomic_path(path) as temporary:
+        np.savez_compressed(temporary, allow_pickle=False, about=np.array(about), **columns)
+
+
+def load(path: str | os.PathLike[str]) -> Solutions:
+    """Read what `save` wrote.
+
+    Raises
+    ------
+    DiffractionError
+        If the file is missing or no set of solutions.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            columns = {name: file[name] for name in ROW.names or ()}
+            about = json.loads(str(file["about"]))
+    except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        reason = " ".join(str(error).split())
+        raise DiffractionError(
+            f"cannot read solutions from '{os.fspath(path)}': {reason}; "
+            "make them with `python -m docs.make.validation solve`"
+        ) from error
+    rows = np.empty(len(columns["order"]), ROW)
+    for name, column in columns.items():
+        rows[name] = column
+    return Solutions(rows, about)
+
+
+def shipped(material: str, solver: str = "integral") -> Solutions:
+    """The solutions that come with the package.
+
+    Raises
+    ------
+    DiffractionError
+        If there are none for this material by this solver.
+    """
+    if material not in MATERIALS:
+        raise DiffractionError(
+            f"material '{material}' is unknown; choose one of {', '.join(MATERIALS)}"
+        )
+    data = resources.files(__package__) / "data"
+    with resources.as_file(data / file_name(material, solver)) as path:
+        return load(path)
+
+
+def file_name(material: str, solver: str) -> str:
+    """What the file of a material's solutions is called."""
+    return f"{material}_{solver}.npz"

@@ -1,0 +1,9 @@
+"""What is measured of a surface or a scene.
+
+Contents
+--------
+maps       BRDF maps: the hemisphere of view directions
+tradeoff   accuracy against speed and memory
+bench      speed and noise
+pictures   patches and albedo as pictures
+"""

@@ -1,0 +1,152 @@
+"""How well directions are drawn: the noise of estimates, beside drawing them by the cosine."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ...progress import Progress
+from ..maps.light import Light
+from .contenders import Tables
+from .figures import Goal, Row, Section
+from .plan import SEED, Plan
+from .scenes import furnace, pixels_of, snake, window
+
+#: Angle of incidence in degrees: relative standard deviation that one sample may have.
+_GOALS = {0.0: 0.6, 45.0: 0.8, 75.0: 1.2}
+_AZIMUTHS = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)
+_WAVELENGTHS = (450.0, 550.0, 650.0)
+
+#: Samples a pixel of the rendering in which bright pixels are looked for.
+_FIREFLY_SPP = 64
+
+
+def measure_noise(plan: Plan, tables: Tables, progress: Progress) -> Section:
+    """Relative standard deviation of one sample's estimate of the directional albedo."""
+    ours = tables.bsdf("default", material="none", energy_conserving=False)
+    cosine = draws_by_cosine(tables.bsdf("default", material="none", energy_conserving=False))
+    columns = ("least", "median", "most", "largest weight", "by the cosine")
+    rows = []
+    for n, (theta, goal) in enumerate(_GOALS.items()):
+        progress(n, len(_GOALS), "noise")
+        found = [
+            _deviation(ours, theta, phi, wavelength, plan.lanes)
+            for phi in _AZIMUTHS
+            for wavelength in _WAVELENGTHS
+        ]
+        deviations = [deviation for deviation, _ in found]
+        values = (
+            min(deviations),
+            float(np.median(deviations)),
+            max(deviations),
+            max(weight for _, weight in found),
+            _deviation(cosine, theta, 0.0, 550.0, plan.lanes)[0],
+        )
+        rows.append(
+            Row(
+                f"{theta:g}°",
+                dict(zip(columns, values, strict=True)),
+                [Goal(f"at most {goal:g}", max(deviations) <= goal)],
+                {"standard deviations": deviations},
+            )
+        )
+    progress(len(_GOALS), len(_GOALS), "noise")
+    title = (
+        "noise: relative standard deviation of one sample's albedo, R = 1, raw Kirchhoff, "
+        f"{len(_AZIMUTHS)} azimuths of the light and {len(_WAVELENGTHS)} wavelengths from "
+        f"{_WAVELENGTHS[0]:g} to {_WAVELENGTHS[-1]:g} nm"
+    )
+    return Section(title, columns, rows)
+
+
+def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> Section:
+    """Variance × time of pictures, against drawing by the cosine; and pixels far too bright."""
+    size = plan.resolution
+    columns = ("variance × time, ratio", "variance, ratio", "time, ratio", "brightest pixel, ratio")
+
+    def bsdf() -> Any:
+        return tables.bsdf("default", material="none")
+
+    cases: dict[str, Callable[[Any], Any]] = {
+        "white furnace": lambda b: furnace(b, size // 2),
+        "snake under a window": lambda b: snake(b, scenes, size // 2, size // 3, window()),
+    }
+    rows = []
+    for n, (name, make) in enumerate(cases.items()):
+        progress(n, len(cases), name)
+        ours, cosine = make(bsdf()), make(draws_by_cosine(bsdf()))
+        pixels = pixels_of(ours, ours.shapes()[0])
+        variance, seconds = _variance_and_time(ours, pixels, plan)
+        cosine_variance, cosine_seconds = _variance_and_time(cosine, pixels, plan)
+        ratio = cosine_variance * cosine_seconds / (variance * seconds)
+        brightest = _brightest(ours, pixels, plan)
+        values = (ratio, cosine_variance / variance, cosine_seconds / seconds, brightest)
+        goals = [Goal("at least 100×", ratio >= 100.0)]
+        if name.startswith("snake"):
+            goals.append(Goal("brightest within 5×", brightest <= 5.0))
+        rows.append(Row(name, dict(zip(columns, values, strict=True)), goals))
+    progress(len(cases), len(cases), "efficiency")
+    title = (
+        "efficiency: drawing by the cosine over our own, path integrator, material=none, variance "
+        f"of the body's pixels; their brightest at {_FIREFLY_SPP} samples a pixel over that at "
+        f"{plan.reference_spp}"
+    )
+    return Section(title, columns, rows)
+
+
+def draws_by_cosine(bsdf: Any) -> Any:
+    """The same plugin, whose directions are drawn from the cosine lobe alone."""
+    bsdf.draw = lambda si, sample1, sample2, active: mi.warp.square_to_cosine_hemisphere(sample2)
+    bsdf.density = lambda si, wo, active: mi.warp.square_to_cosine_hemisphere_pdf(wo)
+    return bsdf
+
+
+def _deviation(
+    bsdf: Any, theta: float, phi: float, wavelength: float, lanes: int
+) -> tuple[float, float]:
+    """Relative standard deviation of the weights, and the largest of them."""
+    si = dr.zeros(mi.SurfaceInteraction3f, lanes)
+    si.wi = mi.Vector3f(*(float(c) for c in Light(theta, phi).direction))
+    si.wavelengths = mi.Spectrum(wavelength)
+    random = mi.PCG32(size=lanes, initstate=SEED)
+    numbers = [random.next_float32() for _ in range(3)]
+    _, weight = bsdf.sample(mi.BSDFContext(), si, numbers[0], mi.Point2f(numbers[1], numbers[2]))
+    weights = np.array(weight[0], float)
+    return float(weights.std() / weights.mean()), float(weights.max())
+
+
+def _variance_and_time(scene: Any, pixels: Any, plan: Plan) -> tuple[float, float]:
+    """Mean over the pixels of the luminance's variance between renderings, and seconds for one."""
+    pictures, seconds = [], []
+    for seed in range(-1, 2 * plan.rounds):  # the first compiles
+        start = time.perf_counter()
+        picture = mi.render(scene, spp=plan.spp, seed=seed + 1)
+        dr.eval(picture)
+        dr.sync_thread()
+        if seed >= 0:
+            seconds.append(time.perf_counter() - start)
+            pictures.append(_luminance(picture)[pixels])
+    return float(np.var(pictures, axis=0, ddof=1).mean()), float(np.median(seconds))
+
+
+def _brightest(scene: Any, pixels: Any, plan: Plan) -> float:
+    """Brightest pixel of a fast rendering over the brightest of a converged one."""
+
+    def brightest(spp: int, seeds: Sequence[int]) -> float:
+        mean = np.mean([_luminance(mi.render(scene, spp=spp, seed=s)) for s in seeds], axis=0)
+        return float(mean[pixels].max())
+
+    passes = max(1, plan.reference_spp // 256)
+    converged = brightest(plan.reference_spp // passes, range(1000, 1000 + passes))
+    return brightest(_FIREFLY_SPP, [SEED]) / converged
+
+
+def _luminance(picture: Any) -> Any:
+    rgb = np.array(picture)[..., :3]
+    return rgb @ np.array([0.2126, 0.7152, 0.0722])

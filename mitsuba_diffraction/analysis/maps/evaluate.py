@@ -1,0 +1,257 @@
+"""Evaluating a BSDF over the hemisphere, with Dr.Jit: what the renderer sees, not a copy of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import DiffractionError
+from ...optics.colour import LONGEST, SHORTEST, check_illuminant, linear_srgb, response
+from ...optics.geometry import wavenumber
+from ...plugin.llvm import require_loaded_llvm
+from ...progress import Progress
+from ...tables.build.error import NEAR
+from . import hemisphere
+from .bands import Bands
+from .light import Light
+from .result import BrdfMap
+
+# Pixels at a time: enough for a GPU, and their sums stay within some tens of megabytes.
+_PIXELS = 1 << 20
+#: Numbers in the largest spectral map, 4 GB.
+_MOST_NUMBERS = 1 << 30
+
+
+def brdf_map(
+    bsdf: Any,
+    theta: float = 0.0,
+    phi: float = 0.0,
+    *,
+    wavelength_range: tuple[float, float] = (360.0, 830.0),
+    step: float = 5.0,
+    wavelength: float | None = None,
+    resolution: int = 512,
+    samples: int | None = None,
+    illuminant: str = "D65",
+    cosine: bool = False,
+    spectral: bool = False,
+    progress: Progress | None = None,
+) -> BrdfMap:
+    """The BRDF for one light direction, over the whole hemisphere of view directions.
+
+    Each pixel is the mean over `samples` directions. The spectrum is integrated by the midpoint
+    rule over bands of `step`; the samples of a pixel take turns within the bands, which refines the
+    rule as many times, so that orders do not fall apart into beads.
+
+    In an RGB variant the BSDF's own colours are mapped, those of the whole spectrum in daylight:
+    one look-up a direction, through the table that such variants render with.
+
+    Parameters
+    ----------
+    bsdf : a Mitsuba BSDF of the variant that is set, `diffraction` or any other without textures.
+    theta, phi : direction to the light, degrees; see `Light`.
+    wavelength_range : nm.
+    step : widest band, nm.
+    wavelength : nm, instead of a range: a map of f at one wavelength.
+    resolution : pixels along each axis.
+    samples : directions in a pixel; by default enough to find every lobe.
+    illuminant : "D65" or "E".
+    cosine : map f·cosθo instead of f.
+    spectral : keep the bands, too.
+    progress : called as progress(done, total, text).
+
+    Raises
+    ------
+    DiffractionError
+        If a parameter is out of range, or the variant is neither spectral nor RGB, or scalar; or if
+        an RGB variant is asked for anything but the whole spectrum in daylight.
+    """
+    light = Light(theta, phi)
+    bands = Bands.of(wavelength_range, step, wavelength)
+    check_illuminant(illuminant)
+    check_map(bands, resolution, samples, spectral)
+    _check_variant(bands, illuminant, spectral)
+    require_loaded_llvm()
+    table = getattr(bsdf, "table", None)
+    if table is not None and bands.low < table.wavelength_range[0]:
+        raise DiffractionError(
+            f"{bands}: below the table's shortest wavelength, {table.wavelength_range[0]:g} "
+            "nm; build a table for them with 'mitsuba-diffraction precompute --wavelength-range'"
+        )
+    # σ·k·Δ = 1/√2 is one standard deviation of exp(−σ²k²Δ²)
+    narrowest = 0.5 if table is None else 1 / (2**0.5 * table.sigma * float(wavenumber(bands.low)))
+    if samples is None:
+        samples = hemisphere.samples_for(resolution, narrowest)
+    sums: _Sums | _Colours
+    if mi.is_rgb:
+        sums = _Colours(cosine)
+    else:
+        sums = _Sums(bands, illuminant, cosine, colours=not bands.is_single, spectral=spectral)
+    coverage, values = _over_pixels(bsdf, light, resolution, samples, sums, progress)
+    if mi.is_rgb:
+        to_xyz = np.linalg.inv(linear_srgb(np.eye(3)))
+        values = np.moveaxis(np.moveaxis(values, 0, -1) @ to_xyz, -1, 0).astype(np.float32)
+    return BrdfMap(
+        light=light,
+        bands=bands,
+        coverage=coverage,
+        xyz=None if bands.is_single else np.moveaxis(values[:3], 0, -1),
+        spectrum=values[0 if bands.is_single else 3 :] if sums.keeps_bands else None,
+        cosine=cosine,
+        illuminant=illuminant,
+        samples=samples,
+        lobe=0.0 if table is None else NEAR / (table.sigma * float(wavenumber(bands.high))),
+    )
+
+
+def _check_variant(bands: Bands, illuminant: str, spectral: bool) -> None:
+    """Refuse a variant that cannot make such a map."""
+    if not (mi.is_spectral or mi.is_rgb) or mi.is_polarized or "scalar" in mi.variant():
+        raise DiffractionError(
+            f"variant '{mi.variant()}' cannot make a map; use llvm_ad_spectral, llvm_ad_rgb, "
+            "cuda_ad_spectral or cuda_ad_rgb"
+        )
+    if mi.is_rgb and (
+        (bands.low, bands.high) != (SHORTEST, LONGEST) or spectral or illuminant != "D65"
+    ):
+        raise DiffractionError(
+            f"variant '{mi.variant()}' knows only the colours of the whole spectrum in daylight; "
+            "leave wavelengths, bands and illuminant out, or use llvm_ad_spectral"
+        )
+
+
+def check_map(bands: Bands, resolution: int, samples: int | None, spectral: bool) -> None:
+    """Refuse numbers of pixels, samples and bands that are out of range or beyond the memory."""
+    hemisphere.check_resolution(resolution)
+    if samples is not None:
+        hemisphere.check_samples(samples)
+    if spectral and resolution**2 * bands.count > _MOST_NUMBERS:
+        raise DiffractionError(
+            f"a spectral map of {resolution}² pixels and {bands.count} bands would take "
+            f"{resolution**2 * bands.count * 4 / 1e9:.0f} GB; lower resolution or widen step"
+        )
+
+
+class _Sums:
+    """Sums over wavelengths, in one kernel that serves all of them."""
+
+    def __init__(
+        self, bands: Bands, illuminant: str, cosine: bool, *, colours: bool, spectral: bool
+    ) -> None:
+        self.bands, self.illuminant, self.cosine = bands, illuminant, cosine
+        self.colours, self.keeps_bands = colours, spectral or not colours
+        self.count = (3 if colours else 0) + (bands.count if self.keeps_bands else 0)
+        self._context = mi.BSDFContext()
+
+    def add(
+        self, totals: list[Any], bsdf: Any, si: Any, wo: Any, active: Any, offset: float
+    ) -> None:
+        """Add one sample of each pixel to its totals: X, Y, Z if wanted, and the bands if wanted.
+
+        Parameters
+        ----------
+        totals : mi.Float each, `count` of them; changed in place.
+        offset : where in each band the wavelength lies, 0 to 1.
+        """
+        packet = len(mi.Spectrum())
+        wavelengths = self.bands.wavelengths(offset)
+        weights = (
+            response(wavelengths, self.illuminant) * self.bands.width if self.colours else None
+        )
+        for first in range(0, self.bands.count, packet):
+            # the last packet is filled up with wavelengths that have no weight and go nowhere
+            index = np.minimum(np.arange(first, first + packet), self.bands.count - 1)
+            used = min(packet, self.bands.count - first)
+            # as variables, not as literals: a literal would be a kernel of its own
+            si.wavelengths = mi.Spectrum(_opaque(wavelengths[index]))
+            f = bsdf.eval(self._context, si, wo, active)
+            if not self.cosine:
+                f *= dr.rcp(wo.z)
+            if weights is not None:
+                shown = weights[index] * (np.arange(packet) < used)[:, None]
+                for n in range(3):
+                    totals[n] += dr.dot(mi.Spectrum(_opaque(shown[:, n])), f)
+            if self.keeps_bands:
+                start = self.count - self.bands.count + first
+                for n in range(used):
+                    totals[start + n] += f[n]
+                dr.eval(totals[start : start + used])
+            dr.eval(totals[:3])
+
+
+class _Colours:
+    """Linear sRGB of RGB variants, with the interface of `_Sums`."""
+
+    count = 3
+    keeps_bands = False
+
+    def __init__(self, cosine: bool) -> None:
+        self.cosine = cosine
+        self._context = mi.BSDFContext()
+
+    def add(
+        self, totals: list[Any], bsdf: Any, si: Any, wo: Any, active: Any, offset: float
+    ) -> None:
+        """Add one sample of each pixel; `offset` is for wavelengths, of which there are none."""
+        f = bsdf.eval(self._context, si, wo, active)
+        if not self.cosine:
+            f *= dr.rcp(wo.z)
+        for n in range(3):
+            totals[n] += f[n]
+        dr.eval(totals)
+
+
+def _over_pixels(
+    bsdf: Any,
+    light: Light,
+    resolution: int,
+    samples: int,
+    sums: _Sums | _Colours,
+    progress: Progress | None,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Means over all pixels: coverage (n, n) and sums (count, n, n)."""
+    inside = hemisphere.inside(resolution)
+    low, size = hemisphere.corners(resolution), 2.0 / resolution
+    rows, columns = np.nonzero(inside)
+    coverage = np.zeros((resolution, resolution), np.float32)
+    values = np.zeros((sums.count, resolution, resolution), np.float32)
+    pattern = hemisphere.sub_samples(samples)
+    chunks = -(-rows.size // _PIXELS)
+    for chunk in range(chunks):
+        part = slice(chunk * _PIXELS, (chunk + 1) * _PIXELS)
+        x0, y0 = (mi.Float(low[index[part]].astype(np.float32)) for index in (columns, rows))
+        si = dr.zeros(mi.SurfaceInteraction3f, dr.width(x0))
+        si.n = mi.Normal3f(0.0, 0.0, 1.0)
+        si.sh_frame = mi.Frame3f(si.n)
+        si.wi = mi.Vector3f(_opaque(light.direction))
+        hit = dr.zeros(mi.Float, dr.width(x0))
+        totals = [dr.zeros(mi.Float, dr.width(x0)) for _ in range(sums.count)]
+        for n, (shift_x, shift_y, offset) in enumerate(pattern):
+            if progress is not None:
+                progress(chunk * samples + n, chunks * samples, "evaluating")
+            shift = _opaque(np.array([shift_x, shift_y]) * size)
+            x, y = x0 + shift[0], y0 + shift[1]
+            z2 = 1.0 - dr.square(x) - dr.square(y)
+            active = z2 > 0.0
+            wo = mi.Vector3f(x, y, dr.sqrt(dr.select(active, z2, 1.0)))
+            hit += dr.select(active, 1.0, 0.0)
+            dr.eval(wo, active, hit)
+            sums.add(totals, bsdf, si, wo, active, float(offset))
+            dr.sync_thread()  # for the progress, and lest kernels queue up beyond Ctrl-C's reach
+        coverage[rows[part], columns[part]] = np.array(hit) / samples
+        for total, value in zip(totals, values, strict=True):
+            value[rows[part], columns[part]] = np.array(total) / samples
+    if progress is not None:
+        progress(chunks * samples, chunks * samples, "evaluating")
+    return coverage, values
+
+
+def _opaque(values: NDArray[np.float64]) -> list[Any]:
+    """Numbers as variables of one element each."""
+    variables = [mi.Float(float(v)) for v in values]
+    dr.make_opaque(variables)
+    return variables

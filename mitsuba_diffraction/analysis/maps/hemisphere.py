@@ -1,0 +1,94 @@
+"""View directions of a map: an orthographic picture of the hemisphere above the surface.
+
+A direction (θ, φ) lies at x = sinθ cosφ, y = sinθ sinφ, the normal in the middle. There solid angle
+times cosθ is area, cosθ dω = dx dy: the mean of a map of f over the square [−1, 1]², times 4, is
+the directional albedo.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import DiffractionError
+
+SMALLEST, LARGEST = 8, 4096
+MOST_SAMPLES = 1024
+
+# More samples than this in a pixel are not chosen automatically: they would take minutes.
+_AUTOMATIC_SAMPLES = (4, 64)
+
+
+def check_resolution(resolution: int) -> None:
+    """Refuse a number of pixels that is no picture, or too large a one."""
+    if not SMALLEST <= resolution <= LARGEST:
+        raise DiffractionError(
+            f"resolution={resolution} must be from {SMALLEST} to {LARGEST} pixels"
+        )
+
+
+def check_samples(samples: int) -> None:
+    """Refuse a number of samples in a pixel that is none, or too large."""
+    if not 1 <= samples <= MOST_SAMPLES:
+        raise DiffractionError(f"samples={samples} must be from 1 to {MOST_SAMPLES} in a pixel")
+
+
+def corners(resolution: int) -> NDArray[np.float64]:
+    """Lower corner of each pixel along an axis, (resolution,), from −1 on."""
+    return np.arange(resolution, dtype=np.float64) * (2.0 / resolution) - 1.0
+
+
+def inside(resolution: int) -> NDArray[np.bool_]:
+    """Which pixels (y, x) the hemisphere touches."""
+    low = corners(resolution)
+    high = low + 2.0 / resolution
+    nearest = np.where(low > 0.0, low, np.where(high < 0.0, high, 0.0))
+    return nearest[:, None] ** 2 + nearest[None, :] ** 2 < 1.0
+
+
+@functools.cache
+def sub_samples(samples: int) -> NDArray[np.float64]:
+    """Where in each pixel and in each band the samples lie, (samples, 3) from 0 to 1.
+
+    Columns are x, y and wavelength; each takes the middles of `samples` equal parts once, so that
+    no column has a bias, and one sample is in the middle. Pixel by pixel the samples repeat, so all
+    of them together are one lattice over the whole map, which sums a smooth lobe much better than
+    random places would; there is no noise. It is the rank-1 lattice (Korobov 1959) whose closest
+    neighbours are farthest apart, first in x and y, then with the wavelength.
+    """
+    steps = np.arange(samples, dtype=np.int64)
+    multiples = steps[:, None] * steps % samples  # row a: where the generator a leads
+    coprime = steps[np.gcd(steps, samples) == 1] if samples > 1 else steps
+    columns = [steps]
+    apart = _wrapped(steps, samples) ** 2.0
+    for _ in ("y", "wavelength"):
+        candidates = multiples[coprime]
+        distances = apart + _wrapped(candidates, samples) ** 2.0
+        best = distances[:, 1:].min(axis=1, initial=np.inf).argmax()
+        apart = distances[best]
+        columns.append(candidates[best])
+    result = (np.stack(columns, axis=1) + 0.5) / samples
+    result.setflags(write=False)
+    return result
+
+
+def samples_for(resolution: int, lobe: float) -> int:
+    """How many samples in a pixel find every lobe.
+
+    Parameters
+    ----------
+    resolution : pixels along an axis.
+    lobe : standard deviation of the narrowest lobe in x and y.
+    """
+    fewest, most = _AUTOMATIC_SAMPLES
+    pixel = 2.0 / resolution
+    # a lattice whose places are √2 standard deviations apart sums a Gaussian within about 1e-4
+    return min(max(math.ceil(0.5 * (pixel / lobe) ** 2), fewest), most)
+
+
+def _wrapped(steps: NDArray[np.int64], period: int) -> NDArray[np.int64]:
+    """Distance to the nearest multiple of the period."""
+    return np.minimum(steps, period - steps)

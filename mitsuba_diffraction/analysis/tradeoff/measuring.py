@@ -1,0 +1,189 @@
+"""Error, colours, time and memory of each setting, side by side in one run."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import DiffractionError
+from ...heights.field import HeightField
+from ...progress import Progress, silent
+from ...tables.build.half_precision import half_scale
+from ...tables.colour.colour_difference import power_loss
+from ...tables.table import DiffractionTable, reach_of
+from ..bench.contenders import Queries
+from ..bench.saved import saved_bsdf
+from ..bench.timing import kernel_seconds, ratio, rounds_of
+from .sample import Sample
+from .setting import Setting
+
+#: What colours are compared with: an error so small that nobody sees it.
+FINEST = 1e-5
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One setting and what it does.
+
+    Attributes
+    ----------
+    setting : what was asked for.
+    refused : why there is no such table; everything else then is as by default.
+    error : Σ|table − exact| / Σ exact, the larger of near order 0 and elsewhere, double precision.
+    error_single : the same by the plugin, in single precision.
+    delta_e, delta_e_99 : ΔE2000 of random directions in daylight from the finest table, mean and
+        99th percentile.
+    nanoseconds : of `eval` with four wavelengths.
+    relative : the same over that of `roughconductor` (Al), median of the rounds.
+    taps, terms, intervals : bins read, numbers of each, intervals of κ.
+    megabytes, seconds : the table's size, and the time it took to build.
+    """
+
+    setting: Setting
+    refused: str = ""
+    error: float = float("nan")
+    error_single: float = float("nan")
+    delta_e: float = float("nan")
+    delta_e_99: float = float("nan")
+    nanoseconds: float = float("nan")
+    relative: float = float("nan")
+    taps: int = 0
+    terms: int = 0
+    intervals: int = 0
+    precision: str = ""
+    megabytes: float = float("nan")
+    seconds: float = float("nan")
+
+
+def measure(
+    field: HeightField,
+    chosen: Sequence[Setting],
+    *,
+    coherence_width: float = 65.0,
+    pairs: int = 240,
+    lanes: int = 1 << 19,
+    rounds: int = 7,
+    progress: Progress = silent,
+) -> list[Measured]:
+    """All settings for one patch, in the current (spectral) variant.
+
+    Parameters
+    ----------
+    field : the patch.
+    chosen : what to try.
+    coherence_width : µm.
+    pairs : of directions and wavelengths that errors are measured on.
+    lanes, rounds : calls at once, and timed repetitions.
+    progress : called as progress(done, total, text).
+
+    Raises
+    ------
+    DiffractionError
+        If the patch is flat, or not even the default table can be built.
+    """
+    modes = {str(setting.arguments.get("coherence", "ensemble")) for setting in chosen}
+    samples = {
+        mode: Sample.of(field, coherence_width, mode, pairs, progress) for mode in sorted(modes)
+    }
+    finest = {
+        mode: DiffractionTable.build(
+            field, coherence_width=coherence_width, coherence=mode, tolerance=FINEST
+        )
+        for mode in sorted(modes)
+    }
+    results, calls = [], {}
+    rough = mi.load_dict({"type": "roughconductor", "material": "Al"})
+    queries = Queries.random(lanes)
+    context = mi.BSDFContext()
+    calls[""] = partial(rough.eval, context, queries.si, queries.wo)
+    for n, setting in enumerate(chosen):
+        progress(n, len(chosen), setting.name)
+        mode = str(setting.arguments.get("coherence", "ensemble"))
+        start = time.perf_counter()
+        try:
+            table = _table(field, setting, coherence_width)
+        except DiffractionError as error:
+            if n == 0:
+                raise
+            results.append(Measured(setting, refused=str(error)))
+            continue
+        seconds = time.perf_counter() - start
+        with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder:
+            file = Path(folder) / "table.exr"
+            table.save(file)
+            bsdf = saved_bsdf(file, energy_conserving=False)
+        calls[setting.name] = partial(bsdf.eval, context, queries.si, queries.wo)
+        sample = samples[mode]
+        loss = power_loss(finest[mode], table)
+        _, _, _, _, terms = table.coefficients.shape
+        results.append(
+            Measured(
+                setting,
+                error=max(sample.error(sample.looked_up(table))),
+                error_single=max(sample.error(_by_plugin(bsdf, sample))),
+                delta_e=float(loss.mean()),
+                delta_e_99=float(np.percentile(loss, 99.0)),
+                taps=table.grid.taps_read,
+                terms=terms,
+                intervals=table.expansion.intervals,
+                precision="half" if table.coefficients.dtype == np.float16 else "single",
+                megabytes=table.nbytes / 1e6,
+                seconds=seconds,
+            )
+        )
+    timed = {name: partial(kernel_seconds, call) for name, call in calls.items()}
+    taken = rounds_of(timed, rounds, lambda done, total: progress(done, total, "timing"))
+    return [_with_times(one, taken, lanes) for one in results]
+
+
+def _table(field: HeightField, setting: Setting, coherence_width: float) -> DiffractionTable:
+    arguments: dict[str, Any] = dict(setting.arguments)
+    if setting.crop is not None:
+        arguments["crop"] = setting.crop * reach_of((360.0, 830.0))
+    table = DiffractionTable.build(field, coherence_width=coherence_width, **arguments)
+    if setting.stored is None:
+        return table
+    kind: Any = np.float16 if setting.stored == "half" else np.float32
+    scale = half_scale(float(np.abs(table.coefficients).max()))
+    coefficients = (table.coefficients.astype(np.float32) * np.float32(scale)).astype(kind)
+    return replace(table, coefficients=coefficients, scale=table.scale * scale)
+
+
+def _by_plugin(bsdf: Any, sample: Sample) -> NDArray[np.float64]:
+    """The window sums (n,) that the plugin finds, all in single precision."""
+    k = 2e3 * np.pi / sample.wavelength
+    total = mi.Vector3f((sample.wi + sample.wo).T)
+    device = bsdf.light.device
+    wavenumber = mi.Float(k)
+    found = device.window_sum(wavenumber * total.x, wavenumber * total.y, wavenumber * total.z)
+    return np.array(found, float)
+
+
+def _with_times(one: Measured, taken: dict[str, list[float]], lanes: int) -> Measured:
+    if one.refused:
+        return one
+    mine = taken[one.setting.name]
+    return replace(
+        one, nanoseconds=float(np.median(mine)) / lanes * 1e9, relative=ratio(mine, taken[""])
+    )
+
+
+def rows(results: Sequence[Measured]) -> Iterator[dict[str, Any]]:
+    """Plain data, one flat record a setting."""
+    for one in results:
+        record: dict[str, Any] = {"group": one.setting.group, "setting": one.setting.name}
+        record |= {"arguments": one.setting.arguments, "usable": one.setting.usable}
+        names = (
+            "refused", "error", "error_single", "delta_e", "delta_e_99", "nanoseconds",
+            "relative", "taps", "terms", "intervals", "precision", "megabytes", "seconds",
+        )  # fmt: skip
+        yield record | {name: getattr(one, name) for name in names}

@@ -1,0 +1,207 @@
+"""A patch of surface: heights on a regular grid, in µm."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import DiffractionError
+from .lengths import LONGEST_HEIGHT, PixelSize, pixel_size_of
+
+FloatArray = npt.NDArray[np.float64]
+
+# 11585² pixels, 1 GiB of heights: beyond it no table could be built in the memory of a workstation.
+MAX_PIXELS = 2**27
+
+
+@dataclass(frozen=True, init=False, eq=False, repr=False)
+class HeightField:
+    """Heights of one patch, which tiles the plane.
+
+    Parameters
+    ----------
+    heights
+        Heights in µm, shape (ny, nx), at least 2 × 2, finite. `heights[iy, ix]` lies at
+        x = ix·dx, y = iy·dy. They are copied, and read-only afterwards.
+    pixel_size
+        µm, one number for square pixels or a pair (dx, dy); "0.05" and "0.05, 0.1" also work.
+    name
+        What to call the patch in messages, for instance its file.
+    history
+        One line per treatment that the heights have had (levelling, filling, ...), oldest first.
+    cut_out
+        The patch is a part of a larger surface, as a file's or a cropped one: opposite edges need
+        not meet, and `validity` says if they do not.
+
+    Raises
+    ------
+    DiffractionError
+        If the heights are not a two-dimensional array of finite real numbers, too small or too
+        large, or the pixel size is not one or two positive lengths.
+    """
+
+    heights: FloatArray
+    pixel_size: tuple[float, float]
+    name: str = field(default="height field", kw_only=True)
+    history: tuple[str, ...] = field(default=(), kw_only=True)
+    cut_out: bool = field(default=False, kw_only=True)
+
+    # Set by the package `heights`, since what they do builds on this class
+    load: ClassVar[Callable[..., HeightField]]  #: from a file: `load.load`
+    treated: ClassVar[Callable[..., HeightField]]  #: after treatments: `load.treated`
+    validity: ClassVar[Callable[..., list[str]]]  #: where the model ends: `validity.validity`
+
+    def __init__(
+        self,
+        heights: npt.ArrayLike,
+        pixel_size: PixelSize,
+        *,
+        name: str = "height field",
+        history: Iterable[str] = (),
+        cut_out: bool = False,
+    ) -> None:
+        size = pixel_size_of(pixel_size, f"{name}: pixel_size")
+        if size is None:
+            raise DiffractionError(
+                f"{name}: pixel_size is missing; give the distance between samples in µm, "
+                "one number or (dx, dy)"
+            )
+        object.__setattr__(self, "heights", _checked_heights(heights, name))
+        object.__setattr__(self, "pixel_size", size)
+        object.__setattr__(self, "name", " ".join(str(name).split()))
+        object.__setattr__(self, "history", tuple(history))
+        object.__setattr__(self, "cut_out", bool(cut_out))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Number of samples (ny, nx)."""
+        ny, nx = self.heights.shape
+        return ny, nx
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Size of the patch (Lx, Ly) in µm, the period with which it tiles the plane."""
+        ny, nx = self.shape
+        dx, dy = self.pixel_size
+        return nx * dx, ny * dy
+
+    @cached_property
+    def range(self) -> float:
+        """Highest minus lowest point, µm."""
+        return float(self.heights.max() - self.heights.min())
+
+    @cached_property
+    def rms_height(self) -> float:
+        """Root-mean-square deviation from the mean height, µm."""
+        return float(self.heights.std())
+
+    @cached_property
+    def rms_slope(self) -> float:
+        """Root-mean-square of |∇h|, dimensionless, from differences of neighbours in the patch.
+
+        The seams between tiles are left out: their steps are not part of the surface.
+        """
+        dx, dy = self.pixel_size
+        return math.sqrt(
+            _mean_square(np.diff(self.heights, axis=1)) / dx**2
+            + _mean_square(np.diff(self.heights, axis=0)) / dy**2
+        )
+
+    @cached_property
+    def _digest(self) -> str:
+        content = hashlib.sha256(repr((self.shape, self.pixel_size)).encode())
+        content.update(np.ascontiguousarray(self.heights, dtype="<f8").data)
+        return content.hexdigest()
+
+    def digest(self) -> str:
+        """SHA-256 of the heights and the pixel size, in hexadecimal: equal for equal content."""
+        return self._digest
+
+    def summary(self) -> dict[str, Any]:
+        """What the patch is, as plain numbers and strings; lengths in µm."""
+        return {
+            "name": self.name,
+            "shape": list(self.shape),
+            "pixel_size": list(self.pixel_size),
+            "extent": list(self.extent),
+            "range": self.range,
+            "rms_height": self.rms_height,
+            "rms_slope": self.rms_slope,
+            "history": list(self.history),
+        }
+
+    def __repr__(self) -> str:
+        ny, nx = self.shape
+        dx, dy = self.pixel_size
+        return (
+            f"HeightField({self.name!r}, {nx} x {ny} pixels of {dx:.4g} x {dy:.4g} µm, "
+            f"range {self.range:.4g} µm, RMS height {self.rms_height:.4g} µm, "
+            f"RMS slope {self.rms_slope:.3g})"
+        )
+
+
+def check_pixel_count(ny: int, nx: int, name: str) -> None:
+    """Refuse a shape before memory is spent on it: too small to be a surface, or too large."""
+    if ny < 2 or nx < 2:
+        raise DiffractionError(
+            f"{name}: {nx} x {ny} pixels are no patch of surface; at least 2 x 2 are needed"
+        )
+    if ny * nx > MAX_PIXELS:
+        raise DiffractionError(
+            f"{name}: {nx} x {ny} pixels are more than the {MAX_PIXELS} supported "
+            f"(about {math.isqrt(MAX_PIXELS)}²); crop the file or use coarser pixels"
+        )
+
+
+def _checked_heights(heights: npt.ArrayLike, name: str) -> FloatArray:
+    """Check and copy to a read-only C-ordered float64 array; one that is all this is not copied."""
+    if np.ma.isMaskedArray(heights) and np.ma.is_masked(heights):
+        raise DiffractionError(f"{name}: heights have masked points; fill them first")
+    try:
+        array = np.asarray(heights)
+    except ValueError as error:  # rows of different lengths
+        raise DiffractionError(f"{name}: heights are not an array (ny, nx) of numbers") from error
+    if array.dtype.kind not in "fiu":
+        raise DiffractionError(
+            f"{name}: heights are {array.dtype.name}, expected real numbers in µm"
+        )
+    if array.ndim != 2:
+        raise DiffractionError(
+            f"{name}: heights have shape {array.shape}, expected two dimensions (ny, nx)"
+        )
+    ny, nx = array.shape
+    check_pixel_count(ny, nx, name)
+    owned = array is heights and array.base is None and not array.flags.writeable
+    if not (owned and array.dtype == np.float64 and array.flags.c_contiguous):
+        array = np.array(array, dtype=np.float64, order="C")
+        array.setflags(write=False)
+    low, high = float(array.min()), float(array.max())  # NaN if any height is
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise DiffractionError(f"{name}: {_describe_missing(array)}")
+    if max(abs(low), abs(high)) > LONGEST_HEIGHT:
+        raise DiffractionError(
+            f"{name}: heights reach {max(abs(low), abs(high)):.3g} µm, at most "
+            f"{LONGEST_HEIGHT:g} is supported; heights are in µm"
+        )
+    return array
+
+
+def _describe_missing(array: FloatArray) -> str:
+    if not np.isfinite(array).any():
+        return "no height is a finite number; the patch is empty"
+    return (
+        f"{np.count_nonzero(np.isnan(array))} of {array.size} heights are NaN and "
+        f"{np.count_nonzero(np.isinf(array))} infinite; fill or crop them"
+    )
+
+
+def _mean_square(values: FloatArray) -> float:
+    flat = values.ravel()
+    return float(np.dot(flat, flat)) / flat.size

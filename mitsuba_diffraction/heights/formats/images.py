@@ -1,0 +1,172 @@
+"""Grey images of heights: PNG, BMP and TIFF through Pillow, EXR through OpenEXR."""
+
+from __future__ import annotations
+
+import struct
+import warnings
+import zlib
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import OpenEXR
+from PIL import Image, UnidentifiedImageError
+
+from ...errors import DiffractionError
+from ..field import check_pixel_count
+from .native import Messages, native_messages
+from .raw import RawHeights, first_line
+
+# Full scale of Pillow's integer modes, and how people call the colour ones.
+_FULL_SCALE = {"1": 1, "L": 255, "I;16": 65535, "I;16L": 65535, "I;16B": 65535, "I;16N": 65535}
+_COLOUR = {
+    "P": "palette colours", "PA": "palette colours", "LA": "a transparency channel",
+    "La": "a transparency channel", "RGB": "colours (RGB)", "RGBA": "colours (RGBA)",
+    "RGBa": "colours (RGBA)", "RGBX": "colours (RGB)", "CMYK": "colours (CMYK)",
+    "YCbCr": "colours (YCbCr)", "LAB": "colours (Lab)", "HSV": "colours (HSV)",
+}  # fmt: skip
+
+# What Pillow's decoders raise on damaged files, found by feeding them random bytes.
+_DAMAGED = (
+    OSError, ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, EOFError,
+    OverflowError, MemoryError, NotImplementedError, RuntimeError, ZeroDivisionError, struct.error,
+    zlib.error,
+)  # fmt: skip
+
+# Private TIFF tag with which Park Systems marks its files.
+_PARK_TAG = 50432
+
+
+def read_image(path: Path) -> RawHeights:
+    """Read a grey PNG, BMP or TIFF of 1, 8 or 16 bits (relative) or 32-bit float (µm).
+
+    Eight-bit colours are read where red, green and blue are alike and nothing is transparent.
+
+    The image's top row is the largest y, so rows are flipped.
+
+    Raises
+    ------
+    DiffractionError
+        If the file is not such an image, is damaged, has colours or several pages.
+    """
+    shown = repr(str(path))
+    printed = Messages()
+    try:
+        with warnings.catch_warnings(), native_messages() as printed:
+            # The size is checked below, against a limit of our own and before anything is decoded.
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            warnings.simplefilter("ignore", UserWarning)  # damaged TIFF tags: decoding decides
+            with Image.open(path, formats=("PNG", "BMP", "DIB", "TIFF")) as image:
+                return _heights_of(image, shown)
+    except DiffractionError:
+        raise
+    except UnidentifiedImageError as error:
+        raise DiffractionError(
+            f"{shown} is not a readable PNG, BMP or TIFF image; is it damaged or misnamed?"
+        ) from error
+    except Image.DecompressionBombError as error:
+        raise DiffractionError(f"{shown} is too large: {first_line(error)}") from error
+    except _DAMAGED as error:
+        reason = printed.last_reason() or first_line(error)
+        raise DiffractionError(f"{shown} is damaged or incomplete: {reason}") from error
+
+
+def is_park_tiff(path: Path) -> bool:
+    """Whether a TIFF is a Park Systems instrument file, a picture with heights in private tags."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            with Image.open(path, formats=("TIFF",)) as image:
+                return _PARK_TAG in image.tag_v2  # type: ignore[attr-defined]
+        except (*_DAMAGED, Image.DecompressionBombError):
+            return False  # reading it as an image will say what is wrong
+
+
+def _heights_of(image: Image.Image, shown: str) -> RawHeights:
+    check_pixel_count(image.height, image.width, shown)
+    mode = image.mode
+    if mode == "I" and image.format == "PNG":  # how Pillow before 10.3 calls 16-bit grey
+        mode = "I;16"
+    if getattr(image, "n_frames", 1) != 1:
+        raise DiffractionError(f"{shown} has {image.n_frames} pages; save the height image alone")  # type: ignore[attr-defined]
+    if mode in _COLOUR:
+        return RawHeights(_grey_levels(image, shown)[::-1] / np.float64(255), relative=True)
+    if mode == "F":
+        return RawHeights(np.asarray(image, dtype=np.float64)[::-1])
+    if mode not in _FULL_SCALE:
+        raise DiffractionError(
+            f"{shown} has pixels of an unsupported kind (mode {mode!r}); save it as 8- or 16-bit "
+            "greyscale, or as 32-bit float in µm"
+        )
+    values = np.asarray(image)[::-1] / np.float64(_FULL_SCALE[mode])
+    return RawHeights(values, relative=True)
+
+
+def _grey_levels(image: Image.Image, shown: str) -> npt.NDArray[np.uint8]:
+    """Levels of a picture that holds grey as colours, as screenshots do: red, green, blue alike."""
+    what = _COLOUR[image.mode]
+    deep = ";16" in repr(getattr(image, "tile", ""))  # Pillow keeps eight bits of them
+    colours = np.asarray(image.convert("RGBA"))
+    grey = colours[..., 0]
+    alike = np.array_equal(grey, colours[..., 1]) and np.array_equal(grey, colours[..., 2])
+    opaque = bool((colours[..., 3] == 255).all())
+    if alike and opaque and not deep:
+        return grey
+    why = (
+        "its red, green and blue differ, as in a false-colour picture"
+        if not alike
+        else "part of it is transparent"
+        if not opaque
+        else "of 16 bits each, of which 8 would be read"
+    )
+    raise DiffractionError(
+        f"{shown} has {what}, and heights are one grey channel: {why}; export the heights "
+        "themselves as 8- or 16-bit greyscale or as numbers, or, if it is grey but for a tint, "
+        "convert it, in Python: PIL.Image.open(...).convert('L').save('grey.png')"
+    )
+
+
+def read_exr(path: Path, channel: str | None = None) -> RawHeights:
+    """Read an EXR with one channel of heights in µm; the top row is the largest y.
+
+    `channel` names the channel to take where there are several.
+
+    Raises
+    ------
+    DiffractionError
+        If it is not an EXR, is damaged, has no pixels or several channels and no choice.
+    """
+    shown = repr(str(path))
+    printed = Messages()
+    try:
+        with native_messages() as printed:
+            header = OpenEXR.File(str(path), header_only=True).header()
+            low, high = header["dataWindow"]
+            check_pixel_count(int(high[1] - low[1] + 1), int(high[0] - low[0] + 1), shown)
+            names = [str(entry.name) for entry in header["channels"]]
+            chosen = _choose_channel(names, channel, shown)
+            with OpenEXR.File(str(path), separate_channels=True) as file:
+                pixels = file.channels()[chosen].pixels
+    except DiffractionError:
+        raise
+    # OpenEXR raises plain RuntimeError and ValueError; the others come of headers that lie
+    except (RuntimeError, ValueError, OSError, KeyError, IndexError, TypeError, MemoryError) as e:
+        reason = printed.last_reason() or first_line(e)
+        raise DiffractionError(f"{shown} is not a readable EXR image: {reason}") from e
+    if pixels is None or pixels.ndim != 2:
+        raise DiffractionError(f"{shown}: channel {chosen!r} has no two-dimensional pixels")
+    return RawHeights(np.asarray(pixels, dtype=np.float64)[::-1])
+
+
+def _choose_channel(names: list[str], channel: str | None, shown: str) -> str:
+    listed = ", ".join(repr(name) for name in names[:8]) + (", ..." if len(names) > 8 else "")
+    if channel is not None:
+        if channel not in names:
+            raise DiffractionError(f"{shown}: channel {channel!r} is not one of {listed}")
+        return channel
+    if len(names) != 1:
+        raise DiffractionError(
+            f"{shown} has {len(names)} channels ({listed}); heights are one channel: name it with "
+            "channel (a table of diffraction goes where a table is asked for)"
+        )
+    return names[0]

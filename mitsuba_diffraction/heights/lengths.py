@@ -1,0 +1,122 @@
+"""Lengths that users give, as numbers or as the strings of XML files and command lines, in µm."""
+
+from __future__ import annotations
+
+import math
+import numbers
+import re
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..errors import DiffractionError, quoted
+
+# A pixel below the size of an atom or a height above 10 mm is a mistake of units, not a sample.
+SHORTEST_PIXEL = 1e-5
+LONGEST_PIXEL = 1e3
+LONGEST_HEIGHT = 1e4
+
+PixelSize = float | str | Iterable[float]
+Crop = PixelSize
+Height = float | str
+
+
+def pixel_size_of(value: PixelSize | None, where: str = "pixel_size") -> tuple[float, float] | None:
+    """Pixel size (dx, dy) in µm from a number, a pair, "0.05", "0.05, 0.1", or "auto".
+
+    `None` and "auto" give `None`: the file has to know.
+
+    Raises
+    ------
+    DiffractionError
+        If it is none of these; `where` names the parameter.
+    """
+    if is_auto(value):
+        return None
+    expected = (
+        f"{where}: expected one length or a pair (dx, dy) in µm, each from {SHORTEST_PIXEL:g} "
+        f"to {LONGEST_PIXEL:g}, or 'auto'"
+    )
+    numbers_ = _numbers_of(value)
+    if numbers_ is None or len(numbers_) not in (1, 2):
+        raise DiffractionError(f"{expected}; got {quoted(value)}")
+    for number in numbers_:
+        if not SHORTEST_PIXEL <= number <= LONGEST_PIXEL:  # also refuses NaN
+            raise DiffractionError(f"{expected}; got {quoted(value)}")
+    return numbers_[0], numbers_[-1]
+
+
+def height_of(value: Height | None, where: str = "max_height") -> float | None:
+    """Height in µm, above 0, from a number or a numeric string; `None` and "auto" give `None`.
+
+    Raises
+    ------
+    DiffractionError
+        If it is no such height; `where` names the parameter.
+    """
+    if is_auto(value):
+        return None
+    numbers_ = _numbers_of(value)
+    if numbers_ is None or len(numbers_) != 1 or not 0 < numbers_[0] <= LONGEST_HEIGHT:
+        raise DiffractionError(
+            f"{where}: expected a height in µm above 0, at most {LONGEST_HEIGHT:g}, or 'auto'; "
+            f"got {quoted(value)}"
+        )
+    return numbers_[0]
+
+
+def crop_of(value: Crop | None, where: str = "crop") -> tuple[float, float] | None:
+    """Size (width, height) in µm from a number, a pair, "20" or "20, 10".
+
+    `None` and "none" give `None`: all of the patch.
+
+    Raises
+    ------
+    DiffractionError
+        If it is none of these; `where` names the parameter.
+    """
+    if value is None or (isinstance(value, str) and value.strip() == "none"):
+        return None
+    numbers_ = _numbers_of(value)
+    if numbers_ is None or len(numbers_) not in (1, 2) or min(numbers_) <= 0:
+        raise DiffractionError(
+            f"{where}: expected a width or a pair (width, height) in µm, above 0, or 'none'; "
+            f"got {quoted(value)}"
+        )
+    return numbers_[0], numbers_[-1]
+
+
+def is_auto(value: object) -> bool:
+    """Whether a value is left to the file."""
+    return value is None or (isinstance(value, str) and value.strip().lower() == "auto")
+
+
+def _numbers_of(value: object) -> tuple[float, ...] | None:
+    """Plain floats of a number, a numeric string or a short sequence; `None` if it is neither."""
+    parts: list[object]
+    if isinstance(value, str):
+        parts = [part for part in re.split(r"[,\s]+", value.strip()) if part]
+    elif isinstance(value, (bool, np.bool_)):
+        return None
+    elif isinstance(value, numbers.Real):
+        parts = [value]
+    elif isinstance(value, np.ndarray):
+        parts = list(value.ravel()[:3])
+    elif isinstance(value, (tuple, list)):
+        parts = list(value[:3])
+    else:
+        return None
+    result = []
+    for part in parts:
+        if isinstance(part, (bool, np.bool_)) or not isinstance(part, (str, numbers.Real)):
+            return None
+        if isinstance(part, str) and isinstance(value, (tuple, list)):
+            return None
+        try:
+            number = float(part)
+        except (ValueError, OverflowError):
+            return None
+        if not math.isfinite(number):
+            return None
+        result.append(number)
+    return tuple(result)

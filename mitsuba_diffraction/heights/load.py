@@ -1,0 +1,103 @@
+"""Height fields from any file that holds heights, and after treatments."""
+
+from __future__ import annotations
+
+import os
+
+from .field import HeightField
+from .formats.raw import existing_file
+from .lengths import Crop, Height, PixelSize
+from .options import LoadOptions
+from .read import kind_of, read_heights, treat
+from .recipes import Recipe
+
+
+def load(
+    path: str | os.PathLike[str],
+    *,
+    pixel_size: PixelSize | None = None,
+    max_height: Height | None = None,
+    channel: str | int | None = None,
+    crop: Crop | None = None,
+    fill: str | None = None,
+    level: str | None = None,
+    clip: float | str | None = None,
+    periodic: str | None = None,
+) -> HeightField:
+    """Read a height field from an image, an array, text, an instrument file or a recipe.
+
+    Parameters
+    ----------
+    path
+        PNG, BMP or TIFF (grey, 8 or 16 bits, or 32-bit float in µm), EXR (one channel, µm),
+        NPY (µm), TXT or CSV (a grid of heights in µm), TOML (a recipe), or an instrument
+        file, which needs the extra `afm`.
+    pixel_size
+        µm, where the file does not say; one number, a pair (dx, dy), or a string of either.
+        `None` and "auto" leave it to the file.
+    max_height
+        Full scale of an integer image in µm: black is 0, white is `max_height`. `None` and
+        "auto" leave it to the file.
+    channel
+        Name or index of the channel of an instrument file (name for an EXR); by default the
+        one that holds heights.
+    crop
+        Keep the middle of the patch only, so wide in µm: one number for a square, a pair
+        (width, height), or a string of either.
+    fill
+        What becomes of points without data: "nearest" or "harmonic" (see `missing`); by
+        default they are refused.
+    level
+        "plane" subtracts the best plane, "lines" aligns the scan lines first; default "none".
+    clip
+        Cut heights off beyond this many robust standard deviations; default not at all.
+    periodic
+        "smooth" or "taper" make the patch fit itself at the seams; default "none". The
+        treatments are applied in the order crop, fill, level, clip, periodic, and each leaves a
+        line in `history`.
+
+    Raises
+    ------
+    DiffractionError
+        If the file cannot be read as heights, a length is missing or contradicts the file, or
+        an option does not fit.
+    """
+    options = LoadOptions.of(
+        pixel_size=pixel_size,
+        max_height=max_height,
+        channel=channel,
+        crop=crop,
+        fill=fill,
+        level=level,
+        clip=clip,
+        periodic=periodic,
+    )
+    return load_heights(path, options)
+
+
+def load_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightField:
+    """Read and treat a height field; parameters and errors as in `load`."""
+    file = existing_file(path)
+    if kind_of(file) == "recipe":
+        return Recipe.load(file).field(options)
+    return read_heights(file, options)
+
+
+def treated(
+    field: HeightField,
+    *,
+    crop: Crop | None = None,
+    level: str | None = None,
+    clip: float | str | None = None,
+    periodic: str | None = None,
+) -> HeightField:
+    """The same patch after treatments of its heights; parameters and order as in `load`.
+
+    Points without data are filled while loading, since a HeightField has none.
+
+    Raises
+    ------
+    DiffractionError
+        If an option does not fit, or `clip` finds nothing to measure outliers by.
+    """
+    return treat(field, LoadOptions.of(crop=crop, level=level, clip=clip, periodic=periodic))

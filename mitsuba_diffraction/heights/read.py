@@ -1,0 +1,178 @@
+"""From any file that holds heights to a HeightField: which reader, which units, which treatment."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import DiffractionError
+from .field import HeightField
+from .formats.afm import read_instrument
+from .formats.arrays import read_npy
+from .formats.images import is_park_tiff, read_exr, read_image
+from .formats.raw import RawHeights, existing_file
+from .formats.text import read_text
+from .options import LoadOptions
+from .preprocess.cropping import crop, crop_line, middle
+from .preprocess.edges import plane_rise
+from .preprocess.levelling import clip_outliers, level_lines, level_plane
+from .preprocess.missing import fill_missing
+from .preprocess.periodic import periodic_smooth, periodic_taper
+
+# What files begin with. Content decides before the suffix does, so a misnamed file still loads.
+_MAGIC = (
+    (b"\x89PNG\r\n\x1a\n", "image"),
+    (b"II*\0", "tiff"),
+    (b"MM\0*", "tiff"),
+    (b"\x76\x2f\x31\x01", "exr"),
+    (b"\x93NUMPY", "npy"),
+    (b"\xff\xd8\xff", "jpeg"),
+)
+_SUFFIX = {
+    ".png": "image", ".bmp": "image", ".tif": "image", ".tiff": "image", ".exr": "exr",
+    ".npy": "npy", ".txt": "text", ".csv": "text", ".tsv": "text", ".xyz": "text",
+    ".toml": "recipe",
+}  # fmt: skip
+
+# A file that states its pixel size wins over a parameter by no more than printing rounds it.
+_SAME_SIZE = 1e-3
+
+
+def read_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightField:
+    """Read and treat the heights of a file; parameters and errors as in `HeightField.load`."""
+    file = existing_file(path)
+    raw, measured = _read(file, options.channel)
+    field = _settle(raw, file, options)
+    if measured and options.level in (None, "none"):
+        field = _noting_tilt(field)
+    return treat(field, replace(options, crop=None))  # cropped before gaps were filled
+
+
+def is_recipe(path: str | os.PathLike[str]) -> bool:
+    """Whether a path names a recipe: by its suffix, .toml."""
+    return Path(path).suffix.lower() == ".toml"
+
+
+def kind_of(file: Path) -> str:
+    """What a file holds, by its content, else its suffix: "recipe" or a reader's name."""
+    with file.open("rb") as stream:
+        head = stream.read(8)
+    for magic, kind in _MAGIC:
+        if head.startswith(magic):
+            return ("instrument" if is_park_tiff(file) else "image") if kind == "tiff" else kind
+    if is_recipe(file):
+        return "recipe"
+    return _SUFFIX.get(file.suffix.lower(), "instrument")
+
+
+def _read(file: Path, channel: str | int | None) -> tuple[RawHeights, bool]:
+    """Heights of a file, and whether an instrument wrote it."""
+    kind = kind_of(file)
+    if kind == "jpeg":
+        raise DiffractionError(
+            f"{str(file)!r} is a JPEG, whose compression changes heights; export PNG or TIFF "
+            "(8- or 16-bit grey) or numbers instead"
+        )
+    if kind == "instrument":
+        return read_instrument(file, channel), True
+    if kind == "exr":
+        return read_exr(file, None if channel is None else str(channel)), False
+    if channel is not None:
+        raise DiffractionError(
+            f"{str(file)!r} has no channels to choose from; leave channel {channel!r} out"
+        )
+    reader = {"image": read_image, "npy": read_npy, "text": read_text}[kind]
+    return reader(file), False
+
+
+def _settle(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
+    """Combine what the file says with what the user says, and refuse gaps and contradictions."""
+    shown = repr(str(file))
+    max_height, pixel_size = options.max_height, options.pixel_size
+    values = raw.values
+    if raw.relative:
+        if max_height is None:
+            raise _missing_lengths(shown, True, pixel_size is None and raw.pixel_size is None)
+        values = values * np.float64(max_height)
+    elif max_height is not None:
+        raise DiffractionError(
+            f"{shown} holds heights in µm; max_height {max_height:g} contradicts it: leave it out"
+        )
+    if pixel_size is None:
+        pixel_size = raw.pixel_size
+    elif raw.pixel_size is not None and not np.allclose(
+        pixel_size, raw.pixel_size, rtol=_SAME_SIZE, atol=0
+    ):
+        raise DiffractionError(
+            f"{shown} states pixels of {raw.pixel_size[0]:.6g} x {raw.pixel_size[1]:.6g} µm; "
+            f"pixel_size {pixel_size[0]:g}, {pixel_size[1]:g} contradicts it: leave it out"
+        )
+    if pixel_size is None:
+        raise _missing_lengths(shown, False, True)
+    notes = raw.notes
+    if options.crop is not None:
+        before = (values.shape[0], values.shape[1])
+        values = values[middle(before, pixel_size, options.crop, shown)]
+        if values.shape != before:
+            after = (values.shape[0], values.shape[1])
+            notes = (*notes, crop_line(before, after, pixel_size))
+    heights = np.ascontiguousarray(values, dtype=np.float64)
+    method = None if options.fill == "none" else options.fill
+    heights, note = fill_missing(heights, method, shown)
+    if heights.base is None and heights is not raw.values:
+        heights.setflags(write=False)  # ours alone: HeightField need not copy it
+    history = (*notes, note) if note else notes
+    return HeightField(heights, pixel_size, name=file.name, history=history, cut_out=True)
+
+
+def _missing_lengths(shown: str, height: bool, pixel: bool) -> DiffractionError:
+    """What to say of an image that lacks the height of white, or of heights without pixel size."""
+    lacks, names, options, parameters = [], [], [], []
+    if height:
+        lacks.append("how high white is")
+        names.append("max_height")
+        options.append("--max-height 0.375")
+        parameters.append("-D max_height=0.375")
+    if pixel:
+        lacks.append("how large a pixel is")
+        names.append("pixel_size")
+        options.append("--pixel-size 0.05")
+        parameters.append("-D pixel_size=0.05")
+    what = " is an image of grey levels and" if height else ""
+    return DiffractionError(
+        f"{shown}{what} does not say {' nor '.join(lacks)}; give {' and '.join(names)} in µm, for "
+        f"instance {' '.join(options)} (for a scene that has them as parameters, "
+        f"{' '.join(parameters)})"
+    )
+
+
+def treat(field: HeightField, options: LoadOptions) -> HeightField:
+    """Crop, level, clip and make periodic: dust stands out from a level surface only."""
+    if options.crop is not None:
+        field, _ = crop(field, options.crop)
+    if options.level == "plane":
+        field, _ = level_plane(field)
+    elif options.level == "lines":
+        field, _ = level_lines(field)
+    if options.clip is not None:
+        field, _ = clip_outliers(field, options.clip)
+    if options.periodic == "smooth":
+        field, _ = periodic_smooth(field)
+    elif options.periodic == "taper":
+        field, _ = periodic_taper(field)
+    return field
+
+
+def _noting_tilt(field: HeightField) -> HeightField:
+    """Say in the history how tilted a scan is that was not levelled: seams repeat the tilt."""
+    line = f"not levelled: the best plane rises {plane_rise(field):.3g} µm across the patch"
+    return HeightField(
+        field.heights,
+        field.pixel_size,
+        name=field.name,
+        history=(*field.history, line),
+        cut_out=field.cut_out,
+    )

@@ -1,0 +1,264 @@
+"""Recipes: TOML files that say where heights come from and how their table is built.
+
+    source = "../scans/elaphe.png"      # or generator = "blazed" with [arguments]
+    pixel_size = 0.0488                 # µm, where the source does not say; or [dx, dy]
+    max_height = 0.375                  # µm, white of an image
+    level = "plane"                     # and channel, crop, ... as in HeightField.load
+    tolerance = 1e-3                    # and other parameters of DiffractionTable.build
+    output = "tables/elaphe.exr"
+
+Several patches of one surface, whose powers one table averages, are a list of sources, or
+`seeds = [1, 2, 3]` for a generator. Paths are relative to the recipe.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import os
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from ..errors import DiffractionError
+from . import gratings
+from .field import HeightField
+from .formats.raw import existing_file, first_line
+from .options import LoadOptions
+from .read import is_recipe, read_heights, treat
+
+TABLE_KEYS = ("coherence_width", "coherence", "basis", "tolerance", "terms", "wavelength_range")
+LOAD_KEYS = tuple(option.name for option in fields(LoadOptions))
+_OWN_KEYS = ("source", "generator", "arguments", "seeds", "output")
+_KEYS = (*_OWN_KEYS, *LOAD_KEYS, *TABLE_KEYS)
+# What makes no sense for heights that are computed.
+_SOURCE_ONLY = ("pixel_size", "max_height", "channel", "fill")
+
+# Recipes are a few lines; a file beyond this is something else with the suffix .toml.
+_LARGEST_RECIPE = 1_000_000
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """One recipe, checked.
+
+    Attributes
+    ----------
+    path
+        The recipe's own file.
+    sources
+        Files of heights; empty if a generator makes them.
+    generator
+        Name of a function of `mitsuba_diffraction.heights.gratings`, or `None`.
+    arguments
+        Its keyword arguments, one mapping per patch.
+    options
+        How sources are read and all patches treated.
+    table
+        Parameters of `DiffractionTable.build`, those that the recipe sets.
+    output
+        Where the table goes; by default the recipe's name with .exr in the current folder.
+    """
+
+    path: Path
+    sources: tuple[Path, ...]
+    generator: str | None
+    arguments: tuple[Mapping[str, Any], ...]
+    options: LoadOptions
+    table: Mapping[str, Any]
+    output: Path
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Recipe:
+        """Read and check a recipe; heights are not read or made yet.
+
+        Raises
+        ------
+        DiffractionError
+            If the file cannot be read, is no TOML, has a key that is unknown, of the wrong type or
+            contradicted by another, or names a generator that does not exist.
+        """
+        file = existing_file(path)
+        shown = repr(str(file))
+        content = _parse(file, shown)
+        for key in content:
+            if key not in _KEYS:
+                near = difflib.get_close_matches(key, _KEYS, 1)
+                hint = f"did you mean {near[0]}? " if near else ""
+                raise DiffractionError(
+                    f"{shown}: unknown key {key!r}; {hint}Known are {', '.join(_KEYS)}"
+                )
+        if ("source" in content) == ("generator" in content):
+            raise DiffractionError(
+                f"{shown} needs either source, a file, or generator, one of "
+                f"{', '.join(gratings.__all__)}"
+            )
+        try:
+            options = LoadOptions.of(**{key: content[key] for key in LOAD_KEYS if key in content})
+        except DiffractionError as error:
+            raise DiffractionError(f"{shown}: {error}") from error
+        sources: tuple[Path, ...] = ()
+        arguments: tuple[Mapping[str, Any], ...] = ()
+        if "source" in content:
+            sources = _sources(content, file, shown)
+        else:
+            arguments = _arguments(content, shown)
+        return cls(
+            path=file,
+            sources=sources,
+            generator=content.get("generator"),
+            arguments=arguments,
+            options=options,
+            table=_table(content, shown),
+            output=_output(content, file, shown),
+        )
+
+    def fields(self, options: LoadOptions | None = None) -> list[HeightField]:
+        """All patches of the recipe; `options` take precedence over the recipe's own.
+
+        Raises
+        ------
+        DiffractionError
+            If a source cannot be read, or the generator refuses an argument.
+        """
+        given = options or LoadOptions()
+        if self.generator is None:
+            return [read_heights(file, self.options.updated(given)) for file in self.sources]
+        for key in _SOURCE_ONLY:
+            if getattr(given, key) is not None:
+                raise DiffractionError(
+                    f"{str(self.path)!r} makes its heights with {self.generator!r}; {key} "
+                    "contradicts it: change the recipe's [arguments] instead"
+                )
+        make: Callable[..., HeightField] = getattr(gratings, self.generator)
+        treatment = self.options.updated(given)
+        return [treat(self._made(make, arguments), treatment) for arguments in self.arguments]
+
+    def field(self, options: LoadOptions | None = None) -> HeightField:
+        """The only patch of the recipe.
+
+        Raises
+        ------
+        DiffractionError
+            As `fields`, and if the recipe has several patches.
+        """
+        count = len(self.sources) or len(self.arguments)
+        if count > 1:
+            raise DiffractionError(
+                f"{str(self.path)!r} describes {count} patches, where one is needed; precompute "
+                "its table and use that"
+            )
+        return self.fields(options)[0]
+
+    def table_arguments(self) -> dict[str, Any]:
+        """Keyword arguments for `DiffractionTable.build`: those that the recipe sets."""
+        return dict(self.table)
+
+    def _made(self, make: Callable[..., HeightField], arguments: Mapping[str, Any]) -> HeightField:
+        try:
+            return make(**arguments)
+        except DiffractionError as error:
+            raise DiffractionError(f"{str(self.path)!r}: [arguments]: {error}") from error
+
+
+def _parse(file: Path, shown: str) -> dict[str, Any]:
+    try:
+        if file.stat().st_size > _LARGEST_RECIPE:
+            raise DiffractionError(f"{shown} is too large for a recipe; is it one?")
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except UnicodeDecodeError as error:
+        raise DiffractionError(f"{shown} is not a recipe: it is not text (UTF-8)") from error
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise DiffractionError(f"{shown} is not a recipe (TOML): {first_line(error)}") from error
+    except OSError as error:
+        raise DiffractionError(f"cannot read {shown}: {error.strerror}") from error
+
+
+def _sources(content: Mapping[str, Any], file: Path, shown: str) -> tuple[Path, ...]:
+    for key in ("arguments", "seeds"):
+        if key in content:
+            raise DiffractionError(f"{shown}: {key} belongs to a generator, and source is a file")
+    source = content["source"]
+    names = source if isinstance(source, list) else [source]
+    if not names or not all(isinstance(name, str) and name for name in names):
+        raise DiffractionError(
+            f"{shown}: source: expected a path, or a list of paths, got {source!r}"
+        )
+    for name in names:
+        if is_recipe(name):
+            raise DiffractionError(
+                f"{shown}: source: {name!r} is a recipe itself; name the file of heights"
+            )
+    return tuple(file.parent / name for name in names)
+
+
+def _arguments(content: Mapping[str, Any], shown: str) -> tuple[Mapping[str, Any], ...]:
+    for key in _SOURCE_ONLY:
+        if key in content:
+            raise DiffractionError(
+                f"{shown}: {key} belongs to a source, and a generator makes these heights; use "
+                "its [arguments]"
+            )
+    name = content["generator"]
+    if not isinstance(name, str) or name not in gratings.__all__:
+        raise DiffractionError(
+            f"{shown}: generator: expected one of {', '.join(gratings.__all__)}, got {name!r}"
+        )
+    arguments = content.get("arguments", {})
+    if not isinstance(arguments, dict):
+        raise DiffractionError(f"{shown}: arguments: expected a table [arguments]")
+    parameters = inspect.signature(getattr(gratings, name)).parameters
+    for key in arguments:
+        if key not in parameters:
+            raise DiffractionError(
+                f"{shown}: [arguments]: {name!r} has no {key!r}; it has {', '.join(parameters)}"
+            )
+    for key, parameter in parameters.items():
+        if parameter.default is parameter.empty and key not in arguments:
+            raise DiffractionError(f"{shown}: [arguments]: {name!r} needs {key!r}")
+    if "seeds" not in content:
+        return (arguments,)
+    seeds = content["seeds"]
+    whole = isinstance(seeds, list) and all(type(s) is int and s >= 0 for s in seeds)
+    if not whole or not seeds or len(set(seeds)) < len(seeds):
+        raise DiffractionError(
+            f"{shown}: seeds: expected a list of different whole numbers, got {seeds!r}"
+        )
+    if "seed" not in parameters or "seed" in arguments:
+        why = "seed is given too" if "seed" in arguments else f"{name!r} takes no seed"
+        raise DiffractionError(f"{shown}: seeds: {why}; leave one out")
+    return tuple({**arguments, "seed": seed} for seed in seeds)
+
+
+def _table(content: Mapping[str, Any], shown: str) -> dict[str, Any]:
+    """Table parameters in the types that the builder takes; it checks their values."""
+    table = {key: content[key] for key in TABLE_KEYS if key in content}
+    kinds: dict[str, tuple[type, ...]] = {
+        "coherence_width": (int, float), "coherence": (str,), "basis": (str,),
+        "tolerance": (int, float), "terms": (int,), "wavelength_range": (list,),
+    }  # fmt: skip
+    for key, value in table.items():
+        if isinstance(value, bool) or not isinstance(value, kinds[key]):
+            expected = " or ".join(kind.__name__ for kind in kinds[key])
+            raise DiffractionError(f"{shown}: {key}: expected {expected}, got {value!r}")
+    if "wavelength_range" in table:
+        pair = table["wavelength_range"]
+        if len(pair) != 2 or not all(type(value) in (int, float) for value in pair):
+            raise DiffractionError(
+                f"{shown}: wavelength_range: expected [shortest, longest] in nm, got {pair!r}"
+            )
+        table["wavelength_range"] = tuple(pair)
+    return table
+
+
+def _output(content: Mapping[str, Any], file: Path, shown: str) -> Path:
+    if "output" not in content:
+        return Path(f"{file.stem}.exr")
+    output = content["output"]
+    if not isinstance(output, str) or Path(output).suffix.lower() != ".exr":
+        raise DiffractionError(
+            f"{shown}: output: expected a path that ends in .exr, got {output!r}"
+        )
+    return file.parent / output

@@ -1,0 +1,113 @@
+"""Where a patch leaves the model, or its own resolution."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from .field import HeightField
+from .preprocess.edges import edge_lines
+
+#: RMS slopes up to which the model's orders are within 5 % and 20 % of rigorous solutions, for
+#: sinusoids of a perfect conductor in light up to 45° from the normal: docs/validation.md has the
+#: rule, `validation.limits` the computation, of which these are rounded down.
+GENTLE_SLOPE = 0.1
+STEEP_SLOPE = 0.35
+
+#: Heights whose whole range is below a tenth of an atom's radius are usually metres taken for µm.
+SMALLEST_RANGE = 1e-5
+
+#: Steeper than any surface that is a height field, 84°: nanometres taken for µm.
+IMPOSSIBLE_SLOPE = 10.0
+#: Pixels in µm beyond which at most a tenth of the directions is known at 380 nm; scans have some
+#: nm to a few hundred.
+COARSEST_PIXEL = 2.0
+
+# A patch this much smaller than the coherence width is worth a warning.
+_SMALLER = 0.9
+
+#: Texts that tables keep in a cache are those of this version: raise it with any of them.
+TEXTS_VERSION = 1
+
+
+def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830.0)) -> list[str]:
+    """Say where a patch leaves the model or its own resolution; an empty list is fine.
+
+    Parameters
+    ----------
+    wavelength_range : shortest and longest wavelength, nm.
+
+    Returns
+    -------
+    One line per cause.
+    """
+    shortest = min(wavelength_range) / 1000  # µm
+    lines = []
+    if field.rms_slope > IMPOSSIBLE_SLOPE:
+        lines.append(
+            f"{field.name}: RMS slope {field.rms_slope:.2g} is no surface's: "
+            f"{units_question(field)}"
+        )
+    elif field.rms_slope > STEEP_SLOPE:
+        lines.append(
+            f"{field.name}: RMS slope {field.rms_slope:.2g} is above {STEEP_SLOPE:g}: scalar "
+            "Kirchhoff diffraction is off by more than 20 % on slopes this steep, and by up to "
+            "all of the light on steeper ones"
+        )
+    elif field.rms_slope > GENTLE_SLOPE:
+        lines.append(
+            f"{field.name}: RMS slope {field.rms_slope:.2g} is above {GENTLE_SLOPE:g}: beside "
+            "rigorous solutions, expect scalar Kirchhoff diffraction to be off by 5 to 20 % in "
+            "light up to 45° from the normal, and by more beyond"
+        )
+    coarse = max(field.pixel_size)
+    if coarse > shortest / 4:
+        # k |(u, v)| reaches 2k at grazing angles on both sides, the pixels π/dx
+        reach = shortest / (2 * coarse)
+        lines.append(
+            f"{field.name}: pixels of {coarse:.3g} µm are coarser than a quarter of the "
+            f"shortest wavelength, which is {shortest / 4:.3g} µm: nothing is known of directions "
+            f"with |sinθi + sinθo| above {reach:.2g} at {shortest * 1000:g} nm"
+            + (f"; {units_question(field)}" if coarse > COARSEST_PIXEL else "")
+        )
+    if 0 < field.range < SMALLEST_RANGE:
+        lines.append(
+            f"{field.name}: heights span only {field.range:.2g} µm, less than an atom: "
+            "are they in metres? Multiply them by 1e6"
+        )
+    if field.cut_out:
+        lines += edge_lines(field, shortest)
+    return lines
+
+
+def units_question(field: HeightField) -> str:
+    """Whether lengths are nanometres taken for µm, as a question; "" if nothing speaks for it."""
+    coarse = max(field.pixel_size)
+    if coarse > COARSEST_PIXEL:
+        return f"is the pixel size of {coarse:.4g} µm in nm? Then divide it by 1000"
+    if field.rms_slope > IMPOSSIBLE_SLOPE:
+        return (
+            f"are the heights, with a range of {field.range:.4g} µm, in nm? Then divide them (of "
+            "an image: max_height) by 1000"
+        )
+    return ""
+
+
+def window_line(field: HeightField, coherence_width: float) -> str:
+    """What to say of a patch that is smaller than the coherence window; "" of others."""
+    width, height = field.extent
+    if min(width, height) >= _SMALLER * coherence_width:
+        return ""
+    fitting = _two_digits(min(width, height))
+    return (
+        f"{field.name}: the patch of {width:.4g} × {height:.4g} µm is smaller than the coherence "
+        f"width of {coherence_width:g} µm: it is tiled, and its repetition shows as a grating of "
+        f"its own; if it is none, take coherence_width={fitting:g} (--coherence-width "
+        f"{fitting:g}) or a larger patch"
+    )
+
+
+def _two_digits(length: float) -> float:
+    """The largest number of two digits that is not above a length."""
+    unit = 10.0 ** (math.floor(math.log10(length)) - 1)
+    return float(f"{math.floor(length / unit * (1 + 1e-9)) * unit:.2g}")

@@ -1,0 +1,125 @@
+"""From spectra to colours, through colour-science: the one place of the project that does it.
+
+The observer is the CIE 1931 2° standard observer, the display sRGB (IEC 61966-2-1), and the eye is
+adapted to the illuminant, so that what reflects all wavelengths alike is white, (1, 1, 1), under
+each of them.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import DiffractionError
+
+#: CIE standard illuminant D65 (daylight), and E, equal energy at all wavelengths.
+ILLUMINANTS = ("D65", "E")
+
+#: Where the observer's tables begin and end, nm.
+SHORTEST, LONGEST = 360.0, 830.0
+
+_OBSERVER = "CIE 1931 2 Degree Standard Observer"
+
+
+def check_illuminant(illuminant: str) -> None:
+    """Raise a DiffractionError for an illuminant that is not one of `ILLUMINANTS`."""
+    if illuminant not in ILLUMINANTS:
+        raise DiffractionError(
+            f"illuminant='{illuminant}' is unknown; choose one of {', '.join(ILLUMINANTS)}"
+        )
+
+
+def response(wavelength: ArrayLike, illuminant: str = "D65") -> NDArray[np.float64]:
+    """What a reflectance of 1 adds to X, Y and Z per nanometre, shape (..., 3), 1/nm.
+
+    This is S(λ)·(x̄, ȳ, z̄)(λ) / ∫ S ȳ dλ: a reflectance of 1 at all wavelengths has Y = 1. The
+    tables, at 1 nm (the observer) and 5 nm (D65), are interpolated linearly, as CIE 15 asks for
+    D65; outside 360–830 nm the result is 0.
+
+    Parameters
+    ----------
+    wavelength : nm, any shape.
+    illuminant : one of `ILLUMINANTS`.
+    """
+    check_illuminant(illuminant)
+    nodes, values = _responses(illuminant)
+    lam = np.asarray(wavelength, np.float64)
+    return np.stack([np.interp(lam, nodes, v, left=0.0, right=0.0) for v in values.T], axis=-1)
+
+
+def daylight(wavelength: ArrayLike) -> NDArray[np.float64]:
+    """D65 of luminance 1 as renderers count: scaled so that ∫ S ȳ dλ = ∫ ȳ dλ, shape of λ (nm)."""
+    import colour
+
+    observer, light = colour.MSDS_CMFS[_OBSERVER], colour.SDS_ILLUMINANTS["D65"]
+    power = np.interp(observer.wavelengths, light.wavelengths, light.values)
+    luminous = observer.values[:, 1]
+    scale = luminous.sum() / (power @ luminous)
+    lam = np.asarray(wavelength, np.float64)
+    return np.asarray(scale * np.interp(lam, observer.wavelengths, power))
+
+
+def linear_srgb(xyz: NDArray[np.floating], illuminant: str = "D65") -> NDArray[np.floating]:
+    """Linear sRGB of X, Y, Z, shape (..., 3), in the precision of the input; white is (1, 1, 1).
+
+    Colours outside the display's gamut have negative components; they are kept.
+    """
+    check_illuminant(illuminant)
+    return xyz @ _matrix(illuminant).astype(xyz.dtype)
+
+
+def encode_srgb(linear: ArrayLike) -> NDArray[np.float64]:
+    """What a display is sent, 0 to 1: clipped, with the transfer curve of sRGB."""
+    import colour
+
+    return np.asarray(colour.cctf_encoding(np.clip(linear, 0.0, 1.0), function="sRGB"))
+
+
+def delta_e(
+    reference: ArrayLike, other: ArrayLike, *, exposure: float | None = None
+) -> NDArray[np.float64]:
+    """ΔE2000 between what a display shows of two pictures; NaN where there is next to no light.
+
+    Parameters
+    ----------
+    reference, other : linear sRGB, shape (..., 3).
+    exposure : factor on both; by default the one that makes the reference's 95th percentile of
+        Y white. Then both are clipped to what the display shows; pixels of the reference with Y
+        of at most 0.01 do not count.
+    """
+    import colour
+
+    first, second = (np.asarray(image, np.float64) for image in (reference, other))
+    to_xyz = np.linalg.inv(linear_srgb(np.eye(3)))
+    luminance = first @ to_xyz[:, 1]
+    if exposure is None:
+        white = np.percentile(luminance, 95.0)
+        exposure = 1.0 / white if white > 0.0 else 1.0
+    lab = [colour.XYZ_to_Lab(np.clip(exposure * a, 0.0, 1.0) @ to_xyz) for a in (first, second)]
+    difference = np.asarray(colour.delta_E(lab[0], lab[1], method="CIE 2000"))
+    return np.where(exposure * luminance > 0.01, difference, np.nan)
+
+
+@functools.cache
+def _responses(illuminant: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Wavelengths (n,) in nm and responses (n, 3) in 1/nm."""
+    import colour  # takes over a second: only where colours are wanted
+
+    observer = colour.MSDS_CMFS[_OBSERVER]
+    nodes = np.asarray(observer.wavelengths, np.float64)
+    # D65 ends at 780 nm; beyond, where the observer sees next to nothing, it is held constant
+    light = colour.SDS_ILLUMINANTS[illuminant]
+    power = np.interp(nodes, light.wavelengths, light.values)
+    values = power[:, None] * observer.values
+    return nodes, values / (values[:, 1].sum() * (nodes[1] - nodes[0]))
+
+
+@functools.cache
+def _matrix(illuminant: str) -> NDArray[np.float64]:
+    """M with rgb = xyz @ M, the adaptation from the illuminant to D65 included."""
+    import colour
+
+    white = colour.CCS_ILLUMINANTS[_OBSERVER][illuminant]
+    return np.asarray(colour.XYZ_to_sRGB(np.eye(3), white, apply_cctf_encoding=False))

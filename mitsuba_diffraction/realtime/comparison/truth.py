@@ -1,0 +1,146 @@
+"""The scene that a path tracer renders for comparison: the same surfaces, the shader's lights."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...optics.colour import daylight
+from ..glsl.camera import Camera
+from ..glsl.lights import Light
+
+
+def with_lights(scene: Any, camera: Camera, lights: Sequence[Light]) -> Any:
+    """The scene's shapes under these lights alone, once reflected.
+
+    Shapes that emit light are left out: their light is among `lights`.
+
+    Returns
+    -------
+    mi.Scene
+        With one sensor, whose film averages evenly over each pixel, as supersampling does.
+    """
+    import mitsuba as mi
+
+    parts: dict[str, Any] = {
+        "type": "scene",
+        # lights without extent are never hit: no samples for that
+        "integrator": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0},
+        "sensor": box_sensor(camera),
+    }
+    for number, shape in enumerate(scene.shapes()):
+        if not shape.is_emitter():
+            parts[f"shape_{number}"] = shape
+    for number, light in enumerate(lights):
+        parts[f"light_{number}"] = _emitter(light)
+    return mi.load_dict(parts)
+
+
+def box_sensor(camera: Camera) -> Any:
+    """A sensor for this camera, whose film averages evenly over each pixel."""
+    import mitsuba as mi
+
+    width, height = camera.size
+    return mi.load_dict(
+        {
+            "type": "perspective",
+            "to_world": mi.ScalarTransform4f(camera.to_world),
+            "fov": camera.fov,
+            "fov_axis": "x",
+            "principal_point_offset_x": camera.offset[0],
+            "principal_point_offset_y": camera.offset[1],
+            "sampler": {"type": "independent"},
+            "film": {
+                "type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb",
+                "component_format": "float32", "rfilter": {"type": "box"},
+            },
+        }
+    )  # fmt: skip
+
+
+def _emitter(light: Light) -> dict[str, Any]:
+    place = np.asarray(light.place, float)
+    if place[3] == 0.0:
+        towards = [-float(x) for x in place[:3]]
+        return {"type": "directional", "direction": towards, "irradiance": _spectrum(light)}
+    position = [float(x) for x in place[:3]]
+    return {"type": "point", "position": position, "intensity": _spectrum(light)}
+
+
+def _spectrum(light: Light) -> dict[str, Any]:
+    import mitsuba as mi
+
+    if not mi.is_spectral:
+        return {"type": "rgb", "value": [float(c) for c in light.colour]}
+    values = light.spectrum * daylight(light.wavelengths)
+    return {
+        "type": "irregular",
+        "wavelengths": ", ".join(f"{x:.9g}" for x in light.wavelengths),
+        "values": ", ".join(f"{x:.9g}" for x in values),
+    }
+
+
+def seen(scene: Any, lights: Sequence[Light], samples: int = 4) -> dict[str, NDArray[Any]]:
+    """What each pixel of a scene of `with_lights` sees, by rays through a grid in the pixel.
+
+    Parameters
+    ----------
+    samples : rays along either side of a pixel.
+
+    Returns
+    -------
+    shape : (height, width) index among the scene's shapes, −1 where there is nothing, and −2 where
+        rays differ.
+    lit : (height, width) whether all rays find every light that is above the surface, and one is.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    sensor = scene.sensors()[0]
+    width, height = (int(n) for n in sensor.film().size())
+    shapes = scene.shapes_dr()
+    first: NDArray[np.int64] | None = None
+    same = np.ones((height, width), bool)
+    lit = np.ones((height, width), bool)
+    y, x = np.mgrid[:height, :width]
+    for j in range(samples):
+        for i in range(samples):
+            place = [(x + (i + 0.5) / samples) / width, (y + (j + 0.5) / samples) / height]
+            ray, _ = sensor.sample_ray(
+                0.0, 0.5,
+                mi.Point2f(*(mi.Float(p.ravel().astype(np.float32)) for p in place)),
+                mi.Point2f(0.5),
+            )  # fmt: skip
+            si = scene.ray_intersect(ray)
+            index = mi.Int32(-1)
+            for number in range(len(shapes)):
+                index = dr.select(si.shape == shapes[number], number, index)
+            index = dr.select(si.is_valid(), index, -1)
+            found = np.array(index, np.int64).reshape(height, width)
+            first = found if first is None else first
+            same &= found == first
+            lit &= _lit(scene, si, lights).reshape(height, width)
+    assert first is not None
+    return {"shape": np.where(same, first, -2), "lit": lit}
+
+
+def _lit(scene: Any, si: Any, lights: Sequence[Light]) -> NDArray[np.bool_]:
+    import mitsuba as mi
+
+    clear, any_above = mi.Mask(True), mi.Mask(False)
+    for light in lights:
+        place = mi.Point3f(*(float(x) for x in light.place[:3]))
+        if light.place[3] == 0.0:
+            ray = si.spawn_ray(mi.Vector3f(place))
+            direction = mi.Vector3f(place)
+        else:
+            ray = si.spawn_ray_to(place)
+            direction = place - si.p
+        # on the side that is seen
+        above = si.sh_frame.cos_theta(si.to_local(direction)) * si.wi.z > 0.0
+        clear &= ~above | ~scene.ray_test(ray, si.is_valid() & above)
+        any_above |= above
+    return np.array(si.is_valid() & clear & any_above, bool)

@@ -1,0 +1,29 @@
+"""The realtime port in GLSL: shaders, what they read, and a renderer (extra `gl`).
+
+Contents
+--------
+Renderer     draws a scene of Mitsuba by shaders, without a window (in `renderer`)
+scene        a scene as the shaders know it, made of the next four
+shapes       triangles and their tangents
+materials    BSDFs and textures
+lights       directions, points, a smooth sky
+camera       sensors
+packing      tables as textures
+thesis       the methods of the thesis as textures
+textures     what a shader reads, as plain NumPy
+source       the shaders' text
+context      OpenGL without a window
+prepared     a method's tables and programs
+target       a picture to draw into
+timing       how long fragments take
+viewer       a window on a scene (extra `view`)
+panel        its panel
+screenshots  numbered files of what it shows
+navigation   the camera and the light, moved by hand
+"""
+
+from __future__ import annotations
+
+from .renderer import Renderer
+
+__all__ = ["Renderer"]

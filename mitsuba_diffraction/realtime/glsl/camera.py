@@ -1,0 +1,101 @@
+"""Mitsuba's sensors as cameras of OpenGL."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import DiffractionError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera.
+
+    Attributes
+    ----------
+    to_world : (4, 4); the camera looks along its z axis, y is up and x to the left.
+    fov : across the picture, degrees.
+    size : width and height, pixels.
+    offset : of the principal point, in widths and heights.
+    """
+
+    to_world: Array
+    fov: float
+    size: tuple[int, int]
+    offset: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def eye(self) -> Array:
+        """Where it stands."""
+        return self.to_world[:3, 3]
+
+    def moved(self, to_world: Array) -> Camera:
+        """The same camera elsewhere."""
+        return replace(self, to_world=to_world)
+
+    def resized(self, width: int, height: int) -> Camera:
+        """The same camera with a picture of another size."""
+        return replace(self, size=(width, height))
+
+    def view_projection(self, low: Array, high: Array) -> Array:
+        """From world space to OpenGL's clip space, for a scene between two corners.
+
+        Column vectors; near and far planes lie around the scene, which keeps depths apart.
+        """
+        to_camera = np.linalg.inv(self.to_world)
+        corners = np.array([[(low, high)[n >> i & 1][i] for i in range(3)] for n in range(8)])
+        depths = corners @ to_camera[2, :3] + to_camera[2, 3]
+        outside = np.maximum(np.maximum(low - self.eye, self.eye - high), 0.0)
+        far = max(float(depths.max()) * 1.001, 1e-6)
+        near = max(0.5 * float(np.linalg.norm(outside)), float(depths.min()) * 0.999, 1e-5 * far)
+        width, height = self.size
+        scale = 1.0 / np.tan(np.radians(0.5 * self.fov))
+        a, b = (far + near) / (far - near), -2.0 * far * near / (far - near)
+        projection = np.array(
+            [
+                [-scale, 0.0, 2.0 * self.offset[0], 0.0],
+                [0.0, scale * width / height, -2.0 * self.offset[1], 0.0],
+                [0.0, 0.0, a, b],
+                [0.0, 0.0, 1.0, 0.0],
+            ]
+        )
+        return projection @ to_camera
+
+
+def read_camera(sensor: Any) -> tuple[Camera, list[str]]:
+    """A sensor's camera, and what of it is not shown.
+
+    Raises
+    ------
+    DiffractionError
+        If it is no perspective camera.
+    """
+    import mitsuba as mi
+
+    kind, parameters = sensor.class_name(), mi.traverse(sensor)
+    if kind not in ("PerspectiveCamera", "ThinLensCamera"):
+        raise DiffractionError(
+            f"the sensor is a {kind}; the realtime renderer has perspective cameras only: "
+            "give the scene a <sensor type='perspective'>"
+        )
+    omissions = ["the lens (shown as a pinhole)"] if kind == "ThinLensCamera" else []
+    width, height = (int(n) for n in sensor.film().size())
+    if tuple(sensor.film().crop_size()) != (width, height):
+        omissions.append("the film's crop")
+
+    def number(name: str) -> float:
+        return float(np.array(parameters[name]).ravel()[0]) if name in parameters else 0.0
+
+    camera = Camera(
+        to_world=np.array(parameters["to_world"].matrix, np.float64).reshape(4, 4),
+        fov=number("x_fov"),
+        size=(width, height),
+        offset=(number("principal_point_offset_x"), number("principal_point_offset_y")),
+    )
+    return camera, omissions

@@ -1,0 +1,283 @@
+"""Mitsuba's BSDFs and textures as a shader knows them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...optics.colour import linear_srgb, response
+from ...plugin.traversal import children
+from ...tables.store.bounds import cached_bound
+from ...tables.table import DiffractionTable
+from .packing import pack_bounds, pack_conductor
+from .textures import Packed, Texture, Uniform, as_half
+
+Array = NDArray[np.float64]
+#: Wavelengths (n,) in nm, and values (n,).
+Spectrum = tuple[Array, Array]
+
+#: BSDFs around another one, by class, and whether they change anything that is not shown.
+_WRAPPERS = {"TwoSidedBRDF": "", "BumpMap": "bumps", "NormalMap": "normal map", "MaskBSDF": "mask"}
+_OTHER_GREY = 0.5
+
+
+@dataclass(frozen=True)
+class Map:
+    """A value over a surface: the same everywhere, at every vertex, or a picture.
+
+    Attributes
+    ----------
+    value : (channels,), where it is the same.
+    picture : (rows, columns, channels), row 0 at v = 0, and `to_uv` (3, 3) that leads into it.
+    attribute : name of a mesh attribute.
+    """
+
+    value: Array
+    picture: NDArray[np.floating] | None = None
+    to_uv: Array = field(default_factory=lambda: np.eye(3))
+    attribute: str | None = None
+
+
+@dataclass(frozen=True)
+class Material:
+    """How one shape reflects.
+
+    Attributes
+    ----------
+    pigment : diffuse reflectance, linear sRGB.
+    two_sided : whether the back reflects like the front.
+    bsdf : the diffraction BSDF, or None.
+    axis : (cos, sin) from the tangent to the patch's x axis.
+    """
+
+    pigment: Map
+    two_sided: bool = False
+    bsdf: Any = None
+    axis: Map = field(default_factory=lambda: Map(np.array([1.0, 0.0])))
+
+    @property
+    def table(self) -> DiffractionTable:
+        """The diffraction table."""
+        table: DiffractionTable = self.bsdf.table
+        return table
+
+
+def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Material:
+    """The material of a shape; what cannot be shown is added to `omissions`.
+
+    light : wavelengths and a spectrum relative to D65, under which pigments get their colours.
+    """
+    two_sided = False
+    while bsdf.class_name() in _WRAPPERS:
+        lost = _WRAPPERS[bsdf.class_name()]
+        two_sided = two_sided or not lost
+        if lost:
+            omissions.append(f"the {lost} of {name}")
+        inner = [b for b in children(bsdf).values() if _is_bsdf(b)]
+        if len(inner) > 1 and inner[0] is not inner[-1]:
+            omissions.append(f"the back of {name}, another material")
+        bsdf = inner[0]
+    if _diffracts(bsdf):
+        pigment = Map(np.zeros(3))
+        if bsdf.nested is not None:
+            pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)
+        return Material(pigment, two_sided, bsdf, _axis(bsdf.orientation))
+    return Material(_diffuse(bsdf, omissions, name, light), two_sided)
+
+
+def pack_albedo_bounds(material: Material, factors: Sequence[float] = (1.0,)) -> Packed:
+    """The bounds that conserve its energy, at its height scale times these factors."""
+    if material.bsdf is None or not material.bsdf.energy_conserving:
+        return pack_bounds(None)
+    own = height_scale(material)
+    return pack_bounds([cached_bound(material.table, own * factor) for factor in factors])
+
+
+def pack_surface(material: Material) -> Packed:
+    """A material, all but its tables and the bound of its albedo."""
+    uniforms: dict[str, Uniform] = {
+        "two_sided": material.two_sided,
+        "colour_uv": tuple(material.pigment.to_uv.T.ravel().tolist()),
+        "axis_uv": tuple(material.axis.to_uv.T.ravel().tolist()),
+    }
+    definitions: dict[str, str] = {}
+    textures = []
+    for name, picture in (("colour", material.pigment.picture), ("axis", material.axis.picture)):
+        if picture is not None:
+            textures.append(Texture(f"{name}_map", as_half(_four(picture)), smooth=True))
+            definitions[f"{name.upper()}_MAPPED"] = ""
+    packed = Packed(tuple(textures), uniforms, definitions)
+    bsdf = material.bsdf
+    if bsdf is None or bsdf.nested is not None:
+        definitions["PIGMENTED"] = ""
+    if bsdf is None:
+        return packed
+    definitions["DIFFRACTING"] = ""
+    if bsdf.vcavity:
+        definitions["VCAVITY"] = ""
+    if hasattr(bsdf.layering, "weight"):
+        definitions["THESIS"] = ""
+        uniforms["diffuse_weight"] = float(bsdf.layering.weight)
+    return packed | _reflectance(bsdf.surface)
+
+
+def height_scale(material: Material) -> float:
+    """The factor on the heights."""
+    return float(np.array(material.bsdf.height_scale).ravel()[0])
+
+
+def _reflectance(surface: Any) -> Packed:
+    kind = type(surface).__name__
+    if kind == "Dielectric":
+        eta = float(np.array(surface.eta).ravel()[0])
+        return Packed(uniforms={"eta": eta}, definitions={"SURFACE_KIND": "1"})
+    if kind == "Conductor":
+        return pack_conductor(*_spectra(surface.eta, surface.k))
+    return Packed()
+
+
+def _spectra(eta: Any, k: Any) -> tuple[Array, Array, Array]:
+    """Wavelengths, and two textures over them; three colours count as three wavelengths."""
+    import mitsuba as mi
+
+    if mi.is_spectral:
+        lam = np.linspace(360.0, 830.0, 96)
+        uv = np.full((1, 2), 0.5)
+        return lam, *(_evaluated(t, uv, lam)[0].astype(float) for t in (eta, k))
+    colours = np.array([464.0, 549.0, 611.0])  # of sRGB's primaries
+    uv = np.full((1, 2), 0.5)
+    return colours, *(_evaluated(t, uv, colours)[0][::-1].astype(float) for t in (eta, k))
+
+
+def _is_bsdf(thing: Any) -> bool:
+    import mitsuba as mi
+
+    return isinstance(thing, mi.BSDF)
+
+
+def _diffracts(bsdf: Any) -> bool:
+    from ...plugin.bsdf import Diffraction
+
+    return isinstance(bsdf, Diffraction)
+
+
+def diffracts(bsdf: Any) -> bool:
+    """Whether a BSDF diffracts, or the first one that it is wrapped around."""
+    while bsdf.class_name() in _WRAPPERS:
+        bsdf = next(b for b in children(bsdf).values() if _is_bsdf(b))
+    return _diffracts(bsdf)
+
+
+def _diffuse(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Map:
+    """Reflectance of a diffuse BSDF; another is shown by its diffuse part, or as grey."""
+    textures = children(bsdf)
+    if bsdf.class_name() == "SmoothDiffuse":
+        return colour_map(textures["reflectance"], light)
+    kind = bsdf.class_name()
+    for key in ("diffuse_reflectance", "base_color", "reflectance"):
+        if key in textures:
+            omissions.append(f"the gloss of {name} ({kind})")
+            return colour_map(textures[key], light)
+    omissions.append(f"the material of {name} ({kind}, shown as grey)")
+    return Map(np.full(3, _OTHER_GREY))
+
+
+def colour_map(texture: Any, light: Spectrum) -> Map:
+    """A texture of reflectances in linear sRGB, right when multiplied with the light's colour."""
+    attribute = _attribute(texture)
+    if attribute is not None:
+        return Map(np.ones(3), attribute=attribute)
+    import mitsuba as mi
+
+    width, height = (int(n) for n in texture.resolution())
+    if width * height <= 1:
+        width = height = 1
+    uv, to_uv = _centres(texture, width, height)
+    found = _lit(texture, uv, light) if mi.is_spectral else _evaluated(texture, uv, np.zeros(3))
+    if width * height == 1:
+        return Map(found[0].astype(float))
+    return Map(np.ones(3), found.reshape(height, width, 3), to_uv)
+
+
+def _lit(texture: Any, uv: Array, light: Spectrum) -> NDArray[np.float32]:
+    """A texture's values (points, 3) under a light, over the light's own, in linear sRGB."""
+    lam = np.linspace(380.0, 740.0, 36)
+    weights = linear_srgb(response(lam)) * np.interp(lam, *light)[:, None]
+    weights /= weights.sum(axis=0)
+    total = np.zeros((len(uv), 3), np.float32)
+    for start in range(0, len(lam), 4):
+        four = slice(start, start + 4)
+        total += _evaluated(texture, uv, lam[four]) @ weights[four].astype(np.float32)
+    return total
+
+
+def _axis(orientation: Any) -> Map:
+    """Where the patch's x axis points."""
+    if not hasattr(orientation, "texture"):
+        angle = np.radians(float(np.array(orientation.degrees).ravel()[0]))
+        return Map(np.array([np.cos(angle), np.sin(angle)]))
+    texture = orientation.texture
+    attribute = _attribute(texture)
+    if attribute is not None:
+        return Map(np.array([1.0, 0.0]), attribute=attribute)
+    width, height = (int(n) for n in texture.resolution())
+    uv, to_uv = _centres(texture, width, height)
+    value = np.array(texture.eval_3(_interaction(uv)), np.float64).T.reshape(height, width, 3)
+    return Map(np.array([1.0, 0.0]), value[..., :2], to_uv)
+
+
+def _attribute(texture: Any) -> str | None:
+    if texture.class_name() != "MeshAttribute":
+        return None
+    found = re.search(r'name = "?(\w+)', str(texture))
+    return found[1] if found else None
+
+
+def _centres(texture: Any, width: int, height: int) -> tuple[Array, Array]:
+    """(u, v) of all texels' middles, and the transform that the texture puts before its picture."""
+    import mitsuba as mi
+
+    parameters = mi.traverse(texture)
+    to_uv = np.eye(3)
+    if "to_uv" in parameters:
+        to_uv = np.array(parameters["to_uv"].matrix, np.float64).reshape(3, 3)
+    x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    inside = np.stack([x.ravel(), y.ravel(), np.ones(x.size)])
+    return (np.linalg.inv(to_uv) @ inside)[:2].T, to_uv
+
+
+def _interaction(uv: Array) -> Any:
+    import drjit as dr
+    import mitsuba as mi
+
+    si = dr.zeros(mi.SurfaceInteraction3f, len(uv))
+    single = np.ascontiguousarray(uv.T, np.float32)
+    si.uv = mi.Point2f(mi.Float(single[0]), mi.Float(single[1]))
+    return si
+
+
+def _evaluated(texture: Any, uv: Array, wavelengths: Array) -> NDArray[np.float32]:
+    """A texture's values (points, wavelengths), or its three colours."""
+    import mitsuba as mi
+
+    si = _interaction(uv)
+    found = []
+    step = 4 if mi.is_spectral else len(wavelengths)
+    for start in range(0, len(wavelengths), step):
+        if mi.is_spectral:
+            si.wavelengths = mi.Spectrum(*(float(w) for w in wavelengths[start : start + 4]))
+        value = np.array(texture.eval(si), np.float32)
+        value = value.reshape(value.shape[0], -1)
+        found.append(np.broadcast_to(value, (value.shape[0], len(uv))))
+    return np.concatenate(found).T
+
+
+def _four(picture: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Four channels: graphics cards pad three to four anyway."""
+    missing = 4 - picture.shape[2]
+    return np.pad(picture, [(0, 0), (0, 0), (0, missing)]).astype(np.float32)

@@ -1,0 +1,192 @@
+"""Tables as textures, for the methods `lut` and `spectral` (NumPy only)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import DiffractionError
+from ...optics.colour import linear_srgb, response
+from ...optics.fresnel import reflectance
+from ...tables.colour.build import VISIBLE
+from ...tables.colour.table import ColourTable
+from ...tables.energy.bound import AZIMUTHAL, LAST_ANGLE, POLAR, SHARE, AlbedoBound
+from ...tables.energy.powers import order_0_power, power_series
+from ...tables.table import DiffractionTable
+from .textures import Packed, Texture, as_half, listed, paired, texels
+
+#: First and last wavenumber of the loops over wavelengths, rad/µm.
+WAVENUMBERS = (2e3 * math.pi / VISIBLE[1], 2e3 * math.pi / VISIBLE[0])
+
+#: Phase of a cell of κ within which functions are straight: off by its square over 8, 1e-4.
+_CELL = 0.03
+
+_RESPONSES = 2048  # over k: 0.4 nm apart
+_ANGLES, _WAVELENGTHS = 129, 64  # of a conductor's reflectance
+
+
+def pack_colours(table: ColourTable) -> Packed:
+    """A colour table, for `lut`."""
+    grid = table.grid
+    starts = np.array([grid.start(n) for n in range(grid.rings)])
+    counts = np.array(grid.counts)  # below 2¹⁶: the table would be too large before
+    pairs = np.stack([starts[:-1], counts[:-1] | counts[1:] << 16], axis=1).astype(np.uint32)
+    radii, zs = table.order_0.shape[:2]
+    return Packed(
+        textures=(
+            listed("colours", paired(table.coefficients).reshape(-1, 4)),
+            listed("rings", pairs),
+            listed("glossy", paired(_with_next(table.order_0[..., :3]))),
+        ),
+        uniforms={
+            "bins": grid.bins,
+            "last_ring": grid.rings - 1,
+            "smallest_radius": grid.smallest,
+            "ring_step": grid.step,
+            "interval_length": table.expansion.length,
+            "intervals": table.expansion.intervals,
+            "inverse_scale": 1.0 / table.scale,
+            "glossy_steps": ((radii - 1) / table.radius_end, (zs - 1) / table.z_max),
+            "glossy_size": (radii, zs),
+            "area_factor": area_factor(table.sigma),
+        },
+        definitions={"COHERENT": ""} if table.expansion.kind == "amplitude" else {},
+    )
+
+
+def _with_next(values: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Of order 0 (radii, zs, 3): each colour, that of the next z, and two zeros, (n, 8)."""
+    following = np.concatenate([values[:, 1:], values[:, -1:]], axis=1)
+    both = np.concatenate([values, following, np.zeros((*values.shape[:2], 2))], axis=-1)
+    return np.asarray(both.reshape(-1, 8))
+
+
+def pack_powers(table: DiffractionTable) -> Packed:
+    """A table of powers, for `spectral`; one of amplitudes is turned into one.
+
+    Raises
+    ------
+    DiffractionError
+        For a coherent sum (`coherence="patch"`), whose orders interfere.
+    """
+    if table.grid.coherent:
+        raise DiffractionError(
+            "method spectral adds powers, but the table has coherence='patch', where amplitudes "
+            "interfere; use method lut"
+        )
+    series, _, scale, expansion = power_series(table)
+    packed = as_half(texels(series.reshape(-1, expansion.terms)))
+    cells = max(8, math.ceil(2.0 * expansion.half_range * expansion.length / _CELL))
+    share = np.clip(np.arange(cells + 1) / cells, 1e-6, 1.0 - 1e-6)
+    kappa = expansion.length * (np.arange(expansion.intervals)[:, None] + share).ravel()
+    functions = texels(expansion.weights(kappa) / expansion.fading(kappa)[:, None])
+    order_0 = np.zeros((len(kappa), 1, 4))
+    order_0[:, 0, 0] = order_0_power(table, kappa)
+    of_kappa = np.concatenate([functions.reshape(len(kappa), -1, 4), order_0], axis=1)
+    return Packed(
+        textures=(
+            listed("orders", packed),
+            listed("functions", of_kappa.reshape(-1, 4).astype(np.float32)),
+        ),
+        uniforms={
+            "last_order": (table.grid.last[0], table.grid.last[1]),
+            "spacing": (table.spacing[0], table.spacing[1]),
+            "sigma": table.sigma,
+            "interval_length": expansion.length,
+            "intervals": expansion.intervals,
+            "cells": cells,
+            "inverse_scale": 1.0 / scale,
+            "area_factor": area_factor(table.sigma),
+        },
+        definitions={"TEXELS": str(-(-expansion.terms // 4))},
+    )
+
+
+def area_factor(sigma: float) -> float:
+    """4π²σ⁴ over the window's area πσ², µm²."""
+    return 4.0 * math.pi * sigma**2
+
+
+def pack_bounds(bounds: Sequence[AlbedoBound] | None) -> Packed:
+    """Bounds of the albedo for one or several height scales, for `energy_conserving`.
+
+    bounds : None where the BSDF does not conserve energy.
+    """
+    if bounds is None:
+        return Packed()
+    definitions = {
+        "ENERGY_CONSERVING": "",
+        "BOUND_PAGES": str(len(bounds)),
+        "BOUND_POLAR": str(POLAR),
+        "BOUND_AZIMUTHAL": str(AZIMUTHAL),
+        "BOUND_SHARE": repr(float(SHARE)),
+        "BOUND_LAST_COSINE": repr(math.cos(LAST_ANGLE)),
+    }
+    values = np.maximum(np.stack([b.values for b in bounds]), np.float32(1.0))
+    corners = [values[:, :-1, :-1], values[:, :-1, 1:], values[:, 1:, :-1], values[:, 1:, 1:]]
+    return Packed(
+        (listed("bounds", np.stack(corners, axis=-1).reshape(-1, 4)),),
+        {"bound_page": 0.0},
+        definitions,
+    )
+
+
+def pack_responses(lights: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Packed:
+    """What each light's wavelengths add to linear sRGB, for `spectral`.
+
+    Parameters
+    ----------
+    lights : of each, wavelengths (n,) in nm and its spectrum relative to D65 of luminance 1 there,
+        (n,) or, from a renderer that knows three colours only, (n, 3). Without lights there is
+        one that is dark.
+    """
+    lights = lights or [(np.array([360.0, 830.0]), np.zeros(2))]
+    k = np.linspace(*WAVENUMBERS, _RESPONSES)
+    lam = 2e3 * np.pi / k
+    # per nm to per µm; the loop's variable is k, and s̄/λ² dλ = s̄/2π dk
+    daylight = linear_srgb(response(lam)) * (1e3 / (2.0 * np.pi))
+    rows = np.zeros((len(lights), _RESPONSES, 4), np.float32)
+    for row, (wavelengths, spectrum) in zip(rows, lights, strict=True):
+        values = np.stack([np.interp(lam, wavelengths, s) for s in np.atleast_2d(spectrum.T)], 1)
+        row[1:-1, :3] = (daylight * values)[1:-1]  # nothing is seen beyond
+    return Packed((Texture("responses", rows),), {"wavenumbers": WAVENUMBERS})
+
+
+def daylight_colour(
+    wavelengths: NDArray[np.float64], spectrum: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Linear sRGB (3,) of a spectrum relative to D65, as in `pack_responses`."""
+    lam = np.arange(360.0, 830.5, 1.0)
+    values = np.stack([np.interp(lam, wavelengths, s) for s in np.atleast_2d(spectrum.T)], 1)
+    return np.asarray((linear_srgb(response(lam)) * values).sum(axis=0))
+
+
+def pack_conductor(
+    wavelengths: NDArray[np.float64], eta: NDArray[np.float64], k: NDArray[np.float64]
+) -> Packed:
+    """A conductor's reflectance over angle and wavelength, and in linear sRGB under daylight.
+
+    Parameters
+    ----------
+    wavelengths : (n,) nm.
+    eta, k : (n,), the complex index of refraction η + ik.
+    """
+    cosines = np.linspace(0.0, 1.0, _ANGLES)
+    waves = np.linspace(*WAVENUMBERS, _WAVELENGTHS)
+    lam = 2e3 * np.pi / waves
+
+    def over(at: NDArray[np.float64]) -> NDArray[np.float64]:
+        index = np.interp(at, wavelengths, eta) + 1j * np.interp(at, wavelengths, k)
+        return reflectance(cosines, index[:, None])
+
+    rows = np.zeros((_WAVELENGTHS + 1, _ANGLES, 4), np.float32)
+    rows[:-1, :, 0] = over(lam)
+    fine = np.arange(360.0, 830.5, 1.0)
+    weights = linear_srgb(response(fine))
+    rows[-1, :, :3] = over(fine).T @ (weights / weights.sum(axis=0))
+    return Packed(
+        (Texture("reflectances", rows),), {"wavenumbers": WAVENUMBERS}, {"SURFACE_KIND": "2"}
+    )

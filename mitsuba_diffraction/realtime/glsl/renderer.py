@@ -1,0 +1,234 @@
+"""The realtime renderer: scenes of Mitsuba, drawn by shaders, without a window."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import DiffractionWarning
+from ...tables.store.bounds import cached_bound
+from .camera import Camera
+from .context import (
+    Bindings,
+    check_version,
+    clock_of,
+    headless_context,
+    require_moderngl,
+    set_uniforms,
+)
+from .lights import Light, light_definitions
+from .materials import height_scale, pack_albedo_bounds, pack_surface
+from .packing import pack_bounds, pack_responses
+from .prepared import Prepared, window
+from .scene import RealtimeScene, load, read_scene
+from .source import LIGHTS
+from .target import Target
+from .textures import Uniform
+
+Image = NDArray[np.float32]
+
+
+class Renderer:
+    """Draws a scene of Mitsuba with a method of the shaders.
+
+    Meshes, rectangles, spheres, disks and cylinders; diffraction over a diffuse BSDF, and diffuse
+    ones; directional and point lights, and one radiance from everywhere. There are no shadows and
+    no light between surfaces. All else is named in one warning, and in `scene.omissions`.
+
+    Parameters
+    ----------
+    scene : a `mi.Scene` of the variant that is set, or an XML file.
+    sensor : index of the camera.
+    context : a moderngl context; by default one without a window, through EGL.
+
+    Raises
+    ------
+    DiffractionError
+        If there is no OpenGL 3.3, nothing diffracts, or the camera has no perspective.
+    """
+
+    def __init__(self, scene: Any, *, sensor: int = 0, context: Any = None) -> None:
+        self.scene: RealtimeScene = read_scene(load(scene), sensor)
+        if self.scene.omissions:
+            listed = "; ".join(dict.fromkeys(self.scene.omissions))
+            warnings.warn(
+                f"the realtime picture does not show: {listed}", DiffractionWarning, stacklevel=2
+            )
+        self.camera = self.scene.camera
+        self.lights: list[Light] = list(self.scene.lighting.lights)
+        self.sky = self.scene.lighting.sky
+        self._own_context = context is None
+        self.context = headless_context() if context is None else context
+        check_version(self.context)
+        self._buffers = [self.context.buffer(s.vertices.tobytes()) for s in self.scene.surfaces]
+        self.bindings = [
+            Bindings(self.context, pack_surface(s.material) | pack_albedo_bounds(s.material))
+            for s in self.scene.surfaces
+        ]
+        self._methods: dict[str, Prepared] = {}
+        self._responses: Bindings | None = None
+        self._lit_by: tuple[int, ...] = ()
+
+    @property
+    def driver(self) -> str:
+        """What draws."""
+        return str(self.context.info["GL_RENDERER"])
+
+    def render(
+        self, method: str = "lut", *, supersampling: int = 4, size: tuple[int, int] | None = None
+    ) -> Image:
+        """A picture (height, width, 4): linear sRGB and the share of each pixel that is covered.
+
+        Parameters
+        ----------
+        method : one of `source.METHODS`.
+        supersampling : samples along either side of a pixel, averaged evenly.
+        size : width and height; the scene's by default.
+        """
+        width, height = size or self.camera.size
+        n = supersampling
+        target = self.target(width * n, height * n)
+        self.draw(target.frame, method, self.camera.resized(width, height))
+        fine = np.frombuffer(target.frame.read(components=4, dtype="f4"), np.float32)
+        target.release()
+        fine = fine.reshape(height, n, width, n, 4)[::-1, ::-1]
+        return np.ascontiguousarray(fine.mean(axis=(1, 3), dtype=np.float32))
+
+    def frame_time(
+        self, method: str, *, size: tuple[int, int] | None = None, frames: int = 1
+    ) -> float:
+        """Seconds a frame takes, the fastest of some, one sample a pixel; compiled beforehand.
+
+        By the clock of `context.clock_of`.
+        """
+        width, height = size or self.camera.size
+        target = self.target(width, height)
+        camera = self.camera.resized(width, height)
+        self.draw(target.frame, method, self.camera.resized(1, 1))
+        self.context.finish()
+        clock, times = clock_of(self.driver), []
+        for _ in range(frames):
+            start = clock()
+            self.draw(target.frame, method, camera)
+            self.context.finish()
+            times.append(clock() - start)
+        target.release()
+        return min(times)
+
+    def texture_bytes(self, method: str) -> int:
+        """Memory of a method's own textures."""
+        return self.prepared(method).nbytes
+
+    def draw(
+        self,
+        frame: Any,
+        method: str,
+        camera: Camera | None = None,
+        *,
+        exposure: float | None = None,
+        scale: float | None = None,
+        coherence_width: float | None = None,
+    ) -> None:
+        """Draw into a framebuffer.
+
+        Parameters
+        ----------
+        frame : of moderngl, with a depth buffer.
+        method : one of `source.METHODS`.
+        camera : the scene's by default.
+        exposure : factor on the light, for display as sRGB; None leaves it linear.
+        scale : height scale of all patches, instead of their own; see `bound_for`.
+        coherence_width : µm, instead of their own; not for `lut` and `pq`, whose tables hold it.
+        """
+        moderngl = require_moderngl()
+        camera = camera or self.camera
+        prepared = self.prepared(method)
+        frame.use()
+        frame.clear(0.0, 0.0, 0.0, 0.0)
+        self.context.enable_only(moderngl.DEPTH_TEST)
+        matrix = camera.view_projection(self.scene.low, self.scene.high)
+        places = np.zeros((LIGHTS, 4), np.float32)
+        colours = np.zeros((LIGHTS, 3), np.float32)
+        for n, light in enumerate(self.lights):
+            place = np.array(light.place, float)
+            if place[3] == 0.0:
+                place[:3] /= np.linalg.norm(place[:3])
+            places[n], colours[n] = place, light.colour
+        shared: dict[str, Uniform] = {
+            "view_projection": tuple(matrix.T.ravel().tolist()),
+            "eye": tuple(camera.eye.tolist()),
+            "view_axis": (0.0, 0.0, 0.0),
+            "light_place": places,
+            "light_colour": colours,
+            "sky": np.asarray(self.sky, np.float32),
+            "exposure": 1.0 if exposure is None else exposure,
+        }
+        lit = light_definitions(
+            len(self.lights), bool(np.any(self.sky != 0.0)), exposure is not None
+        )
+        for surface, own, part in zip(
+            self.scene.surfaces, self.bindings, prepared.parts(lit), strict=True
+        ):
+            program, array = part.program, part.array
+            set_uniforms(program, shared)
+            unit = own.use(program)
+            unit = part.tables.use(program, unit)
+            self.use_responses(program, unit)
+            if surface.material.bsdf is not None:
+                factor = scale if scale is not None else height_scale(surface.material)
+                set_uniforms(program, {"height_scale": factor})
+                if coherence_width is not None:
+                    set_uniforms(program, window(part.tables, coherence_width))
+            array.render(moderngl.TRIANGLES)
+
+    def bound_for(self, scale: float) -> None:
+        """Take the albedo's bound for another height scale: a second or so, where it is new."""
+        for surface, own in zip(self.scene.surfaces, self.bindings, strict=True):
+            if "bounds" in own.textures:
+                packed = pack_bounds([cached_bound(surface.material.table, scale)])
+                own.textures["bounds"].write(packed.textures[0].data.tobytes())
+
+    def release(self) -> None:
+        """Free what lies in the graphics card's memory."""
+        for prepared in self._methods.values():
+            prepared.release()
+        for thing in (*self.bindings, *self._buffers):
+            thing.release()
+        if self._responses is not None:
+            self._responses.release()
+        if self._own_context:
+            self.context.release()
+
+    def prepared(self, method: str) -> Prepared:
+        """A method's tables and programs, uploaded when it is first wanted.
+
+        Raises
+        ------
+        DiffractionError
+            If there is no such method, or a table does not suit it.
+        """
+        if method not in self._methods:
+            self._methods[method] = Prepared(
+                self.context, self.scene, method, self.bindings, self._buffers
+            )
+        return self._methods[method]
+
+    def use_responses(self, program: Any, unit: int) -> None:
+        """The lights' spectra, uploaded anew when other lights are set."""
+        if "responses" not in program:
+            return
+        lit_by = tuple(id(light.spectrum) for light in self.lights)
+        if self._responses is None or lit_by != self._lit_by:
+            if self._responses is not None:
+                self._responses.release()
+            pairs = [(light.wavelengths, light.spectrum) for light in self.lights]
+            self._responses = Bindings(self.context, pack_responses(pairs))
+            self._lit_by = lit_by
+        self._responses.use(program, unit)
+
+    def target(self, width: int, height: int) -> Target:
+        """A framebuffer to draw into, to be released."""
+        return Target(self.context, width, height)

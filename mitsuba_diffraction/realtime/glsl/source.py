@@ -1,0 +1,79 @@
+"""Shader sources: one body for desktop OpenGL 3.3 and for WebGL 2, with a preamble each."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from importlib import resources
+from typing import Literal
+
+from ...errors import DiffractionError
+from .textures import PAGE
+
+Dialect = Literal["desktop", "web"]
+
+#: Methods of the fragment stage.
+METHODS = ("lut", "spectral", "flss", "nmm", "pq")
+#: Those of the source documents, which `methods` has too.
+DOCUMENTED = METHODS[2:]
+
+#: Lights at once.
+LIGHTS = 4
+
+_PREAMBLES = {
+    "desktop": "#version 330 core\n",
+    "web": (
+        "#version 300 es\nprecision highp float;\nprecision highp int;\n"
+        "precision highp sampler2D;\nprecision highp usampler2D;\n"
+    ),
+}
+
+
+@functools.cache
+def _file(name: str) -> str:
+    return resources.files(__package__).joinpath("shaders", name).read_text(encoding="utf-8")
+
+
+def vertex_source(dialect: Dialect = "desktop", name: str = "surface.vert") -> str:
+    """The vertex stage, the same for all methods."""
+    return _PREAMBLES[dialect] + _file(name)
+
+
+def fragment_source(
+    method: str,
+    definitions: Mapping[str, str],
+    dialect: Dialect = "desktop",
+    main: str = "surface.frag",
+) -> str:
+    """The fragment stage of a method.
+
+    Parameters
+    ----------
+    method : one of `METHODS`.
+    definitions : what the surface and the tables ask for (`Packed.definitions`).
+    dialect : "desktop" is GLSL 3.30 core, "web" GLSL ES 3.00.
+    main : the file with the main function.
+
+    Raises
+    ------
+    DiffractionError
+        If there is no such method.
+    """
+    return "".join(text for _, text in fragment_parts(method, definitions, dialect, main))
+
+
+def fragment_parts(
+    method: str,
+    definitions: Mapping[str, str],
+    dialect: Dialect = "desktop",
+    main: str = "surface.frag",
+) -> list[tuple[str, str]]:
+    """The names and texts that `fragment_source` joins; parameters and errors as there."""
+    if method not in METHODS:
+        raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
+    constants = {"PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1), "LIGHTS": str(LIGHTS)}
+    constants |= {"SURFACE_KIND": "0", "LIGHTS_LIT": "1", **definitions}
+    lines = [f"#define {name} {value}\n" for name, value in constants.items()]
+    parts = [("preamble", _PREAMBLES[dialect] + "".join(lines))]
+    shared = ("library.glsl", "taylor.glsl") if method in DOCUMENTED else ("library.glsl",)
+    return parts + [(name, _file(name)) for name in (*shared, f"{method}.glsl", main)]

@@ -1,0 +1,310 @@
+"""A window on a scene of Mitsuba (extra `view`): orbit, pan, zoom, drag the light, compare."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import moderngl_window
+import numpy as np
+from imgui_bundle import imgui
+
+from ...errors import DiffractionError
+from ...optics.colour import encode_srgb
+from ..comparison.progressive import Progressive
+from .navigation import Orbit, dragged
+from .panel import TITLE, PanelWindow
+from .renderer import Renderer
+from .screenshots import write_screenshot
+from .source import DOCUMENTED, METHODS
+
+HELP = (
+    "left button: turn   right: drag the light\n"
+    "middle, or shift and left: move   wheel: nearer\n"
+    "S: screenshot   P: path-trace this view   R: reset   Esc: close"
+)
+
+_TURN = 0.006  # rad per pixel
+_FRAMES = 30  # that the readout averages over
+
+
+class Viewer(PanelWindow):
+    """The window. What it shows is set on a subclass: see `show`."""
+
+    gl_version = (3, 3)
+    title = TITLE
+    aspect_ratio = None
+    vsync = False
+    log_level = 30  # warnings
+
+    mitsuba_scene: Any = None
+    sensor = 0
+    method = "lut"
+    stops = 0.0
+    folder = Path()
+    frames = 0  # to close after; 0 is never
+    spp = 64
+
+    def __init__(self, **arguments: Any) -> None:
+        super().__init__(**arguments)
+        self.times: deque[float] = deque(maxlen=_FRAMES)
+        self.drawn = 0
+        self.message = ""
+        self.renderer: Renderer | None = None
+        self.tracing: Progressive | None = None
+        self._loading: Iterator[str] | None = self._load()
+
+    # ---------------------------------------------------------------- loading
+
+    def _load(self) -> Iterator[str]:
+        """Everything slow, in steps between which the window can be closed."""
+        yield "reading the scene ..."
+        self.renderer = Renderer(self.mitsuba_scene, sensor=self.sensor, context=self.ctx)
+        yield f"tables of method {self.method} ..."
+        self.renderer.texture_bytes(self.method)
+        self._start()
+
+    def _start(self) -> None:
+        renderer = self._ready
+        scene = renderer.scene
+        self.orbit = Orbit.of(scene.camera, 0.5 * (scene.low + scene.high))
+        first = scene.diffracting[0].material
+        self.scale = float(np.array(first.bsdf.height_scale).ravel()[0])
+        self.largest_scale = float(first.table.height_scale_max)
+        self.own_width = self.width = float(first.table.coherence_width)
+        renderer.lights = list(scene.lighting.lights)
+
+    @property
+    def _ready(self) -> Renderer:
+        assert self.renderer is not None
+        return self.renderer
+
+    # ---------------------------------------------------------------- frames
+
+    def on_render(self, now: float, since: float) -> None:
+        """Draw one frame, or do one step of loading."""
+        if self._loading is not None:
+            try:
+                self.say(next(self._loading))
+            except StopIteration:
+                self._loading = None
+            return
+        if self.tracing is not None:
+            self._trace()
+        start = time.perf_counter()
+        self._draw(self.wnd.fbo)
+        self.ctx.finish()
+        self.times.append(time.perf_counter() - start)
+        self._panel()
+        self.drawn += 1
+        if self.frames and self.drawn >= self.frames:
+            self.wnd.close()
+
+    def _draw(self, frame: Any) -> None:
+        renderer = self._ready
+        camera = renderer.camera.moved(self.orbit.to_world)
+        width, height = frame.size
+        renderer.draw(
+            frame,
+            self.method,
+            camera.resized(width, height),
+            exposure=2.0**self.stops,
+            scale=self.scale,
+            coherence_width=None if self._baked else self.width,
+        )
+
+    @property
+    def _baked(self) -> bool:
+        """Whether the method's table holds the window itself."""
+        return self.method in ("lut", "pq")
+
+    @property
+    def frame_ms(self) -> float:
+        """Mean of the last frames."""
+        return 1e3 * float(np.mean(self.times)) if self.times else 0.0
+
+    def _panel(self) -> None:
+        imgui.new_frame()
+        imgui.set_next_window_pos((10, 10), imgui.Cond_.first_use_ever)
+        imgui.begin(TITLE, flags=imgui.WindowFlags_.always_auto_resize)
+        imgui.text(f"{self.frame_ms:.1f} ms a frame, {self._ready.driver}")
+        changed, index = imgui.combo("method", METHODS.index(self.method), list(METHODS))
+        if changed:
+            self.choose(METHODS[index])
+        _, self.stops = imgui.slider_float("exposure, stops", self.stops, -8.0, 8.0)
+        _, self.scale = imgui.slider_float("height scale", self.scale, 0.05, self.largest_scale)
+        if imgui.is_item_deactivated_after_edit():
+            self._ready.bound_for(self.scale)
+        if not self._baked:
+            widest = 4.0 * self.own_width
+            _, self.width = imgui.slider_float("coherence, µm", self.width, self.own_width, widest)
+        imgui.text(HELP)
+        imgui.text(self.message)
+        imgui.end()
+        self.show_panel()
+
+    # ---------------------------------------------------------------- what it can do
+
+    def choose(self, method: str) -> None:
+        """Draw with another method, if it suits the surface."""
+        try:
+            self._ready.texture_bytes(method)
+        except DiffractionError as error:
+            self.message = str(error)
+            return
+        self.method, self.message = method, ""
+        self.times.clear()
+        if method in DOCUMENTED:
+            self.message = "a method of the source documents: slow, for comparison"
+
+    def screenshot(self) -> Path:
+        """Write what is seen, without the panel, as PNG; the next free name."""
+        target = self._ready.target(*self.wnd.fbo.size)
+        try:
+            self._draw(target.frame)
+            found = np.frombuffer(target.frame.read(components=3, dtype="f4"), np.float32)
+        finally:
+            target.release()
+        width, height = self.wnd.fbo.size
+        path = write_screenshot(found.reshape(height, width, 3)[::-1], self.folder, "view")
+        self.message = f"written: {path}"
+        return path
+
+    def start_tracing(self) -> None:
+        """Send this view to the path tracer, which works between frames."""
+        renderer = self._ready
+        width, height = self.wnd.fbo.size
+        camera = renderer.camera.moved(self.orbit.to_world).resized(width, height)
+        self.tracing = Progressive(self.mitsuba_scene, camera, renderer.lights, self.spp)
+        self.message = "path tracing ..."
+
+    def _trace(self) -> None:
+        tracing = self.tracing
+        assert tracing is not None
+        tracing.advance()
+        self.message = f"path tracing: {tracing.done} of {tracing.spp} samples"
+        if tracing.finished:
+            self.tracing = None
+            shown = encode_srgb(tracing.image * 2.0**self.stops)
+            path = write_screenshot(shown, self.folder, "view_path")
+            self.message = f"written: {path} (direct light, {tracing.spp} samples)"
+
+    # ---------------------------------------------------------------- events
+
+    def on_mouse_drag_event(self, x: int, y: int, dx: int, dy: int) -> None:
+        """Turn, move, or drag the light."""
+        self.panel.mouse_drag_event(x, y, dx, dy)
+        if self._loading is not None or imgui.get_io().want_capture_mouse:
+            return
+        buttons = self.wnd.mouse_states
+        if buttons.right:
+            renderer = self._ready
+            for n, light in enumerate(renderer.lights[:1]):
+                renderer.lights[n] = dragged(light, self.orbit, _TURN * dx, -_TURN * dy)
+        elif buttons.middle or (buttons.left and self.wnd.modifiers.shift):
+            height = self.wnd.size[1]
+            self.orbit = self.orbit.panned(-dx / height, dy / height)
+        elif buttons.left:
+            self.orbit = self.orbit.turned(_TURN * dx, _TURN * dy)
+
+    def on_mouse_scroll_event(self, x_offset: float, y_offset: float) -> None:
+        """Nearer or farther."""
+        self.panel.mouse_scroll_event(x_offset, y_offset)
+        if self._loading is None and not imgui.get_io().want_capture_mouse:
+            self.orbit = self.orbit.zoomed(0.9**y_offset)
+
+    def on_key_event(self, key: Any, action: Any, modifiers: Any) -> None:
+        """S, P and R."""
+        self.panel.key_event(key, action, modifiers)
+        keys = self.wnd.keys
+        if self._loading is not None or action != keys.ACTION_PRESS:
+            return
+        try:
+            if key == keys.S:
+                self.screenshot()
+            elif key == keys.P and self.tracing is None:
+                self.start_tracing()
+            elif key == keys.R:
+                self._start()
+        except DiffractionError as error:
+            self.message = str(error)  # a full disk need not close the window
+
+    def on_close(self) -> None:
+        """Free the graphics card's memory, also of what was half loaded."""
+        self._loading = None
+        if self.renderer is not None:
+            self.renderer.release()
+            self.renderer = None
+
+
+def show(
+    scene: Any,
+    *,
+    sensor: int = 0,
+    method: str = "lut",
+    stops: float = 0.0,
+    size: tuple[int, int] = (1280, 800),
+    folder: Path = Path(),
+    frames: int = 0,
+    window: str = "pyglet",
+) -> tuple[int, float]:
+    """Open a window on a scene and wait until it is closed.
+
+    Parameters
+    ----------
+    scene : `mi.Scene` of the variant that is set.
+    sensor : index of the camera to start at.
+    method, stops : to start with; exposure in stops.
+    size : of the window, pixels.
+    folder : for screenshots.
+    frames : close after so many; 0 waits for the user.
+    window : kind of window, as moderngl-window names it; "headless" needs no display.
+
+    Returns
+    -------
+    frames drawn, and the mean of the last ones in ms.
+
+    Raises
+    ------
+    DiffractionError
+        If no window can be opened, or as `Renderer`.
+    """
+    settings = {
+        "mitsuba_scene": scene, "sensor": sensor, "method": method, "stops": stops,
+        "folder": folder, "frames": frames, "window_size": size,
+    }  # fmt: skip
+    kind = type("SceneViewer", (Viewer,), settings)
+    arguments = ["--window", window]
+    if window == "headless":
+        arguments += ["--backend", "egl"]
+    viewer = open_viewer(kind, arguments)
+    moderngl_window.run_window_config_instance(viewer)
+    return viewer.drawn, viewer.frame_ms
+
+
+def open_viewer(kind: type[Viewer], arguments: list[str]) -> Viewer:
+    """A window of a kind of viewer, not shown yet.
+
+    Parameters
+    ----------
+    arguments : of moderngl-window's command line.
+
+    Raises
+    ------
+    DiffractionError
+        If no window can be opened, or as `Renderer`.
+    """
+    try:
+        viewer: Viewer = moderngl_window.create_window_config_instance(kind, args=arguments)
+    except DiffractionError:
+        raise
+    except Exception as error:  # every kind of window has exceptions of its own
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise DiffractionError(
+            f"no window could be opened ({reason}); a display and OpenGL 3.3 are needed: over ssh "
+            "use ssh -X, or render pictures with 'compare'"
+        ) from error
+    return viewer

@@ -1,0 +1,246 @@
+"""A scene as a page draws it: what the shaders read, with the page's header around it."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import DiffractionError
+from ...optics.colour import encode_srgb
+from ...progress import Progress
+from ...tables.table import DiffractionTable
+from ..glsl.lights import light_definitions
+from ..glsl.materials import height_scale, pack_albedo_bounds, pack_surface
+from ..glsl.packing import pack_responses
+from ..glsl.scene import RealtimeScene
+from ..glsl.source import fragment_source, vertex_source
+from ..glsl.textures import Packed, Texture
+from .geometry import packed_mesh, sections_of
+from .sections import Sections, packed_array, packed_file
+from .tables import as_columns, fitting_tables
+
+#: Largest page, bytes.
+MAX_BYTES = 25_000_000
+
+#: Albedo bounds are at height scales 2^n of the scene's own.
+OCTAVES = (-2.0, -1.5, -1.0, -0.5, 0.0, 0.5)
+
+_HEADER = 200_000  # bytes for shaders, script and style, generously
+
+
+@dataclass(frozen=True)
+class WebScene:
+    """What a page holds.
+
+    Attributes
+    ----------
+    header : as JSON.
+    data : all arrays and pictures, compressed.
+    loss : mean and 99th percentile of ΔE2000 that the rounding of tables makes, by method.
+    left_out : methods that were asked for but are not there, each with the reason.
+    """
+
+    header: dict[str, Any]
+    data: bytes
+    loss: dict[str, tuple[float, float]]
+    left_out: dict[str, str]
+
+
+def web_scene(
+    scene: RealtimeScene, title: str, methods: Sequence[str], progress: Progress
+) -> WebScene:
+    """Pack a scene.
+
+    Parameters
+    ----------
+    scene : of `glsl.scene.read_scene`.
+    title : for people.
+    methods : of `tables.WEB_METHODS`, the first being shown first; those whose tables do not fit
+        are left out, from the last on.
+    progress : is told what is done.
+
+    Raises
+    ------
+    DiffractionError
+        If not even one method fits.
+    """
+    sections = Sections()
+    tables: list[DiffractionTable] = []
+    surfaces = []
+    for number, surface in enumerate(scene.surfaces):
+        progress(number, len(scene.surfaces), f"packing {surface.name}")
+        material = surface.material
+        # at all height scales that the slider offers
+        common = pack_surface(material) | pack_albedo_bounds(material, [2.0**n for n in OCTAVES])
+        entry: dict[str, Any] = {
+            "name": surface.name,
+            "mesh": sections_of(packed_mesh(surface.vertices), sections.add),
+            "parts": _parts(common, sections),
+        }
+        if material.bsdf is not None:
+            entry["height_scale"] = height_scale(material)
+            if not any(material.table is t for t in tables):
+                tables.append(material.table)
+            entry["table"] = next(n for n, t in enumerate(tables) if t is material.table)
+        surfaces.append((entry, common))
+    lights = scene.lighting.lights
+    pairs = [(light.wavelengths, light.spectrum) for light in lights]
+    responses = _parts(pack_responses(pairs), sections)
+
+    room = (MAX_BYTES - _HEADER) // 4 * 3 - sections.nbytes
+    shown, packed, left_out = _fitted(methods, tables, room, progress)
+    header: dict[str, Any] = {
+        "title": title,
+        "surfaces": [entry for entry, _ in surfaces],
+        "responses": responses,
+        "tables": {
+            method: [
+                _parts(packed[method, n].packed, sections, packed[method, n].sections)
+                for n in range(len(tables))
+            ]
+            for method in shown
+        },
+        "methods": shown,
+        "octaves": [OCTAVES[0], OCTAVES[-1]],
+        "bound_pages": len(OCTAVES),
+        "omissions": list(dict.fromkeys(scene.omissions)),
+        "lights": [
+            {"name": light.name, "place": light.place.tolist(), "colour": light.colour.tolist()}
+            for light in lights
+        ],
+        "sky": scene.lighting.sky.ravel().tolist(),
+        "background": _zenith(scene.lighting.sky),
+        "camera": {
+            "to_world": scene.camera.to_world.tolist(),
+            "fov": scene.camera.fov,
+            "size": list(scene.camera.size),
+            "offset": list(scene.camera.offset),
+        },
+        "box": [scene.low.tolist(), scene.high.tolist()],
+        "subject": _box([s.vertices[:, :3] for s in scene.diffracting]),
+    }
+    lit = light_definitions(len(lights), any(x != 0.0 for x in header["sky"]))
+    _add_programs(header, surfaces, shown, packed, lit)
+    loss = {
+        method: _worst([packed[method, n].loss for n in range(len(tables))]) for method in shown
+    }
+    header["loss"] = loss
+    data, header["sections"] = sections.joined()
+    return WebScene(header, data, loss, left_out)
+
+
+def _fitted(
+    methods: Sequence[str], tables: Sequence[DiffractionTable], room: int, progress: Progress
+) -> tuple[list[str], Any, dict[str, str]]:
+    """Methods whose tables fit, the tables, and why the others are not there."""
+    shown, left_out = list(methods), {}
+    if "spectral" in shown and any(table.grid.coherent for table in tables):
+        shown.remove("spectral")
+        left_out["spectral"] = "orders interfere with coherence='patch', which it cannot add up"
+    while shown:
+        packed = fitting_tables(shown, tables, room, progress)
+        if not isinstance(packed, int):
+            return shown, packed, left_out
+        left_out[shown.pop()] = (
+            f"{(packed - room) / 1e6:.1f} MB too much for a page of {MAX_BYTES / 1e6:.0f} MB"
+        )
+    reasons = "; ".join(f"{method}: {reason}" for method, reason in left_out.items())
+    raise DiffractionError(
+        f"the scene does not fit into a page ({reasons}); use fewer triangles, a smaller "
+        "coherence_width, or a shallower surface"
+    )
+
+
+def _worst(losses: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    return max(mean for mean, _ in losses), max(most for _, most in losses)
+
+
+def _parts(packed: Packed, sections: Sections, done: Any = None) -> dict[str, Any]:
+    """Textures and uniforms as the header has them; `done` are sections that are there already."""
+    return {
+        "uniforms": {name: _plain(value) for name, value in packed.uniforms.items()},
+        "textures": [_texture(t, sections, (done or {}).get(t.name)) for t in packed.textures],
+    }
+
+
+def _texture(texture: Texture, sections: Sections, done: Any) -> dict[str, Any]:
+    rows, columns, channels = texture.data.shape
+    entry: dict[str, Any] = {
+        "name": texture.name, "width": columns, "height": rows, "channels": channels,
+        "smooth": texture.smooth,
+    }  # fmt: skip
+    if texture.name == "colour_map":
+        entry["kind"] = "picture"
+        entry["section"] = sections.add(packed_file(_png(texture.data)))
+        return entry
+    entry["kind"] = {2: "half", 4: "single"}[texture.data.dtype.itemsize]
+    if texture.data.dtype == np.uint32:
+        entry["kind"] = "words"
+    if done is None:
+        done = packed_array(as_columns(texture.data, channels))
+    entry["section"] = sections.add(done)
+    return entry
+
+
+def _png(data: NDArray[np.generic]) -> bytes:
+    """A picture of reflectances as eight bits of sRGB, as which nearly all of them began."""
+    from PIL import Image
+
+    linear = np.asarray(data, np.float64)[..., :3]
+    pixels = np.round(255.0 * encode_srgb(linear)).astype(np.uint8)
+    file = io.BytesIO()
+    Image.fromarray(pixels, "RGB").save(file, "PNG", optimize=True)
+    return file.getvalue()
+
+
+def _add_programs(
+    header: dict[str, Any],
+    surfaces: Sequence[tuple[dict[str, Any], Packed]],
+    methods: Sequence[str],
+    packed: Any,
+    lit: dict[str, str],
+) -> None:
+    """The shaders, each once, and which surface is drawn with which."""
+    sources: list[str] = []
+    for entry, common in surfaces:
+        # what does not diffract is drawn by any of the programs
+        table = entry.setdefault("table", 0)
+        entry["programs"] = {}
+        for method in methods:
+            tables = packed[method, table].packed.definitions
+            definitions = {**common.definitions, **tables, **lit}
+            source = fragment_source(method, definitions, "web")
+            if source not in sources:
+                sources.append(source)
+            entry["programs"][method] = sources.index(source)
+    header["programs"] = sources
+    header["vertex"] = vertex_source("web")
+    whole = fragment_source(
+        methods[0], packed[methods[0], 0].packed.definitions, "web", "shown.frag"
+    )
+    header["shown"] = {"vertex": vertex_source("web", "whole.vert"), "fragment": whole}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.ravel().tolist()
+    if isinstance(value, tuple):
+        return [_plain(v) for v in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _zenith(sky: NDArray[np.float64]) -> list[float]:
+    """The brightest of a sky: its own where it lights one half, the mean where it is all around."""
+    slope = np.linalg.norm(sky[1:], axis=0)
+    return [float(x) for x in np.maximum(sky[0] + slope, 0.0)]
+
+
+def _box(positions: Sequence[NDArray[np.float32]]) -> list[list[float]]:
+    low = np.min([p.min(axis=0) for p in positions], axis=0)
+    high = np.max([p.max(axis=0) for p in positions], axis=0)
+    return [low.tolist(), high.tolist()]

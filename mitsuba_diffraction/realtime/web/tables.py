@@ -1,0 +1,103 @@
+"""The tables of a page: as many digits of them as fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...progress import Progress
+from ...tables.colour.colour_difference import colour_loss, power_loss
+from ...tables.store.cache import cached_colours
+from ...tables.table import DiffractionTable
+from ..glsl.packing import pack_colours, pack_powers
+from ..glsl.textures import Packed
+from .rounding import power_table, rounded_colours, rounded_table
+from .sections import Section, packed_array
+
+#: What a page can draw with.
+WEB_METHODS = ("lut", "spectral")
+
+#: Binary digits that are tried, from the largest page to the smallest.
+DIGITS = (9, 8, 7, 6)
+
+_LARGE = 1 << 20  # entries of the textures that are rounded
+
+
+@dataclass(frozen=True)
+class WebTable:
+    """One table for one method.
+
+    Attributes
+    ----------
+    packed : textures, uniforms and definitions for the shader, rounded.
+    sections : of the textures, by name.
+    loss : mean and 99th percentile of ΔE2000 against the table that was not rounded.
+    """
+
+    packed: Packed
+    sections: dict[str, Section]
+    loss: tuple[float, float]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of its sections."""
+        return sum(len(section.data) for section in self.sections.values())
+
+
+def web_table(method: str, table: DiffractionTable, digits: int) -> WebTable:
+    """A table with fewer digits, for one of `WEB_METHODS`."""
+    if method == "lut":
+        colours = cached_colours(table)
+        fewer = rounded_colours(colours, digits)
+        packed, loss = pack_colours(fewer), colour_loss(colours, fewer)
+        width = fewer.coefficients.shape[-1] // 2  # two numbers a word
+    else:
+        powers = power_table(table)
+        less = rounded_table(powers, digits)
+        packed, loss = pack_powers(less), power_loss(powers, less)
+        width = 4 * int(packed.definitions["TEXELS"])
+    sections = {}
+    for texture in packed.textures:
+        channels = texture.data.shape[2]
+        sections[texture.name] = packed_array(
+            as_columns(texture.data, width if texture.data.size > _LARGE else channels)
+        )
+    return WebTable(packed, sections, (float(loss.mean()), float(np.percentile(loss, 99.0))))
+
+
+def as_columns(data: Any, width: int) -> Any:
+    """A texture's numbers as rows of a given width; the last row is filled up with zeros."""
+    flat = data.reshape(-1)
+    missing = -len(flat) % width
+    if missing:
+        flat = np.concatenate([flat, np.zeros(missing, flat.dtype)])
+    return flat.reshape(-1, width)
+
+
+def fitting_tables(
+    methods: Sequence[str],
+    tables: Sequence[DiffractionTable],
+    room: int,
+    progress: Progress,
+) -> dict[tuple[str, int], WebTable] | int:
+    """Tables for all methods with as many digits as fit into a number of bytes.
+
+    Returns
+    -------
+    by method and number of the table; or, if nothing fits, the least bytes that it takes.
+    """
+    least = 0
+    for digits in DIGITS:
+        found: dict[tuple[str, int], WebTable] = {}
+        for method in methods:
+            for number, table in enumerate(tables):
+                done = len(found)
+                progress(done, len(methods) * len(tables), f"{method}, {digits} digits")
+                found[method, number] = web_table(method, table, digits)
+        least = sum(one.nbytes for one in found.values())
+        if least <= room:
+            return found
+    return least

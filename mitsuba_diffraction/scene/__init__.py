@@ -1,0 +1,12 @@
+"""Scenes: loaded, rendered in passes, planned, and meshes that a patch can follow.
+
+Contents
+--------
+load          a variant set and a scene loaded
+parameters    names that -D may set
+passes        rendering in passes of samples
+pictures      EXR and PNG of it
+mitsuba_text  what Mitsuba says, as lines of our own
+planning      the tables that suffice for a scene
+orientation   directions that a patch follows over a mesh
+"""

@@ -1,0 +1,279 @@
+"""Smooth fields of tangent directions on any triangle mesh, with or without texture coordinates.
+
+A direction at a vertex is a complex number z in a frame of its tangent plane. Neighbours agree
+where z_i = r_ij z_j, with r_ij the rotation that carries one frame into the other, so that
+
+    E(z) = Σ w_ij |z_i − r_ij z_j|² = zᴴ L z
+
+measures how much a field turns; L is the connection Laplacian, w the cotangent weights. The
+smoothest field is its lowest eigenvector, and one that follows a guide q within a distance ℓ solves
+(L + M/ℓ²) z = (M/ℓ²) q, M the vertices' areas (Knöppel, Crane, Pinkall and Schröder 2013, *Globally
+optimal direction fields*, sections 3 and 6.2, for n = 1).
+
+On a closed surface that is no torus every field has singular points, around which it turns once:
+their indices add up to the Euler characteristic (Poincaré and Hopf), 2 for a ball.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csc_array, csr_array, diags_array
+from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.linalg import splu
+
+from ...errors import DiffractionError
+from .tangents import carried
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Complexes = NDArray[np.complex128]
+
+#: What a field may follow.
+GUIDES = ("smooth", "x", "y", "z", "body")
+_ITERATIONS = 60
+_SHIFT = 1e-6  # of the eigenvalues' scale: the Laplacian of a flat sheet is singular
+
+
+@dataclass(frozen=True)
+class DirectionField:
+    """A unit tangent vector for every vertex, and where there is none.
+
+    Attributes
+    ----------
+    directions : (n, 3) unit vectors at right angles to the normals; zero where there is none.
+    singular : (k, 3) places around which the field turns.
+    indices : (k,) how often, counter-clockwise.
+    """
+
+    directions: Floats
+    singular: Floats
+    indices: Ints
+
+
+def direction_field(
+    positions: Floats,
+    normals: Floats,
+    faces: Ints,
+    along: str = "smooth",
+    *,
+    smoothing: float = 0.03,
+) -> DirectionField:
+    """A smooth field of tangent directions.
+
+    Parameters
+    ----------
+    positions, normals : (n, 3); vertices at one place are one, so seams of textures do not matter.
+    faces : (m, 3).
+    along
+        `smooth`: the field that turns least. `x`, `y`, `z`: that axis, laid onto the surface.
+        `body`: from one end of each part to the other, the way a current flows from tip to tip.
+    smoothing : distance within which a field may leave its guide, as a share of the mesh's size.
+
+    Raises
+    ------
+    DiffractionError
+        If `along` or `smoothing` is none of these, or the mesh has no area or is not finite.
+    """
+    if along not in GUIDES:
+        raise DiffractionError(f"along={along!r} is unknown; choose one of {', '.join(GUIDES)}")
+    if not 1e-4 <= smoothing <= 1.0:
+        raise DiffractionError(f"directions: smoothing = {smoothing:g} is outside 0.0001 to 1")
+    lost = np.flatnonzero(~np.isfinite(np.hstack([positions, normals])).all(axis=1))
+    if len(lost):
+        raise DiffractionError(
+            f"mesh: the position or normal of vertex {lost[0]} is not finite ({len(lost)} such "
+            "vertices); repair the mesh"
+        )
+    surface = _Surface.weld(positions, normals, faces)
+    if along == "smooth":
+        field = _smoothest(surface)
+    else:
+        size = float(np.ptp(surface.positions, axis=0).max())
+        guide = _current(surface) if along == "body" else np.eye(3)["xyz".index(along)]
+        field = _following(surface, surface.complex_of(guide), smoothing * size)
+    length = np.abs(field)
+    unit = field / np.where(length > 0, length, 1.0)
+    indices = surface.indices(unit)
+    singular = np.flatnonzero(indices)
+    spread = surface.vectors_of(unit)[surface.welded]
+    spread -= (spread * normals).sum(axis=1, keepdims=True) * normals
+    size_of = np.linalg.norm(spread, axis=1, keepdims=True)
+    return DirectionField(
+        spread / np.where(size_of > 0, size_of, 1.0),
+        surface.positions[surface.faces[singular]].mean(axis=1),
+        indices[singular],
+    )
+
+
+def turned(directions: Floats, normals: Floats, degrees: float) -> Floats:
+    """Directions (n, 3) turned around their normals, counter-clockwise seen from outside."""
+    angle = np.radians(degrees)
+    return np.cos(angle) * directions + np.sin(angle) * np.cross(normals, directions)
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """A mesh welded by position, with frames, transport along its edges, weights and areas."""
+
+    positions: Floats
+    faces: Ints
+    welded: Ints  # (n,) from the given vertices to these
+    frames: Floats  # (k, 2, 3) two unit vectors at right angles to the normal
+    normals: Floats
+    edges: Ints  # (e, 2)
+    weights: Floats
+    areas: Floats
+
+    @classmethod
+    def weld(cls, positions: Floats, normals: Floats, faces: Ints) -> _Surface:
+        places, welded = np.unique(positions, axis=0, return_inverse=True)
+        welded = welded.reshape(-1)
+        faces = welded[faces]
+        faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+        corners = places[faces]
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        double = np.linalg.norm(across, axis=1)
+        faces, corners, double = faces[double > 0], corners[double > 0], double[double > 0]
+        if not len(faces):
+            raise DiffractionError("mesh: no triangle has an area, so there is no direction on it")
+        up = np.zeros_like(places)
+        np.add.at(up, welded, normals)
+        size = np.linalg.norm(up, axis=1, keepdims=True)
+        up = np.where(size > 1e-6, up / np.maximum(size, 1e-6), [0.0, 0.0, 1.0])
+        # the coordinate axis that lies flattest gives the frame
+        axis = np.eye(3)[np.abs(up).argmin(axis=1)]
+        first = axis - (axis * up).sum(axis=1, keepdims=True) * up
+        first /= np.linalg.norm(first, axis=1, keepdims=True)
+        frames = np.stack([first, np.cross(up, first)], axis=1)
+
+        pairs, cotangents = [], []
+        for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):  # the angle at c is opposite to a–b
+            one, two = corners[:, a] - corners[:, c], corners[:, b] - corners[:, c]
+            pairs.append(faces[:, [a, b]])
+            cotangents.append((one * two).sum(axis=1) / double)
+        edges, inverse = np.unique(np.sort(np.concatenate(pairs)), axis=0, return_inverse=True)
+        weights = np.zeros(len(edges))
+        np.add.at(weights, inverse.reshape(-1), np.concatenate(cotangents) / 2)
+        # obtuse triangles make some negative: a small positive weight keeps the energy one
+        weights = np.maximum(weights, 1e-2)
+        areas = np.zeros(len(places))
+        np.add.at(areas, faces.ravel(), np.repeat(double / 6, 3))
+        areas = np.maximum(areas, 1e-9 * areas.max())  # vertices that no triangle uses
+        return cls(places, faces, welded, frames, up, edges, weights, areas)
+
+    def transport(self, to: Ints, origin: Ints) -> Complexes:
+        """Rotations (e,) from the frames at `origin` to those at `to`, the normals' tilt apart."""
+        laid_over = carried(self.frames[origin, 0], self.normals[origin], self.normals[to])
+        x, y = ((laid_over * self.frames[to, n]).sum(axis=1) for n in (0, 1))
+        rotation = x + 1j * y
+        length = np.abs(rotation)
+        return np.where(length > 1e-6, rotation / np.maximum(length, 1e-6), 1.0)
+
+    def laplacian(self, rotation: Complexes | float) -> csc_array:
+        """Σ w |z_i − r_ij z_j|² as a Hermitian matrix; r of the edges from second to first."""
+        i, j = self.edges.T
+        off = -self.weights * rotation
+        n = len(self.positions)
+        rows, columns = np.concatenate([i, j]), np.concatenate([j, i])
+        diagonal = np.bincount(rows, np.tile(self.weights, 2), n)
+        matrix = coo_array((np.concatenate([off, np.conj(off)]), (rows, columns)), shape=(n, n))
+        return csc_array(matrix + diags_array(diagonal))
+
+    def connection_laplacian(self) -> csc_array:
+        i, j = self.edges.T
+        return self.laplacian(self.transport(i, j))
+
+    def parts(self) -> tuple[int, Ints]:
+        """Number of connected parts, and of which one each vertex is."""
+        n = len(self.positions)
+        ones = np.ones(len(self.edges))
+        count, label = connected_components(coo_array((ones, tuple(self.edges.T)), shape=(n, n)))
+        return int(count), label
+
+    def complex_of(self, vectors: Floats) -> Complexes:
+        """Vectors, one or (k, 3), in the frames: their tangential parts."""
+        x, y = ((self.frames[:, n] * vectors).sum(axis=1) for n in (0, 1))
+        return x + 1j * y
+
+    def vectors_of(self, field: Complexes) -> Floats:
+        """The inverse of `complex_of`, (k, 3)."""
+        return field.real[:, None] * self.frames[:, 0] + field.imag[:, None] * self.frames[:, 1]
+
+    def indices(self, field: Complexes) -> Ints:
+        """How often a field turns around each triangle, counter-clockwise seen from its front."""
+        turn = np.zeros(len(self.faces))
+        holonomy = np.ones(len(self.faces), dtype=np.complex128)
+        for a, b in ((0, 1), (1, 2), (2, 0)):
+            i, j = self.faces[:, a], self.faces[:, b]
+            rotation = self.transport(j, i)
+            turn += np.angle(field[j] * np.conj(rotation * field[i]))
+            holonomy *= rotation
+        # what is carried once around comes back turned by the curvature within
+        return np.round((turn + np.angle(holonomy)) / (2 * np.pi)).astype(np.int64)
+
+
+def _smoothest(surface: _Surface) -> Complexes:
+    """The lowest eigenvector of L z = λ M z on each connected part, by inverse iteration."""
+    count, part = surface.parts()
+    laplacian, mass = surface.connection_laplacian(), surface.areas
+    shift = _SHIFT * laplacian.diagonal().real.sum() / mass.sum()
+    solve = splu(csc_array(laplacian + diags_array(shift * mass))).solve
+    rng = np.random.default_rng(0)
+    field = rng.normal(size=(2, len(mass))).T @ np.array([1, 1j])
+    for _ in range(_ITERATIONS):
+        field = solve(mass * field)
+        norm = np.sqrt(np.bincount(part, mass * np.abs(field) ** 2, count))
+        field /= np.maximum(norm, 1e-300)[part]
+    return field
+
+
+def _following(surface: _Surface, guide: Complexes, distance: float) -> Complexes:
+    """The field that follows a guide where it has a length, smooth within a distance."""
+    mass = surface.areas / distance**2
+    matrix = csc_array(surface.connection_laplacian() + diags_array(mass.astype(np.complex128)))
+    return splu(matrix).solve(mass * guide)
+
+
+def _current(surface: _Surface) -> Floats:
+    """Unit vectors along the current from one end of each part to the other, (k, 3)."""
+    count, part = surface.parts()
+    n = len(surface.positions)
+    i, j = surface.edges.T
+    length = np.linalg.norm(surface.positions[i] - surface.positions[j], axis=1)
+    graph = csr_array(coo_array((length, (i, j)), shape=(n, n)))
+    source = np.zeros(n)
+    for number in range(count):
+        inside = np.flatnonzero(part == number)
+        if len(inside) < 3:
+            continue
+        # the farthest place from anywhere is one end, the farthest from there the other
+        start = inside[0]
+        ends = []
+        for _ in range(2):
+            away = dijkstra(graph, directed=False, indices=start)[inside]
+            start = inside[np.argmax(away)]
+            ends.append(start)
+        source[ends[0]], source[ends[1]] = -1.0, 1.0
+    laplacian = surface.laplacian(1.0)
+    small = _SHIFT * laplacian.diagonal().sum() / n
+    potential = splu(csc_array(laplacian + diags_array(np.full(n, small)))).solve(source)
+    return _gradient(surface, potential)
+
+
+def _gradient(surface: _Surface, values: Floats) -> Floats:
+    """Unit vectors along the gradient of a function that is linear on the triangles, (k, 3)."""
+    corners, at = surface.positions[surface.faces], values[surface.faces]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    squared = (across**2).sum(axis=1, keepdims=True)
+    rising = np.zeros_like(across)
+    for n in range(3):
+        opposite = corners[:, (n + 2) % 3] - corners[:, (n + 1) % 3]
+        rising += at[:, n, None] * np.cross(across, opposite) / squared
+    total = np.zeros_like(surface.positions)
+    for n in range(3):
+        np.add.at(total, surface.faces[:, n], rising * np.sqrt(squared))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return total / np.where(length > 0, length, 1.0)

@@ -1,0 +1,125 @@
+"""Triangle meshes as arrays, and the PLY files that carry them."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...atomic import atomic_path
+from ...errors import DiffractionError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TriangleMesh:
+    """Vertices with normals and texture coordinates, and the triangles between them.
+
+    Attributes
+    ----------
+    positions, normals : (n, 3) floats; normals are unit vectors.
+    uv : (n, 2) floats; dp/du is the first tangent, which a measured patch follows.
+    faces : (m, 3) integers, counter-clockwise seen from outside.
+    orientation : (n, 2) floats or None
+        Cosine and sine of the angle by which the patch is turned away from dp/du.
+    """
+
+    positions: Floats
+    normals: Floats
+    uv: Floats
+    faces: NDArray[np.int64]
+    orientation: Floats | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.positions)
+        widths = {"positions": 3, "normals": 3, "uv": 2, "orientation": 2}
+        for name, width in widths.items():
+            array = getattr(self, name)
+            if array is not None and array.shape != (n, width):
+                raise DiffractionError(
+                    f"mesh: '{name}' has shape {array.shape}, where ({n}, {width}) is needed"
+                )
+        if self.faces.ndim != 2 or self.faces.shape[1] != 3:
+            raise DiffractionError(f"mesh: 'faces' has shape {self.faces.shape}, not (m, 3)")
+        if self.faces.size and not (0 <= self.faces.min() and self.faces.max() < n):
+            raise DiffractionError(f"mesh: 'faces' names a vertex outside 0 to {n - 1}")
+
+
+def cell_corners(grid: NDArray[np.int64]) -> tuple[NDArray[np.int64], ...]:
+    """The four corners of every cell of a grid of vertex numbers, in the sense of rotation."""
+    corners = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
+    return tuple(corner.ravel() for corner in corners)
+
+
+def grid_faces(grid: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Two triangles for every cell of a grid of vertex numbers."""
+    a, b, c, d = cell_corners(grid)
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+
+
+def vertex_normals(positions: Floats, faces: NDArray[np.int64]) -> Floats:
+    """Unit normals (n, 3): the mean over a vertex's triangles, weighted by their areas."""
+    corners = positions[faces]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    total = np.zeros_like(positions)
+    for n in range(3):
+        np.add.at(total, faces[:, n], across)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.where(length > 0, total / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
+
+
+def join(meshes: list[TriangleMesh]) -> TriangleMesh:
+    """One mesh out of several, without welding; an orientation is kept where all have one."""
+    starts = np.cumsum([0] + [len(mesh.positions) for mesh in meshes])
+    turns = [mesh.orientation for mesh in meshes if mesh.orientation is not None]
+    return TriangleMesh(
+        np.concatenate([mesh.positions for mesh in meshes]),
+        np.concatenate([mesh.normals for mesh in meshes]),
+        np.concatenate([mesh.uv for mesh in meshes]),
+        np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]),
+        np.concatenate(turns) if len(turns) == len(meshes) else None,
+    )
+
+
+def write_ply(
+    path: str | os.PathLike[str], mesh: TriangleMesh, comment: str = "", *, with_uv: bool = True
+) -> None:
+    """Write a binary little-endian PLY with the property names that Mitsuba reads.
+
+    An orientation becomes the mesh attribute `vertex_orientation` with the channels (cos, sin, 0):
+    Mitsuba 3.9 reads attributes of one or three channels and ignores those of two.
+
+    Raises
+    ------
+    DiffractionError
+        If the file cannot be written.
+    """
+    columns: dict[str, Floats] = {
+        **dict(zip(("x", "y", "z"), mesh.positions.T, strict=True)),
+        **dict(zip(("nx", "ny", "nz"), mesh.normals.T, strict=True)),
+    }
+    if with_uv:
+        columns |= dict(zip(("u", "v"), mesh.uv.T, strict=True))
+    if mesh.orientation is not None:
+        cosine, sine = mesh.orientation.T
+        columns |= {"orientation_x": cosine, "orientation_y": sine}
+        columns["orientation_z"] = np.zeros_like(cosine)
+    vertices = np.empty(len(mesh.positions), dtype=[(name, "<f4") for name in columns])
+    for name, values in columns.items():
+        vertices[name] = values
+    faces = np.empty(len(mesh.faces), dtype=[("count", "u1"), ("indices", "<i4", 3)])
+    faces["count"] = 3
+    faces["indices"] = mesh.faces
+
+    header = ["ply", "format binary_little_endian 1.0"]
+    header += [f"comment {line}" for line in comment.splitlines()]
+    header += [f"element vertex {len(vertices)}"]
+    header += [f"property float {name}" for name in columns]
+    header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    with atomic_path(path) as temporary, open(temporary, "wb") as file:
+        file.write(("\n".join(header) + "\n").encode("ascii", "replace"))
+        file.write(vertices.tobytes())
+        file.write(faces.tobytes())

@@ -1,0 +1,137 @@
+"""Parameters of an XML scene, so that a misspelt -D is answered with the names there are."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..errors import DiffractionError
+
+_REFERENCE = re.compile(r"\$(\w+)")
+# Mitsuba stops at 15 includes within each other.
+_DEEPEST = 15
+# Of a path, in characters: longer texts name no file, and asking would be an error.
+_LONGEST = 1024
+
+
+def check_parameters(scene: Path, given: Mapping[str, str]) -> None:
+    """Refuse parameters that the scene does not have.
+
+    Parameters
+    ----------
+    scene : an XML file.
+    given : the parameters from the command line.
+
+    Raises
+    ------
+    DiffractionError
+        If one is unknown; the text names those of the scene and its includes, with defaults.
+    """
+    known = parameters_of(scene, given)
+    if known is None:
+        return  # Mitsuba says what is wrong with the file
+    for name in given:
+        if name in known:
+            continue
+        if not known:
+            raise DiffractionError(f"-D {name}: '{scene}' has no parameters; leave it out")
+        listed = ", ".join(
+            name if default is None else f"{name}={default}" for name, default in known.items()
+        )
+        close = difflib.get_close_matches(name, known, 1)
+        hint = f"; did you mean {close[0]}?" if close else ""
+        raise DiffractionError(
+            f"-D {name}: '{scene}' has no parameter {name!r}; it has (with defaults) {listed}{hint}"
+        )
+
+
+def parameters_of(
+    scene: Path, given: Mapping[str, str] | None = None
+) -> dict[str, str | None] | None:
+    """Names of a scene's parameters and their defaults, includes and all.
+
+    Parameters
+    ----------
+    scene : an XML file.
+    given : values that are set, which may occur in the names of included files.
+
+    Returns
+    -------
+    dict
+        By name; `None` where the scene uses a parameter without giving a default. The result as a
+        whole is `None` if a file is missing or no XML.
+    """
+    found: dict[str, str | None] = {}
+    return found if _collect(scene, dict(given or {}), found, 0) else None
+
+
+def files_of(scene: Path, given: Mapping[str, str] | None = None) -> list[Path]:
+    """The scene, its includes, and every file that one of them or a recipe among those names.
+
+    Parameters
+    ----------
+    scene : an XML file.
+    given : values that are set.
+    """
+    from ..heights.read import is_recipe
+    from ..heights.recipes import Recipe
+
+    values = {name: value or "" for name, value in (parameters_of(scene, given) or {}).items()}
+    values |= given or {}
+    found: dict[Path, None] = {}
+    waiting = [scene]
+    while waiting:
+        file = waiting.pop()
+        if file in found or not file.is_file():
+            continue
+        found[file] = None
+        if is_recipe(file):
+            waiting += Recipe.load(file).sources
+        if file.suffix.lower() != ".xml":
+            continue
+        with contextlib.suppress(ElementTree.ParseError, ValueError):
+            for element in ElementTree.parse(file).getroot().iter():
+                for text in element.attrib.values():
+                    named = _with_values(text, values, {})
+                    if named and len(named) < _LONGEST and "\0" not in named:
+                        waiting.append(scene.parent / named)
+    return list(found)
+
+
+def _collect(
+    file: Path, given: Mapping[str, str], found: dict[str, str | None], depth: int
+) -> bool:
+    """Add the parameters of one file to `found`; whether it and its includes could be read."""
+    if depth > _DEEPEST:
+        return False
+    try:
+        root = ElementTree.parse(file).getroot()
+    except (OSError, ElementTree.ParseError, ValueError):
+        return False
+    for element in root.iter():
+        if element.tag == "default":
+            name = element.get("name", "")
+            if found.get(name) is None:  # the first default counts, as in Mitsuba
+                found[name] = element.get("value", "")
+            continue
+        for value in element.attrib.values():
+            for name in _REFERENCE.findall(value):
+                found.setdefault(name, None)
+        if element.tag == "include":
+            included = file.parent / _with_values(element.get("filename", ""), given, found)
+            if not _collect(included, given, found, depth + 1):
+                return False
+    return True
+
+
+def _with_values(text: str, given: Mapping[str, str], defaults: Mapping[str, str | None]) -> str:
+    """The text with parameters replaced by their values, as far as they have one."""
+
+    def value(match: re.Match[str]) -> str:
+        return given.get(match[1]) or defaults.get(match[1]) or match[0]
+
+    return _REFERENCE.sub(value, text)

@@ -1,0 +1,270 @@
+"""Making a plan for a scene, and trying it until the picture is as it was."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import drjit as dr
+
+from ...errors import DiffractionError
+from ...plugin.session import Session
+from ...progress import Progress
+from ...tables.table import DiffractionTable
+from .difference import Difference, difference
+from .domain import Asked, domain_for
+from .paths import Seen, trace
+from .plan import Plan, PlannedTable
+
+Load = Callable[[], Any]
+
+#: A planned table that is not smaller than this share of the whole one is not worth it.
+WORTH = 0.8
+#: A picture that differs by more than the tolerance is planned anew with a smaller share outside.
+ATTEMPTS, TIGHTER = 3, 0.3
+#: A plan is refused where this many times its tolerance lies outside: paths differ from the last.
+MOST_OUTSIDE = 3.0
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A scene in a recording session, and what its tables were asked."""
+
+    scene: Any
+    session: Session
+    seen: Seen
+    asked: dict[str, Asked]
+
+
+def look(
+    load: Load,
+    sensor: Callable[[Any], Any],
+    paths: int,
+    *,
+    plan: Plan | None = None,
+    seed: int = 0,
+    timing: bool = False,
+) -> Loaded:
+    """Load a scene with whole tables, or with those of a plan, and trace paths through it.
+
+    Parameters
+    ----------
+    load : loads the scene in the variant that is set.
+    sensor : the sensor of a scene.
+    paths : how many.
+    plan : whose tables to load it with.
+    seed : of the paths.
+    timing : build tables anew, and take the time.
+
+    Raises
+    ------
+    DiffractionError
+        If no surface diffracts, if no path meets one that does, or if the plan is for others.
+    """
+    session = Session(limits=plan.limits() if plan else {}, recording=True, timing=timing)
+    with session:
+        scene = load()
+    if not session.bsdfs:
+        raise DiffractionError(
+            "the scene has no BSDF 'diffraction'; there is nothing to plan, render it as it is"
+        )
+    if plan is not None:
+        _check_match(session, plan)
+    elif not session.tables:
+        names = ", ".join(sorted({name for name, _ in session.bsdfs}))
+        raise DiffractionError(
+            f"the tables of {names} come from files and stay as they are; give the scene the "
+            "height field, or its recipe, to have smaller ones planned"
+        )
+    seen = trace(scene, sensor(scene), session, paths, seed)
+    if not len(seen.light):
+        names = ", ".join(sorted({name for name, _ in session.bsdfs}))
+        raise DiffractionError(
+            f"none of {paths} paths carries light of a surface that diffracts ({names}): the "
+            "camera does not see it lit; check camera and lights, or raise --paths"
+        )
+    return Loaded(scene, session, seen, _asked(session, seen))
+
+
+def _asked(session: Session, seen: Seen) -> dict[str, Asked]:
+    """What each table is asked; tables from files, which cannot be made smaller, are left out."""
+    found = {}
+    for key, table in session.tables.items():
+        mine = [n for n, (_, bsdf) in enumerate(session.bsdfs) if bsdf.table is table]
+        chosen = seen.of(mine)
+        if chosen.any():
+            found[key] = Asked(
+                seen.u[chosen], seen.v[chosen], seen.w[chosen], seen.wavelength[chosen],
+                seen.xyz[chosen], float(min(seen.total[mine].sum(), 1.0)),
+            )  # fmt: skip
+    return found
+
+
+def draft(name: str, loaded: Loaded, tolerance: float, share: float | None = None) -> Plan:
+    """The plan that leaves a share of each surface's light outside, `tolerance` by default.
+
+    What it says of memory is not known yet: see `settled`.
+    """
+    session = loaded.session
+    tables = {}
+    for key, table in session.tables.items():
+        asked, mine = loaded.asked.get(key), [b for b in session.bsdfs if b[1].table is table]
+        # A surface that no path meets keeps what it has
+        domain = None
+        if asked is not None:
+            scale = max(float(dr.slice(dr.max(bsdf.height_scale))) for _, bsdf in mine)
+            domain = domain_for(asked, table, scale, share or tolerance)
+        tables[key] = PlannedTable(
+            surfaces=sorted({name for name, _ in mine}),
+            name=str(table.source.get("name", "")),
+            digest=str(table.source.get("digest", "")),
+            domain=domain,
+            memory=(table.nbytes, table.nbytes),
+        )
+    return Plan(name, tolerance, loaded.seen.paths, tables)
+
+
+def given_up(plan: Plan) -> Plan:
+    """The plan with every table whole."""
+    tables = {
+        key: replace(table, domain=None, memory=(table.memory[0], table.memory[0]))
+        for key, table in plan.tables.items()
+    }
+    return replace(plan, tables=tables)
+
+
+def settled(plan: Plan, planned: dict[str, DiffractionTable]) -> Plan:
+    """The plan without what is not worth it, and with what the rest saves."""
+    tables = {}
+    for key, table in plan.tables.items():
+        before, now = table.memory[0], planned[key].nbytes
+        worth = table.domain is not None and now < WORTH * before
+        tables[key] = replace(
+            table,
+            domain=table.domain if worth else None,
+            memory=(before, now if worth else before),
+        )
+    return replace(plan, tables=tables)
+
+
+def load_planned(load: Load, plan: Plan, *, timing: bool = False) -> tuple[Any, Session]:
+    """Load a scene with the tables of a plan.
+
+    Raises
+    ------
+    DiffractionError
+        If none of the plan's tables is one of the scene's.
+    """
+    session = Session(limits=plan.limits(), timing=timing)
+    with session:
+        scene = load()
+    _check_match(session, plan)
+    return scene, session
+
+
+def _check_match(session: Session, plan: Plan) -> None:
+    if session.tables and set(session.tables) <= set(plan.tables):
+        return
+    names = sorted(
+        {n for n, bsdf in session.bsdfs if session.key_of(bsdf.table) not in plan.tables}
+    )
+    session.close()
+    theirs = ", ".join(sorted({t.name for t in plan.tables.values()})) or "nothing"
+    raise DiffractionError(
+        f"the plan is for tables of {theirs} in '{plan.scene}', and not for "
+        f"{', '.join(names) or 'this scene'}: the heights or a table's parameters are others; "
+        "plan this scene"
+    )
+
+
+def check_light(loaded: Loaded, plan: Plan) -> dict[str, float]:
+    """Share of each table's light that a scene looks up outside its plan.
+
+    Raises
+    ------
+    DiffractionError
+        If it is several times what the plan was to leave out: camera or lights are others.
+    """
+    shares = {}
+    for key, asked in loaded.asked.items():
+        table = plan.tables[key]
+        if table.domain is None:
+            continue
+        domain = table.domain
+        shares[key] = asked.outside(domain.crop, domain.kappa_max)
+        if shares[key] > MOST_OUTSIDE * plan.tolerance:
+            farthest = float(asked.frequency.max())
+            raise DiffractionError(
+                f"the plan does not fit: {100 * shares[key]:.2g} % of the light of "
+                f"{', '.join(table.surfaces)} is looked up outside of it (|q| up to "
+                f"{farthest:.3g} rad/µm; the plan ends at {domain.crop[0]:.3g} along x, "
+                f"{domain.crop[1]:.3g} along y, κ at {domain.kappa_max:.3g}), and it was made for "
+                f"{100 * plan.tolerance:.2g} %; plan the scene with this camera and these lights, "
+                "or render without --plan"
+            )
+    return shares
+
+
+def planned_tables(
+    load: Load, plan: Plan, *, timing: bool = False
+) -> tuple[dict[str, DiffractionTable], dict[str, float]]:
+    """Load a scene with a plan, for its tables only, and the seconds that they took."""
+    _, session = load_planned(load, plan, timing=timing)
+    tables, seconds = dict(session.tables), dict(session.seconds)
+    session.close()
+    return tables, seconds
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A plan that was tried.
+
+    Attributes
+    ----------
+    plan : the plan; without any restriction where no picture came near enough.
+    planned : its tables by key, as they were last tried.
+    seconds : that they took to build, with `timing`.
+    difference : between the last pictures, or None where nothing could be made smaller.
+    """
+
+    plan: Plan
+    planned: dict[str, DiffractionTable]
+    seconds: dict[str, float]
+    difference: Difference | None
+
+    @property
+    def suits(self) -> bool:
+        """Whether the picture is within the plan's tolerance."""
+        return self.difference is None or self.difference.relative <= self.plan.tolerance
+
+
+def fitted(
+    name: str,
+    loaded: Loaded,
+    load: Load,
+    sensor: Callable[[Any], Any],
+    tolerance: float,
+    tell: Progress,
+    *,
+    timing: bool = False,
+) -> Fitted:
+    """Draft plans, with less and less light outside, until the picture is near enough.
+
+    Orders that cells average may be far apart, as those of gratings are, and a flat surface under
+    one light asks between them: the light outside then says little of the error, so it is measured.
+    """
+    share = tolerance
+    for _ in range(ATTEMPTS):
+        tell(0, 0, "building tables")
+        drafted = draft(name, loaded, tolerance, share)
+        planned, seconds = planned_tables(load, drafted, timing=timing)
+        plan = settled(drafted, planned)
+        if not plan.limits():
+            return Fitted(plan, planned, seconds, None)
+        changed = difference(loaded.scene, loaded.session.tables, load, plan, sensor, tell)
+        found = Fitted(plan, planned, seconds, changed)
+        if found.suits:
+            return found
+        share *= TIGHTER
+    return replace(found, plan=given_up(plan))

@@ -1,0 +1,278 @@
+"""Paths from the camera, and what light passes the diffracting surfaces on them.
+
+An ordinary path tracer (emitter and BSDF sampling, combined by the power heuristic; Veach 1997,
+ch. 9), run one bounce after the other, so that each BSDF writes down what it is asked. Light that
+reaches the camera has passed every vertex of its path: it counts at each of them, to the share
+that diffraction has in what the vertex reflects.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import DiffractionError
+from ...optics.colour import response
+from ...plugin.session import Session
+
+#: Longest paths that are followed, vertices and camera included.
+MOST_BOUNCES = 12
+#: The brightest paths count no more than this percentile of those that carry light: next to
+#: mirror images of the sun all else would be nothing, though a display shows them as mere white.
+BRIGHTEST = 99.0
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What diffracting surfaces are asked, weighted with the light of the picture.
+
+    Attributes
+    ----------
+    bsdf : (n,) index of the BSDF among the session's.
+    u, v, w : (n,) ωi + ωo in the patch's frame, w times height_scale.
+    wavelength : (n,) nm.
+    light : (n,) X + Y + Z that this look-up adds to the picture, relative to `total`.
+    xyz : (n, 3) the same in colours.
+    total : (bsdfs,) light of all paths that meet each BSDF, nested BSDFs' included; the light of
+        all paths is 1.
+    paths : how many were traced.
+    lobe_turn : (bsdfs,) median over pixels of how far ωi turns within a pixel, in direction
+        cosines; NaN where the camera does not see the BSDF.
+    """
+
+    bsdf: NDArray[np.int64]
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    w: NDArray[np.float64]
+    wavelength: NDArray[np.float64]
+    light: NDArray[np.float64]
+    xyz: NDArray[np.float64]
+    total: NDArray[np.float64]
+    paths: int
+    lobe_turn: NDArray[np.float64]
+
+    def of(self, bsdfs: list[int]) -> NDArray[np.bool_]:
+        """Which look-ups are those of some BSDFs."""
+        return np.isin(self.bsdf, bsdfs)
+
+
+def trace(scene: Any, sensor: Any, session: Session, paths: int, seed: int = 0) -> Seen:
+    """Trace paths through a scene that was loaded in a recording session.
+
+    Parameters
+    ----------
+    scene, sensor : of the variant that is set, a spectral one.
+    paths : how many; two of them a pixel.
+
+    Raises
+    ------
+    DiffractionError
+        If no path carries light.
+    """
+    paths += paths % 2
+    wavelengths, vertices, emitted, turns = _follow(scene, sensor, session, paths, seed)
+    colours = _response(sensor, wavelengths)  # (paths, wavelengths, 3)
+    reaching = [np.zeros_like(wavelengths)]  # at a vertex, by whatever comes after it
+    for vertex, light in zip(vertices[::-1], emitted[::-1], strict=True):
+        reaching.append(reaching[-1] + light + vertex.direct)
+    # emitted[d] is what the ray to vertex d finds there, so it counts before that vertex
+    whole = (reaching[-1] * colours.sum(axis=2)).sum(axis=1)
+    lit = whole > 0.0
+    if not lit.any():
+        raise DiffractionError(
+            f"none of {paths} paths through the scene carries light; check its camera and emitters"
+        )
+    most = np.percentile(whole[lit], BRIGHTEST)
+    weight = np.minimum(1.0, np.divide(most, whole, out=np.ones_like(whole), where=lit))
+    weight /= weight @ whole
+    parts: list[list[NDArray[Any]]] = [[] for _ in range(7)]
+    met = np.zeros((len(session.bsdfs), paths), bool)
+    for number, vertex in enumerate(vertices):
+        onward = reaching[len(vertices) - 1 - number]
+        for heard, returned, light in (
+            (vertex.lit, vertex.lit_value, vertex.direct),
+            (vertex.sampled, vertex.sampled_value, onward),
+        ):
+            for record in heard:
+                lane = record.lane
+                met[record.bsdf, lane] = True
+                whole_value = returned[lane]
+                share = np.divide(
+                    record.value, whole_value, out=np.zeros_like(whole_value),
+                    where=whole_value > 0.0,
+                )  # fmt: skip
+                xyz = (share * light[lane])[..., None] * colours[lane] * weight[lane, None, None]
+                shape = wavelengths[lane].shape
+                carries = xyz.sum(axis=2) > 0.0
+                asked = (record.u, record.v, record.w)
+                spread = (np.broadcast_to(a[:, None], shape) for a in asked)
+                columns = (
+                    np.full(shape, record.bsdf), *spread, wavelengths[lane], xyz.sum(axis=2), xyz,
+                )  # fmt: skip
+                for part, column in zip(parts, columns, strict=True):
+                    part.append(column[carries])
+    empty = [np.zeros((0, 3) if n == 6 else 0) for n in range(7)]
+    joined = [np.concatenate([nothing, *part]) for nothing, part in zip(empty, parts, strict=True)]
+    return Seen(
+        bsdf=joined[0].astype(np.int64),
+        u=joined[1],
+        v=joined[2],
+        w=joined[3],
+        wavelength=joined[4],
+        light=joined[5],
+        xyz=joined[6],
+        total=met @ (weight * whole),
+        paths=paths,
+        lobe_turn=_turns(turns, vertices[0], len(session.bsdfs)) if vertices else np.zeros(0),
+    )
+
+
+@dataclass(frozen=True)
+class _Vertex:
+    """One bounce: light straight from emitters, and what was asked for it and for the next ray."""
+
+    direct: NDArray[np.float64]  # (paths, wavelengths), as it reaches the camera
+    lit: list[Any]
+    lit_value: NDArray[np.float64]
+    sampled: list[Any]
+    sampled_value: NDArray[np.float64]
+
+
+def _follow(
+    scene: Any, sensor: Any, session: Session, paths: int, seed: int
+) -> tuple[NDArray[np.float64], list[_Vertex], list[NDArray[np.float64]], NDArray[np.float64]]:
+    """Wavelengths, vertices, light that rays find at emitters, and ωi at the first vertex."""
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(dr.opaque(mi.UInt32, seed), paths)  # as a literal it would be part of kernels
+    film = sensor.film()
+    size, crop, offset = (
+        np.array(a, float) for a in (film.size(), film.crop_size(), film.crop_offset())
+    )
+    rng = np.random.default_rng(seed)
+    pixel = np.repeat(np.floor(rng.random((paths // 2, 2)) * crop), 2, axis=0) + offset
+    place = mi.Point2f(*(mi.Float(a.astype(np.float32)) for a in (pixel / size).T))
+    place += sampler.next_2d() * mi.Vector2f(*(1.0 / float(n) for n in size))
+    ray, throughput = sensor.sample_ray(
+        0.0, sampler.next_1d(), place, sampler.next_2d(), mi.Mask(True)
+    )
+    wavelengths = _lanes(ray.wavelengths, paths)
+    lane = mi.Float(dr.arange(mi.UInt32, paths))
+    context = mi.BSDFContext()
+    # Opaque, so that all bounces are the same few kernels
+    active, delta = dr.opaque(mi.Mask, True, paths), dr.opaque(mi.Mask, True, paths)
+    density = dr.opaque(mi.Float, 1.0, paths)
+    before = dr.zeros(mi.SurfaceInteraction3f, paths)
+    dr.make_opaque(before)
+    sampler.schedule_state()
+    dr.eval(ray, throughput)
+    vertices: list[_Vertex] = []
+    emitted = []
+    turns = np.zeros((paths, 2))
+    for number in range(_bounces(scene.integrator())):
+        si = scene.ray_intersect(mi.Ray3f(ray), mi.RayFlags.All, True, active)
+        emitter = si.emitter(scene, active)
+        there = mi.DirectionSample3f(scene, si, before)
+        by_emitter = scene.pdf_emitter_direction(before, there, active & ~delta)
+        share = dr.select(delta, 1.0, _heuristic(density, by_emitter))
+        found = throughput * emitter.eval(si, active) * share
+        emitted.append(_lanes(dr.select(active, found, 0.0), paths))
+        active &= si.is_valid()
+        if number == 0:
+            turns = np.stack([_lane(si.wi.x, paths), _lane(si.wi.y, paths)], axis=1)
+        dr.eval(si, active, throughput)
+        if not dr.any(active):
+            break
+        bsdf = si.bsdf()
+        asked = mi.SurfaceInteraction3f(si)
+        asked.time = mi.Float(lane)  # no BSDF looks at the time: it tells which lane a call is of
+        sample, radiance = scene.sample_emitter_direction(si, sampler.next_2d(), True, active)
+        lit = active & (sample.pdf > 0.0) & dr.any(radiance > 0.0)
+        value, by_bsdf, heard = _listened(session, bsdf, context, asked, si.to_local(sample.d), lit)
+        share = dr.select(sample.delta, 1.0, _heuristic(sample.pdf, by_bsdf))
+        direct = dr.select(lit, throughput * radiance * value * share, 0.0)
+        drawn, weight = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(), active)
+        delta = mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta)
+        onward, _, heard_on = _listened(session, bsdf, context, asked, drawn.wo, active & ~delta)
+        vertices.append(
+            _Vertex(
+                _lanes(direct, paths), heard, _lanes(value, paths),
+                heard_on, _lanes(onward, paths),
+            )
+        )  # fmt: skip
+        throughput = throughput * mi.unpolarized_spectrum(weight)
+        active &= dr.any(throughput > 0.0)
+        density, before = drawn.pdf, si
+        ray = si.spawn_ray(si.to_world(drawn.wo))
+        sampler.schedule_state()
+        dr.eval(ray, throughput, active, density, delta, before)
+    # What the last ray finds is seen from the vertex before it
+    vertices += [_nothing(paths, wavelengths.shape[1])] * (len(emitted) - len(vertices))
+    return wavelengths, vertices, emitted, turns
+
+
+def _listened(
+    session: Session, bsdf: Any, context: Any, si: Any, wo: Any, active: Any
+) -> tuple[Any, Any, list[Any]]:
+    """eval and pdf, and what BSDFs of ours were asked."""
+    session.listen(dr.width(si))
+    try:
+        value, pdf = bsdf.eval_pdf(context, si, wo, active)
+        dr.eval(value, pdf)
+    finally:
+        heard = session.heard()
+    return mi.unpolarized_spectrum(value), pdf, heard
+
+
+def _heuristic(a: Any, b: Any) -> Any:
+    """The power heuristic's weight of the density a."""
+    return dr.select(a > 0.0, dr.square(a) * dr.rcp(dr.square(a) + dr.square(b)), 0.0)
+
+
+def _nothing(paths: int, count: int) -> _Vertex:
+    zeros = np.zeros((paths, count))
+    return _Vertex(zeros, [], zeros, [], zeros)
+
+
+def _lane(value: Any, count: int) -> NDArray[np.float64]:
+    return np.broadcast_to(np.array(value, np.float64), (count,))
+
+
+def _lanes(spectrum: Any, count: int) -> NDArray[np.float64]:
+    """(count, wavelengths) of a spectrum; what is not finite carries no light."""
+    values = np.stack([_lane(spectrum[n], count) for n in range(len(spectrum))], axis=1)
+    return np.where(np.isfinite(values), values, 0.0)
+
+
+def _bounces(integrator: Any) -> int:
+    """Rays of a path: what the integrator's description says, at most MOST_BOUNCES."""
+    found = re.search(r"max_depth = (-?\d+)", str(integrator))
+    depth = int(found[1]) if found else -1
+    return MOST_BOUNCES if depth < 0 else min(max(depth, 1), MOST_BOUNCES)
+
+
+def _response(sensor: Any, wavelengths: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What light of each wavelength adds to X, Y and Z; all alike to a film of spectral bands."""
+    if "SpecFilm" in str(sensor.film()):
+        return np.full((*wavelengths.shape, 3), 1.0 / 3.0)
+    return response(wavelengths, "E")
+
+
+def _turns(incident: NDArray[np.float64], first: _Vertex, count: int) -> NDArray[np.float64]:
+    """Median of how far ωi turns between the two paths of a pixel, per BSDF."""
+    owner = np.full(len(incident), -1)
+    for record in (*first.lit, *first.sampled):
+        owner[record.lane] = record.bsdf
+    same = (owner[0::2] == owner[1::2]) & (owner[0::2] >= 0)
+    turned = np.hypot(*(incident[0::2] - incident[1::2]).T)
+    return np.array(
+        [
+            float(np.median(turned[mine])) if (mine := same & (owner[0::2] == n)).any() else np.nan
+            for n in range(count)
+        ]
+    )

@@ -1,0 +1,101 @@
+"""One try at a table: its coefficients, and the error that they leave."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...heights.field import HeightField
+from ...progress import Progress
+from .checks import check_size
+from .coefficients import coefficients_of
+from .error import FLOOR, ErrorMeter, Grid, Parts, worst
+from ..expansion import Expansion
+from .half_precision import halved
+from .spectrum import Spectrum
+from ..window import FULL_REACH
+
+#: Below it single precision transforms would spend a share of the tolerance themselves.
+DOUBLE_BELOW = 2e-4
+
+
+class Attempt:
+    """A table with one setting, and its error.
+
+    Parameters
+    ----------
+    patches, grid, expansion : what is tabulated, where, and in which series.
+    functions : how many functions of basis "svd" the Chebyshev series is made into, if it is.
+    half : store half floats.
+    tolerance : of the table; the finest take transforms in double precision.
+    tell : called as tell(done, total, text).
+
+    Attributes
+    ----------
+    coefficients, order_0, scale, expansion, grid : of the table.
+    measured : the error last measured, see `tables.error.worst`.
+    """
+
+    def __init__(
+        self,
+        patches: Sequence[HeightField],
+        grid: Grid,
+        expansion: Expansion,
+        functions: int | None,
+        half: bool,
+        tolerance: float,
+        tell: Progress,
+    ) -> None:
+        check_size(grid, expansion, functions)
+        double = expansion.basis == "taylor" or tolerance < DOUBLE_BELOW
+        margin = math.ceil(FULL_REACH * math.sqrt(2.0) / min(grid.steps)) + 2
+        outer = (grid.last[0] + margin, grid.last[1] + margin)
+        self._spectra = [Spectrum(patch, outer, double) for patch in patches]
+        self._checks = [expansion.extrema(interval) for interval in range(expansion.intervals)]
+        self._transforms = expansion.intervals * expansion.series_terms
+        self._total = self._transforms + sum(map(len, self._checks))
+        self._tell, self.grid = tell, grid
+        self.measured: dict[str, float] = {}
+        self._parts: list[Parts] = []
+        self._trims: tuple[int, ...] | None = None
+        self.coefficients: NDArray[Any]
+        self.coefficients, self.order_0, self.expansion = coefficients_of(
+            self._spectra,
+            grid,
+            expansion,
+            functions,
+            lambda done: tell(done, self._total, "transforming"),
+        )
+        self.scale = 1.0
+        if half:
+            self.coefficients, self.scale = halved(self.coefficients)
+
+    def error(self, trims: tuple[int, ...] = ()) -> float:
+        """The larger of both errors, with some taps left out."""
+        if trims != self._trims:
+            self._meter = ErrorMeter(self._spectra, replace(self.grid, trims=trims), self.expansion)
+            self._parts = []
+            for values, centre, kappas in zip(
+                self.coefficients, self.order_0, self._checks, strict=True
+            ):
+                for part in self._meter.series(values, centre, kappas, self.scale):
+                    self._parts.append(part)
+                    done = self._transforms + len(self._parts)
+                    self._tell(done, self._total, "measuring the error")
+            self.measured = worst(np.concatenate(self._checks).tolist(), self._parts)
+            self._trims = trims
+        return max(self.measured["near"], self.measured["far"])
+
+    def taps_error(self) -> float:
+        """The taps' own share of the error where it was worst."""
+        floor = FLOOR * np.array(self._parts)[:, 1].max(axis=0)
+        shares = []
+        for n, name in enumerate(("near", "far")):
+            alone = self._meter.taps_alone(self.measured[f"kappa_{name}"])
+            shares.append(float(alone[0, n] / max(alone[1, n], floor[n], 1e-30)))
+        return max(shares)

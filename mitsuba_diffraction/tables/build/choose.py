@@ -1,0 +1,281 @@
+"""How many terms and intervals a tolerance takes, before anything large is computed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+from ...errors import DiffractionError
+from ...heights.field import HeightField
+from .error import FLOOR
+from ..expansion import Expansion, principal_functions
+from .spectrum import Spectrum
+from ..table import refuse
+
+#: Terms of one interval when the user does not say: a packet of 8 is what processors gather at
+#: best; shallow surfaces do with 4.
+PACKET, SMALL_PACKET = 8, 4
+#: Largest number of intervals that is tried.
+MAX_INTERVALS = 1024
+
+_SAMPLE = 160  # pixels a side of the cut-out that trials are made on
+_TRIALS = 6  # intervals looked at in one trial, from the first to the last
+_SINGLE_ROUNDING = 2.0**-24
+#: Share of a series' budget that its interpolation between nodes may take, besides the functions.
+_FINE, _LONGEST = 0.15, 200
+
+_Maker = Callable[[int, int], Expansion]
+
+
+def expansion_kind(basis: str, coherence: str) -> str:
+    """`ensemble` adds powers, so Chebyshev tabulates them; Taylor's series is of amplitudes."""
+    return "power" if coherence == "ensemble" and basis == "chebyshev" else "amplitude"
+
+
+def chebyshev_expansion(
+    heights: HeightField, coherence: str, kappa_max: float, budget: float, terms: int | None
+) -> Expansion:
+    """The Chebyshev series whose error on a cut-out of the patch is at most `budget`.
+
+    The exact measure on the whole patch has the last word (`tables.build`).
+    """
+    make = _maker(heights, coherence, kappa_max)
+    if heights.range == 0.0:
+        return make(terms or SMALL_PACKET, 1)
+    trial = _Trial(heights, kappa_max)
+    if terms is None and trial.error(make(SMALL_PACKET, 1)) <= budget:
+        return make(SMALL_PACKET, 1)
+    chosen = terms or PACKET
+    return make(chosen, _fewest_intervals(partial(make, chosen), trial.error, chosen, budget))
+
+
+def svd_expansion(
+    heights: HeightField, coherence: str, kappa_max: float, budget: float, terms: int | None
+) -> tuple[Expansion, int | None]:
+    """The Chebyshev series to start from, and how many functions to make of it, if any.
+
+    Their error on a cut-out of the patch is at most `budget`. Unless the user says how many
+    functions, there are as many as make the smallest table, the fewer if that makes no difference.
+    """
+    make = _maker(heights, coherence, kappa_max)
+    if heights.range == 0.0:
+        return make(terms or SMALL_PACKET, 1), None
+    trial = _Trial(heights, kappa_max)
+
+    def series(count: int, intervals: int) -> Expansion:
+        return make(max(count + 2, trial.length(make, intervals, budget)), intervals)
+
+    def suffices(count: int, intervals: int) -> bool:
+        return trial.error(series(count, intervals), count) <= budget
+
+    if terms is None and suffices(SMALL_PACKET, 1):
+        return series(SMALL_PACKET, 1), SMALL_PACKET
+    count = terms or PACKET
+    intervals = _fewest_intervals(
+        partial(series, count), lambda expansion: trial.error(expansion, count), count, budget
+    )
+    if terms is None and intervals == 1 and suffices(SMALL_PACKET, 2):
+        return series(SMALL_PACKET, 2), SMALL_PACKET
+    return series(count, intervals), count
+
+
+def _maker(heights: HeightField, coherence: str, kappa_max: float) -> _Maker:
+    kind = expansion_kind("chebyshev", coherence)
+    half_range = 0.5 * heights.range
+
+    def make(terms: int, intervals: int) -> Expansion:
+        return Expansion("chebyshev", kind, terms, intervals, kappa_max, half_range)
+
+    return make
+
+
+def _fewest_intervals(
+    make: Callable[[int], Expansion],
+    error: Callable[[Expansion], float],
+    terms: int,
+    budget: float,
+) -> int:
+    """About the smallest number of intervals whose error is at most `budget`."""
+    # An interval's worth of phase that so many terms resolve, as a first guess
+    first = make(1)
+    guess = max(1, round(first.kappa_max * first.half_range / 8.0))
+    if error(make(guess)) <= budget:
+        good = guess
+        while good > 1 and error(make(good // 2)) <= budget:
+            good //= 2
+        bad = good // 2
+    else:
+        bad, good = guess, 2 * guess
+        while (found := error(make(good))) > budget:
+            if good >= MAX_INTERVALS:
+                raise too_many_intervals(make(good), terms, found)
+            bad, good = good, 2 * good
+    while good - bad > max(1, good // 16):
+        middle = (good + bad) // 2
+        if error(make(middle)) <= budget:
+            good = middle
+        else:
+            bad = middle
+    return good
+
+
+def too_many_intervals(expansion: Expansion, terms: int, error: float) -> DiffractionError:
+    """What to say of a series that has been cut into as many intervals as make sense."""
+    return refuse(
+        f"{expansion.intervals} intervals of κ with {terms} terms each still leave an "
+        f"error of {error:.2g} for heights of {2 * expansion.half_range:.3g} µm; give more terms "
+        "or a larger tolerance"
+    )
+
+
+def taylor_expansion(
+    heights: HeightField, coherence: str, kappa_max: float, budget: float, terms: int | None
+) -> Expansion:
+    """The Taylor series with as many terms as `taylor_truncation` asks for."""
+    count = terms or 1
+    if terms is None:
+        while taylor_truncation(heights, kappa_max, count) > budget and count < 400:
+            count += 1
+    return Expansion("taylor", "amplitude", count, 1, kappa_max, 0.5 * heights.range)
+
+
+def taylor_truncation(heights: HeightField, kappa_max: float, terms: int) -> float:
+    """Bound on the relative L1 error of Σ|a|² after `terms` Taylor terms (n = 1 … terms).
+
+    |exp(iφ) − Σ_{n≤N} (iφ)ⁿ/n!| ≤ |φ|^(N+1)/(N+1)!; by Parseval the amplitudes are off by its
+    root mean square δ over the patch, and the power, by Cauchy and Schwarz, by at most 2δ.
+    """
+    log_x, log_moment = _log_moments(heights, kappa_max, terms + 1)
+    return _exp(math.log(2.0) + (terms + 1) * log_x - gammaln(terms + 2) + 0.5 * log_moment[-1])
+
+
+def taylor_rounding(heights: HeightField, kappa_max: float, terms: int) -> float:
+    """Predicted relative error that single precision leaves: the terms' own rounding adds up."""
+    if 0.5 * heights.range == 0.0:
+        return 0.0
+    log_x, log_moment = _log_moments(heights, kappa_max, terms)
+    n = np.arange(1, terms + 1)
+    log_squares = 2.0 * (n * log_x - gammaln(n + 1)) + log_moment
+    largest = float(log_squares.max())
+    log_sum = largest + math.log(float(np.exp(log_squares - largest).sum()))
+    return _exp(math.log(2.0 * _SINGLE_ROUNDING) + 0.5 * log_sum)
+
+
+def _log_moments(
+    heights: HeightField, kappa_max: float, last: int
+) -> tuple[float, NDArray[np.float64]]:
+    """log x, and log mean (2h/H)^2n for n = 1 … last, of centred heights."""
+    sample = heights.heights.ravel()
+    sample = sample[:: max(1, sample.size // 50_000)]
+    half = 0.5 * heights.range
+    if half == 0.0:
+        return -math.inf, np.zeros(last)
+    low = float(heights.heights.min())
+    unit = np.abs((sample - low) / half - 1.0)
+    log_square = 2.0 * np.log(np.maximum(unit, 1e-12))
+    moments = [
+        np.logaddexp.reduce(n * log_square) - math.log(unit.size) for n in range(1, last + 1)
+    ]
+    return math.log(kappa_max * half), np.array(moments)
+
+
+def _exp(x: float) -> float:
+    return math.exp(x) if x < 700.0 else math.inf
+
+
+class _Trial:
+    """Series errors on a cut-out of the patch, without window and taps."""
+
+    def __init__(self, heights: HeightField, kappa_max: float) -> None:
+        ny, nx = heights.shape
+        top, left = max(0, (ny - _SAMPLE) // 2), max(0, (nx - _SAMPLE) // 2)
+        cut = heights.heights[top : top + _SAMPLE, left : left + _SAMPLE]
+        # The range must be the whole patch's: the extremes may lie outside the cut-out
+        cut = np.concatenate(
+            [cut, np.resize([heights.heights.min(), heights.heights.max()], (1, cut.shape[1]))]
+        )
+        field = HeightField(cut, heights.pixel_size, name=heights.name)
+        last = tuple(
+            min(n // 2, math.ceil(kappa_max * length / (2 * np.pi)))
+            for n, length in zip(field.shape[::-1], field.extent, strict=True)
+        )
+        # In single precision its rounding would look like a series that is too short
+        self._spectrum = Spectrum(field, (last[0], last[1]), double=True)
+        self._centre = (last[1], last[0])
+        self._lengths: dict[int, int] = {}
+
+    def length(self, make: _Maker, intervals: int, budget: float) -> int:
+        """Terms of a Chebyshev series that is so good that the functions' number is what counts."""
+        if intervals not in self._lengths:
+            length = SMALL_PACKET + 2
+            while self.error(make(length, intervals)) > _FINE * budget and length < _LONGEST:
+                length = math.ceil(1.2 * length)
+            self._lengths[intervals] = length
+        return self._lengths[intervals]
+
+    def error(self, expansion: Expansion, functions: int | None = None) -> float:
+        """Worst relative error near and away from order 0, over a few intervals.
+
+        functions : of basis "svd" that the Chebyshev series is made into, if it is.
+        """
+        count = min(expansion.intervals, _TRIALS)
+        errors, exact = [], []
+        for interval in np.unique(np.linspace(0, expansion.intervals - 1, count).round()):
+            values = np.stack([self._value(k, expansion) for k in expansion.nodes(int(interval))])
+            specular = float(expansion.specular(interval))
+            values[:, *self._centre] -= specular
+            if functions is not None:
+                values = self._projected(values, expansion, int(interval), functions)
+            coefficients = np.tensordot(expansion.fit(int(interval)), values, (0, 0))
+            for kappa in expansion.extrema(int(interval)):
+                series = np.tensordot(expansion.weights(kappa), coefficients, 1)
+                series[self._centre] += specular
+                truth = self._value(kappa, expansion)
+                if expansion.kind == "amplitude":
+                    series, truth = np.abs(series) ** 2, np.abs(truth) ** 2
+                difference = np.abs(series - truth)
+                errors.append(self._parts(difference))
+                exact.append(self._parts(truth))
+        scale = np.maximum(exact, FLOOR * np.max(exact, axis=0))
+        return float(np.max(np.array(errors) / np.maximum(scale, 1e-30)))
+
+    def _projected(
+        self, values: NDArray[Any], expansion: Expansion, interval: int, functions: int
+    ) -> NDArray[Any]:
+        """The nodes' values with all bins but order 0 made of a few functions."""
+        centre = values[:, *self._centre].copy()
+        values[:, *self._centre] = 0.0
+        parts = [values] if expansion.kind == "power" else [values.real, values.imag]
+        flat = np.stack(parts, axis=-1).reshape(len(values), -1)
+        projection, series = principal_functions(
+            flat, expansion, interval, functions, self._near(len(parts))
+        )
+        back = np.linalg.solve(expansion.fit(interval).T, series)  # functions at the nodes
+        flat = back @ (projection.T @ flat)
+        found = flat.reshape(*values.shape, len(parts))
+        result = found[..., 0] if len(parts) == 1 else found[..., 0] + 1j * found[..., 1]
+        result[:, *self._centre] = centre
+        return np.asarray(result)
+
+    def _near(self, parts: int) -> NDArray[np.int64]:
+        """Indices (…, parts) of the bins around order 0."""
+        row, column = self._centre
+        rows, columns = np.mgrid[row - 1 : row + 2, column - 1 : column + 2].reshape(2, -1)
+        bins = (rows * (2 * column + 1) + columns)[np.arange(9) != 4]
+        return np.asarray((bins[:, None] * parts + np.arange(parts)).ravel())
+
+    def _value(self, kappa: float, expansion: Expansion) -> NDArray[Any]:
+        amplitude = self._spectrum.of_phase(kappa, minus_one=True)
+        amplitude[self._centre] += 1.0
+        return np.abs(amplitude) ** 2 if expansion.kind == "power" else amplitude
+
+    def _parts(self, bins: NDArray[np.floating]) -> tuple[float, float]:
+        row, column = self._centre
+        near = float(bins[row - 1 : row + 2, column - 1 : column + 2].sum())
+        return near, float(bins.sum()) - near

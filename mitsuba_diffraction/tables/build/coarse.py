@@ -1,0 +1,166 @@
+"""A patch's diffraction in coarse cells: what a table of a restricted domain has everywhere else.
+
+A scene sends next to no light to most spatial frequencies that light could probe. A table that
+ends early (`DiffractionTable.build` with `crop` or `kappa_max`) goes on as this one, whose bins are
+cells of many orders each. A cell holds the power of all its orders, and a Gaussian about one cell
+wide carries it: sums over a few cells are right, the structure within a cell (speckle, the sharp
+orders of a grating) is averaged. Order 0 keeps its own lobe.
+
+With cells of width D (rad/µm) in both directions and s = σ'D, the window σ' of the cells has the
+integral π/σ'² = πD²/s² where that of the orders has π/σ²; so a cell that holds the power p has the
+coefficient p·(s/σD)².
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...optics.geometry import sigma_of
+from ...heights.field import HeightField
+from ...progress import Progress
+from .choose import svd_expansion
+from .error import Grid
+from ..expansion import Expansion, principal_functions
+from .half_precision import half_scale
+from .spectrum import Spectrum
+from ..table import DiffractionTable, reach_of
+from ..window import taps_for
+
+#: Width of a cell in units of 1/σ, and fewest cells from the middle to the edge.
+CELL, FEWEST = 16.0, 24
+#: s: a sum of Gaussians exp(−s²Δ²) one apart is even to 2 exp(−π²/s²) = 1 %, and 3×3 taps do.
+STEP = 1.35
+#: Of the series in κ and of the taps: the averaging itself costs more.
+TOLERANCE = 1e-2
+
+
+def coarse_table(
+    patches: Sequence[HeightField],
+    *,
+    coherence_width: float,
+    wavelength_range: tuple[float, float],
+    height_scale_max: float,
+    progress: Progress,
+) -> DiffractionTable:
+    """Sum a patch's orders over coarse cells, as far as light can probe."""
+    deepest = max(patches, key=lambda patch: patch.range)
+    sigma, reach = sigma_of(coherence_width), reach_of(wavelength_range)
+    expansion, functions = svd_expansion(
+        deepest, "ensemble", reach * height_scale_max, 0.5 * TOLERANCE, None
+    )
+    orders = [2.0 * np.pi / length for length in patches[0].extent]
+    wanted = min(CELL / sigma, reach / FEWEST)
+    # An odd number of orders, so that order 0 is in the middle of a cell
+    each = [2 * math.floor(0.5 * wanted / spacing) + 1 for spacing in orders]
+    spacing = [n * dq for n, dq in zip(each, orders, strict=True)]
+    own = [sigma * width for width in spacing]
+    steps = tuple(s if n == 1 else min(s, STEP) for s, n in zip(own, each, strict=True))
+    taps = taps_for((steps[0], steps[1]), TOLERANCE, False)
+    radius = (reach / spacing[0], reach / spacing[1])
+    ny, nx = np.max([patch.shape for patch in patches], axis=0)
+    last = tuple(  # beyond Nyquist's frequency there are no orders
+        min(math.ceil(r), int(pixels) // (2 * n) + 1) + tap
+        for r, pixels, n, tap in zip(radius, (nx, ny), each, taps, strict=True)
+    )
+    grid = Grid(
+        (last[0], last[1]),
+        (steps[0], steps[1]),
+        radius,
+        taps,
+        False,
+        order_0_steps=(own[0], own[1]),
+    )
+    coefficients, order_0, expansion = _coefficients(
+        patches, grid, expansion, functions, (each[0], each[1]), progress
+    )
+    coefficients *= np.float32(steps[0] * steps[1] / (own[0] * own[1]))
+    scale = half_scale(float(np.abs(coefficients).max()))
+    return DiffractionTable(
+        coefficients=(coefficients * np.float32(scale)).astype(np.float16),
+        order_0=order_0,
+        scale=scale,
+        expansion=expansion,
+        grid=grid,
+        spacing=(spacing[0], spacing[1]),
+        coherence_width=float(coherence_width),
+        coherence="ensemble",
+        tolerance=TOLERANCE,
+        wavelength_range=(float(wavelength_range[0]), float(wavelength_range[1])),
+        height_scale_max=float(height_scale_max),
+        error={},
+    )
+
+
+def cell_powers(
+    table: DiffractionTable, powers: NDArray[np.floating]
+) -> tuple[NDArray[np.floating], tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """From a coarse table's coefficients at some κ to what the cells hold, and the cells' middles.
+
+    Parameters
+    ----------
+    powers : (ny, nx) sums of the table's series, over its scale.
+
+    Returns
+    -------
+    (ny, nx) shares of the light, and spatial frequencies (nx,), (ny,) in rad/µm.
+    """
+    grid = table.grid
+    own = [table.sigma * width for width in table.spacing]
+    middles = [
+        np.asarray(width * np.arange(-n, n + 1), np.float64)
+        for n, width in zip(grid.last, table.spacing, strict=True)
+    ]
+    factor = own[0] * own[1] / (grid.steps[0] * grid.steps[1])
+    return np.maximum(powers, 0.0) * factor, (middles[0], middles[1])
+
+
+def _coefficients(
+    patches: Sequence[HeightField],
+    grid: Grid,
+    expansion: Expansion,
+    functions: int | None,
+    each: tuple[int, int],
+    tell: Progress,
+) -> tuple[NDArray[np.float32], NDArray[np.float64], Expansion]:
+    """Series coefficients of the cells' power (intervals, ny, nx, 1, terms), and of order 0.
+
+    functions : how many functions of basis "svd" the Chebyshev series is made into, if it is; the
+        expansion returned then has them.
+    """
+    ny, nx = 2 * grid.last[1] + 1, 2 * grid.last[0] + 1
+    outermost = [n * last + n // 2 for n, last in zip(each, grid.last, strict=True)]
+    spectra = [Spectrum(patch, (outermost[0], outermost[1])) for patch in patches]
+    terms = functions or expansion.terms
+    coefficients = np.empty((expansion.intervals, ny, nx, 1, terms), np.float32)
+    found = []
+    order_0 = np.empty((expansion.intervals, 1, expansion.terms))
+    total = expansion.intervals * expansion.terms
+    for interval in range(expansion.intervals):
+        cells = np.zeros((expansion.terms, ny, nx), np.float32)
+        centre = np.zeros(expansion.terms)
+        for n, kappa in enumerate(expansion.nodes(interval)):
+            for spectrum in spectra:
+                amplitude = spectrum.of_phase(kappa, minus_one=True)
+                zero = complex(amplitude[outermost[1], outermost[0]])
+                amplitude[outermost[1], outermost[0]] = 0.0
+                power = amplitude.real**2 + amplitude.imag**2
+                cells[n] += power.reshape(ny, each[1], nx, each[0]).sum(axis=(1, 3))
+                centre[n] += abs(zero) ** 2 + 2.0 * zero.real  # |1 + (a_0 − 1)|² − 1
+            tell(interval * expansion.terms + n + 1, total, "summing what lies outside")
+        fit = expansion.fit(interval)
+        centre = centre / len(spectra) + (1.0 - float(expansion.specular(interval)))
+        order_0[interval, 0] = centre @ fit
+        mean = cells.reshape(expansion.terms, -1) / np.float32(len(spectra))
+        if functions is not None:
+            none = np.zeros(0, np.int64)  # a cell is much wider than the light close to order 0
+            fit, series = principal_functions(mean, expansion, interval, functions, none)
+            found.append(series)
+        coefficients[interval] = (mean.T @ fit.astype(np.float32)).reshape(ny, nx, 1, -1)
+    if functions is not None:
+        expansion = replace(expansion, basis="svd", terms=functions, functions=np.array(found))
+    return coefficients, order_0, expansion

@@ -1,0 +1,60 @@
+"""What a table remembers of the heights it was built from, and what to warn of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...optics.geometry import wavenumber
+from ...heights.field import HeightField
+from ...heights.validity import window_line
+from .spectrum import Spectrum
+
+_SLOW = 150  # orders read in a look-up; 16 are usual
+_GREEN = 550.0  # nm, where the variation between patches is stated
+
+
+def describe(
+    patches: Sequence[HeightField],
+    coherence_width: float,
+    wavelength_range: tuple[float, float],
+    taps: tuple[int, int],
+) -> dict[str, Any]:
+    """Statistics, digest and warnings of the patches, as plain data.
+
+    With several patches, `variation` is the mean over orders of the standard deviation of |a_j|²
+    between patches, over its mean, at 550 nm and normal incidence and reflection.
+    """
+    first = patches[0]
+    warnings = [line for patch in patches for line in patch.validity(wavelength_range)]
+    small = window_line(first, coherence_width)
+    if small:
+        warnings.append(small)
+    if taps[0] * taps[1] > _SLOW:
+        warnings.append(
+            f"{first.name}: the patch of {first.extent[0]:.4g} × {first.extent[1]:.4g} µm is so "
+            f"much larger than the coherence width of {coherence_width:g} µm that every look-up "
+            f"reads {taps[0]}×{taps[1]} orders: rendering will be slow; crop the "
+            f"patch, for instance crop={coherence_width:g} (--crop {coherence_width:g})"
+        )
+    source = first.summary() | {"digest": first.digest(), "warnings": warnings}
+    if len(patches) > 1:
+        source["patches"] = [p.summary() | {"digest": p.digest()} for p in patches]
+        source["variation"] = _variation(patches)
+    return source
+
+
+def _variation(patches: Sequence[HeightField]) -> float:
+    kappa = 2.0 * float(wavenumber(_GREEN))
+    reach = 2.0 * float(wavenumber(_GREEN)) / (2 * np.pi)
+    extent = patches[0].extent
+    last = tuple(
+        int(min(reach * length, max(p.shape[axis] for p in patches) // 2))
+        for axis, length in ((1, extent[0]), (0, extent[1]))
+    )
+    powers = np.stack(
+        [np.abs(Spectrum(p, (last[0], last[1])).of_phase(kappa)) ** 2 for p in patches]
+    )
+    return float(powers.std(axis=0, ddof=1).sum() / powers.mean(axis=0).sum())

@@ -1,0 +1,247 @@
+"""How far a table is from the exact DFT: the one error measure of the project.
+
+At every bin that light can reach, moved by up to half a bin (fixed seed), the table's ⟨|P|²⟩ is
+compared with the exact one, over κ between the nodes of the series and at its ends:
+
+    error = Σ |table − exact| / Σ exact     at the worst κ,
+
+taps, series and storage included. The bins within 3/σ of order 0 (the glossy reflection) and all
+others (the colours) are sums of their own, since one may outweigh the other a thousandfold. A
+grating can put out either part at one κ altogether; there the sum is compared with a thousandth
+of the largest value that this part has at any κ.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..expansion import Expansion
+from .spectrum import Spectrum
+from ..window import apply_window, rows_by_trim, tap_matrix
+
+#: Radius of the bins counted as the glossy reflection, in units of 1/σ.
+NEAR = 3.0
+#: A part that vanishes at some κ is compared with this share of its largest value.
+FLOOR = 1e-3
+
+#: Units of 1/σ from a bin within which its lobe is looked at: 1/e⁴ of its power at the edge.
+_WITHIN = 2.0
+_SEED = 20140113
+_SMALL = 1 << 16  # coefficients
+_TOGETHER = 10  # κ whose series are summed at once: widening half floats takes longer than the sum
+
+Parts = NDArray[np.float64]  # [[|error| near, |error| far], [exact near, exact far]]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The bins of a table and the window around them.
+
+    Attributes
+    ----------
+    last : (jx, jy), outermost bins stored.
+    steps : (σ·dqx, σ·dqy), bin spacing in units of 1/σ.
+    reach : radius in bins (x, y) that light can reach.
+    taps : (x, y) bins read by a look-up.
+    coherent : amplitudes are added (`patch`) instead of powers.
+    order_0_steps : bin spacing in units of order 0's own 1/σ, where that differs (`coarse`).
+    trims : taps left out at both ends of each row, one number a row; empty if none are.
+    """
+
+    last: tuple[int, int]
+    steps: tuple[float, float]
+    reach: tuple[float, float]
+    taps: tuple[int, int]
+    coherent: bool
+    trims: tuple[int, ...] = ()
+    # Not part of repr, by which files in the cache are found
+    order_0_steps: tuple[float, float] | None = field(default=None, repr=False)
+
+    @property
+    def taps_read(self) -> int:
+        """Bins that one look-up reads."""
+        return self.taps[0] * self.taps[1] - 2 * sum(self.trims)
+
+    @property
+    def exponents(self) -> tuple[float, float]:
+        """Of exp(−exponent·Δ²), the weight of a bin Δ bins away."""
+        half = 0.5 if self.coherent else 1.0
+        return half * self.steps[0] ** 2, half * self.steps[1] ** 2
+
+    @property
+    def order_0_exponents(self) -> tuple[float, float]:
+        """The same for order 0."""
+        if self.order_0_steps is None:
+            return self.exponents
+        return self.order_0_steps[0] ** 2, self.order_0_steps[1] ** 2
+
+
+class ErrorMeter:
+    """Compares a table with the exact DFT of the same heights, one κ at a time.
+
+    Several spectra are of several patches, whose powers are averaged.
+    """
+
+    def __init__(self, spectra: Sequence[Spectrum], grid: Grid, expansion: Expansion) -> None:
+        self.spectra, self.grid, self.expansion = spectra, grid, expansion
+        spectrum = spectra[0]
+        self._real, self._outer = spectrum.real_type, spectrum.last
+        rng = np.random.default_rng(_SEED)
+        axes = []
+        self._lobe: list[NDArray[Any]] = []
+        self._wide: list[sparse.csr_array] = []
+        tapped: list[list[sparse.csr_array]] = []
+        rows = rows_by_trim(grid.taps, grid.trims)
+        for axis in (0, 1):
+            outer = min(int(grid.reach[axis]), spectrum.last[axis])
+            bins = np.arange(-outer, outer + 1)
+            # Bins of a short period are far apart: half-way between them there is no light at all
+            most = min(0.5, _WITHIN / grid.steps[axis])
+            positions = bins + rng.uniform(-most, most, len(bins))
+            exponent, last = grid.exponents[axis], grid.last[axis]
+            wide = tap_matrix(
+                positions, -spectrum.last[axis], spectrum.shape[1 - axis], exponent, None
+            )
+            chosen = [range(trim, grid.taps[0] - trim) for trim in rows]
+            few = [
+                tap_matrix(positions, -last, 2 * last + 1, exponent, grid.taps[axis], numbers)
+                for numbers in (chosen if axis == 0 else rows.values())
+            ]
+            self._wide.append(wide.astype(spectrum.real_type))
+            tapped.append([matrix.astype(spectrum.real_type) for matrix in few])
+            self._lobe.append(np.exp(-exponent * positions**2).astype(spectrum.real_type))
+            axes.append(bins)
+        self._tapped = list(zip(*tapped, strict=True))
+        x, y = np.meshgrid(axes[0], axes[1])
+        reached = (x / grid.reach[0]) ** 2 + (y / grid.reach[1]) ** 2 <= 1.0
+        self._near = reached & (np.hypot(x * grid.steps[0], y * grid.steps[1]) <= NEAR)
+        self._far = reached & ~self._near
+
+    def series(
+        self,
+        coefficients: NDArray[np.floating],
+        order_0: NDArray[np.float64],
+        kappas: NDArray[np.float64],
+        scale: float = 1.0,
+    ) -> Iterator[Parts]:
+        """Parts of the stored table at one κ after the other, all of one interval.
+
+        Parameters
+        ----------
+        coefficients : (ny, nx, components, terms), those of the interval.
+        order_0 : (components, series_terms), likewise.
+        kappas : (n,), rad/µm.
+        scale : what `coefficients` were multiplied with.
+        """
+        weights = self.expansion.weights(kappas).astype(self._real)
+        centres = self.expansion.series_weights(kappas) @ order_0.T
+        centres[:, 0] += self.expansion.specular(self.expansion.interval(kappas))
+        for start in range(0, len(kappas), _TOGETHER):
+            few = slice(start, start + _TOGETHER)
+            tables = self._tables(coefficients, weights[few].T / self._real(scale))
+            for kappa, centre, table in zip(kappas[few], centres[few], tables, strict=True):
+                if self.expansion.kind == "power":
+                    yield self._compare(self._exact(kappa), table[..., 0], centre[0])
+                else:
+                    bins = table[..., 0] + 1j * table[..., 1]
+                    yield self._compare(self._exact(kappa), bins, complex(*centre))
+
+    def _tables(
+        self, coefficients: NDArray[np.floating], weights: NDArray[np.floating]
+    ) -> NDArray[np.floating]:
+        """Series (n, ny, nx, components) with weights (terms, n): each coefficient is read once."""
+        if coefficients.size < _SMALL:  # threads would take longer to start
+            return np.moveaxis(coefficients.astype(self._real) @ weights, -1, 0)
+        result = np.empty((weights.shape[1], *coefficients.shape[:3]), self._real)
+
+        def sum_row(y: int) -> None:
+            result[:, y] = np.moveaxis(coefficients[y].astype(self._real) @ weights, -1, 0)
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(sum_row, range(len(coefficients))))
+        return result
+
+    def taps_alone(self, kappa: float) -> Parts:
+        """Parts of a table whose series and storage are perfect: the taps' share of the error."""
+        exact = self._exact(kappa)
+        (y, x), (last_y, last_x) = self._outer[::-1], self.grid.last[::-1]
+        inner = exact[y - last_y : y + last_y + 1, x - last_x : x + last_x + 1].copy()
+        centre = inner[last_y, last_x]
+        inner[last_y, last_x] = 0.0
+        return self._compare(exact, inner, complex(centre))
+
+    def _exact(self, kappa: float) -> NDArray[Any]:
+        """Exact |a_j|², mean over the patches; for amplitudes, a_j of the only patch."""
+        amplitudes = (s.of_phase(kappa, minus_one=True) for s in self.spectra)
+        total: Any = 0.0
+        for amplitude in amplitudes:
+            amplitude[self._outer[1], self._outer[0]] += 1.0
+            if self.grid.coherent:
+                alternate(amplitude, self._outer)
+            total = total + (_power(amplitude) if self.expansion.kind == "power" else amplitude)
+        return total / self._real(len(self.spectra))
+
+    def _tap(self, table: NDArray[Any]) -> NDArray[Any]:
+        """What a look-up's taps add up to, without order 0."""
+        total: Any = 0.0
+        for matrices in self._tapped:
+            total = total + apply_window(matrices, table)
+        return total
+
+    def _compare(self, exact: NDArray[Any], table: NDArray[Any], centre: complex) -> Parts:
+        """Sums over the bins, of a table without order 0 and of the whole lobe of `centre`."""
+        lobe = np.outer(self._lobe[1], self._lobe[0])
+        if self.grid.coherent:
+            truth = _power(apply_window(self._wide, exact))
+            approximate = _power(self._tap(table) + centre * lobe)
+        else:
+            if self.expansion.kind == "amplitude":
+                exact, table, centre = _power(exact), _power(table), abs(centre) ** 2
+            truth = apply_window(self._wide, exact)
+            approximate = np.maximum(self._tap(table) + centre.real * lobe, 0.0)
+        difference = np.abs(approximate - truth)
+        return np.array(
+            [
+                [difference[self._near].sum(dtype=float), difference[self._far].sum(dtype=float)],
+                [truth[self._near].sum(dtype=float), truth[self._far].sum(dtype=float)],
+            ]
+        )
+
+
+def worst(kappas: Sequence[float], parts: Sequence[Parts]) -> dict[str, float]:
+    """The measure of the project, from the parts at many κ.
+
+    Returns
+    -------
+    dict with `near` and `far`, relative errors, and `kappa_near`, `kappa_far`, rad/µm, where.
+    """
+    error, exact = np.array(parts)[:, 0], np.array(parts)[:, 1]
+    floor = FLOOR * exact.max(axis=0)
+    scale = np.maximum(exact, floor)
+    ratio = np.divide(error, scale, out=np.zeros_like(error), where=scale > 0)
+    where = ratio.argmax(axis=0)
+    return {
+        "near": float(ratio[where[0], 0]),
+        "far": float(ratio[where[1], 1]),
+        "kappa_near": float(kappas[where[0]]),
+        "kappa_far": float(kappas[where[1]]),
+    }
+
+
+def alternate(amplitude: NDArray[Any], last: tuple[int, int]) -> None:
+    """Multiply bin (jx, jy) by (−1)^(jx+jy), in place: exp(−i q_j·x₀) for x₀ = half the patch."""
+    parity = (last[0] + last[1]) % 2
+    amplitude[0::2, 1 - parity :: 2] *= -1
+    amplitude[1::2, parity::2] *= -1
+
+
+def _power(amplitude: NDArray[Any]) -> NDArray[np.floating]:
+    return amplitude.real**2 + amplitude.imag**2

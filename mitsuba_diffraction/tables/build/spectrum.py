@@ -1,0 +1,103 @@
+"""DFT coefficients of the phase screen exp(iκh), cropped to the orders that light can reach."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from ...heights.field import HeightField
+
+_SMALL = 1 << 16  # pixels
+_ROWS = 64  # rows (or columns) a task: large enough for the FFT, small enough to stay in cache
+
+
+class Spectrum:
+    """a_j = mean over pixels of f(h)·exp(i q_j·r), for |j| up to `last` in each direction.
+
+    Bins beyond the patch's Nyquist frequency are 0: a sampled surface says nothing there.
+
+    Parameters
+    ----------
+    field : the heights; they are centred here (half range ±H/2), which only turns phases.
+    last : (jx, jy), the outermost bins wanted.
+    double : compute in double precision instead of single.
+    """
+
+    def __init__(self, field: HeightField, last: tuple[int, int], double: bool = False) -> None:
+        self.real_type: Any = np.float64 if double else np.float32
+        self.complex_type: Any = np.complex128 if double else np.complex64
+        lowest, highest = float(field.heights.min()), float(field.heights.max())
+        self.half_range = 0.5 * (highest - lowest)
+        self.heights = (field.heights - 0.5 * (highest + lowest)).astype(self.real_type)
+        self.last = last
+        self._columns = _Crop(self.heights.shape[1], last[0])
+        self._rows = _Crop(self.heights.shape[0], last[1])
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Bins (ny, nx) of every result; bin (0, 0) is in the middle."""
+        return 2 * self.last[1] + 1, 2 * self.last[0] + 1
+
+    def of_phase(self, kappa: float, minus_one: bool = False) -> NDArray[np.complexfloating]:
+        """DFT of exp(iκh), or of exp(iκh) − 1, which keeps its precision as κ → 0."""
+
+        def screen(heights: NDArray[np.floating]) -> NDArray[np.complexfloating]:
+            phase = heights * self.real_type(kappa)
+            out = np.empty(phase.shape, self.complex_type)
+            np.sin(phase, out=out.imag)
+            if minus_one:
+                phase *= self.real_type(0.5)
+                np.sin(phase, out=phase)
+                np.multiply(phase, phase, out=phase)
+                np.multiply(phase, self.real_type(-2.0), out=out.real)
+            else:
+                np.cos(phase, out=out.real)
+            return out
+
+        return self.of(screen)
+
+    def of(self, function: Callable[[NDArray[Any]], NDArray[Any]]) -> NDArray[np.complexfloating]:
+        """DFT of function(h), which is applied to blocks of rows of the centred heights (µm)."""
+        ny = self.heights.shape[0]
+        half = np.empty((ny, len(self._columns.bins)), self.complex_type)
+        result = np.zeros(self.shape, self.complex_type)
+
+        def along_x(start: int) -> None:
+            block = function(self.heights[start : start + _ROWS]).astype(
+                self.complex_type, copy=False
+            )
+            lines = scipy.fft.ifft(block, axis=1, overwrite_x=True)
+            half[start : start + _ROWS] = lines[:, self._columns.source]
+
+        def along_y(start: int) -> None:
+            block = np.ascontiguousarray(half[:, start : start + _ROWS].T)
+            lines = scipy.fft.ifft(block, axis=1, overwrite_x=True)
+            wanted = lines[:, self._rows.source].T
+            columns = self._columns.target[start : start + _ROWS]
+            result[self._rows.target[0] : self._rows.target[-1] + 1, columns] = wanted
+
+        blocks = range(0, ny, _ROWS), range(0, half.shape[1], _ROWS)
+        if self.heights.size < _SMALL:  # threads would take longer to start
+            for work, starts in zip((along_x, along_y), blocks, strict=True):
+                for start in starts:
+                    work(start)
+            return result
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            for work, starts in zip((along_x, along_y), blocks, strict=True):
+                list(pool.map(work, starts))
+        return result
+
+
+class _Crop:
+    """Which DFT bins of n are wanted, and where they go in an array of bins −last … last."""
+
+    def __init__(self, n: int, last: int) -> None:
+        self.bins = np.arange(max(-last, -(n // 2)), min(last, (n - 1) // 2) + 1)
+        self.source = self.bins % n
+        self.target = self.bins + last

@@ -1,0 +1,300 @@
+"""Building a colour table: the integral over wavelengths, as a correlation in log radius.
+
+What light of wavelength λ sees at (u, v, z) are the spatial frequency q = 2π(u, v)/λ and the phase
+per height κ = 2πz/λ, z = w·height_scale. In polar coordinates, with G_t(ln|q|, φ) the window sum of
+term t of the table's series in κ and b_t that term's polynomial,
+
+    RGB(r, φ, z) = ∫ Σ_t G_t(ln 2πr − ln λ, φ) b_t(2πz/λ) s̄(λ)/λ² dλ:
+
+G is looked up once on a grid that is even in ln|q| and φ, and every ring of the colour table is
+then one matrix product of it with weights that are the same for all rings and azimuths.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage, sparse
+
+from ...optics.colour import linear_srgb, response
+from ..energy.powers import order_0_power, power_expansion, powers_of
+from ..expansion import Expansion
+from ..table import DiffractionTable
+from ..window import base_bin, first_tap
+from .polar import RESOLVED_RADIUS, PolarGrid
+
+#: Wavelengths that the eye sees (nm): what is cut off is 1e-4 of the white.
+VISIBLE = (376.0, 744.0)
+
+_FINE = 0.0004  # of ln λ, for the integrals of s̄
+_BLOCK = 1 << 23  # numbers at a time: neither they nor their taps take more than 150 MB
+_MOST_TAPS = 36  # wider windows are applied to all bins at once, and then interpolated
+
+
+def lobe_of(table: DiffractionTable) -> float:
+    """Standard deviation of an order's lobe in (u, v), in the blue where it is narrowest.
+
+    The speckle of a coherent sum is half as wide: its amplitudes beat with each other.
+    """
+    width = 0.44 / (2 * math.pi * math.sqrt(2.0) * table.sigma)
+    return 0.5 * width if table.grid.coherent else width
+
+
+def wavelength_weights(step: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Wavelengths (n,) in µm, even in ln λ, and what each adds to linear sRGB, (n, 3).
+
+    Between them an integrand is taken to be linear in ln λ. The weights add up to white (1, 1, 1).
+    """
+    low, high = np.log(VISIBLE)
+    count = math.ceil((high - low) / step) + 1
+    nodes = low + step * np.arange(count)
+    fine = np.arange(low, nodes[-1], _FINE)
+    density = linear_srgb(response(np.exp(fine))) * np.exp(fine)[:, None]
+    position = (fine - low) / step
+    left = np.minimum(position.astype(int), count - 2)
+    share = (position - left)[:, None]
+    weights = np.zeros((count, 3))
+    np.add.at(weights, left, (1.0 - share) * density)
+    np.add.at(weights, left + 1, share * density)
+    return np.exp(nodes) * 1e-3, weights / weights.sum(axis=0)
+
+
+def order_0_colour(
+    table: DiffractionTable, radii: NDArray[np.float64], z: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """RGB of order 0 alone at these radii (n,) and z (m,), shape (n, m, 3), 1/µm²."""
+    lam, weights = wavelength_weights(0.5 * lobe_of(table) / 2.0)
+    kappa = np.minimum(2 * np.pi * z[:, None] / lam, table.expansion.kappa_max)
+    power = order_0_power(table, kappa)
+    lobe = np.exp(-((table.sigma * 2 * np.pi * radii[:, None] / lam) ** 2))
+    return np.einsum("nl,ml,lc->nmc", lobe, power, weights / lam[:, None] ** 2, optimize=True)
+
+
+class OtherOrders:
+    """All orders but order 0 as a series in z, wherever a polar grid has bins."""
+
+    def __init__(self, table: DiffractionTable) -> None:
+        self._lobe = lobe_of(table)
+        self._source = _Source(table)
+
+    def blocks(
+        self, grid: PolarGrid, band: range, azimuths: NDArray[np.int64], expansion: Expansion
+    ) -> Iterator[tuple[int, NDArray[np.int64], NDArray[np.float32]]]:
+        """Coefficients at some azimuths of all rings of a band, in blocks.
+
+        Yields
+        ------
+        ring, azimuths, and coefficients (azimuths, intervals, 3, terms) in 1/µm².
+        """
+        source = self._source
+        # Neither the lobes nor the observer's curves may slip between two wavelengths
+        lobe = self._lobe / min(grid.radius(band.stop - 1), RESOLVED_RADIUS)
+        per_ring = math.ceil(grid.step / min(1.2 * lobe, 0.5 * grid.step))
+        lam, weights = wavelength_weights(grid.step / per_ring)
+        lam, weights = lam[::-1], weights[::-1]  # the frequency falls with λ
+        parts = _parts(source.expansion, expansion, lam, weights)
+        count = (len(band) - 1) * per_ring + len(lam)
+        first = 2 * np.pi * grid.radius(band.start) / lam[0]
+        frequency = first * np.exp(grid.step / per_ring * np.arange(count))
+        size = max(1, _BLOCK // (count * max(16, source.width)))
+        for start in range(0, len(azimuths), size):
+            mine = azimuths[start : start + size]
+            found = source.at(frequency, 2 * np.pi / grid.counts[band.start] * mine)
+            for n, ring in enumerate(band):
+                result = np.zeros((len(mine), expansion.intervals, 3, expansion.terms), np.float32)
+                for part in parts:
+                    lower, upper = part.wavelengths.start, part.wavelengths.stop
+                    term = found[:, part.source, n * per_ring + lower : n * per_ring + upper]
+                    added = term.reshape(len(mine), -1) @ part.matrix
+                    result[:, part.targets] += added.reshape(len(mine), -1, 3, expansion.terms)
+                yield ring, mine, result
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What one interval of κ adds to the intervals of z, through a run of wavelengths.
+
+    Attributes
+    ----------
+    source : the interval of κ.
+    targets : those of z that it adds to, a run of them.
+    wavelengths : the run of wavelengths.
+    matrix : (wavelengths·terms, targets·3·terms).
+    """
+
+    source: int
+    targets: slice
+    wavelengths: slice
+    matrix: NDArray[np.float32]
+
+
+def _parts(
+    source: Expansion,
+    target: Expansion,
+    wavelengths: NDArray[np.float64],
+    weights: NDArray[np.float64],
+) -> list[_Part]:
+    """How the series in κ at all wavelengths (n,) in µm make the series in z."""
+    scaled = weights / wavelengths[:, None] ** 2
+    nodes = np.array([target.nodes(n) for n in range(target.intervals)])
+    fits = np.array([target.fit(n) for n in range(target.intervals)])
+    kappa = np.minimum(2 * np.pi / wavelengths[:, None, None] * nodes, source.kappa_max)
+    home = source.interval(kappa)
+    parts = []
+    for mine in np.unique(home):
+        inside = home == mine
+        run, targets = _run(inside.any(axis=(1, 2))), _run(inside.any(axis=(0, 2)))
+        inside, at = inside[run, targets], kappa[run, targets]
+        matrix = np.einsum(
+            "lint,lc,inm->lticm",
+            source.weights(np.where(inside, at, 0.0)) * inside[..., None],
+            scaled[run],
+            fits[targets],
+            optimize=True,
+        )
+        flat = matrix.reshape((run.stop - run.start) * source.terms, -1)
+        parts.append(_Part(int(mine), targets, run, np.ascontiguousarray(flat, np.float32)))
+    return parts
+
+
+def _run(used: NDArray[np.bool_]) -> slice:
+    """From the first to the last that is True."""
+    indices = np.flatnonzero(used)
+    return slice(int(indices[0]), int(indices[-1]) + 1)
+
+
+class _Source:
+    """Window sums of a table's series in κ at any spatial frequency, without order 0.
+
+    Attributes
+    ----------
+    expansion : the series of the *power* in κ, whatever the table stores.
+    """
+
+    def __init__(self, table: DiffractionTable) -> None:
+        self._table = table
+        self.expansion = table.expansion
+        coefficients = table.coefficients
+        if table.expansion.kind == "amplitude":
+            self.expansion = power_expansion(table)
+        if table.expansion.kind == "amplitude" and not table.grid.coherent:
+            powers = powers_of(coefficients.astype(np.float32), table.expansion, self.expansion)
+            self._scale = table.scale**2
+            self._bins = _flat(powers[:, :, :, None])
+        else:
+            self._scale = table.scale
+            self._bins = _flat(coefficients)
+        self._shape = coefficients.shape[1:3]
+        taps_x, taps_y = table.grid.taps
+        self._smooth = taps_x * taps_y > _MOST_TAPS
+        if self._smooth:
+            self._bins = _smoothed(self._bins, self._shape, table.grid.exponents)
+
+    @property
+    def width(self) -> int:
+        """Numbers that a point has, at most."""
+        return max(self._bins.shape[1], self.expansion.intervals * self.expansion.terms)
+
+    def at(
+        self, frequency: NDArray[np.floating], azimuth: NDArray[np.floating]
+    ) -> NDArray[np.float32]:
+        """Coefficients (azimuths, intervals, frequencies, terms) of the power's series."""
+        table = self._table
+        qx = np.outer(np.cos(azimuth), frequency).ravel()
+        qy = np.outer(np.sin(azimuth), frequency).ravel()
+        found = self._taps(qx, qy) @ self._bins
+        if table.grid.coherent:
+            found = self._coherent(found, qx, qy)
+        found *= np.float32(1.0 / self._scale)
+        shape = (len(azimuth), len(frequency), self.expansion.intervals, self.expansion.terms)
+        return np.ascontiguousarray(found.reshape(shape).transpose(0, 2, 1, 3))
+
+    def _taps(self, qx: NDArray[np.float64], qy: NDArray[np.float64]) -> sparse.csr_array:
+        """Weights from bins to points, a sparse (points, ny·nx) matrix."""
+        grid, spacing = self._table.grid, self._table.spacing
+        columns, weights_x = self._axis(qx / spacing[0], grid.last[0], grid.taps[0], 0)
+        rows, weights_y = self._axis(qy / spacing[1], grid.last[1], grid.taps[1], 1)
+        index = rows[:, :, None] * np.int32(self._shape[1]) + columns[:, None, :]
+        weights = weights_y[:, :, None] * weights_x[:, None, :]
+        each = index.shape[1] * index.shape[2]
+        return sparse.csr_array(
+            (weights.ravel(), index.ravel(), np.arange(0, index.size + 1, each, dtype=np.int32)),
+            shape=(len(qx), self._shape[0] * self._shape[1]),
+        )
+
+    def _axis(
+        self, position: NDArray[np.float64], last: int, taps: int, axis: int
+    ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """Array indices and weights of the taps along one axis, both (points, taps)."""
+        if self._smooth:
+            taps = 4
+        first = base_bin(position, taps) + first_tap(taps)
+        distance = (position - first)[:, None] - np.arange(taps)
+        if self._smooth:
+            weights = _cubic(position - base_bin(position, taps))
+        else:
+            weights = np.exp(-self._table.grid.exponents[axis] * distance**2)
+        lowest = np.clip(first + last, 0, 2 * last + 1 - taps).astype(np.int32)
+        outside = np.abs(position) > last + taps
+        weights[outside] = 0.0
+        return lowest[:, None] + np.arange(taps, dtype=np.int32), weights.astype(np.float32)
+
+    def _coherent(
+        self, found: NDArray[np.float32], qx: NDArray[np.float64], qy: NDArray[np.float64]
+    ) -> NDArray[np.float32]:
+        """The power's series of a sum of amplitudes, less the power of order 0 alone."""
+        table = self._table
+        old, new = table.expansion, self.expansion
+        parts = found.reshape(len(found), old.intervals, 2, old.terms)
+        x, y = qx / table.spacing[0], qy / table.spacing[1]
+        lobe = np.exp(-table.grid.exponents[0] * x * x - table.grid.exponents[1] * y * y)
+        result = np.empty((len(found), new.intervals, new.terms), np.float32)
+        for interval in range(new.intervals):
+            values = np.empty((len(found), new.terms), np.float32)
+            for n, kappa in enumerate(new.nodes(interval)):
+                mine, weights = int(old.interval(kappa)), old.weights(kappa).astype(np.float32)
+                amplitude = parts[:, mine] @ weights * np.float32(1.0 / table.scale)
+                centre = table.centre(kappa)
+                # |o + c|² − |c|² = |o|² + 2 Re(o c*), c the part of order 0
+                values[:, n] = (amplitude**2).sum(axis=1) + 2.0 * lobe * (amplitude @ centre)
+            result[:, interval] = values @ new.fit(interval).astype(np.float32)
+        return result.reshape(len(found), -1) * np.float32(self._scale)
+
+
+def _flat(coefficients: NDArray[np.floating]) -> NDArray[np.float32]:
+    """(intervals, ny, nx, components, terms) to (ny·nx, intervals·components·terms)."""
+    intervals, ny, nx, components, terms = coefficients.shape
+    flat = np.empty((ny, nx, intervals, components, terms), np.float32)
+    for interval in range(intervals):
+        flat[:, :, interval] = coefficients[interval]
+    return flat.reshape(ny * nx, -1)
+
+
+def _smoothed(
+    bins: NDArray[np.float32], shape: tuple[int, ...], exponents: tuple[float, float]
+) -> NDArray[np.float32]:
+    """The window applied to all bins: for windows many bins wide, whose sums are smooth."""
+    image = bins.reshape(*shape, -1)
+    for axis, exponent in ((0, exponents[1]), (1, exponents[0])):
+        reach = math.ceil(4.2 / math.sqrt(exponent))
+        kernel = np.exp(-exponent * np.arange(-reach, reach + 1) ** 2).astype(np.float32)
+        image = ndimage.convolve1d(image, kernel, axis, mode="constant")
+    return image.reshape(bins.shape)
+
+
+def _cubic(offset: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lagrange's weights (points, 4) for the taps at −1, 0, 1, 2; offset 0 … 1 from tap 0."""
+    t = offset
+    return np.stack(
+        [
+            -t * (t - 1) * (t - 2) / 6,
+            (t + 1) * (t - 1) * (t - 2) / 2,
+            -(t + 1) * t * (t - 2) / 2,
+            (t + 1) * t * (t - 1) / 6,
+        ],
+        axis=1,
+    )

@@ -1,0 +1,76 @@
+"""Powers of the orders as series in κ, also of tables that store amplitudes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..expansion import Expansion
+from ..table import DiffractionTable
+
+
+def kind_of(table: DiffractionTable) -> str:
+    """How all orders but order 0 fade as κ → 0, by the kind of series that does the same.
+
+    A power fades as κ²; in a coherent sum an amplitude beats with order 0's, and fades as κ.
+    """
+    return "amplitude" if table.grid.coherent else "power"
+
+
+def power_expansion(table: DiffractionTable) -> Expansion:
+    """A series of the power for a table of amplitudes: the power oscillates twice as fast."""
+    amplitude = table.expansion
+    intervals = max(1, math.ceil(amplitude.kappa_max * amplitude.half_range / 4.0))
+    return Expansion(
+        "chebyshev", kind_of(table), 12, intervals, amplitude.kappa_max, amplitude.half_range
+    )
+
+
+def powers_of(
+    coefficients: NDArray[np.float32], old: Expansion, new: Expansion
+) -> NDArray[np.float32]:
+    """Series of |a_j|², (intervals, ny, nx, terms), from one of a_j; order 0 is zero in both."""
+    ny, nx = coefficients.shape[1:3]
+    result = np.empty((new.intervals, ny, nx, new.terms), np.float32)
+    for interval in range(new.intervals):
+        values = np.empty((ny, nx, new.terms), np.float32)
+        for n, kappa in enumerate(new.nodes(interval)):
+            parts = coefficients[int(old.interval(kappa))] @ old.weights(kappa).astype(np.float32)
+            values[..., n] = (parts**2).sum(axis=2)
+        result[interval] = values @ new.fit(interval).astype(np.float32)
+    return result
+
+
+def order_0_power(table: DiffractionTable, kappa: NDArray[np.float64]) -> NDArray[np.float64]:
+    """|a_0(κ)|², the shape of κ."""
+    parts = table.centre(kappa)
+    if table.expansion.kind == "power":
+        return np.asarray(np.maximum(parts[..., 0], 0.0))
+    return np.asarray(np.sum(parts**2, axis=-1))
+
+
+def power_series(
+    table: DiffractionTable,
+) -> tuple[NDArray[np.floating], NDArray[np.float64], float, Expansion]:
+    """The powers |a_j(κ)|² of an incoherent table, whatever it stores.
+
+    Returns
+    -------
+    coefficients : (intervals, ny, nx, terms), to be divided by the scale; order 0 is zero.
+    order_0 : (intervals, series_terms) of order 0, less 1 in the first interval.
+    scale, expansion
+    """
+    table.require_whole("a list of powers is made of")
+    old = table.expansion
+    if old.kind == "power":
+        order_0 = table.order_0[:, 0]
+        return table.coefficients[:, :, :, 0], order_0, table.scale, old
+    new = power_expansion(table)
+    found = powers_of(table.coefficients.astype(np.float32), old, new)
+    order_0 = np.empty((new.intervals, new.terms))
+    for interval in range(new.intervals):
+        values = order_0_power(table, new.nodes(interval)) - new.specular(interval)
+        order_0[interval] = values @ new.fit(interval)
+    return found, order_0, table.scale**2, new

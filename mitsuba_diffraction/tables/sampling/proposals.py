@@ -1,0 +1,129 @@
+"""Where a surface sends its light, roughly: densities in spatial frequency to draw directions from.
+
+(α, β) → ωo has the Jacobian dωo = dα dβ / (k² cosθo), so that a density proportional to the window
+sum over (α, β) is almost the BRDF times cosθo. The plane of frequencies is cut into square cells
+about one lobe of the window wide; each holds the power of all orders but order 0 that falls into
+it. The power depends on κ, which varies with the direction drawn: a few bands of κ have densities
+of their own. Order 0 is a Gaussian with a weight known exactly, and needs no cells.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse, special
+
+from ..table import DiffractionTable
+from ..window import apply_window
+
+#: Width of a cell in units of 1/σ: a lobe is then nearly even across it.
+CELL = 1.5
+#: Most cells in each direction; more memory would buy little.
+MOST_CELLS = 1024
+#: Bands of κ, up to 3/4 of κ_max: κ is at most k(cosθi + 1), and k(cosθi + 1/2) picks the band.
+BANDS, BANDED = 6, 0.75
+
+_KAPPAS = 4  # averaged in a band
+_SPREAD = 0.25  # half width of a band's average, as a share of κ_max: κ spreads over k
+
+
+@dataclass(frozen=True)
+class Proposals:
+    """Cumulative distributions over the cells, one set a band.
+
+    Attributes
+    ----------
+    origin : (x, y), lower corner of cell (0, 0), rad/µm.
+    cell : width of a cell, rad/µm.
+    rows : (bands, ny + 1) cumulative probability of rows, from 0 to 1.
+    columns : (bands, ny, nx + 1) cumulative probability within a row, from 0 to 1.
+    occupied : (bands,) whether there is any power besides order 0.
+    """
+
+    origin: tuple[float, float]
+    cell: float
+    rows: NDArray[np.float32]
+    columns: NDArray[np.float32]
+    occupied: NDArray[np.bool_]
+
+
+def proposals(table: DiffractionTable) -> Proposals:
+    """Tabulate the densities of all bands."""
+    edge = [
+        min(radius, n * spacing) + 2.0 / table.sigma
+        for radius, n, spacing in zip(table.radii, table.grid.last, table.spacing, strict=True)
+    ]
+    cell = max(CELL / table.sigma, 2.0 * max(edge) / MOST_CELLS)
+    counts = [math.ceil(2.0 * e / cell) for e in edge]
+    origin = (-0.5 * cell * counts[0], -0.5 * cell * counts[1])
+    matrices = [_cell_matrix(table, axis, origin[axis], cell, counts[axis]) for axis in (0, 1)]
+    rows = np.zeros((BANDS, counts[1] + 1), np.float32)
+    columns = np.zeros((BANDS, counts[1], counts[0] + 1), np.float32)
+    for band in range(BANDS):
+        power = _cell_power(table, matrices, band)
+        of_row = power.sum(axis=1)
+        if of_row.sum() > 0.0:
+            rows[band] = _cumulative(of_row)
+            columns[band] = _cumulative(power)
+    return Proposals(origin, cell, rows, columns, rows[:, -1] > 0.0)
+
+
+def _cell_power(
+    table: DiffractionTable, matrices: list[sparse.csr_array], band: int
+) -> NDArray[np.float64]:
+    """Mean window sum in each cell (ny, nx) over the band's range of κ, without order 0."""
+    expansion = table.expansion
+    centre = BANDED * (band + 0.5) / BANDS
+    shares = centre + _SPREAD * np.linspace(-0.75, 0.75, _KAPPAS)
+    kappas = np.clip(shares, 0.02, 1.0) * expansion.kappa_max
+    intervals = expansion.interval(kappas)
+    weights = expansion.weights(kappas) / table.scale
+    total: NDArray[np.float64] = np.zeros(())
+    for interval in np.unique(intervals):
+        mine = weights[intervals == interval]
+        coefficients = table.coefficients[interval].astype(np.float32)
+        if expansion.kind == "power":  # linear: the mean of the weights does
+            power = coefficients[:, :, 0] @ mine.sum(axis=0).astype(np.float32)
+            total = total + apply_window(matrices, np.maximum(power, 0.0))
+            continue
+        for weight in mine.astype(np.float32):
+            parts = coefficients @ weight
+            if table.grid.coherent:
+                amplitude = parts[..., 0] + 1j * parts[..., 1]
+                total = total + np.abs(apply_window(matrices, amplitude)) ** 2
+            else:
+                total = total + apply_window(matrices, np.sum(parts**2, axis=2))
+    return np.asarray(total, float)
+
+
+def _cell_matrix(
+    table: DiffractionTable, axis: int, origin: float, cell: float, count: int
+) -> sparse.csr_array:
+    """Sparse (cells, bins): the window around a bin, integrated over a cell.
+
+    Amplitudes are taken at the cell's centre instead: their square is what is wanted.
+    """
+    last, spacing = table.grid.last[axis], table.spacing[axis]
+    frequency = spacing * np.arange(-last, last + 1)
+    lower = origin + cell * np.arange(count)
+    if table.grid.coherent:
+        distance = lower[:, None] + 0.5 * cell - frequency
+        weights = np.exp(-0.5 * (table.sigma * distance) ** 2)
+    else:
+        low = special.erf(table.sigma * (lower[:, None] - frequency))
+        high = special.erf(table.sigma * (lower[:, None] + cell - frequency))
+        weights = high - low
+    weights[weights < 1e-7] = 0.0
+    return sparse.csr_array(weights.astype(np.float32))
+
+
+def _cumulative(power: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Running sums along the last axis, from exactly 0 to exactly 1; 0 where there is none."""
+    sums = np.cumsum(power, axis=-1)
+    total = sums[..., -1:]
+    result = np.zeros((*power.shape[:-1], power.shape[-1] + 1), np.float32)
+    np.divide(sums, total, out=result[..., 1:], where=total > 0.0, casting="same_kind")
+    return result

@@ -1,0 +1,33 @@
+"""A monochromatic beam on a patch: the ridge of maxima against the grating equation (NumPy only).
+
+Contents
+--------
+Beam            direction of the light, and the plane of the detector
+Response        what a method sends to each viewing angle at each wavelength
+measure         a method under a beam
+Ridge           viewing angle of the maximum at each wavelength
+ridge_of        the ridge of one order
+Fit             period of the grating equation that fits a ridge
+fit_period      that fit
+window_fits     the same for windows all over the patch
+documents_fit   the procedure behind the source documents' published periods
+"""
+
+from __future__ import annotations
+
+from .beam import Beam, Response, measure
+from .procedure import documents_fit
+from .ridge import Fit, Ridge, fit_period, ridge_of
+from .windows import window_fits
+
+__all__ = [
+    "Beam",
+    "Fit",
+    "Response",
+    "Ridge",
+    "documents_fit",
+    "fit_period",
+    "measure",
+    "ridge_of",
+    "window_fits",
+]

@@ -1,0 +1,123 @@
+"""One coherence window at many places of a patch, and the period that each of them shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import DiffractionError
+from ...progress import Progress
+from ...tables.table import DiffractionTable
+from .beam import Array, Beam, measure
+from .ridge import Fit, fit_period, ridge_of
+
+MOST_WINDOWS = 4096
+
+_SEED = 20140113
+
+
+@dataclass(frozen=True, eq=False)
+class WindowFits:
+    """Fits of single windows.
+
+    Attributes
+    ----------
+    places : (n, 2), centres of the windows, µm.
+    fits : as many; `None` where too few maxima were found.
+    """
+
+    places: Array
+    fits: tuple[Fit | None, ...]
+
+    @property
+    def periods(self) -> Array:
+        """µm, of the windows that have one."""
+        return np.array([fit.period for fit in self.fits if fit is not None])
+
+    @property
+    def mean(self) -> float:
+        """µm."""
+        return float(self.periods.mean())
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation between windows, µm; 0 for a single one."""
+        return float(self.periods.std(ddof=1)) if self.periods.size > 1 else 0.0
+
+
+def window_fits(
+    table: DiffractionTable,
+    beam: Beam,
+    wavelengths: Array,
+    angles: Array,
+    *,
+    count: int,
+    order: int = 1,
+    progress: Progress | None = None,
+) -> WindowFits:
+    """Fit a period to each of `count` windows, spread over the patch with one offset (fixed seed).
+
+    Parameters
+    ----------
+    table : with coherence="patch".
+
+    Raises
+    ------
+    DiffractionError
+        If `count` is out of range, or no window gives a period.
+    """
+    if not 1 <= count <= MOST_WINDOWS:
+        raise DiffractionError(f"windows={count} must be from 1 to {MOST_WINDOWS}")
+    extent = 2.0 * np.pi / np.array(table.spacing)
+    places = _lattice(count) * extent
+    fits: list[Fit | None] = []
+    for n, place in enumerate(places):
+        moved = moved_window(table, (float(place[0]), float(place[1])))
+        response = measure(
+            moved.brdf, beam, wavelengths, angles, sigma=table.sigma, label=f"window {n + 1}"
+        )
+        try:
+            fits.append(fit_period(ridge_of(response, order)))
+        except DiffractionError:
+            fits.append(None)  # this window shows too few maxima; counted below
+        if progress is not None:
+            progress(n + 1, count, "moving the window")
+    if all(fit is None for fit in fits):
+        raise DiffractionError(
+            f"none of {count} windows shows order {order} at enough wavelengths to fit a period to"
+        )
+    return WindowFits(places, tuple(fits))
+
+
+def moved_window(table: DiffractionTable, place: tuple[float, float]) -> DiffractionTable:
+    """The table of a window centred on `place` (µm from the patch's first pixel).
+
+    A coherent table has the phases exp(−i q_j·x₀) of a window on the patch's centre; the rest of
+    the way turns them by exp(−i q_j·(place − x₀)).
+
+    Raises
+    ------
+    DiffractionError
+        If the table holds no amplitudes.
+    """
+    if not table.grid.coherent:
+        raise DiffractionError("a window can only be moved in a table with coherence='patch'")
+    phases: list[NDArray[np.complex128]] = []
+    for axis in (0, 1):
+        bins = np.arange(-table.grid.last[axis], table.grid.last[axis] + 1)
+        half = np.pi / table.spacing[axis]  # half of the extent
+        phases.append(np.exp(-1j * bins * table.spacing[axis] * (place[axis] - half)))
+    turn = (phases[1][:, None] * phases[0])[None, :, :, None]
+    real, imaginary = (table.coefficients[..., part, :].astype(np.float32) for part in (0, 1))
+    cos, sin = turn.real.astype(np.float32), turn.imag.astype(np.float32)
+    coefficients = np.stack([real * cos - imaginary * sin, real * sin + imaginary * cos], axis=-2)
+    return replace(table, coefficients=coefficients)
+
+
+def _lattice(count: int) -> Array:
+    """Places (count, 2) in [0, 1)²: a rank-1 lattice by the plastic number, with one offset."""
+    plastic = 1.32471795724474602596
+    steps = np.arange(count)[:, None] * np.array([1.0 / plastic, 1.0 / plastic**2])
+    return np.asarray((steps + np.random.default_rng(_SEED).random(2)) % 1.0)

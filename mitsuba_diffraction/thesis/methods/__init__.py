@@ -1,0 +1,46 @@
+"""Ways to spend the wavelength loop: those of the source documents beside the package's own.
+
+One interface (`Method`): `brdf` in 1/sr at single wavelengths, `relative` as the documents define
+reflectance, `xyz` and `linear_srgb` under D65, all for arrays of direction pairs (NumPy only).
+
+Contents
+--------
+make               a method by name, for a height field
+make_all           several of them, which share what they tabulate
+NAMES              their names
+Method             what each of them is
+FullSpectrum       default and flss: uniform sampling of the whole spectrum
+OrdersOnly         nmm: only the wavelengths whose orders reach the view direction
+Repeated           pq: the patch repeated, with linear or sinc interpolation
+Rainbow            rainbow: the grating equation alone
+Gain               the documents' gain factor C
+method_map         a method over the hemisphere (in `maps`)
+estimate_periods   the period of a patch, with its confidence
+"""
+
+from __future__ import annotations
+
+from .full_spectrum import FullSpectrum
+from .gain import Gain
+from .make import NAMES, make, make_all
+from .maps import method_map
+from .method import Method
+from .nmm import OrdersOnly
+from .period import Period, estimate_periods
+from .pq import Repeated
+from .rainbow import Rainbow
+
+__all__ = [
+    "NAMES",
+    "FullSpectrum",
+    "Gain",
+    "Method",
+    "OrdersOnly",
+    "Period",
+    "Rainbow",
+    "Repeated",
+    "estimate_periods",
+    "make",
+    "make_all",
+    "method_map",
+]

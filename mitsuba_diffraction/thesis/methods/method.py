@@ -1,0 +1,170 @@
+"""What every method is: a spectrum for direction pairs, and a rule that sums it to colours."""
+
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import trapezoid
+
+from ...errors import DiffractionError
+from ...optics.colour import linear_srgb, response
+from ...optics.geometry import kirchhoff_factor
+from ...progress import Progress
+from .gain import Gain
+
+Array = NDArray[np.float64]
+
+_PAIRS = 4096  # direction pairs at a time, per thread
+
+
+class Method(ABC):
+    """One way to spend the wavelength loop.
+
+    Directions are unit vectors (n, 3) or (3,) in the patch's frame, both pointing away from the
+    surface; the surface reflects everything (R = 1), and nothing from below.
+
+    Attributes
+    ----------
+    name : one of `NAMES`.
+    sigma : µm; 4πσ² is the coherent area (that of a Gaussian window of this σ).
+    wavelength_range : nm, that the colours are summed over.
+    """
+
+    name: str
+    sigma: float
+    wavelength_range: tuple[float, float]
+
+    @abstractmethod
+    def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
+        """S = ⟨|P|²⟩/(2πσ²)², shape (n,), dimensionless: 1 for a flat mirror in its direction.
+
+        Parameters
+        ----------
+        wi, wo : (n, 3), above the surface.
+        wavelength : (n,), nm.
+        """
+
+    @abstractmethod
+    def samples(self, wi: Array, wo: Array) -> Iterator[tuple[Array, Array]]:
+        """Wavelengths (n,) in nm and their weights (n,) in nm, 0 where there is none for a pair."""
+
+    def special(self, wi: Array, wo: Array) -> tuple[NDArray[np.bool_], float]:
+        """Pairs (n,) that are white instead, as bright as at this wavelength (nm); none here."""
+        return np.zeros(len(wi), bool), 550.0
+
+    def brdf(self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike) -> Array:
+        """f = (1 + ωi·ωo)²·4πσ²·S / (λ² w² cosθi cosθo), the BRDF in 1/sr, shape (n,).
+
+        wavelength : (n,) or scalar, nm.
+        """
+        return self._value(wi, wo, wavelength, None)
+
+    def relative(
+        self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, gain: Gain | None = None
+    ) -> Array:
+        """ρ = C·S, the documents' relative reflectance (see `gain`), shape (n,)."""
+        return self._value(wi, wo, wavelength, gain or Gain())
+
+    def xyz(
+        self,
+        wi: ArrayLike,
+        wo: ArrayLike,
+        *,
+        gain: Gain | None = None,
+        progress: Progress | None = None,
+    ) -> Array:
+        """X, Y, Z under D65, shape (n, 3): Σ over the method's wavelengths of value·s̄(λ)·weight.
+
+        s̄ = S_D65·(x̄, ȳ, z̄)/∫S_D65·ȳ dλ (`colour.response`), so that what reflects all wavelengths
+        alike is D65's white with Y = its value.
+
+        Parameters
+        ----------
+        gain : sum the relative reflectance with this gain factor instead of the BRDF.
+        progress : called as progress(done, total, text).
+        """
+        incident, outgoing = self._pairs(wi, wo)
+        result = np.zeros((len(incident), 3))
+        starts = range(0, len(incident), _PAIRS)
+
+        def chunk(start: int) -> None:
+            part = slice(start, start + _PAIRS)
+            above = (incident[part, 2] > 0) & (outgoing[part, 2] > 0)
+            rows = np.flatnonzero(above) + start
+            result[rows] = self._xyz(incident[rows], outgoing[rows], gain)
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            for done, _ in enumerate(pool.map(chunk, starts)):
+                if progress is not None:
+                    progress(done + 1, len(starts), f"evaluating {self.name}")
+        return result
+
+    def linear_srgb(
+        self,
+        wi: ArrayLike,
+        wo: ArrayLike,
+        *,
+        gain: Gain | None = None,
+        progress: Progress | None = None,
+    ) -> Array:
+        """The same in linear sRGB, (n, 3); components outside the gamut are negative."""
+        xyz = self.xyz(wi, wo, gain=gain, progress=progress)
+        return np.asarray(linear_srgb(xyz), np.float64)
+
+    def _xyz(self, wi: Array, wo: Array, gain: Gain | None) -> Array:
+        """Colours of pairs above the surface."""
+        total = np.zeros((len(wi), 3))
+        white, wavelength = self.special(wi, wo)
+        if white.any():
+            value = self._scaled(wi[white], wo[white], np.full(white.sum(), wavelength), gain)
+            total[white] = value[:, None] * self._white()
+        for wavelengths, weights in self.samples(wi, wo):
+            on = (weights > 0) & ~white
+            if not on.any():
+                continue
+            lam = wavelengths[on]
+            value = self._scaled(wi[on], wo[on], lam, gain) * weights[on]
+            total[on] += value[:, None] * response(lam)
+        return total
+
+    def _white(self) -> Array:
+        """X, Y, Z (3,) of a reflectance of 1 over the method's range."""
+        lam = np.arange(self.wavelength_range[0], self.wavelength_range[1] + 0.5)
+        return np.asarray(trapezoid(response(lam), lam, axis=0))
+
+    def _value(
+        self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, gain: Gain | None
+    ) -> Array:
+        incident, outgoing = self._pairs(wi, wo)
+        lam = np.broadcast_to(np.asarray(wavelength, float), len(incident))
+        if not np.all(lam > 0):
+            raise DiffractionError("wavelength must be positive, in nm")
+        above = (incident[:, 2] > 0) & (outgoing[:, 2] > 0)
+        result = np.zeros(len(incident))
+        result[above] = self._scaled(incident[above], outgoing[above], lam[above], gain)
+        return result
+
+    def _scaled(self, wi: Array, wo: Array, wavelength: Array, gain: Gain | None) -> Array:
+        s = self.window_sum(wi, wo, wavelength)
+        if gain is not None:
+            return gain.factor(wi, wo) * s
+        area = 4.0 * np.pi * self.sigma**2
+        return kirchhoff_factor(wi, wo, wavelength, self.sigma) * (np.pi * self.sigma**2 * area) * s
+
+    @staticmethod
+    def _pairs(wi: ArrayLike, wo: ArrayLike) -> tuple[Array, Array]:
+        incident, outgoing = (np.atleast_2d(np.asarray(d, float)) for d in (wi, wo))
+        try:
+            incident, outgoing = np.broadcast_arrays(incident, outgoing)
+        except ValueError:
+            incident = incident[:0, :2]
+        if incident.ndim != 2 or incident.shape[-1] != 3:
+            raise DiffractionError(
+                f"wi has shape {np.shape(wi)} and wo {np.shape(wo)}; both must be (n, 3) or (3,)"
+            )
+        return incident, outgoing

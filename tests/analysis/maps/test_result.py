@@ -1,0 +1,36 @@
+"""What a map knows of itself: how bright to show it, and whether it has colours."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from mitsuba_diffraction.analysis.maps import brdf_map
+from tests.analysis.maps.surfaces import GRATING, mirror, plugin
+
+# Patches here are small and tiled, and the flat ones coarse: the warnings are right, but known.
+pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+
+
+@pytest.mark.usefixtures("variant")
+def test_exposure_shows_what_lies_around_the_mirror_direction():
+    result = brdf_map(plugin(GRATING), 20.0, step=20, resolution=128)
+    stops = result.exposure()
+    shown = np.sort((result.luminance * 2.0**stops)[result.away_from_mirror()].astype(float))
+    below_white = shown[shown < 1.0].sum() / shown.sum()
+    assert below_white >= 0.45  # rounded to a tenth of a stop
+    assert (result.luminance * 2.0**stops > 8.6).mean() <= 1e-3
+    alone = brdf_map(mirror(), 20.0, step=47, resolution=64)  # nothing but the lobe: it counts
+    assert alone.luminance.max() * 2.0 ** alone.exposure() > 1.0
+    dark = brdf_map(mi.load_dict({"type": "dielectric"}), resolution=8)  # specular only
+    assert dark.exposure() == 0.0
+
+
+@pytest.mark.usefixtures("variant")
+def test_a_single_wavelength_has_no_colours():
+    result = brdf_map(mirror(), wavelength=550.0, resolution=16)
+    assert result.xyz is None
+    assert result.albedo().shape == (1,)
+    with pytest.raises(ValueError, match="no colours"):
+        _ = result.linear

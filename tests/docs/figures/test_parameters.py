@@ -1,0 +1,112 @@
+"""The reference of parameters: the plugin's docstring, README and code say the same."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from pathlib import Path
+
+import mitsuba as mi
+import pytest
+
+import mitsuba_diffraction as md
+from docs.make.figures import parameters
+from mitsuba_diffraction.errors import DiffractionError
+
+ROOT = Path(__file__).parents[2]
+ENTRIES = [e for entries in parameters.groups(parameters.docstring()).values() for e in entries]
+BY_NAME = {name: entry for entry in ENTRIES for name in entry.names}
+
+
+@pytest.fixture
+def patch():
+    return md.gratings.sinusoidal(period=1.6, depth=0.06, periods=4, pixels_per_period=32)
+
+
+def test_the_page_is_made_of_the_docstring(tmp_path):
+    made = tmp_path / "parameters.md"
+    assert parameters.main(["-o", str(made)]) == 0
+    committed = (ROOT / "docs" / "parameters.md").read_text("utf-8")
+    assert committed == made.read_text("utf-8"), "run make parameters"
+
+
+def test_every_parameter_is_described_once(some_variant):
+    from mitsuba_diffraction.plugin.parameters import NAMES
+
+    names = [name for entry in ENTRIES for name in entry.names]
+    assert sorted(names) == sorted([*NAMES, "(nested)"])
+
+
+def test_the_readme_gives_the_same_defaults():
+    readme = (ROOT / "README.md").read_text("utf-8")
+    rows = readme[readme.index("| parameter |") :].partition("\n\n")[0].splitlines()[2:]
+    compared = 0
+    for row in rows:
+        first, _, default, *_ = (cell.strip() for cell in row.strip("|").split("|"))
+        for name in re.findall(r"`(\w+)`", first):
+            assert BY_NAME[name].default == default.replace("`", ""), name
+            compared += 1
+    assert compared > 20
+
+
+def test_the_defaults_are_those_of_the_code(some_variant, patch):
+    from mitsuba_diffraction.plugin import parameters as code
+    from mitsuba_diffraction.tables.table import DiffractionTable
+
+    def default(name):
+        return BY_NAME[name].default
+
+    build = inspect.signature(DiffractionTable.build).parameters
+    assert float(default("coherence_width")) == build["coherence_width"].default
+    assert float(default("tolerance")) == build["tolerance"].default
+    for name in ("coherence", "basis"):
+        assert default(name) == build[name].default
+
+    properties = mi.Properties("diffraction")
+    given = md.bsdf_dict(patch, coherence_width=4, tolerance=0.1)
+    for name in ("data", "pixel_size", "coherence_width", "tolerance"):
+        properties[name] = given[name]
+    read = code.read_parameters(properties)
+    assert float(default("height_scale")) == read.height_scale
+    assert float(default("wavelength")) == read.wavelength
+    assert default("energy_conserving") == str(read.energy_conserving).lower()
+    assert default("shadowing") == ("vcavity" if read.vcavity else "none")
+    assert default("layering") == str(read.layering)
+    assert float(default("orientation")) == read.orientation.degrees[0]
+    interior, exterior = (float(index) for index in default("int_ior").split(","))
+    # single precision
+    assert read.reflectance.eta[0] == pytest.approx(interior / exterior, rel=1e-6)
+
+
+def test_the_choices_are_those_of_the_code(some_variant):
+    from mitsuba_diffraction.heights import options
+    from mitsuba_diffraction.plugin import parameters as code
+    from mitsuba_diffraction.tables.expansion import BASES
+
+    choices = {
+        "fill": ("none", *options.FILLS),
+        "level": options.LEVELS,
+        "periodic": options.PERIODICS,
+        "shadowing": code.SHADOWINGS,
+        "layering": code.LAYERINGS,
+        "basis": (*BASES, "auto"),
+    }
+    for name, allowed in choices.items():
+        named = set(re.findall(r"`(\w+)`", BY_NAME[name].text))
+        assert named == set(allowed), name
+
+
+def test_what_is_marked_differentiable_is(some_variant, patch):
+    named = {"eta": 1.4, "k": 6.0}
+    bsdf = mi.load_dict(
+        md.bsdf_dict(patch, coherence_width=4, tolerance=0.1, energy_conserving=False) | named
+    )
+    found = {key.split(".")[0] for key, _ in mi.traverse(bsdf)}
+    marked = {name for entry in ENTRIES if entry.differentiable for name in entry.names}
+    assert found == marked - {"(nested)"}
+
+
+@pytest.mark.parametrize("entry", ["depth\n    Text.", "depth : float"])
+def test_a_line_that_is_no_entry_is_refused(entry):
+    with pytest.raises(DiffractionError, match="expected 'name : type"):
+        parameters.groups(f"The surface\n-----------\n{entry}\n\nThe model is that.")

@@ -1,0 +1,75 @@
+"""The README's table and sheet of the shaders are those that `compare` wrote."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from docs.make.figures import markers, realtime
+
+README = Path(__file__).parents[2] / "README.md"
+
+
+@pytest.fixture
+def compared(tmp_path):
+    found = {
+        "pixels": 640, "share": 0.25, "delta_e_mean": 0.4567, "delta_e_percentiles": {"99": 3.21},
+        "flip": 0.0213, "relative_rmse": None,
+    }  # fmt: skip
+    entry = {
+        "diffracting": found, "both": {**found, "pixels": 900}, "frame_ms": 1234.5,
+        "fragment_ns": 35.2, "look_up_ns": 12.3, "texture_bytes": 2.1e7,
+    }  # fmt: skip
+    document = {
+        "scene": "scenes/plate.xml", "size": [64, 40], "driver": "abacus",
+        "noise_delta_e_mean": 0.29,
+        "methods": {
+            "lut": entry,
+            "spectral": {**entry, "both": {**found, "delta_e_mean": 0.321}},
+            "flss": {**entry, "fragment_ns": 35200.0},
+        },
+    }  # fmt: skip
+    folder = tmp_path / "compared"
+    folder.mkdir()
+    (folder / "compare.json").write_text(json.dumps(document), "utf-8")
+    Image.new("RGB", (320, 80), (10, 20, 30)).save(folder / "lut.png")
+    return folder
+
+
+@pytest.fixture
+def page(tmp_path):
+    (tmp_path / realtime.SHEET).parent.mkdir(parents=True)
+    file = tmp_path / "README.md"
+    file.write_text("<!-- begin realtime -->\nstale\n<!-- end realtime -->\n", "utf-8")
+    return file
+
+
+def test_table_and_sheet_are_replaced(compared, page):
+    assert realtime.main([str(compared), "-o", str(page)]) == 0
+    text = page.read_text("utf-8")
+    assert "| `lut` | 0.46 | 3.21 | 0.021 |  | 1230 | 35.2 | 1000 | 12.3 | 21.0 |" in text
+    assert "| [plate](scenes/plate.xml) | 0.46 | 3.21 | 0.32 | 3.21 | 0.29 | 900 |" in text
+    assert "25 % of 64 × 40 pixels" in text
+    assert "stale" not in text
+    with Image.open(page.parent / realtime.SHEET) as image:
+        assert image.size == (1600, 400)
+
+
+@pytest.mark.parametrize("missing", ["compare.json", "lut.png"])
+def test_what_compare_did_not_write_is_refused_in_one_line(compared, page, capsys, missing):
+    (compared / missing).unlink()
+    assert realtime.main([str(compared), "-o", str(page)]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+    assert "stale" in page.read_text("utf-8")
+
+
+def test_the_committed_readme_has_all_methods():
+    text = markers.part(README.read_text("utf-8"), "realtime")
+    for method in ("lut", "spectral", "flss", "nmm", "pq"):
+        assert f"| `{method}` |" in text
+    for scene in ("snake", "plate", "sphere"):
+        assert f"| [{scene}](scenes/{scene}.xml) |" in text
+    assert (README.parent / realtime.SHEET).is_file()

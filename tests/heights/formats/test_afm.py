@@ -1,0 +1,206 @@
+"""Instrument files are read in their own units, and what they lack is named."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
+from mitsuba_diffraction.heights.field import HeightField
+from tests.heights.formats.refusals import refusal
+from tests.instruments import nanoscope
+
+surface_topography = pytest.importorskip(
+    "SurfaceTopography", reason="instrument files need the extra afm"
+)
+
+NX, NY = 6, 4
+COUNTS = np.random.default_rng(8).integers(-3000, 3000, (NY, NX)).astype("<i2")
+
+
+def write(tmp_path, *args, name="scan.001", length=None, **kwargs):
+    path = tmp_path / name
+    path.write_bytes(nanoscope(COUNTS, *args, **kwargs)[:length])
+    return path
+
+
+def test_heights_and_size_come_in_the_units_of_the_file(tmp_path):
+    field = HeightField.load(write(tmp_path))
+    # 0.5 V over 2^16 counts, 100 nm/V; the file's first line is the bottom of the picture
+    assert field.heights == pytest.approx(COUNTS * (0.5 / 2**16 * 100 * 1e-3), rel=1e-12)
+    assert field.pixel_size == pytest.approx((3 / NX, 2 / NY), rel=1e-12)
+    assert "ZSensor" in field.history[0]
+
+
+@pytest.mark.parametrize(("unit", "in_micrometres"), [("pm", 1e-6), ("um", 1), ("nm", 1e-3)])
+def test_any_unit_of_length_will_do(tmp_path, unit, in_micrometres):
+    field = HeightField.load(write(tmp_path, [("Height", unit)], scan_size="300 nm"))
+    assert field.range == pytest.approx(np.ptp(COUNTS) * 0.5 / 2**16 * 100 * in_micrometres)
+    assert field.pixel_size == pytest.approx((0.3 / NX, 0.3 / NY), rel=1e-12)
+
+
+def test_height_channel_is_found_among_others(tmp_path):
+    path = write(tmp_path, [("AmplitudeError", "nm"), ("ZSensor", "nm"), ("Phase", "deg")])
+    field = HeightField.load(path)
+    assert "'ZSensor', the only height channel" in field.history[0]
+
+
+def test_of_several_height_channels_the_first_is_taken_with_a_warning(tmp_path):
+    path = write(tmp_path, [("Height", "nm"), ("ZSensor", "nm")])
+    with pytest.warns(DiffractionWarning, match="several height channels.*'ZSensor'") as caught:
+        field = HeightField.load(path)
+    assert len(caught) == 1
+    assert "'Height', the first height channel" in field.history[0]
+
+
+def test_channel_is_chosen_by_name_or_index(tmp_path):
+    path = write(tmp_path, [("Height", "nm"), ("Deflection", "nm")])
+    for channel in ("Deflection", "deflection", 1, "1"):
+        assert "'Deflection', chosen" in HeightField.load(path, channel=channel).history[0]
+    assert "is not one of 0 'Height', 1 'Deflection'" in refusal(path, channel="Phase")
+    assert "is not one of" in refusal(path, channel=2)
+    assert "is not one of" in refusal(path, channel=-1)
+    assert "channel:" in refusal(path, channel=1.5)
+
+
+def test_channels_of_one_name_need_the_index(tmp_path):
+    path = write(tmp_path, [("Height", "nm"), ("Height", "nm")])
+    assert "index" in refusal(path, channel="Height")
+    assert HeightField.load(path, channel=1).shape == (NY, NX)
+
+
+def test_files_without_heights_say_what_they_have(tmp_path):
+    assert "no height channel among 0 'Phase'" in refusal(write(tmp_path, [("Phase", "deg")]))
+    path = write(tmp_path, [("Phase", "deg")])
+    assert "not a unit of length" in refusal(path, channel=0)
+
+
+def test_what_the_file_states_cannot_be_contradicted(tmp_path):
+    path = write(tmp_path)
+    assert "contradicts" in refusal(path, pixel_size=0.1)
+    assert "contradicts" in refusal(path, max_height=0.1)
+    HeightField.load(path, pixel_size=0.5)  # the same
+
+
+def test_treatments_are_applied_in_order_and_reported(tmp_path):
+    field = HeightField.load(write(tmp_path), level="lines", clip="2", periodic="taper")
+    words = ["channel", "scan lines", "clipped", "tapered"]
+    assert len(field.history) == len(words)
+    assert all(word in line for word, line in zip(words, field.history, strict=True))
+    assert "not levelled" in HeightField.load(write(tmp_path), level="none").history[1]
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("level", "flat"), ("fill", "biharmonic"), ("periodic", True), ("clip", "few"), ("clip", 0)],
+)
+def test_unknown_options_name_the_choices(tmp_path, option, value):
+    message = refusal(write(tmp_path), **{option: value})
+    assert message.startswith(option)
+    assert repr(value) in message
+
+
+def test_gwyddion_files_are_read(tmp_path):
+    topography = surface_topography.Topography(np.arange(20.0).reshape(5, 4), (5, 8), unit="nm")
+    topography.to_gwy(str(tmp_path / "a.gwy"))
+    field = HeightField.load(tmp_path / "a.gwy")
+    assert field.heights == pytest.approx(np.arange(20).reshape(5, 4).T[::-1] * 1e-3, rel=1e-12)
+    assert field.pixel_size == pytest.approx((0.001, 0.002), rel=1e-12)
+
+
+def test_undefined_points_are_refused_or_filled(tmp_path):
+    heights = np.ma.masked_equal(np.arange(20.0).reshape(5, 4), 6)
+    surface_topography.Topography(heights, (5, 8), unit="nm").to_netcdf(str(tmp_path / "a.nc"))
+    assert "1 of 20 points" in refusal(tmp_path / "a.nc")
+    field = HeightField.load(tmp_path / "a.nc", fill="harmonic")
+    # the mean of the four neighbours 2, 10, 5, 7
+    assert field.heights[::-1].T[1, 2] == pytest.approx(6e-3, rel=1e-6)
+
+
+def test_units_that_are_not_stated_are_not_guessed(tmp_path):
+    surface_topography.Topography(np.eye(4), (1, 1)).to_netcdf(str(tmp_path / "a.nc"))
+    assert "does not state its units" in refusal(tmp_path / "a.nc")
+
+
+def test_line_scans_and_scattered_points_are_refused(tmp_path):
+    line = surface_topography.UniformLineScan(np.arange(8.0), 4, unit="nm")
+    line.to_netcdf(str(tmp_path / "line.nc"))
+    assert "line scan" in refusal(tmp_path / "line.nc")
+    np.savetxt(tmp_path / "scattered.xyz", np.random.default_rng(0).random((9, 3)))
+    assert "grid" in refusal(tmp_path / "scattered.xyz")
+
+
+def test_a_channel_on_a_non_uniform_grid_is_refused(tmp_path, monkeypatch):
+    from SurfaceTopography.IO.DI import DIReader
+
+    class Scattered(DIReader):
+        @property
+        def channels(self):
+            for channel in super().channels:
+                channel._uniform = False
+            return super().channels
+
+    monkeypatch.setattr("SurfaceTopography.IO.open_topography", Scattered)
+    assert "not on a uniform grid" in refusal(write(tmp_path))
+
+
+def test_without_the_package_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "SurfaceTopography.IO", None)
+    assert "[afm]" in refusal(write(tmp_path))
+
+
+def test_unknown_files_list_what_is_known(tmp_path):
+    (tmp_path / "a.xyzzy").write_bytes(b"nothing that anyone reads" * 9)
+    assert "not a height field of a known kind" in refusal(tmp_path / "a.xyzzy")
+
+
+@pytest.mark.parametrize("length", [1, 30, 400, 4000, 4097, 4096 + COUNTS.nbytes - 1])
+def test_truncated_instrument_files_are_refused(tmp_path, length):
+    refusal(write(tmp_path, length=length))
+
+
+def test_nanoscope_file_needs_no_option(shared_afm):
+    field = HeightField.load(shared_afm / "nanoscope-10um.di")
+    assert field.shape == (512, 512)
+    assert field.extent == pytest.approx((10, 10), rel=1e-12)
+    # -25000 to 32760 counts, 1.5 V over 2^16 at 363.9 nm/V (its "Sens. ZsensSens")
+    assert field.range == pytest.approx(0.4811, rel=1e-3)
+    assert "'ZSensor', the only height channel" in field.history[0]
+
+
+HEADS = [
+    *(b"", nanoscope(COUNTS)[:600], b"GWYP", b"PK\3\4", b"\x89HDF\r\n\x1a\n", b"CDF\1"),
+    *(b"aBCR-0.0", b"\\*File list\r\n", b"\5\0", b"DSS\1", b"WSxM file"),
+]
+
+
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture],
+          deadline=None)  # fmt: skip
+@given(st.sampled_from(HEADS), st.binary(max_size=300))
+def test_random_bytes_are_one_clear_line(tmp_path, head, tail):
+    path = tmp_path / "a.spm"
+    path.write_bytes(head + tail)
+    try:
+        HeightField.load(path)
+    except DiffractionError as error:
+        assert "\n" not in str(error)
+
+
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture],
+          deadline=None)  # fmt: skip
+@given(st.data())
+def test_damaged_headers_load_or_are_one_clear_line(tmp_path, data):
+    content = bytearray(nanoscope(COUNTS))
+    end = content.index(b"\0")
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, end))] = data.draw(st.integers(0, 255))
+    path = tmp_path / "a.spm"
+    path.write_bytes(content)
+    try:
+        HeightField.load(path)
+    except DiffractionError as error:
+        assert "\n" not in str(error)

@@ -1,0 +1,255 @@
+"""Grey images become heights, and nothing else does."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+
+import numpy as np
+import OpenEXR
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.heights.field import HeightField
+from tests.heights.formats.refusals import refusal
+
+RNG = np.random.default_rng(5)
+BYTES = RNG.integers(0, 256, (5, 7), dtype=np.uint8)
+SHORTS = RNG.integers(0, 65536, (5, 7), dtype=np.uint16)
+FLOATS = RNG.normal(size=(5, 7)).astype(np.float32)
+
+
+def write_exr(path, channels):
+    header = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION}
+    OpenEXR.File(header, channels).write(str(path))
+
+
+@pytest.mark.parametrize("suffix", ["png", "bmp", "tif"])
+def test_black_is_zero_white_is_max_height_and_the_top_row_is_the_largest_y(tmp_path, suffix):
+    path = tmp_path / f"a.{suffix}"
+    Image.fromarray(BYTES).save(path)
+    field = HeightField.load(path, pixel_size=(0.1, 0.2), max_height=0.5)
+    assert np.array_equal(field.heights, BYTES[::-1] / 255 * 0.5)
+    assert field.pixel_size == (0.1, 0.2)
+    assert field.name == path.name
+
+
+@pytest.mark.parametrize("suffix", ["png", "tif"])
+def test_sixteen_bits_are_kept(tmp_path, suffix):
+    path = tmp_path / f"a.{suffix}"
+    Image.fromarray(SHORTS).save(path)
+    field = HeightField.load(path, pixel_size="0.1", max_height="2")
+    assert np.array_equal(field.heights, SHORTS[::-1] / 65535 * 2)
+
+
+def test_one_bit_masks_are_two_heights(tmp_path):
+    path = tmp_path / "a.png"
+    Image.fromarray(BYTES > 127).save(path)
+    field = HeightField.load(path, pixel_size=0.1, max_height=0.3)
+    assert np.array_equal(field.heights, (BYTES[::-1] > 127) * 0.3)
+
+
+def test_float_tiff_is_in_micrometres(tmp_path):
+    path = tmp_path / "a.tif"
+    Image.fromarray(FLOATS).save(path)
+    assert np.array_equal(HeightField.load(path, pixel_size=1).heights, FLOATS[::-1])
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float16, np.uint32])
+def test_exr_is_in_micrometres(tmp_path, dtype):
+    path = tmp_path / "a.exr"
+    values = np.abs(FLOATS * 10).astype(dtype)
+    write_exr(path, {"height": values})
+    assert np.array_equal(HeightField.load(path, pixel_size=1).heights, values[::-1])
+
+
+def test_content_decides_not_the_suffix(tmp_path):
+    path = tmp_path / "a.dat"
+    Image.fromarray(BYTES).save(path, format="PNG")
+    assert HeightField.load(path, pixel_size=1, max_height=1).shape == (5, 7)
+
+
+def test_elaphe_patch_has_its_recorded_range(shared_afm):
+    field = HeightField.load(shared_afm / "elaphe-65um.png", pixel_size=65 / 1332, max_height=0.375)
+    assert field.range == 0.375  # it uses all 256 levels
+    assert field.extent == pytest.approx((65, 65), rel=1e-12)
+
+
+def test_a_large_image_is_not_a_bomb(tmp_path):
+    path = tmp_path / "a.png"
+    Image.new("L", (9600, 9600)).save(path)  # above Pillow's own limit of 89 million, a warning
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        field = HeightField.load(path, pixel_size=0.01, max_height=1)
+    assert field.shape == (9600, 9600)
+
+
+SIZES = {"pixel_size": 0.1, "max_height": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("mode", "word"), [("RGB", "colours"), ("RGBA", "colours"), ("P", "palette"), ("LA", "transp")]
+)
+def test_colours_are_refused(tmp_path, mode, word):
+    picture = Image.new("RGBA", (8, 8))
+    picture.putpixel((2, 3), (90, 60, 30, 255) if word != "transp" else (90, 90, 90, 128))
+    picture.convert(mode).save(tmp_path / "a.png")
+    line = refusal(tmp_path / "a.png", **SIZES)
+    assert word in line
+    assert "8- or 16-bit greyscale" in line
+
+
+@pytest.mark.parametrize("mode", ["RGB", "RGBA", "P", "LA"])
+def test_grey_that_is_kept_as_colours_is_grey(tmp_path, mode):
+    Image.fromarray(BYTES).convert(mode).save(tmp_path / "a.png")
+    with Image.open(tmp_path / "a.png") as picture:
+        assert picture.mode == mode
+    field = HeightField.load(tmp_path / "a.png", **SIZES)
+    assert np.array_equal(field.heights, BYTES[::-1] / 255 * 0.5)
+
+
+def test_sixteen_bits_of_colour_are_not_read_as_eight(tmp_path):
+    grey = np.dstack([SHORTS] * 3).astype(">u2")
+    rows = b"".join(b"\0" + row.tobytes() for row in grey)
+
+    def chunk(kind, content):
+        body = kind + content
+        return struct.pack(">I", len(content)) + body + struct.pack(">I", zlib.crc32(body))
+
+    (tmp_path / "a.png").write_bytes(
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", struct.pack(">IIBBBBB", 7, 5, 16, 2, 0, 0, 0))
+        + chunk(b"IDAT", zlib.compress(rows))
+        + chunk(b"IEND", b"")
+    )
+    assert "16 bits each" in refusal(tmp_path / "a.png", **SIZES)
+
+
+def test_a_jpeg_is_refused_for_what_it_is(tmp_path):
+    Image.fromarray(BYTES).save(tmp_path / "a.png", format="JPEG")
+    assert "is a JPEG, whose compression changes heights" in refusal(tmp_path / "a.png", **SIZES)
+
+
+def test_lengths_that_an_image_lacks_are_asked_for(tmp_path):
+    path = tmp_path / "a.png"
+    Image.fromarray(BYTES).save(path)
+    assert "max_height" in refusal(path, pixel_size=0.1)
+    assert "max_height" in refusal(path, pixel_size=0.1, max_height="auto")
+    assert "pixel_size" in refusal(path, max_height=0.1)
+    both = refusal(path)
+    assert "--max-height 0.375 --pixel-size 0.05" in both
+    assert "-D max_height=0.375 -D pixel_size=0.05" in both
+
+
+def test_max_height_contradicts_heights_in_micrometres(tmp_path):
+    write_exr(tmp_path / "a.exr", {"Y": FLOATS})
+    np.save(tmp_path / "a.npy", FLOATS)
+    for name in ("a.exr", "a.npy"):
+        assert "contradicts" in refusal(tmp_path / name, **SIZES)
+
+
+@pytest.mark.parametrize("bad", [0, -1, float("nan"), float("inf"), "high", "", True, 1e9, (1, 2)])
+def test_unusable_max_height_is_named(tmp_path, bad):
+    path = tmp_path / "a.png"
+    Image.fromarray(BYTES).save(path)
+    assert "max_height" in refusal(path, pixel_size=0.1, max_height=bad)
+
+
+def test_files_that_are_not_there_or_not_files(tmp_path):
+    (tmp_path / "empty.png").touch()
+    assert "does not exist" in refusal(tmp_path / "none.png", **SIZES)
+    assert "folder" in refusal(tmp_path, **SIZES)
+    assert "empty" in refusal(tmp_path / "empty.png", **SIZES)
+    assert "null" in refusal(str(tmp_path / "a\0b"), **SIZES)
+    assert "cannot read" in refusal("a" * 5000, **SIZES)
+
+
+def test_one_pixel_and_several_pages_are_refused(tmp_path):
+    Image.new("L", (1, 1)).save(tmp_path / "a.png")
+    assert "1 x 1" in refusal(tmp_path / "a.png", **SIZES)
+    page = Image.fromarray(BYTES)
+    page.save(tmp_path / "a.tif", save_all=True, append_images=[page])
+    assert "2 pages" in refusal(tmp_path / "a.tif", **SIZES)
+
+
+def test_exr_with_several_channels_or_nan_is_refused(tmp_path):
+    write_exr(tmp_path / "rgb.exr", {"RGB": np.dstack([FLOATS] * 3)})
+    assert "3 channels" in refusal(tmp_path / "rgb.exr", pixel_size=0.1)
+    write_exr(tmp_path / "nan.exr", {"Y": FLOATS * np.float32("nan")})
+    assert "finite" in refusal(tmp_path / "nan.exr", pixel_size=0.1)
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.bmp", "a.tif", "a.exr"])
+def test_truncated_files_are_refused(tmp_path, name, capfd):
+    path = tmp_path / name
+    if name == "a.exr":
+        write_exr(path, {"Y": RNG.random((64, 64)).astype(np.float32)})
+    else:
+        Image.fromarray(RNG.integers(0, 256, (64, 64), dtype=np.uint8)).save(path)
+    content = path.read_bytes()
+    for share in (0.02, 0.3, 0.7, 0.9):
+        path.write_bytes(content[: int(len(content) * share)])
+        refusal(path, pixel_size=0.1, max_height=None if name == "a.exr" else 0.5)
+    # the error is the one line: libraries print nothing past it
+    assert capfd.readouterr() == ("", "")
+
+
+HEADS = [
+    b"", b"\x89PNG\r\n\x1a\n", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", b"BM", b"II*\0", b"MM\0*",
+    b"\x76\x2f\x31\x01", b"\x76\x2f\x31\x01\x02\0\0\0", b"\x93NUMPY\x01\0",
+]  # fmt: skip
+
+
+def test_signalling_not_a_numbers_are_one_clear_line(tmp_path):
+    heights = np.zeros((4, 4), np.float32)
+    heights.view(np.uint32)[1, 2] = 0x7FA00000  # converting it raises the flag of an invalid value
+    np.save(tmp_path / "a.npy", heights)
+    with pytest.raises(DiffractionError) as caught:
+        HeightField.load(tmp_path / "a.npy", pixel_size=0.1)
+    assert "\n" not in str(caught.value)
+
+
+@settings(
+    max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(st.sampled_from(HEADS), st.binary(max_size=200), st.sampled_from([".png", ".exr", ".x"]))
+def test_random_bytes_are_one_clear_line(tmp_path, head, tail, suffix):
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(head + tail)
+    for options in ({}, {"pixel_size": 0.1}, SIZES):
+        try:
+            HeightField.load(path, **options)
+        except DiffractionError as error:
+            assert "\n" not in str(error)
+
+
+@pytest.fixture(scope="module")
+def samples(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("samples")
+    for name in ("a.png", "a.bmp", "a.tif"):
+        Image.fromarray(BYTES).save(folder / name)
+    write_exr(folder / "a.exr", {"Y": FLOATS})
+    np.save(folder / "a.npy", FLOATS)
+    return folder
+
+
+@settings(
+    max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(st.data())
+def test_damaged_files_load_or_are_one_clear_line(samples, tmp_path, data):
+    name = data.draw(st.sampled_from(["a.png", "a.bmp", "a.tif", "a.exr", "a.npy"]))
+    content = bytearray((samples / name).read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    path = tmp_path / name
+    path.write_bytes(content)
+    try:
+        HeightField.load(path, pixel_size=0.1, max_height=0.5 if name[2] in "pbt" else None)
+    except DiffractionError as error:
+        assert "\n" not in str(error)

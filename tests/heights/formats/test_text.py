@@ -1,0 +1,122 @@
+"""Grids of numbers in text become heights; anything else is one clear line."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.heights.field import HeightField
+
+GRID = [[0.1, 0.2, 0.3, 0.4], [0.5, 0.6, 0.7, 0.8]]
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.txt", "0.1 0.2 0.3 0.4\n0.5  0.6 0.7 0.8\n"),
+        ("a.txt", "# a comment\n\n0.1\t0.2\t0.3\t0.4\r\n0.5\t0.6\t0.7\t0.8"),
+        ("a.csv", "0.1,0.2,0.3,0.4\n0.5, 0.6, 0.7, 8e-1\n"),
+        ("a.csv", "0.1,0.2,0.3,0.4,\n0.5,0.6,0.7,0.8,\n"),
+        ("a.csv", "0,1;0,2;0,3;0,4\n0,5;0,6;0,7;0,8\n"),
+        ("a.tsv", "\ufeff0,1\t0,2\t0,3\t0,4\n0,5\t0,6\t0,7\t0,8\n"),
+    ],
+)
+def test_a_grid_in_micrometres_has_its_first_line_on_top(tmp_path, name, text):
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8", newline="")
+    field = HeightField.load(path, pixel_size=0.1)
+    assert field.heights.tolist() == GRID[::-1]
+
+
+def test_an_exported_header_gives_size_and_unit(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_text(
+        "# Channel: Topography\n# Width: 8.00 \u00b5m\n# Height: 2000 nm\n# Value units: nm\n"
+        "1 2 3 4\n5 6 7 8\n",
+        encoding="utf-8",
+    )
+    field = HeightField.load(path)
+    assert field.pixel_size == pytest.approx((2, 1), rel=1e-12)
+    assert field.heights[1] == pytest.approx([0.001, 0.002, 0.003, 0.004], rel=1e-12)
+
+
+def test_points_on_a_regular_grid_are_arranged(tmp_path):
+    path = tmp_path / "a.csv"
+    points = [(x * 0.5, y * 0.25, 10 * y + x) for y in range(3) for x in range(4)]
+    points = np.random.default_rng(0).permutation(points)
+    np.savetxt(path, points, delimiter=",")
+    field = HeightField.load(path)
+    assert field.pixel_size == (0.5, 0.25)
+    assert field.heights.tolist() == [[0, 1, 2, 3], [10, 11, 12, 13], [20, 21, 22, 23]]
+
+
+def test_missing_cells_are_filled_if_asked(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("1,1,1,1\n1,,nan,1\n1,1,1,1\n")
+    with pytest.raises(DiffractionError, match=r"2 of 12 points.*fill"):
+        HeightField.load(path, pixel_size=0.1)
+    field = HeightField.load(path, pixel_size=0.1, fill="nearest")
+    assert field.range == 0
+    assert "nearest" in field.history[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("1 2 3\n4 5\n", "line 2"),
+        ("1 2 3\n4 five 6\n", "five"),
+        ("x,y\n1,2\n", "line 1"),
+        ("# nothing\n", "no line of numbers"),
+        ("1\n2\n3\n", "line scan"),
+        ("1 2 3 4\n", "line scan"),
+        ("0 0 1\n1 0 1\n0 1 1\n5 7 1\n", "uniform grid"),
+        ("0 0 1\n1 0 1\n0 1 1\n1 1 1\n3 0 1\n3 1 1\n", "uniform grid"),
+        ("nan nan nan\n" * 5, "empty"),
+        ("# Value units: V\n1 2\n3 4\n", "unit of length"),
+        ("# Width: 1 furlong\n1 2\n3 4\n", "furlong"),
+        ("# Width: 0 nm\n# Height: 1 nm\n1 2\n3 4\n", "size"),
+        ("nan nan\nnan nan\n", "no line|empty|line scan"),
+        ("1e300 1\n1 1\n", "in µm"),
+    ],
+)
+def test_what_is_no_grid_is_refused(tmp_path, text, word):
+    path = tmp_path / "a.txt"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(DiffractionError, match=word) as caught:
+        HeightField.load(path, pixel_size=0.1)
+    assert "\n" not in str(caught.value)
+
+
+def test_binary_data_is_no_text(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_bytes(b"\xff\xfe\x00\x01" * 9)
+    with pytest.raises(DiffractionError, match="not text"):
+        HeightField.load(path, pixel_size=0.1)
+
+
+cells = st.sampled_from(["1", "0.5", "-2e3", "nan", "", "1,5", "x", "1e999", "0x1", "٣", "1_0"])
+
+
+@settings(
+    max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    st.one_of(
+        st.text(max_size=100),
+        st.lists(st.lists(cells, max_size=5), max_size=5),
+    ),
+    st.sampled_from([" ", ",", ";", "\t"]),
+    st.sampled_from([None, "nearest", "harmonic"]),
+)
+def test_random_text_loads_or_is_one_clear_line(tmp_path, content, separator, fill):
+    if not isinstance(content, str):
+        content = "\n".join(separator.join(row) for row in content)
+    path = tmp_path / "a.csv"
+    path.write_bytes(content.encode("utf-8", "surrogatepass"))
+    try:
+        HeightField.load(path, pixel_size=0.1, fill=fill)
+    except DiffractionError as error:
+        assert "\n" not in str(error)

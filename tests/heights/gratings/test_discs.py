@@ -1,0 +1,135 @@
+"""Discs have the tracks and run lengths of their standards."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mitsuba_diffraction.heights.gratings import cd, dvd
+from mitsuba_diffraction.heights.spectra import frequencies, order_powers
+
+# track pitch, channel bit, pit width and depth in µm (ECMA-130, ECMA-267, AFM images of discs)
+STANDARD = {cd: (1.6, 0.2777, 0.5, 0.12), dvd: (0.74, 0.1333, 0.32, 0.105)}
+
+
+@pytest.fixture(scope="module", params=STANDARD, ids=lambda make: make.__name__)
+def make(request):
+    return request.param
+
+
+@pytest.fixture(scope="module")
+def smooth(make):
+    """Eight tracks without irregularity, finely sampled."""
+    pitch = STANDARD[make][0]
+    return make(extent=(60.0, 8 * pitch), pixels=(3000, 256), seed=5, irregularity=0)
+
+
+def track_lines(make, field):
+    """Pit or not, along the middle of every track, each rolled to begin with a pit."""
+    ny = field.shape[0]
+    rows = ((np.arange(8) + 0.5) * ny / 8).astype(int)
+    lines = field.heights[rows] < STANDARD[make][3] / 2
+    starts = [np.flatnonzero(line & ~np.roll(line, 1))[0] for line in lines]
+    return [np.roll(line, -start) for line, start in zip(lines, starts, strict=True)]
+
+
+def runs_of(line):
+    """Lengths of pits and lands that follow one another, in pixels."""
+    changes = np.flatnonzero(line != np.roll(line, 1))
+    return np.diff(np.append(changes, line.size))
+
+
+def test_run_lengths_are_3_to_11_channel_bits(make, smooth):
+    bit = STANDARD[make][1]
+    for line in track_lines(make, smooth):
+        runs = runs_of(line) * smooth.pixel_size[0] / bit
+        # whole bits, but that a whole number of them fits (0.3 %) and for a pixel, 0.15 bit, twice
+        assert np.abs(runs - np.round(runs)).max() < 0.4
+        assert runs.min() > 2.6
+        assert runs.max() < 11.4
+
+
+def test_short_runs_are_frequent(make, smooth):
+    bit = STANDARD[make][1]
+    runs = np.concatenate([runs_of(line) for line in track_lines(make, smooth)])
+    bits = np.round(runs * smooth.pixel_size[0] / bit)
+    # P(n) = λ⁻ⁿ of the code of largest entropy has mean 5.2 and P(3) = 0.32; 300 to 700 runs
+    assert bits.mean() == pytest.approx(5.2, abs=0.5)
+    assert np.mean(bits == 3) == pytest.approx(0.32, abs=0.08)
+
+
+def test_pits_are_as_wide_and_deep_as_they_should_be(make, smooth):
+    _, _, width, depth = STANDARD[make]
+    assert smooth.range == pytest.approx(depth, abs=2e-6)  # rounding
+    line = track_lines(make, smooth)[0]
+    longest = np.flatnonzero(line != np.roll(line, 1))
+    middles = (longest[:-1:2] + longest[1::2]) // 2
+    ny = smooth.shape[0] // 8
+    first = np.roll(smooth.heights[:ny], -_start(make, smooth), axis=1)[:, middles] < depth / 2
+    measured = first.sum(axis=0) * smooth.pixel_size[1]
+    # to a pixel, an eighth of a pit or finer
+    assert np.abs(measured - width).max() <= 1.01 * smooth.pixel_size[1]
+
+
+def _start(make, field):
+    line = field.heights[field.shape[0] // 16] < STANDARD[make][3] / 2
+    return np.flatnonzero(line & ~np.roll(line, 1))[0]
+
+
+def test_tracks_throw_light_along_y(make):
+    """Orders at multiples of 1/pitch along y stand far above everything between them."""
+    pitch = STANDARD[make][0]
+    field = make(extent=20 * pitch, pixels=400, seed=1)
+    fx, fy = frequencies(field)
+    line = order_powers(field, 550.0)[:, np.abs(fx) < 1e-9][:, 0]
+    order = fy[:, 0] * pitch
+    first = line[np.abs(np.abs(order) - 1) < 1e-6]
+    between = line[(np.abs(order) > 0.2) & (np.abs(order) < 0.8)]
+    assert first.size == 2
+    assert first.min() > 20 * between.max()
+
+
+def test_whole_tracks_fit(make):
+    pitch = STANDARD[make][0]
+    field = make(extent=(10.0, 4.3 * pitch + 4), pixels=(100, 400), seed=2)
+    low = field.heights.mean(axis=1) < field.heights.mean()  # rows within a track's width of pits
+    tracks = np.count_nonzero(low & ~np.roll(low, 1))
+    assert tracks == round(field.extent[1] / pitch)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_the_seam_is_a_place_like_any_other(make, axis):
+    heights = np.moveaxis(make(extent=20.0, pixels=400, seed=3).heights, axis, 0)
+    steps = np.sqrt(np.mean((np.roll(heights, -1, axis=0) - heights) ** 2, axis=1))
+    assert steps[:-1].min() <= steps[-1] <= steps[:-1].max()
+
+
+def test_a_seed_gives_one_disc(make):
+    same, again, other = (make(extent=8.0, pixels=100, seed=s).digest() for s in (1, 1, 2))
+    assert same == again != other
+
+
+def test_irregularity_stays_small(make):
+    depth = STANDARD[make][3]
+    field = make(extent=16.0, pixels=320, seed=4)
+    rough = 6 * 0.002  # six standard deviations of the rougher one
+    assert -rough < field.heights.min()
+    assert field.heights.max() < depth + rough
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    make=st.sampled_from(list(STANDARD)),
+    extent=st.floats(4, 12) | st.tuples(st.floats(4, 12), st.floats(4, 12)),
+    pixels=st.integers(8, 64) | st.tuples(st.integers(8, 64), st.integers(8, 64)),
+    seed=st.integers(0, 2**63 - 1),
+    depth=st.floats(0, 10),
+    pitch=st.floats(0.7, 2.0),
+    irregularity=st.floats(0, 3),
+)
+def test_parameters_in_range_give_a_patch(make, extent, pixels, seed, depth, pitch, irregularity):
+    field = make(extent, pixels, seed, depth=depth, track_pitch=pitch, irregularity=irregularity)
+    # relief and 6 standard deviations of the roughness on both sides
+    assert field.range <= depth + 12 * irregularity * 0.002

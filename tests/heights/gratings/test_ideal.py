@@ -1,0 +1,117 @@
+"""Ideal gratings have the orders that theory gives them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import jv
+
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.heights.gratings import blazed, lamellar, sinusoidal
+
+KAPPAS = (0.3, 11.0, 25.0)  # 4π/λ is 15 to 35 per µm
+
+
+def orders(field, kappa, periods):
+    """|a_m|² for m = −8..8 of the DFT a = mean(exp(iκh)·exp(iqx)), along x."""
+    line = np.exp(1j * kappa * field.heights[0])
+    amplitudes = np.fft.ifft(line)  # exp(+iqx), mean included
+    return np.abs(amplitudes[np.arange(-8, 9) * periods]) ** 2
+
+
+M = np.arange(-8, 9)
+
+
+@pytest.mark.parametrize("kappa", KAPPAS)
+def test_sinusoid_follows_bessel_functions(kappa):
+    field = sinusoidal(2.5, 0.3, periods=3, rows=2)
+    # aliases are J_24(κh₀) and beyond, below 1e-12 at κh₀ = 3.75
+    assert orders(field, kappa, 3) == pytest.approx(jv(M, kappa * 0.15) ** 2, abs=1e-12)
+
+
+@pytest.mark.parametrize("kappa", KAPPAS)
+@pytest.mark.parametrize(("direction", "sign"), [("descending", 1), ("ascending", -1)])
+def test_blazed_follows_sinc(kappa, direction, sign):
+    field = blazed(2.5, 0.25, direction=direction, periods=2, pixels_per_period=256, rows=2)
+    expected = np.sinc(M - sign * kappa * 0.25 / (2 * np.pi)) ** 2
+    # sampling error falls as 1/N²; 1e-4 at N ≈ 60 for small orders, 256 here for |m| = 8
+    assert orders(field, kappa, 2) == pytest.approx(expected, abs=1e-4)
+
+
+@pytest.mark.parametrize("kappa", KAPPAS)
+def test_lamellar_follows_its_sampled_closed_form(kappa):
+    n = 120
+    field = lamellar(3.0, 0.2, periods=2, pixels_per_period=n, rows=2)
+    phase = kappa * 0.2
+    expected = np.where(M % 2, 4 * np.sin(phase / 2) ** 2, 0.0)
+    expected[M != 0] /= (n * np.sin(np.pi * M[M != 0] / n)) ** 2
+    expected[M == 0] = np.cos(phase / 2) ** 2
+    assert orders(field, kappa, 2) == pytest.approx(expected, abs=1e-12)  # exact but for rounding
+
+
+def test_axis_y_is_the_transpose():
+    along_x = blazed(2.0, 0.2, periods=2, rows=5)
+    along_y = blazed(2.0, 0.2, periods=2, rows=5, axis="y")
+    assert np.array_equal(along_y.heights, along_x.heights.T)
+    assert np.ptp(along_x.heights, axis=0).max() == 0
+
+
+def test_default_patch_is_square_and_about_as_wide_as_the_window():
+    field = sinusoidal(2.5, 0.1)
+    assert field.extent == pytest.approx((65, 65), rel=1e-12)
+    assert field.shape[0] == field.shape[1]
+
+
+def test_duty_is_the_share_of_high_pixels():
+    field = lamellar(1.0, 0.5, duty=0.25, periods=1, rows=2)
+    assert (field.heights == 0.5).mean() == 0.25
+
+
+@pytest.mark.parametrize(
+    ("make", "word"),
+    [
+        (lambda: sinusoidal(0, 1), "period"),
+        (lambda: sinusoidal(-1, 1), "period"),
+        (lambda: sinusoidal(float("nan"), 1), "period"),
+        (lambda: sinusoidal("1", 1), "period"),
+        (lambda: sinusoidal(1, -1), "depth"),
+        (lambda: sinusoidal(1, 1, axis="z"), "axis"),
+        (lambda: sinusoidal(1, 1, pixels_per_period=1), "pixels_per_period"),
+        (lambda: sinusoidal(1, 1, pixels_per_period=2.5), "pixels_per_period"),
+        (lambda: sinusoidal(1, 1, periods=0), "periods"),
+        (lambda: sinusoidal(1, 1, rows=1), "rows"),
+        (lambda: sinusoidal(1, 1, periods=10**5), "more than"),
+        (lambda: blazed(1, 1, direction="left"), "direction"),
+        (lambda: blazed(1, 1, pixels_per_period=10**10), "pixels_per_period"),
+        (lambda: lamellar(1, 1, duty=0), "duty"),
+        (lambda: lamellar(1, 1, duty=0.001), "duty"),
+        (lambda: lamellar(1, 1, duty=2), "duty"),
+    ],
+)
+def test_parameters_that_do_not_fit_are_named(make, word):
+    with pytest.raises(DiffractionError, match=word) as caught:
+        make()
+    assert "\n" not in str(caught.value)
+
+
+anything = st.one_of(st.none(), st.integers(), st.floats(), st.text(max_size=5), st.booleans())
+
+
+@settings(deadline=None)  # the machine may be busy
+@given(
+    make=st.sampled_from([sinusoidal, blazed, lamellar]),
+    period=anything,
+    depth=anything,
+    pixels=st.integers(-2, 64) | anything,
+    periods=st.integers(-2, 9) | anything,
+    rows=st.integers(-2, 9),
+)
+def test_any_parameters_work_or_are_one_clear_line(make, period, depth, pixels, periods, rows):
+    try:
+        field = make(period, depth, pixels_per_period=pixels, periods=periods, rows=rows)
+    except DiffractionError as error:
+        assert "\n" not in str(error)
+    else:
+        assert field.range <= depth

@@ -1,0 +1,165 @@
+"""Properties of HeightField: what it accepts, what it computes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.heights.field import MAX_PIXELS, HeightField
+
+FLAT = np.zeros((3, 4))
+
+
+def test_heights_are_copied_and_read_only():
+    heights = np.zeros((3, 4), dtype=np.float32, order="F")
+    field = HeightField(heights, 1)
+    heights[0, 0] = 7
+    assert field.heights[0, 0] == 0
+    assert field.heights.dtype == np.float64
+    assert field.heights.flags.c_contiguous
+    with pytest.raises(ValueError, match="read-only"):
+        field.heights[0, 0] = 1
+
+
+def test_attributes_cannot_be_rebound():
+    with pytest.raises(AttributeError):
+        HeightField(FLAT, 1).pixel_size = (2.0, 2.0)  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        (0.05, (0.05, 0.05)),
+        ((0.05, 0.1), (0.05, 0.1)),
+        ([1, 2], (1.0, 2.0)),
+        (np.float32(0.5), (0.5, 0.5)),
+        (np.array([0.25, 0.5]), (0.25, 0.5)),
+        ("0.05", (0.05, 0.05)),
+        ("0.05, 0.1", (0.05, 0.1)),
+        (" 0.05 0.1 ", (0.05, 0.1)),
+    ],
+)
+def test_pixel_size_takes_numbers_pairs_and_strings(given, expected):
+    assert HeightField(FLAT, given).pixel_size == expected
+
+
+def test_extent_is_the_period_of_the_tiling():
+    field = HeightField(FLAT, (0.5, 0.25))
+    assert field.shape == (3, 4)
+    assert field.extent == (2.0, 0.75)
+
+
+def test_statistics_of_a_plane():
+    y, x = np.mgrid[0:40, 0:30]
+    field = HeightField(0.2 * x * 0.5 + 0.1 * y * 0.25, (0.5, 0.25))
+    # exact differences of an exact plane: rounding only
+    assert field.rms_slope == pytest.approx(math.hypot(0.2, 0.1), rel=1e-12)
+    assert field.range == pytest.approx(0.2 * 0.5 * 29 + 0.1 * 0.25 * 39, rel=1e-12)
+    assert field.rms_height == pytest.approx(field.heights.std(), rel=1e-12)
+
+
+def test_rms_slope_of_a_sinusoid():
+    x = np.arange(256) / 256
+    field = HeightField(np.tile(0.05 * np.cos(2 * np.pi * x), (4, 1)), 2.5 / 256)
+    # differences of 256 samples a period lose 2.5e-5 of the slope, one sample of 256 is left out
+    assert field.rms_slope == pytest.approx(math.pi * 0.1 / (math.sqrt(2) * 2.5), rel=5e-3)
+
+
+def test_equal_content_has_equal_digest():
+    heights = np.random.default_rng(1).random((5, 6))
+    field = HeightField(heights, 0.1)
+    assert field.digest() == HeightField(heights.copy(order="F"), (0.1, 0.1), name="b").digest()
+    assert field.digest() != HeightField(heights, 0.2).digest()
+    assert field.digest() != HeightField(heights.reshape(6, 5), 0.1).digest()
+    assert field.digest() != HeightField(heights + 1e-9, 0.1).digest()
+
+
+def test_summary_is_plain_data():
+    import json
+
+    field = HeightField(FLAT, 0.1, name="flat", history=["filled"])
+    assert json.loads(json.dumps(field.summary())) == field.summary()
+    assert field.summary()["history"] == ["filled"]
+
+
+def test_gentle_well_sampled_patch_is_valid():
+    x = np.tile(np.arange(8), (8, 1))
+    assert HeightField(0.002 * x, 0.05).validity((360, 830)) == []
+    assert HeightField(FLAT, 0.05).validity() == []
+
+
+@pytest.mark.parametrize(
+    ("heights", "pixel", "word"),
+    [
+        (0.015 * np.arange(8), 0.05, "off by 5 to 20 %"),
+        (0.02 * np.arange(8), 0.05, "more than 20 %"),
+        (0.002 * np.arange(8), 0.0901, "coarser than a quarter"),  # λ/4 = 0.09 µm
+        (2e-9 * np.arange(8), 0.05, "metres"),
+        (0.002 * np.arange(8), 48.8, "is the pixel size of 48.8 µm in nm?"),
+        (4.0 * np.arange(8), 0.05, "are the heights, with a range of 28 µm"),
+    ],
+)
+def test_each_cause_of_doubt_is_one_line(heights, pixel, word):
+    lines = HeightField(np.tile(heights, (8, 1)), pixel).validity((360, 830))
+    assert len(lines) == 1
+    assert word in lines[0]
+    assert "\n" not in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("heights", "word"),
+    [
+        (np.full((4, 4), np.nan), "no height is a finite number"),
+        (np.where(np.eye(4), np.nan, 0), "4 of 16 heights are NaN"),
+        (np.where(np.eye(4), np.inf, 0), "4 infinite"),
+        (np.zeros((1, 1)), "1 x 1"),
+        (np.zeros((1, 9)), "9 x 1"),
+        (np.zeros((0, 9)), "9 x 0"),
+        (np.zeros(9), "two dimensions"),
+        (np.zeros((2, 2, 2)), "two dimensions"),
+        (np.zeros((4, 4), dtype=complex), "complex"),
+        (np.zeros((4, 4), dtype=bool), "bool"),
+        ("surface", "expected real numbers"),
+        ([[1, 2], [3]], "not an array"),
+        (np.full((4, 4), 1e9), "in µm"),
+        (np.ma.masked_less(np.arange(9.0).reshape(3, 3), 4), "masked"),
+    ],
+)
+def test_unusable_heights_are_refused(heights, word):
+    with pytest.raises(DiffractionError, match=word) as caught:
+        HeightField(heights, 0.1)
+    assert "\n" not in str(caught.value)
+
+
+def test_absurd_sizes_are_refused_without_memory():
+    huge = np.broadcast_to(np.zeros(1), (2**20, 2**20))
+    with pytest.raises(DiffractionError, match=str(MAX_PIXELS)):
+        HeightField(huge, 0.1)
+
+
+@pytest.mark.parametrize(
+    "pixel_size",
+    [0, -1, math.nan, math.inf, (0.1, 0), (0.1, 0.1, 0.1), (), "", "wide", "0.1,nan", "1,2,3",
+     True, 1e9, 1e-9, {"dx": 1}, object(), ("0.1", "0.1"), None, "auto", 10**400],
+)  # fmt: skip
+def test_unusable_pixel_sizes_are_refused(pixel_size):
+    with pytest.raises(DiffractionError, match="pixel_size") as caught:
+        HeightField(FLAT, pixel_size)
+    assert "\n" not in str(caught.value)
+
+
+@settings(deadline=None)  # the machine may be busy
+@given(st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(), st.binary(),
+                 st.complex_numbers(), st.lists(st.floats(), max_size=4)))  # fmt: skip
+def test_any_pixel_size_works_or_is_one_clear_line(value):
+    try:
+        field = HeightField(FLAT, value)
+    except DiffractionError as error:
+        assert "\n" not in str(error)
+    else:
+        assert min(field.pixel_size) > 0

@@ -1,0 +1,83 @@
+"""Colours: published white points and the transfer curve of sRGB."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.optics.colour import (
+    ILLUMINANTS,
+    delta_e,
+    encode_srgb,
+    linear_srgb,
+    response,
+)
+
+EVERY_NM = np.arange(360.0, 831.0)
+
+
+@pytest.mark.parametrize("illuminant", ILLUMINANTS)
+def test_a_white_surface_has_y_1_and_is_white(illuminant):
+    xyz = response(EVERY_NM, illuminant).sum(axis=0)
+    assert xyz[1] == pytest.approx(1.0, abs=1e-12)  # the same sum normalises it
+    # the published matrix of sRGB has four digits, and the adaptation keeps its white
+    np.testing.assert_allclose(linear_srgb(xyz, illuminant), 1.0, atol=5e-4)
+
+
+@pytest.mark.parametrize(("illuminant", "x", "y"), [("D65", 0.31272, 0.32903), ("E", 1 / 3, 1 / 3)])
+def test_the_white_points_are_the_published_ones(illuminant, x, y):
+    xyz = response(EVERY_NM, illuminant).sum(axis=0)
+    # CIE 15:2004, table T.3; the observer's own sums are 1/3 to within 5e-5
+    np.testing.assert_allclose(xyz[:2] / xyz.sum(), (x, y), atol=5e-5)
+
+
+def test_the_observer_is_brightest_at_555_nm_and_blind_beyond_the_visible():
+    assert EVERY_NM[response(EVERY_NM, "E")[:, 1].argmax()] == 555
+    np.testing.assert_array_equal(response([359.9, 830.1, 100.0, 2000.0]), 0.0)
+
+
+def test_monochromatic_light_is_outside_the_gamut_and_stays_there():
+    assert linear_srgb(response(500.0)).min() < 0
+
+
+def test_shapes_and_precision_are_kept():
+    assert response(np.full((2, 3), 500.0)).shape == (2, 3, 3)
+    assert linear_srgb(np.ones((4, 5, 3), np.float32)).dtype == np.float32
+
+
+def test_the_transfer_curve_is_that_of_srgb():
+    # IEC 61966-2-1: 12.92 x up to 0.0031308, 1.055 x^(1/2.4) − 0.055 above; five digits by hand
+    given = [-1.0, 0.0, 0.002, 0.18, 0.5, 1.0, 7.0]
+    expected = [0.0, 0.0, 0.02584, 0.46136, 0.73536, 1.0, 1.0]
+    np.testing.assert_allclose(encode_srgb(given), expected, atol=1e-5)
+
+
+def test_an_unknown_illuminant_is_refused():
+    with pytest.raises(DiffractionError, match=r"illuminant='A' is unknown; choose one of D65, E"):
+        response(500.0, "A")
+
+
+def test_the_difference_of_greys_is_that_of_their_lightness():
+    # ΔE2000 without chroma: ΔL'/S_L (Sharma, Wu and Dalal 2005, eqs. 8 and 15); L* as in CIE 15
+    y = np.array([0.3, 0.4])
+    lightness = 116.0 * np.cbrt(y) - 16.0
+    off = (lightness.mean() - 50.0) ** 2
+    expected = np.diff(lightness)[0] / (1.0 + 0.015 * off / np.sqrt(20.0 + off))
+    found = delta_e([[y[0]] * 3], [[y[1]] * 3], exposure=1.0)
+    assert found[0] == pytest.approx(expected, rel=2e-3)  # sRGB's published matrix has four digits
+
+
+def test_what_is_dark_or_clipped_does_not_count():
+    reference = np.array([[0.001] * 3, [1.0] * 3, [5.0, 5.0, 5.0]])
+    other = np.array([[0.009] * 3, [1.0] * 3, [9.0, 7.0, 8.0]])
+    found = delta_e(reference, other, exposure=1.0)
+    assert np.isnan(found[0])
+    np.testing.assert_allclose(found[1:], 0.0, atol=1e-9)
+
+
+def test_the_exposure_shows_the_95th_percentile_as_white():
+    reference = np.linspace(0.0, 200.0, 101)[:, None] * np.ones(3)
+    assert np.nanmax(delta_e(reference, 1.02 * reference)) > 0.2
+    # above the percentile both are white
+    np.testing.assert_allclose(delta_e(reference, 1.02 * reference)[-5:], 0.0, atol=1e-9)

@@ -1,0 +1,43 @@
+"""The libraries of this machine, or of one that a test makes up."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mitsuba_diffraction.plugin.llvm import choose, find
+from mitsuba_diffraction.plugin.llvm.find import Library
+
+HERE = [Library.at(path) for path in find.in_folders()]
+
+
+def installed(version: int) -> Path:
+    """The library of that version on this machine, or skip."""
+    for library in HERE:
+        if library.version == version:
+            return library.path
+    pytest.skip(f"LLVM {version} is not installed here")
+
+
+def only(monkeypatch: pytest.MonkeyPatch, *files: Path) -> None:
+    """Make these the only libraries of the machine."""
+    for module in (find, choose):
+        monkeypatch.setattr(module, "in_folders", lambda: iter(files))
+    monkeypatch.setattr(find, "known_to_loader", lambda: iter(()))
+
+
+def python(code: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Run code in a process of its own, with these environment variables on top."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        env={**environment, **variables},
+        capture_output=True,
+        text=True,
+        errors="replace",
+        check=False,
+    )

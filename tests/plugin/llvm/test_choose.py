@@ -1,0 +1,163 @@
+"""The LLVM that Dr.Jit gets: chosen before it loads one, refused in one line."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.plugin import llvm
+from mitsuba_diffraction.plugin.llvm.find import VARIABLE, Library
+from tests.plugin.llvm.machine import installed, only, python
+
+
+@pytest.mark.usefixtures("no_child")
+def test_19_is_chosen_without_a_child_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for name in ("libLLVM-15.so.1", "libLLVM.so.19.1", "libLLVM.so.21.1"):
+        (tmp_path / name).touch()
+    only(monkeypatch, *sorted(tmp_path.glob("libLLVM*")))
+    assert llvm.select_llvm() == Library(tmp_path / "libLLVM.so.19.1", 19)
+    assert os.environ[VARIABLE] == str(tmp_path / "libLLVM.so.19.1")
+    llvm.require_llvm()
+
+
+@pytest.mark.usefixtures("no_child")
+def test_choice_of_the_user_stays(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv(VARIABLE, "/some/libLLVM.so")
+    assert llvm.select_llvm() is None
+    assert os.environ[VARIABLE] == "/some/libLLVM.so"
+
+
+@pytest.mark.usefixtures("no_child")
+def test_nothing_is_chosen_once_drjit_has_its_own(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "drjit", sys)
+    assert llvm.select_llvm() is None
+    assert VARIABLE not in os.environ
+
+
+# the package as it is while its __init__ has only begun: nothing of it imported yet
+BEGUN = """
+import importlib.util, os, sys, time, types
+package = types.ModuleType("mitsuba_diffraction")
+package.__path__ = importlib.util.find_spec("mitsuba_diffraction").submodule_search_locations
+sys.modules["mitsuba_diffraction"] = package
+os.environ.pop("DRJIT_LIBLLVM_PATH", None)
+from mitsuba_diffraction.plugin.llvm import choose, find
+"""
+
+
+def test_choice_takes_milliseconds():
+    installed(19)
+    code = f"""
+{BEGUN}
+times = []
+for _ in range(5):
+    os.environ.pop("DRJIT_LIBLLVM_PATH", None)
+    start = time.perf_counter()
+    choose.select_llvm()
+    times.append(time.perf_counter() - start)
+print(min(times), "numpy" in sys.modules, "drjit" in sys.modules)
+"""
+    seconds, *loaded = python(code).stdout.split()
+    assert loaded == ["False", "False"]
+    # 2 ms with 3000 files beside the library; ten times that for slow disks and busy machines
+    assert float(seconds) < 0.03
+
+
+def test_choice_after_a_trial_still_comes_before_drjit(tmp_path: Path):
+    copy = tmp_path / "libLLVM.so"
+    shutil.copyfile(installed(19), copy)
+    code = f"""
+{BEGUN}
+from pathlib import Path
+for module in (choose, find):
+    module.in_folders = lambda: iter([Path({str(copy)!r})])
+find.known_to_loader = lambda: iter(())
+choose.select_llvm()
+print(os.environ["DRJIT_LIBLLVM_PATH"], "drjit" in sys.modules)
+"""
+    assert python(code).stdout.split() == [str(copy), "False"]
+
+
+@pytest.mark.parametrize("name", ["libLLVM-15.so.1", "libLLVM.so", "missing.so"])
+def test_unusable_choice_of_the_user_is_one_line(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    good = tmp_path / "libLLVM.so.19.1"
+    for file in ("libLLVM.so.19.1", "libLLVM-15.so.1", "libLLVM.so"):
+        (tmp_path / file).touch()
+    only(monkeypatch, good)
+    monkeypatch.setenv(VARIABLE, str(tmp_path / name))
+    with pytest.raises(DiffractionError) as caught:
+        llvm.require_llvm()
+    text = str(caught.value)
+    assert "\n" not in text
+    assert f'{VARIABLE}="{tmp_path / name}"' in text
+    assert f"set it to {good}" in text
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="names Debian's package")
+def test_machine_without_a_usable_llvm_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "libLLVM-14.so.1").touch()
+    only(monkeypatch, tmp_path / "libLLVM-14.so.1")
+    assert llvm.select_llvm() is None
+    with pytest.raises(DiffractionError) as caught:
+        llvm.require_llvm()
+    text = str(caught.value)
+    assert "\n" not in text
+    assert f"found: 14 ({tmp_path}" in text
+    assert "apt install libllvm19" in text
+
+
+def test_import_of_the_package_makes_drjit_load_what_it_chose():
+    installed(19)
+    code = "import mitsuba_diffraction.plugin.llvm as llvm; print(*llvm.loaded_llvm_version())"
+    assert python(code).stdout.startswith("19 ")
+
+
+def test_drjit_that_was_imported_first_with_an_unusable_llvm_is_one_error_not_an_abort():
+    code = """
+import os
+import drjit  # before the package, which can then only look on
+del os.environ["DRJIT_LIBLLVM_PATH"]
+import mitsuba_diffraction.plugin.llvm as llvm
+try:
+    llvm.require_llvm()
+except ValueError as error:
+    print(error)
+"""
+    done = python(code, **{VARIABLE: str(installed(15))})
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("Dr.Jit has loaded LLVM 15")
+    assert "import mitsuba_diffraction before mitsuba" in done.stdout
+
+
+def test_plugin_refuses_an_unusable_llvm_before_any_kernel():
+    code = """
+import mitsuba_diffraction
+import mitsuba as mi
+mi.set_variant("llvm_ad_spectral")
+try:
+    mi.load_dict({"type": "diffraction"})
+except Exception as error:
+    print(error)
+"""
+    done = python(code, **{VARIABLE: str(installed(15))})
+    assert done.returncode == 0, done.stderr
+    assert "LLVM 15 cannot compile the kernels of Dr.Jit" in done.stdout
+
+
+def test_scalar_variants_need_no_llvm():
+    code = """
+import mitsuba_diffraction.plugin.llvm as llvm
+import mitsuba as mi
+mi.set_variant("scalar_spectral")
+llvm.require_loaded_llvm()
+print("fine")
+"""
+    done = python(code, **{VARIABLE: "/nowhere/libLLVM.so"})
+    assert done.stdout.endswith("fine\n"), done.stderr

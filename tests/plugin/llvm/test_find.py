@@ -1,0 +1,65 @@
+"""Which LLVM there are: found by name, where the loader looks."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from mitsuba_diffraction.plugin import llvm
+from mitsuba_diffraction.plugin.llvm import find
+from mitsuba_diffraction.plugin.llvm.find import VARIABLE, Library
+from tests.plugin.llvm.machine import only
+
+
+@pytest.mark.parametrize(
+    ("path", "version"),
+    [
+        ("/usr/lib/x86_64-linux-gnu/libLLVM.so.19.1", 19),
+        ("/nowhere/libLLVM-19.so.1", 19),
+        ("/nowhere/libLLVM-14.0.6.so.1", 14),
+        ("/nowhere/libLLVM.so.21.1", 21),
+        ("/nowhere/lib/libLLVM.so", None),
+        ("/nowhere/lib/libLLVM.so.1", None),
+        ("/nowhere/llvm-18/lib/libLLVM.so.1", 18),
+        ("/nowhere/lib64/llvm17/lib/libLLVM.so", 17),
+        ("/nowhere/llvm/20/lib64/libLLVM.so", 20),
+        ("/opt/homebrew/Cellar/llvm/19.1.7/lib/libLLVM.dylib", 19),
+        ("/opt/homebrew/Cellar/llvm@18/18.1.8/lib/libLLVM.dylib", 18),
+    ],
+)
+def test_version_is_read_from_the_path(path: str, version: int | None):
+    assert Library.at(path).version == version
+
+
+def test_version_is_that_of_the_real_file_behind_a_link(tmp_path: Path):
+    (tmp_path / "libLLVM-15.so.1").touch()
+    (tmp_path / "libLLVM-19.so").symlink_to("libLLVM-15.so.1")
+    assert Library.at(tmp_path / "libLLVM-19.so").version == 15
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="searched through the loader path")
+def test_only_llvm_itself_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    names = ("libLLVM.so.23.1", "libLLVM-C.so.23", "libLLVM.so.23.1-rust-1.99.0", "libLLVMPolly.so")
+    for name in names:
+        (tmp_path / name).touch()
+    (tmp_path / "libLLVM-24.so.1").symlink_to("dangling")
+    monkeypatch.setenv("LD_LIBRARY_PATH", str(tmp_path))
+    found = [library for library in llvm.find_llvm() if library.path.parent == tmp_path]
+    assert found == [Library(tmp_path / "libLLVM.so.23.1", 23)]
+
+
+def test_19_is_preferred_then_the_newest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    files = [tmp_path / f"libLLVM.so.{version}.1" for version in (17, 21, 19, 15, 20)]
+    for file in files:
+        file.touch()
+    only(monkeypatch, *files)
+    assert [library.version for library in llvm.find_llvm()] == [19, 21, 20, 17, 15]
+
+
+def test_bare_name_is_looked_up_as_the_loader_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "libLLVM-15.so.1").touch()
+    only(monkeypatch, tmp_path / "libLLVM-15.so.1")
+    monkeypatch.setenv(VARIABLE, "libLLVM-15.so.1")
+    assert find.named_library() == Library(tmp_path / "libLLVM-15.so.1", 15)

@@ -1,0 +1,102 @@
+"""The plugin in scenes, in dictionaries and in every variant, whenever it is imported."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from tests.conftest import ROOT
+from tests.lanes import evaluated
+from tests.plugin.gentle import PATCH, WIDTH, load, pairs
+
+XML = """<scene version="3.0.0">
+  <integrator type="path"><integer name="max_depth" value="3"/></integrator>
+  <sensor type="perspective">
+    <transform name="to_world"><lookat origin="0,-3,3" target="0,0,0" up="0,0,1"/></transform>
+    <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film>
+  </sensor>
+  <emitter type="constant"/>
+  <shape type="rectangle">
+    <bsdf type="twosided">
+      <bsdf type="diffraction">
+        <string name="heightfield" value="patch.npy"/>
+        <string name="pixel_size" value="0.085, 0.08"/>
+        <string name="max_height" value="auto"/>
+        <float name="coherence_width" value="4.5"/>
+        <string name="coherence" value="ensemble"/>
+        <float name="tolerance" value="1e-3"/>
+        <float name="orientation" value="15"/>
+        <float name="int_ior" value="1.5"/>
+        <boolean name="energy_conserving" value="false"/>
+        <bsdf type="diffuse"><spectrum name="reflectance" value="0.2"/></bsdf>
+      </bsdf>
+    </bsdf>
+  </shape>
+</scene>
+"""
+
+
+def test_scenes_in_xml_render(variant, tmp_path, monkeypatch):
+    np.save(tmp_path / "patch.npy", PATCH.heights)
+    monkeypatch.chdir(tmp_path)
+    scene = mi.load_string(XML)
+    image = np.array(mi.render(scene, spp=16, seed=1))
+    assert np.all(np.isfinite(image))
+    # a sky of radiance 1 over 20 % pigment and a few per cent of reflection, in sRGB's luminance
+    luminance = image[3:5, 3:5, :3].mean()
+    assert 0.1 < luminance < 0.4
+
+
+def test_a_dictionary_from_arrays(some_variant):
+    given = md.bsdf_dict(PATCH, material="Al", coherence_width=WIDTH, energy_conserving=False)
+    assert given["type"] == "diffraction"
+    assert given["pixel_size"] == "0.085, 0.08"
+    bsdf = mi.load_dict({"type": "sphere", "bsdf": given}).bsdf()
+    assert bsdf.table.source["pixel_size"] == [0.085, 0.08]
+
+
+def test_variants_may_be_switched_back_and_forth(some_variant):
+    wi, wo, lam = pairs(20)
+    first = load()
+    before = evaluated(first, wi, wo, lam[:, None])
+    for name in ("scalar_rgb", "llvm_ad_rgb", some_variant):
+        mi.set_variant(name)
+    assert np.array_equal(evaluated(load(), wi, wo, lam[:, None]), before)
+    assert np.array_equal(evaluated(first, wi, wo, lam[:, None]), before)  # still of use
+
+
+LOADS = """
+import numpy as np
+heights = 0.01 * np.sin(np.arange(64) / 64 * 2 * np.pi)[None, :] + np.zeros((64, 1))
+def check():
+    b = mi.load_dict(md.bsdf_dict(md.HeightField(heights, 0.08), coherence_width=5.0))
+    assert 'Diffraction[' in str(b), b
+"""
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        "import mitsuba_diffraction as md, mitsuba as mi; mi.set_variant('{0}')",
+        "import mitsuba as mi; mi.set_variant('{0}'); import mitsuba_diffraction as md",
+        "import mitsuba as mi; import mitsuba_diffraction as md; mi.set_variant('scalar_rgb'); "
+        "mi.set_variant('{0}'); mi.set_variant('llvm_ad_rgb'); mi.set_variant('{0}')",
+    ],
+    ids=["import first", "variant first", "several variants"],
+)
+def test_the_plugin_is_there_whenever_it_is_imported(some_variant, order):
+    code = f"{order.format(some_variant)}\n{LOADS}\ncheck()"
+    result = subprocess.run(
+        [sys.executable, "-W", "error::DeprecationWarning:mitsuba_diffraction", "-c", code],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert (result.returncode, result.stderr) == (0, "")

@@ -1,0 +1,294 @@
+"""The shaders' functions against the NumPy code that they are twins of."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+from numpy.typing import NDArray
+
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
+from mitsuba_diffraction.heights import gratings
+from mitsuba_diffraction.optics.colour import linear_srgb, response
+from mitsuba_diffraction.optics.fresnel import reflectance
+from mitsuba_diffraction.realtime.glsl.context import compile_program, compiler_words
+from mitsuba_diffraction.realtime.glsl.packing import (
+    WAVENUMBERS,
+    pack_bounds,
+    pack_colours,
+    pack_conductor,
+    pack_powers,
+    pack_responses,
+)
+from mitsuba_diffraction.realtime.glsl.source import (
+    METHODS,
+    fragment_parts,
+    fragment_source,
+    vertex_source,
+)
+from mitsuba_diffraction.realtime.glsl.textures import (
+    PAGE,
+    Packed,
+    half_error,
+    listed,
+    paired,
+    shortened,
+)
+from mitsuba_diffraction.realtime.glsl.thesis import make_documented, pack_method
+from mitsuba_diffraction.tables.colour.colour_difference import colour_loss
+from mitsuba_diffraction.tables.colour.table import ColourTable
+from mitsuba_diffraction.tables.energy.bound import AZIMUTHAL, POLAR, AlbedoBound
+from mitsuba_diffraction.tables.store import cache
+from mitsuba_diffraction.thesis.methods import make
+from tests.realtime.glsl.conftest import probed
+
+DAYLIGHT = [(np.array([360.0, 830.0]), np.ones(2))]
+PERFECT = Packed(definitions={"SURFACE_KIND": "0"})
+
+
+def places(n: int, seed: int = 1) -> NDArray[np.float64]:
+    """(u, v, z, 1) of random pairs of directions, a sixth of them close to the specular one."""
+    rng = np.random.default_rng(seed)
+    pairs = rng.normal(size=(2, n, 3))
+    pairs /= np.linalg.norm(pairs, axis=-1, keepdims=True)
+    pairs[..., 2] = np.abs(pairs[..., 2])
+    near = np.arange(n) % 6 == 0
+    pairs[1, near, :2] = -pairs[0, near, :2] + rng.normal(0.0, 0.01, (near.sum(), 2))
+    pairs[1, near, 2] = pairs[0, near, 2]
+    total = pairs.sum(axis=0)
+    return np.concatenate([total, np.ones((n, 1))], axis=1).astype(np.float32).astype(float)
+
+
+def summed(table: DiffractionTable, at: NDArray[np.float64], lit: Any = None) -> NDArray[Any]:
+    """Colours (n, 3) by the table's own look-up at every quarter of a nanometre."""
+    lam = np.arange(376.0, 744.0, 0.25) + 0.125
+    weights = linear_srgb(response(lam)) * 0.25 / (lam[:, None] * 1e-3) ** 2
+    if lit is not None:
+        weights *= lit(lam)[:, None]
+    k = 2e3 * np.pi / lam[:, None]
+    return table.window_sum(k * at[:, 0], k * at[:, 1], k * at[:, 2]).T @ weights
+
+
+def difference(found: NDArray[Any], exact: NDArray[Any]) -> float:
+    """Relative L1 error."""
+    return float(np.abs(found - exact).sum() / np.abs(exact).sum())
+
+
+@pytest.mark.parametrize("coherence", ["ensemble", "patch"])
+def test_lut_reads_a_colour_table_as_its_numpy_twin_does(
+    gl: Any, patch: HeightField, coherence: str
+) -> None:
+    shallow = HeightField(patch.heights * 0.5, patch.pixel_size, name="shallow")
+    table = DiffractionTable.build(shallow, coherence_width=4.0, coherence=coherence)
+    colours = ColourTable.build(table)
+    at = places(3000)
+    found = probed(gl, "lut", pack_colours(colours) | PERFECT, at)
+    read = dataclasses.replace(
+        colours,
+        coefficients=shortened(colours.coefficients),
+        order_0=shortened(colours.order_0),
+    )
+    # single precision, in the logarithm of the radius above all
+    assert difference(found, read.colour(*at.T[:3])) < 1e-4
+    # and eight digits of each number: what the eye can tell apart is one
+    loss = colour_loss(colours, read)
+    assert loss.mean() < 0.1
+    assert np.percentile(loss, 99) < 0.5
+
+
+@given(arrays.arrays(np.float32, (3, 4), elements=st.floats(-16384, 16384, width=32)))
+def test_two_numbers_lie_in_a_word(values: NDArray[np.float32]) -> None:
+    words = paired(values)
+    assert words.shape == (3, 2)
+    found = np.stack([words << 16, words & np.uint32(0xFFFF0000)], axis=-1).view(np.float32)
+    np.testing.assert_array_equal(found.reshape(3, 4), shortened(values))
+    # half a unit of the eighth digit; numbers too small to have eight are off by less than 2⁻¹³⁰
+    np.testing.assert_allclose(shortened(values), values, rtol=2.0**-8, atol=1e-39)
+
+
+def test_spectral_sums_the_table_over_wavelengths(gl: Any, table: DiffractionTable) -> None:
+    at = places(360)
+    found = probed(gl, "spectral", pack_powers(table) | pack_responses(DAYLIGHT) | PERFECT, at)
+    exact = summed(table, at)
+    # cut windows 2e-4, lobes averaged at two points to third order: 4e-3 measured
+    assert difference(found, exact) < 8e-3
+    far = np.hypot(at[:, 0], at[:, 1]) > 0.5
+    assert difference(found[far], exact[far]) < 4e-3
+    close = np.hypot(at[:, 0], at[:, 1]) < 0.05
+    assert close.any()
+    assert difference(found[close], exact[close]) < 2e-3
+
+
+def test_spectral_knows_the_lights_own_spectrum(gl: Any, table: DiffractionTable) -> None:
+    at = places(120)
+
+    def lit(lam: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.exp(-(((lam - 590.0) / 25.0) ** 2))
+
+    grid = np.arange(360.0, 831.0)
+    packed = pack_powers(table) | pack_responses([(grid, lit(grid))]) | PERFECT
+    assert difference(probed(gl, "spectral", packed, at), summed(table, at, lit)) < 1e-2
+
+
+def test_amplitudes_serve_spectral_as_powers(gl: Any, patch: HeightField) -> None:
+    tables = [
+        DiffractionTable.build(patch, coherence_width=6.5, basis=basis, tolerance=1e-3)
+        for basis in ("svd", "taylor")
+    ]
+    assert [t.expansion.kind for t in tables] == ["power", "amplitude"]
+    at = places(300)
+    first, second = (
+        probed(gl, "spectral", pack_powers(t) | pack_responses(DAYLIGHT) | PERFECT, at)
+        for t in tables
+    )
+    assert difference(second, first) < 2e-3  # both tables have an error of up to 1e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "coherence"),
+    [("flss", "ensemble"), ("flss", "patch"), ("nmm", "ensemble"), ("pq", "patch")],
+)
+def test_the_documents_methods_are_those_of_their_evaluators(
+    gl: Any, name: str, coherence: str
+) -> None:
+    blazed = gratings.blazed(period=2.0, depth=0.2, periods=4)
+    settings = {} if name == "pq" else {"taps": 3}
+    method = make(
+        name, blazed, coherence_width=8.0, coherence=coherence, terms=37, tolerance=0.02, **settings
+    )  # fmt: skip
+    rng = np.random.default_rng(2)
+    x, y = rng.uniform(-0.6, 0.6, (2, 600, 2))
+    y[:, 1] = -y[:, 0] + rng.normal(0.0, 0.03, 600)  # where a grating sends light
+    wi, wo = (
+        np.stack([x[:, n], y[:, n], np.sqrt(1 - x[:, n] ** 2 - y[:, n] ** 2)], 1) for n in (0, 1)
+    )
+    total = wi + wo
+    at = np.concatenate([total, np.ones((600, 1))], axis=1)
+    packed = pack_method(method)
+    found = probed(gl, name, packed | pack_responses(DAYLIGHT) | PERFECT, at)
+    outside = (0.5 * np.sum(total**2, axis=1) / total[:, 2]) ** 2 / (wi[:, 2] * wo[:, 2])
+    found *= (outside * packed.uniforms["area_factor"])[:, None]
+
+    expected = method.linear_srgb(wi, wo)
+    bright = np.abs(expected).max(axis=1) > 0.01 * np.abs(expected).max()
+    assert bright.sum() > 60
+    norm = np.linalg.norm(expected[bright], axis=1)
+    error = np.linalg.norm((found - expected)[bright], axis=1) / norm
+    # the figure asked for; a line of nmm may come or go at the very end of the range
+    assert np.quantile(error, 0.98 if name == "nmm" else 1.0) < 0.01
+
+
+def test_a_coherent_sum_is_refused_by_spectral(patch: HeightField) -> None:
+    table = DiffractionTable.build(patch, coherence_width=6.5, coherence="patch")
+    with pytest.raises(DiffractionError, match=r"coherence='patch'.*use method lut"):
+        pack_powers(table)
+
+
+def test_a_conductors_colour_multiplies_the_light(gl: Any, table: DiffractionTable) -> None:
+    lam = np.array([360.0, 500.0, 520.0, 830.0])
+    eta, k = np.array([1.5, 1.4, 0.3, 0.2]), np.array([1.9, 1.8, 2.5, 5.0])  # like gold
+    at = places(60)
+    at[:, 3] = np.linspace(0.2, 1.0, 60)
+    packed = pack_powers(table) | pack_responses(DAYLIGHT) | pack_conductor(lam, eta, k)
+    found = probed(gl, "spectral", packed, at)
+
+    fine = np.arange(376.0, 744.0, 0.25) + 0.125
+    index = np.interp(fine, lam, eta) + 1j * np.interp(fine, lam, k)
+    reflected = reflectance(at[:, 3], index[:, None])
+    exact = np.array(
+        [summed(table, at[n : n + 1], lambda _, n=n: reflected[:, n])[0] for n in range(60)]
+    )
+    assert difference(found, exact) < 8e-3  # as for a perfect mirror
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("all_parts", [False, True])
+def test_one_body_compiles_on_the_desktop_and_in_a_browser(
+    gl: Any, method: str, all_parts: bool
+) -> None:
+    definitions = {"TEXELS": "2", "TAPS_X": "3", "TAPS_Y": "3", "DIFFRACTING": ""}
+    if all_parts:
+        bounds = AlbedoBound(np.ones((POLAR + 1, AZIMUTHAL + 1), np.float32))
+        parts = ("COLOUR_MAPPED", "AXIS_MAPPED", "PIGMENTED", "VCAVITY", "THESIS", "COHERENT")
+        definitions |= dict.fromkeys(parts, "") | {"SURFACE_KIND": "2"}
+        definitions |= pack_bounds([bounds, bounds]).definitions
+    compile_program(gl, method, definitions).release()
+    if "GL_ARB_ES3_compatibility" not in gl.extensions:
+        pytest.skip(f"{gl.info['GL_RENDERER']} compiles no GLSL ES")
+    gl.program(
+        vertex_shader=vertex_source("web"),
+        fragment_shader=fragment_source(method, definitions, "web"),
+    ).release()
+
+
+def test_a_shader_that_does_not_compile_is_named_with_its_line(gl: Any) -> None:
+    definitions = {"TEXELS": "two"}
+    body = dict(fragment_parts("spectral", {}))["spectral.glsl"].split("\n")
+    line = next(n for n, text in enumerate(body, 1) if text.startswith("float series("))
+    with pytest.raises(DiffractionError) as caught:
+        compile_program(gl, "spectral", definitions)
+    assert f"compile method spectral: spectral.glsl, line {line}: " in str(caught.value)
+    assert "two" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "log",
+    ["0:15(3): error: `a' undeclared", "0(15) : error C1503: undefined variable", "ERROR: 0:15: a"],
+)
+def test_the_logs_of_other_compilers_are_understood(log: str) -> None:
+    parts = [("a.glsl", 10 * "\n"), ("b.glsl", 10 * "\n")]
+    words = compiler_words(f"GLSL Compiler failed\n\nfragment_shader\n{log}\n", parts)
+    assert words.startswith("b.glsl, line 5: ")
+
+
+def test_an_unknown_method_is_refused_with_the_choices() -> None:
+    with pytest.raises(DiffractionError, match="'phong' is unknown; choose one of lut, spec"):
+        fragment_source("phong", {})
+
+
+def test_lists_keep_their_order_over_rows() -> None:
+    entries = np.arange(2 * PAGE + 10, dtype=np.float32)[:, None].repeat(4, axis=1)
+    data = listed("numbers", entries).data
+    assert data.shape == (3, PAGE, 4)
+    np.testing.assert_array_equal(data.reshape(-1, 4)[: len(entries)], entries)
+
+
+def test_the_documents_tables_are_built_once(
+    table: DiffractionTable, patch: HeightField, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("MITSUBA_DIFFRACTION_CACHE", str(tmp_path))
+    first = make_documented("flss", patch, table)
+    assert len([*tmp_path.glob("*.exr")]) == 1
+
+    def build(*_: object, **__: object) -> DiffractionTable:
+        raise AssertionError("built again")
+
+    monkeypatch.setattr(DiffractionTable, "build", build)
+    monkeypatch.setattr(cache, "_open_tables", {})  # as in the next process
+    second = make_documented("flss", patch, table)
+    np.testing.assert_array_equal(second.table.coefficients, first.table.coefficients)
+    with pytest.raises(AssertionError, match="built again"):
+        make_documented("pq", patch, table)
+
+
+def test_half_floats_are_taken_where_they_hold(table: DiffractionTable) -> None:
+    orders = pack_powers(table).textures[0]
+    assert orders.data.dtype == np.float16
+    assert half_error(np.array([1.0, 0.5], np.float32)) == 0.0
+    assert 1e-4 < half_error(np.array([1.0 + 2.0**-11 * 0.9], np.float32)) < 1e-3
+
+
+def test_what_eyes_do_not_see_adds_nothing() -> None:
+    (texture,) = pack_responses(DAYLIGHT).textures
+    assert not texture.data[:, [0, -1]].any()
+    # ∫ s̄ dλ is white: s̄/2π dk · λ²
+    k = np.linspace(*WAVENUMBERS, texture.data.shape[1])
+    white = (texture.data[0, :, :3] * (2 * np.pi / k[:, None]) ** 2).sum(0) * (k[1] - k[0])
+    np.testing.assert_allclose(white, 1.0, atol=1e-3)

@@ -1,0 +1,140 @@
+"""A browser without a window, and a small scene with its page."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction.realtime.web.export import Page, make_page
+from tests.conftest import VARIANTS, obstacle
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+FLAGS = (
+    "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
+)  # fmt: skip
+SIZE = (96, 64)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """Chromium, driven by Playwright, in a user's folder of its own."""
+    api = pytest.importorskip("playwright.sync_api")
+    path = next((p for p in map(shutil.which, BROWSERS) if p), None)
+    if path is None:
+        pytest.skip("no Chromium here: apt install chromium")
+    with api.sync_playwright() as playwright:
+        try:
+            found = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
+        except api.Error as error:
+            pytest.skip(f"{path} does not start: {str(error).splitlines()[0]}")
+        yield found
+        found.close()
+
+
+@pytest.fixture(scope="session")
+def scene() -> Any:
+    """A grating on a roll over diffuse grey, on chequered ground, under a sun and a lamp."""
+    import mitsuba as mi
+    import numpy as np
+
+    name = next((name for name in VARIANTS if obstacle(name) is None), None)
+    if name is None:
+        pytest.skip(f"none of {', '.join(VARIANTS)} runs on this machine")
+    mi.set_variant(name)
+    transform = mi.ScalarTransform4f
+    chequers = np.full((8, 8, 3), 0.1, np.float32)
+    chequers[::2, ::2] = [0.5, 0.3, 0.2]
+    grating = md.gratings.sinusoidal(period=1.6, depth=0.06, periods=4)
+    grey = {"type": "diffuse", "reflectance": 0.1}
+    film = {"type": "hdrfilm", "width": SIZE[0], "height": SIZE[1]}
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "sensor": {
+                "type": "perspective", "fov": 30, "film": film,
+                "to_world": transform().look_at([0, -6, 4], [0, 0, 0.7], [0, 0, 1]),
+            },
+            "roll": {
+                "type": "cylinder", "p0": [-1.2, 0.3, 0.9], "p1": [1.2, -0.3, 0.9], "radius": 0.9,
+                "bsdf": md.bsdf_dict(
+                    grating, coherence_width=6, orientation=30.0, pigment=grey
+                ),
+            },
+            "ground": {
+                "type": "rectangle", "to_world": transform().scale(5),
+                "bsdf": {
+                    "type": "diffuse",
+                    "reflectance": {"type": "bitmap", "bitmap": mi.Bitmap(chequers), "raw": False},
+                },
+            },
+            "sun": {"type": "directional", "direction": [0.3, 1, -1.2], "irradiance": 3.0},
+            "lamp": {"type": "point", "position": [2, -3, 4], "intensity": 10.0},
+        }
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def page(scene: Any) -> Page:
+    """The scene's page, with both methods."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mitsuba_diffraction.realtime.web.scene.OCTAVES", (-1.0, 0.0))  # seconds each
+        # the title is the worst that a file can be called
+        return make_page(scene, title="</script><script>throw 1</script>")
+
+
+@pytest.fixture(scope="session")
+def page_file(page: Page, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page in a file."""
+    path = tmp_path_factory.mktemp("page") / "scene.html"
+    path.write_text(page.text, encoding="utf-8")
+    return path
+
+
+class Tab:
+    """A page that is open, with all that it says and asks for."""
+
+    def __init__(self, browser: Any, size: tuple[int, int], script: str = "") -> None:
+        self.page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+        self.said: list[str] = []
+        self.asked: list[str] = []
+        self.page.on("console", lambda message: self._heard(message.text))
+        self.page.on("pageerror", lambda error: self.said.append(str(error)))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        if script:
+            self.page.add_init_script(script)
+
+    def _heard(self, text: str) -> None:
+        # frames are timed on purpose, which drivers in software remark upon
+        if "GPU stall due to ReadPixels" not in text:
+            self.said.append(text)
+
+    def open(self, path: Path) -> str:
+        """Load a file and return the state that it reaches: ready, or failed."""
+        self.page.goto(path.as_uri())
+        return self.state(self.page)
+
+    @staticmethod
+    def state(frame: Any) -> str:
+        """Wait until a page has loaded or given up."""
+        frame.wait_for_function("document.documentElement.dataset.state", timeout=60_000)
+        return str(frame.evaluate("document.documentElement.dataset.state"))
+
+
+@pytest.fixture
+def tab(browser: Any) -> Iterator[Any]:
+    """Opens pages: `tab(size, script)`, the script running before theirs."""
+    opened: list[Tab] = []
+
+    def make(size: tuple[int, int] = SIZE, script: str = "") -> Tab:
+        opened.append(Tab(browser, size, script))
+        return opened[-1]
+
+    yield make
+    for one in opened:
+        one.page.close()

@@ -1,0 +1,219 @@
+"""Fields of directions on meshes, and the meshes whose patch follows them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.scene.orientation.directions import GUIDES, direction_field
+from mitsuba_diffraction.scene.orientation.oriented import oriented_mesh
+from mitsuba_diffraction.scene.orientation.tangents import check_tangents, load_mesh
+from mitsuba_diffraction.scene.orientation.trimesh import (
+    TriangleMesh,
+    grid_faces,
+    vertex_normals,
+    write_ply,
+)
+from scenes.make import disc, piece
+from scenes.make.scales import Scales
+
+Arrays = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+def _wrapped(n: int, m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Angles (i, j) over a grid whose ends meet, and its triangles."""
+    i, j = np.meshgrid(
+        np.linspace(0, 2 * np.pi, n + 1), np.linspace(0, 2 * np.pi, m + 1), indexing="ij"
+    )
+    return i.ravel(), j.ravel(), grid_faces(np.arange(i.size).reshape(n + 1, m + 1))
+
+
+def _placed(positions: np.ndarray, normals: np.ndarray, faces: np.ndarray) -> Arrays:
+    # so that both ends of a seam are the same numbers
+    return np.round(positions, 9) + 0.0, normals, faces
+
+
+def ball() -> Arrays:
+    i, j, faces = _wrapped(20, 40)
+    p = np.stack([np.sin(i / 2) * np.cos(j), np.sin(i / 2) * np.sin(j), np.cos(i / 2)], axis=1)
+    return _placed(p, p, faces)
+
+
+def ring() -> Arrays:
+    """A torus around z; radii 2 and 0.7."""
+    i, j, faces = _wrapped(40, 20)
+    out = np.stack([np.cos(i), np.sin(i), 0 * i], axis=1)
+    normals = np.cos(j)[:, None] * out + np.sin(j)[:, None] * np.array([0.0, 0.0, 1.0])
+    return _placed(2 * out + 0.7 * normals, normals, faces)
+
+
+def bent_tube() -> tuple[Arrays, np.ndarray]:
+    """Three quarters of a torus, open, and the direction along it."""
+    i, j, faces = _wrapped(60, 16)
+    i = 0.75 * i
+    out = np.stack([np.cos(i), np.sin(i), 0 * i], axis=1)
+    along = np.stack([-np.sin(i), np.cos(i), 0 * i], axis=1)
+    normals = np.cos(j)[:, None] * out + np.sin(j)[:, None] * np.array([0.0, 0.0, 1.0])
+    return _placed(3 * out + 0.4 * normals, normals, faces), along
+
+
+@pytest.mark.parametrize("along", GUIDES)
+@pytest.mark.parametrize(("mesh", "euler"), [(ball, 2), (ring, 0)])
+def test_singular_points_add_up_to_the_euler_characteristic(mesh, euler, along):
+    field = direction_field(*mesh(), along)
+    assert field.indices.sum() == euler  # Poincaré–Hopf
+    assert np.allclose(np.linalg.norm(field.directions, axis=1), 1)
+    assert np.abs((field.directions * mesh()[1]).sum(axis=1)).max() < 1e-12
+
+
+def test_the_smoothest_field_has_no_more_singular_points_than_it_must():
+    assert list(direction_field(*ball()).indices) == [1, 1]
+    assert not len(direction_field(*ring()).indices)
+
+
+def test_an_axis_is_followed_where_it_lies_in_the_surface():
+    positions, normals, faces = ball()
+    field = direction_field(positions, normals, faces, "z")
+    projected = [0.0, 0.0, 1.0] - normals[:, 2:] * normals
+    sine = np.linalg.norm(projected, axis=1)
+    cosine = (field.directions * projected).sum(axis=1) / np.maximum(sine, 1e-9)
+    # meridians are their own best smoothing but near the poles, which the grid has in vertices
+    assert np.degrees(np.arccos(np.clip(cosine[sine > 0.5], -1, 1))).max() < 2
+    assert np.abs(field.singular[:, 2]).min() > 0.95
+
+
+def test_a_current_runs_along_a_body():
+    mesh, along = bent_tube()
+    field = direction_field(*mesh, "body")
+    assert not len(field.indices)
+    cosine = (field.directions * along).sum(axis=1)
+    sign = np.sign(np.median(cosine))
+    angle = np.degrees(np.arccos(np.clip(sign * cosine, -1, 1)))
+    # at its two ends the current gathers in one point: three widths away exp(−3 · 0.8 / 0.4), in
+    # potential, is left of that; twice as much on both sides in slope, 0.3°
+    i = np.arctan2(-along[:, 0], along[:, 1]) % (2 * np.pi)
+    middle = (i > 2.4 / 3) & (i < 1.5 * np.pi - 2.4 / 3)
+    assert angle[middle].max() < 0.6
+
+
+def test_parts_that_do_not_touch_have_fields_of_their_own():
+    positions, normals, faces = ball()
+    two = np.concatenate([positions, 0.1 * positions + [5.0, 0.0, 0.0]])
+    joined = np.concatenate([faces, faces + len(positions)])
+    for along in GUIDES:
+        field = direction_field(two, np.tile(normals, (2, 1)), joined, along)
+        assert np.allclose(np.linalg.norm(field.directions, axis=1), 1), along
+        assert field.indices.sum() == 4
+
+
+@pytest.mark.usefixtures("some_variant")
+@pytest.mark.parametrize("own_uv", [True, False])
+def test_mitsuba_lays_the_patch_along_the_field(own_uv: bool, tmp_path: Path) -> None:
+    """The frame at a hit, turned by the attribute, is the interpolated field."""
+    import mitsuba as mi
+
+    positions, normals, faces = ball()
+    field = direction_field(positions, normals, faces, "x").directions
+    i, j, _ = _wrapped(20, 40)
+    uv = None if own_uv else np.stack([3 * j, i + 0.3 * j], axis=1)  # stretched and askew
+    mesh = oriented_mesh(positions, normals, faces, field, uv)
+    write_ply(tmp_path / "ball.ply", mesh)
+    scene = mi.load_dict({"type": "scene", "ball": {
+        "type": "ply", "filename": str(tmp_path / "ball.ply")}})  # fmt: skip
+    corners = positions[faces]
+    # close to a corner of every triangle
+    places = np.einsum("fcx,c->fx", corners, [0.98, 0.01, 0.01])
+    inwards = -places / np.linalg.norm(places, axis=1, keepdims=True)
+    si = scene.ray_intersect(mi.Ray3f(mi.Point3f((places - inwards).T), mi.Vector3f(inwards.T)))
+    turn = si.shape.eval_attribute_3("vertex_orientation", si)
+    found = np.array(si.to_world(mi.Vector3f(turn.x, turn.y, 0.0))).T
+    expected = field[faces[:, 0]]
+    hit = np.array(si.is_valid())
+    assert hit.mean() > 0.9  # the ends of triangles without area at the poles
+    # next to the two singular points the field turns by up to 180° along an edge
+    hit &= np.abs(positions[faces[:, 0], 0]) < 0.8
+    cosine = (found * expected).sum(axis=1)[hit] / np.linalg.norm(found[hit], axis=1)
+    # 2 % of the 20° that it turns by from corner to corner elsewhere
+    assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() < 0.4
+
+
+def test_what_is_oriented_is_usable_and_reads_back(tmp_path: Path) -> None:
+    positions, normals, faces = ring()
+    field = direction_field(positions, normals, faces)
+    mesh = oriented_mesh(positions, normals, faces, field.directions)
+    report = check_tangents(mesh.positions, mesh.normals, mesh.uv, mesh.faces)
+    assert report.usable
+    assert report.problems() == []
+    assert report.stretch == pytest.approx(1)
+    write_ply(tmp_path / "ring.ply", mesh)
+    again = load_mesh(tmp_path / "ring.ply")
+    np.testing.assert_allclose(again[0], mesh.positions, atol=1e-6)
+
+
+@given(
+    arrays(np.int64, st.tuples(st.integers(1, 12), st.just(3)), elements=st.integers(0, 7)),
+    st.integers(0, 99),
+    st.sampled_from(GUIDES),
+    st.booleans(),
+)
+@settings(max_examples=60, deadline=None)
+def test_any_triangles_get_a_finite_field_or_are_refused(faces, seed, along, own_uv):
+    rng = np.random.default_rng(seed)
+    positions = rng.normal(size=(8, 3))
+    normals = vertex_normals(positions, faces)
+    try:
+        field = direction_field(positions, normals, faces, along)
+    except DiffractionError as error:
+        assert "no triangle has an area" in str(error)
+        return
+    uv = None if own_uv else rng.normal(size=(8, 2))
+    mesh = oriented_mesh(positions, normals, faces, field.directions, uv)
+    assert np.isfinite(mesh.uv).all()
+    assert np.isfinite(mesh.orientation).all()
+
+
+def test_bad_requests_are_one_line() -> None:
+    with pytest.raises(DiffractionError, match="along='w' is unknown; choose one of smooth, x"):
+        direction_field(*ball(), "w")
+    with pytest.raises(DiffractionError, match="smoothing = nan is outside"):
+        direction_field(*ball(), "x", smoothing=float("nan"))
+    flat = np.zeros((3, 3)), np.ones((3, 3)), np.array([[0, 1, 2]])
+    with pytest.raises(DiffractionError, match="no triangle has an area"):
+        direction_field(*flat)
+    positions, normals, faces = ball()
+    positions[7] = np.inf
+    with pytest.raises(DiffractionError, match="normal of vertex 7 is not finite"):
+        direction_field(positions, normals, faces)
+    with pytest.raises(DiffractionError, match="disc: inner = 3 is outside"):
+        disc(3.0, 2.0)
+    with pytest.raises(DiffractionError, match="piece: rows = 99 is outside 3 to 17"):
+        piece(rows=99)
+
+
+@pytest.mark.parametrize("inner", [0.0, 2.0])
+def test_a_disc_has_its_area_and_faces_up(inner: float) -> None:
+    mesh = disc(inner, 5.0, sectors=360)
+    corners = mesh.positions[mesh.faces]
+    up = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] / 2
+    assert up.min() > 0
+    # a polygon of 360 corners lacks 5e-5 of the circle
+    assert up.sum() == pytest.approx(np.pi * (25 - inner**2), rel=1e-4)
+
+
+def test_a_piece_is_the_back_of_a_snake() -> None:
+    mesh: TriangleMesh = piece(scales=Scales(detail=2, turn=-90.0), columns=4, rows=7)
+    assert np.allclose(np.linalg.norm(mesh.normals, axis=1), 1)
+    assert mesh.normals[:, 2].mean() > 0.8
+    report = check_tangents(mesh.positions, mesh.normals, mesh.uv, mesh.faces)
+    assert report.usable
+    pitch = 2 * 0.74 / 18 * 1.25  # circumferences
+    # the cells that the cut goes through, of 1.22 / 4 pitches, are left out at both ends
+    assert 4 * pitch - 2 * 1.22 / 4 * pitch < np.ptp(mesh.uv[:, 0]) <= 4 * pitch + 1e-9
+    assert mesh.orientation is not None
+    np.testing.assert_allclose(mesh.orientation, np.tile([0, -1], (len(mesh.uv), 1)), atol=1e-12)

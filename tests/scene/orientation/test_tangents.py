@@ -1,0 +1,155 @@
+"""The check of tangents, on meshes that do and do not have them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.scene.orientation.tangents import check_tangents, load_mesh
+from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, grid_faces, write_ply
+from tests.conftest import ROOT
+
+PLY = b"""ply
+format binary_little_endian 1.0
+element vertex 1
+property float x
+property float y
+property float z
+end_header
+"""
+PLY_FACE = PLY.replace(
+    b"end_header", b"element face 1\nproperty list uchar int vertex_indices\nend_header"
+)
+
+Arrays = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+def _sheet(n: int = 8) -> Arrays:
+    """A flat square sheet with texture coordinates x, y."""
+    x, y = (g.ravel() for g in np.meshgrid(*2 * [np.linspace(0, 1, n + 1)], indexing="ij"))
+    positions = np.stack([x, y, 0 * x], axis=1)
+    normals = np.broadcast_to([0.0, 0.0, 1.0], positions.shape)
+    faces = grid_faces(np.arange((n + 1) ** 2).reshape(n + 1, n + 1))
+    return positions, normals, positions[:, :2].copy(), faces
+
+
+def test_a_plain_sheet_is_fine() -> None:
+    report = check_tangents(*_sheet())
+    assert report.usable
+    assert report.problems() == []
+    assert report.triangles == 128
+    assert report.stretch == pytest.approx(1)
+    assert report.degenerate == report.mirrored == report.turning == 0
+
+
+def test_without_texture_coordinates_there_is_no_direction() -> None:
+    positions, normals, _, faces = _sheet()
+    report = check_tangents(positions, normals, None, faces)
+    assert not report.usable
+    assert len(report.problems()) == 1
+    assert "no texture coordinates" in report.problems()[0]
+
+
+def test_collapsed_texture_coordinates_are_named() -> None:
+    positions, normals, uv, faces = _sheet()
+    uv[positions[:, 0] > 0.7] = 0.5
+    report = check_tangents(positions, normals, uv, faces)
+    # two columns of cells, and one triangle of each cell in the column before
+    assert report.degenerate == pytest.approx(2.5 / 8)
+    assert not report.usable
+    assert any("without area" in line for line in report.problems())
+
+
+def test_a_mirrored_half_is_named() -> None:
+    positions, normals, uv, faces = _sheet()
+    uv[:, 1] = np.abs(uv[:, 1] - 0.5)
+    report = check_tangents(positions, normals, uv, faces)
+    assert report.mirrored == pytest.approx(0.5)
+    assert any("mirrored" in line for line in report.problems())
+
+
+def test_turning_tangents_are_named() -> None:
+    positions, normals, uv, faces = _sheet(16)
+    # the texture turns by a right angle half-way
+    right = positions[faces].mean(axis=1)[:, 0] > 0.5
+    split = faces.copy()
+    split[right] += len(positions)
+    turned = np.stack([uv[:, 1], -uv[:, 0]], axis=1)
+    report = check_tangents(
+        np.tile(positions, (2, 1)), np.tile(normals, (2, 1)), np.concatenate([uv, turned]), split
+    )
+    # one triangle in each cell on both sides of the seam
+    assert report.turning == pytest.approx(2 * 0.5 / 16)
+    assert not report.usable
+
+
+def test_stretch_is_the_ratio_of_the_tangents() -> None:
+    positions, normals, uv, faces = _sheet()
+    uv[:, 0] /= 3
+    assert check_tangents(positions, normals, uv, faces).stretch == pytest.approx(3)
+
+
+@pytest.mark.parametrize("name", ["elaphe", "xenopeltis"])
+def test_the_snakes_are_usable(name: str) -> None:
+    report = check_tangents(*load_mesh(ROOT / "scenes" / "meshes" / f"{name}.ply"))
+    assert report.usable
+    assert report.problems() == []
+
+
+@pytest.mark.parametrize(
+    ("content", "name", "words"),
+    [
+        (None, "mesh.ply", "there is no such file"),
+        (b"", "mesh.ply", "cannot be read"),
+        (b"ply\nformat ascii 1.0\nend_header\n", "mesh.ply", "it has no triangles"),
+        (PLY + bytes(12), "mesh.ply", "it has no triangles"),
+        (b"solid", "mesh.stl", "must end in .ply, .obj, .serialized"),
+        (b"v 0 0 0\n", "mesh.obj", "it has no triangles"),
+        (PLY_FACE + bytes(12) + b"\3" + bytes([9, 0, 0, 0] * 3), "mesh.ply", "names vertex"),
+    ],
+)
+def test_bad_files_are_refused_in_one_line(
+    content: bytes | None, name: str, words: str, tmp_path: Path
+) -> None:
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(DiffractionError, match=words) as caught:
+        load_mesh(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@given(st.binary(max_size=300))
+@settings(max_examples=40, deadline=None)
+def test_any_bytes_after_a_ply_header_are_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, content: bytes
+) -> None:
+    path = tmp_path_factory.mktemp("ply") / "mesh.ply"
+    path.write_bytes(b"ply\nformat binary_little_endian 1.0\n" + content)
+    with pytest.raises(DiffractionError) as caught:
+        load_mesh(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_written_mesh_reads_back(tmp_path: Path) -> None:
+    positions, normals, uv, faces = _sheet(2)
+    write_ply(tmp_path / "sheet.ply", TriangleMesh(positions, normals, uv, faces), "a sheet")
+    read = load_mesh(tmp_path / "sheet.ply")
+    for before, after in zip((positions, normals, uv, faces), read, strict=True):
+        np.testing.assert_array_equal(before, after)
+
+
+def test_arrays_that_do_not_fit_are_refused() -> None:
+    positions, normals, uv, faces = _sheet(2)
+    with pytest.raises(DiffractionError, match="'uv' has shape"):
+        TriangleMesh(positions, normals, uv[:-1], faces)
+    with pytest.raises(DiffractionError, match="outside 0 to 8"):
+        TriangleMesh(positions, normals, uv, faces + 1)
+    with pytest.raises(DiffractionError, match="'faces' has shape"):
+        TriangleMesh(positions, normals, uv, faces[:, :2])

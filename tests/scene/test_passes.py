@@ -1,0 +1,105 @@
+"""Passes of `render`: their mean is the picture, and Ctrl-C keeps what there is of it."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from mitsuba_diffraction.scene.passes import Stop, render_passes, samples_per_pass
+from tests.cli.room import QUICK, SCENE, pixels
+
+
+def passes(scene, *, spp, size, stop=None, progress=lambda *_: None):
+    """render_passes with passes of `size`, as seed 5 gives them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mitsuba_diffraction.scene.passes.samples_per_pass", lambda *_: size)
+        return render_passes(
+            scene, scene.sensors()[0], spp=spp, seed=5, variant=mi.variant(),
+            stop=stop or Stop(), progress=progress,
+        )  # fmt: skip
+
+
+LAMP = '<emitter type="point"><point name="position" x="2" y="2" z="3"/></emitter>'
+
+
+@pytest.mark.parametrize("integrator", ["path", "ptracer"])
+@pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_rgb"])
+def test_passes_average_to_the_mean_weighted_by_samples(scene, variant, integrator):
+    # a box filter gives every sample to one pixel: there the average of pictures is exact, too
+    scene.write_text(
+        SCENE.replace("</film>", '<rfilter type="box"/></film>')
+        .replace('"path"', f'"{integrator}"')
+        .replace("  <shape", LAMP + "  <shape")
+    )
+    mi.set_variant(variant)
+    loaded = mi.load_file(str(scene))
+    result = passes(loaded, spp=7, size=3)
+    assert result.spp == 7
+    expected = 0.0
+    for sequence, spp in zip(np.random.SeedSequence(5).spawn(3), (3, 3, 1), strict=True):
+        seed = int(sequence.generate_state(1)[0])
+        expected = expected + spp / 7 * np.array(mi.render(loaded, spp=spp, seed=seed))
+    assert np.array(result.bitmap) == pytest.approx(expected, rel=1e-5, abs=1e-6)  # single
+
+
+def test_a_pass_of_one_size_divides_the_samples():
+    pixels = 512 * 512
+    assert samples_per_pass(256, pixels, "llvm_ad_rgb") == 8
+    assert samples_per_pass(100, pixels, "llvm_ad_rgb") == 5
+    assert samples_per_pass(97, pixels, "llvm_ad_rgb") == 8
+    assert samples_per_pass(4, pixels, "llvm_ad_rgb") == 4
+    assert samples_per_pass(256, 10**9, "cuda_ad_rgb") == 1
+    assert samples_per_pass(256, pixels, "scalar_rgb") == 1
+
+
+def test_asked_to_stop_it_keeps_the_passes_so_far(scene):
+    mi.set_variant("llvm_ad_rgb")
+    stop = Stop()
+
+    def progress(done, total, text):
+        stop.asked = done >= 4
+
+    result = passes(mi.load_file(str(scene)), spp=100, size=2, stop=stop, progress=progress)
+    assert result.interrupted
+    assert result.spp == 4
+    assert np.array(result.bitmap)[0, 0] == pytest.approx(0.5, rel=1e-3)
+
+
+def test_ctrl_c_keeps_the_picture_so_far(run, scene, monkeypatch):
+    def interrupt(self, done, total, text):
+        if done == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr("mitsuba_diffraction.cli.progress.Bar.__call__", interrupt)
+    ran = run("render", scene, *QUICK, "-s", "50", "-o", "a.exr")
+    assert ran.code == 130
+    assert ran.err.splitlines() == [
+        "mitsuba-diffraction: interrupted; the picture has 2 of 50 samples per pixel"
+    ]
+    assert pixels("a.exr")[0, 0] == pytest.approx(0.5, rel=1e-3)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_ctrl_c_before_the_first_pass_writes_nothing(run, scene, monkeypatch):
+    monkeypatch.setattr(
+        "mitsuba_diffraction.cli.progress.Bar.__call__",
+        lambda *_: os.kill(os.getpid(), signal.SIGINT),
+    )
+    assert run("render", scene, *QUICK, "-o", "a.exr").code == 130
+    assert os.listdir() == ["room.xml"]
+
+
+def test_ctrl_c_while_compiling_writes_nothing(run, scene, monkeypatch):
+    def interrupt(self, done, total, text):
+        if text == "compiling":
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr("mitsuba_diffraction.cli.progress.Bar.__call__", interrupt)
+    ran = run("render", scene, *QUICK, "-o", "a.exr")
+    assert ran.code == 130
+    assert "nothing half-written" in ran.err
+    assert os.listdir() == ["room.xml"]

@@ -1,0 +1,155 @@
+"""What cannot be built is refused in one line that says why; all the rest meets its tolerance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
+from mitsuba_diffraction import reference
+from mitsuba_diffraction.tables.build.build.choose import taylor_rounding
+from tests.directions import rough_patch
+from tests.tables.patches import DEEP, DEFAULTS, PATCH
+
+
+def refused(**arguments):
+    """The one line with which a table of PATCH, or of heights=…, is refused."""
+    heights = arguments.pop("heights", PATCH)
+    with pytest.raises(DiffractionError) as caught:
+        DiffractionTable.build(heights, **(DEFAULTS | arguments))
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_taylor_is_refused_where_single_precision_does_not_survive_it():
+    text = refused(heights=DEEP, basis="taylor")
+    assert text.startswith(
+        "cannot build the table: basis='taylor' cannot reach tolerance=0.001 for heights of 1.2 µm"
+    )
+    assert "predicted error of" in text
+    assert text.endswith("use basis='svd'")
+
+
+@pytest.mark.parametrize("depth", [0.25, 0.4, 0.6])
+def test_taylor_s_predicted_rounding_is_what_is_measured(depth):
+    field = rough_patch((64, 64), (0.08, 0.08), depth)
+    # so many taps and terms, at such a tolerance, that rounding is all the error there is
+    table = DiffractionTable.build(
+        field, basis="taylor", terms=60, taps=12, tolerance=0.9, **DEFAULTS
+    )
+    predicted = taylor_rounding(field, table.expansion.kappa_max, 60)
+    measured = table.largest_error
+    # a root mean square of errors with random signs, of which the measure sees one part or more
+    assert 0.5 < predicted / measured < 8.0
+
+
+def test_too_few_taylor_terms_are_refused_with_the_error_they_leave():
+    text = refused(basis="taylor", terms=5)
+    assert "terms=5 of basis='taylor' leave a predicted error of up to" in text
+    assert "leave terms out, raise it, or use basis='svd'" in text
+    text = refused(basis="taylor", terms=20)  # near enough to be tried
+    assert "terms=20 of basis='taylor' leave an error of" in text
+    assert "more than tolerance=0.001" in text
+
+
+def test_too_few_taps_are_refused_with_the_error_they_leave():
+    text = refused(taps=2)
+    assert text.startswith("cannot build the table: taps=2 leave an error of ")
+    assert text.endswith("leave taps out, or raise the tolerance")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            {"basis": "fourier"},
+            "basis='fourier' is unknown; choose one of svd, chebyshev, taylor, auto",
+        ),
+        ({"coherence": "full"}, "coherence='full' is unknown; choose one of ensemble, patch"),
+        ({"coherence_width": 0.0}, "coherence_width=0.0 must be a positive number of µm"),
+        ({"coherence_width": np.nan}, "coherence_width=nan must be a positive number"),
+        ({"tolerance": 1e-7}, "tolerance=1e-07 must lie between 1e-6 (single precision) and 1"),
+        ({"tolerance": 1.0}, "tolerance=1.0 must lie between"),
+        ({"tolerance": np.nan}, "tolerance=nan must lie between"),
+        ({"terms": 0}, "terms=0 must be a whole number from 1 to 400"),
+        ({"terms": 401}, "terms=401 must be a whole number from 1 to 400"),
+        ({"taps": 65}, "taps=65 must be a whole number from 1 to 64"),
+        ({"wavelength_range": (700.0, 400.0)}, "wavelength_range=(700, 400) must be two rising"),
+        ({"wavelength_range": (0.36, 0.83)}, "in nm, between 10 and 100000"),
+        ({"height_scale_max": 0.0}, "height_scale_max=0 must be a positive factor, at most 1000"),
+        ({"height_scale_max": np.nan}, "height_scale_max=nan must be a positive factor"),
+        ({"heights": []}, "there is no height field; give at least one"),
+        ({"heights": [PATCH, PATCH], "coherence": "patch"}, "which coherence='patch' cannot"),
+        ({"heights": [PATCH, PATCH], "basis": "taylor"}, "which basis='taylor' cannot"),
+        ({"heights": [PATCH, DEEP]}, "crop them to one size"),
+        ({"coherence_width": 0.05}, "look-up would read"),
+    ],
+)
+def test_bad_parameters_are_refused_in_one_line(arguments, message):
+    assert message in refused(**arguments)
+
+
+def test_a_series_too_short_for_any_number_of_intervals_is_refused():
+    text = refused(terms=1, tolerance=1e-5)
+    assert "intervals of κ with 1 terms each still leave an error of" in text
+    assert text.endswith("give more terms or a larger tolerance")
+
+
+def test_a_table_too_large_for_any_renderer_is_refused_before_it_is_computed():
+    # 5 µm of relief at a very short wavelength: some 1e5 terms for each of 1e6 orders
+    large = HeightField(np.tile(rough_patch((64, 64), (0.02, 0.02), 12.0).heights, (8, 8)), 0.02)
+    text = refused(heights=large, coherence_width=10.0, wavelength_range=(40.0, 830.0))
+    assert "it would take" in text
+    assert "GB" in text
+    assert "use a smaller or shallower patch" in text
+
+
+parameters = st.fixed_dictionaries(
+    {
+        "coherence_width": st.floats(0.05, 5.0),
+        "coherence": st.sampled_from(reference.COHERENCES),
+        "basis": st.sampled_from(["auto", "svd", "chebyshev", "taylor"]),
+        "tolerance": st.sampled_from([1e-5, 1e-4, 1e-3, 0.01, 0.3]),
+        "terms": st.none() | st.integers(1, 40),
+        "taps": st.none() | st.integers(1, 12),
+        "height_scale_max": st.floats(0.1, 3.0),
+        "wavelength_range": st.sampled_from([(360.0, 830.0), (500.0, 501.0), (250.0, 1000.0)]),
+    }
+)
+
+
+EIGHT_FUNCTIONS = {
+    "coherence_width": 1.0,
+    "coherence": "ensemble",
+    "basis": "auto",
+    "tolerance": 1e-5,
+    "terms": None,
+    "taps": None,
+    "height_scale_max": 0.75,
+    "wavelength_range": (500.0, 501.0),
+}
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(0.0, 0.5), st.integers(2, 17), st.integers(2, 17), parameters)
+# four functions of a series of six do not suffice, and eight are more than it has
+@example(0.109375, 3, 3, EIGHT_FUNCTIONS)
+def test_any_table_meets_its_tolerance_or_is_refused(depth, ny, nx, arguments):
+    heights = np.random.default_rng(ny * nx).random((ny, nx)) * depth
+    field = HeightField(heights, (0.1, 0.08))
+    try:
+        table = DiffractionTable.build(field, **arguments)
+    except DiffractionError as error:
+        assert "\n" not in str(error)
+        return
+    assert table.largest_error <= arguments["tolerance"]
+    assert np.all(np.isfinite(table.coefficients))
+    rng = np.random.default_rng(1)
+    q = rng.uniform(-1.0, 1.0, (2, 500)) * table.reach / np.sqrt(2)
+    values = table.window_sum(*q, rng.uniform(0.0, table.expansion.kappa_max, 500))
+    # Σ|a|² = 1 bounds any sum of powers; |Σ a·g|² of amplitudes by as much as windows overlap
+    most = max(1.0, np.prod([1 + 4 / step for step in table.grid.steps]))
+    assert values.min() >= 0.0
+    assert values.max() <= most * (1 + arguments["tolerance"])

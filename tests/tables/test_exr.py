@@ -1,0 +1,241 @@
+"""Tables on disk: the same bits come back, and whatever is no table is refused in one line."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import stat
+import subprocess
+import sys
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from mitsuba_diffraction import DiffractionError, DiffractionTable
+from mitsuba_diffraction.tables.exr import ATTRIBUTE, read_document
+from tests.directions import rough_patch
+
+PATCH = rough_patch((24, 21), (0.08, 0.09), 0.2)
+#: Every layout of coefficients: half and single floats, one component and two, intervals.
+KINDS = {
+    "power, half": {"tolerance": 1e-3},
+    "power, single": {"tolerance": 1e-5},
+    "amplitude, half": {"coherence": "patch"},
+    "taylor": {"basis": "taylor"},
+}
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def table(request):
+    """A small table of each kind."""
+    return DiffractionTable.build(PATCH, coherence_width=1.8, **KINDS[request.param])
+
+
+@pytest.fixture
+def saved(tmp_path):
+    """A file with a table, to be damaged."""
+    file = tmp_path / "table.exr"
+    DiffractionTable.build(PATCH, coherence_width=1.8).save(file)
+    return file
+
+
+def rewritten(file, change):
+    """Change the JSON document of a table's file."""
+    with OpenEXR.File(str(file), separate_channels=True) as exr:
+        channels = {name: np.array(c.pixels) for name, c in exr.channels().items()}
+        header = dict(exr.header())
+    document = json.loads(header[ATTRIBUTE])
+    change(document)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    header[ATTRIBUTE] = json.dumps(document)
+    OpenEXR.File(header, channels).write(str(file))
+
+
+def refused(file):
+    """The one line with which a file is refused."""
+    with pytest.raises(DiffractionError) as caught:
+        DiffractionTable.load(file)
+    assert "\n" not in str(caught.value)
+    assert str(file) in str(caught.value)
+    return str(caught.value)
+
+
+def test_a_table_comes_back_bit_by_bit(table, tmp_path):
+    table.save(tmp_path / "table.exr")
+    loaded = DiffractionTable.load(tmp_path / "table.exr")
+    for field in dataclasses.fields(DiffractionTable):
+        before, after = getattr(table, field.name), getattr(loaded, field.name)
+        if isinstance(before, np.ndarray):
+            assert before.dtype == after.dtype
+            assert before.tobytes() == np.ascontiguousarray(after).tobytes()
+        else:
+            assert before == after, field.name
+    assert np.array_equal(table.expansion.functions, loaded.expansion.functions)
+    assert loaded.summary() == table.summary()
+
+
+def test_saving_what_was_loaded_makes_the_same_file(table, tmp_path):
+    table.save(tmp_path / "first.exr")
+    DiffractionTable.load(tmp_path / "first.exr").save(tmp_path / "second.exr")
+    first, second = ((tmp_path / f"{n}.exr").read_bytes() for n in ("first", "second"))
+    assert first == second
+
+
+def test_other_programs_find_named_float_channels_and_what_they_mean(saved):
+    with OpenEXR.File(str(saved), separate_channels=True) as file:
+        channels, document = set(file.channels()), json.loads(file.header()[ATTRIBUTE])
+    expansion = document["expansion"]
+    assert channels == {
+        f"power.{i}.{t}" for i in range(expansion["intervals"]) for t in range(expansion["terms"])
+    }
+    assert document["version"] == 2
+    assert document["coherence_width"] == 1.8
+    assert document["source"]["digest"] == PATCH.digest()
+
+
+def test_a_file_follows_the_umask_and_replaces_an_older_one(saved):
+    before = saved.stat().st_ino
+    DiffractionTable.load(saved).save(saved)
+    assert saved.stat().st_ino != before
+    umask = os.umask(0)
+    os.umask(umask)
+    assert stat.S_IMODE(saved.stat().st_mode) == 0o666 & ~umask
+    assert os.listdir(saved.parent) == ["table.exr"]
+
+
+# ------------------------------------------------------------------------ what is no table
+
+
+def test_a_missing_file_and_a_folder(tmp_path):
+    assert refused(tmp_path / "no.exr").endswith("there is no such file")
+    assert refused(tmp_path).endswith("it is a folder")
+
+
+@pytest.mark.parametrize("content", [b"", b"\x00" * 400, b"PNG is not EXR", "µ".encode() * 999])
+def test_what_is_no_exr(tmp_path, content):
+    file = tmp_path / "x.exr"
+    file.write_bytes(content)
+    assert refused(file).startswith(f"cannot read '{file}' as EXR")
+
+
+@pytest.mark.parametrize("share", [0.01, 0.3, 0.6, 0.9, 0.999])
+def test_a_truncated_table(saved, share, capfd):
+    content = saved.read_bytes()
+    saved.write_bytes(content[: int(share * len(content))])
+    refused(saved)
+    assert capfd.readouterr() == ("", "")  # nor does OpenEXR print anything beside our line
+
+
+def test_an_image_that_is_no_table(tmp_path):
+    file = tmp_path / "picture.exr"
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, {"RGB": np.ones((4, 4, 3), np.float32)}).write(str(file))
+    assert read_document(file) is None
+    assert "is an EXR image but no table; make one of it with" in refused(file)
+
+
+@pytest.mark.parametrize("version", [1, 3, None, "2"])
+def test_a_table_of_another_version(saved, version):
+    rewritten(saved, lambda document: document.update(version=version))
+    text = refused(saved)
+    assert f"is a table of format version {version}, this program reads version 2" in text
+    assert text.endswith("build it again with 'mitsuba-diffraction precompute'")
+
+
+DAMAGE = {
+    "no grid": lambda d: d.pop("grid"),
+    "no order 0": lambda d: d.pop("order_0"),
+    "no spacing": lambda d: d.pop("spacing"),
+    "order 0 too small": lambda d: d.update(order_0=[[[1.0]]]),
+    "order 0 no number": lambda d: d.update(order_0="many"),
+    "more terms than channels": lambda d: d["expansion"].update(terms=9),
+    "no interval": lambda d: d["expansion"].update(intervals=0),
+    "unknown basis": lambda d: d["expansion"].update(basis="fourier"),
+    "unknown kind": lambda d: d["expansion"].update(kind="phase"),
+    "unknown entry": lambda d: d["expansion"].update(phase=1),
+    "another size": lambda d: d["grid"].update(last=[3, 3]),
+    "no expansion": lambda d: d.update(expansion=None),
+    "a list for a grid": lambda d: d.update(grid=[1, 2]),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_a_table_whose_description_is_damaged(saved, damage):
+    rewritten(saved, DAMAGE[damage])
+    assert f"'{saved}' is a damaged table (" in refused(saved)
+
+
+def test_a_description_that_is_no_json(saved):
+    content = saved.read_bytes()
+    at = content.index(b'{"version"')
+    saved.write_bytes(content[:at] + b"}" + content[at + 1 :])
+    assert "is no JSON" in refused(saved)
+
+
+# ------------------------------------------------------------------------ what cannot be written
+
+
+def test_only_exr_files_are_written(table, tmp_path):
+    with pytest.raises(DiffractionError, match=r"file name must end with \.exr"):
+        table.save(tmp_path / "table.png")
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_folder_that_does_not_exist(table, tmp_path):
+    with pytest.raises(DiffractionError, match="No such file or directory; choose a "):
+        table.save(tmp_path / "nowhere" / "table.exr")
+
+
+def test_a_folder_in_place_of_the_file(table, tmp_path):
+    (tmp_path / "table.exr").mkdir()
+    with pytest.raises(DiffractionError, match="it is a folder; name a file in it"):
+        table.save(tmp_path / "table.exr")
+
+
+def test_a_write_that_breaks_off_leaves_the_older_table(saved, monkeypatch):
+    before = saved.read_bytes()
+    table = DiffractionTable.load(saved)
+
+    class Interrupted:
+        def __init__(self, *_):
+            pass
+
+        def write(self, name):
+            with open(name, "wb") as file:
+                file.write(b"half a ta")
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(OpenEXR, "File", Interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        table.save(saved)
+    assert saved.read_bytes() == before
+    assert os.listdir(saved.parent) == [saved.name]
+
+
+def test_a_full_disk_is_one_line_and_leaves_nothing(saved, tmp_path):
+    # a limit on the size of files is what a full disk is like without one
+    code = (
+        "import resource, signal, sys\n"
+        "from mitsuba_diffraction import DiffractionError, DiffractionTable\n"
+        f"table = DiffractionTable.load({str(saved)!r})\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
+        "try:\n"
+        "    table.save('out.exr')\n"
+        "except DiffractionError as error:\n"
+        "    sys.exit(str(error))\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert result.returncode == 1
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("cannot write 'out.exr': ")
+    assert sorted(os.listdir(tmp_path)) == ["table.exr"]

@@ -1,0 +1,172 @@
+"""Ridges follow the grating equation; fits find the period; what cannot be fitted says so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mitsuba_diffraction import DiffractionError, HeightField, reference
+from mitsuba_diffraction.heights import gratings
+from mitsuba_diffraction.thesis import methods
+from mitsuba_diffraction.thesis.evaluation import (
+    Beam,
+    Response,
+    documents_fit,
+    fit_period,
+    measure,
+    ridge_of,
+    window_fits,
+)
+from mitsuba_diffraction.thesis.evaluation.windows import moved_window
+from tests.directions import polar, rough_patch
+
+WAVELENGTHS = np.arange(380.0, 781.0, 20.0)
+ANGLES = np.linspace(-75.0, 30.0, 1051)
+
+
+@pytest.fixture(scope="module")
+def blazed() -> HeightField:
+    return gratings.blazed(2.5, 0.25, rows=2)
+
+
+@pytest.fixture(scope="module")
+def of_blazed(blazed):
+    return methods.make_all(("default", "flss", "nmm", "pq", "pq-sinc"), blazed)
+
+
+def response_of(method, beam=None, angles=ANGLES, wavelengths=WAVELENGTHS) -> Response:
+    return measure(
+        method.brdf, beam or Beam(), wavelengths, angles, sigma=method.sigma, label=method.name
+    )
+
+
+@pytest.mark.parametrize("name", ["default", "flss", "nmm", "pq", "pq-sinc"])
+def test_the_blazed_grating_follows_the_grating_equation(of_blazed, name):
+    ridge = ridge_of(response_of(of_blazed[name]))
+    expected = Beam().grating_angles(WAVELENGTHS, 2.5, 1)
+    assert ridge.found.all()
+    # 0.05° is asked for; nmm knows its λₙ to half a step of 5 nm only, 0.1° here
+    allowed = 0.1 if name == "nmm" else 0.05
+    assert np.abs(ridge.angles - expected).max() < allowed
+    fit = fit_period(ridge)
+    assert fit.period == pytest.approx(2.5, rel=1e-3)
+    assert fit.points == len(WAVELENGTHS)
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    st.floats(0.8, 3.0),
+    st.floats(0.0, 75.0),
+    st.sampled_from([1, -1]),
+    st.sampled_from([0.0, 90.0, 180.0]),
+)
+def test_a_made_up_ridge_is_fitted(period, theta, order, phi):
+    beam = Beam(theta, phi)
+    angles = np.linspace(-89.0, 89.0, 3561)
+    sigma = 16.0
+    u = beam.sine + np.sin(np.radians(angles))
+    k = 2e3 * np.pi / WAVELENGTHS[:, None]
+    values = np.exp(-(sigma**2) * (k * u - order * 2 * np.pi / period) ** 2)
+    ridge = ridge_of(Response(beam, WAVELENGTHS, angles, values, sigma, "made up"), order)
+    within = np.abs(beam.grating_angles(WAVELENGTHS, period, order)) < 85.0
+    if within.sum() < 5:
+        with pytest.raises(DiffractionError, match="too few to fit a period"):
+            fit_period(ridge)
+        return
+    fit = fit_period(ridge)
+    # the parabola is exact in u; in angle it bends by cosθ over a step of 0.05°
+    assert fit.period == pytest.approx(period, rel=2e-4)
+
+
+def test_outliers_do_not_move_the_fit():
+    beam, sigma = Beam(), 16.0
+    wavelengths = np.arange(380.0, 781.0, 10.0)
+    u = beam.sine + np.sin(np.radians(ANGLES))
+    k = 2e3 * np.pi / wavelengths[:, None]
+    where = np.full((wavelengths.size, 1), 2 * np.pi / 1.2)
+    where[5:10] = 2 * np.pi / 0.9
+    values = np.exp(-(sigma**2) * (k * u - where) ** 2)
+    fit = fit_period(ridge_of(Response(beam, wavelengths, ANGLES, values, sigma, "jumps")))
+    assert fit.period == pytest.approx(1.2, rel=0.01)
+    assert fit.largest > 1.0  # and is told
+
+
+def test_a_moved_window_is_the_reference_s_moved_patch():
+    rough = rough_patch((64, 96), (0.09, 0.1), 0.2)
+    table = methods.make("default", rough, coherence_width=9.0, coherence="patch").table
+    dx, dy = rough.pixel_size
+    shift = (17, 40)  # pixels that the patch is rolled by; the window stays on its centre
+    rolled = HeightField(np.roll(rough.heights, (-shift[1], -shift[0]), axis=(0, 1)), (dx, dy))
+    lx, ly = rough.extent
+    moved = moved_window(table, (0.5 * lx + shift[0] * dx, 0.5 * ly + shift[1] * dy))
+    wi = polar(30.0)
+    wo = np.array([polar(t, p) for t in (5.0, 20.0, 45.0) for p in (0.0, 100.0, 200.0)])
+    expected = reference.brdf(rolled, wi, wo, 500.0, coherence_width=9.0, coherence="patch")
+    found = moved.brdf(np.broadcast_to(wi, wo.shape), wo, np.full(len(wo), 500.0))
+    # the table's tolerance, on the sum
+    assert np.abs(found - expected).sum() < 1e-3 * expected.sum()
+
+
+def test_windows_of_a_grating_agree_and_those_of_a_scale_do_not(blazed):
+    beam, few = Beam(), WAVELENGTHS[::3]
+    table = methods.make("default", blazed, coherence="patch").table
+    exact = window_fits(table, beam, few, ANGLES, count=4)
+    assert exact.spread < 1e-5
+    assert exact.mean == pytest.approx(2.5, rel=1e-3)
+    scale = gratings.elaphe_like(32.0, 512)
+    table = methods.make("default", scale, coherence="patch", coherence_width=12.0).table
+    found = window_fits(table, beam, few, ANGLES[::2], count=6)
+    assert found.spread > 0.01
+    assert 0.9 < found.mean < 1.3  # fingers some 1 µm apart
+
+
+def test_the_documents_procedure_finds_the_blazed_period(of_blazed, blazed):
+    table = methods.make("default", blazed, coherence="patch").table
+    fit = documents_fit(table, Beam(), WAVELENGTHS, ANGLES)
+    assert fit.period == pytest.approx(2.5, rel=1e-3)  # they report 2500 nm
+
+
+def test_a_measured_scale_has_the_period_of_its_fingers(shared_afm):
+    patch = HeightField.load(shared_afm / "elaphe-65um.png", pixel_size=65 / 1332, max_height=0.375)
+    angles = np.linspace(-75.0, 20.0, 951)
+    method = methods.make("default", patch)
+    fit = fit_period(ridge_of(response_of(method, angles=angles)))
+    assert 1.0 < fit.period < 1.3
+    table = methods.make("default", patch, coherence="patch").table
+    found = window_fits(table, Beam(), WAVELENGTHS[::4], angles, count=8)
+    assert 1.0 < found.mean < 1.3
+    assert 0.02 < found.spread < 0.1
+    # published: 1144 nm, from one window on the corner
+    assert documents_fit(table, Beam(), WAVELENGTHS, angles).period == pytest.approx(
+        1.144, abs=0.003
+    )
+
+
+def test_a_mirror_has_no_orders_to_fit():
+    flat = HeightField(np.zeros((16, 16)), 0.5, name="flat")
+    method = methods.make("default", flat)
+    with pytest.raises(DiffractionError, match=r"0 of 21 wavelengths have a maximum.*too few"):
+        fit_period(ridge_of(response_of(method)))
+
+
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (lambda: Beam(90.0), "theta=90 must be at least 0 and below 90"),
+        (lambda: Beam(30.0, 400.0), "phi=400 must be from -360 to 360"),
+    ],
+)
+def test_beams_out_of_range_are_refused(call, text):
+    with pytest.raises(DiffractionError, match=text):
+        call()
+
+
+def test_axes_that_make_no_plot_are_refused(of_blazed):
+    with pytest.raises(DiffractionError, match="too few; widen"):
+        response_of(of_blazed["default"], wavelengths=np.array([500.0]))
+    with pytest.raises(DiffractionError, match="above -90 and below 90"):
+        response_of(of_blazed["default"], angles=np.linspace(-95.0, 0.0, 20))
+    with pytest.raises(DiffractionError, match="order=0"):
+        ridge_of(response_of(of_blazed["default"], angles=ANGLES[::10]), 0)
