@@ -21,7 +21,7 @@ from . import markers
 from .program import exit_code
 
 #: Read, not imported: that would take a variant of Mitsuba.
-PLUGIN = ROOT / "mitsuba_diffraction/plugin/bsdf.py"
+PLUGIN = Path(__file__).resolve().parents[3] / "mitsuba_diffraction/plugin/bsdf.py"
 
 _GROUP = re.compile(r"^(\w[\w ]*)\n-{3,}\n", re.M)
 _ENTRY = re.compile(
