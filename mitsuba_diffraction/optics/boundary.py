@@ -1,0 +1,179 @@
+"""What the material makes of the light: Jones matrices of a pair of directions (NumPy, float64).
+
+A surface of heights h diffracts the plane wave along −ωi into the plane wave along ωo with
+
+    f = 4 cosθi cosθo · N / (λ² A w²) · ⟨|P|²⟩,   w = cosθi + cosθo,
+
+where ⟨|P|²⟩ and A know the heights alone (see `reference`), and N, the mean power of the Jones
+matrix for unpolarised light, knows directions and index alone. Two matrices are given here:
+
+- the *small-slope approximation* of first order (Voronovich 1985), whose matrix B is Rice's (1951)
+  coefficient of first-order perturbation: exact for gentle slopes at any angle as κh → 0;
+- *Kirchhoff's* tangent plane, whose matrix K is Fresnel's at the half vector: exact for wide
+  facets, as the wavelength → 0.
+
+Both are Fresnel's coefficients in the mirror direction (Elfouhaily and Guérin 2004, "A critical
+survey of approximate scattering wave theories from random rough surfaces", sections 3 and 4).
+
+Conventions. Time exp(−iωt), so an absorbing index is n + ik with k ≥ 0. Light travels along
+d = −ωi, then along d = ωo; s = ẑ×d/|ẑ×d| and p = d×s, so that (s, p, d) is right-handed, as
+Mitsuba's bases are. Then r_s and r_p of a mirror have opposite signs at normal incidence. Row 0
+and column 0 of a matrix are s, row 1 and column 1 are p: E_out = J E_in.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+# sinθ below which a direction is the normal itself: its azimuth is rounding
+_NORMAL = 1e-12
+
+
+def small_slope(wi: ArrayLike, wo: ArrayLike, index: ArrayLike) -> Complex:
+    """Jones matrices B of the first-order small-slope approximation, (..., 2, 2).
+
+    With k0, k the tangential parts of −ωi and ωo, q0, q their cosines, q' = √(ε − k²), all in
+    units of the wavenumber, and unit vectors k̂0, k̂ (Rice 1951; Elfouhaily and Guérin 2004,
+    section 4; ε is the square of `index`):
+
+        B_ss = −(ε−1) (k̂·k̂0)                       / ((q+q')(q0+q0'))
+        B_pp =  (ε−1) (q' q0' (k̂·k̂0) − ε |k||k0|)  / ((εq+q')(εq0+q0'))
+        B_ps =  (ε−1) q'  ẑ·(k̂0×k̂)                 / ((εq+q')(q0+q0'))    s in, p out
+        B_sp =  (ε−1) q0' ẑ·(k̂0×k̂)                 / ((q+q')(εq0+q0'))    p in, s out
+
+    Parameters
+    ----------
+    wi, wo : (..., 3) unit vectors above the surface, pointing away from it.
+    index : (...) n + ik of the material over that of the medium above it, finite, k ≥ 0.
+    """
+    s_in, s_out = polarisation_axes(wi, wo)
+    n = np.asarray(index, np.complex128)
+    epsilon, contrast = n * n, n * n - 1
+    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    sine0, sine = np.hypot(*_xy(incident)), np.hypot(*_xy(outgoing))
+    q0, q = incident[..., 2], outgoing[..., 2]
+    q0_inside, q_inside = _decaying_root(epsilon - sine0**2), _decaying_root(epsilon - sine**2)
+    # s turned by a quarter of a turn is k̂, so products of the axes are those of k̂
+    (x0, y0), (x, y) = _xy(s_in), _xy(s_out)
+    dot, cross = x0 * x + y0 * y, x0 * y - y0 * x
+    s0, s1 = q0 + q0_inside, q + q_inside
+    p0, p1 = epsilon * q0 + q0_inside, epsilon * q + q_inside
+    return _matrix(
+        ss=-contrast * dot / (s1 * s0),
+        sp=contrast * q0_inside * cross / (s1 * p0),
+        ps=contrast * q_inside * cross / (p1 * s0),
+        pp=contrast * (q_inside * q0_inside * dot - epsilon * sine * sine0) / (p1 * p0),
+    )
+
+
+def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: ArrayLike) -> Complex:
+    """Jones matrices K of the tangent-plane approximation, (..., 2, 2); arguments as above.
+
+    Fresnel's coefficients of a facet that mirrors ωi to ωo, between the axes of that facet and
+    those of the surface, times (1 + ωi·ωo)/(2 cosθi cosθo): for unpolarised light
+    4 cosθi cosθo N/w² is then R(cosθ_half) (1 + ωi·ωo)²/(w² cosθi cosθo) (Stam 1999, eq. 7).
+    """
+    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    s_in, s_out = polarisation_axes(incident, outgoing)
+    axis = _facet_axis(incident, outgoing, s_in)
+    total = incident + outgoing
+    # |ωi + ωo|² = 2(1 + ωi·ωo) is the form that survives opposite grazing directions
+    one_plus_dot = 0.5 * np.sum(total * total, axis=-1)
+    r_s, r_p = fresnel(np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0)), index)
+    zero = np.zeros_like(r_s)
+    facet = _matrix(ss=r_s, sp=zero, ps=zero, pp=r_p)
+    turned = _turn(s_out, axis, outgoing) @ facet @ _turn(axis, s_in, -incident)
+    scale = one_plus_dot / (2 * incident[..., 2] * outgoing[..., 2])
+    return np.asarray(scale[..., None, None] * turned)
+
+
+def fresnel(cos_theta: ArrayLike, index: ArrayLike) -> tuple[Complex, Complex]:
+    """Fresnel's amplitude coefficients (r_s, r_p) of reflection, in the module's conventions.
+
+    Born and Wolf, Principles of Optics, section 1.5.2 (eq. 21a) and, for p axes as here, its sign
+    of r_p; complex index as in section 14.2.
+    """
+    cosine, n = np.asarray(cos_theta, np.float64), np.asarray(index, np.complex128)
+    inside = _decaying_root(n * n - (1.0 - cosine * cosine))
+    r_s = (cosine - inside) / (cosine + inside)
+    r_p = (n * n * cosine - inside) / (n * n * cosine + inside)
+    return r_s, r_p
+
+
+def polarisation_axes(wi: ArrayLike, wo: ArrayLike) -> tuple[Real, Real]:
+    """Unit vectors s = ẑ×d/|ẑ×d| of the incident and the outgoing light, (..., 3) each.
+
+    Along the normal, where any axis would do, s is that of the other direction; x if both are.
+    """
+    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    incident, outgoing = np.broadcast_arrays(incident, outgoing)
+    s_in, found_in = _horizontal(-incident)
+    s_out, found_out = _horizontal(outgoing)
+    y = np.array([0.0, 1.0, 0.0])  # s of light in the x–z plane
+    first = np.where(found_in, s_in, np.where(found_out, s_out, y))
+    return first, np.where(found_out, s_out, first)
+
+
+def unpolarised(jones: ArrayLike) -> Real:
+    """N = ½ Σ|J|², the power that unpolarised light of unit power has after `jones`, (...)."""
+    matrix = np.asarray(jones, np.complex128)
+    return np.asarray(0.5 * np.sum(np.abs(matrix) ** 2, axis=(-2, -1)), np.float64)
+
+
+def mueller(jones: ArrayLike) -> Real:
+    """Mueller matrices (..., 4, 4) of Jones matrices, for the Stokes vectors that Mitsuba has.
+
+    S = (|E_s|²+|E_p|², |E_s|²−|E_p|², 2 Re E_s E_p*, 2 Im E_s E_p*): with axes (s, p, d) and time
+    as above, S₃ > 0 turns clockwise for who looks into the light.
+    """
+    matrix = np.asarray(jones, np.complex128)
+    # E_out ⊗ E_out* = (J ⊗ J*) (E_in ⊗ E_in*), and Stokes' vector is a linear map of that
+    pairs = np.einsum("...ik,...jl->...ijkl", matrix, matrix.conj())
+    coherency = pairs.reshape(*matrix.shape[:-2], 4, 4)
+    stokes = np.array([[1, 0, 0, 1], [1, 0, 0, -1], [0, 1, 1, 0], [0, -1j, 1j, 0]])
+    return np.asarray((stokes @ coherency @ np.linalg.inv(stokes)).real, np.float64)
+
+
+def _horizontal(direction: Real) -> tuple[Real, NDArray[np.bool_]]:
+    """ẑ×d normalised (arbitrary along the normal), and whether it is any length to speak of."""
+    x, y = _xy(direction)
+    length = np.hypot(x, y)
+    found = length > _NORMAL
+    safe = np.where(found, length, 1.0)
+    return np.stack([-y / safe, x / safe, np.zeros_like(x)], axis=-1), found[..., None]
+
+
+def _facet_axis(incident: Real, outgoing: Real, fallback: Real) -> Real:
+    """s of a facet that mirrors ωi to ωo: normal to both; any where they are one direction."""
+    # (ωi+ωo)×(−ωi) = ωi×ωo: the direction of ẑ×d with the half vector for ẑ
+    normal = np.cross(incident, outgoing)
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    found = length > _NORMAL
+    return np.where(found, normal / np.where(found, length, 1.0), fallback)
+
+
+def _turn(to: Real, start: Real, direction: Real) -> Complex:
+    """Matrix (..., 2, 2) from components along (start, d×start) to those along (to, d×to)."""
+    cosine = np.sum(to * start, axis=-1)
+    sine = np.sum(to * np.cross(direction, start), axis=-1)
+    return _matrix(ss=cosine, sp=sine, ps=-sine, pp=cosine)
+
+
+def _matrix(*, ss: ArrayLike, sp: ArrayLike, ps: ArrayLike, pp: ArrayLike) -> Complex:
+    """[[ss, sp], [ps, pp]]: first the outgoing, then the incident polarisation."""
+    entries = np.broadcast_arrays(*(np.asarray(x, np.complex128) for x in (ss, sp, ps, pp)))
+    return np.stack(entries, axis=-1).reshape(*entries[0].shape, 2, 2)
+
+
+def _xy(vector: Real) -> tuple[Real, Real]:
+    return vector[..., 0], vector[..., 1]
+
+
+def _decaying_root(square: Complex) -> Complex:
+    """The square root whose wave exp(i q' |z|) decays, or else travels, away from the surface."""
+    root = np.sqrt(square)
+    return np.where(root.imag < 0, -root, root)
