@@ -16,6 +16,8 @@ g(r − x₀) = exp(−|r − x₀|²/2σ²) the integral over the plane is then
 and its power averaged over every window position x₀ keeps the diagonal alone:
 
     ⟨|P|²⟩ = 4π²σ⁴ Σ_j |a_j|² exp(−σ²|q − q_j|²).
+
+What the material makes of the light is a factor outside the integral, `optics.boundary`.
 """
 
 from __future__ import annotations
@@ -25,9 +27,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import DiffractionError
 from .heights.field import HeightField
+from .optics import blend, boundary
 from .optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
 
 COHERENCES = ("ensemble", "patch")
+MODELS = ("kirchhoff", "small_slope")
 
 # exp(−8.6²/2) = 9e-17: further orders are below the last bit of the sum
 _REACH = 8.6
@@ -41,10 +45,14 @@ def brdf(
     *,
     coherence_width: float = 65.0,
     coherence: str = "ensemble",
+    model: str = "kirchhoff",
+    eta: ArrayLike | None = None,
+    k: ArrayLike = 0.0,
 ) -> NDArray[np.float64]:
-    """Kirchhoff BRDF of a perfect reflector (R = 1) with these heights, in 1/sr, shape (n,).
+    """BRDF of a surface with these heights for unpolarised light, in 1/sr, shape (n,).
 
-    Stam 1999, eq. 7–11, with a normalised Gaussian window (see the package's theory page).
+    Stam 1999, eq. 7–11, with a normalised Gaussian window (see the package's theory page); the
+    material as in `optics.blend`. By default Kirchhoff's of a perfect reflector, R = 1.
 
     Parameters
     ----------
@@ -55,17 +63,54 @@ def brdf(
     coherence_width : 4σ of the amplitude window, µm.
     coherence : "ensemble", the power averaged over every position of the window, or "patch", the
         power under one window centred on the patch.
+    model : "kirchhoff", or "small_slope", which needs an index.
+    eta, k : (n,) or scalar, the index eta + ik of the material over that of the medium above it;
+        without eta R = 1.
 
     Raises
     ------
     DiffractionError
-        For an unknown coherence, a width that is not positive and finite, or arrays whose shapes
-        do not fit.
+        For an unknown coherence or model, a width that is not positive and finite, an index that
+        is missing or none, or arrays whose shapes do not fit.
     """
     check_coherence(coherence_width, coherence)
     incident, outgoing, lam = _broadcast(wi, wo, wavelength)
-    power = window_power(field, incident, outgoing, lam, sigma_of(coherence_width), coherence)
-    return kirchhoff_factor(incident, outgoing, lam, sigma_of(coherence_width)) * power
+    index = _index(model, eta, k, lam.shape)
+    sigma = sigma_of(coherence_width)
+    power = window_power(field, incident, outgoing, lam, sigma, coherence)
+    if index is None:
+        return kirchhoff_factor(incident, outgoing, lam, sigma) * power
+    jones = _jones(field, incident, outgoing, lam, model, index)
+    return _order_factor(incident, outgoing, lam, sigma) * boundary.unpolarised(jones) * power
+
+
+def mueller(
+    field: HeightField,
+    wi: ArrayLike,
+    wo: ArrayLike,
+    wavelength: ArrayLike,
+    *,
+    eta: ArrayLike,
+    k: ArrayLike = 0.0,
+    coherence_width: float = 65.0,
+    coherence: str = "ensemble",
+    model: str = "small_slope",
+) -> NDArray[np.float64]:
+    """Mueller matrices of the BRDF, in 1/sr, shape (n, 4, 4); arguments and errors as `brdf`.
+
+    They take Stokes vectors of light along −ωi to those of light along ωo, both about the axes of
+    `optics.boundary.polarisation_axes`. Entry (0, 0) is `brdf`.
+    """
+    check_coherence(coherence_width, coherence)
+    incident, outgoing, lam = _broadcast(wi, wo, wavelength)
+    index = _index(model, eta, k, lam.shape)
+    if index is None:
+        raise DiffractionError("polarisation needs an index: give eta (and k of a conductor)")
+    sigma = sigma_of(coherence_width)
+    power = window_power(field, incident, outgoing, lam, sigma, coherence)
+    factor = _order_factor(incident, outgoing, lam, sigma) * power
+    jones = _jones(field, incident, outgoing, lam, model, index)
+    return np.asarray(factor[..., None, None] * boundary.mueller(jones))
 
 
 def window_power(
@@ -123,6 +168,69 @@ def check_coherence(coherence_width: float, coherence: str) -> None:
         raise DiffractionError(
             f"coherence_width={coherence_width} must be a positive number of µm (65 is usual)"
         )
+
+
+def _jones(
+    field: HeightField,
+    wi: NDArray[np.float64],
+    wo: NDArray[np.float64],
+    wavelength: NDArray[np.float64],
+    model: str,
+    index: NDArray[np.complex128],
+) -> NDArray[np.complex128]:
+    """Jones matrices (n, 2, 2) of a model; those of a mirror's normal where there is no light."""
+    above = ((wi[:, 2] > 0) & (wo[:, 2] > 0))[:, None]
+    normal = np.array([0.0, 0.0, 1.0])
+    incident, outgoing = np.where(above, wi, normal), np.where(above, wo, normal)
+    if model == "kirchhoff":
+        return boundary.kirchhoff(incident, outgoing, index)
+    u, v, w = diffraction_coordinates(incident, outgoing)
+    wave = wavenumber(wavelength)
+    roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
+    s = blend.weight(wave * w, roughness.at(wave * np.hypot(u, v)))
+    return blend.jones(incident, outgoing, index, s)
+
+
+def _order_factor(
+    wi: NDArray[np.float64],
+    wo: NDArray[np.float64],
+    wavelength: NDArray[np.float64],
+    sigma: float,
+) -> NDArray[np.float64]:
+    """4 cosθi cosθo / (λ² A w²) in 1/µm⁴, λ in µm; zero below the surface (see `boundary`)."""
+    cos_i, cos_o = wi[:, 2], wo[:, 2]
+    above = (cos_i > 0) & (cos_o > 0)
+    w = np.where(above, cos_i + cos_o, 1.0)
+    lam = wavelength * 1e-3
+    return np.where(above, 4 * cos_i * cos_o / (lam**2 * np.pi * sigma**2 * w**2), 0.0)
+
+
+def _index(
+    model: str, eta: ArrayLike | None, k: ArrayLike, shape: tuple[int, ...]
+) -> NDArray[np.complex128] | None:
+    """The index eta + ik, (n,), or none, which is R = 1."""
+    if model not in MODELS:
+        raise DiffractionError(f"model='{model}' is unknown; choose one of {', '.join(MODELS)}")
+    if eta is None:
+        if model == "small_slope":
+            raise DiffractionError(
+                "model='small_slope' needs an index: give eta (and k of a conductor), or "
+                "model='kirchhoff' for a perfect reflector"
+            )
+        return None
+    real, imaginary = np.asarray(eta, np.float64), np.asarray(k, np.float64)
+    if not (np.all(np.isfinite(real)) and np.all(real > 0)):
+        raise DiffractionError(f"eta={real} must be positive and finite")
+    if not (np.all(np.isfinite(imaginary)) and np.all(imaginary >= 0)):
+        raise DiffractionError(
+            f"k={imaginary} must be finite and at least 0: the index is eta + ik"
+        )
+    try:
+        return np.broadcast_to(real + 1j * imaginary, shape)
+    except ValueError as error:
+        raise DiffractionError(
+            f"eta {real.shape} and k {imaginary.shape} do not fit {shape[0]} directions"
+        ) from error
 
 
 def _plane_waves(

@@ -3,6 +3,8 @@
 Contents
 --------
 geometry   directions, wave numbers, the coherence window, the Kirchhoff factor
-fresnel    reflectance of a smooth interface
+fresnel    amplitudes and reflectance of a smooth interface
+boundary   Jones and Mueller matrices of a pair of directions: small slope, Kirchhoff
+blend      which of the two an order of a surface follows
 colour     from spectra to XYZ and sRGB; differences of colours
 """

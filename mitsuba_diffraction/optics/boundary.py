@@ -26,6 +26,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .fresnel import amplitudes, decaying_root
+
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
@@ -56,7 +58,7 @@ def small_slope(wi: ArrayLike, wo: ArrayLike, index: ArrayLike) -> Complex:
     incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
     sine0, sine = np.hypot(*_xy(incident)), np.hypot(*_xy(outgoing))
     q0, q = incident[..., 2], outgoing[..., 2]
-    q0_inside, q_inside = _decaying_root(epsilon - sine0**2), _decaying_root(epsilon - sine**2)
+    q0_inside, q_inside = decaying_root(epsilon - sine0**2), decaying_root(epsilon - sine**2)
     # s turned by a quarter of a turn is k̂, so products of the axes are those of k̂
     (x0, y0), (x, y) = _xy(s_in), _xy(s_out)
     dot, cross = x0 * x + y0 * y, x0 * y - y0 * x
@@ -83,7 +85,7 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: ArrayLike) -> Complex:
     total = incident + outgoing
     # |ωi + ωo|² = 2(1 + ωi·ωo) is the form that survives opposite grazing directions
     one_plus_dot = 0.5 * np.sum(total * total, axis=-1)
-    r_s, r_p = fresnel(np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0)), index)
+    r_s, r_p = amplitudes(np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0)), index)
     zero = np.zeros_like(r_s)
     facet = _matrix(ss=r_s, sp=zero, ps=zero, pp=r_p)
     turned = _turn(s_out, axis, outgoing) @ facet @ _turn(axis, s_in, -incident)
@@ -91,29 +93,17 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: ArrayLike) -> Complex:
     return np.asarray(scale[..., None, None] * turned)
 
 
-def fresnel(cos_theta: ArrayLike, index: ArrayLike) -> tuple[Complex, Complex]:
-    """Fresnel's amplitude coefficients (r_s, r_p) of reflection, in the module's conventions.
-
-    Born and Wolf, Principles of Optics, section 1.5.2 (eq. 21a) and, for p axes as here, its sign
-    of r_p; complex index as in section 14.2.
-    """
-    cosine, n = np.asarray(cos_theta, np.float64), np.asarray(index, np.complex128)
-    inside = _decaying_root(n * n - (1.0 - cosine * cosine))
-    r_s = (cosine - inside) / (cosine + inside)
-    r_p = (n * n * cosine - inside) / (n * n * cosine + inside)
-    return r_s, r_p
-
-
 def polarisation_axes(wi: ArrayLike, wo: ArrayLike) -> tuple[Real, Real]:
     """Unit vectors s = ẑ×d/|ẑ×d| of the incident and the outgoing light, (..., 3) each.
 
-    Along the normal, where any axis would do, s is that of the other direction; x if both are.
+    Along the normal, where any axis would do, s is that of the other direction; y if both are
+    (light in the x–z plane).
     """
     incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
     incident, outgoing = np.broadcast_arrays(incident, outgoing)
     s_in, found_in = _horizontal(-incident)
     s_out, found_out = _horizontal(outgoing)
-    y = np.array([0.0, 1.0, 0.0])  # s of light in the x–z plane
+    y = np.array([0.0, 1.0, 0.0])
     first = np.where(found_in, s_in, np.where(found_out, s_out, y))
     return first, np.where(found_out, s_out, first)
 
@@ -171,9 +161,3 @@ def _matrix(*, ss: ArrayLike, sp: ArrayLike, ps: ArrayLike, pp: ArrayLike) -> Co
 
 def _xy(vector: Real) -> tuple[Real, Real]:
     return vector[..., 0], vector[..., 1]
-
-
-def _decaying_root(square: Complex) -> Complex:
-    """The square root whose wave exp(i q' |z|) decays, or else travels, away from the surface."""
-    root = np.sqrt(square)
-    return np.where(root.imag < 0, -root, root)

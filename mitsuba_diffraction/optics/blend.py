@@ -1,0 +1,100 @@
+"""How much of each boundary: the small-slope model's Jones matrix, (1−s) K + s B (NumPy, float64).
+
+The local curvature approximation (Elfouhaily, Guignard, Awadallah and Thompson 2003, "Local and
+non-local curvature approximation", Waves in Random Media 13, 321) corrects Kirchhoff's K towards
+the small-slope B by the local slope: with ⟨·⟩ the mean under the phase screen that makes the
+order q, the order's matrix is
+
+    K + (B − K) (1 − t),   t = ⟨(κ q̂·∇h)²⟩ / q².
+
+For a sinusoid's first order t = κ²σ²/2 − …: a smooth surface follows B, one that is rough against
+the wavelength K. What counts is how rough it is at the scales that make the order q: waves much
+longer than 2π/q tilt and shift what makes the order, and do not make it; roughness much finer
+dims it. So s = exp(−κ²σ_q²/2), where σ_q² is the height variance of the components q' near and
+below q,
+
+    σ_q² = Σ_q' |h_q'|² (1 − exp(−(4q'/q)⁴)) exp(−(q'/2q)⁴).
+
+The band's limits, from an eighth to about twice the order's frequency, are chosen against rigorous
+solutions (docs/validation.md). s is 1 − κ²σ_q²/2 at first, as the theory has it, symmetric in ωi
+and ωo, and smooth in both and in the wavelength.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import boundary
+from .boundary import Complex, Real
+
+#: Components are told apart to this part of an octave; lines of a grating stay where they are.
+_BINS_PER_OCTAVE = 256
+#: Nodes of `ScaleRoughness.table`: linear interpolation is then within 5e-4 of the variance.
+NODES_PER_OCTAVE = 32
+
+
+@dataclass(frozen=True)
+class ScaleRoughness:
+    """Height variance of a periodic surface by the length of the spatial frequency.
+
+    Attributes
+    ----------
+    frequency : (n,) |q'| in rad/µm, ascending, without 0.
+    variance : (n,) Σ|h_q'|² of the components there, µm².
+    """
+
+    frequency: Real
+    variance: Real
+
+    @classmethod
+    def of(cls, heights: ArrayLike, pixel_size: tuple[float, float]) -> ScaleRoughness:
+        """That of heights (ny, nx) in µm; pixel_size is (dx, dy) in µm."""
+        surface = np.asarray(heights, np.float64)
+        ny, nx = surface.shape
+        power = np.abs(np.fft.fft2(surface) / surface.size) ** 2
+        qx = 2 * np.pi * np.fft.fftfreq(nx, pixel_size[0])
+        qy = 2 * np.pi * np.fft.fftfreq(ny, pixel_size[1])
+        length = np.hypot(qx[None, :], qy[:, None]).ravel()[1:]
+        weight = power.ravel()[1:]
+        bins = np.floor(_BINS_PER_OCTAVE * np.log2(length)).astype(int)
+        _, which = np.unique(bins, return_inverse=True)
+        total = np.bincount(which, weight).astype(np.float64)
+        # the mean over the power in a bin; a bin without any may lie anywhere
+        moment = np.bincount(which, weight * length).astype(np.float64)
+        found = total > 0
+        return cls(moment[found] / total[found], total[found])
+
+    def at(self, q: ArrayLike) -> Real:
+        """σ_q² in µm², shaped as q, the length of an order's spatial frequency in rad/µm."""
+        order = np.abs(np.asarray(q, np.float64))
+        with np.errstate(divide="ignore", over="ignore", under="ignore"):
+            ratio = (self.frequency / order[..., None]) ** 4  # infinite at q = 0: no component
+            share = -np.expm1(-256.0 * ratio) * np.exp(-ratio / 16.0)
+        return np.asarray(share @ self.variance, np.float64)
+
+    def table(self, q_max: float) -> tuple[float, Real]:
+        """σ_q² at nodes log2 q = first + n/`NODES_PER_OCTAVE`, up to q_max (rad/µm) or just above.
+
+        Below the first node, an eighth of the lowest frequency, σ_q² is 0. Returns (first, nodes).
+        """
+        if not len(self.frequency):
+            return 0.0, np.zeros(2)
+        first = float(np.log2(self.frequency[0] / 8))
+        count = max(1, int(np.ceil((np.log2(q_max) - first) * NODES_PER_OCTAVE)))
+        return first, self.at(2.0 ** (first + np.arange(count + 1) / NODES_PER_OCTAVE))
+
+
+def weight(kappa: ArrayLike, variance: ArrayLike) -> Real:
+    """s = exp(−κ²σ_q²/2); κ in rad/µm, σ_q² in µm² (`ScaleRoughness.at`)."""
+    exponent = -0.5 * np.square(np.asarray(kappa, np.float64)) * np.asarray(variance, np.float64)
+    return np.exp(exponent)
+
+
+def jones(wi: ArrayLike, wo: ArrayLike, index: ArrayLike, s: ArrayLike) -> Complex:
+    """(1−s) K + s B, (..., 2, 2); arguments as `boundary.small_slope`, s as `weight` (...)."""
+    share: NDArray[np.float64] = np.asarray(s, np.float64)[..., None, None]
+    tangent, gentle = boundary.kirchhoff(wi, wo, index), boundary.small_slope(wi, wo, index)
+    return np.asarray((1 - share) * tangent + share * gentle)
