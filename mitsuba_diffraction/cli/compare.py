@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import DiffractionError
-from ..realtime.glsl.source import DOCUMENTED, METHODS
+from ..realtime.glsl.source import METHODS, THESIS_METHODS
 from .arguments import whole_number
 from .console import say_warning
 from .output import check_writable
@@ -167,7 +167,7 @@ def _drawn(pictures: _Pictures, bar: Bar) -> dict[str, dict[str, Any]]:
     methods = METHODS if every else tuple(dict.fromkeys(args.method))
     for n, method in enumerate(methods):
         bar(n, len(methods), f"drawing with {method}")
-        samples = min(args.supersampling, _FEWER if method in DOCUMENTED else 64)
+        samples = min(args.supersampling, _FEWER if method in THESIS_METHODS else 64)
         try:
             drawn = pictures.both.renderer.render(method, supersampling=samples)
         except DiffractionError as error:
@@ -193,7 +193,7 @@ def _compared(pictures: _Pictures, method: str, drawn: Any, samples: int) -> dic
     areas = pictures.both.regions(drawn)
     pictures.compared, other = areas["both"], drawn[..., :3]
     errors = {name: difference(reference, other, mask, exposure) for name, mask in areas.items()}
-    seconds = renderer.frame_time(method, frames=1 if method in DOCUMENTED else 3)
+    seconds = renderer.frame_time(method, frames=1 if method in THESIS_METHODS else 3)
     _write(other, folder / f"{method}.exr", pictures.args, pictures.variant, samples**2)
     write_sheet(
         folder / f"{method}.png", reference, other, pictures.full, method=method,

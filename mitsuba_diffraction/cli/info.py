@@ -169,7 +169,8 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
 def _mesh(file: Path) -> dict[str, Any]:
     import mitsuba as mi
 
-    from ..scene.orientation.tangents import check_tangents, load_mesh, load_orientation
+    from ..scene.orientation.files import load_mesh, load_orientation
+    from ..scene.orientation.tangents import check_tangents
     from .console import warnings_as_ours
 
     if mi.variant() is None:

@@ -17,7 +17,7 @@ from .scene_options import add_scene_options, scene_parameters
 
 if TYPE_CHECKING:
     from ..scene.planning.difference import Difference
-    from ..scene.planning.make import Fitted, Loaded
+    from ..scene.planning.make import RecordedScene, TestedPlan
     from ..scene.planning.plan import Plan
 
 PATHS, TOLERANCE = 1 << 15, 1e-3
@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
         args.parser.error(f"argument --paths: at most {_MOST_PATHS}, got {args.paths}")
 
     from ..scene.load import load_scene, sensor_of
-    from ..scene.planning.make import fitted, look
+    from ..scene.planning.make import find_plan, record_scene
     from .console import warnings_as_ours
 
     variant = planning_variant(args.mode)
@@ -102,8 +102,8 @@ def run(args: argparse.Namespace) -> int:
             return sensor_of(scene, args.sensor)
 
         bar(0, 0, "tracing paths")
-        loaded = look(load, sensor, args.paths, timing=True)
-        found = fitted(str(args.scene), loaded, load, sensor, tolerance, bar, timing=True)
+        loaded = record_scene(load, sensor, args.paths, timing=True)
+        found = find_plan(str(args.scene), loaded, load, sensor, tolerance, bar, timing=True)
         plan, planned, seconds = found.plan, found.planned, found.seconds
         say_if_unsuited(found)
         bar(0, 0, "timing look-ups")
@@ -126,7 +126,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def say_if_unsuited(found: Fitted) -> None:
+def say_if_unsuited(found: TestedPlan) -> None:
     """Warn of a scene whose picture no plan keeps."""
     if not found.suits and found.difference is not None:
         say_warning(
@@ -145,7 +145,7 @@ def plan_or_json(text: str) -> Path:
 
 
 def _of_table(
-    key: str, loaded: Loaded, plan: Plan, planned: dict[str, Any], seconds: dict[str, float]
+    key: str, loaded: RecordedScene, plan: Plan, planned: dict[str, Any], seconds: dict[str, float]
 ) -> dict[str, Any]:
     from ..plugin.sampling import sampler_bytes
     from ..scene.planning.domain import lobes_in_a_pixel, wavelengths_needed
@@ -161,7 +161,7 @@ def _of_table(
         "precision": str(table.coefficients.dtype),
         "taps": list(table.grid.taps),
     }
-    asked = loaded.asked.get(key)
+    asked = loaded.statistics.get(key)
     if asked is None:
         return result | {"asked for": "nothing: no path meets it; it stays whole", "whole": whole}
     bsdfs = [n for n, (_, bsdf) in enumerate(loaded.session.bsdfs) if bsdf.table is table]

@@ -82,7 +82,7 @@ def _plan(
     args: argparse.Namespace, variant: str, load: Callable[[], Any], tell: Progress
 ) -> tuple[Plan, dict[str, float]]:
     """The plan, and the shares of light outside; in the variant that paths are traced in."""
-    from ..scene.planning.make import check_light, fitted, look
+    from ..scene.planning.make import check_light, find_plan, record_scene
     from ..scene.planning.plan import Plan
 
     def sensor(scene: Any) -> Any:
@@ -90,11 +90,11 @@ def _plan(
 
     given = None if args.plan == MAKE else Plan.load(args.plan)
     planning_variant(variant if variant.startswith(("llvm", "cuda")) else None)
-    loaded = look(load, sensor, args.paths, plan=given)
+    loaded = record_scene(load, sensor, args.paths, plan=given)
     try:
         if given is not None:
             return given, check_light(loaded, given)
-        found = fitted(str(args.scene), loaded, load, sensor, args.plan_tolerance, tell)
+        found = find_plan(str(args.scene), loaded, load, sensor, args.plan_tolerance, tell)
     finally:
         loaded.session.close()
     say_if_unsuited(found)

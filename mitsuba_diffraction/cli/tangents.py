@@ -12,7 +12,7 @@ from .output import check_writable
 from .progress import Bar
 
 if TYPE_CHECKING:
-    from ..scene.orientation.tangents import TangentReport
+    from ..scene.orientation.report import TangentReport
 
 _GUIDES = ("smooth", "x", "y", "z", "body")
 _NAMED = 6  # singular points that are named
@@ -58,9 +58,10 @@ def run(args: argparse.Namespace) -> int:
     check_writable(args.output)
     from ..scene.orientation.breaks import BREAK
     from ..scene.orientation.directions import direction_field, turned
+    from ..scene.orientation.files import load_mesh, write_ply
     from ..scene.orientation.oriented import oriented_mesh
-    from ..scene.orientation.tangents import check_tangents, load_mesh
-    from ..scene.orientation.trimesh import vertex_normals, write_ply
+    from ..scene.orientation.tangents import check_tangents
+    from ..scene.orientation.trimesh import vertex_normals
     from .console import warnings_as_ours
 
     with Bar(args) as bar, warnings_as_ours():

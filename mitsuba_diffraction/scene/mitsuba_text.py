@@ -26,7 +26,8 @@ _UNREAD = re.compile(
     r'Found \d+ unreferenced (?:property|properties) in (\w+) plugin of type "([^"]+)":'
 )
 _NO_PLY = re.compile(
-    r'Error while loading PLY file "(?P<file>[^"]+)": (?:"[^"]+": )?(?P<why>invalid PLY .*)'
+    r'Error while loading PLY file "(?P<file>[^"]+)": (?:"[^"]+": )?'
+    r"(?P<why>(?:invalid PLY|incompatible contents|trailing tokens) .*)"
 )
 _UNUSED = re.compile(r"Found unused parameters?: (?P<list>.*)")
 _PLUGIN = re.compile(r"\[[A-Z]\w+\] ")
@@ -62,9 +63,11 @@ def plain_text(error: BaseException) -> str:
 def _no_ply(found: re.Match[str]) -> str:
     """A mesh of another format where a PLY is expected, with what to do about it."""
     file = PurePath(found["file"])
+    todo = f"run 'mitsuba-diffraction tangents {file} -o mesh.ply' first, and use mesh.ply"
+    if not found["why"].startswith("invalid PLY"):
+        return f"'{file}' has polygons, of which Mitsuba reads only triangles: {todo}"
     if file.suffix.lower() in (".ply", ""):
         return f"'{file}' is no undamaged PLY: {found['why']}; export the mesh again"
-    todo = f"run 'mitsuba-diffraction tangents {file} -o mesh.ply' first, and use mesh.ply"
     if file.suffix.lower() not in (".obj", ".serialized"):
         todo = "convert it to PLY or OBJ"
     return f"'{file}' is no PLY mesh, which the scene expects: {todo}"

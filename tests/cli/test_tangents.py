@@ -11,12 +11,11 @@ import pytest
 
 from mitsuba_diffraction.cli.tangents import _GUIDES
 from mitsuba_diffraction.scene.orientation.directions import GUIDES
-from mitsuba_diffraction.scene.orientation.tangents import load_mesh
+from mitsuba_diffraction.scene.orientation.files import load_mesh, write_ply
 from mitsuba_diffraction.scene.orientation.trimesh import (
     TriangleMesh,
     grid_faces,
     vertex_normals,
-    write_ply,
 )
 from scenes.make import knot
 
@@ -96,9 +95,9 @@ def test_a_turn_is_counter_clockwise_from_outside(run, ball):
     positions, _, uv, faces = load_mesh(out)
     sides = positions[faces[:, 1:]] - positions[faces[:, :1]]
     uv_sides = uv[faces[:, 1:]] - uv[faces[:, :1]]
-    from mitsuba_diffraction.scene.orientation.tangents import tangents
+    from mitsuba_diffraction.scene.orientation.trimesh import texture_tangents
 
-    along = tangents(sides, uv_sides)[0]
+    along = texture_tangents(sides, uv_sides)[0]
     middle = positions[faces].mean(axis=1)
     west = np.cross(middle, [0.0, 0.0, 1.0])
     near = np.linalg.norm(west, axis=1) > 0.5

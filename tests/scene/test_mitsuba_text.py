@@ -37,6 +37,19 @@ CASES = {
         "'a.xml', line 2: shape 'ply': '/m/ball.obj' is no PLY mesh, which the scene expects: run "
         "'mitsuba-diffraction tangents /m/ball.obj -o mesh.ply' first, and use mesh.ply"
     ),
+    # quads, in binary and as text
+    '[parser.cpp:1718] At a.xml (line 2, col 5): failed to instantiate shape plugin of type "ply": '
+    '[PLYMesh] Error while loading PLY file "q.ply": incompatible contents -- is this a triangle '
+    "mesh?!": (
+        "'a.xml', line 2: shape 'ply': 'q.ply' has polygons, of which Mitsuba reads only "
+        "triangles: run 'mitsuba-diffraction tangents q.ply -o mesh.ply' first, and use mesh.ply"
+    ),
+    '[parser.cpp:1718] At a.xml (line 2, col 5): failed to instantiate shape plugin of type "ply": '
+    '[PLYMesh] Error while loading PLY file "t.ply": [ply.h:268] "t.ply": trailing tokens after '
+    "end of PLY file!": (
+        "'a.xml', line 2: shape 'ply': 't.ply' has polygons, of which Mitsuba reads only "
+        "triangles: run 'mitsuba-diffraction tangents t.ply -o mesh.ply' first, and use mesh.ply"
+    ),
 }  # fmt: skip
 
 

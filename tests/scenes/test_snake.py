@@ -14,7 +14,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.scene.orientation.tangents import load_mesh, tangents
+from mitsuba_diffraction.scene.orientation.files import load_mesh
+from mitsuba_diffraction.scene.orientation.trimesh import texture_tangents
 from scenes.make.__main__ import elaphe, main, xenopeltis
 from scenes.make.anatomy import Anatomy
 from scenes.make.scales import Scales
@@ -53,7 +54,7 @@ def test_the_first_tangent_runs_along_the_body(snake: Snake) -> None:
     middle = (u > 0.5) & (u < snake.skin.u_max - 0.3)
     faces, u = faces[middle], u[middle]
     sides = body.positions[faces[:, 1:]] - body.positions[faces[:, :1]]
-    dp_du, dp_dv, texture = tangents(sides, body.uv[faces[:, 1:]] - body.uv[faces[:, :1]])
+    dp_du, dp_dv, texture = texture_tangents(sides, body.uv[faces[:, 1:]] - body.uv[faces[:, :1]])
     area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     # slivers that close the gaps between three scales have no texture area
     good = np.abs(texture) > 1e-4 * area

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from mitsuba_diffraction.realtime.comparison.table import markdown, scenes_table
+from mitsuba_diffraction.realtime.comparison.table import markdown, plain_number
 
 from . import markers
 from .jpeg import write_jpeg
@@ -22,6 +22,7 @@ from .program import exit_code, from_json
 #: Beside the README; the sheet that it shows is that of the default method.
 SHEET = Path("docs", "images", "realtime.jpg")
 
+_OURS = ("lut", "spectral")
 _METHOD, _WIDTH = "lut", 1600
 
 
@@ -53,6 +54,30 @@ def _tables(files: Sequence[Path]) -> str:
         for file in files
     ]  # fmt: skip
     return f"{scenes_table(documents)}\n\n{markdown(documents[0])}"
+
+
+def scenes_table(documents: Sequence[dict[str, Any]]) -> str:
+    """How far `lut` and `spectral` are off in some scenes, over all pixels that are compared.
+
+    Parameters
+    ----------
+    documents : what is in each compare.json.
+    """
+    head = "| scene |" + "".join(f" `{m}`, ΔE2000 mean | 99 % |" for m in _OURS)
+    rows = [head + " noise | pixels |", "|---|" + 2 * len(_OURS) * "---|" + "---|---|"]
+    for document in documents:
+        cells = [f"[{Path(document['scene']).stem}]({document['scene']})"]
+        for method in _OURS:
+            found = document["methods"][method]["both"]
+            cells += [
+                plain_number(found["delta_e_mean"]),
+                plain_number(found["delta_e_percentiles"]["99"]),
+            ]
+        pixels = document["methods"][_OURS[0]]["both"]["pixels"]
+        rows.append(
+            f"| {' | '.join(cells)} | {plain_number(document['noise_delta_e_mean'])} | {pixels} |"
+        )
+    return "\n".join(rows)
 
 
 def _complete(document: dict[str, Any]) -> dict[str, Any]:

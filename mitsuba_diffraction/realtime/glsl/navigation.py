@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from .camera import Camera
 from .lights import Light
@@ -86,7 +87,5 @@ def dragged(light: Light, orbit: Orbit, right: float, up: float) -> Light:
 
 
 def rotation_about(axis: Array, angle: float) -> Array:
-    """Rotation matrix (3, 3) about a unit vector, counter-clockwise (Rodrigues)."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
+    """Rotation matrix (3, 3) about a unit vector, counter-clockwise."""
+    return np.asarray(Rotation.from_rotvec(angle * axis).as_matrix())

@@ -12,9 +12,9 @@ from .context import Bindings, compile_program
 from .materials import Material
 from .packing import area_factor, pack_colours, pack_powers
 from .scene import VERTEX, RealtimeScene
-from .source import DOCUMENTED, METHODS
+from .source import METHODS, THESIS_METHODS
 from .textures import Packed, Uniform
-from .thesis import make_documented, pack_method
+from .thesis import pack_method, thesis_method
 
 
 class Part:
@@ -122,9 +122,9 @@ def method_tables(method: str, material: Material) -> Packed:
         return pack_colours(cached_colours(material.table))
     if method == "spectral":
         return pack_powers(material.table)
-    if method in DOCUMENTED:
+    if method in THESIS_METHODS:
         heights = material.bsdf.heights()
-        return pack_method(make_documented(method, heights, material.table))
+        return pack_method(thesis_method(method, heights, material.table))
     raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
 
 

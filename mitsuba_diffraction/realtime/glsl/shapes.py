@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...scene.orientation.trimesh import grid_faces, texture_tangents
+
 Array = NDArray[np.float64]
 
 _RINGS, _SEGMENTS = 192, 384  # of a sphere: 3e-5 of its radius away from it
@@ -23,7 +25,6 @@ class Triangles:
     positions, normals, tangents : (n, 3); tangents are ∂p/∂u, of any length.
     texcoords : (n, 2).
     vertices : (n,) index of each in the mesh that it comes from, or None.
-    faces : (n / 3,) likewise of each triangle.
     """
 
     positions: Array
@@ -37,15 +38,11 @@ def triangles_of(shape: Any) -> Triangles | None:
     """A shape's triangles, or None for a kind that cannot be shown."""
     maker = _ANALYTIC.get(shape.class_name())
     if maker is not None:
-        return _placed(maker(), _matrix(shape), flipped="flip_normals = 1" in str(shape))
+        import mitsuba as mi
+
+        to_world = np.array(mi.traverse(shape)["to_world"].matrix, np.float64).reshape(4, 4)
+        return _placed(maker(), to_world, flipped="flip_normals = 1" in str(shape))
     return _of_mesh(shape) if shape.is_mesh() else None
-
-
-def _matrix(shape: Any) -> Array:
-    import mitsuba as mi
-
-    matrix = np.array(mi.traverse(shape)["to_world"].matrix, np.float64)
-    return matrix.reshape(4, 4)
 
 
 def _placed(local: Triangles, to_world: Array, flipped: bool) -> Triangles:
@@ -62,26 +59,25 @@ def _placed(local: Triangles, to_world: Array, flipped: bool) -> Triangles:
 
 def _of_mesh(shape: Any) -> Triangles:
     """Mitsuba shades a triangle with one tangent, that of its texture coordinates."""
-    faces = np.array(shape.faces_buffer(), np.int64).reshape(-1, 3)
-    corners = faces.ravel()
-    positions = np.array(shape.vertex_positions_buffer(), np.float64).reshape(-1, 3)[corners]
-    corner = positions.reshape(-1, 3, 3)
-    edges = corner[:, 1:] - corner[:, :1]
-    flat = np.cross(edges[:, 0], edges[:, 1])
+
+    def buffer(values: Any, width: int) -> Array:
+        return np.array(values, np.float64).reshape(-1, width)[corners]
+
+    corners = np.array(shape.faces_buffer(), np.int64).ravel()
+    positions = buffer(shape.vertex_positions_buffer(), 3)
+    sides = positions.reshape(-1, 3, 3)[:, 1:] - positions[::3, None]
+    flat = np.cross(sides[:, 0], sides[:, 1])
     flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
     normals = np.repeat(flat, 3, axis=0)
     if shape.has_vertex_normals():
-        normals = np.array(shape.vertex_normals_buffer(), np.float64).reshape(-1, 3)[corners]
+        normals = buffer(shape.vertex_normals_buffer(), 3)
     tangents = across(flat)
     texcoords = np.zeros((len(corners), 2))
     if shape.has_vertex_texcoords():
-        texcoords = np.array(shape.vertex_texcoords_buffer(), np.float64).reshape(-1, 2)[corners]
-        uv = texcoords.reshape(-1, 3, 2)
-        duv = uv[:, 1:] - uv[:, :1]
-        determinant = duv[:, 0, 0] * duv[:, 1, 1] - duv[:, 0, 1] * duv[:, 1, 0]
-        along = duv[:, 1, 1:] * edges[:, 0] - duv[:, 0, 1:] * edges[:, 1]
-        known = determinant != 0.0
-        tangents[known] = along[known] / determinant[known, None]
+        texcoords = buffer(shape.vertex_texcoords_buffer(), 2)
+        uv_sides = texcoords.reshape(-1, 3, 2)[:, 1:] - texcoords[::3, None]
+        dp_du, _, area = texture_tangents(sides, uv_sides)
+        tangents = np.where(area[:, None] != 0.0, dp_du, tangents)
     return Triangles(positions, normals, np.repeat(tangents, 3, axis=0), texcoords, corners)
 
 
@@ -93,25 +89,21 @@ def across(normals: Array) -> Array:
     return np.stack([1.0 + sign * x * x * a, sign * x * y * a, -sign * x], axis=1)
 
 
-def _rectangle() -> Triangles:
-    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]], float)
-    return Triangles(
-        positions=np.pad(corners, [(0, 0), (0, 1)]),
-        normals=np.tile([0.0, 0.0, 1.0], (6, 1)),
-        tangents=np.tile([2.0, 0.0, 0.0], (6, 1)),
-        texcoords=0.5 * (corners + 1.0),
-    )
-
-
 def _grid(rows: int, columns: int, point: Callable[[Array, Array], tuple[Array, ...]]) -> Triangles:
     """Triangles of a parametrisation (u, v) ↦ position, normal, tangent."""
     s, t = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))
     position, normal, tangent = point(s.ravel(), t.ravel())
-    n = np.arange((rows + 1) * (columns + 1)).reshape(rows + 1, columns + 1)
-    a, b, c, d = n[:-1, :-1], n[:-1, 1:], n[1:, 1:], n[1:, :-1]
-    index = np.stack([a, b, c, a, c, d], axis=-1).ravel()
+    index = grid_faces(np.arange(s.size).reshape(s.shape).T).ravel()
     uv = np.stack([s.ravel(), t.ravel()], axis=1)
     return Triangles(position[index], normal[index], tangent[index], uv[index])
+
+
+def _rectangle() -> Triangles:
+    def point(u: Array, v: Array) -> tuple[Array, ...]:
+        p = np.stack([2.0 * u - 1.0, 2.0 * v - 1.0, 0.0 * u], axis=1)
+        return p, np.tile([0.0, 0.0, 1.0], (len(u), 1)), np.tile([2.0, 0.0, 0.0], (len(u), 1))
+
+    return _grid(1, 1, point)
 
 
 def _sphere() -> Triangles:

@@ -14,8 +14,8 @@ Dialect = Literal["desktop", "web"]
 
 #: Methods of the fragment stage.
 METHODS = ("lut", "spectral", "flss", "nmm", "pq")
-#: Those of the source documents, which `methods` has too.
-DOCUMENTED = METHODS[2:]
+#: Those of the 2014 thesis; `thesis.methods` evaluates them in NumPy.
+THESIS_METHODS = METHODS[2:]
 
 #: Lights at once.
 LIGHTS = 4
@@ -75,5 +75,5 @@ def fragment_parts(
     constants |= {"SURFACE_KIND": "0", "LIGHTS_LIT": "1", **definitions}
     lines = [f"#define {name} {value}\n" for name, value in constants.items()]
     parts = [("preamble", _PREAMBLES[dialect] + "".join(lines))]
-    shared = ("library.glsl", "taylor.glsl") if method in DOCUMENTED else ("library.glsl",)
+    shared = ("library.glsl", "taylor.glsl") if method in THESIS_METHODS else ("library.glsl",)
     return parts + [(name, _file(name)) for name in (*shared, f"{method}.glsl", main)]

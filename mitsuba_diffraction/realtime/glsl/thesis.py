@@ -1,4 +1,4 @@
-"""The source documents' methods as textures, from their evaluators in `methods`; no OpenGL."""
+"""The methods of the 2014 thesis as textures, from their evaluators in `thesis.methods`."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from ...thesis.methods import FullSpectrum, OrdersOnly, Repeated, make
 from ...thesis.methods.method import Method
 from ...thesis.methods.nmm import SPECULAR_WAVELENGTH
 from .packing import area_factor
-from .source import DOCUMENTED
+from .source import THESIS_METHODS
 from .textures import Packed, as_half, listed, texels
 
-#: As in the source documents: terms of the series, bins read along each axis, and nm.
+#: As in the thesis: terms of the series, bins read along each axis, and nm.
 TERMS, TAPS, STEP = 37, 3, 5.0
-#: What 37 terms and 3 × 3 bins reach on snakes' scales; the documents ask for none.
+#: What 37 terms and 3 × 3 bins reach on snakes' scales; the thesis asks for none.
 TOLERANCE = 0.02
 
 
-def make_documented(name: str, heights: HeightField, table: DiffractionTable) -> Method:
-    """The documents' method for a patch, with their own settings.
+def thesis_method(name: str, heights: HeightField, table: DiffractionTable) -> Method:
+    """A method of the thesis for a patch, with the thesis' own settings.
 
     Parameters
     ----------
-    name : one of `source.DOCUMENTED`.
+    name : one of `source.THESIS_METHODS`.
     heights : the patch.
     table : the package's own of that patch, for its window and how positions are averaged.
 
@@ -37,8 +37,8 @@ def make_documented(name: str, heights: HeightField, table: DiffractionTable) ->
     DiffractionError
         If the series is too short for the patch, or it has no period and the method needs one.
     """
-    if name not in DOCUMENTED:
-        raise DiffractionError(f"method='{name}' is none of {', '.join(DOCUMENTED)}")
+    if name not in THESIS_METHODS:
+        raise DiffractionError(f"method='{name}' is none of {', '.join(THESIS_METHODS)}")
     settings = {} if name == "pq" else {"taps": TAPS}  # pq reads two bins along each axis
     return make(
         name, heights, coherence_width=table.coherence_width, coherence=table.coherence,

@@ -19,7 +19,7 @@ from .navigation import Orbit, dragged
 from .panel import TITLE, PanelWindow
 from .renderer import Renderer
 from .screenshots import write_screenshot
-from .source import DOCUMENTED, METHODS
+from .source import METHODS, THESIS_METHODS
 
 HELP = (
     "left button: turn   right: drag the light\n"
@@ -157,8 +157,8 @@ class Viewer(PanelWindow):
             return
         self.method, self.message = method, ""
         self.times.clear()
-        if method in DOCUMENTED:
-            self.message = "a method of the source documents: slow, for comparison"
+        if method in THESIS_METHODS:
+            self.message = "a method of the thesis: slow, for comparison"
 
     def screenshot(self) -> Path:
         """Write what is seen, without the panel, as PNG; the next free name."""

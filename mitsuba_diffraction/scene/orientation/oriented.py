@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .tangents import tangents
-from .trimesh import TriangleMesh
+from .trimesh import TriangleMesh, texture_tangents
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -45,7 +44,7 @@ def oriented_mesh(
     if uv is not None:
         given = uv[faces]
         sides = corners[:, 1:] - corners[:, :1]
-        dp_du, _, area = tangents(sides, given[:, 1:] - given[:, :1])
+        dp_du, _, area = texture_tangents(sides, given[:, 1:] - given[:, :1])
         good = (area != 0)[:, None]
         along = np.where(good, dp_du, along)
         # where they span nothing, they must span a little

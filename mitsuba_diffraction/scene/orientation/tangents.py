@@ -8,209 +8,17 @@ between neighbours: where it does, the patch turns suddenly and the colours show
 
 from __future__ import annotations
 
-import os
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
-
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import DiffractionError
-from ...plugin.attributes import ORIENTATION
 from .breaks import BREAK, Corners, length_of_breaks
+from .report import TURN, TangentReport
+from .trimesh import texture_tangents
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-KINDS = {".ply": "ply", ".obj": "obj", ".serialized": "serialized"}
-MOST_TURNING = 0.05  # of the surface, on which the direction may turn too fast
-LONG = 0.05  # of the mesh's size: breaks that are longer in all are seen
-TURN = 30.0  # degrees between neighbours from which on a seam shows
 FLAT = 1e-3  # of the typical ratio of texture area to surface area: as good as none
-
-
-@dataclass(frozen=True)
-class TangentReport:
-    """What `check_tangents` found; shares are of the surface area, 0 to 1.
-
-    Attributes
-    ----------
-    triangles : number of triangles with an area.
-    has_uv, has_normals, has_orientation : whether the mesh carries them.
-    degenerate : share whose texture coordinates span no area: no tangent there.
-    mirrored : share where u × v runs the other way round: the patch is seen mirrored.
-    turning : share within which the direction turns by over 60 degrees, or which lies beside an
-        edge across which it turns by more than 30.
-    stretch : median ratio of |dp/du| to |dp/dv| (1: no direction is stretched).
-    broken : length of the lines along which the direction breaks, in the unit of the positions.
-    size : of the mesh, its longest side along an axis.
-    """
-
-    triangles: int
-    has_uv: bool
-    has_normals: bool
-    degenerate: float
-    mirrored: float
-    turning: float
-    stretch: float
-    broken: float
-    size: float
-    has_orientation: bool = False
-
-    @property
-    def usable(self) -> bool:
-        """True where a patch can follow nearly all of the surface."""
-        return self.has_uv and self.degenerate < 0.01 and not self.turns_fast and not self.breaks
-
-    @property
-    def breaks(self) -> bool:
-        """Whether the direction breaks along lines that are long enough to be seen."""
-        return self.broken >= LONG * self.size and self.broken > 0
-
-    @property
-    def turns_fast(self) -> bool:
-        """Whether the direction turns too fast for the triangles on much of the surface."""
-        return self.turning >= MOST_TURNING
-
-    def breaking(self) -> str:
-        """How long the lines are along which the direction breaks, in words."""
-        return (
-            f"breaks (turns by over {BREAK:g} degrees) along lines of {self.broken:.3g} in all, "
-            f"{self.broken / self.size:.2g} times the mesh's size of {self.size:.3g}"
-        )
-
-    def problems(self) -> list[str]:
-        """One line for each thing that speaks against this mesh, with what to do."""
-        if not self.has_uv:
-            return [
-                "no texture coordinates, so the patch has no direction: give the mesh one with "
-                "'mitsuba-diffraction tangents', or unwrap it so that u runs the way the patch's x "
-                "axis shall"
-            ]
-        lines = []
-        if not self.has_normals:
-            lines.append("no vertex normals: every triangle reflects like a flat mirror")
-        if self.degenerate >= 0.01:
-            lines.append(
-                f"{self.degenerate:.0%} of the surface has texture coordinates without area, hence "
-                "no tangent: unwrap those parts"
-            )
-        if self.breaks:
-            lines.append(
-                f"the patch's direction {self.breaking()}: colours will show seams; "
-                + (
-                    "make it with 'mitsuba-diffraction tangents' and another --along"
-                    if self.has_orientation
-                    else "unwrap along the body in one piece"
-                )
-            )
-        if self.turns_fast:
-            lines.append(
-                f"the patch's direction turns by over {TURN:g} degrees between neighbours, or "
-                f"{BREAK:g} within a triangle, on {self.turning:.0%} of the surface: "
-                + (
-                    "use a finer mesh, or another --along of 'mitsuba-diffraction tangents'"
-                    if self.has_orientation
-                    else "colours will show seams; unwrap along the body in one piece"
-                )
-            )
-        if 0.01 < self.mirrored < 0.99:
-            lines.append(
-                f"{self.mirrored:.0%} of the surface shows the patch mirrored: flip those parts"
-            )
-        return lines
-
-    def summary(self) -> dict[str, Any]:
-        """Plain numbers and strings, for printing."""
-        return {
-            "triangles": self.triangles,
-            "texture coordinates": self.has_uv,
-            "normals": self.has_normals,
-            "direction of the patch": (
-                "none"
-                if not self.has_uv
-                else f"dp/du turned by {ORIENTATION}"
-                if self.has_orientation
-                else "dp/du"
-            ),
-            "shares of the surface area, 0 to 1": {
-                "without tangent": self.degenerate,
-                "mirrored": self.mirrored,
-                "turning tangent": self.turning,
-            },
-            "lines along which the direction breaks": {
-                "length": self.broken,
-                "length / mesh size": self.broken / self.size if self.size > 0 else 0.0,
-            },
-            "stretch, median |dp/du| / |dp/dv|": self.stretch,
-            "usable": self.usable,
-            "problems": self.problems(),
-        }
-
-
-def load_mesh(
-    path: str | os.PathLike[str],
-) -> tuple[Floats, Floats | None, Floats | None, Ints]:
-    """Positions (n, 3), normals (n, 3) or None, texture coordinates (n, 2) or None, faces (m, 3).
-
-    Reads what Mitsuba reads: .ply, .obj, .serialized.
-
-    Raises
-    ------
-    DiffractionError
-        If there is no such file, or it is no mesh of these kinds.
-    """
-    file = Path(path)
-    kind = KINDS.get(file.suffix.lower())
-    if kind is None:
-        raise DiffractionError(
-            f"mesh '{file}': its name must end in {', '.join(KINDS)}; convert it to PLY or OBJ"
-        )
-    if not file.is_file():
-        raise DiffractionError(f"mesh '{file}': there is no such file")
-    if mi.variant() is None:
-        mi.set_variant("scalar_rgb")
-    # without normals first: making them, Mitsuba follows indices that point nowhere
-    mesh = _load(file, kind, face_normals=True)
-    faces = np.array(mi.traverse(mesh)["faces"], dtype=np.int64).reshape(-1, 3)
-    if not len(faces):
-        raise DiffractionError(f"mesh '{file}': it has no triangles")
-    if faces.max() >= mesh.vertex_count():
-        raise DiffractionError(
-            f"mesh '{file}': a triangle names vertex {faces.max()}, but there are only "
-            f"{mesh.vertex_count()}; export the mesh again"
-        )
-    mesh = _load(file, kind, face_normals=False)
-    values = mi.traverse(mesh)
-
-    def array(name: str, width: int) -> Floats:
-        return np.array(values[name], dtype=np.float64).reshape(-1, width)
-
-    normals = array("vertex_normals", 3) if mesh.has_vertex_normals() else None
-    uv = array("vertex_texcoords", 2) if mesh.has_vertex_texcoords() else None
-    return array("vertex_positions", 3), normals, uv, faces
-
-
-def _load(file: Path, kind: str, face_normals: bool) -> mi.Mesh:
-    try:
-        return mi.load_dict({"type": kind, "filename": str(file), "face_normals": face_normals})
-    # what Mitsuba throws, text that is not UTF-8, and sizes beyond the memory
-    except (RuntimeError, ValueError, MemoryError) as error:
-        lines = str(error).split(": ", 1)[-1].split()
-        reason = " ".join(lines)[-200:] or type(error).__name__
-        raise DiffractionError(f"mesh '{file}': cannot be read: {reason}") from error
-
-
-def load_orientation(path: str | os.PathLike[str]) -> Floats | None:
-    """The attribute vertex_orientation of a mesh that `load_mesh` reads, (n, 2), or None."""
-    file = Path(path)
-    mesh = _load(file, KINDS[file.suffix.lower()], face_normals=False)
-    if not mesh.has_attribute(ORIENTATION):
-        return None
-    values = np.array(mi.traverse(mesh)[ORIENTATION], dtype=np.float64)
-    return values.reshape(mesh.vertex_count(), -1)[:, :2]
 
 
 def check_tangents(
@@ -238,7 +46,7 @@ def check_tangents(
             len(faces), uv is not None, normals is not None, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
         )
 
-    dp_du, dp_dv, signed = tangents(sides, uv[faces[:, 1:]] - uv[faces[:, :1]])
+    dp_du, dp_dv, signed = texture_tangents(sides, uv[faces[:, 1:]] - uv[faces[:, :1]])
     ratio = np.abs(signed) / area
     outward = across if normals is None else normals[faces].sum(axis=1)
     mirrored = (np.cross(dp_du, dp_dv) * outward).sum(axis=1) < 0
@@ -268,19 +76,6 @@ def check_tangents(
         size=float(np.ptp(positions[faces].reshape(-1, 3), axis=0).max()),
         has_orientation=orientation is not None,
     )
-
-
-def tangents(sides: Floats, uv_sides: Floats) -> tuple[Floats, Floats, Floats]:
-    """dp/du and dp/dv of triangles, (m, 3) each, and the signed areas of their (u, v), (m,).
-
-    Solves sides = uv_sides · (dp/du, dp/dv); where (u, v) span no area the result is zero.
-    """
-    (du0, dv0), (du1, dv1) = uv_sides[:, 0].T, uv_sides[:, 1].T
-    determinant = du0 * dv1 - dv0 * du1
-    safe = np.where(determinant == 0, np.inf, determinant)[:, None]
-    dp_du = (dv1[:, None] * sides[:, 0] - dv0[:, None] * sides[:, 1]) / safe
-    dp_dv = (du0[:, None] * sides[:, 1] - du1[:, None] * sides[:, 0]) / safe
-    return dp_du, dp_dv, determinant / 2
 
 
 def carried(vectors: Floats, before: Floats, after: Floats) -> Floats:

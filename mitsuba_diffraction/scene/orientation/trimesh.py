@@ -1,14 +1,12 @@
-"""Triangle meshes as arrays, and the PLY files that carry them."""
+"""Triangle meshes as arrays."""
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...atomic import atomic_path
 from ...errors import DiffractionError
 
 Floats = NDArray[np.float64]
@@ -84,42 +82,14 @@ def join(meshes: list[TriangleMesh]) -> TriangleMesh:
     )
 
 
-def write_ply(
-    path: str | os.PathLike[str], mesh: TriangleMesh, comment: str = "", *, with_uv: bool = True
-) -> None:
-    """Write a binary little-endian PLY with the property names that Mitsuba reads.
+def texture_tangents(sides: Floats, uv_sides: Floats) -> tuple[Floats, Floats, Floats]:
+    """dp/du and dp/dv of triangles, (m, 3) each, and the signed areas of their (u, v), (m,).
 
-    An orientation becomes the mesh attribute `vertex_orientation` with the channels (cos, sin, 0):
-    Mitsuba 3.9 reads attributes of one or three channels and ignores those of two.
-
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be written.
+    Solves sides = uv_sides · (dp/du, dp/dv); where (u, v) span no area the result is zero.
     """
-    columns: dict[str, Floats] = {
-        **dict(zip(("x", "y", "z"), mesh.positions.T, strict=True)),
-        **dict(zip(("nx", "ny", "nz"), mesh.normals.T, strict=True)),
-    }
-    if with_uv:
-        columns |= dict(zip(("u", "v"), mesh.uv.T, strict=True))
-    if mesh.orientation is not None:
-        cosine, sine = mesh.orientation.T
-        columns |= {"orientation_x": cosine, "orientation_y": sine}
-        columns["orientation_z"] = np.zeros_like(cosine)
-    vertices = np.empty(len(mesh.positions), dtype=[(name, "<f4") for name in columns])
-    for name, values in columns.items():
-        vertices[name] = values
-    faces = np.empty(len(mesh.faces), dtype=[("count", "u1"), ("indices", "<i4", 3)])
-    faces["count"] = 3
-    faces["indices"] = mesh.faces
-
-    header = ["ply", "format binary_little_endian 1.0"]
-    header += [f"comment {line}" for line in comment.splitlines()]
-    header += [f"element vertex {len(vertices)}"]
-    header += [f"property float {name}" for name in columns]
-    header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
-    with atomic_path(path) as temporary, open(temporary, "wb") as file:
-        file.write(("\n".join(header) + "\n").encode("ascii", "replace"))
-        file.write(vertices.tobytes())
-        file.write(faces.tobytes())
+    (du0, dv0), (du1, dv1) = uv_sides[:, 0].T, uv_sides[:, 1].T
+    determinant = du0 * dv1 - dv0 * du1
+    safe = np.where(determinant == 0, np.inf, determinant)[:, None]
+    dp_du = (dv1[:, None] * sides[:, 0] - dv0[:, None] * sides[:, 1]) / safe
+    dp_dv = (du0[:, None] * sides[:, 1] - du1[:, None] * sides[:, 0]) / safe
+    return dp_du, dp_dv, determinant / 2

@@ -19,7 +19,7 @@ ROOM = 1.02
 
 
 @dataclass(frozen=True)
-class Asked:
+class LookupStatistics:
     """What one table is asked, over all surfaces that share it.
 
     Attributes
@@ -91,7 +91,7 @@ class Domain:
 
 
 def domain_for(
-    asked: Asked, table: DiffractionTable, height_scale: float, tolerance: float
+    asked: LookupStatistics, table: DiffractionTable, height_scale: float, tolerance: float
 ) -> Domain:
     """The smallest domain that leaves at most `tolerance` of the surfaces' light outside.
 
@@ -166,7 +166,7 @@ def lobes_in_a_pixel(turn: float, sigma: float) -> float:
     return float((2.0 * turn * float(wavenumber(550.0)) * sigma) ** 2)
 
 
-def wavelengths_needed(asked: Asked, share: float = 1e-3) -> dict[str, Any]:
+def wavelengths_needed(asked: LookupStatistics, share: float = 1e-3) -> dict[str, Any]:
     """The band that all but a share of the diffracted light lies in, half of it on either side.
 
     Returns

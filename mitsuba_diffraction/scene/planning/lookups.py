@@ -12,13 +12,15 @@ from ...optics.geometry import wavenumber
 from ...plugin.lookup import device_table
 from ...plugin.restricted import Outside, RestrictedTable
 from ...tables.table import DiffractionTable
-from .domain import Asked
+from .domain import LookupStatistics
 
 #: That are timed: some hundredths of a second.
 LOOKUPS = 1 << 19
 
 
-def evaluation_ratio(asked: Asked, whole: DiffractionTable, planned: DiffractionTable) -> float:
+def evaluation_ratio(
+    asked: LookupStatistics, whole: DiffractionTable, planned: DiffractionTable
+) -> float:
     """Time of a look-up in the planned table over that in the whole one, where the scene asks."""
     rng = np.random.default_rng(0)
     chosen = rng.integers(0, len(asked.w), LOOKUPS)

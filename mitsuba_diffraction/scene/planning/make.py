@@ -13,7 +13,7 @@ from ...plugin.session import Session
 from ...progress import Progress
 from ...tables.table import DiffractionTable
 from .difference import Difference, difference
-from .domain import Asked, domain_for
+from .domain import LookupStatistics, domain_for
 from .paths import Seen, trace
 from .plan import Plan, PlannedTable
 
@@ -28,16 +28,16 @@ MOST_OUTSIDE = 3.0
 
 
 @dataclass(frozen=True)
-class Loaded:
+class RecordedScene:
     """A scene in a recording session, and what its tables were asked."""
 
     scene: Any
     session: Session
     seen: Seen
-    asked: dict[str, Asked]
+    statistics: dict[str, LookupStatistics]
 
 
-def look(
+def record_scene(
     load: Load,
     sensor: Callable[[Any], Any],
     paths: int,
@@ -45,7 +45,7 @@ def look(
     plan: Plan | None = None,
     seed: int = 0,
     timing: bool = False,
-) -> Loaded:
+) -> RecordedScene:
     """Load a scene with whole tables, or with those of a plan, and trace paths through it.
 
     Parameters
@@ -72,44 +72,48 @@ def look(
     if plan is not None:
         _check_match(session, plan)
     elif not session.tables:
-        names = ", ".join(sorted({name for name, _ in session.bsdfs}))
         raise DiffractionError(
-            f"the tables of {names} come from files and stay as they are; give the scene the "
-            "height field, or its recipe, to have smaller ones planned"
+            f"the tables of {_names(session)} come from files and stay as they are; give the scene "
+            "the height field, or its recipe, to have smaller ones planned"
         )
     seen = trace(scene, sensor(scene), session, paths, seed)
     if not len(seen.light):
-        names = ", ".join(sorted({name for name, _ in session.bsdfs}))
         raise DiffractionError(
-            f"none of {paths} paths carries light of a surface that diffracts ({names}): the "
-            "camera does not see it lit; check camera and lights, or raise --paths"
+            f"none of {paths} paths carries light of a surface that diffracts ({_names(session)}): "
+            "the camera does not see it lit; check camera and lights, or raise --paths"
         )
-    return Loaded(scene, session, seen, _asked(session, seen))
+    return RecordedScene(scene, session, seen, _statistics(session, seen))
 
 
-def _asked(session: Session, seen: Seen) -> dict[str, Asked]:
+def _names(session: Session) -> str:
+    return ", ".join(sorted({name for name, _ in session.bsdfs}))
+
+
+def _statistics(session: Session, seen: Seen) -> dict[str, LookupStatistics]:
     """What each table is asked; tables from files, which cannot be made smaller, are left out."""
     found = {}
     for key, table in session.tables.items():
         mine = [n for n, (_, bsdf) in enumerate(session.bsdfs) if bsdf.table is table]
         chosen = seen.of(mine)
         if chosen.any():
-            found[key] = Asked(
+            found[key] = LookupStatistics(
                 seen.u[chosen], seen.v[chosen], seen.w[chosen], seen.wavelength[chosen],
                 seen.xyz[chosen], float(min(seen.total[mine].sum(), 1.0)),
             )  # fmt: skip
     return found
 
 
-def draft(name: str, loaded: Loaded, tolerance: float, share: float | None = None) -> Plan:
+def draft_plan(
+    name: str, loaded: RecordedScene, tolerance: float, share: float | None = None
+) -> Plan:
     """The plan that leaves a share of each surface's light outside, `tolerance` by default.
 
-    What it says of memory is not known yet: see `settled`.
+    What it says of memory is not known yet: see `worthwhile`.
     """
     session = loaded.session
     tables = {}
     for key, table in session.tables.items():
-        asked, mine = loaded.asked.get(key), [b for b in session.bsdfs if b[1].table is table]
+        asked, mine = loaded.statistics.get(key), [b for b in session.bsdfs if b[1].table is table]
         # A surface that no path meets keeps what it has
         domain = None
         if asked is not None:
@@ -125,20 +129,17 @@ def draft(name: str, loaded: Loaded, tolerance: float, share: float | None = Non
     return Plan(name, tolerance, loaded.seen.paths, tables)
 
 
-def given_up(plan: Plan) -> Plan:
-    """The plan with every table whole."""
-    tables = {
-        key: replace(table, domain=None, memory=(table.memory[0], table.memory[0]))
-        for key, table in plan.tables.items()
-    }
-    return replace(plan, tables=tables)
+def worthwhile(plan: Plan, planned: dict[str, DiffractionTable]) -> Plan:
+    """The plan without what is not worth it, and with what the rest saves.
 
-
-def settled(plan: Plan, planned: dict[str, DiffractionTable]) -> Plan:
-    """The plan without what is not worth it, and with what the rest saves."""
+    Parameters
+    ----------
+    planned : its tables by key; those that are missing stay whole.
+    """
     tables = {}
     for key, table in plan.tables.items():
-        before, now = table.memory[0], planned[key].nbytes
+        before = table.memory[0]
+        now = planned[key].nbytes if key in planned else before
         worth = table.domain is not None and now < WORTH * before
         tables[key] = replace(
             table,
@@ -178,7 +179,7 @@ def _check_match(session: Session, plan: Plan) -> None:
     )
 
 
-def check_light(loaded: Loaded, plan: Plan) -> dict[str, float]:
+def check_light(loaded: RecordedScene, plan: Plan) -> dict[str, float]:
     """Share of each table's light that a scene looks up outside its plan.
 
     Raises
@@ -187,7 +188,7 @@ def check_light(loaded: Loaded, plan: Plan) -> dict[str, float]:
         If it is several times what the plan was to leave out: camera or lights are others.
     """
     shares = {}
-    for key, asked in loaded.asked.items():
+    for key, asked in loaded.statistics.items():
         table = plan.tables[key]
         if table.domain is None:
             continue
@@ -206,18 +207,8 @@ def check_light(loaded: Loaded, plan: Plan) -> dict[str, float]:
     return shares
 
 
-def planned_tables(
-    load: Load, plan: Plan, *, timing: bool = False
-) -> tuple[dict[str, DiffractionTable], dict[str, float]]:
-    """Load a scene with a plan, for its tables only, and the seconds that they took."""
-    _, session = load_planned(load, plan, timing=timing)
-    tables, seconds = dict(session.tables), dict(session.seconds)
-    session.close()
-    return tables, seconds
-
-
 @dataclass(frozen=True)
-class Fitted:
+class TestedPlan:
     """A plan that was tried.
 
     Attributes
@@ -239,16 +230,16 @@ class Fitted:
         return self.difference is None or self.difference.relative <= self.plan.tolerance
 
 
-def fitted(
+def find_plan(
     name: str,
-    loaded: Loaded,
+    loaded: RecordedScene,
     load: Load,
     sensor: Callable[[Any], Any],
     tolerance: float,
     tell: Progress,
     *,
     timing: bool = False,
-) -> Fitted:
+) -> TestedPlan:
     """Draft plans, with less and less light outside, until the picture is near enough.
 
     Orders that cells average may be far apart, as those of gratings are, and a flat surface under
@@ -257,14 +248,16 @@ def fitted(
     share = tolerance
     for _ in range(ATTEMPTS):
         tell(0, 0, "building tables")
-        drafted = draft(name, loaded, tolerance, share)
-        planned, seconds = planned_tables(load, drafted, timing=timing)
-        plan = settled(drafted, planned)
+        drafted = draft_plan(name, loaded, tolerance, share)
+        session = load_planned(load, drafted, timing=timing)[1]
+        planned, seconds = dict(session.tables), dict(session.seconds)
+        session.close()
+        plan = worthwhile(drafted, planned)
         if not plan.limits():
-            return Fitted(plan, planned, seconds, None)
+            return TestedPlan(plan, planned, seconds, None)
         changed = difference(loaded.scene, loaded.session.tables, load, plan, sensor, tell)
-        found = Fitted(plan, planned, seconds, changed)
+        found = TestedPlan(plan, planned, seconds, changed)
         if found.suits:
             return found
         share *= TIGHTER
-    return replace(found, plan=given_up(plan))
+    return replace(found, plan=worthwhile(plan, {}))

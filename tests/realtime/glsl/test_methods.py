@@ -40,7 +40,7 @@ from mitsuba_diffraction.realtime.glsl.textures import (
     paired,
     shortened,
 )
-from mitsuba_diffraction.realtime.glsl.thesis import make_documented, pack_method
+from mitsuba_diffraction.realtime.glsl.thesis import pack_method, thesis_method
 from mitsuba_diffraction.tables.colour.colour_difference import colour_loss
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from mitsuba_diffraction.tables.energy.bound import AZIMUTHAL, POLAR, AlbedoBound
@@ -264,7 +264,7 @@ def test_the_documents_tables_are_built_once(
     table: DiffractionTable, patch: HeightField, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("MITSUBA_DIFFRACTION_CACHE", str(tmp_path))
-    first = make_documented("flss", patch, table)
+    first = thesis_method("flss", patch, table)
     assert len([*tmp_path.glob("*.exr")]) == 1
 
     def build(*_: object, **__: object) -> DiffractionTable:
@@ -272,10 +272,10 @@ def test_the_documents_tables_are_built_once(
 
     monkeypatch.setattr(DiffractionTable, "build", build)
     monkeypatch.setattr(cache, "_open_tables", {})  # as in the next process
-    second = make_documented("flss", patch, table)
+    second = thesis_method("flss", patch, table)
     np.testing.assert_array_equal(second.table.coefficients, first.table.coefficients)
     with pytest.raises(AssertionError, match="built again"):
-        make_documented("pq", patch, table)
+        thesis_method("pq", patch, table)
 
 
 def test_half_floats_are_taken_where_they_hold(table: DiffractionTable) -> None:

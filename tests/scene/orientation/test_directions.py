@@ -12,13 +12,13 @@ from hypothesis.extra.numpy import arrays
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.orientation.directions import GUIDES, direction_field
+from mitsuba_diffraction.scene.orientation.files import load_mesh, write_ply
 from mitsuba_diffraction.scene.orientation.oriented import oriented_mesh
-from mitsuba_diffraction.scene.orientation.tangents import check_tangents, load_mesh
+from mitsuba_diffraction.scene.orientation.tangents import check_tangents
 from mitsuba_diffraction.scene.orientation.trimesh import (
     TriangleMesh,
     grid_faces,
     vertex_normals,
-    write_ply,
 )
 from scenes.make import disc, piece
 from scenes.make.scales import Scales

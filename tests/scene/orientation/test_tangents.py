@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.scene.orientation.tangents import check_tangents, load_mesh
-from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, grid_faces, write_ply
+from mitsuba_diffraction.scene.orientation.files import load_mesh, write_ply
+from mitsuba_diffraction.scene.orientation.tangents import check_tangents
+from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, grid_faces
 from tests.conftest import ROOT
 
 PLY = b"""ply
@@ -153,3 +155,36 @@ def test_arrays_that_do_not_fit_are_refused() -> None:
         TriangleMesh(positions, normals, uv, faces + 1)
     with pytest.raises(DiffractionError, match="'faces' has shape"):
         TriangleMesh(positions, normals, uv, faces[:, :2])
+
+
+@pytest.mark.parametrize("order", ["ascii", "<", ">"])
+def test_polygons_are_cut_into_triangles(order: str, tmp_path: Path) -> None:
+    """A quad and a pentagon, faces with a colour of their own, as an OBJ of the same has them."""
+    corners = [(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 2)]
+    polygons = [(0, 1, 2, 3), (0, 1, 2, 4, 3)]
+    kind = {"ascii": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}[order]
+    extra = "" if order == "ascii" else "property uchar red\n"
+    header = (
+        f"ply\nformat {kind} 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
+        f"property double z\nelement face 2\n{extra}property list uchar int vertex_indices\n"
+        "end_header\n"
+    ).encode()
+    if order == "ascii":
+        rows = [" ".join(map(str, [*corner, 0])) for corner in corners]
+        rows += [" ".join(map(str, [len(p), *p])) for p in polygons]
+        body = "\n".join(rows).encode() + b"\n"
+    else:
+        body = b"".join(struct.pack(f"{order}ffd", *corner, 0) for corner in corners)
+        body += b"".join(
+            struct.pack(f"{order}BB{len(p)}i", 7, len(p), *p) for p in polygons
+        )  # fmt: skip
+    (tmp_path / "polygons.ply").write_bytes(header + body)
+    lines = [f"v {x} {y} 0" for x, y in corners]
+    lines += ["f " + " ".join(str(n + 1) for n in p) for p in polygons]
+    (tmp_path / "polygons.obj").write_text("\n".join(lines) + "\n")
+    ours, theirs = (load_mesh(tmp_path / f"polygons.{kind}") for kind in ("ply", "obj"))
+    np.testing.assert_array_equal(ours[0][ours[3]], theirs[0][theirs[3]])
+    # cut short, it is refused as any damaged file
+    (tmp_path / "short.ply").write_bytes((header + body)[:-8])
+    with pytest.raises(DiffractionError, match="cannot be read"):
+        load_mesh(tmp_path / "short.ply")

@@ -10,14 +10,20 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.optics.colour import linear_srgb
+from mitsuba_diffraction.optics.colour import linear_srgb, response
 from mitsuba_diffraction.scene.planning.domain import (
-    Asked,
+    LookupStatistics,
     domain_for,
     quantiles,
     wavelengths_needed,
 )
-from mitsuba_diffraction.scene.planning.make import check_light, draft, load_planned, look, settled
+from mitsuba_diffraction.scene.planning.make import (
+    check_light,
+    draft_plan,
+    load_planned,
+    record_scene,
+    worthwhile,
+)
 from mitsuba_diffraction.scene.planning.plan import Plan
 from tests.directions import polar, rough_patch
 
@@ -62,7 +68,7 @@ def sensor(scene):
 def looked():
     """The plate, and what its table is asked."""
     mi.set_variant("llvm_ad_spectral")
-    loaded = look(plate, sensor, PATHS)
+    loaded = record_scene(plate, sensor, PATHS)
     yield loaded
     loaded.session.close()
 
@@ -77,11 +83,11 @@ def asked_of(u, v, w, wavelength, light):
     """Look-ups by hand; the picture's light is theirs."""
     columns = (np.atleast_1d(np.asarray(a, float)) for a in (u, v, w, wavelength))
     xyz = np.asarray(light, float)[:, None] * np.full(3, 1.0 / 3.0)
-    return Asked(*columns, xyz, float(np.sum(light)))
+    return LookupStatistics(*columns, xyz, float(np.sum(light)))
 
 
 def test_a_plate_is_asked_for_one_direction_only(looked):
-    (asked,) = looked.asked.values()
+    (asked,) = looked.statistics.values()
     u, v, w = LIGHT + VIEW  # all in float32
     assert asked.u == pytest.approx(u, abs=1e-5)
     assert asked.v == pytest.approx(v, abs=1e-5)
@@ -98,7 +104,7 @@ def test_a_plate_is_asked_for_one_direction_only(looked):
 
 
 def test_its_table_ends_where_the_light_does(looked):
-    plan = draft("plate", looked, 1e-3)
+    plan = draft_plan("plate", looked, 1e-3)
     (table,) = plan.tables.values()
     u, v, w = LIGHT + VIEW
     # The observer is blind below 360 nm, and 0.1 % of the light lie below some 390 nm
@@ -116,8 +122,8 @@ def test_its_table_ends_where_the_light_does(looked):
 
 def test_what_lies_beneath_takes_its_share():
     pigment = {"pigment": {"type": "diffuse", "reflectance": 0.5}}
-    loaded = look(lambda: plate(**pigment), sensor, PATHS)
-    (asked,) = loaded.asked.values()
+    loaded = record_scene(lambda: plate(**pigment), sensor, PATHS)
+    (asked,) = loaded.statistics.values()
     # Mitsuba's own renderer on both, with the pigment and with nothing beneath
     brightness = [
         float((np.array(mi.render(scene, spp=512)) @ np.linalg.inv(linear_srgb(np.eye(3)))).mean())
@@ -145,9 +151,9 @@ def test_the_reach_is_a_quantile_of_the_light():
 
 def test_wavelengths_that_the_eye_does_not_see_cost_no_colour():
     wavelength = np.linspace(360.0, 830.0, 471)
-    xyz = md.colour.response(wavelength)
+    xyz = response(wavelength)
     ones = np.ones(471)
-    asked = Asked(ones, ones, ones, wavelength, xyz / xyz.sum(), 1.0)
+    asked = LookupStatistics(ones, ones, ones, wavelength, xyz / xyz.sum(), 1.0)
     found = wavelengths_needed(asked, 1e-3)
     low, high = found["range_nm"]
     assert 380.0 < low < 410.0
@@ -156,19 +162,19 @@ def test_wavelengths_that_the_eye_does_not_see_cost_no_colour():
 
 
 def test_turned_light_is_noticed(looked):
-    plan = draft("plate", looked, 1e-3)
-    inside = look(plate, sensor, PATHS, plan=plan, seed=1)
+    plan = draft_plan("plate", looked, 1e-3)
+    inside = record_scene(plate, sensor, PATHS, plan=plan, seed=1)
     (share,) = check_light(inside, plan).values()
     assert share <= 3e-3
     inside.session.close()
-    turned = look(lambda: plate(polar(70.0, 25.0)), sensor, PATHS, plan=plan)
+    turned = record_scene(lambda: plate(polar(70.0, 25.0)), sensor, PATHS, plan=plan)
     with pytest.raises(DiffractionError, match=r"the plan does not fit: .* % of the light of foil"):
         check_light(turned, plan)
     turned.session.close()
 
 
 def test_other_heights_and_parameters_are_refused(looked):
-    plan = draft("plate", looked, 1e-3)
+    plan = draft_plan("plate", looked, 1e-3)
     other = rough_patch((64, 64), (0.3, 0.3), 0.1)
     for load in (lambda: plate(patch=other), lambda: plate(tolerance=1e-2)):
         with pytest.raises(DiffractionError, match=r"not for foil: the heights or a table's"):
@@ -176,12 +182,12 @@ def test_other_heights_and_parameters_are_refused(looked):
 
 
 def test_what_saves_too_little_is_left_whole(looked):
-    plan = draft("plate", looked, 1e-3)
+    plan = draft_plan("plate", looked, 1e-3)
     (key,) = plan.tables
     whole = looked.session.tables[key]
-    assert settled(plan, {key: whole}).limits() == {}
+    assert worthwhile(plan, {key: whole}).limits() == {}
     smaller = md.DiffractionTable.build(PATCH, coherence_width=18.0, crop=4.0, kappa_max=20.0)
-    found = settled(plan, {key: smaller})
+    found = worthwhile(plan, {key: smaller})
     assert set(found.limits()) == {key}
     assert found.tables[key].memory == (whole.nbytes, smaller.nbytes)
 
@@ -196,16 +202,16 @@ def test_scenes_without_anything_to_plan_are_refused(tmp_path):
     ):
         parts = {"type": "scene", "ball": {"type": "sphere", "bsdf": bsdf}}
         with pytest.raises(DiffractionError, match=expected):
-            look(lambda parts=parts: mi.load_dict(parts), sensor, 100)
+            record_scene(lambda parts=parts: mi.load_dict(parts), sensor, 100)
 
 
 def test_a_scene_in_the_dark_is_refused():
     with pytest.raises(DiffractionError, match="none of 100 paths through the scene carries light"):
-        look(lambda: plate(polar(120.0, 25.0)), sensor, 100)
+        record_scene(lambda: plate(polar(120.0, 25.0)), sensor, 100)
 
 
 def test_a_plan_comes_back_from_its_file(looked, tmp_path):
-    plan = draft("plate", looked, 1e-3)
+    plan = draft_plan("plate", looked, 1e-3)
     file = tmp_path / "plan.json"
     plan.save(file)
     assert Plan.load(file) == plan
@@ -230,7 +236,7 @@ def test_files_that_are_no_plan_are_refused_in_one_line(tmp_path, text, says):
 
 def test_a_plan_with_a_domain_of_nothing_is_damaged(looked, tmp_path):
     file = tmp_path / "plan.json"
-    draft("plate", looked, 1e-3).save(file)
+    draft_plan("plate", looked, 1e-3).save(file)
     document = json.loads(file.read_text())
     next(iter(document["tables"].values()))["domain"]["crop"] = [-1.0, 1.0]
     file.write_text(json.dumps(document))

@@ -1,4 +1,4 @@
-// `nmm`: the source documents' n_min–n_max method, only wavelengths whose orders reach the view
+// `nmm`: the thesis' n_min–n_max method, only wavelengths whose orders reach the view
 // direction, each with the step of the full sum (methods/nmm.py).
 
 uniform vec2 periods;           // along x and y, µm; 0 where there is none

@@ -1,4 +1,4 @@
-// The source documents' table: the DFT of (2h/H)ⁿ, complex, summed as a Taylor series in κH/2
+// The thesis' table: the DFT of (2h/H)ⁿ, complex, summed as a Taylor series in κH/2
 // before it is squared. Shared by flss, nmm and pq; what is summed says methods/ in Python.
 
 #define SKIPS_UNLIT  // loops end early where no fragment is lit

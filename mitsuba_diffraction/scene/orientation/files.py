@@ -1,0 +1,139 @@
+"""Mesh files: read and written by Mitsuba."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ...atomic import atomic_path
+from ...errors import DiffractionError, one_line
+from ...plugin.attributes import ORIENTATION
+from .polygons import triangulated_ply
+from .trimesh import TriangleMesh
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+KINDS = {".ply": "ply", ".obj": "obj", ".serialized": "serialized"}
+
+
+def load_mesh(
+    path: str | os.PathLike[str],
+) -> tuple[Floats, Floats | None, Floats | None, Ints]:
+    """Positions (n, 3), normals (n, 3) or None, texture coordinates (n, 2) or None, faces (m, 3).
+
+    Reads what Mitsuba reads, .ply, .obj, .serialized, and PLY files of polygons.
+
+    Raises
+    ------
+    DiffractionError
+        If there is no such file, or it is no mesh of these kinds.
+    """
+    file = Path(path)
+    kind = KINDS.get(file.suffix.lower())
+    if kind is None:
+        raise DiffractionError(
+            f"mesh '{file}': its name must end in {', '.join(KINDS)}; convert it to PLY or OBJ"
+        )
+    if not file.is_file():
+        raise DiffractionError(f"mesh '{file}': there is no such file")
+    _need_variant()
+    # without normals first: making them, Mitsuba follows indices that point nowhere
+    mesh = _load(file, kind, face_normals=True)
+    faces = np.array(mi.traverse(mesh)["faces"], dtype=np.int64).reshape(-1, 3)
+    if not len(faces):
+        raise DiffractionError(f"mesh '{file}': it has no triangles")
+    if faces.max() >= mesh.vertex_count():
+        raise DiffractionError(
+            f"mesh '{file}': a triangle names vertex {faces.max()}, but there are only "
+            f"{mesh.vertex_count()}; export the mesh again"
+        )
+    mesh = _load(file, kind, face_normals=False)
+    values = mi.traverse(mesh)
+
+    def array(name: str, width: int) -> Floats:
+        return np.array(values[name], dtype=np.float64).reshape(-1, width)
+
+    normals = array("vertex_normals", 3) if mesh.has_vertex_normals() else None
+    uv = array("vertex_texcoords", 2) if mesh.has_vertex_texcoords() else None
+    return array("vertex_positions", 3), normals, uv, faces
+
+
+def _load(file: Path, kind: str, face_normals: bool) -> mi.Mesh:
+    try:
+        return _read(file, kind, face_normals)
+    # what Mitsuba throws, text that is not UTF-8, and sizes beyond the memory
+    except (RuntimeError, ValueError, MemoryError) as error:
+        triangles = triangulated_ply(file.read_bytes()) if kind == "ply" else None
+        if triangles is not None:
+            with tempfile.TemporaryDirectory() as folder, contextlib.suppress(RuntimeError):
+                cut = Path(folder, file.name)
+                cut.write_bytes(triangles)
+                return _read(cut, kind, face_normals)
+        lines = str(error).split(": ", 1)[-1].split()
+        reason = " ".join(lines)[-200:] or type(error).__name__
+        raise DiffractionError(f"mesh '{file}': cannot be read: {reason}") from error
+
+
+def _read(file: Path, kind: str, face_normals: bool) -> mi.Mesh:
+    return mi.load_dict({"type": kind, "filename": str(file), "face_normals": face_normals})
+
+
+def load_orientation(path: str | os.PathLike[str]) -> Floats | None:
+    """The attribute vertex_orientation of a mesh that `load_mesh` reads, (n, 2), or None."""
+    file = Path(path)
+    mesh = _load(file, KINDS[file.suffix.lower()], face_normals=False)
+    if not mesh.has_attribute(ORIENTATION):
+        return None
+    values = np.array(mi.traverse(mesh)[ORIENTATION], dtype=np.float64)
+    return values.reshape(mesh.vertex_count(), -1)[:, :2]
+
+
+def write_ply(
+    path: str | os.PathLike[str], mesh: TriangleMesh, comment: str = "", *, with_uv: bool = True
+) -> None:
+    """Write a binary PLY.
+
+    An orientation becomes the mesh attribute `vertex_orientation` with the channels (cos, sin, 0):
+    Mitsuba 3.9 reads attributes of one or three channels and ignores those of two.
+
+    Raises
+    ------
+    DiffractionError
+        If the file cannot be written.
+    """
+    _need_variant()
+    made = mi.Mesh(
+        "mesh", len(mesh.positions), len(mesh.faces),
+        has_vertex_normals=True, has_vertex_texcoords=with_uv,
+    )  # fmt: skip
+    if mesh.orientation is not None:
+        turn = np.pad(mesh.orientation, [(0, 0), (0, 1)])
+        made.add_attribute(ORIENTATION, 3, turn.ravel())
+    values = mi.traverse(made)
+    values["vertex_positions"] = mesh.positions.ravel()
+    values["vertex_normals"] = mesh.normals.ravel()
+    if with_uv:
+        values["vertex_texcoords"] = mesh.uv.ravel()
+    values["faces"] = mesh.faces.ravel()
+    values.update()
+    with atomic_path(path) as temporary:
+        try:
+            made.write_ply(str(temporary))
+        except RuntimeError as error:  # what Mitsuba makes of a full disk
+            raise DiffractionError(f"cannot write '{path}': {one_line(str(error))}") from error
+        # Mitsuba writes no comments: they follow the line that names the format
+        lines = Path(temporary).read_bytes().split(b"\n", 2)
+        said = [f"comment {line}".encode("ascii", "replace") for line in comment.splitlines()]
+        Path(temporary).write_bytes(b"\n".join([*lines[:2], *said, lines[2]]))
+
+
+def _need_variant() -> None:
+    if mi.variant() is None:
+        mi.set_variant("scalar_rgb")
