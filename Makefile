@@ -39,10 +39,10 @@ package: setup .venv/browser  ## build wheel and sdist, and test them in an empt
 	@.ci/package
 
 # with a patch of your own: make bench MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"
-bench: setup  ## measure speed and noise, and put the figures into README.md
+bench: setup  ## measure speed and noise: docs/benchmarks.md
 	@mkdir -p out
 	@$(RUN) bench $(MEASURED) --json out/bench.json
-	@$(PYTHON3) -m docs.make.figures.speed out/bench.json -o README.md
+	@$(PYTHON3) -m docs.make.figures.speed out/bench.json
 
 # a measured patch beside the look-alikes: make figures MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"
 figures: setup  ## make the pictures in docs/images
@@ -57,14 +57,14 @@ evaluation: setup  ## make docs/evaluation.md: ridges, grating equation, fitted 
 sweeps: setup  ## make docs/sweeps.md: contact sheets of BRDF maps
 	@$(PYTHON3) -m docs.make.figures.sweeps -o docs/sweeps.md $(if $(MEASURED),--measured $(MEASURED))
 
-methods: setup  ## measure the methods, and put the table into the README
-	@$(PYTHON3) -m docs.make.figures.methods -o README.md $(if $(MEASURED),--measured $(MEASURED))
+methods: setup  ## measure the methods: docs/methods.md
+	@$(PYTHON3) -m docs.make.figures.methods $(if $(MEASURED),--measured $(MEASURED))
 
-tradeoff: setup  ## measure accuracy against speed and memory: README.md and docs/accuracy.md
+tradeoff: setup  ## measure accuracy against speed and memory: docs/accuracy.md
 	@$(RUN) tradeoff $(MEASURED) -o out/tradeoff
 	@$(PYTHON3) -m docs.make.figures.tradeoff out/tradeoff
 
-plan: setup  ## plan the snake's scene, and put the figures into README.md and docs/plan.md
+plan: setup  ## plan the snake's scene: docs/benchmarks.md and docs/plan.md
 	@mkdir -p out
 	@$(RUN) plan scenes/snake.xml --json out/plan.json
 	@$(PYTHON3) -m docs.make.figures.plan out/plan.json
@@ -79,16 +79,17 @@ validation: setup  ## compare the model with rigorous solutions: docs/validation
 	@$(PYTHON3) -m docs.make.validation report -o docs
 
 COMPARE := $(RUN) compare
-realtime: setup  ## compare the shaders with the path tracer, and put sheet and tables into README.md
+realtime: setup  ## compare the shaders with the path tracer: docs/realtime.md
 	@$(COMPARE) scenes/snake.xml --method all -s 768 --full-spp 48 -o out/compare/snake
 	@$(COMPARE) scenes/plate.xml --method lut spectral -s 2048 --full-spp 0 -D resx=240 -D resy=200 -o out/compare/plate
 	@$(COMPARE) scenes/sphere.xml --method lut spectral -s 1024 --full-spp 0 -D resx=240 -D resy=200 -o out/compare/sphere
-	@$(PYTHON3) -m docs.make.figures.realtime $(addprefix out/compare/,snake plate sphere) -o README.md
+	@$(PYTHON3) -m docs.make.figures.realtime $(addprefix out/compare/,snake plate sphere)
 
-lint: setup  ## check style and types
+lint: setup  ## check style, types and the layers of imports
 	@$(PYTHON3) -m ruff check
 	@$(PYTHON3) -m ruff format --check
 	@$(PYTHON3) -m mypy
+	@.venv/bin/lint-imports
 
 clean:  ## remove .venv, out and all caches
 	@rm -rf .venv out build dist precompute/tables .pytest_cache .mypy_cache .ruff_cache .hypothesis

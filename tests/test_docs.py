@@ -118,7 +118,7 @@ def test_every_option_in_a_sentence_is_one_of_some_command():
     # those of the programs that make documents
     own = {
         option
-        for path in PACKAGE.rglob("*.py")
+        for path in (ROOT / "docs" / "make").rglob("*.py")
         for option in re.findall(r'add_argument\([^)]*?"(--[\w-]+)"', path.read_text("utf-8"))
     }
     for page in PAGES:
@@ -156,7 +156,7 @@ def test_linked_files_exist(page):
         elif anchor:
             headings = re.findall(r"^#+ (.*)$", file.read_text(encoding="utf-8"), re.M)
             assert anchor in {slug(heading) for heading in headings}, target
-    # a picture that is made together with figures, while these are still to be measured
+    # a picture that is made together with figures, before these are measured
     empty = re.findall(r"<!-- begin (\S+) -->\s*<!-- end \1 -->", text)
     if absent and empty and all(target.endswith(".png") for target in absent):
         pytest.skip(f"to be measured: {', '.join(empty)}; without {', '.join(absent)} until then")

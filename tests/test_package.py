@@ -67,7 +67,7 @@ def test_the_wheel_holds_the_whole_package(in_wheel):
     package = tracked("mitsuba_diffraction")
     assert package <= in_wheel
     assert "mitsuba_diffraction/py.typed" in package
-    for needed in ("glsl/shaders/*.glsl", "web/page/*", "validation/data/*"):
+    for needed in ("realtime/glsl/shaders/*.glsl", "realtime/web/page/*"):
         assert list((ROOT / "mitsuba_diffraction").glob(needed)), needed
 
 

@@ -6,20 +6,18 @@ main                   the parser, and the boundary at which every error becomes
 precompute             from heights to a table
 info                   what is in a file
 render                 a scene to a picture
-animation, frames      `render --frames`: what changes, and pictures of it
-planned, plan          `render --plan`, and what a plan says
-brdf_map, method_map   the hemisphere of view directions, by the BSDF or by a method
+frames                 `render --frames`: pictures of a scene that changes
+plan, planned          what a plan says, and `render --plan`
+brdf_map               the hemisphere of view directions, by the BSDF or by a method
 evaluate, sweep        the methods of the thesis
 view, compare          a scene in real time, and beside the path tracer
 export_viewer          a scene as a page for a browser
 tangents               a patch laid smoothly over any mesh
 tradeoff, bench        accuracy, speed and memory
 patch                  the one patch of a command that needs heights
-heights_options        options shared by commands: how heights are read,
-light_options          which light a patch is looked at in,
-scene_options          which scene, variant and sensor
+options                options that several commands share, each declared once
 arguments              types of arguments
-output                 where results go, checked before the work
+output                 output files, checked before the work
 progress               bars
 console                lines on stderr, Mitsuba's among them
 report                 nested plain data as text

@@ -7,6 +7,9 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+from ..errors import DiffractionError, quoted
+from ..scene.animation import Change, change_of
+
 
 def path_ending_in(*suffixes: str) -> Callable[[str], Path]:
     """A path whose suffix is one of those given."""
@@ -15,7 +18,9 @@ def path_ending_in(*suffixes: str) -> Callable[[str], Path]:
         result = Path(text)
         if result.suffix.lower() not in suffixes:
             expected = " or ".join(suffixes)
-            raise argparse.ArgumentTypeError(f"expected a name ending in {expected}, got {text!r}")
+            raise argparse.ArgumentTypeError(
+                f"expected a name ending in {expected}, got {quoted(text)}"
+            )
         return result
 
     return path
@@ -30,7 +35,9 @@ def whole_number(least: int) -> Callable[[str], int]:
         except ValueError:
             value = least - 1
         if not least <= value < 2**31:
-            raise argparse.ArgumentTypeError(f"expected a whole number from {least}, got {text!r}")
+            raise argparse.ArgumentTypeError(
+                f"expected a whole number from {least}, got {quoted(text)}"
+            )
         return value
 
     return number
@@ -46,7 +53,7 @@ def number_between(low: float, high: float) -> Callable[[str], float]:
             value = math.nan
         if not low <= value <= high:
             raise argparse.ArgumentTypeError(
-                f"expected a number from {low:g} to {high:g}, got {text!r}"
+                f"expected a number from {low:g} to {high:g}, got {quoted(text)}"
             )
         return value
 
@@ -57,5 +64,13 @@ def definition(text: str) -> tuple[str, str]:
     """KEY=VALUE."""
     key, equals, value = text.partition("=")
     if not (equals and key):
-        raise argparse.ArgumentTypeError(f"expected KEY=VALUE, got {text!r}")
+        raise argparse.ArgumentTypeError(f"expected KEY=VALUE, got {quoted(text)}")
     return key, value
+
+
+def change(text: str) -> Change:
+    """KEY=FROM:TO, a parameter of a scene that changes."""
+    try:
+        return change_of(text)
+    except DiffractionError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error

@@ -5,22 +5,15 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..errors import DiffractionError
 from .arguments import path_ending_in
 from .console import say_warning
-from .heights_options import add_heights_options, load_options, was_given
-from .output import check_writable
+from .options import add_json, add_own_patch, check_own_patch, own_patch
 from .progress import Bar
-from .report import save_json
-
-if TYPE_CHECKING:
-    from ..analysis.bench.figures import Section
-    from ..analysis.bench.plan import Plan
+from .report import save_report
 
 PARTS = ("build", "eval", "sample", "render", "snake", "noise", "efficiency", "colours", "scaling")
 
@@ -37,10 +30,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         ),
     )
     parser.add_argument("--quick", action="store_true", help="fewer, smaller and shorter runs")
-    parser.add_argument(
-        "--json", metavar="FILE", type=path_ending_in(".json"),
-        help="write every single measurement as well",
-    )  # fmt: skip
+    add_json(parser, "every single measurement")
     parser.add_argument(
         "--against", metavar="FILE", type=path_ending_in(".json"),
         help="compare with an earlier run, written by --json",
@@ -50,23 +40,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--scenes", metavar="FOLDER", type=Path, default=Path("scenes"),
         help="where the project's scenes are, for its snake; default: scenes",
     )  # fmt: skip
-    parser.add_argument(
-        "heights",
-        metavar="HEIGHTS",
-        type=Path,
-        nargs="?",
-        help="patch to evaluate, from any file of heights; default: gratings.elaphe_like",
-    )
-    add_heights_options(parser)
+    add_own_patch(parser)
     parser.set_defaults(run=run, parser=parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print, and return the exit code; a missed goal is no failure."""
-    if args.json is not None:
-        check_writable(args.json)
-    if args.heights is None and was_given(args):
-        args.parser.error(f"{was_given(args)[0]} needs a file of heights")
+    check_own_patch(args)
     from ..analysis.bench.history import compared, read_run
 
     earlier = read_run(args.against) if args.against is not None else None
@@ -77,31 +57,31 @@ def run(args: argparse.Namespace) -> int:
 
     from ..analysis.bench import plan
     from ..analysis.bench.machine import describe_machine
+    from ..analysis.bench.run import sections
 
     chosen = plan.QUICK if args.quick else plan.FULL
     machine = describe_machine()
     print("; ".join(f"{name} {value}" for name, value in machine.items()), flush=True)
     if machine["load"] > 0.5 * machine["cores"]:
         say_warning("the machine is busy: trust the ratios, not the times")
-    sections = []
+    measured = []
     with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder, Bar(args) as bar:
-        for section in _sections(parts, chosen, Path(folder), bar, args):
+        for section in sections(parts, chosen, Path(folder), bar, args.scenes, own_patch(args)):
             tqdm.write("\n".join(["", *section.lines()]))  # above the progress bar
             sys.stdout.flush()
-            sections.append(section)
-    goals = [goal for section in sections for goal in section.goals]
+            measured.append(section)
+    goals = [goal for section in measured for goal in section.goals]
     if goals:
         print(f"\n{sum(goal.met for goal in goals)} of {len(goals)} goals met")
     data = {
         "machine": machine,
         "plan": asdict(chosen),
-        "sections": [section.plain() for section in sections],
+        "sections": [section.plain() for section in measured],
     }
     if earlier is not None:
         print(f"\nnow / {args.against}")
         print("\n".join(compared(earlier, data)))
-    if args.json is not None:
-        save_json(args.json, data)
+    save_report(args, data)
     return 0
 
 
@@ -113,52 +93,3 @@ def _check_scenes(folder: Path) -> None:
             "with --scenes, or measure a part without them: --only build, eval, sample, render "
             "or noise"
         )
-
-
-def _sections(
-    parts: tuple[str, ...], plan: Plan, folder: Path, bar: Bar, args: argparse.Namespace
-) -> Iterator[Section]:
-    """Everything that is asked for, one after the other."""
-    if "build" in parts:
-        from ..analysis.bench.build import measure_builds
-
-        yield measure_builds(plan, folder, bar)
-    if set(parts) <= {"build"}:
-        return
-    import drjit as dr
-
-    from ..analysis.bench.colours import measure_colours
-    from ..analysis.bench.contenders import build_tables
-    from ..analysis.bench.evaluation import measure_eval, measure_sampling
-    from ..analysis.bench.rendering import measure_rendering, measure_snake
-    from ..analysis.bench.scaling import measure_lookups, measure_pictures
-    from ..analysis.bench.variance import measure_efficiency, measure_noise
-    from ..heights.load import load_heights
-    from ..scene.load import set_variant
-
-    patch = None
-    if args.heights is not None:
-        patch = load_heights(args.heights, load_options(args))
-    tables = build_tables(plan, folder, bar, patch)
-    for backend in ("llvm", "cuda"):
-        if not dr.has_backend(getattr(dr.JitBackend, backend.upper())):
-            continue
-        set_variant(f"{backend}_ad_spectral")
-        if "eval" in parts:
-            yield measure_eval(plan, tables, bar)
-        if "sample" in parts:
-            yield from measure_sampling(plan, tables, bar)
-        if "render" in parts:
-            yield measure_rendering(plan, tables, bar)
-        if "snake" in parts:
-            yield measure_snake(plan, tables, args.scenes, bar)
-        if "noise" in parts:
-            yield measure_noise(plan, tables, bar)
-        if "efficiency" in parts:
-            yield measure_efficiency(plan, tables, args.scenes, bar)
-        if "colours" in parts:
-            yield from measure_colours(plan, tables, args.scenes, backend, bar)
-        if "scaling" in parts:
-            set_variant(f"{backend}_ad_spectral")
-            yield measure_lookups(plan, folder, bar)
-            yield measure_pictures(plan, tables, bar)

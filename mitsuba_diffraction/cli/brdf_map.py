@@ -4,26 +4,41 @@ from __future__ import annotations
 
 import argparse
 import time
+import warnings
 from pathlib import Path
 from typing import Any
 
+from ..errors import DiffractionError, DiffractionWarning
 from ..optics.colour import ILLUMINANTS
-from ..reference import COHERENCES
-from .arguments import number_between, path_ending_in, whole_number
-from .heights_options import add_heights_options, load_options, was_given
-from .light_options import add_direction, add_wavelengths
-from .method_map import add_method_options, refuse_contradictions, run_method
+from .arguments import number_between, path_ending_in
+from .options import (
+    add_direction,
+    add_exposure,
+    add_heights,
+    add_method,
+    add_mode,
+    add_resolution,
+    add_table,
+    add_wavelengths,
+    given_for_heights,
+    in_library,
+    load_options,
+    table_options,
+    wavelengths,
+)
 from .output import check_outputs
-from .precompute import BASES
+from .patch import load_patch
 from .progress import Bar
 
-_FULL_RANGE = (360.0, 830.0)
-_STEP = 5.0
+_KEPT = "that of the table or recipe, else "
+_TABLE = {
+    "coherence_width": f"{_KEPT}65", "coherence": f"{_KEPT}ensemble", "basis": f"{_KEPT}auto",
+    "tolerance": f"{_KEPT}1e-3", "terms": "as many as the tolerance needs",
+}  # fmt: skip
 # Options that are parameters of the BSDF, by the plugin's own names.
-_BSDF_NAMES = (
-    "coherence_width", "coherence", "basis", "tolerance", "terms", "material", "int_ior",
-    "orientation", "height_scale",
-)  # fmt: skip
+_SURFACE = ("material", "int_ior", "orientation", "height_scale")
+# What only the renderer's BSDF knows.
+_OF_THE_BSDF = ("mode", "material", "orientation", "height_scale", "basis")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -46,27 +61,26 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="EXR, with a PNG beside it, or only a PNG; default: SOURCE's name with -map.exr in "
         "the current folder",
     )  # fmt: skip
-    parser.add_argument(
-        "-m", "--mode", metavar="VARIANT",
-        help="Mitsuba variant, spectral or RGB; default: cuda_ad_spectral with a GPU, else "
-        "llvm_ad_spectral",
-    )  # fmt: skip
+    add_mode(parser)
     _add_map_options(parser.add_argument_group("the map"))
     _add_surface_options(parser.add_argument_group("the surface"))
-    add_method_options(parser.add_argument_group("methods of the source documents"))
-    add_heights_options(parser)
+    group = parser.add_argument_group("methods of the 2014 thesis")
+    add_method(
+        group, None,
+        "evaluate by this method in NumPy instead of the renderer's BSDF; R is 1, the light D65",
+    )  # fmt: skip
+    add_relative(group)
+    add_heights(parser)
     parser.set_defaults(run=run, parser=parser)
 
 
 def _add_map_options(group: argparse._ArgumentGroup) -> None:
     add_direction(group)
-    add_wavelengths(group, *_FULL_RANGE, filled=False)
+    add_wavelengths(group)
     group.add_argument(
         "--wavelength", metavar="NM", type=float, help="one wavelength only, in false colours"
     )
-    group.add_argument(
-        "--resolution", metavar="N", type=int, default=512, help="pixels a side; default: 512"
-    )
+    add_resolution(group, 512)
     group.add_argument(
         "--samples", metavar="N", type=int,
         help="directions in a pixel; default: enough to find every lobe",
@@ -78,12 +92,12 @@ def _add_map_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--cosine", action="store_true", help="map f·cosθo, what a lit surface shows, instead of f"
     )
-    group.add_argument(
-        "--exposure", metavar="EV", type=number_between(-100, 100),
-        help="of the PNG, in stops; default: half of the diffracted light is darker than white",
+    add_exposure(
+        group, None,
+        "of the PNG, in stops; default: half of the diffracted light is darker than white",
     )  # fmt: skip
     group.add_argument(
-        "--spectral", action="store_true", help="every band as a channel of the EXR, too"
+        "--spectral", action="store_true", help="also write every band as a channel of the EXR"
     )
 
 
@@ -99,16 +113,40 @@ def _add_surface_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--height-scale", metavar="S", type=number_between(1e-6, 1000), help="multiplies heights"
     )
+    add_table(group, tuple(_TABLE), **_TABLE)
+
+
+def add_relative(group: argparse._ArgumentGroup) -> None:
+    """Declare --relative; see `gain_of`."""
     group.add_argument(
-        "--coherence-width", metavar="W", type=float,
-        help="µm, 4σ of the amplitude window; default: 65, or what table or recipe say",
+        "--relative", action="store_true",
+        help="the thesis' relative reflectance instead of the BRDF, against a mirror of the same "
+        "--int-ior (default: 1.5)",
     )  # fmt: skip
-    group.add_argument("--coherence", choices=COHERENCES, help="default: ensemble, or likewise")
-    group.add_argument("--basis", choices=BASES, help="series in κ; default: auto, or likewise")
-    group.add_argument(
-        "--tolerance", metavar="E", type=float, help="relative error; default: 1e-3, or likewise"
-    )
-    group.add_argument("--terms", metavar="N", type=whole_number(1), help="terms of the series")
+
+
+def gain_of(args: argparse.Namespace) -> Any:
+    """The gain factor of --relative, or `None`.
+
+    Raises
+    ------
+    DiffractionError
+        If --int-ior is no number.
+    """
+    from ..thesis.methods import Gain
+
+    if not args.relative:
+        if args.int_ior is not None:
+            args.parser.error("argument --int-ior: only for --relative, or without a method")
+        return None
+    if args.int_ior is None:
+        return Gain()
+    try:
+        return Gain(int_ior=float(args.int_ior))
+    except ValueError as error:
+        raise DiffractionError(
+            f"int_ior='{args.int_ior}': relative reflectance takes a number, e.g. 1.5"
+        ) from error
 
 
 def run(args: argparse.Namespace) -> int:
@@ -122,31 +160,18 @@ def run(args: argparse.Namespace) -> int:
         args.parser.error(f"argument --spectral: bands need an EXR, e.g. -o {output.stem}.exr")
     written = [png] if only_png else [output, png]
     check_outputs(written, [args.source], "map")
-    load_options(args)  # what does not fit is said before Mitsuba is loaded
-    if args.method is not None:
-        return run_method(args, _map_arguments(args), written)
+    load_options(args)  # what does not fit is reported before Mitsuba is loaded
 
-    from ..analysis.maps import Bands, Light, brdf_map, check_map, save_exr, save_png
-    from ..scene.load import set_variant
-    from .console import warnings_as_ours
+    from ..analysis.maps import Bands, save_exr, save_png
 
-    arguments = _map_arguments(args)
-    light = Light(args.theta, args.phi)
-    bands = Bands.of(arguments["wavelength_range"], arguments["step"], arguments["wavelength"])
-    check_map(bands, args.resolution, args.samples, args.spectral)
-    variant = set_variant(args.mode)
-
-    with warnings_as_ours(), Bar(args) as bar:
-        bsdf = _bsdf(args)
-        result = brdf_map(
-            bsdf, light.theta, light.phi, resolution=args.resolution, samples=args.samples,
-            illuminant=args.illuminant, cosine=args.cosine, spectral=args.spectral, progress=bar,
-            **arguments,
-        )  # fmt: skip
-    surface = _surface(bsdf)
+    spectrum = wavelengths(args)
+    bands = Bands.of(spectrum["wavelength_range"], spectrum["step"], args.wavelength)
+    evaluate = _by_bsdf if args.method is None else _by_method
+    result, surface, how = evaluate(args, bands, spectrum)
     exposure = None if bands.is_single else args.exposure
     if not only_png:
-        save_exr(result, output, notes={"source": str(args.source), "surface": surface})
+        notes = {"source": str(args.source), "surface": surface}
+        save_exr(result, output, notes=notes | ({"method": args.method} if args.method else {}))
     save_png(result, png, exposure=exposure, title=args.source.name, notes=surface)
     shown = ""
     if not bands.is_single:
@@ -154,31 +179,86 @@ def run(args: argparse.Namespace) -> int:
     print(
         f"{' and '.join(map(str, written))}: {args.resolution} x {args.resolution} pixels, "
         f"{result.samples} samples per pixel, {bands}{shown}, {time.perf_counter() - start:.1f} s, "
-        f"{variant}"
+        f"{how}"
     )
     return 0
 
 
+def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> tuple[Any, ...]:
+    """A map by the renderer's BSDF, what reflects, and how it was made."""
+    from ..analysis.maps import Light, brdf_map, check_map
+    from ..scene.load import set_variant
+    from .console import mitsuba_warnings
+
+    light = Light(args.theta, args.phi)
+    check_map(bands, args.resolution, args.samples, args.spectral)
+    variant = set_variant(args.mode)
+    with mitsuba_warnings(), Bar(args) as bar:
+        bsdf = _bsdf(args)
+        result = brdf_map(
+            bsdf, light.theta, light.phi, resolution=args.resolution, samples=args.samples,
+            illuminant=args.illuminant, cosine=args.cosine, spectral=args.spectral, progress=bar,
+            wavelength=args.wavelength, **spectrum,
+        )  # fmt: skip
+    return result, _surface(bsdf), variant
+
+
+def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> tuple[Any, ...]:
+    """The same by a method of the thesis."""
+    from ..analysis.maps import Light, check_map
+    from ..thesis.methods import make
+    from ..thesis.methods.maps import method_map
+
+    light, samples, single = Light(args.theta, args.phi), args.samples or 1, args.wavelength
+    check_map(bands, args.resolution, args.samples, spectral=False)
+    gain = gain_of(args)
+    patch, settings = load_patch(args)
+    if single is not None:
+        spectrum = {"wavelength_range": (0.999 * single, 1.001 * single), "step": 0.001 * single}
+    with Bar(args) as bar, warnings.catch_warnings():
+        warnings.simplefilter("ignore", DiffractionWarning)
+        method = make(
+            in_library(args.method), patch, period=args.period, progress=bar, **settings, **spectrum
+        )
+        start = time.perf_counter()
+        result = method_map(
+            method, light, step=bands.width, wavelength=single, resolution=args.resolution,
+            samples=samples, cosine=args.cosine, gain=gain, progress=bar,
+        )  # fmt: skip
+    quantity = "relative reflectance" if args.relative else "R = 1"
+    how = f"method {args.method}: {time.perf_counter() - start:.2f} s for the map"
+    return result, f"{quantity}; method {args.method}", how
+
+
 def _refuse_contradictions(args: argparse.Namespace) -> None:
     """Usage errors that argparse does not find by itself."""
+    refused: list[str] = []
     if args.wavelength is not None:
-        for name in ("wavelength_range", "step", "exposure"):
-            if getattr(args, name) is not None:
-                option = f"--{name.replace('_', '-')}"
-                args.parser.error(f"argument --wavelength: not allowed with argument {option}")
-        if args.spectral:
-            args.parser.error("argument --wavelength: not allowed with argument --spectral")
+        refused = [
+            f"argument --wavelength: not allowed with argument --{name.replace('_', '-')}"
+            for name in ("wavelength_range", "step", "exposure", "spectral")
+            if getattr(args, name) not in (None, False)
+        ]
     if args.material is not None and args.int_ior is not None:
-        args.parser.error("argument --int-ior: not allowed with argument --material")
-    refuse_contradictions(args)
-
-
-def _map_arguments(args: argparse.Namespace) -> dict[str, Any]:
-    return {
-        "wavelength_range": tuple(args.wavelength_range or _FULL_RANGE),
-        "step": _STEP if args.step is None else args.step,
-        "wavelength": args.wavelength,
-    }
+        refused.append("argument --int-ior: not allowed with argument --material")
+    if args.method is None:
+        refused += [
+            f"argument --{name}: only with argument --method"
+            for name in ("period", "relative")
+            if getattr(args, name)
+        ]
+    else:
+        refused += [
+            f"argument --{name.replace('_', '-')}: not allowed with argument --method"
+            for name in (*_OF_THE_BSDF, "spectral")
+            if getattr(args, name) not in (None, False)
+        ]
+        if args.illuminant != "D65":
+            refused.append("argument --method: is under --illuminant D65 only")
+        if args.int_ior is not None and not args.relative:
+            refused.append("argument --int-ior: with argument --method, only for --relative")
+    if refused:
+        args.parser.error(refused[0])
 
 
 def _bsdf(args: argparse.Namespace) -> Any:
@@ -187,18 +267,17 @@ def _bsdf(args: argparse.Namespace) -> Any:
 
     from ..plugin.bsdf import Diffraction
 
-    parameters = {
-        name: getattr(args, name) for name in _BSDF_NAMES if getattr(args, name) is not None
-    }
-    for option in was_given(args):
+    given = {n: getattr(args, n) for n in _SURFACE if getattr(args, n) is not None}
+    settings = {k: v for k, v in table_options(args).items() if k in _TABLE}
+    for option in given_for_heights(args):
         name = option.removeprefix("--").replace("-", "_")
-        parameters[name] = getattr(args, name)
-    if "int_ior" not in parameters:
-        parameters.setdefault("material", "none")
-    elif _is_number(parameters["int_ior"]):
-        parameters["int_ior"] = float(parameters["int_ior"])
+        given[name] = getattr(args, name)
+    if "int_ior" not in given:
+        given.setdefault("material", "none")
+    elif _is_number(given["int_ior"]):
+        given["int_ior"] = float(given["int_ior"])
     props = mi.Properties("diffraction")
-    for name, value in {"heightfield": str(args.source), **parameters}.items():
+    for name, value in {"heightfield": str(args.source), **settings, **given}.items():
         props[name] = value
     return Diffraction(props)
 

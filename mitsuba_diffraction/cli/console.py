@@ -67,7 +67,7 @@ def saying_once() -> Callable[[str], None]:
 
 
 @contextlib.contextmanager
-def warnings_as_ours() -> Iterator[None]:
+def mitsuba_warnings() -> Iterator[None]:
     """Inside, Mitsuba's warnings are printed like this program's, each once.
 
     A variant must be set.

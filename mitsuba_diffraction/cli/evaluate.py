@@ -9,13 +9,21 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
-from ..thesis.methods import NAMES as METHODS
 from .arguments import path_ending_in, whole_number
-from .heights_options import add_heights_options
-from .light_options import add_direction, add_wavelengths
+from .options import (
+    add_direction,
+    add_heights,
+    add_json,
+    add_method,
+    add_table,
+    add_wavelengths,
+    in_library,
+    wavelengths,
+)
 from .output import check_outputs
-from .patch import add_table_options, load_patch
+from .patch import TABLE_NAMES, load_patch
 from .progress import Bar
+from .report import save_report
 
 _WINDOWS = 32
 # Single windows are fitted at about so many wavelengths: the period needs no more.
@@ -42,22 +50,23 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )  # fmt: skip
     _add_beam_options(parser.add_argument_group("the beam"))
     group = parser.add_argument_group("the model")
-    group.add_argument("--method", choices=METHODS, default="default", help="default: default")
-    add_table_options(
-        group, coherence="ensemble for the default method, patch for those of the documents"
+    add_method(group, "spectral", "what evaluates")
+    add_table(
+        group, TABLE_NAMES, coherence="ensemble for spectral, patch for the thesis' own methods"
     )
     group.add_argument(
         "--windows", metavar="N", type=whole_number(0), default=_WINDOWS,
         help="window positions whose own periods are fitted, for the spread; 0 leaves them out; "
         f"default: {_WINDOWS}",
     )  # fmt: skip
-    add_heights_options(parser)
+    add_json(parser)
+    add_heights(parser)
     parser.set_defaults(run=run, parser=parser)
 
 
 def _add_beam_options(group: argparse._ArgumentGroup) -> None:
     add_direction(group, theta=75.0)
-    add_wavelengths(group, 380.0, 780.0)
+    add_wavelengths(group)
     group.add_argument(
         "--angles", metavar=("LOW", "HIGH"), nargs=2, type=float,
         help="viewing angles, degrees, positive on the light's side; default: from the mirror "
@@ -67,10 +76,6 @@ def _add_beam_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--order", metavar="M", type=int, default=1, help="order that is followed; default: 1"
     )
-    group.add_argument(
-        "--period", metavar="D", type=float,
-        help="µm, for the grating equation and methods that need one; default: fitted",
-    )  # fmt: skip
 
 
 def run(args: argparse.Namespace) -> int:
@@ -93,21 +98,22 @@ def run(args: argparse.Namespace) -> int:
     beam = Beam(args.theta, args.phi)
     if args.period is not None:
         check_period(args.period)
-    wavelengths = trapezoid_rule(tuple(args.wavelength_range), args.step)[0]
+    spectrum = wavelengths(args)
+    steps = trapezoid_rule(spectrum["wavelength_range"], spectrum["step"])[0]
     angles = viewing_angles(args.angles, args.angle_step, args.theta, args.order)
-    check_axes(wavelengths, angles)
+    check_axes(steps, angles)
     patch, settings = load_patch(args)
-    settings |= {"wavelength_range": tuple(args.wavelength_range), "step": args.step}
+    settings |= spectrum
     with Bar(args) as bar, warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
-        method = make(args.method, patch, period=args.period, progress=bar, **settings)
+        method = make(in_library(args.method), patch, period=args.period, progress=bar, **settings)
         response = measure(
-            method.brdf, beam, wavelengths, angles, sigma=method.sigma, label=args.method,
+            method.brdf, beam, steps, angles, sigma=method.sigma, label=args.method,
             progress=bar,
         )  # fmt: skip
         ridge = ridge_of(response, args.order)
         fit = fit_period(ridge)
-        lines, more = _windows(args, patch, settings, beam, wavelengths, angles, bar)
+        lines, more = _windows(args, patch, settings, beam, steps, angles, bar)
     period = fit.period if args.period is None else args.period
     report = [_fitted(fit), *lines]
     with atomic_path(written[0]) as path:
@@ -121,17 +127,18 @@ def run(args: argparse.Namespace) -> int:
     save_npz(written[2], response, ridge, period, args.order, more)
     print(
         f"{', '.join(map(str, written))}: {patch.name}, method {args.method}, light at "
-        f"{args.theta:g}°, {wavelengths.size} wavelengths, {angles.size} angles, "
+        f"{args.theta:g}°, {steps.size} wavelengths, {angles.size} angles, "
         f"{time.perf_counter() - start:.1f} s"
     )
     if args.period is not None:
-        expected = beam.grating_angles(wavelengths, period, args.order)
+        expected = beam.grating_angles(steps, period, args.order)
         apart = np.abs(ridge.angles - expected)
         if np.isfinite(apart).any():
             report.insert(1, ("given", f"{1e3 * period:.6g} nm, the ridge is within "
                                        f"{np.nanmax(apart):.2g}° of it"))  # fmt: skip
     for name, text in report:
         print(f"  {name:<9} {text}")
+    save_report(args, {"patch": patch.name, "method": args.method, "theta": args.theta, **more})
     return 0
 
 
@@ -160,16 +167,16 @@ def viewing_angles(limits: Any, step: float, theta: float, order: int) -> Any:
 
 
 def _windows(
-    args: argparse.Namespace, patch: Any, settings: dict[str, Any], beam: Any, wavelengths: Any,
+    args: argparse.Namespace, patch: Any, settings: dict[str, Any], beam: Any, steps: Any,
     angles: Any, bar: Bar,
 ) -> tuple[list[tuple[str, str]], dict[str, Any]]:  # fmt: skip
-    """What single windows show, and the documents' procedure: lines, and entries of the NPZ."""
+    """What single windows show, and the thesis' procedure: lines, and entries of the NPZ."""
     if args.windows == 0:
         return [], {}
     from ..thesis.evaluation import documents_fit, window_fits
     from ..thesis.methods import make
 
-    few = wavelengths[:: max(1, wavelengths.size // _FEW)]
+    few = steps[:: max(1, steps.size // _FEW)]
     # the look-up in the package's own series: a single window's amplitudes
     single = {**settings, "coherence": "patch"}
     table = make("default", patch, progress=bar, **single).table  # type: ignore[attr-defined]
@@ -190,14 +197,14 @@ def _windows(
              f"{periods.max():.5g} nm")
         )  # fmt: skip
     try:
-        as_documents = documents_fit(table, beam, wavelengths, angles, args.order)
+        as_in_thesis = documents_fit(table, beam, steps, angles, args.order)
     except DiffractionError as error:
-        lines.append(("documents", f"their procedure finds none ({error})"))
+        lines.append(("thesis", f"its procedure finds no period ({error})"))
     else:
-        more["documents_period"] = as_documents.period
+        more["thesis_period"] = as_in_thesis.period
         lines.append(
-            ("documents", f"{1e3 * as_documents.period:.5g} nm by their procedure (phase without "
-             "w, one window, on the corner)")
+            ("thesis", f"{1e3 * as_in_thesis.period:.5g} nm by its procedure (phase without w, one "
+             "window, on the corner)")
         )  # fmt: skip
     return lines, more
 

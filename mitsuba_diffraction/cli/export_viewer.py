@@ -7,10 +7,10 @@ import time
 
 from ..realtime.web.tables import WEB_METHODS
 from .arguments import path_ending_in
-from .console import say_warning
+from .console import mitsuba_warnings, say_warning
+from .options import add_scene, scene_parameters
 from .output import check_writable
 from .progress import Bar
-from .scene_options import add_scene_options, scene_parameters
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -24,7 +24,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
             "as fit; the ΔE2000 that this makes is printed and stands on the page."
         ),
     )
-    add_scene_options(parser)
+    add_scene(parser)
     parser.add_argument(
         "output", metavar="OUT", type=path_ending_in(".html"), help="the page to write"
     )
@@ -42,11 +42,10 @@ def run(args: argparse.Namespace) -> int:
 
     from ..realtime.web import export_viewer
     from ..scene.load import load_scene, sensor_of, set_variant
-    from .console import warnings_as_ours
 
     start = time.perf_counter()
     set_variant(args.mode)
-    with warnings_as_ours(), Bar(args, delay=0) as bar:
+    with mitsuba_warnings(), Bar(args, delay=0) as bar:
         bar(0, 0, "loading")
         scene = load_scene(args.scene, parameters)
         sensor_of(scene, args.sensor)

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 from ..errors import DiffractionError
 from ..heights.validity import window_line
 from .arguments import path_ending_in
-from .heights_options import add_heights_options, load_options, was_given
+from .console import mitsuba_warnings
+from .options import STDOUT, add_heights, add_json, given_for_heights, load_options
 from .progress import Bar
-from .report import lines_of, plain
+from .report import lines_of, plain, save_report
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
@@ -34,7 +35,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         ),
     )
     parser.add_argument("file", metavar="FILE", type=Path, help="what to describe")
-    parser.add_argument("--json", action="store_true", help="print JSON instead of text")
+    add_json(parser, "the description", nargs="?", const=STDOUT)
     parser.add_argument(
         "--albedo", metavar="OUT", type=path_ending_in(".png", ".pdf", ".svg"),
         help="of a table: plot its raw directional albedo against angle and azimuth",
@@ -42,9 +43,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--picture", metavar="OUT", type=path_ending_in(".png", ".pdf", ".svg"),
         help="of heights or a recipe: draw them, their distribution and spectrum, and the light "
-        "that they throw",
+        "that they scatter",
     )  # fmt: skip
-    add_heights_options(parser)
+    add_heights(parser)
     parser.set_defaults(run=run, parser=parser)
 
 
@@ -61,10 +62,11 @@ def run(args: argparse.Namespace) -> int:
             args.parser.error(f"argument --picture: '{args.file}' is a {data['kind']}, not heights")
         _draw(args)
         data["picture"] = str(args.picture)
-    if args.json:
+    if args.json == STDOUT:
         print(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
     else:
         print("\n".join(lines_of(data)))
+        save_report(args, data)
     return 0
 
 
@@ -92,7 +94,7 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _refuse_heights_options(args: argparse.Namespace, what: str) -> None:
-    given = was_given(args)
+    given = given_for_heights(args)
     if given:
         args.parser.error(f"argument {given[0]}: '{args.file}' is {what}, not heights")
 
@@ -171,10 +173,9 @@ def _mesh(file: Path) -> dict[str, Any]:
 
     from ..scene.orientation.files import load_mesh, load_orientation
     from ..scene.orientation.tangents import check_tangents
-    from .console import warnings_as_ours
 
     if mi.variant() is None:
         mi.set_variant("scalar_rgb")  # any reads meshes; this one needs neither GPU nor LLVM
-    with warnings_as_ours():
+    with mitsuba_warnings():
         report = check_tangents(*load_mesh(file), load_orientation(file))
     return {"kind": "mesh", **report.summary()}

@@ -34,6 +34,8 @@ from . import (
     view,
 )
 from .console import PROGRAM, say, say_error, warnings_in_one_line
+from .options import STDOUT
+from .output import check_writable
 
 COMMANDS = (
     precompute, info, tangents, plan, render, brdf_map, evaluate, sweep, tradeoff, compare, view,
@@ -97,6 +99,8 @@ def _add_common(group: argparse._ActionsContainer) -> None:
 
 def _run(args: argparse.Namespace) -> int:
     try:
+        if getattr(args, "json", None) not in (None, STDOUT):
+            check_writable(args.json)
         code: int = args.run(args)
         sys.stdout.flush()
         return code

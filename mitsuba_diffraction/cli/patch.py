@@ -6,24 +6,13 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
-from ..reference import COHERENCES
-from .arguments import whole_number
-from .heights_options import load_options
+from .options import WAVELENGTH_RANGE, load_options, table_options
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
 
-_TABLE_NAMES = ("coherence_width", "coherence", "tolerance", "terms")
-
-
-def add_table_options(group: argparse._ArgumentGroup, *, coherence: str) -> None:
-    """Declare the settings that `load_patch` returns; `coherence` tells that one's default."""
-    group.add_argument(
-        "--coherence-width", metavar="W", type=float, help="µm, 4σ of the window; default: 65"
-    )
-    group.add_argument("--coherence", choices=COHERENCES, help=f"default: {coherence}")
-    group.add_argument("--tolerance", metavar="E", type=float, help="of the tables; default: 1e-3")
-    group.add_argument("--terms", metavar="N", type=whole_number(1), help="of Taylor series")
+#: The settings of a table that the evaluators of the thesis take.
+TABLE_NAMES = ("coherence_width", "coherence", "tolerance", "terms")
 
 
 def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
@@ -37,6 +26,7 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
     from ..heights.load import load_heights
     from ..heights.read import is_recipe
     from ..heights.recipes import Recipe
+    from ..tables.build.checks import check_parameters
     from ..tables.exr import is_table
 
     options = load_options(args)
@@ -45,14 +35,14 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
         raise DiffractionError(
             f"'{source}' is a table; this needs the heights it was made of, or their recipe"
         )
-    settings: dict[str, Any] = {}
+    settings = table_options(args)
+    check_parameters(
+        "auto", settings.get("tolerance", 1e-3), settings.get("terms"), WAVELENGTH_RANGE, 1.0, None
+    )
     if is_recipe(source):
         recipe = Recipe.load(source)
-        settings = {k: v for k, v in recipe.table_arguments().items() if k in _TABLE_NAMES}
+        settings = recipe.table_arguments() | settings
         patch = recipe.field(options)
     else:
         patch = load_heights(source, options)
-    for name in _TABLE_NAMES:
-        if getattr(args, name, None) is not None:
-            settings[name] = getattr(args, name)
-    return patch, settings
+    return patch, {name: settings[name] for name in TABLE_NAMES if name in settings}

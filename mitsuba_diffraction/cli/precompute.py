@@ -8,26 +8,19 @@ import time
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionWarning
-from ..reference import COHERENCES
-from ..tables import expansion
-from .arguments import number_between, path_ending_in, whole_number
-from .heights_options import add_heights_options, load_options
+from .arguments import path_ending_in
+from .options import add_heights, add_json, add_table, add_wavelength_range, load_options
+from .options import table_options as options_of_table
 from .output import check_outputs
 from .progress import Bar
+from .report import save_report
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
     from ..tables import DiffractionTable
-
-BASES = ("auto", *expansion.BASES)
-
-_TABLE_NAMES = (
-    "coherence_width", "coherence", "basis", "tolerance", "terms", "taps", "wavelength_range",
-    "height_scale_max",
-)  # fmt: skip
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -50,36 +43,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="the table; default: where the recipe says, or else SOURCE's name with .exr in the "
         "current folder",
     )  # fmt: skip
-    add_heights_options(parser)
+    add_heights(parser)
     group = parser.add_argument_group("the table")
-    group.add_argument(
-        "--coherence-width", metavar="W", type=float,
-        help="µm, 4σ of the amplitude window; default: 65",
-    )  # fmt: skip
-    group.add_argument(
-        "--coherence", choices=COHERENCES,
-        help="average over window positions, or one window on the patch; default: ensemble",
-    )  # fmt: skip
-    group.add_argument("--basis", choices=BASES, help="series in κ; default: auto, which is svd")
-    group.add_argument(
-        "--tolerance", metavar="E", type=float, help="relative error that is met; default: 1e-3"
-    )
-    group.add_argument(
-        "--terms", metavar="N", type=whole_number(1),
-        help="terms of the series; default: as many as the tolerance takes",
-    )  # fmt: skip
-    group.add_argument(
-        "--taps", metavar="N", type=whole_number(1),
-        help="orders read in each direction; default: as many as the tolerance takes",
-    )  # fmt: skip
-    group.add_argument(
-        "--wavelength-range", metavar=("MIN", "MAX"), nargs=2, type=float,
-        help="nm; default: 360 830",
-    )  # fmt: skip
-    group.add_argument(
-        "--height-scale-max", metavar="S", type=number_between(1e-6, 1e6),
-        help="largest height_scale that the table serves; default: 1.5",
-    )  # fmt: skip
+    add_table(group)
+    add_wavelength_range(group)
+    add_json(parser, "what is in the table")
     parser.set_defaults(run=run, parser=parser)
 
 
@@ -89,19 +57,19 @@ def run(args: argparse.Namespace) -> int:
 
     recipes = [source for source in args.sources if is_recipe(source)]
     if not recipes:
-        _precompute(args.sources, args)
+        save_report(args, _precompute(args.sources, args))
         return 0
     if len(recipes) < len(args.sources):
         args.parser.error("argument SOURCE: recipes and other files cannot be mixed")
     if len(recipes) > 1 and args.output is not None:
         args.parser.error("argument -o/--output: one name, but there are several recipes")
-    for recipe in recipes:
-        _precompute([recipe], args)
+    made = [_precompute([recipe], args) for recipe in recipes]
+    save_report(args, made[0] if len(made) == 1 else {"tables": made})
     return 0
 
 
-def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> None:
-    """One table, of a recipe or of one or several files."""
+def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, Any]:
+    """One table, of a recipe or of one or several files, and what is in it."""
     from ..heights.load import load_heights
     from ..heights.preprocess.edges import edge_lines
     from ..heights.read import is_recipe
@@ -110,9 +78,7 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> None:
 
     start = time.perf_counter()
     options = load_options(args)
-    table_options = {
-        name: getattr(args, name) for name in _TABLE_NAMES if getattr(args, name) is not None
-    }
+    table_options = options_of_table(args)
     recipe = Recipe.load(sources[0]) if is_recipe(sources[0]) else None
     inputs = list(sources)
     if recipe is not None:
@@ -148,6 +114,7 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> None:
     print(f"{', '.join(map(str, sources))} -> {output}")
     for label, text in _report(fields, table, output, time.perf_counter() - start):
         print(f"  {label:<6} {text}")
+    return {"file": str(output), **table.summary()}
 
 
 def _report(

@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
-from .animation import change
-from .arguments import number_between, whole_number
-from .console import say, say_warning
+from .arguments import change, number_between, whole_number
+from .console import mitsuba_warnings, say, say_warning
+from .options import add_exposure, add_samples, add_scene, scene_parameters
 from .output import check_writable
 from .plan import add_plan_options, plan_or_json
 from .planned import MAKE, check_plan_options, load_by_plan, say_outside
 from .progress import Bar
-from .scene_options import add_scene_options, scene_parameters
 
 if TYPE_CHECKING:
     from ..scene.passes import Result
@@ -35,25 +34,15 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
             "same settings, are kept, so an interrupted run goes on where it was."
         ),
     )
-    add_scene_options(parser)
+    add_scene(parser)
     parser.add_argument(
         "-o", "--output", metavar="OUT", type=Path,
         help="EXR, with a PNG beside it, or only a PNG; default: the scene's name with .exr in "
         "the current folder. With --frames: a folder, or a film, .webp or .gif, whose frames go "
         "into a folder of its name; default: the folder SCENE_frames",
     )  # fmt: skip
-    parser.add_argument(
-        "-s", "--spp", metavar="N", type=whole_number(1),
-        help="samples per pixel; default: the scene's",
-    )  # fmt: skip
-    parser.add_argument(
-        "--seed", metavar="N", type=whole_number(0), default=0,
-        help="of the random numbers; default: 0",
-    )  # fmt: skip
-    parser.add_argument(
-        "--exposure", metavar="EV", type=number_between(-100, 100), default=0.0,
-        help="of the PNG, in stops: +1 doubles the light; default: 0",
-    )  # fmt: skip
+    add_samples(parser, 1, None)
+    add_exposure(parser, 0.0, "of the PNG, in stops: +1 doubles the light; default: 0")
     parser.add_argument(
         "--preview", action="store_true",
         help="half the width and height, and at most 16 samples, unless -s is given",
@@ -120,11 +109,10 @@ def _run_one(args: argparse.Namespace) -> int:
 
     from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink
     from ..scene.passes import Stop, render_passes
-    from .console import warnings_as_ours
 
     start = time.perf_counter()
     variant = set_variant(args.mode)
-    with warnings_as_ours():
+    with mitsuba_warnings():
         with Bar(args, unit=" spp", delay=0) as bar:
             spp = args.spp or 0
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 from collections.abc import Iterator, Mapping
@@ -42,10 +43,10 @@ def plain(value: Any) -> Any:
         value = asdict(value)
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):  # an array or scalar of NumPy
+        value = value.tolist()
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
-    if hasattr(value, "item"):  # a NumPy scalar
-        value = value.item()
     if isinstance(value, float) and not math.isfinite(value):
         return None
     if value is None or isinstance(value, (bool, int, float, str)):
@@ -64,6 +65,12 @@ def save_json(path: Path, data: Mapping[str, Any]) -> None:
     with atomic_path(path) as temporary:
         text = json.dumps(plain(data), indent=1, ensure_ascii=False)
         temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def save_report(args: argparse.Namespace, data: Mapping[str, Any]) -> None:
+    """Write the file of --json, if one is asked for."""
+    if args.json is not None:
+        save_json(args.json, data)
 
 
 def _label(key: str) -> tuple[str, str]:

@@ -11,14 +11,26 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
-from ..thesis.methods import NAMES as METHODS
-from .arguments import number_between, path_ending_in
-from .heights_options import add_heights_options
-from .light_options import add_direction, add_wavelengths
-from .method_map import gain_of
+from .arguments import path_ending_in
+from .brdf_map import add_relative, gain_of
+from .options import (
+    METHODS,
+    add_direction,
+    add_exposure,
+    add_heights,
+    add_json,
+    add_method,
+    add_resolution,
+    add_table,
+    add_wavelengths,
+    in_library,
+    method,
+    wavelengths,
+)
 from .output import check_outputs
-from .patch import add_table_options, load_patch
+from .patch import TABLE_NAMES, load_patch
 from .progress import Bar
+from .report import save_report
 
 # Written out so that --help need not load what makes maps; a test holds them against the library.
 KINDS = ("wavelength-step", "coherence-width", "terms", "light-angle", "method")
@@ -32,8 +44,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "sweep",
         help="BRDF maps over one parameter: wavelength step, coherence width, terms, light, method",
         description=(
-            "Evaluate BRDF maps for several values of one parameter by the methods of the source "
-            "documents, and put them on a contact sheet, with times and ΔE2000 from the best. A "
+            "Evaluate BRDF maps for several values of one parameter by the methods of the 2014 "
+            "thesis, and put them on a contact sheet, with times and ΔE2000 from the best. A "
             "sweep over methods also times the package's own look-up against flss with both "
             "compiled. Writes a picture, and the numbers as CSV beside it."
         ),
@@ -47,41 +59,29 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="contact sheet; default: SOURCE's name with -KIND.png in the current folder",
     )  # fmt: skip
     parser.add_argument(
-        "--values", metavar="V", nargs="+", help="of the parameter; default: the documents'"
+        "--values", metavar="V", nargs="+", help="of the parameter; default: the thesis'"
     )
     _add_options(parser.add_argument_group("the maps"))
-    add_heights_options(parser)
+    add_json(parser)
+    add_heights(parser)
     parser.set_defaults(run=run, parser=parser)
 
 
 def _add_options(group: argparse._ArgumentGroup) -> None:
-    group.add_argument(
-        "--method", choices=METHODS, default="flss",
-        help="what evaluates, except in a sweep over methods; default: flss",
-    )  # fmt: skip
+    add_method(group, "flss", "what evaluates, except in a sweep over methods")
     add_direction(group)
-    add_wavelengths(group, 380.0, 780.0)
-    group.add_argument(
-        "--resolution", metavar="N", type=int, default=128, help="pixels a side; default: 128"
-    )
+    add_wavelengths(group)
+    add_resolution(group, 128)
     group.add_argument(
         "--samples", metavar="N", type=int, default=1, help="directions in a pixel; default: 1"
     )
-    group.add_argument(
-        "--exposure", metavar="EV", type=number_between(-100, 100),
-        help="of all maps, in stops; default: the best map's own",
-    )  # fmt: skip
-    add_table_options(group, coherence="patch")
-    group.add_argument("--period", metavar="D", type=float, help="µm; default: estimated")
-    group.add_argument(
-        "--relative",
-        action="store_true",
-        help="relative reflectance, as in the documents' pictures",
-    )
+    add_exposure(group, None, "of all maps, in stops; default: the best map's own")
+    add_table(group, TABLE_NAMES, coherence="patch")
+    add_relative(group)
     group.add_argument("--int-ior", metavar="N", help="of --relative; default: 1.5")
     group.add_argument(
         "--compiled", action=argparse.BooleanOptionalAction, default=True,
-        help="time default and flss in compiled code, in a sweep over methods",
+        help="time spectral and flss in compiled code, in a sweep over methods",
     )  # fmt: skip
 
 
@@ -97,18 +97,16 @@ def run(args: argparse.Namespace) -> int:
     numbers = output.with_suffix(".csv")
     check_outputs((output, numbers), [args.source], "sheet")
     light, values, gain = Light(args.theta, args.phi), _values(args), gain_of(args)
-    if args.int_ior is not None and gain is None:
-        args.parser.error("argument --int-ior: only with argument --relative")
     patch, settings = load_patch(args)
-    settings |= {"wavelength_range": tuple(args.wavelength_range), "step": args.step}
+    settings |= wavelengths(args)
     if args.period is not None:
         settings["period"] = args.period
     if values is None and args.kind == "method" and gain is not None:
-        values = [name for name in METHODS if name != "rainbow"]
+        values = [in_library(name) for name in METHODS if name != "rainbow"]
     with Bar(args) as bar, warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
         result = sweep(
-            args.kind, patch, light, values=values, method=args.method, gain=gain,
+            args.kind, patch, light, values=values, method=in_library(args.method), gain=gain,
             resolution=args.resolution, samples=args.samples, progress=bar, **settings,
         )  # fmt: skip
         compiled = _compiled(args, patch, light, settings, bar)
@@ -125,13 +123,18 @@ def run(args: argparse.Namespace) -> int:
     print(f"{output}, {numbers}: {time.perf_counter() - start:.1f} s")
     for line in [*_lines(result), *compiled]:
         print(f"  {line}")
+    save_report(
+        args, {"patch": patch.name, "sweep": args.kind, "steps": [*map(_row, result.steps)]}
+    )
     return 0
 
 
 def _values(args: argparse.Namespace) -> list[Any] | None:
     """The values given, as the sweep takes them."""
-    if args.values is None or args.kind == "method":
-        return args.values
+    if args.values is None:
+        return None
+    if args.kind == "method":
+        return [in_library(value) for value in args.values]
     try:
         return [int(v) if args.kind == "terms" else float(v) for v in args.values]
     except ValueError as error:
@@ -151,29 +154,29 @@ def _compiled(
     tables = {k: settings[k] for k in ("coherence_width", "tolerance") if k in settings}
     resolution = 2 * args.resolution  # below it Python's share shows
     found = time_compiled(
-        patch, light, resolution=resolution, samples=args.samples, step=args.step,
+        patch, light, resolution=resolution, samples=args.samples, step=settings["step"],
         progress=bar, **tables,
     )  # fmt: skip
     return [
         f"compiled ({variant} and RGB), {resolution} x {resolution} pixels, 360–830 nm in steps of "
-        f"{args.step:g} nm:",
-        f"  flss {found.flss:.3g} s; default {found.spectral:.3g} s, {found.ratio:.3g}× as fast; "
-        f"default, colours {found.colours:.3g} s, {found.colour_ratio:.3g}× as fast",
+        f"{settings['step']:g} nm:",
+        f"  flss {found.flss:.3g} s; spectral {found.spectral:.3g} s, {found.ratio:.3g}× as fast; "
+        f"lut {found.colours:.3g} s, {found.colour_ratio:.3g}× as fast",
     ]
 
 
 def _title(step: Any, result: Any) -> str:
     if result.reference is None:
-        return str(step.label)
+        return method(step.label)
     if step.label == result.reference:
-        return f"{step.label} (reference)"
-    return f"{step.label}; ΔE {step.mean:.2g}"
+        return f"{method(step.label)} (reference)"
+    return f"{method(step.label)}; ΔE {step.mean:.2g}"
 
 
 def _lines(result: Any) -> list[str]:
     lines = []
     for step in result.steps:
-        text = f"{step.label:<12} {step.seconds:7.2f} s"
+        text = f"{method(step.label):<12} {step.seconds:7.2f} s"
         if step.label == result.reference:
             text += "  reference"
         elif math.isfinite(step.mean):
@@ -194,7 +197,11 @@ def _save(path: Path, result: Any) -> None:
     ):
         writer = csv.writer(stream)
         writer.writerow(_COLUMNS)
-        for step in result.steps:
-            numbers = (step.seconds, step.mean, step.high, step.own_mean, step.blueness)
-            cells = [f"{n:.6g}" if math.isfinite(n) else "" for n in numbers]
-            writer.writerow([step.value, *cells])
+        for value, *numbers in (_row(step).values() for step in result.steps):
+            writer.writerow([value, *(f"{n:.6g}" if math.isfinite(n) else "" for n in numbers)])
+
+
+def _row(step: Any) -> dict[str, Any]:
+    value = method(step.value) if isinstance(step.value, str) else step.value
+    numbers = (step.seconds, step.mean, step.high, step.own_mean, step.blueness)
+    return dict(zip(_COLUMNS, (value, *numbers), strict=True))

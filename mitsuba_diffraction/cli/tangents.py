@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .arguments import number_between, path_ending_in
-from .console import say_warning
+from .console import mitsuba_warnings, say_warning
 from .output import check_writable
 from .progress import Bar
 
@@ -62,9 +62,8 @@ def run(args: argparse.Namespace) -> int:
     from ..scene.orientation.oriented import oriented_mesh
     from ..scene.orientation.tangents import check_tangents
     from ..scene.orientation.trimesh import vertex_normals
-    from .console import warnings_as_ours
 
-    with Bar(args) as bar, warnings_as_ours():
+    with Bar(args) as bar, mitsuba_warnings():
         bar(0, 0, "reading")
         positions, normals, uv, faces = load_mesh(args.mesh)
         if normals is None:

@@ -8,9 +8,10 @@ from pathlib import Path
 
 from ..errors import DiffractionError
 from ..realtime.glsl.source import METHODS
-from .arguments import number_between, whole_number
+from .arguments import whole_number
+from .console import mitsuba_warnings
+from .options import add_exposure, add_scene, scene_parameters
 from .output import check_writable
-from .scene_options import add_scene_options, scene_parameters
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -24,12 +25,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
             "S takes a screenshot, P sends the view to the path tracer, R resets, Esc closes."
         ),
     )
-    add_scene_options(parser)
+    add_scene(parser)
     parser.add_argument("--method", choices=METHODS, default="lut", help="default: lut")
-    parser.add_argument(
-        "--exposure", metavar="EV", type=number_between(-8, 8), default=0.0,
-        help="stops to start with: +1 doubles the light; default: 0",
-    )  # fmt: skip
+    add_exposure(parser, 0.0, "stops to start with: +1 doubles the light; default: 0")
     parser.add_argument(
         "--size", metavar="WxH", type=_size, default=(1280, 800),
         help="of the window, pixels; default: 1280x800",
@@ -60,10 +58,9 @@ def run(args: argparse.Namespace) -> int:
             f"view needs {error.name}: pip install 'mitsuba-diffraction[view]'"
         ) from error
     from ..scene.load import load_scene, sensor_of, set_variant
-    from .console import warnings_as_ours
 
     set_variant(args.mode)
-    with warnings_as_ours():
+    with mitsuba_warnings():
         scene = load_scene(args.scene, parameters)
         sensor_of(scene, args.sensor)
         frames, milliseconds = show(

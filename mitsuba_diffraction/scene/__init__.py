@@ -6,6 +6,8 @@ load          a variant set and a scene loaded
 parameters    names that -D may set
 passes        rendering in passes of samples
 pictures      EXR and PNG of it
+animation     parameters that change from frame to frame
+frames        frames of an animation, and a film of them
 mitsuba_text  what Mitsuba says, as lines of our own
 planning      the tables that suffice for a scene
 orientation   directions that a patch follows over a mesh

@@ -10,8 +10,9 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction.cli.animation import change, values_of_frames
-from mitsuba_diffraction.cli.frames import Frame
+from mitsuba_diffraction.cli.arguments import change
+from mitsuba_diffraction.scene.animation import values_of_frames
+from mitsuba_diffraction.scene.frames import Frame
 
 # A uniform sky alone: every pixel is as bright as `light` says.
 SCENE = """<scene version="3.5.0">
@@ -76,7 +77,7 @@ def test_frames_that_are_there_are_kept(render):
     os.remove(f"{folder}/frame_0001.png")
     ran = render("--frames", "3", *LIGHT)
     assert ran.code == 0
-    assert ran.err == "mitsuba-diffraction: 2 of 3 frames are there already\n"
+    assert ran.err == "mitsuba-diffraction: 2 of 3 frames are up to date\n"
     assert "3 frames, 1 of them new" in ran.out
     for name in ("frame_0000.png", "frame_0002.png"):
         assert os.stat(f"{folder}/{name}").st_mtime_ns == before[name]
@@ -86,8 +87,8 @@ def test_frames_that_are_there_are_kept(render):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["-s", "1"], "2 of 2 frames are made anew for their samples: of frame_0000.png it was the "
-         "scene's and is 1"),
+        (["-s", "1"], "2 of 2 frames are rendered again because of their samples: of frame_0000.png "
+         "it was the scene's and is 1"),
         (["-D", "around=7"], "their -D around: of frame_0000.png it was None and is 7"),
         (["--exposure", "1"], "their exposure"),
         (["--exr"], "their EXR: of frame_0000.png it is missing"),
@@ -109,7 +110,7 @@ def test_a_change_of_the_scene_or_of_what_it_names_is_noticed(render, scene):
     named.write_text('<scene version="3.0.0"><emitter type="constant"/></scene>'.replace(
         '<emitter type="constant"/>', '<default name="a" value="1"/>'))  # fmt: skip
     assert (
-        "made anew for their scene: of frame_0000.png it changed"
+        "rendered again because of their scene: of frame_0000.png it changed"
         in render("--frames", "2", *LIGHT).err
     )
 
@@ -118,7 +119,7 @@ def test_somebody_elses_picture_is_not_overwritten(render):
     os.mkdir("out")
     Image.new("RGB", (4, 4)).save("out/frame_0001.png")
     line = render("--frames", "2", *LIGHT, "-o", "out").failed_in_one_line()
-    assert "'out/frame_0001.png' is there, and no frame of this command" in line
+    assert "'out/frame_0001.png' exists and is no frame of this command" in line
     assert os.listdir("out") == ["frame_0001.png"]
 
 
@@ -133,7 +134,7 @@ def test_ctrl_c_keeps_finished_frames_and_the_next_run_goes_on(render, monkeypat
     monkeypatch.setattr("mitsuba_diffraction.cli.progress.Bar.__call__", interrupt)
     ran = render("--frames", "4", *LIGHT, "-s", "3", "-o", "out.webp")
     assert ran.code == 130
-    assert "interrupted; 2 of 4 frames are done, the same command goes on" in ran.err
+    assert "interrupted; 2 of 4 frames are done, run the command again to continue" in ran.err
     assert sorted(os.listdir("out")) == ["frame_0000.png", "frame_0001.png"]
     assert not os.path.exists("out.webp")
     again = render("--frames", "4", *LIGHT, "-s", "3", "-o", "out.webp")

@@ -244,17 +244,22 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(child, heights, tmp_path):
     assert os.listdir(tmp_path) == ["in"]
 
 
-@pytest.mark.parametrize("before", [False, True])
 @pytest.mark.parametrize(
-    "interrupted",
+    ("interrupted", "before"),
     [
-        "import mitsuba_diffraction.cli.progress as p\n"
-        "p.Bar.__call__ = lambda *_: os.kill(os.getpid(), signal.SIGINT)",
-        "import OpenEXR\n"
-        "def write(self, path):\n"
-        "    open(path, 'wb').write(b'half of it')\n"
-        "    os.kill(os.getpid(), signal.SIGINT)\n"
-        "OpenEXR.File = type('File', (), {'__init__': lambda *_: None, 'write': write})",
+        (
+            "import mitsuba_diffraction.cli.progress as p\n"
+            "p.Bar.__call__ = lambda *_: os.kill(os.getpid(), signal.SIGINT)",
+            False,
+        ),
+        (
+            "import OpenEXR\n"
+            "def write(self, path):\n"
+            "    open(path, 'wb').write(b'half of it')\n"
+            "    os.kill(os.getpid(), signal.SIGINT)\n"
+            "OpenEXR.File = type('File', (), {'__init__': lambda *_: None, 'write': write})",
+            True,
+        ),
     ],
     ids=["building", "writing"],
 )

@@ -6,7 +6,7 @@ import json
 import math
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mitsuba_diffraction.cli.report import lines_of, plain
@@ -17,18 +17,21 @@ data = st.recursive(
 )
 
 
+@settings(max_examples=30, deadline=None)
 @given(st.dictionaries(st.text(), data))
 def test_any_data_prints_without_stray_line_ends(content):
     for line in lines_of(content):
         assert len(line.splitlines()) <= 1
 
 
+@settings(max_examples=30, deadline=None)
 @given(data)
 def test_any_data_is_strict_json(content):
     json.loads(json.dumps(plain(content), allow_nan=False))
 
 
 def test_numbers_of_arrays_are_plain():
+    assert plain(np.arange(2)) == [0, 1]
     assert plain({"a": np.float32(0.5), "b": (np.int64(2), math.inf)}) == {"a": 0.5, "b": [2, None]}
 
 

@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction.cli import sweep
+from mitsuba_diffraction.cli.options import METHODS, in_library
 from mitsuba_diffraction.thesis.methods import NAMES
 from mitsuba_diffraction.thesis.sweeps import SWEEPS
 
@@ -21,6 +22,7 @@ pytestmark = pytest.mark.usefixtures("here")
 
 def test_choices_are_the_library_s():
     assert tuple(SWEEPS) == sweep.KINDS
+    assert tuple(map(in_library, METHODS)) == NAMES
 
 
 def test_a_sheet_and_its_numbers_are_written(run, heights, here):
@@ -39,13 +41,13 @@ def test_a_sheet_and_its_numbers_are_written(run, heights, here):
 def test_a_sweep_over_methods_states_how_much_faster_the_default_is(run, heights, some_variant):
     ran = run("sweep", "method", heights, *QUICK, "-o", "a.png")
     assert ran.code == 0, ran.err
-    for name in NAMES:
+    for name in METHODS:
         assert f"\n  {name} " in ran.out
     assert "compiled" in ran.out
     assert ran.out.count("× as fast") == 2
 
 
-@pytest.mark.parametrize("method", NAMES)
+@pytest.mark.parametrize("method", METHODS)
 def test_every_method_makes_a_map(run, heights, here, method):
     ran = run("brdf-map", heights, *QUICK, "--method", method, "-o", "a.exr")
     assert ran.code == 0, ran.err

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mitsuba_diffraction.cli.console import warnings_as_ours
+from mitsuba_diffraction.cli.console import mitsuba_warnings
 from mitsuba_diffraction.scene.mitsuba_text import plain_text
 
 # as Mitsuba 3.9.1 throws them
@@ -66,7 +66,7 @@ def test_any_error_is_one_line(text):
 def test_mitsuba_s_warnings_are_ours_and_said_once(capfd):
     mi.set_variant("scalar_rgb")
     count = mi.logger().appender_count()
-    with warnings_as_ours():
+    with mitsuba_warnings():
         for _ in range(2):
             mi.Log(mi.LogLevel.Warn, "too few\nsamples")
         mi.Log(mi.LogLevel.Info, "of no interest")

@@ -5,7 +5,7 @@ Contents
 patches, maps, snakes   pictures: heights and their light, BRDF maps, the scenes' snakes
 gallery                 a picture of every scene, and the pages that show them
 evaluation, sweeps      pages about the methods: the grating equation, one parameter at a time
-methods                 the README's table of methods
+methods                 the table of docs/methods.md
 speed, tradeoff         tables of what `bench` and `tradeoff` measured
 realtime, plan          tables of what `compare` and `plan` measured
 parameters              the reference of the plugin's parameters, from its own docstring

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mitsuba_diffraction.atomic import atomic_path
-from mitsuba_diffraction.cli.main import main as program
+from mitsuba_diffraction.cli import main as program
 from mitsuba_diffraction.errors import DiffractionError
 from scenes.make.__main__ import main as meshes
 

@@ -1,7 +1,7 @@
-"""The README's and docs/plan.md's figures of a planned scene, from what `plan` measured.
+"""The figures of docs/benchmarks.md and docs/plan.md of a planned scene, from what `plan` measured.
 
 mitsuba-diffraction plan scenes/snake.xml --json out/plan.json
-python -m docs.make.figures.plan out/plan.json -o README.md docs/plan.md
+python -m docs.make.figures.plan out/plan.json
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _PICTURE = "picture, planned against whole, same random numbers"
 
 
 def tables(report: dict[str, Any]) -> dict[str, str]:
-    """Markdown by the name of its markers: `planned` for the README, `plan` in full.
+    """Markdown by the name of its markers: `planned` in a sentence, `plan` in full.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Replace the figures, and return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m docs.make.figures.plan")
     parser.add_argument("report", metavar="PLAN.json", type=Path, help="from plan --json")
-    add_pages(parser, "README.md", "docs/plan.md")
+    add_pages(parser, "docs/benchmarks.md", "docs/plan.md")
     args = parser.parse_args(argv)
 
     def work() -> None:

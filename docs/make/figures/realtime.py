@@ -1,8 +1,8 @@
-"""The README's sheet and tables of the shaders, from what `compare` measured.
+"""The picture and the tables of docs/realtime.md, from what `compare` measured.
 
 mitsuba-diffraction compare scenes/snake.xml --method all -o out/compare/snake
 mitsuba-diffraction compare scenes/plate.xml --method lut spectral -o out/compare/plate
-python -m docs.make.figures.realtime out/compare/snake out/compare/plate -o README.md
+python -m docs.make.figures.realtime out/compare/snake out/compare/plate
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ from . import markers
 from .jpeg import write_jpeg
 from .program import exit_code, from_json
 
-#: Beside the README; the sheet that it shows is that of the default method.
-SHEET = Path("docs", "images", "realtime.jpg")
+PAGE = Path("docs", "realtime.md")
+#: Beside the page; the picture that it shows is that of the default method.
+SHEET = Path("images", "realtime.jpg")
 
 _OURS = ("lut", "spectral")
 _METHOD, _WIDTH = "lut", 1600
@@ -33,7 +34,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         "compared", metavar="FOLDER", type=Path, nargs="+",
         help="written by compare; of the first the sheet and all methods are shown",
     )  # fmt: skip
-    parser.add_argument("-o", "--output", metavar="FILE", type=Path, default=Path("README.md"))
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", type=Path, default=Path("docs/realtime.md")
+    )
     args = parser.parse_args(argv)
 
     def work() -> None:
@@ -53,7 +56,9 @@ def _tables(files: Sequence[Path]) -> str:
         )
         for file in files
     ]  # fmt: skip
-    return f"{scenes_table(documents)}\n\n{markdown(documents[0])}"
+    # links of `compare` start at the repository's root, those of the page in docs
+    scenes = scenes_table(documents).replace("](scenes/", "](../scenes/")
+    return f"{scenes}\n\n{markdown(documents[0])}"
 
 
 def scenes_table(documents: Sequence[dict[str, Any]]) -> str:

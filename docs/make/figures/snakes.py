@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from mitsuba_diffraction.cli.main import main as command
+from mitsuba_diffraction.cli import main as command
 from mitsuba_diffraction.errors import DiffractionError
 
 from .jpeg import write_jpeg

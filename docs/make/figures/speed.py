@@ -1,7 +1,7 @@
-"""The README's table of speed and quality, from what `bench` measured.
+"""The table of speed and quality in docs/benchmarks.md, from what `bench` measured.
 
 mitsuba-diffraction bench --json out/bench.json
-python -m docs.make.figures.speed out/bench.json -o README.md
+python -m docs.make.figures.speed out/bench.json
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from mitsuba_diffraction.errors import DiffractionError
 
 from . import markers
 from .program import exit_code, from_json
+
+PAGE = Path("docs", "benchmarks.md")
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Replace the table, and return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m docs.make.figures.speed")
     parser.add_argument("measured", metavar="BENCH.json", type=Path, help="from bench --json")
-    parser.add_argument("-o", "--output", metavar="FILE", type=Path, default=Path("README.md"))
+    parser.add_argument("-o", "--output", metavar="FILE", type=Path, default=PAGE)
     args = parser.parse_args(argv)
 
     def work() -> None:

@@ -1,7 +1,7 @@
-"""The README's and docs/accuracy.md's tables of the trade, from what `tradeoff` measured.
+"""The tables of docs/accuracy.md, from what `tradeoff` measured.
 
 mitsuba-diffraction tradeoff -o out/tradeoff
-python -m docs.make.figures.tradeoff out/tradeoff -o README.md docs/accuracy.md
+python -m docs.make.figures.tradeoff out/tradeoff
 """
 
 from __future__ import annotations
@@ -18,8 +18,6 @@ from mitsuba_diffraction.atomic import atomic_path
 from . import markers
 from .program import add_pages, exit_code, from_json
 
-#: What the README shows: groups, in this order.
-SHORT = ("default", "tolerance", "basis")
 _HEAD = (
     "setting", "error", "ΔE2000, mean (99 %)", "`eval` / `roughconductor`", "taps × numbers", "MB",
     "built in, s",
@@ -27,18 +25,16 @@ _HEAD = (
 
 
 def tables(measured: dict[str, Any]) -> dict[str, str]:
-    """Markdown by the name of its markers: `tradeoff` for the README, `settings` and `spectral`.
+    """Markdown by the name of its markers: `settings` and `spectral`.
 
     Parameters
     ----------
     measured : the content of `tradeoff.json`.
     """
     settings = measured["settings"]
-    short = [record for record in settings if record["group"] in SHORT]
     machine = measured["machine"]
     where = f"{measured['patch']}; {machine['cores']} cores ({machine['processor']})"
     return {
-        "tradeoff": f"{markers.table(_HEAD, tuple(_rows(short)))}\n\n{where}.",
         "settings": f"{markers.table(_HEAD, tuple(_rows(settings)))}\n\n{where}.",
         "spectral": _spectral(measured["spectral"]),
     }
@@ -77,7 +73,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Replace the tables and copy the plots, and return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m docs.make.figures.tradeoff")
     parser.add_argument("measured", metavar="FOLDER", type=Path, help="from tradeoff -o")
-    add_pages(parser, "README.md", "docs/accuracy.md")
+    add_pages(parser, "docs/accuracy.md")
     parser.add_argument("--images", metavar="FOLDER", type=Path, default=Path("docs/images"))
     args = parser.parse_args(argv)
 

@@ -3,6 +3,7 @@
 Contents
 --------
 plan            how much is measured: in full, or quickly
+run             all of them, part by part
 machine         what the figures depend on besides the code
 figures         rows with goals, as text and as plain data
 timing          rounds through all contenders, so that background load affects all alike

@@ -2,6 +2,7 @@
 
 Contents
 --------
+Comparison    pictures, sheets, errors and times of both renderers, in a folder
 SameLights    a scene for both renderers, under the lights that both know
 difference    how far a picture is from its reference, over some of the pixels
 Difference    what that gives
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 from ...optics.colour import delta_e
 from .measures import Difference, difference, exposure_of
+from .run import Comparison
 from .same_lights import SameLights
 
-__all__ = ["Difference", "SameLights", "delta_e", "difference", "exposure_of"]
+__all__ = ["Comparison", "Difference", "SameLights", "delta_e", "difference", "exposure_of"]

@@ -133,18 +133,6 @@ def test_a_folder_without_measurements_is_refused(tmp_path, capsys):
     assert "is not what tradeoff writes" in capsys.readouterr().err
 
 
-def test_the_project_s_pages_have_the_markers():
-    root = Path(__file__).parents[2]
-    for name, marks in (
-        ("README.md", ["tradeoff"]),
-        ("docs/accuracy.md", ["settings", "spectral"]),
-    ):
-        text = (root / name).read_text("utf-8")
-        for mark in marks:
-            assert f"<!-- begin {mark} -->" in text
-            assert f"<!-- end {mark} -->" in text
-
-
 def test_the_command_measures_and_recommends(tmp_path, monkeypatch, capsys):
     from mitsuba_diffraction.cli import tradeoff as command
     from mitsuba_diffraction.cli.main import main

@@ -10,7 +10,7 @@ from PIL import Image
 from docs.make.figures import evaluation, markers
 from mitsuba_diffraction import DiffractionError
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 
 
 def test_the_page_is_made_by_one_command(tmp_path, capsys):
@@ -31,13 +31,6 @@ def test_the_page_is_made_by_one_command(tmp_path, capsys):
     assert "blazed grating" in markers.part(text, "windows")
     with Image.open(tmp_path / "images" / "evaluation.png") as image:
         assert min(image.size) > 300
-
-
-def test_the_committed_page_is_complete():
-    text = (DOCS / "evaluation.md").read_text(encoding="utf-8")
-    for name in ("periods", "differences", "windows"):
-        assert "blazed grating" in markers.part(text, name)
-    assert (DOCS / "images" / "evaluation.png").is_file()
 
 
 def test_a_page_without_markers_is_one_line(tmp_path, capsys):

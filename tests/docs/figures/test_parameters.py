@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import re
-from pathlib import Path
 
 import mitsuba as mi
 import pytest
@@ -13,7 +12,6 @@ import mitsuba_diffraction as md
 from docs.make.figures import parameters
 from mitsuba_diffraction.errors import DiffractionError
 
-ROOT = Path(__file__).parents[2]
 ENTRIES = [e for entries in parameters.groups(parameters.docstring()).values() for e in entries]
 BY_NAME = {name: entry for entry in ENTRIES for name in entry.names}
 
@@ -23,30 +21,11 @@ def patch():
     return md.gratings.sinusoidal(period=1.6, depth=0.06, periods=4, pixels_per_period=32)
 
 
-def test_the_page_is_made_of_the_docstring(tmp_path):
-    made = tmp_path / "parameters.md"
-    assert parameters.main(["-o", str(made)]) == 0
-    committed = (ROOT / "docs" / "parameters.md").read_text("utf-8")
-    assert committed == made.read_text("utf-8"), "run make parameters"
-
-
 def test_every_parameter_is_described_once(some_variant):
     from mitsuba_diffraction.plugin.parameters import NAMES
 
     names = [name for entry in ENTRIES for name in entry.names]
     assert sorted(names) == sorted([*NAMES, "(nested)"])
-
-
-def test_the_readme_gives_the_same_defaults():
-    readme = (ROOT / "README.md").read_text("utf-8")
-    rows = readme[readme.index("| parameter |") :].partition("\n\n")[0].splitlines()[2:]
-    compared = 0
-    for row in rows:
-        first, _, default, *_ = (cell.strip() for cell in row.strip("|").split("|"))
-        for name in re.findall(r"`(\w+)`", first):
-            assert BY_NAME[name].default == default.replace("`", ""), name
-            compared += 1
-    assert compared > 20
 
 
 def test_the_defaults_are_those_of_the_code(some_variant, patch):

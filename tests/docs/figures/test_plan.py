@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 
 from docs.make.figures import plan
-
-ROOT = Path(__file__).parents[2]
 
 
 def report() -> dict:
@@ -62,9 +59,3 @@ def test_a_page_without_markers_is_refused(tmp_path, capsys):
     page.write_text("nothing", "utf-8")
     assert plan.main([str(file), "-o", str(page)]) == 1
     assert "has none of the markers" in capsys.readouterr().err
-
-
-def test_the_project_s_pages_have_the_markers():
-    for name, mark in (("README.md", "planned"), ("docs/plan.md", "plan")):
-        text = (ROOT / name).read_text("utf-8")
-        assert text.count(f"<!-- begin {mark} -->") == text.count(f"<!-- end {mark} -->") == 1

@@ -1,16 +1,13 @@
-"""The README's table and sheet of the shaders are those that `compare` wrote."""
+"""The table and picture of the shaders are those that `compare` wrote."""
 
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 from PIL import Image
 
-from docs.make.figures import markers, realtime
-
-README = Path(__file__).parents[2] / "README.md"
+from docs.make.figures import realtime
 
 
 @pytest.fixture
@@ -42,7 +39,7 @@ def compared(tmp_path):
 @pytest.fixture
 def page(tmp_path):
     (tmp_path / realtime.SHEET).parent.mkdir(parents=True)
-    file = tmp_path / "README.md"
+    file = tmp_path / "realtime.md"
     file.write_text("<!-- begin realtime -->\nstale\n<!-- end realtime -->\n", "utf-8")
     return file
 
@@ -51,7 +48,7 @@ def test_table_and_sheet_are_replaced(compared, page):
     assert realtime.main([str(compared), "-o", str(page)]) == 0
     text = page.read_text("utf-8")
     assert "| `lut` | 0.46 | 3.21 | 0.021 |  | 1230 | 35.2 | 1000 | 12.3 | 21.0 |" in text
-    assert "| [plate](scenes/plate.xml) | 0.46 | 3.21 | 0.32 | 3.21 | 0.29 | 900 |" in text
+    assert "| [plate](../scenes/plate.xml) | 0.46 | 3.21 | 0.32 | 3.21 | 0.29 | 900 |" in text
     assert "25 % of 64 × 40 pixels" in text
     assert "stale" not in text
     with Image.open(page.parent / realtime.SHEET) as image:
@@ -64,12 +61,3 @@ def test_what_compare_did_not_write_is_refused_in_one_line(compared, page, capsy
     assert realtime.main([str(compared), "-o", str(page)]) == 1
     assert capsys.readouterr().err.count("\n") == 1
     assert "stale" in page.read_text("utf-8")
-
-
-def test_the_committed_readme_has_all_methods():
-    text = markers.part(README.read_text("utf-8"), "realtime")
-    for method in ("lut", "spectral", "flss", "nmm", "pq"):
-        assert f"| `{method}` |" in text
-    for scene in ("snake", "plate", "sphere"):
-        assert f"| [{scene}](scenes/{scene}.xml) |" in text
-    assert (README.parent / realtime.SHEET).is_file()

@@ -1,4 +1,4 @@
-"""The README's figures are those that `bench` wrote, and nothing else."""
+"""The page's figures are those that `bench` wrote, and nothing else."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from docs.make.figures import markers, speed
-
-README = Path(__file__).parents[2] / "README.md"
+from docs.make.figures import speed
 
 
 def measured(value: float = 2.0, *, met: bool = True) -> dict:
@@ -75,22 +73,3 @@ def test_another_file_is_refused_in_one_line(tmp_path, capsys, content):
     assert said.count("\n") == 1
     assert "bench" in said
     assert "stale" in target.read_text("utf-8")
-
-
-def test_the_committed_readme_has_the_figures():
-    rows = markers.part(README.read_text("utf-8"), "speed").splitlines()
-    assert len([row for row in rows if row.startswith("|")]) == 2 + len(speed.FIGURES)
-
-
-def test_the_comparison_gives_the_measured_times():
-    text = README.read_text("utf-8")
-    rows = [[c.strip() for c in row.split("|")[1:-1]] for row in text.splitlines() if "|" in row]
-    figures = {row[0]: row[1] for row in rows if len(row) == 3}
-    (times,) = (row[1:] for row in rows if row[0] == "time of `eval`")
-    ours = float(figures["`eval` / `roughconductor` (Al)"])
-    thesis = ours * float(figures["the thesis' look-up / `eval`"])
-    expected = [ours, 1.0, float(figures["`measured` / `roughconductor`"]), thesis]
-    # the last is a product of rounded numbers
-    assert [float(t) for t in times] == pytest.approx(expected, rel=0.03)
-    snake = figures["the snake's scene / with `roughconductor`"]
-    assert f"{snake} on the snake" in text

@@ -9,7 +9,7 @@ from PIL import Image
 from docs.make.figures import markers, sweeps
 from mitsuba_diffraction.thesis.sweeps import SWEEPS
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 
 
 def test_the_page_is_made_by_one_command(tmp_path, capsys):
@@ -24,10 +24,3 @@ def test_the_page_is_made_by_one_command(tmp_path, capsys):
         assert ("reference" in markers.part(text, kind)) == (parameter.reference is not None)
         with Image.open(tmp_path / "images" / f"sweep-{kind}.png") as image:
             assert image.size[0] > 400
-
-
-def test_the_committed_page_is_complete():
-    text = (DOCS / "sweeps.md").read_text(encoding="utf-8")
-    for kind, parameter in SWEEPS.items():
-        assert len(markers.part(text, kind).splitlines()) == 2 + len(parameter.values)
-        assert (DOCS / "images" / f"sweep-{kind}.png").is_file()

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import DiffractionError
-from ..scene.parameters import parameters_of
+from ..errors import DiffractionError, quoted
+from .parameters import parameters_of
 
 Numbers = tuple[float, ...]
 
@@ -28,18 +27,22 @@ class Change:
         return ", ".join(f"{value:.10g}" for value in steps)
 
 
-def change(text: str) -> Change:
-    """KEY=FROM:TO, where FROM and TO are numbers, or lists of them with commas between."""
+def change_of(text: str) -> Change:
+    """KEY=FROM:TO, where FROM and TO are numbers, or lists of them with commas between.
+
+    Raises
+    ------
+    DiffractionError
+        If it is none.
+    """
     name, equals, values = text.partition("=")
     start, colon, end = values.partition(":")
     if not (name and equals and colon):
-        raise argparse.ArgumentTypeError(
-            f"expected KEY=FROM:TO, e.g. sun_azimuth=0:90, got {text!r}"
-        )
+        raise DiffractionError(f"expected KEY=FROM:TO, e.g. sun_azimuth=0:90, got {quoted(text)}")
     pair = numbers_in(start), numbers_in(end)
     if pair[0] is None or pair[1] is None or len(pair[0]) != len(pair[1]):
-        raise argparse.ArgumentTypeError(
-            f"expected numbers, as many before as after the colon, got {text!r}"
+        raise DiffractionError(
+            f"expected numbers, as many before as after the colon, got {quoted(text)}"
         )
     return Change(name, pair[0], pair[1])
 

@@ -1,0 +1,71 @@
+"""All measurements of `bench`, part by part, on every backend that is here."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from pathlib import Path
+
+from ...heights.field import HeightField
+from ...progress import Progress
+from .figures import Section
+from .plan import Plan
+
+
+def sections(
+    parts: Collection[str],
+    plan: Plan,
+    folder: Path,
+    progress: Progress,
+    scenes: Path,
+    patch: HeightField | None = None,
+) -> Iterator[Section]:
+    """Measure the parts that are asked for, one after the other.
+
+    Parameters
+    ----------
+    parts : of `PARTS`.
+    plan : how much is measured.
+    folder : for temporary files.
+    progress : called as progress(done, total, text).
+    scenes : folder of the project's scenes.
+    patch : evaluated instead of the plan's own.
+    """
+    if "build" in parts:
+        from .build import measure_builds
+
+        yield measure_builds(plan, folder, progress)
+    if set(parts) <= {"build"}:
+        return
+    import drjit as dr
+
+    from ...scene.load import set_variant
+    from .colours import measure_colours
+    from .contenders import build_tables
+    from .evaluation import measure_eval, measure_sampling
+    from .rendering import measure_rendering, measure_snake
+    from .scaling import measure_lookups, measure_pictures
+    from .variance import measure_efficiency, measure_noise
+
+    tables = build_tables(plan, folder, progress, patch)
+    for backend in ("llvm", "cuda"):
+        if not dr.has_backend(getattr(dr.JitBackend, backend.upper())):
+            continue
+        set_variant(f"{backend}_ad_spectral")
+        if "eval" in parts:
+            yield measure_eval(plan, tables, progress)
+        if "sample" in parts:
+            yield from measure_sampling(plan, tables, progress)
+        if "render" in parts:
+            yield measure_rendering(plan, tables, progress)
+        if "snake" in parts:
+            yield measure_snake(plan, tables, scenes, progress)
+        if "noise" in parts:
+            yield measure_noise(plan, tables, progress)
+        if "efficiency" in parts:
+            yield measure_efficiency(plan, tables, scenes, progress)
+        if "colours" in parts:
+            yield from measure_colours(plan, tables, scenes, backend, progress)
+        if "scaling" in parts:
+            set_variant(f"{backend}_ad_spectral")
+            yield measure_lookups(plan, folder, progress)
+            yield measure_pictures(plan, tables, progress)

@@ -1,0 +1,80 @@
+"""What was measured of all settings: as text, as plain data, and as CSV."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ...atomic import atomic_path
+from .depth import Depths
+from .measuring import Measured, rows
+from .wavelengths import Spectral
+
+_HEAD = "  error  plugin's  ΔE2000    99 %  × roughconductor   taps  terms      MB   s"
+
+
+def plain(results: list[Measured], depths: Depths) -> dict[str, Any]:
+    """All settings, and the errors over depth."""
+    return {
+        "settings": list(rows(results)),
+        "depths": {
+            "depth_um": depths.depth.tolist(),
+            "errors": {name: values.tolist() for name, values in depths.errors.items()},
+            "intervals": depths.intervals.tolist(),
+        },
+    }
+
+
+def save_csv(path: Path, settings: Sequence[Mapping[str, Any]]) -> None:
+    """Write the settings of `plain`, a row each.
+
+    Raises
+    ------
+    DiffractionError
+        If the file cannot be written.
+    """
+    with (
+        atomic_path(path) as temporary,
+        temporary.open("w", newline="", encoding="utf-8") as file,
+    ):
+        columns = [name for name in settings[0] if name != "arguments"]
+        writer = csv.DictWriter(file, columns, extrasaction="ignore")
+        writer.writeheader()
+        writer.writerows(settings)
+
+
+def lines(
+    results: Sequence[Measured],
+    spectral: Spectral,
+    best: Measured,
+    budget: Mapping[str, float | None],
+) -> Iterator[str]:
+    """A row for each setting, the errors of sums over the spectrum, and the recommendation."""
+    width = max(len(one.setting.name) for one in results)
+    yield f"{'':<{width}} {_HEAD}"
+    for one in results:
+        name = f"{one.setting.name:<{width}}"
+        if one.refused:
+            yield f"{name}  {one.refused}"
+            continue
+        series = f"{one.intervals} × {one.terms}"
+        yield (
+            f"{name} {one.error:7.1e}   {one.error_single:7.1e} {one.delta_e:7.3f} "
+            f"{one.delta_e_99:7.2f} {one.relative:16.2f} {one.taps:6d} {series:>6} "
+            f"{one.megabytes:7.2f} {one.seconds:3.1f}"
+        )
+    steps = ", ".join(f"{step:g} nm {error:.2f}" for step, error in spectral.steps.items())
+    counts = ", ".join(f"{count} {noise:.2f}" for count, noise in spectral.counts.items())
+    yield f"sums over the spectrum, ΔE2000: {steps}"
+    yield f"wavelengths of a ray, noise of its luminance: {counts}"
+    asked = ", ".join(f"{name} {value:g}" for name, value in budget.items() if value)
+    arguments = best.setting.arguments or {"": "the defaults"}
+    said = ", ".join(f"{k}={v}" if k else str(v) for k, v in arguments.items())
+    if best.setting.crop is not None:
+        said += f", crop at {best.setting.crop:g} of all frequencies"
+    yield (
+        f"recommended{f' ({asked})' if asked else ''}: {said}: error {best.error:.1e}, "
+        f"{best.relative:.1f} × roughconductor, {best.megabytes:.1f} MB"
+    )

@@ -1,0 +1,278 @@
+"""Options that several commands share, each declared once.
+
+`add_…` functions declare them on a parser or a group; the functions beside them read what was
+given. Modules of the library are imported where values are read, so that --help answers at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..reference import COHERENCES
+from ..tables import expansion
+from .arguments import definition, number_between, path_ending_in, whole_number
+
+if TYPE_CHECKING:
+    from ..heights.field import HeightField
+    from ..heights.options import LoadOptions
+
+Group = argparse._ActionsContainer
+
+#: Default of --wavelength-range and of --step, nm.
+WAVELENGTH_RANGE, STEP = (360.0, 830.0), 5.0
+#: `--json` without a file, which only `info` has: printed instead of the text.
+STDOUT = Path("-")
+
+#: Ways to add up a spectrum, by the name that every --method uses.
+METHODS = ("spectral", "flss", "nmm", "pq", "pq-sinc", "rainbow")
+#: What `thesis.methods` and earlier versions of the command line call some of them.
+_IN_LIBRARY = {"spectral": "default"}
+_IN_COMMANDS = {name: ours for ours, name in _IN_LIBRARY.items()}
+
+_HEIGHTS: dict[str, tuple[str, str]] = {
+    "pixel_size": ("DX[,DY]", "µm between samples, where the file does not say"),
+    "max_height": ("H", "µm, height of white in an image"),
+    "channel": ("C", "name or index of the channel; default: the heights"),
+    "crop": ("W[,H]", "µm, crop to a central region; default: all of the patch"),
+    "fill": ("METHOD", "points without data: nearest or harmonic; default: refuse them"),
+    "level": (
+        "METHOD",
+        "plane: subtract the best plane; lines: also align the scan lines; default: none",
+    ),
+    "clip": ("N", "clip heights beyond N robust standard deviations (dust)"),
+    "periodic": ("METHOD", "smooth or taper: make the patch tile without seams; default: none"),
+}
+
+_TABLE: dict[str, dict[str, Any]] = {
+    "coherence_width": {
+        "metavar": "W", "type": float, "help": "µm, 4σ of the amplitude window; default: 65",
+    },
+    "coherence": {
+        "choices": COHERENCES,
+        "help": "ensemble: average over window positions; patch: one window; default: ensemble",
+    },
+    "basis": {
+        "choices": ("auto", *expansion.BASES), "help": "series in κ; default: auto, which is svd",
+    },
+    "tolerance": {
+        "metavar": "E", "type": float,
+        "help": "relative error of a table, which is met or refused; default: 1e-3",
+    },
+    "terms": {
+        "metavar": "N", "type": whole_number(1),
+        "help": "terms of the series; default: as many as the tolerance needs",
+    },
+    "taps": {
+        "metavar": "N", "type": whole_number(1),
+        "help": "orders read in each direction; default: as many as the tolerance needs",
+    },
+    "height_scale_max": {
+        "metavar": "S", "type": number_between(1e-6, 1000),
+        "help": "largest height_scale that the table serves; default: 1.5",
+    },
+}  # fmt: skip
+
+
+def add_heights(parser: argparse.ArgumentParser) -> None:
+    """How a file of heights is read; the values are checked by `load_options`."""
+    group = parser.add_argument_group("reading heights")
+    for name, (metavar, text) in _HEIGHTS.items():
+        group.add_argument(_option(name), metavar=metavar, help=text)
+
+
+def load_options(args: argparse.Namespace) -> LoadOptions:
+    """How heights are read, as `HeightField.load` takes it.
+
+    Raises
+    ------
+    DiffractionError
+        If a value does not fit.
+    """
+    from ..heights.options import LoadOptions
+
+    return LoadOptions.of(**{name: getattr(args, name) for name in _HEIGHTS})
+
+
+def given_for_heights(args: argparse.Namespace) -> list[str]:
+    """Options for reading heights that stand on the command line."""
+    return [_option(name) for name in _HEIGHTS if getattr(args, name) is not None]
+
+
+def add_own_patch(parser: argparse.ArgumentParser) -> None:
+    """A patch of the user's own, with how it is read; see `own_patch`."""
+    parser.add_argument(
+        "heights", metavar="HEIGHTS", type=Path, nargs="?",
+        help="patch to measure, from any file of heights; default: gratings.elaphe_like",
+    )  # fmt: skip
+    add_heights(parser)
+
+
+def check_own_patch(args: argparse.Namespace) -> None:
+    """Refuse options for reading heights where no file is named; a usage error."""
+    if args.heights is None and given_for_heights(args):
+        args.parser.error(f"{given_for_heights(args)[0]} needs a file of heights")
+
+
+def own_patch(args: argparse.Namespace) -> HeightField | None:
+    """The patch that was named, or None."""
+    from ..heights.load import load_heights
+
+    return None if args.heights is None else load_heights(args.heights, load_options(args))
+
+
+def add_table(group: Group, names: Sequence[str] = tuple(_TABLE), **defaults: str) -> None:
+    """The settings of a table; `defaults` are texts that replace what the help says of one's."""
+    for name in names:
+        described = dict(_TABLE[name])
+        if name in defaults:
+            described["help"] = (
+                f"{described['help'].split('; default')[0]}; default: " + (defaults[name])
+            )
+        group.add_argument(_option(name), **described)
+
+
+def table_options(args: argparse.Namespace) -> dict[str, Any]:
+    """The settings of a table that were given, by name."""
+    names = [*_TABLE, "wavelength_range"]
+    return {n: getattr(args, n) for n in names if getattr(args, n, None) is not None}
+
+
+def add_direction(group: Group, *, theta: float = 0.0) -> None:
+    """The direction of the light, degrees."""
+    group.add_argument(
+        "--theta", metavar="DEG", type=float, default=theta,
+        help=f"angle of the light from the normal, 0 to below 90; default: {theta:g}",
+    )  # fmt: skip
+    group.add_argument(
+        "--phi", metavar="DEG", type=float, default=0.0,
+        help="azimuth of the light, from the patch's x axis towards y; default: 0",
+    )  # fmt: skip
+
+
+def add_wavelength_range(group: Group) -> None:
+    """The spectrum, nm."""
+    low, high = WAVELENGTH_RANGE
+    group.add_argument(
+        "--wavelength-range", metavar=("MIN", "MAX"), nargs=2, type=float,
+        help=f"nm; default: {low:g} {high:g}",
+    )  # fmt: skip
+
+
+def add_wavelengths(group: Group) -> None:
+    """The spectrum and its step, nm; see `wavelengths`."""
+    add_wavelength_range(group)
+    group.add_argument(
+        "--step", metavar="NM", type=float, help=f"between wavelengths; default: {STEP:g}"
+    )
+
+
+def wavelengths(args: argparse.Namespace) -> dict[str, Any]:
+    """The arguments `wavelength_range` and `step`, nm."""
+    step = STEP if args.step is None else args.step
+    return {"wavelength_range": tuple(args.wavelength_range or WAVELENGTH_RANGE), "step": step}
+
+
+def add_resolution(group: Group, pixels: int) -> None:
+    """The size of a map."""
+    group.add_argument(
+        "--resolution", metavar="N", type=int, default=pixels,
+        help=f"pixels a side; default: {pixels}",
+    )  # fmt: skip
+
+
+def method(text: str) -> str:
+    """A method's name; those of earlier versions are taken as well."""
+    return _IN_COMMANDS.get(text, text)
+
+
+def in_library(name: str) -> str:
+    """What `thesis.methods` calls a method."""
+    return _IN_LIBRARY.get(name, name)
+
+
+def add_method(group: Group, default: str | None, text: str) -> None:
+    """How the spectrum is added up by the evaluators of the thesis, and the period some need."""
+    group.add_argument(
+        "--method", type=method, choices=METHODS, default=default,
+        help=text + (f"; default: {default}" if default else ""),
+    )  # fmt: skip
+    group.add_argument(
+        "--period", metavar="D", type=float,
+        help="µm, for the methods that need one; default: estimated from the heights",
+    )  # fmt: skip
+
+
+def add_exposure(group: Group, default: float | None, text: str) -> None:
+    """Stops of a picture."""
+    group.add_argument(
+        "--exposure", metavar="EV", type=number_between(-100, 100), default=default, help=text
+    )
+
+
+def add_scene(parser: argparse.ArgumentParser) -> None:
+    """A scene, its parameters, variant and sensor."""
+    parser.add_argument("scene", metavar="SCENE", type=Path, help="Mitsuba XML file")
+    add_mode(parser)
+    parser.add_argument(
+        "-D", "--define", metavar="KEY=VALUE", type=definition, action="append", default=[],
+        dest="parameters", help="set a parameter of the scene; may be given several times",
+    )  # fmt: skip
+    parser.add_argument(
+        "--sensor", metavar="N", type=whole_number(0), default=0,
+        help="which sensor, counted from 0; default: 0",
+    )  # fmt: skip
+
+
+def add_mode(parser: argparse.ArgumentParser) -> None:
+    """Mitsuba's variant."""
+    parser.add_argument(
+        "-m", "--mode", metavar="VARIANT",
+        help="Mitsuba variant; default: cuda_ad_spectral with a GPU, else llvm_ad_spectral",
+    )  # fmt: skip
+
+
+def scene_parameters(args: argparse.Namespace) -> dict[str, str]:
+    """The values of -D; one that is given twice is a usage error."""
+    parameters = dict(args.parameters)
+    if len(parameters) < len(args.parameters):
+        twice = next(k for k in parameters if [n for n, _ in args.parameters].count(k) > 1)
+        args.parser.error(f"argument -D: {twice!r} is set more than once")
+    return parameters
+
+
+def add_samples(parser: argparse.ArgumentParser, least: int, default: int | None) -> None:
+    """Samples per pixel and the seed of their random numbers."""
+    shown = "the scene's" if default is None else str(default)
+    parser.add_argument(
+        "-s", "--spp", metavar="N", type=whole_number(least), default=default,
+        help=f"samples per pixel; default: {shown}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--seed", metavar="N", type=whole_number(0), default=0,
+        help="of the random numbers; default: 0",
+    )  # fmt: skip
+
+
+def add_json(parser: argparse.ArgumentParser, what: str = "the figures", **more: Any) -> None:
+    """A file for the figures that are printed; `main` checks that it can be written."""
+    parser.add_argument(
+        "--json", metavar="FILE", type=path_ending_in(".json"), help=f"write {what} as JSON", **more
+    )
+
+
+class Renamed(argparse.Action):
+    """An option of earlier versions: refused with the name that it has now."""
+
+    def __init__(self, option_strings: Sequence[str], dest: str, now: str) -> None:
+        super().__init__(option_strings, argparse.SUPPRESS, nargs="?", help=argparse.SUPPRESS)
+        self._now = now
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        parser.error(f"argument {self.option_strings[0]}: {self._now}")
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"

@@ -1,0 +1,178 @@
+"""A scene by shaders beside the path tracer: pictures, sheets, errors and times in a folder."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import DiffractionError, DiffractionWarning
+from ...progress import Progress, silent
+from ...scene.passes import Stop, render_passes
+from ...scene.pictures import write_exr
+from ..glsl.source import THESIS_METHODS
+from ..glsl.timing import fragment_times
+from .measures import difference, exposure_of
+from .same_lights import SameLights
+from .sheet import write_sheet
+from .truth import box_sensor
+
+#: Samples along either side of a pixel for the slow methods, whose own errors are far larger.
+_FEWER, _MOST = 2, 64
+
+
+@dataclass
+class Comparison:
+    """What is compared, and where the pictures go.
+
+    Attributes
+    ----------
+    scene : a `mi.Scene` of the variant that is set.
+    name : of its file.
+    variant : that is set.
+    folder : for pictures (EXR) and sheets (PNG); made when there is something to write.
+    sensor : index of the camera.
+    spp, full_spp : samples per pixel of the direct light and of full transport, which 0 leaves out.
+    supersampling : the shaders' samples along either side of a pixel.
+    seed : of the random numbers.
+    progress : called as progress(done, total, text).
+    """
+
+    scene: Any
+    name: str
+    variant: str
+    folder: Path
+    sensor: int = 0
+    spp: int = 1024
+    full_spp: int = 64
+    supersampling: int = 8
+    seed: int = 0
+    progress: Progress = silent
+    both: SameLights = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.both = SameLights(self.scene, sensor=self.sensor, name=f"'{self.name}'")
+
+    def run(self, methods: Sequence[str], *, leave_out: bool = False) -> dict[str, Any]:
+        """Draw with these methods of the shaders, path-trace, and measure.
+
+        Parameters
+        ----------
+        leave_out : warn of methods that do not suit the surfaces, instead of raising their error.
+
+        Raises
+        ------
+        DiffractionError
+            Before anything is rendered, if a method does not suit the surfaces.
+        KeyboardInterrupt
+            If the rendering was interrupted: half a picture is no use here.
+        """
+        suited = [name for name in dict.fromkeys(methods) if self._suits(name, leave_out)]
+        renderer, first = self.both.renderer, 2 * self.seed
+        full = None
+        with Stop() as stop:
+            direct = self.both.scene
+            halves = [
+                self._traced(direct, direct.sensors()[0], self.spp // 2, seed, stop)
+                for seed in (first, first + 1)
+            ]
+            if self.full_spp:
+                sensor = box_sensor(renderer.camera)
+                full = self._traced(self.scene, sensor, self.full_spp, self.seed, stop)
+        reference = 0.5 * (halves[0] + halves[1])
+        exposure = exposure_of(reference)
+        self._make_folder()
+        self._write(reference, "direct", self.spp)
+        if full is not None:
+            self._write(full, "full", self.full_spp)
+        table, compared = self._drawn(suited, reference, full, exposure)
+        noise = difference(halves[0], halves[1], compared, exposure)
+        everywhere = np.ones(reference.shape[:2], bool)
+        return {
+            "scene": self.name, "variant": self.variant, "driver": renderer.driver,
+            "size": list(renderer.camera.size), "spp": self.spp, "exposure": exposure,
+            "lights": [light.name for light in renderer.lights],
+            "not_shown": list(renderer.scene.omissions),
+            # two halves of the samples differ by twice what their mean is off
+            "noise_delta_e_mean": 0.5 * noise.delta_e_mean,
+            "full_transport": None
+            if full is None
+            else difference(full, reference, everywhere, exposure),
+            "methods": table,
+        }  # fmt: skip
+
+    def _suits(self, method: str, leave_out: bool) -> bool:
+        """Whether a method's tables can be made; they are kept for the drawing."""
+        self.progress(0, 0, f"preparing {method}")
+        try:
+            self.both.renderer.prepared(method)
+        except DiffractionError as error:
+            if not leave_out:
+                raise
+            warnings.warn(f"left out: {error}", DiffractionWarning, stacklevel=2)
+            return False
+        return True
+
+    def _drawn(
+        self, methods: Sequence[str], reference: Any, full: Any, exposure: float
+    ) -> tuple[dict[str, dict[str, Any]], Any]:
+        """Errors, times and memory of all methods; pixels that both renderers see lit."""
+        renderer, table = self.both.renderer, {}
+        compared: Any = None
+        for n, method in enumerate(methods):
+            self.progress(n, len(methods), f"drawing with {method}")
+            samples = min(self.supersampling, _FEWER if method in THESIS_METHODS else _MOST)
+            drawn = renderer.render(method, supersampling=samples)
+            areas, picture = self.both.regions(drawn), drawn[..., :3]
+            compared = areas["both"]
+            errors = {
+                name: difference(reference, picture, mask, exposure) for name, mask in areas.items()
+            }
+            seconds = renderer.frame_time(method, frames=1 if method in THESIS_METHODS else 3)
+            self._write(picture, method, samples**2)
+            write_sheet(
+                self.folder / f"{method}.png", reference, picture, full, method=method,
+                found=errors["diffracting"], compared=compared, exposure=exposure,
+            )  # fmt: skip
+            table[method] = {
+                "supersampling": samples,
+                "frame_ms": 1e3 * seconds,
+                "texture_bytes": renderer.texture_bytes(method),
+                **errors,
+            }
+        self.progress(0, 1, "timing fragments")
+        for method, times in fragment_times(renderer, tuple(table)).items():
+            table[method]["fragment_ns"] = 1e9 * times["whole"]
+            table[method]["look_up_ns"] = 1e9 * times["look_up"]
+        return table, compared
+
+    def _traced(self, scene: Any, sensor: Any, spp: int, seed: int, stop: Stop) -> Any:
+        """A path-traced picture (height, width, 3)."""
+        result = render_passes(
+            scene, sensor, spp=spp, seed=seed, variant=self.variant, stop=stop,
+            progress=self.progress,
+        )  # fmt: skip
+        if result.interrupted:
+            raise KeyboardInterrupt
+        return np.array(result.bitmap, np.float32)[..., :3]
+
+    def _make_folder(self) -> None:
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise DiffractionError(
+                f"cannot make the folder '{self.folder}': {error.strerror}; choose another"
+            ) from error
+
+    def _write(self, image: Any, name: str, samples: int) -> None:
+        import mitsuba as mi
+
+        origin: dict[str, str | int] = {
+            "scene": self.name, "variant": self.variant, "spp": samples,
+        }  # fmt: skip
+        bitmap = mi.Bitmap(np.ascontiguousarray(image, np.float32), mi.Bitmap.PixelFormat.RGB)
+        write_exr(bitmap, self.folder / f"{name}.exr", origin)

@@ -1,0 +1,178 @@
+"""A scene many times, in files that a later run with the same settings keeps."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..atomic import atomic_path
+from ..errors import DiffractionError, DiffractionWarning
+from ..progress import Progress
+from .load import load_scene, preview_samples, sensor_of, shrink
+from .parameters import files_of
+from .passes import Stop, render_passes
+from .pictures import colours_of, count_bad, write_exr, write_png
+
+#: Suffixes of films, and what Pillow needs to know about each.
+FILMS: dict[str, dict[str, Any]] = {
+    ".webp": {"quality": 85, "method": 4},
+    ".gif": {"optimize": True},
+}
+#: Why a frame that is not there is rendered.
+MISSING = ("", "")
+_KEY = "mitsuba-diffraction"  # of the text in a frame's PNG
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame: its file, the scene's parameters, and the settings that decide its pixels."""
+
+    png: Path
+    values: dict[str, str]
+    settings: dict[str, Any]
+
+    @property
+    def exr(self) -> Path:
+        """The linear picture beside the PNG."""
+        return self.png.with_suffix(".exr")
+
+    def outdated(self, with_exr: bool) -> tuple[str, str] | None:
+        """Why the frame has to be rendered, and an example; None if the file is this frame.
+
+        Raises
+        ------
+        DiffractionError
+            If the file there is something else.
+        """
+        if not self.png.exists():
+            return MISSING
+        before = _settings_in(self.png)
+        if before is None:
+            raise DiffractionError(
+                f"'{self.png}' exists and is no frame of this command; name another folder with -o"
+            )
+        for name in {**before, **self.settings}:
+            old, new = before.get(name), self.settings.get(name)
+            if old != new:
+                return name, "it changed" if name == "scene" else f"it was {old} and is {new}"
+        return ("EXR", "it is missing") if with_exr and not self.exr.exists() else None
+
+
+def render_frames(
+    scene: Path, frames: Sequence[Frame], variant: str, *, with_exr: bool, progress: Progress
+) -> Iterator[Frame]:
+    """Render and write frame after frame, in the variant that is set; ends early after Ctrl-C.
+
+    Parameters
+    ----------
+    scene : XML file.
+    frames : settings hold `samples` (a number, or a text for the scene's own), `seed`, `sensor`,
+        `exposure` and `preview`.
+    variant : that is set.
+    with_exr : write a linear EXR beside each PNG.
+    progress : called as progress(samples done, samples in all, text).
+
+    Raises
+    ------
+    DiffractionError
+        If the scene fails, or its film holds no colours.
+    """
+    loaded = None
+    with Stop() as stop:
+        for n, frame in enumerate(frames):
+            settings = frame.settings
+            # the scene before is held until the next is there, and with it its tables
+            loaded = load_scene(scene, frame.values)
+            sensor = sensor_of(loaded, settings["sensor"])
+            if settings["preview"]:
+                shrink(sensor)
+            spp = settings["samples"]
+            if not isinstance(spp, int):
+                spp = preview_samples(sensor, settings["preview"])
+
+            def tell(done: int, total: int, text: str, n: int = n) -> None:
+                progress(n * total + done, len(frames) * total, f"frame {n + 1} of {len(frames)}")
+
+            result = render_passes(
+                loaded, sensor, spp=spp, seed=settings["seed"], variant=variant, stop=stop,
+                progress=tell,
+            )  # fmt: skip
+            if result.interrupted and result.spp < spp:
+                return
+            _write(frame, result.bitmap, scene, variant, with_exr)
+            yield frame
+            if stop.asked:
+                return
+
+
+def _write(frame: Frame, bitmap: Any, scene: Path, variant: str, with_exr: bool) -> None:
+    colours = colours_of(bitmap)
+    if colours is None:
+        raise DiffractionError(
+            f"the film of '{scene}' holds no colours that a PNG could show; render its frames one "
+            "by one, to EXR"
+        )
+    bad = count_bad(bitmap)
+    if bad:
+        warnings.warn(
+            f"{frame.png}: {bad} pixels are not finite and black", DiffractionWarning, stacklevel=3
+        )
+    frame.png.parent.mkdir(parents=True, exist_ok=True)  # not for a scene that fails
+    if with_exr:
+        write_exr(bitmap, frame.exr, {"scene": str(scene), "variant": variant})
+    # the PNG marks the frame as done
+    write_png(colours, frame.png, frame.settings["exposure"], {_KEY: json.dumps(frame.settings)})
+
+
+def write_film(frames: Sequence[Path], film: Path, fps: float) -> None:
+    """Join PNG files to an endless film, by the suffix an animated WebP or GIF.
+
+    Raises
+    ------
+    DiffractionError
+        If Pillow cannot write such a file.
+    """
+    from PIL import Image
+
+    # not as open files, of which there may be too many
+    pictures = [Image.open(io.BytesIO(path.read_bytes())) for path in frames]
+    try:
+        with atomic_path(film) as temporary:
+            pictures[0].save(
+                temporary, format=film.suffix[1:].upper(), save_all=True,
+                append_images=pictures[1:], duration=round(1000 / fps), loop=0,
+                **FILMS[film.suffix.lower()],
+            )  # fmt: skip
+    except (OSError, KeyError, ValueError) as error:
+        raise DiffractionError(f"cannot write '{film}': {error}") from error
+    finally:
+        for picture in pictures:
+            picture.close()
+
+
+def digest_of(scene: Path, given: Mapping[str, str]) -> str:
+    """Changes when the scene, what it includes, or a file that it names does."""
+    content = hashlib.sha256()
+    for file in files_of(scene, given):
+        content.update(file.name.encode())
+        content.update(file.read_bytes())
+    return content.hexdigest()[:32]
+
+
+def _settings_in(png: Path) -> dict[str, Any] | None:
+    """The settings that a frame was written with; None if it is none."""
+    from PIL import Image
+
+    try:
+        with Image.open(png) as image:
+            text = getattr(image, "text", {}).get(_KEY, "")
+        found = json.loads(text[1:-1])  # Mitsuba puts it into quotes
+    except (OSError, ValueError, SyntaxError):
+        return None
+    return found if isinstance(found, dict) else None
