@@ -35,7 +35,7 @@ print("usable")
 """
 
 
-@pytest.mark.parametrize("path", sorted(lib.path for lib in HERE if (lib.version or 0) >= OLDEST))
+@pytest.mark.parametrize("path", sorted({lib.path for lib in HERE if (lib.version or 0) >= OLDEST}))
 def test_what_may_be_chosen_compiles_the_kernels(path: Path, tmp_path: Path):
     # a kernel that was compiled earlier would prove nothing
     done = python(KERNELS, **{VARIABLE: str(path), "DRJIT_CACHE_DIR": str(tmp_path)})
