@@ -7,7 +7,6 @@ most 1, and the divisor is symmetric in its directions, so that it stays recipro
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -17,8 +16,8 @@ from numpy.typing import NDArray
 from ..tables.energy.bound import AZIMUTHAL, LAST_ANGLE, POLAR, SHARE
 from ..tables.store.bounds import BoundsAround, bounds_around
 from ..tables.table import DiffractionTable
-from .memory import index_between, read, upload
-from .series import load
+from .memory import index_between, read_record, upload
+from .roles import Buffer, Float, Index, Vector2f
 
 
 class EnergyBound:
@@ -28,8 +27,8 @@ class EnergyBound:
         self._table = table
         self._height_scale = math.nan
         self._around: BoundsAround | None = None
-        self._ends: tuple[Any, Any] = (None, None)
-        self._values: Any = None
+        self._ends: tuple[Buffer, Buffer] = (None, None)
+        self._values: Buffer = None
         self._low, self._slope = mi.Float(0.0), mi.Float(0.0)
 
     def update(self, height_scale: float, differentiable: bool = False) -> None:
@@ -50,8 +49,8 @@ class EnergyBound:
         self._height_scale = height_scale
 
     def divisor(
-        self, incident: Any, cos_i: Any, outgoing: Any, cos_o: Any, height_scale: Any
-    ) -> Any:
+        self, incident: Vector2f, cos_i: Float, outgoing: Vector2f, cos_o: Float, height_scale: Float
+    ) -> Float:
         """max(1, a(ωi), a(ωo)), from tangential parts in the patch's frame and cosines.
 
         height_scale : the one given to `update`; needed where derivatives with respect to it are.
@@ -61,14 +60,14 @@ class EnergyBound:
             share = (height_scale - self._low) * self._slope
         return dr.maximum(self._bound(incident, cos_i, share), self._bound(outgoing, cos_o, share))
 
-    def _corners(self, cell: Any, share: Any | None) -> list[Any]:
+    def _corners(self, cell: Index, share: Float | None) -> list[Float]:
         """The bound at a cell's corners; interpolated here only where its derivative is wanted."""
         if share is None:
-            return _read(self._values, cell)
-        low, high = (_read(end, cell) for end in self._ends)
+            return read_record(self._values, cell, 4)
+        low, high = (read_record(end, cell, 4) for end in self._ends)
         return [dr.lerp(*ends, share) for ends in zip(low, high, strict=True)]
 
-    def _bound(self, tangential: Any, cosine: Any, share: Any | None) -> Any:
+    def _bound(self, tangential: Vector2f, cosine: Float, share: Float | None) -> Float:
         """max(1, a): bilinear in (θ, φ), like `AlbedoBound`."""
         remaining = 1.0 - dr.safe_acos(cosine) * (2.0 / dr.pi)
         row = (1.0 - dr.safe_sqrt(remaining)) * (POLAR / SHARE)
@@ -88,10 +87,3 @@ def _cells(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """All four corners of each cell together: (rows, columns) → (rows − 1, columns − 1, 4)."""
     corners = (values[:-1, :-1], values[:-1, 1:], values[1:, :-1], values[1:, 1:])
     return np.stack(corners, axis=-1)
-
-
-def _read(source: Any, cell: Any) -> list[Any]:
-    """The four corners of a cell."""
-    if not dr.is_jit_v(mi.Float):
-        return [read(mi.Float, source, 4 * cell + n) for n in range(4)]
-    return load(source, cell, mi.ArrayXf, 4)

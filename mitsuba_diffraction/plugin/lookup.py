@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import weakref
-from typing import Any
+from collections.abc import Callable
 
 import drjit as dr
 import mitsuba as mi
@@ -17,10 +17,10 @@ import numpy as np
 from ..errors import DiffractionError
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
-from .memory import index_between, upload
+from .memory import index_between, packet_size, read_packets, upload
 from .restricted import RestrictedTable, within
-from .scalar_lookup import ScalarTable
-from .series import inner, packet_size, packets, pad, padded, series_of
+from .roles import Float, Index, Packet
+from .series import inner, pad, padded, series_of
 
 #: Look-ups of more taps run through their rows in a loop instead of one long program.
 _UNROLLED_TAPS = 36
@@ -31,8 +31,11 @@ _SHALLOW = 30.0
 #: Dr.Jit's indices are 32 bits wide.
 _MOST_PACKETS = 2**31
 
+#: The weight of a tap, by its number.
+Weight = Callable[[Float], Float]
+
 _uploaded: weakref.WeakKeyDictionary[
-    DiffractionTable, dict[str, DeviceTable | ScalarTable | RestrictedTable]
+    DiffractionTable, dict[str, DeviceTable | RestrictedTable]
 ] = weakref.WeakKeyDictionary()
 
 
@@ -54,11 +57,11 @@ class DeviceTable:
                 f"a table of {table.nbytes / 1e9:.1f} GB is too large to index; raise tolerance "
                 "or use a smaller patch"
             )
-        scalar = mi.Float16 if self.half else mi.Float
-        self._coefficients = upload(scalar, pad(table.coefficients, self.terms))
+        kind = mi.Float16 if self.half else mi.Float
+        self._coefficients = upload(kind, pad(table.coefficients, self.terms))
         self.series = series_of(table)
 
-    def window_sum(self, qx: Any, qy: Any, kappa: Any) -> Any:
+    def window_sum(self, qx: Float, qy: Float, kappa: Float) -> Float:
         """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`).
 
         qx, qy, kappa : mi.Float, rad/µm. Outside the table the result is NaN, never a guess.
@@ -92,7 +95,7 @@ class DeviceTable:
                 result = dr.maximum(parts[0], 0.0)  # a cut series may dip below zero by its error
         return dr.select(inside, result, dr.nan)
 
-    def first_bin(self, qx: Any, qy: Any, kappa: Any) -> Any:
+    def first_bin(self, qx: Float, qy: Float, kappa: Float) -> Index:
         """Index of the first bin that `window_sum` reads (for benchmarks)."""
         x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
         return self._place(x, y, self.series.at(kappa)[0])[0]
@@ -103,31 +106,36 @@ class DeviceTable:
         trims = self.grid.trims or (0,) * rows
         return [(row, list(range(trim, columns - trim))) for row, trim in enumerate(trims)]
 
-    def read(self, index: Any) -> list[Any]:
+    def read(self, index: Index) -> list[Packet]:
         """All floats of the bin with this index, in packets."""
-        kind = mi.ArrayXf16 if self.half else mi.ArrayXf
-        return packets(self._coefficients, index, kind, self._floats)
+        return read_packets(self._coefficients, index, self._floats)
 
-    def order_0(self, kappa: Any) -> Any:
+    def order_0(self, kappa: Float) -> Float:
         """|a_0(κ)|², the power of order 0."""
         centre = self.series.at(kappa)[2]
         if self.components == 2:
             return dr.square(centre[0]) + dr.square(centre[1])
         return dr.maximum(centre[0], 0.0)
 
-    def _place(self, x: Any, y: Any, interval: Any) -> tuple[Any, Any, Any]:
+    def _place(self, x: Float, y: Float, interval: Index) -> tuple[Index, Weight, Weight]:
         """Index of the first bin read at (x, y) in bins; weights along x and y as functions."""
         grid = self.grid
         column, weight_x = _taps(x, grid.last[0], grid.taps[0], grid.exponents[0])
         row, weight_y = _taps(y, grid.last[1], grid.taps[1], grid.exponents[1])
         return (interval * self.rows + row) * self.columns + column, weight_x, weight_y
 
-    def _over_taps(self, first: Any, weights_x: list[Any], weight_y: Any, of: Any) -> list[Any]:
+    def _over_taps(
+        self,
+        first: Index,
+        weights_x: list[Float],
+        weight_y: Weight,
+        of: Callable[[list[Packet]], list[Float]],
+    ) -> list[Float]:
         """Σ over the taps of their Gaussian weights times of(packets)."""
         rows = self.grid.taps[1]
 
-        def row_sum(start: Any, columns: list[int]) -> list[Any]:
-            total: list[Any] = []
+        def row_sum(start: Index, columns: list[int]) -> list[Float]:
+            total: list[Float] = []
             for i in columns:
                 found = of(self.read(start + i))
                 if not total:
@@ -161,31 +169,30 @@ class DeviceTable:
                 total = [dr.fma(p, weight_y(j), t) for p, t in zip(found, total, strict=True)]
         return total
 
-    def _components(self, packets: list[Any]) -> list[list[Any]]:
+    def _components(self, packets: list[Packet]) -> list[list[Float]]:
         """The terms of each component, from packets that hold one component after the other."""
-        values = [packet[n] for packet in packets for n in range(len(packet))]
+        values = [x for packet in packets for x in packet]
         return [values[c * self.terms : (c + 1) * self.terms] for c in range(self.components)]
 
-    def _squares(self, packets: list[Any], weights: list[Any]) -> list[Any]:
+    def _squares(self, packets: list[Packet], weights: list[Float]) -> list[Float]:
         """|a_j|² of one bin."""
         real, imaginary = (inner(part, weights) for part in self._components(packets))
         return [dr.fma(real, real, dr.square(imaginary))]
 
 
-def device_table(table: DiffractionTable) -> DeviceTable | ScalarTable | RestrictedTable:
+def device_table(table: DiffractionTable) -> DeviceTable | RestrictedTable:
     """The table in the current variant's memory, uploaded once for all BSDFs that share it."""
     variants = _uploaded.setdefault(table, {})
     if mi.variant() not in variants:
-        kind: Any = DeviceTable if dr.is_jit_v(mi.Float) else ScalarTable
-        device = kind(table)
+        device: DeviceTable | RestrictedTable = DeviceTable(table)
         if table.coarse is not None:
-            coarse = kind(table.coarse)
+            coarse = DeviceTable(table.coarse)
             device = RestrictedTable(device, coarse, table.radii, table.expansion.kappa_max)
         variants[mi.variant()] = device
     return variants[mi.variant()]
 
 
-def _taps(position: Any, last: int, taps: int, exponent: float) -> tuple[Any, Any]:
+def _taps(position: Float, last: int, taps: int, exponent: float) -> tuple[Index, Weight]:
     """Array index of the first tap, and the weight of tap n as a function."""
     base = dr.floor(position) if taps % 2 == 0 else dr.floor(position + 0.5)
     first = base + first_tap(taps)

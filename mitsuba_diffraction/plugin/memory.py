@@ -1,37 +1,63 @@
-"""Arrays in the memory of the current variant, and indices into them."""
+"""Arrays in the memory of the current variant, and reading them: all that knows scalar variants."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from .roles import Buffer, Float, Index, Kind, Packet
 
-def upload(kind: Any, values: NDArray[np.generic]) -> Any:
+#: Largest number of floats that one packet load fetches.
+PACKET = 16
+
+
+def upload(kind: Kind, values: NDArray[np.generic]) -> Buffer:
     """A Dr.Jit array in memory of Dr.Jit's own, which starts at a cache line.
 
     On the CPU an array made from NumPy's may go on using NumPy's memory: aligned by chance, and
     mistaken for other arrays when a function recorded by `dr.freeze` runs again. Scalar variants
-    have no such arrays: there it stays NumPy's.
+    have no such arrays: there it stays NumPy's, in single precision for want of `mi.Float16`.
     """
     if not dr.is_jit_v(mi.Float):
-        return values.ravel()
+        return values.astype(np.float32 if kind is mi.Float16 else values.dtype).ravel()
     array = kind(values.ravel()) * dr.opaque(kind, 1)
     dr.eval(array)
     return array
 
 
-def read(kind: Any, source: Any, index: Any) -> Any:
+def read(kind: Kind, source: Buffer, index: Index) -> Float | Index:
     """One number of what `upload` made."""
     if not dr.is_jit_v(mi.Float):
         return kind(source[index])
     return dr.gather(kind, source, index)
 
 
-def index_between(value: Any, low: float, high: float) -> Any:
+def read_packets(source: Buffer, index: Index, floats: int) -> list[Packet]:
+    """The record with this index, of so many floats, in packets as large as divide it."""
+    if not dr.is_jit_v(mi.Float):
+        return [mi.ArrayXf(source[index * floats : (index + 1) * floats])]
+    size = packet_size(floats)
+    count = floats // size
+    kind = mi.ArrayXf16 if dr.type_v(source) is dr.VarType.Float16 else mi.ArrayXf
+    return [
+        mi.ArrayXf(dr.gather(kind, source, index * count + n, shape=(size, dr.width(index))))
+        for n in range(count)
+    ]
+
+
+def read_record(source: Buffer, index: Index, floats: int) -> list[Float]:
+    """The same, its floats one by one."""
+    return [x for packet in read_packets(source, index, floats) for x in packet]
+
+
+def packet_size(floats: int) -> int:
+    """The largest power of two that divides a record, at most `PACKET`."""
+    return min(PACKET, floats & -floats)
+
+
+def index_between(value: Float, low: float, high: float) -> Float:
     """The value clipped to an index's range; NaN, as from a degenerate mesh, becomes `low`.
 
     `dr.clip` would keep the NaN, and what an integer makes of it reads far outside the table.

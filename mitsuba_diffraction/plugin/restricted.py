@@ -36,7 +36,7 @@ class RestrictedTable:
 
     Parameters
     ----------
-    fine, coarse : `plugin.lookup.DeviceTable`, or `ScalarTable` in scalar variants.
+    fine, coarse : `plugin.lookup.DeviceTable`.
     radii, kappa_max : where the fine one ends, (x, y) and κ in rad/µm.
     """
 

@@ -6,14 +6,14 @@ of all colours of a bin.
 
 from __future__ import annotations
 
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from ..tables.colour.table import PACKET, TERMS, ColourTable
-from .memory import read, upload
+from .memory import read, read_record, upload
+from .roles import Colour, Float, Index, Vector2f
 from .series import series_interval, series_weights
 
 
@@ -26,18 +26,18 @@ class PolarCoordinates:
         starts = [grid.start(n) for n in range(grid.rings)]
         self._starts = upload(mi.UInt32, np.array([*starts, grid.bins], np.uint32))
 
-    def ring(self, squared_radius: Any) -> Any:
+    def ring(self, squared_radius: Float) -> Float:
         """Position among the rings; below 0 inside the smallest."""
         smallest = self.smallest**2
         logarithm = dr.log(dr.maximum(squared_radius, 0.25 * smallest) * (1.0 / smallest))
         return logarithm * (0.5 / self.step)
 
-    def turn(self, uv: Any) -> Any:
+    def turn(self, uv: Vector2f) -> Float:
         """Azimuth in turns, 0 … 1."""
         turn = dr.atan2(uv.y, uv.x) * (0.5 / dr.pi)
         return dr.select(turn < 0.0, turn + 1.0, turn)
 
-    def start(self, ring: Any) -> Any:
+    def start(self, ring: Index) -> Index:
         """Index of a ring's first bin."""
         return read(mi.UInt32, self._starts, ring)
 
@@ -52,18 +52,17 @@ class ColourLookup:
         self._inverse_scale = 1.0 / table.scale
         self._radius_end = table.radius_end
         self._radii, self._zs = table.order_0.shape[:2]
-        half = mi.Float16 if dr.is_jit_v(mi.Float) else mi.Float
-        self._coefficients = upload(half, table.coefficients)
+        self._coefficients = upload(mi.Float16, table.coefficients)
         self._order_0 = upload(mi.Float, table.order_0)
 
-    def colour(self, uv: Any, z: Any) -> Any:
+    def colour(self, uv: Vector2f, z: Float) -> Colour:
         """RGB in 1/µm², mi.Color3f, signed. z must not be beyond the table's."""
         squared_radius = dr.squared_norm(uv)
         colours = self._other_orders(uv, squared_radius, z)
-        order_0 = self._glossy(dr.sqrt(dr.maximum(squared_radius, 1e-14)), z)
+        order_0 = self._zeroth_order(dr.sqrt(dr.maximum(squared_radius, 1e-14)), z)
         return mi.Color3f(*(a + b for a, b in zip(colours, order_0, strict=True)))
 
-    def _other_orders(self, uv: Any, squared_radius: Any, z: Any) -> list[Any]:
+    def _other_orders(self, uv: Vector2f, squared_radius: Float, z: Float) -> list[Float]:
         offset, interval = series_interval(self.expansion, z)
         weights = series_weights(self.expansion, TERMS, offset, interval, z)
         coordinates = self.coordinates
@@ -76,7 +75,7 @@ class ColourLookup:
             azimuth, a = _split(turn * (mi.Float(count) - 1.0), count)
             bin_ = interval * self._bins + starts[n] + azimuth
             for m, share in ((0, of_ring * (1.0 - a)), (1, of_ring * a)):
-                packet = _packet(self._coefficients, bin_ + m, PACKET)
+                packet = read_record(self._coefficients, bin_ + m, PACKET)
                 total = [dr.fma(p, share, s) for p, s in zip(packet, total, strict=False)]
         colours = []
         for c in range(3):
@@ -86,7 +85,7 @@ class ColourLookup:
             colours.append(value * self._inverse_scale)
         return colours
 
-    def _glossy(self, radius: Any, z: Any) -> list[Any]:
+    def _zeroth_order(self, radius: Float, z: Float) -> list[Float]:
         """Order 0's colour, 0 beyond its lobe."""
         inside = radius < self._radius_end
         at_radius = radius * ((self._radii - 1) / self._radius_end)
@@ -95,24 +94,14 @@ class ColourLookup:
         result = [mi.Float(0.0)] * 3
         for n, of_radius in ((0, 1.0 - s), (1, s)):
             for m, of_z in ((0, 1.0 - t), (1, t)):
-                packet = _packet(self._order_0, (row + n) * self._zs + column + m, 4)
+                packet = read_record(self._order_0, (row + n) * self._zs + column + m, 4)
                 share = dr.select(inside, of_radius * of_z, 0.0)
                 result = [dr.fma(p, share, r) for p, r in zip(packet, result, strict=False)]
         return result
 
 
-def _split(position: Any, count: Any) -> tuple[Any, Any]:
+def _split(position: Float, count: Index | int) -> tuple[Index, Float]:
     """The lower of the two whole numbers around a position, at most count − 2, and the rest."""
     clipped = dr.maximum(position, 0.0)
     lower = dr.minimum(mi.UInt32(clipped), count - 2)
     return lower, dr.minimum(clipped - mi.Float(lower), 1.0)
-
-
-def _packet(source: Any, index: Any, size: int) -> list[Any]:
-    """`size` numbers that lie side by side."""
-    if not dr.is_jit_v(mi.Float):
-        return [float(x) for x in source[index * size : (index + 1) * size]]
-    half = dr.type_v(source) is dr.VarType.Float16
-    kind = mi.ArrayXf16 if half else mi.ArrayXf
-    packet = dr.gather(kind, source, index, shape=(size, dr.width(index)))
-    return list(mi.ArrayXf(packet) if half else packet)

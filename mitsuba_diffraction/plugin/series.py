@@ -7,7 +7,7 @@ functions of basis "svd" have none: they are tabulated, as parabolas on equal ce
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
 
 import drjit as dr
 import mitsuba as mi
@@ -16,10 +16,8 @@ from numpy.typing import NDArray
 
 from ..tables.expansion import Expansion
 from ..tables.table import DiffractionTable
-from .memory import index_between, upload
-
-#: Largest number of floats that one packet load fetches.
-PACKET = 16
+from .memory import PACKET, index_between, read_record, upload
+from .roles import Float, Index
 
 #: A parabola through three points on a cell of phase h leaves max|f'''| h³/192 (Chebyshev nodes);
 #: this share of the tolerance is what the cells may add.
@@ -35,12 +33,12 @@ class Recurrence:
         self._order_0 = upload(mi.Float, pad(table.order_0.astype(np.float32), self._terms))
         self._components = table.order_0.shape[1]
 
-    def at(self, kappa: Any) -> tuple[Any, list[Any], list[Any]]:
+    def at(self, kappa: Float) -> tuple[Index, list[Float], list[Float]]:
         """Interval, weights of a bin's terms, and order 0: its power, or the parts of a_0."""
         offset, interval = series_interval(self._expansion, kappa)
         weights = series_weights(self._expansion, self._terms, offset, interval, kappa)
         floats = self._components * self._terms
-        values = load(self._order_0, interval, mi.ArrayXf, floats)
+        values = read_record(self._order_0, interval, floats)
         centre = [
             inner(values[n * self._terms : (n + 1) * self._terms], weights)
             for n in range(self._components)
@@ -75,14 +73,14 @@ class Tabulated:
         self._floats = -(-record.shape[1] // PACKET) * PACKET
         self._record = upload(mi.Float, pad(record.astype(np.float32), self._floats))
 
-    def at(self, kappa: Any) -> tuple[Any, list[Any], list[Any]]:
+    def at(self, kappa: Float) -> tuple[Index, list[Float], list[Float]]:
         """Interval, weights of a bin's terms, and order 0: its power, or the parts of a_0."""
         last = self._expansion.intervals * self._cells - 1.0
         position = kappa * (self._cells / self._expansion.length)
         lower = index_between(dr.floor(position), 0.0, last)
         t = dr.clip(position - lower, 0.0, 1.0)
         cell = mi.UInt32(lower)
-        values = load(self._record, cell, mi.ArrayXf, self._floats)
+        values = read_record(self._record, cell, self._floats)
         count = self._expansion.terms + self._components
         a, b, c = (values[n * count : (n + 1) * count] for n in range(3))
         found = [dr.fma(dr.fma(z, t, y), t, x) for x, y, z in zip(a, b, c, strict=True)]
@@ -102,7 +100,7 @@ def series_of(table: DiffractionTable) -> Recurrence | Tabulated:
     return Recurrence(table) if table.expansion.functions is None else Tabulated(table)
 
 
-def series_interval(expansion: Expansion, kappa: Any) -> tuple[Any, Any]:
+def series_interval(expansion: Expansion, kappa: Float) -> tuple[Float, Index]:
     """Where in its interval κ lies (0 … 1), and the interval."""
     position = kappa * (1.0 / expansion.length)
     lower = index_between(dr.floor(position), 0.0, expansion.intervals - 1.0)
@@ -110,8 +108,8 @@ def series_interval(expansion: Expansion, kappa: Any) -> tuple[Any, Any]:
 
 
 def series_weights(
-    expansion: Expansion, terms: int, offset: Any, interval: Any, kappa: Any
-) -> list[Any]:
+    expansion: Expansion, terms: int, offset: Float, interval: Index, kappa: Float
+) -> list[Float]:
     """What each term of a Chebyshev or Taylor series is multiplied with; `offset` is 0 … 1."""
     if expansion.basis == "taylor":
         x = kappa * expansion.half_range
@@ -128,35 +126,12 @@ def series_weights(
     return weights[:terms]
 
 
-def inner(terms: list[Any], weights: list[Any]) -> Any:
+def inner(terms: Sequence[Float], weights: Sequence[Float]) -> Float:
     """Σ terms·weights."""
     total = terms[0] * weights[0]
     for term, weight in zip(terms[1:], weights[1:], strict=True):
         total = dr.fma(term, weight, total)
     return total
-
-
-def load(source: Any, index: Any, kind: Any, floats: int) -> list[Any]:
-    """A record of so many floats, fetched in packets as large as divide it."""
-    return [
-        packet[n] for packet in packets(source, index, kind, floats) for n in range(len(packet))
-    ]
-
-
-def packets(source: Any, index: Any, kind: Any, floats: int) -> list[Any]:
-    """The same, each packet an array of its own in single precision."""
-    size = packet_size(floats)
-    count = floats // size
-    found = []
-    for n in range(count):
-        packet = dr.gather(kind, source, index * count + n, shape=(size, dr.width(index)))
-        found.append(packet if kind is mi.ArrayXf else mi.ArrayXf(packet))
-    return found
-
-
-def packet_size(floats: int) -> int:
-    """The largest power of two that divides a record, at most `PACKET`."""
-    return min(PACKET, floats & -floats)
 
 
 def padded(terms: int) -> int:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import sys
 
 from ...errors import DiffractionError
-from .find import TRUSTED, VARIABLE, Library, find_llvm, in_folders, named_library
-from .trial import OLDEST, fault_of, tried
+from .find import OLDEST, TESTED, VARIABLE, Library, find_llvm, named_library
 
 
 def select_llvm() -> Library | None:
-    """Point DRJIT_LIBLLVM_PATH to the best usable library, unless it is set or it is too late.
+    """Point DRJIT_LIBLLVM_PATH to the best library, unless it is set or it is too late.
 
     Returns what was chosen. Nothing is said if there is none: other backends do without LLVM, and
     `require_llvm` has the words.
@@ -23,15 +21,6 @@ def select_llvm() -> Library | None:
     if library is not None:
         os.environ[VARIABLE] = str(library.path)
     return library
-
-
-def _best(apart_from: Library | None = None) -> Library | None:
-    for file in in_folders():  # the quick way out: no child process at all
-        library = Library.at(file)
-        if library.version == TRUSTED and library != apart_from and library.path.is_file():
-            return library
-    others = (library for library in find_llvm() if library != apart_from)
-    return next((library for library in others if fault_of(library) is None), None)
 
 
 def loaded_llvm_version() -> tuple[int, int, int] | None:
@@ -52,12 +41,11 @@ def require_llvm() -> None:
     DiffractionError
         If it cannot: what there is, what would do, and how to get it.
     """
-    if "drjit" in sys.modules:
-        _require_loaded()
-        return
     named = named_library()
-    if named is not None:
-        if fault := fault_of(named):
+    if "drjit" in sys.modules:
+        _require_loaded(named)
+    elif named is not None:
+        if fault := _fault_of(named):
             raise DiffractionError(_bad_choice(named, fault))
     elif _best() is None:
         raise DiffractionError(_nothing_usable())
@@ -68,17 +56,16 @@ def require_loaded_llvm() -> None:
     import mitsuba as mi
 
     if (mi.variant() or "").startswith("llvm"):
-        _require_loaded()
+        _require_loaded(named_library())
 
 
-@functools.lru_cache(maxsize=1)  # what is loaded stays loaded, so once proved is enough
-def _require_loaded() -> None:
+def _require_loaded(named: Library | None) -> None:
     version = loaded_llvm_version()
-    named = named_library()
-    if version is not None and _survives(version[0], named):
+    if version is not None and version[0] >= OLDEST:
         return
     if named is not None and (version is None or named.version in (None, version[0])):
-        raise DiffractionError(_bad_choice(named, fault_of(named) or "Dr.Jit cannot load it"))
+        fault = _too_old(version[0]) if version else _fault_of(named)
+        raise DiffractionError(_bad_choice(named, fault or "Dr.Jit cannot load it"))
     if version is None:
         raise DiffractionError(
             f"Dr.Jit has found no LLVM; {_start_again()}" if _best() else _nothing_usable()
@@ -89,18 +76,25 @@ def _require_loaded() -> None:
     )
 
 
-def _survives(major: int, named: Library | None) -> bool:
-    """Whether the version that Dr.Jit has loaded is one to compile with."""
-    if major == TRUSTED or major < OLDEST:
-        return major == TRUSTED
-    # Dr.Jit does not tell the file: the one named, or of this version, or its own choice again
-    same = [library for library in find_llvm() if library.version == major]
-    if named is not None and named.version in (None, major):
-        same.insert(0, named)
-    return tried(same[0].path if same else None) == (major, True)
+def _best(apart_from: Library | None = None) -> Library | None:
+    libraries = (library for library in find_llvm() if library != apart_from)
+    return next((library for library in libraries if _fault_of(library) is None), None)
+
+
+def _fault_of(library: Library) -> str | None:
+    """Why Dr.Jit cannot work with it, as a clause, or None; a version untold may do."""
+    if not library.path.is_file():
+        return "there is no such file"
+    if library.version is not None and library.version < OLDEST:
+        return _too_old(library.version)
+    return None
 
 
 # ------------------------------------------------------------------------------- messages
+
+
+def _too_old(version: int) -> str:
+    return f"LLVM {version} cannot compile the kernels of Dr.Jit"
 
 
 def _bad_choice(named: Library, fault: str) -> str:
@@ -122,14 +116,14 @@ def _start_again() -> str:
 def _nothing_usable() -> str:
     found = ", ".join(str(library) for library in find_llvm()) or "none"
     return (
-        f"there is no LLVM that Dr.Jit can use; found: {found}; usable: {TRUSTED}, or another from "
-        f"{OLDEST} on that survives a trial kernel; {_install()}"
+        f"there is no LLVM that Dr.Jit can use; found: {found}; usable: {OLDEST} or newer, best "
+        f"{TESTED}; {_install()}"
     )
 
 
 def _install() -> str:
     if sys.platform == "darwin":
-        return f"brew install llvm@{TRUSTED}"
+        return f"brew install llvm@{TESTED}"
     if sys.platform == "win32":
-        return f"install LLVM {TRUSTED}, and set {VARIABLE} to its LLVM-C.dll"
-    return f"apt install libllvm{TRUSTED}, or set {VARIABLE} to one elsewhere"
+        return f"install LLVM {TESTED}, and set {VARIABLE} to its LLVM-C.dll"
+    return f"apt install libllvm{TESTED}, or set {VARIABLE} to one elsewhere"

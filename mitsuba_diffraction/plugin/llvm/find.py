@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import platform
 import re
-import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,8 +13,10 @@ from pathlib import Path
 #: Environment variable through which Dr.Jit is told what to load.
 VARIABLE = "DRJIT_LIBLLVM_PATH"
 
-#: Major version used without a trial.
-TRUSTED = 19
+#: The first whose x86 backend compiles Dr.Jit's minimum and maximum (tried: not 14, 15 or 16).
+OLDEST = 17
+#: What the tests run on, and so the first choice; they run kernels on every other that there is.
+TESTED = 19
 
 # libLLVM-19.so.1, libLLVM.so.19.1, libLLVM-14.0.6.so.1, libLLVM.dylib; not libLLVM-C.dylib,
 # libLLVMPolly.so or the private libLLVM.so.19.1-rust-1.86.0
@@ -45,11 +45,10 @@ class Library:
 
 
 def find_llvm() -> list[Library]:
-    """All of them, the one to prefer first: 19, then the newest."""
+    """All of them, the one to prefer first: 19, then the newest, then those of no known version."""
     named = named_library()
-    files = itertools.chain([named.path] if named else [], in_folders(), known_to_loader())
-    libraries = {Library.at(file) for file in files if file.is_file()}
-    return sorted(libraries, key=_preference)
+    files = [*([named.path] if named else []), *in_folders()]
+    return sorted({Library.at(file) for file in files if file.is_file()}, key=_preference)
 
 
 def named_library() -> Library | None:
@@ -58,14 +57,14 @@ def named_library() -> Library | None:
     if not value:
         return None
     if Path(value).name == value and not Path(value).is_file():
-        for file in itertools.chain(in_folders(), known_to_loader()):
+        for file in in_folders():
             if file.name == value:
                 return Library.at(file)
     return Library.at(value)
 
 
 def _preference(library: Library) -> tuple[bool, int, str]:
-    return library.version != TRUSTED, -(library.version or 0), str(library.path)
+    return library.version != TESTED, -(library.version or 0), str(library.path)
 
 
 def in_folders() -> Iterator[Path]:
@@ -100,29 +99,3 @@ def _folders() -> Iterator[Path]:
         yield usr / "local" / "lib"
         searched = os.environ.get("LD_LIBRARY_PATH", "")
     yield from (Path(folder) for folder in searched.split(os.pathsep) if folder)
-
-
-def known_to_loader() -> Iterator[Path]:
-    """What `ldconfig` lists: folders that an administrator added to the loader's (Linux)."""
-    if not sys.platform.startswith("linux"):
-        return
-    # users have no /sbin on their path
-    environment = {**os.environ, "PATH": os.environ.get("PATH", os.defpath) + ":/sbin:/usr/sbin"}
-    try:
-        listing = subprocess.run(
-            ["ldconfig", "-p"],
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=10,
-            check=False,
-        ).stdout
-    except (OSError, subprocess.TimeoutExpired):
-        return  # some systems have none
-    # "libLLVM.so.19.1 (libc6,x86-64) => /lib/x86_64-linux-gnu/libLLVM.so.19.1"
-    wide = sys.maxsize > 2**32
-    for name, flags, path in re.findall(r"(\S+) \((.*?)\) => (\S+)", listing):
-        if _FILE.fullmatch(name) and ("64" in flags) == wide:
-            yield Path(path)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from mitsuba_diffraction.plugin.llvm import choose, find
+from mitsuba_diffraction.plugin.llvm import find
 from mitsuba_diffraction.plugin.llvm.find import Library
 
 HERE = [Library.at(path) for path in find.in_folders()]
@@ -25,9 +25,7 @@ def installed(version: int) -> Path:
 
 def only(monkeypatch: pytest.MonkeyPatch, *files: Path) -> None:
     """Make these the only libraries of the machine."""
-    for module in (find, choose):
-        monkeypatch.setattr(module, "in_folders", lambda: iter(files))
-    monkeypatch.setattr(find, "known_to_loader", lambda: iter(()))
+    monkeypatch.setattr(find, "in_folders", lambda: iter(files))
 
 
 def python(code: str, **variables: str) -> subprocess.CompletedProcess[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 from pathlib import Path
 
@@ -15,8 +14,7 @@ from mitsuba_diffraction.plugin.llvm.find import VARIABLE, Library
 from tests.plugin.llvm.machine import installed, only, python
 
 
-@pytest.mark.usefixtures("no_child")
-def test_19_is_chosen_without_a_child_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_19_is_chosen_before_newer_ones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     for name in ("libLLVM-15.so.1", "libLLVM.so.19.1", "libLLVM.so.21.1"):
         (tmp_path / name).touch()
     only(monkeypatch, *sorted(tmp_path.glob("libLLVM*")))
@@ -25,14 +23,12 @@ def test_19_is_chosen_without_a_child_process(tmp_path: Path, monkeypatch: pytes
     llvm.require_llvm()
 
 
-@pytest.mark.usefixtures("no_child")
 def test_choice_of_the_user_stays(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv(VARIABLE, "/some/libLLVM.so")
     assert llvm.select_llvm() is None
     assert os.environ[VARIABLE] == "/some/libLLVM.so"
 
 
-@pytest.mark.usefixtures("no_child")
 def test_nothing_is_chosen_once_drjit_has_its_own(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "drjit", sys)
     assert llvm.select_llvm() is None
@@ -68,27 +64,12 @@ print(min(times), "numpy" in sys.modules, "drjit" in sys.modules)
     assert float(seconds) < 0.03
 
 
-def test_choice_after_a_trial_still_comes_before_drjit(tmp_path: Path):
-    copy = tmp_path / "libLLVM.so"
-    shutil.copyfile(installed(19), copy)
-    code = f"""
-{BEGUN}
-from pathlib import Path
-for module in (choose, find):
-    module.in_folders = lambda: iter([Path({str(copy)!r})])
-find.known_to_loader = lambda: iter(())
-choose.select_llvm()
-print(os.environ["DRJIT_LIBLLVM_PATH"], "drjit" in sys.modules)
-"""
-    assert python(code).stdout.split() == [str(copy), "False"]
-
-
-@pytest.mark.parametrize("name", ["libLLVM-15.so.1", "libLLVM.so", "missing.so"])
+@pytest.mark.parametrize("name", ["libLLVM-15.so.1", "missing.so"])
 def test_unusable_choice_of_the_user_is_one_line(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     good = tmp_path / "libLLVM.so.19.1"
-    for file in ("libLLVM.so.19.1", "libLLVM-15.so.1", "libLLVM.so"):
+    for file in ("libLLVM.so.19.1", "libLLVM-15.so.1"):
         (tmp_path / file).touch()
     only(monkeypatch, good)
     monkeypatch.setenv(VARIABLE, str(tmp_path / name))
@@ -98,6 +79,19 @@ def test_unusable_choice_of_the_user_is_one_line(
     assert "\n" not in text
     assert f'{VARIABLE}="{tmp_path / name}"' in text
     assert f"set it to {good}" in text
+
+
+def test_file_that_is_no_library_is_one_line(tmp_path: Path):
+    (tmp_path / "libLLVM.so").write_bytes(b"not a library")
+    code = """
+import mitsuba_diffraction.plugin.llvm as llvm
+try:
+    llvm.require_llvm()
+except ValueError as error:
+    print(error)
+"""
+    done = python(code, **{VARIABLE: str(tmp_path / "libLLVM.so")})
+    assert "Dr.Jit cannot load it" in done.stdout, done.stderr
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="names Debian's package")
