@@ -49,7 +49,12 @@ class EnergyBound:
         self._height_scale = height_scale
 
     def divisor(
-        self, incident: Vector2f, cos_i: Float, outgoing: Vector2f, cos_o: Float, height_scale: Float
+        self,
+        incident: Vector2f,
+        cos_i: Float,
+        outgoing: Vector2f,
+        cos_o: Float,
+        height_scale: Float,
     ) -> Float:
         """max(1, a(ωi), a(ωo)), from tangential parts in the patch's frame and cosines.
 

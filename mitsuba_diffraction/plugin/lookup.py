@@ -34,9 +34,9 @@ _MOST_PACKETS = 2**31
 #: The weight of a tap, by its number.
 Weight = Callable[[Float], Float]
 
-_uploaded: weakref.WeakKeyDictionary[
-    DiffractionTable, dict[str, DeviceTable | RestrictedTable]
-] = weakref.WeakKeyDictionary()
+_uploaded: weakref.WeakKeyDictionary[DiffractionTable, dict[str, DeviceTable | RestrictedTable]] = (
+    weakref.WeakKeyDictionary()
+)
 
 
 class DeviceTable:
