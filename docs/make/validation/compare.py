@@ -72,8 +72,10 @@ class Comparison:
         return float(self.model.sum() / self.rigorous.sum())
 
 
-def compare(material: str, solutions: Solutions | None = None) -> Comparison:
-    """Evaluate the model for what has converged, by default of the solutions that are shipped.
+def compare(
+    material: str, solutions: Solutions | None = None, model: str = "kirchhoff"
+) -> Comparison:
+    """Evaluate a model (`model.MODELS`) for what has converged, by default of what is shipped.
 
     Raises
     ------
@@ -82,7 +84,7 @@ def compare(material: str, solutions: Solutions | None = None) -> Comparison:
     """
     trusted = (solutions or shipped(material)).trusted()
     rows = trusted.rows
-    model = np.full(len(rows), np.nan)
+    found = np.full(len(rows), np.nan)
     unique, inverse = np.unique(rows[KEY], return_inverse=True)
     starts = np.argsort(inverse.ravel(), kind="stable")
     ends = np.cumsum(np.bincount(inverse.ravel()))
@@ -90,9 +92,9 @@ def compare(material: str, solutions: Solutions | None = None) -> Comparison:
         profile, period, depth, theta, wavelength = (_decimal(value) for value in key)
         grating = Grating(PROFILES[int(profile)], period, depth)
         orders, _ = order_sines(period, wavelength, theta)
-        efficiencies = order_efficiencies(grating, material, theta, wavelength)
-        model[members] = efficiencies[np.searchsorted(orders, rows["order"][members])]
-    return Comparison(material, trusted, model)
+        efficiencies = order_efficiencies(grating, material, theta, wavelength, model)
+        found[members] = efficiencies[np.searchsorted(orders, rows["order"][members])]
+    return Comparison(material, trusted, found)
 
 
 def gratings_of(comparison: Comparison, profile: str) -> list[Grating]:

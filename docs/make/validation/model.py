@@ -9,16 +9,19 @@ and carries the power ∫ f cosθo dωo of a beam of unit power. With dωo = dα
 
     η_m = f(ωi, ω_m) · π/(σ²k²) = R(cosθ_half) (1 + ωi·ω_m)² / (w² cosθi cosθ_m) · |a_m(k w)|².
 
-For a mirror this is R; for m = 0 of any grating R·|a_0|².
+For a mirror this is R; for m = 0 of any grating R·|a_0|². The small-slope model puts
+4 cosθi cosθm N/w² for R (1 + ωi·ω_m)²/(w² cosθi cosθ_m), see `mitsuba_diffraction.optics.boundary`.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_diffraction import reference
-from mitsuba_diffraction.optics import fresnel
+from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 
 from .cases import PIXELS, Grating, index_of, order_sines
@@ -26,26 +29,38 @@ from .cases import PIXELS, Grating, index_of, order_sines
 # Neighbouring orders are 2π/d apart and weigh exp(−(2π·σ/d)²), 4e-18 at σ = d
 _SIGMA_PER_PERIOD = 1.0
 
+#: As `reference.brdf` has them, and the small-slope matrix alone, unblended.
+MODELS = (*reference.MODELS, "small_slope_alone")
+
 
 def order_efficiencies(
-    grating: Grating, material: str, theta: float, wavelength: float
+    grating: Grating, material: str, theta: float, wavelength: float, model: str = "kirchhoff"
 ) -> NDArray[np.float64]:
     """η_m of every propagating order, ordered as `cases.order_sines`, for unpolarised light.
 
     Parameters
     ----------
     grating : in the plane of incidence.
-    material : of `cases.MATERIALS`.
+    material : of `cases.MATERIALS`; a perfect conductor is Kirchhoff's alone.
     theta : angle of incidence, degrees.
     wavelength : nm.
+    model : of `MODELS`.
     """
     _, sines = order_sines(grating.period, wavelength, theta)
     wi, wo = in_plane(np.sin(np.radians(theta))), in_plane(sines)
-    brdf = lobe_peaks(grating, wi, wo, wavelength)
     sigma, k = lobe_sigma(grating), float(wavenumber(wavelength))
-    index = np.inf if material == "perfect" else index_of(material, wavelength)
-    cos_half = np.sqrt(np.clip(0.5 * (1 + wo @ wi), 0, 1))
-    return fresnel.reflectance(cos_half, index) * brdf * np.pi / (sigma * k) ** 2
+    per_brdf = np.pi / (sigma * k) ** 2
+    if material == "perfect":
+        return lobe_peaks(grating, wi, wo, wavelength) * per_brdf
+    index = index_of(material, wavelength)
+    material_of = {"eta": index.real, "k": index.imag}
+    if model in reference.MODELS:
+        peaks = lobe_peaks(grating, wi, wo, wavelength, model=model, **material_of)
+        return peaks * per_brdf
+    # what Kirchhoff's matrix weighs, replaced
+    peaks = lobe_peaks(grating, wi, wo, wavelength, model="kirchhoff", **material_of)
+    alone = boundary.unpolarised(boundary.small_slope(wi, wo, index))
+    return peaks * per_brdf * alone / boundary.unpolarised(boundary.kirchhoff(wi, wo, index))
 
 
 def lobe_sigma(grating: Grating) -> float:
@@ -59,21 +74,24 @@ def lobe_peaks(
     wo: NDArray[np.float64],
     wavelength: float,
     pixels: int = PIXELS,
+    **material: Any,
 ) -> NDArray[np.float64]:
-    """The BRDF (R = 1) at the centres of lobes, through a window of `lobe_sigma`.
+    """The BRDF at the centres of lobes, through a window of `lobe_sigma`.
 
     Parameters
     ----------
     wi, wo : (3,) and (n, 3), unit vectors away from the surface.
     wavelength : nm.
     pixels : a period.
+    material : model and index as `reference.brdf` takes them; Kirchhoff with R = 1 by default.
 
     Returns
     -------
     (n,) in 1/sr.
     """
     width = WIDTHS_PER_SIGMA * lobe_sigma(grating)
-    return reference.brdf(grating.heights(pixels), wi, wo, wavelength, coherence_width=width)
+    field = grating.heights(pixels)
+    return reference.brdf(field, wi, wo, wavelength, coherence_width=width, **material)
 
 
 def in_plane(sine: ArrayLike) -> NDArray[np.float64]:

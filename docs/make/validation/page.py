@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.progress import Progress, silent
 
-from . import plots, sections, statistics
+from . import models, plots, sections, statistics
 from .cases import FEW_WAVELENGTHS, MATERIALS, PROBE_GRATING, Grating
 from .compare import Comparison, compare
 from .solutions import Solutions, shipped
@@ -73,6 +73,7 @@ def write_report(folder: Path, *, quick: bool = False, progress: Progress | None
         sections.edges(perfect),
         sections.polarisation(perfect),
         sections.materials(comparisons),
+        models.section(models.compare_all(_few(comparisons) if quick else comparisons)),
         sections.random_surfaces(measured),
     ]
     page = folder / "validation.md"
@@ -85,6 +86,10 @@ def write_report(folder: Path, *, quick: bool = False, progress: Progress | None
 def _at_few_wavelengths(solutions: Solutions) -> Solutions:
     keep = np.isin(solutions.rows["wavelength"], FEW_WAVELENGTHS)
     return Solutions(solutions.rows[keep], solutions.about)
+
+
+def _few(comparisons: dict[str, Comparison]) -> dict[str, Comparison]:
+    return {name: part.where(period=2.5, depth=0.1) for name, part in comparisons.items()}
 
 
 def _write_figure(figure: Figure, path: Path) -> None:

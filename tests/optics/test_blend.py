@@ -1,0 +1,74 @@
+"""The blend of small slope and Kirchhoff: what it weighs by, and its limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import gratings
+from mitsuba_diffraction.optics import blend, boundary
+from mitsuba_diffraction.optics.blend import NODES_PER_OCTAVE, ScaleRoughness
+from tests.directions import polar, rough_patch
+
+PATCH = rough_patch((40, 56), (0.11, 0.09), 0.3)
+
+
+def roughness() -> ScaleRoughness:
+    return ScaleRoughness.of(PATCH.heights, PATCH.pixel_size)
+
+
+def test_all_components_together_are_the_variance_of_the_heights():
+    assert roughness().variance.sum() == pytest.approx(PATCH.heights.var(), rel=1e-12)
+
+
+def test_it_is_the_sum_over_all_components():
+    power = np.abs(np.fft.fft2(PATCH.heights) / PATCH.heights.size) ** 2
+    ny, nx = PATCH.shape
+    qx = 2 * np.pi * np.fft.fftfreq(nx, PATCH.pixel_size[0])
+    qy = 2 * np.pi * np.fft.fftfreq(ny, PATCH.pixel_size[1])[:, None]
+    power[0, 0] = 0
+    for q in (0.3, 2.0, 7.0, 30.0):
+        ratio = np.hypot(qx, qy) / q
+        share = (1 - np.exp(-((4 * ratio) ** 4))) * np.exp(-((ratio / 2) ** 4))
+        # components are told apart to 1/256 of an octave
+        assert roughness().at(q) == pytest.approx((power * share).sum(), rel=1e-5)
+
+
+def test_ripples_of_an_order_count_and_long_waves_and_fine_roughness_do_not():
+    ripples = ScaleRoughness.of(gratings.sinusoidal(1.0, 0.05).heights, (1 / 32, 1 / 32))
+    line = ripples.frequency[np.argmax(ripples.variance)]
+    whole = ripples.variance.max()
+    assert ripples.at(line) == pytest.approx(0.94 * whole, rel=2e-3)  # exp(−1/16)
+    assert ripples.at(2 * line) > 0.95 * whole  # the second order is made by the ripples too
+    assert ripples.at(10 * line) < 0.03 * whole
+    assert ripples.at(line / 5) < 1e-3 * whole
+    assert ripples.at(0.0) == 0.0
+
+
+def test_a_table_of_nodes_interpolates_to_it():
+    exact = roughness()
+    first, nodes = exact.table(35.0)
+    q = np.geomspace(0.01, 35.0, 2000)
+    place = (np.log2(q) - first) * NODES_PER_OCTAVE
+    found = np.interp(place, np.arange(len(nodes)), nodes, left=0.0)
+    assert place.max() <= len(nodes) - 1
+    assert found == pytest.approx(exact.at(q), abs=5e-4 * nodes.max())
+
+
+def test_a_flat_surface_has_no_roughness_at_any_scale():
+    flat = ScaleRoughness.of(np.full((4, 6), 0.3), (0.1, 0.1))
+    assert np.all(flat.at([0.0, 1.0, 30.0]) < 1e-30)
+    first, nodes = flat.table(35.0)
+    assert np.isfinite(first)
+    assert np.all(nodes < 1e-30)
+
+
+@pytest.mark.parametrize("index", [1.56, 0.65 + 5.6j])
+def test_smooth_surfaces_follow_small_slope_and_rough_ones_kirchhoff(index):
+    wi, wo = polar(60, 0), polar(20, 100)
+    gentle, tangent = boundary.small_slope(wi, wo, index), boundary.kirchhoff(wi, wo, index)
+    smooth = blend.weight(20.0, 0.0), blend.weight(20.0, 0.001**2)
+    assert np.array_equal(blend.jones(wi, wo, index, smooth[0]), gentle)
+    assert blend.jones(wi, wo, index, smooth[1]) == pytest.approx(gentle, abs=1e-3)
+    rough = blend.jones(wi, wo, index, blend.weight(20.0, 1.0))
+    assert np.array_equal(rough, tangent)

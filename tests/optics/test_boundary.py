@@ -1,0 +1,159 @@
+"""Jones matrices of a pair of directions: limits, symmetries, and Mitsuba's conventions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction.optics import boundary, fresnel
+from mitsuba_diffraction.optics.geometry import kirchhoff_factor
+from tests.directions import polar, uniform_directions
+
+INDICES = (1.5, 0.8, 0.65 + 5.6j)
+MATRICES = (boundary.small_slope, boundary.kirchhoff)
+#: Reversed light has its s axis reversed, its p axis as it was.
+REVERSED = np.array([[1, -1], [-1, 1]])
+
+
+def pairs(count: int = 300) -> tuple[np.ndarray, np.ndarray]:
+    """Directions not quite at the horizon, where Kirchhoff's matrix has a pole."""
+    directions = uniform_directions(2 * count, np.random.default_rng(2), lowest=0.05)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    return directions[:count], directions[count:]
+
+
+@pytest.mark.parametrize("index", INDICES)
+@pytest.mark.parametrize("matrix", MATRICES)
+def test_in_the_mirror_direction_it_is_fresnel_s(matrix, index):
+    wi, _ = pairs()
+    r_s, r_p = fresnel.amplitudes(wi[:, 2], index)
+    found = matrix(wi, wi * [-1, -1, 1], index)
+    expected = np.stack([r_s, 0 * r_s, 0 * r_s, r_p], -1).reshape(-1, 2, 2)
+    assert found == pytest.approx(expected, abs=1e-13)  # rounding
+
+
+@pytest.mark.parametrize("index", INDICES)
+@pytest.mark.parametrize("matrix", MATRICES)
+def test_reciprocity(matrix, index):
+    wi, wo = pairs()
+    there, back = matrix(wi, wo, index), matrix(wo, wi, index)
+    scale = np.abs(there).max()
+    assert back == pytest.approx(REVERSED * np.swapaxes(there, -1, -2), abs=1e-13 * scale)
+
+
+@pytest.mark.parametrize("index", INDICES)
+def test_kirchhoff_s_power_is_the_scalar_form_with_fresnel_at_the_half_vector(index):
+    wi, wo = pairs()
+    power = boundary.unpolarised(boundary.kirchhoff(wi, wo, index))
+    w = wi[:, 2] + wo[:, 2]
+    cos_half = np.sqrt(0.5 * (1 + np.sum(wi * wo, axis=1)))
+    sigma, wavelength = 1.0, 1000.0  # λ²A is then π
+    scalar = kirchhoff_factor(wi, wo, wavelength, sigma) * np.pi
+    expected = fresnel.reflectance(cos_half, index) * scalar
+    assert 4 * wi[:, 2] * wo[:, 2] * power / w**2 == pytest.approx(expected, rel=1e-11)
+
+
+@pytest.mark.parametrize("index", [1.5, 0.65 + 5.6j])
+def test_near_the_mirror_both_agree_to_first_order_cross_terms_included(index):
+    # Kirchhoff's cross terms are rotations of axes: their signs are those of geometry
+    wi, _ = pairs()
+    wi = wi[wi[:, 2] > 0.3]
+    aside = np.random.default_rng(5).normal(size=wi.shape)
+    differences = []
+    for step in (1e-3, 1e-4):
+        wo = wi * [-1, -1, 1] + step * aside
+        wo /= np.linalg.norm(wo, axis=1, keepdims=True)
+        both = [matrix(wi, wo, index) for matrix in MATRICES]
+        differences.append(np.abs(both[0] - both[1]).max())
+        assert np.abs(both[0][:, 0, 1]).max() > 0.01 * step  # there is something to compare
+    assert differences[1] < 0.015 * differences[0]  # quadratic: 0.01, and a little of the cubic
+
+
+@pytest.mark.parametrize("matrix", MATRICES)
+@pytest.mark.parametrize("place", [(0.0, 0.0), (0.0, 40.0), (40.0, 0.0), (40.0, 40.0)])
+def test_along_the_normal_and_in_retroreflection_the_power_is_continuous(matrix, place):
+    wi, wo = polar(place[0], 20), polar(place[1], 20)
+    at = boundary.unpolarised(matrix(wi, wo, 1.5))
+    for azimuth in (10.0, 130.0, 250.0):
+        near = polar(place[0] + 1e-5, 20 + azimuth * (place[0] == 0))
+        assert boundary.unpolarised(matrix(near, wo, 1.5)) == pytest.approx(float(at), rel=1e-6)
+
+
+@pytest.mark.parametrize("matrix", MATRICES)
+def test_turning_both_directions_about_the_normal_changes_nothing(matrix):
+    wi, wo = pairs()
+    c, s = np.cos(1.0), np.sin(1.0)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    turned = matrix(wi @ turn.T, wo @ turn.T, 0.65 + 5.6j)
+    here = matrix(wi, wo, 0.65 + 5.6j)
+    assert turned == pytest.approx(here, abs=1e-12 * np.abs(here).max())
+
+
+def test_mirrored_in_the_plane_of_incidence_the_cross_terms_change_sign():
+    wi, wo = polar(50, 0), polar(30, 130)
+    for matrix in MATRICES:
+        there, mirrored = matrix(wi, wo, 1.5), matrix(wi, wo * [1, -1, 1], 1.5)
+        assert mirrored == pytest.approx(REVERSED * there, abs=1e-15)
+        assert abs(there[0, 1]) > 1e-3
+
+
+# ------------------------------------------------------------------------------------- Mueller
+
+
+def test_a_mueller_matrix_does_to_stokes_vectors_what_the_jones_matrix_does_to_fields():
+    rng = np.random.default_rng(1)
+    jones = rng.normal(size=(20, 2, 2)) + 1j * rng.normal(size=(20, 2, 2))
+    field = rng.normal(size=(20, 2)) + 1j * rng.normal(size=(20, 2))
+    after = np.einsum("nij,nj->ni", jones, field)
+    found = np.einsum("nij,nj->ni", boundary.mueller(jones), stokes(field))
+    assert found == pytest.approx(stokes(after), rel=1e-12)
+    assert boundary.mueller(jones)[:, 0, 0] == pytest.approx(boundary.unpolarised(jones))
+
+
+def stokes(field: np.ndarray) -> np.ndarray:
+    """Stokes vectors (n, 4) of fields (n, 2) as `boundary.mueller` has them."""
+    s, p = field[:, 0], field[:, 1]
+    cross = s * p.conj()
+    plus, minus = abs(s) ** 2 + abs(p) ** 2, abs(s) ** 2 - abs(p) ** 2
+    return np.stack([plus, minus, 2 * cross.real, 2 * cross.imag], -1)
+
+
+@pytest.mark.parametrize("index", [1.5, 0.65 + 5.6j])
+def test_a_mirror_s_mueller_matrix_is_mitsuba_s(index):
+    import mitsuba as mi
+
+    mi.set_variant("scalar_spectral_polarized")
+    for theta in (5.0, 45.0, 56.0, 80.0):
+        wi = polar(theta, 70)
+        mine = boundary.mueller(boundary.small_slope(wi, wi * [-1, -1, 1], index))
+        eta = mi.Complex2f(complex(index).real, complex(index).imag)
+        theirs = np.array(mi.mueller.specular_reflection(float(wi[2]), eta))
+        assert mine == pytest.approx(theirs, abs=2e-6)  # single precision
+
+
+@pytest.mark.parametrize("matrix", MATRICES)
+def test_axes_of_stokes_vectors_turn_as_mitsuba_s_do(matrix):
+    # a facet's own matrix, turned by Mitsuba's functions as roughconductor does it
+    import mitsuba as mi
+
+    mi.set_variant("scalar_spectral_polarized")
+    wi, wo = polar(40, 10), polar(38, 195)
+    half = (wi + wo) / np.linalg.norm(wi + wo)
+    cosine = float(wi @ half)
+    facet = mi.mueller.specular_reflection(cosine, mi.Complex2f(0.65, 5.6))
+    s_in, s_out = boundary.polarisation_axes(wi, wo)
+    theirs = np.array(mi.mueller.rotate_mueller_basis(
+        facet,
+        mi.Vector3f(-wi), mi.Vector3f(unit(np.cross(half, -wi))), mi.Vector3f(s_in),
+        mi.Vector3f(wo), mi.Vector3f(unit(np.cross(half, wo))), mi.Vector3f(s_out),
+    ))  # fmt: skip
+    mine = boundary.mueller(matrix(wi, wo, 0.65 + 5.6j))
+    assert abs(theirs[0, 2]) > 1e-3  # there is something to turn
+    # near the mirror both matrices are alike to second order (4e-3); Kirchhoff's exactly
+    tolerance = 5e-6 if matrix is boundary.kirchhoff else 2e-2
+    assert mine / mine[0, 0] == pytest.approx(theirs / theirs[0, 0], abs=tolerance)
+
+
+def unit(vector: np.ndarray) -> np.ndarray:
+    """The vector at length 1."""
+    return vector / np.linalg.norm(vector)
