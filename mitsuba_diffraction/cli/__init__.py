@@ -23,6 +23,9 @@ console                lines on stderr, Mitsuba's among them
 report                 nested plain data as text
 """
 
+from .console import say_error
 from .main import main
+from .output import check_writable
+from .progress import Bar
 
-__all__ = ["main"]
+__all__ = ["Bar", "check_writable", "main", "say_error"]

@@ -87,8 +87,8 @@ def test_frames_that_are_there_are_kept(render):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["-s", "1"], "2 of 2 frames are rendered again because of their samples: of frame_0000.png "
-         "it was the scene's and is 1"),
+        (["-s", "1"], "frames are rendered again because of their samples: of frame_0000.png it "
+         "was the scene's and is 1"),
         (["-D", "around=7"], "their -D around: of frame_0000.png it was None and is 7"),
         (["--exposure", "1"], "their exposure"),
         (["--exr"], "their EXR: of frame_0000.png it is missing"),

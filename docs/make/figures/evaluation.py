@@ -38,7 +38,7 @@ from mitsuba_diffraction.thesis.evaluation.plot import draw
 from mitsuba_diffraction.thesis.methods import FullSpectrum, make, make_all
 
 from . import markers
-from .program import add_measured, exit_code, measured_patch
+from .program import SHOWN, add_measured, exit_code, measured_patch
 
 METHODS = ("default", "flss", "nmm", "pq", "pq-sinc")
 
@@ -69,7 +69,7 @@ class Periods:
     given : period that it is made with, µm, or `None`.
     windows : mean, spread, smallest and largest period of single windows, µm.
     count : number of those windows.
-    documents : period that the documents' procedure finds, µm; NaN if none.
+    thesis : period that the procedure of the thesis finds, µm; NaN if none.
     """
 
     name: str
@@ -77,7 +77,7 @@ class Periods:
     given: float | None
     windows: tuple[float, float, float, float]
     count: int
-    documents: float
+    thesis: float
 
 
 def exact_gratings() -> list[tuple[HeightField, float | None]]:
@@ -111,13 +111,13 @@ def evaluate_patch(
     few = wavelengths[:: max(1, wavelengths.size // 20)]
     found = window_fits(single.table, beam, few, angles, count=windows)
     try:
-        documents = documents_fit(single.table, beam, wavelengths, angles).period
+        thesis = documents_fit(single.table, beam, wavelengths, angles).period
     except DiffractionError:
-        documents = float("nan")
+        thesis = float("nan")
     return Periods(
         patch.name, results, given,
         (found.mean, found.spread, float(found.periods.min()), float(found.periods.max())),
-        windows, documents,
+        windows, thesis,
     )  # fmt: skip
 
 
@@ -151,7 +151,7 @@ def evaluation_figure(patches: Sequence[Periods]) -> Figure:
 def period_table(patches: Sequence[Periods]) -> str:
     """Fitted periods, in nm, as a Markdown table."""
     names = list(patches[0].by_method)
-    header = ("patch", "made with", *names)
+    header = ("patch", "nominal", *(SHOWN.get(name, name) for name in names))
     rows = []
     for patch in patches:
         made = "" if patch.given is None else f"{1e3 * patch.given:.4g}"
@@ -174,23 +174,23 @@ def difference_table(patches: Sequence[Periods]) -> str:
             expected = response.beam.grating_angles(response.wavelengths, patch.given, 1)
             cells.append(f"{_short(float(np.nanmax(np.abs(ridge.angles - expected))))}°")
         rows.append((patch.name, f"{1e3 * patch.given:.4g}", *cells))
-    return markers.table(("patch", "period, nm", *names), rows)
+    return markers.table(("patch", "period, nm", *(SHOWN.get(name, name) for name in names)), rows)
 
 
 def window_table(patches: Sequence[Periods]) -> str:
-    """Periods of single windows and of the documents' procedure, in nm, as a Markdown table."""
+    """Periods of single windows and of the procedure of the thesis, in nm, as a Markdown table."""
     rows = []
     for patch in patches:
         mean, spread, least, most = (1e3 * value for value in patch.windows)
         ensemble = 1e3 * patch.by_method["default"].fit.period
         spread_text = f"± {spread:.2g}" if spread >= 0.01 else "± 0"
-        documents = "" if np.isnan(patch.documents) else f"{1e3 * patch.documents:.5g}"
+        thesis = "" if np.isnan(patch.thesis) else f"{1e3 * patch.thesis:.5g}"
         ends = f"{least:.5g} – {most:.5g}"
-        rows.append((patch.name, f"{ensemble:.5g}", f"{mean:.5g} {spread_text}", ends, documents))
+        rows.append((patch.name, f"{ensemble:.5g}", f"{mean:.5g} {spread_text}", ends, thesis))
     count = patches[0].count
     header = (
         "patch", "ensemble", f"{count} single windows", "smallest – largest",
-        "documents' procedure",
+        "procedure of the thesis",
     )  # fmt: skip
     return markers.table(header, rows)
 

@@ -25,10 +25,7 @@ from mitsuba_diffraction.thesis.sweeps.compiled import Compiled, time_compiled
 from mitsuba_diffraction.thesis.sweeps.run import Step, compared, timed_map
 
 from . import markers
-from .program import add_measured, exit_code, measured_patch
-
-#: The command line's name where the library has another.
-_SHOWN = {"default": "spectral"}
+from .program import SHOWN, add_measured, exit_code, measured_patch
 
 #: What each method leaves out.
 APPROXIMATES = {
@@ -99,7 +96,7 @@ def table(measured: Measured) -> str:
         grating, scale = measured.grating[name], measured.scale[name]
         cost = scale.seconds / measured.scale["flss"].seconds
         rows.append(
-            (f"`{_SHOWN.get(name, name)}`" if name in NAMES else name, text, f"{cost:.2g}",
+            (f"`{SHOWN.get(name, name)}`" if name in NAMES else name, text, f"{cost:.2g}",
              f"{grating.mean:.2g} (× {grating.blueness:.2f})", f"{scale.mean:.2g}")
         )  # fmt: skip
     header = (

@@ -93,7 +93,7 @@ def page(text: str) -> str:
     sections = [
         "# Parameters of `diffraction`",
         "Made by `make parameters` of the text at the top of "
-        "[bsdf.py](../mitsuba_diffraction/bsdf.py). ∂: differentiable, a parameter of "
+        "[bsdf.py](../mitsuba_diffraction/plugin/bsdf.py). ∂: differentiable, a parameter of "
         "`mi.traverse`. Lengths are in µm, wavelengths in nm. In an image file the top row is the "
         "largest y.",
     ]

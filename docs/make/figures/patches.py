@@ -1,4 +1,4 @@
-"""Patches side by side: heights, their distribution and spectrum, and the light that they throw.
+"""Patches side by side: heights, their distribution and spectrum, and the light that they scatter.
 
     python -m docs.make.figures.patches -o docs/images/patches.png \\
         --measured elaphe.png --pixel-size 0.0488 --max-height 0.375

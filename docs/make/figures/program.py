@@ -14,6 +14,9 @@ from mitsuba_diffraction.heights.field import HeightField
 
 Made = TypeVar("Made")
 
+#: What the command line calls a method that the library has under another name.
+SHOWN = {"default": "spectral"}
+
 
 def add_measured(parser: argparse.ArgumentParser, what: str) -> None:
     """Declare the options that name a measured patch; `what` says what becomes of it."""

@@ -23,7 +23,7 @@ from mitsuba_diffraction.heights.gratings import blazed, elaphe_like
 from mitsuba_diffraction.thesis.sweeps import SWEEPS, Sweep, sweep
 
 from . import markers
-from .program import add_measured, exit_code, measured_patch
+from .program import SHOWN, add_measured, exit_code, measured_patch
 
 _LIGHT = Light(30.0)
 
@@ -39,7 +39,7 @@ def numbers(result: Sweep) -> str:
         elif math.isfinite(step.mean):
             cells = [f"{step.mean:.2g}", f"{step.high:.2g}"]
         time = [f"{step.seconds / result.steps[0].seconds:.2g}"] if timed else []
-        rows.append((step.label, *cells, *time))
+        rows.append((SHOWN.get(step.label, step.label), *cells, *time))
     header = ("value", "mean ΔE", "95th percentile")
     return markers.table((*header, "time (first = 1)") if timed else header, rows)
 
@@ -69,7 +69,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             best = next((s for s in result.steps if s.label == result.reference), None)
             sheet = contact_sheet(
                 [step.map for step in result.steps],
-                [step.label for step in result.steps],
+                [SHOWN.get(step.label, step.label) for step in result.steps],
                 title=f"{patch.name}: {kind}",
                 exposure=None if best is None else best.map.exposure(),
             )

@@ -12,9 +12,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from mitsuba_diffraction.cli.console import say_error
-from mitsuba_diffraction.cli.output import check_writable
-from mitsuba_diffraction.cli.progress import Bar
+from mitsuba_diffraction.cli import Bar, check_writable, say_error
 from mitsuba_diffraction.errors import DiffractionError
 
 from .cases import MATERIALS
@@ -33,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     report.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=Path("docs"))
     report.add_argument("--quick", action="store_true", help="a small version, for tests")
     report.set_defaults(run=_report)
-    solve = commands.add_parser("solve", help="make the rigorous solutions anew")
+    solve = commands.add_parser("solve", help="compute the rigorous solutions again")
     solve.add_argument("material", choices=MATERIALS)
     solve.add_argument("--solver", choices=("integral", "coupled_wave"), default="integral")
     solve.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
@@ -51,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         say_error(str(error))
         return 1
     except KeyboardInterrupt:
-        say_error("interrupted; nothing was left half written")
+        say_error("interrupted; nothing half-written was left behind")
         return 130
 
 

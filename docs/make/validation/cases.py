@@ -1,4 +1,4 @@
-"""Which gratings, lights and materials the model is held against rigorous solutions for.
+"""Gratings, lights and materials for which the model is compared with rigorous solutions.
 
 Angles are those of the light's direction in the plane of the grooves' normal, positive towards +x;
 order m leaves at sinθo = mλ/d − sinθi, positive towards +x too. Blazed gratings ascend towards +x:
