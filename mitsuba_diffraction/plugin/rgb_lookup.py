@@ -6,7 +6,6 @@ of all colours of a bin.
 
 from __future__ import annotations
 
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
