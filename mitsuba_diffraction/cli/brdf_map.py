@@ -295,7 +295,7 @@ def _surface(bsdf: Any) -> str:
     table, scale, turn = bsdf.table, bsdf.height_scale[0], bsdf.orientation.degrees[0]
     return "; ".join(
         [
-            "R = 1" if str(bsdf.surface) == "none" else str(bsdf.surface),
+            "R = 1" if str(bsdf.fresnel) == "none" else str(bsdf.fresnel),
             f"{table.coherence}, coherence width {table.coherence_width:g} µm",
             *([f"heights × {scale:g}"] if scale != 1.0 else []),
             *([f"turned by {turn:g}°"] if turn != 0.0 else []),

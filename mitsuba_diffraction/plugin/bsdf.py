@@ -121,7 +121,6 @@ from __future__ import annotations
 
 import functools
 import operator
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -130,31 +129,48 @@ from ..errors import DiffractionError
 from .energy import EnergyBound
 from .frozen import arrays_within, marks
 from .llvm import require_loaded_llvm
+from .pair import Pair, from_patch
 from .parameters import read_parameters
-from .power import variant_light
-from .sampling import COSINE, fold, unfolded
-from .session import enrol
+from .power import power_model
+from .roles import (
+    BSDF,
+    Callback,
+    Colour,
+    Context,
+    Float,
+    Interaction,
+    Mask,
+    Properties,
+    Sample,
+    Spectrum,
+    Vector2f,
+    Vector3f,
+)
+from .sampling import COSINE, fold
 from .shadowing import vcavity
+from .sources import TableProvider, from_cache
+
+#: The component of a context that asks for all of them.
+_ALL = 0xFFFFFFFF
 
 
 class Diffraction(mi.BSDF):
     """Scalar Kirchhoff diffraction of a measured height field."""
 
-    def __init__(self, props: mi.Properties) -> None:
+    def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
         require_loaded_llvm()
         super().__init__(props)
-        parameters = read_parameters(props)
+        parameters = read_parameters(props, provider)
         self.table = parameters.table
         self.heights = parameters.heights
-        self.surface = parameters.reflectance
-        self.nested = parameters.nested
+        self.fresnel = parameters.reflectance
+        self.nested: BSDF = parameters.nested  # or None
         self.height_scale = mi.Float(parameters.height_scale)
         self.orientation = parameters.orientation
         self.layering = parameters.layering
         self.vcavity = parameters.vcavity
-        self.light = variant_light(self.table, parameters.wavelength)
+        self.power = power_model(self.table, parameters.wavelength)
         self._energy = EnergyBound(self.table) if parameters.energy_conserving else None
-        self._record = enrol(self, props.id())
         self._area_factor = 4.0 * dr.pi * self.table.sigma**2  # 4π²σ⁴ over the window's area πσ²
         front = mi.BSDFFlags.FrontSide
         glossy = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.Anisotropic | front
@@ -167,69 +183,117 @@ class Diffraction(mi.BSDF):
 
     # ------------------------------------------------------------------ Mitsuba's interface
 
-    def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+    def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
         """f·cosθo per wavelength."""
         active = self._above(si, wo, active)
+        above, nested = self._lobes(ctx)
         value = mi.Spectrum(0.0)
-        if ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0):
-            value = mi.depolarizer(self._diffraction(si, wo, active))
-        if self.nested is not None:
-            value *= self.layering.above
-            beneath = self.layering.beneath(si, wo, active)
-            value += mi.Spectrum(beneath) * self.nested.eval(ctx, si, wo, active)
+        if above:
+            pair = self._pair(si, wo, active)
+            power = self.power.power(pair, self.height_scale, si)
+            value = self.layering.above * mi.depolarizer(self.diffracted(si, pair, power, active))
+        if nested is not None:
+            beneath = mi.Spectrum(self.layering.beneath(si, wo, active))
+            value += beneath * self.nested.eval(nested, si, wo, active)
         return dr.select(active, value, 0.0)
 
-    def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+    def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
         """Density of `sample` per solid angle."""
         active = self._above(si, wo, active)
-        density = self.density(si, wo, active)
-        if self.nested is not None:
-            beneath = self.nested.pdf(ctx, si, wo, active)
-            density = dr.lerp(beneath, density, self._glossy_share(si, active))
+        above, nested = self._lobes(ctx)
+        density = mi.Float(0.0)
+        if above:
+            pair = self._pair(si, wo, active)
+            density = _with_cosine(self.power.density(pair, self.height_scale, si), wo)
+        if nested is not None:
+            beneath = self.nested.pdf(nested, si, wo, active)
+            density = dr.lerp(beneath, density, self._glossy_share(above, si, active))
         return dr.select(active, density, 0.0)
 
-    def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> tuple[Any, Any]:
+    def eval_pdf(
+        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
+    ) -> tuple[Spectrum, Float]:
         """`eval` and `pdf` at once."""
-        return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+        active = self._above(si, wo, active)
+        above, nested = self._lobes(ctx)
+        value, density = mi.Spectrum(0.0), mi.Float(0.0)
+        if above:
+            pair = self._pair(si, wo, active)
+            power, density = self.power.power_and_density(pair, self.height_scale, si)
+            value = self.layering.above * mi.depolarizer(self.diffracted(si, pair, power, active))
+            density = _with_cosine(density, wo)
+        if nested is not None:
+            beneath = mi.Spectrum(self.layering.beneath(si, wo, active))
+            its_value, its_density = self.nested.eval_pdf(nested, si, wo, active)
+            value += beneath * its_value
+            density = dr.lerp(its_density, density, self._glossy_share(above, si, active))
+        return dr.select(active, value, 0.0), dr.select(active, density, 0.0)
 
     def sample(
-        self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True
-    ) -> tuple[Any, Any]:
-        """A direction, and f·cosθo over its density."""
+        self,
+        ctx: Context,
+        si: Interaction,
+        sample1: Float,
+        sample2: Vector2f,
+        active: Mask = True,
+    ) -> tuple[Sample, Spectrum]:
+        """A direction, and f·cosθo over its density.
+
+        Of what lies beneath, lobes of one direction are returned alone: the diffraction has no
+        share in them. All others are mixed with it, in value and density.
+        """
         active = mi.Mask(active) & (mi.Frame3f.cos_theta(si.wi) > 0.0)
+        above, nested = self._lobes(ctx)
         result = dr.zeros(mi.BSDFSample3f)
         result.eta = 1.0
         result.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
-        glossy = active
-        if self.nested is not None:
-            share = self._glossy_share(si, active)
-            glossy = active & (sample1 < share)
-            remaining = (sample1 - share) / (1.0 - share)
-            result, _ = self.nested.sample(ctx, si, remaining, sample2, active & (sample1 >= share))
-            result.sampled_component += 1
-            sample1 = dr.select(glossy, sample1 / share, sample1)
-            result.eta = dr.select(glossy, 1.0, result.eta)
-            result.sampled_type = dr.select(
-                glossy, mi.UInt32(+mi.BSDFFlags.GlossyReflection), result.sampled_type
-            )
-            result.sampled_component = dr.select(glossy, 0, result.sampled_component)
-        drawn = self.draw(si, sample1, sample2, active)
-        result.wo = dr.select(glossy, drawn, result.wo)
-        value, density = self.eval_pdf(ctx, si, result.wo, active)
-        active &= density > 0.0
+        share, delta, weight = mi.Float(1.0), mi.Mask(False), mi.Spectrum(0.0)
+        if nested is not None:
+            share = self._glossy_share(above, si, active)
+            chosen = active & (sample1 >= share)
+            remaining = (sample1 - share) / dr.select(chosen, 1.0 - share, 1.0)
+            below, weight = self.nested.sample(nested, si, remaining, sample2, chosen)
+            below.sampled_component += 1
+            result = dr.select(chosen, below, result)
+            delta = chosen & mi.has_flag(below.sampled_type, mi.BSDFFlags.Delta)
+            sample1 = dr.select(chosen, sample1, sample1 / dr.select(chosen, 1.0, share))
+        if above:
+            drawn = self._draw(si, sample1, sample2, active)
+            result.wo = drawn if nested is None else dr.select(chosen, result.wo, drawn)
+        value, density = self.eval_pdf(ctx, si, result.wo, active & ~delta)
+        value = value / dr.select(density > 0.0, density, 1.0)
+        if nested is not None:
+            beneath = mi.Spectrum(self.layering.beneath(si, result.wo, delta))
+            value = dr.select(delta, beneath * weight / dr.select(delta, 1.0 - share, 1.0), value)
+            density = dr.select(delta, result.pdf * (1.0 - share), density)
+        active &= (density > 0.0) & (mi.Frame3f.cos_theta(result.wo) > 0.0)
         result.pdf = dr.select(active, density, 0.0)
-        return result, dr.select(active, value / dr.select(active, density, 1.0), 0.0)
+        return result, dr.select(active, value, 0.0)
 
-    def traverse(self, callback: Any) -> None:
+    def eval_diffuse_reflectance(self, si: Interaction, active: Mask = True) -> Spectrum:
+        """What a denoiser takes for the surface's colour: its reflectance at normal incidence.
+
+        That of the interface, and of what lies beneath; 0 to 1, the same from every direction.
+        """
+        reflectance = mi.Spectrum(self.fresnel.reflectance(mi.Float(1.0), si, active))
+        if self.nested is not None:
+            level = mi.SurfaceInteraction3f(si)
+            level.wi = mi.Vector3f(0.0, 0.0, 1.0)
+            beneath = self.layering.beneath(level, level.wi, active)
+            own = self.nested.eval_diffuse_reflectance(level, active)
+            reflectance = self.layering.above * reflectance + mi.Spectrum(beneath) * own
+        return dr.select(active, dr.clip(reflectance, 0.0, 1.0), 0.0)
+
+    def traverse(self, callback: Callback) -> None:
         """Expose what may change between renderings without another table."""
         differentiable = mi.ParamFlags.Differentiable
         callback.put("height_scale", self.height_scale, differentiable)
         self.orientation.traverse(callback)
-        self.surface.traverse(callback)
+        self.fresnel.traverse(callback)
         if self.nested is not None:
             callback.put("nested", self.nested, differentiable)
 
-    def parameters_changed(self, keys: Any) -> None:
+    def parameters_changed(self, keys: list[str]) -> None:
         """Check what changed, and keep it out of the kernels' code.
 
         Raises
@@ -247,8 +311,8 @@ class Diffraction(mi.BSDF):
             self._energy.update(largest, dr.grad_enabled(self.height_scale))
         dr.make_opaque(self.height_scale)
         self.orientation.update()
-        self.surface.update()
-        held = arrays_within(self.light, self._energy, self.orientation, self.surface)
+        self.fresnel.update()
+        held = arrays_within(self.power, self._energy, self.orientation, self.fresnel)
         self._for_freezing = held + marks(self.table, self.vcavity, str(self.layering))
 
     @property
@@ -264,7 +328,7 @@ class Diffraction(mi.BSDF):
             f"  table = {self.table},\n"
             f"  coherence_width = {self.table.coherence_width:g} µm,\n"
             f"  tolerance = {self.table.tolerance:g},\n"
-            f"  surface = {self.surface},\n"
+            f"  surface = {self.fresnel},\n"
             f"  height_scale = {dr.slice(self.height_scale):g},\n"
             f"  energy_conserving = {'false' if self._energy is None else 'true'},\n"
             f"  orientation = {self.orientation},\n"
@@ -275,51 +339,42 @@ class Diffraction(mi.BSDF):
 
     # ------------------------------------------------------------------ the model
 
-    def _above(self, si: Any, wo: Any, active: Any) -> Any:
+    def diffracted(self, si: Interaction, pair: Pair, power: Colour, active: Mask) -> Colour:
+        """R (1 + ωi·ωo)² / (λ² A w² cosθi) · ⟨|P|²⟩, that is f·cosθo of diffraction alone.
+
+        power : what the power model says of this pair of directions.
+        """
+        outside = self._area_factor * dr.square(pair.one_plus_dot / pair.w) / pair.cos_i
+        if self._energy is not None:
+            outside /= self._energy.divisor(pair, self.height_scale)
+        if self.vcavity:
+            outside *= vcavity(pair.cos_i, pair.cos_o, pair.one_plus_dot)
+        reflectance = self.fresnel.reflectance(pair.cos_half, si, active)
+        return dr.select(active, outside * reflectance * power, 0.0)
+
+    def _pair(self, si: Interaction, wo: Vector3f, active: Mask) -> Pair:
+        return Pair(si, wo, self.orientation.rotation(si, active), active)
+
+    def _above(self, si: Interaction, wo: Vector3f, active: Mask) -> Mask:
         cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
         return mi.Mask(active) & (cos_i > 0.0) & (cos_o > 0.0)
 
-    def _diffraction(self, si: Any, wo: Any, active: Any) -> Any:
-        """R (1 + ωi·ωo)² / (λ² A w² cosθi) · ⟨|P|²⟩, that is f·cosθo, for R = 1."""
-        total = si.wi + wo
-        rotation = self.orientation.rotation(si, active)
-        uv = _in_patch(total, rotation)
-        w = dr.select(active, total.z, 1.0)
-        # (1 + ωi·ωo) from the sum's length: accurate for opposite grazing directions too
-        one_plus_dot = 0.5 * dr.squared_norm(total)
-        cos_i = dr.select(active, mi.Frame3f.cos_theta(si.wi), 1.0)
-        outside = self._area_factor * dr.square(one_plus_dot / w) / cos_i
-        scaled_w = w * self.height_scale
-        power = self.light.power(uv, scaled_w, si)
-        if self._energy is not None:
-            incident, outgoing = _in_patch(si.wi, rotation), _in_patch(wo, rotation)
-            outside /= self._energy.divisor(incident, cos_i, outgoing, w - cos_i, self.height_scale)
-        if self.vcavity:
-            outside *= vcavity(cos_i, w - cos_i, one_plus_dot)
-        cos_half = dr.safe_sqrt(0.5 * one_plus_dot)
-        reflectance = self.surface.reflectance(cos_half, si, active)
-        value = dr.select(active, outside * reflectance * power, 0.0)
-        if self._record is not None and self._record[0].listening:
-            session, number = self._record
-            session.hear(number, si, uv, scaled_w, mi.unpolarized_spectrum(value))
-        return value
+    def _lobes(self, ctx: Context) -> tuple[bool, Context | None]:
+        """Whether a context asks for the diffraction, and what it asks of the nested BSDF."""
+        above = ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0)
+        if self.nested is None or ctx.component == 0:
+            return above, None
+        asked = mi.BSDFContext(ctx.mode, ctx.type_mask, ctx.component)
+        if ctx.component != _ALL:
+            asked.component -= 1
+        lobes = range(self.nested.component_count())
+        if not any(asked.is_enabled(self.nested.flags(n) & mi.BSDFFlags.All, n) for n in lobes):
+            return above, None
+        return above, asked
 
-    def density(self, si: Any, wo: Any, active: Any) -> Any:
-        """Density of `draw`: that of the orders, and a little cosine."""
-        rotation = self.orientation.rotation(si, active)
-        orders = self.light.density(
-            _in_patch(si.wi + wo, rotation),
-            _in_patch(mi.Vector2f(si.wi.x, si.wi.y) + unfolded(wo), rotation),
-            mi.Frame3f.cos_theta(si.wi),
-            mi.Frame3f.cos_theta(wo),
-            dr.detach(self.height_scale),
-            si,
-        )
-        return dr.lerp(orders, mi.warp.square_to_cosine_hemisphere_pdf(wo), COSINE)
-
-    def draw(self, si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
+    def _draw(self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask) -> Vector3f:
         """A direction, possibly below the surface (then it has no density and no value)."""
-        uv = self.light.draw(
+        uv = self.power.draw(
             mi.Frame3f.cos_theta(si.wi),
             dr.detach(self.height_scale),
             dr.maximum((sample1 - COSINE) * (1.0 / (1.0 - COSINE)), 0.0),
@@ -327,30 +382,22 @@ class Diffraction(mi.BSDF):
             si,
         )
         rotation = self.orientation.rotation(si, active)
-        ordered = fold(_from_patch(uv, rotation) - mi.Vector2f(si.wi.x, si.wi.y))
+        ordered = fold(from_patch(uv, rotation) - mi.Vector2f(si.wi.x, si.wi.y))
         return dr.select(sample1 < COSINE, mi.warp.square_to_cosine_hemisphere(sample2), ordered)
 
-    def _glossy_share(self, si: Any, active: Any) -> Any:
+    def _glossy_share(self, above: bool, si: Interaction, active: Mask) -> Float:
         """Share of the samples for diffraction where something lies beneath: by reflected power."""
-        reflectance = self.surface.reflectance(mi.Frame3f.cos_theta(si.wi), si, active)
+        if not above:
+            return mi.Float(0.0)
+        reflectance = self.fresnel.reflectance(mi.Frame3f.cos_theta(si.wi), si, active)
         mean = dr.mean(mi.unpolarized_spectrum(reflectance))
         # What lies beneath is taken to return half of what it gets
         return dr.clip(mean / (0.5 + 0.5 * mean), 0.1, 0.9)
 
 
-def _in_patch(direction: Any, rotation: tuple[Any, Any]) -> Any:
-    """A vector's tangential part, turned from the shading frame to the patch's."""
-    cos, sin = rotation
-    return mi.Vector2f(
-        dr.fma(cos, direction.x, sin * direction.y),
-        dr.fma(cos, direction.y, -sin * direction.x),
-    )
-
-
-def _from_patch(q: Any, rotation: tuple[Any, Any]) -> Any:
-    """The inverse of `_in_patch`."""
-    cos, sin = rotation
-    return mi.Vector2f(dr.fma(cos, q.x, -sin * q.y), dr.fma(cos, q.y, sin * q.x))
+def _with_cosine(density: Float, wo: Vector3f) -> Float:
+    """That of the orders, and a little cosine."""
+    return dr.lerp(density, mi.warp.square_to_cosine_hemisphere_pdf(wo), COSINE)
 
 
 mi.register_bsdf("diffraction", Diffraction)

@@ -6,15 +6,17 @@ import os
 from typing import Any
 
 import mitsuba as mi
-import numpy as np
 
 from ..errors import DiffractionError, quoted
 from ..heights.field import HeightField
 
-# By digest, what the patches are that dictionaries were made of: tensors do not carry it. The last
-# few suffice, as dictionaries are loaded soon after they are made.
-_given: dict[str, tuple[str, bool]] = {}
-_REMEMBERED = 256
+
+class HeightData(mi.Object):
+    """A height field that a dictionary of Mitsuba's can hold, with all that it knows of itself."""
+
+    def __init__(self, field: HeightField) -> None:
+        super().__init__()
+        self.field = field
 
 
 def bsdf_dict(field: HeightField | str | os.PathLike[str], **parameters: Any) -> dict[str, Any]:
@@ -23,38 +25,24 @@ def bsdf_dict(field: HeightField | str | os.PathLike[str], **parameters: Any) ->
     Parameters
     ----------
     field : heights in µm; or the path of a file, as for the parameter `heightfield`.
-    parameters : any other parameter of the plugin, e.g. material="Al", tolerance=1e-4.
+    parameters : any other parameter of the plugin, e.g. material="Al", tolerance=1e-4; None is
+        the same as to leave it out.
 
     Returns
     -------
-    dict for `mi.load_dict`, alone or inside a shape. A variant must be set.
+    dict for `mi.load_dict`, alone or inside a shape.
 
     Raises
     ------
     DiffractionError
         If `field` is neither heights nor a path.
     """
+    given = {name: value for name, value in parameters.items() if value is not None}
     if isinstance(field, str | os.PathLike):
-        return {"type": "diffraction", "heightfield": os.fspath(field), **parameters}
+        return {"type": "diffraction", "heightfield": os.fspath(field), **given}
     if not isinstance(field, HeightField):
         raise DiffractionError(
             f"bsdf_dict: expected a HeightField or the path of a file, got {quoted(field)}; make "
             "one of an array with HeightField(heights, pixel_size)"
         )
-    dx, dy = field.pixel_size
-    heights = field.heights.astype(np.float32)
-    _given[HeightField(heights, (dx, dy)).digest()] = (field.name, field.cut_out)
-    while len(_given) > _REMEMBERED:
-        del _given[next(iter(_given))]
-    return {
-        "type": "diffraction",
-        "data": mi.TensorXf(heights),
-        "pixel_size": f"{dx!r}, {dy!r}",
-        **parameters,
-    }
-
-
-def as_given(data: HeightField) -> HeightField:
-    """The heights of a tensor with the name that they had when `bsdf_dict` made it."""
-    name, cut_out = _given.get(data.digest(), (data.name, data.cut_out))
-    return HeightField(data.heights, data.pixel_size, name=name, cut_out=cut_out)
+    return {"type": "diffraction", "data": HeightData(field), **given}

@@ -17,6 +17,7 @@ from ..tables.energy.bound import AZIMUTHAL, LAST_ANGLE, POLAR, SHARE
 from ..tables.store.bounds import BoundsAround, bounds_around
 from ..tables.table import DiffractionTable
 from .memory import index_between, read_record, upload
+from .pair import Pair
 from .roles import Buffer, Float, Index, Vector2f
 
 
@@ -48,22 +49,18 @@ class EnergyBound:
         self._values = upload(mi.Float, low * (1 - share) + high * share)
         self._height_scale = height_scale
 
-    def divisor(
-        self,
-        incident: Vector2f,
-        cos_i: Float,
-        outgoing: Vector2f,
-        cos_o: Float,
-        height_scale: Float,
-    ) -> Float:
-        """max(1, a(ωi), a(ωo)), from tangential parts in the patch's frame and cosines.
+    def divisor(self, pair: Pair, height_scale: Float) -> Float:
+        """max(1, a(ωi), a(ωo)).
 
         height_scale : the one given to `update`; needed where derivatives with respect to it are.
         """
         share = None
         if dr.grad_enabled(height_scale):
             share = (height_scale - self._low) * self._slope
-        return dr.maximum(self._bound(incident, cos_i, share), self._bound(outgoing, cos_o, share))
+        return dr.maximum(
+            self._bound(pair.incident, pair.cos_i, share),
+            self._bound(pair.outgoing, pair.cos_o, share),
+        )
 
     def _corners(self, cell: Index, share: Float | None) -> list[Float]:
         """The bound at a cell's corners; interpolated here only where its derivative is wanted."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 
 from .reflectance import Reflectance
+from .roles import Colour, Interaction, Mask, Vector3f
 
 LAYERINGS = ("transmission", "thesis")
 
@@ -19,13 +20,13 @@ class Transmission:
     A white pair reflects no more than it gets: what f_diffraction sends back is about R(cosθi).
     """
 
-    surface: Reflectance
+    fresnel: Reflectance
     above = 1.0
 
-    def beneath(self, si: Any, wo: Any, active: Any) -> Any:
+    def beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
         """Factor of the nested BSDF."""
-        inwards = 1.0 - self.surface.reflectance(mi.Frame3f.cos_theta(si.wi), si, active)
-        outwards = 1.0 - self.surface.reflectance(mi.Frame3f.cos_theta(wo), si, active)
+        inwards = 1.0 - self.fresnel.reflectance(mi.Frame3f.cos_theta(si.wi), si, active)
+        outwards = 1.0 - self.fresnel.reflectance(mi.Frame3f.cos_theta(wo), si, active)
         return inwards * outwards
 
     def __str__(self) -> str:
@@ -41,7 +42,7 @@ class Blend:
     constant for which it gives no value. A white pair gains energy, towards grazing angles most.
     """
 
-    surface: Reflectance
+    fresnel: Reflectance
     weight: float
 
     @property
@@ -49,11 +50,10 @@ class Blend:
         """Factor of the diffraction."""
         return 1.0 - self.weight
 
-    def beneath(self, si: Any, wo: Any, active: Any) -> Any:
+    def beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
         """Factor of the nested BSDF."""
-        half = si.wi + wo
-        cos_half = mi.Float(0.5) * (half.x**2 + half.y**2 + half.z**2) ** 0.5
-        return 1.0 - self.surface.reflectance(cos_half, si, active) + self.weight
+        cos_half = 0.5 * dr.norm(si.wi + wo)
+        return 1.0 - self.fresnel.reflectance(cos_half, si, active) + self.weight
 
     def __str__(self) -> str:
         return f"thesis[diffuse_weight = {self.weight:g}]"

@@ -184,11 +184,11 @@ def device_table(table: DiffractionTable) -> DeviceTable | RestrictedTable:
     """The table in the current variant's memory, uploaded once for all BSDFs that share it."""
     variants = _uploaded.setdefault(table, {})
     if mi.variant() not in variants:
-        device: DeviceTable | RestrictedTable = DeviceTable(table)
-        if table.coarse is not None:
-            coarse = DeviceTable(table.coarse)
-            device = RestrictedTable(device, coarse, table.radii, table.expansion.kappa_max)
+        device = DeviceTable(table)
         variants[mi.variant()] = device
+        if table.coarse is not None:
+            coarse, kappa_max = DeviceTable(table.coarse), table.expansion.kappa_max
+            variants[mi.variant()] = RestrictedTable(device, coarse, table.radii, kappa_max)
     return variants[mi.variant()]
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import drjit as dr
 import mitsuba as mi
+
+from .roles import Callback, Interaction, Mask, Rotation, Texture
 
 
 class Constant:
@@ -14,12 +14,12 @@ class Constant:
     def __init__(self, degrees: float) -> None:
         self.degrees = mi.Float(degrees)
 
-    def rotation(self, si: Any, active: Any) -> tuple[Any, Any]:
+    def rotation(self, si: Interaction, active: Mask) -> Rotation:
         """(cos, sin) of the angle."""
         sin, cos = dr.sincos(dr.deg2rad(self.degrees))
         return cos, sin
 
-    def traverse(self, callback: Any) -> None:
+    def traverse(self, callback: Callback) -> None:
         """Expose the angle."""
         callback.put("orientation", self.degrees, mi.ParamFlags.Differentiable)
 
@@ -38,10 +38,10 @@ class Textured:
     unit length; where both are 0 the patch is not turned.
     """
 
-    def __init__(self, texture: Any) -> None:
+    def __init__(self, texture: Texture) -> None:
         self.texture = texture
 
-    def rotation(self, si: Any, active: Any) -> tuple[Any, Any]:
+    def rotation(self, si: Interaction, active: Mask) -> Rotation:
         """(cos, sin) of the angle at the surface point."""
         value = self.texture.eval_3(si, active)
         length = dr.sqrt(dr.square(value.x) + dr.square(value.y))
@@ -49,7 +49,7 @@ class Textured:
         scale = dr.rcp(dr.select(turned, length, 1.0))
         return dr.select(turned, value.x * scale, 1.0), dr.select(turned, value.y * scale, 0.0)
 
-    def traverse(self, callback: Any) -> None:
+    def traverse(self, callback: Callback) -> None:
         """Expose the texture."""
         callback.put("orientation", self.texture, mi.ParamFlags.Differentiable)
 

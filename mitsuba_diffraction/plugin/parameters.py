@@ -7,7 +7,6 @@ import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
 
 import mitsuba as mi
 
@@ -19,8 +18,15 @@ from ..tables.table import DiffractionTable
 from .layers import LAYERINGS, Blend, Layering, Transmission
 from .orientation import Constant, Orientation, Textured
 from .reflectance import Conductor, Dielectric, Perfect, Reflectance
+from .roles import BSDF, Properties
 from .shadowing import SHADOWINGS
-from .sources import heights_of_file, heights_of_tensor, table_of_file, table_of_heights
+from .sources import (
+    TableProvider,
+    heights_of_file,
+    heights_of_tensor,
+    table_of_file,
+    table_of_heights,
+)
 
 SOURCES = ("heightfield", "table", "data")
 READING = tuple(field.name for field in fields(LoadOptions))
@@ -73,11 +79,11 @@ class Parameters:
     vcavity: bool
     layering: Layering
     wavelength: float
-    nested: Any | None
+    nested: BSDF | None
 
 
-def read_parameters(props: Any) -> Parameters:
-    """Check everything, and get the table: loaded, from the cache, or built.
+def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
+    """Check everything, and get the table: loaded, or from what provides those of heights.
 
     Raises
     ------
@@ -100,7 +106,7 @@ def read_parameters(props: Any) -> Parameters:
             f"a nested BSDF lies beneath a surface that lets no light through (material="
             f"'{reflectance}'); give int_ior instead, or remove the nested BSDF"
         )
-    table, heights = _table(props, height_scale)
+    table, heights = _table(props, height_scale, provider)
     return Parameters(
         table=table,
         heights=heights,
@@ -115,7 +121,9 @@ def read_parameters(props: Any) -> Parameters:
     )
 
 
-def _table(props: Any, height_scale: float) -> tuple[DiffractionTable, Callable[[], HeightField]]:
+def _table(
+    props: Properties, height_scale: float, provider: TableProvider
+) -> tuple[DiffractionTable, Callable[[], HeightField]]:
     given = [name for name in SOURCES if name in props]
     if len(given) != 1:
         raise DiffractionError(
@@ -133,11 +141,11 @@ def _table(props: Any, height_scale: float) -> tuple[DiffractionTable, Callable[
     value = props.get(given[0])
     if given[0] == "data":
         heights = heights_of_tensor(value, options)
-        return table_of_heights(heights, asked, height_scale), lambda: heights
+        return table_of_heights(heights, asked, height_scale, provider), lambda: heights
     if not isinstance(value, str):
         raise DiffractionError(f"{given[0]}={value!r} must be the name of a file")
     path = _found(value, given[0])
-    table = table_of_file(path, given[0] == "table", options, asked, height_scale)
+    table = table_of_file(path, given[0] == "table", options, asked, height_scale, provider)
     return table, lambda: heights_of_file(path, given[0] == "table", options)
 
 
@@ -161,7 +169,7 @@ def _found(name: str, parameter: str) -> Path:
     )
 
 
-def _wavelength(props: Any, table: DiffractionTable) -> float:
+def _wavelength(props: Properties, table: DiffractionTable) -> float:
     """The wavelength of mono variants in nm: a scene for all variants may give it in all."""
     wavelength = _number(props, "wavelength", DEFAULT_WAVELENGTH)
     shortest, longest = table.wavelength_range
@@ -172,7 +180,7 @@ def _wavelength(props: Any, table: DiffractionTable) -> float:
     return wavelength
 
 
-def _reflectance(props: Any) -> Reflectance:
+def _reflectance(props: Properties) -> Reflectance:
     conductor = [n for n in ("material", "eta", "k") if n in props]
     dielectric = [n for n in ("int_ior", "ext_ior") if n in props]
     if conductor and dielectric:
@@ -196,7 +204,7 @@ def _reflectance(props: Any) -> Reflectance:
     return Dielectric(iors.get("int_ior", 1.5), iors.get("ext_ior", 1.000277))
 
 
-def _index(props: Any, name: str) -> float | str:
+def _index(props: Properties, name: str) -> float | str:
     value = props.get(name)
     if isinstance(value, str):
         return value
@@ -207,7 +215,7 @@ def _index(props: Any, name: str) -> float | str:
     return float(value)
 
 
-def _refuse_unknown(props: Any, objects: Collection[str]) -> None:
+def _refuse_unknown(props: Properties, objects: Collection[str]) -> None:
     for name in props.keys():  # noqa: SIM118 - Properties is no mapping
         if name in NAMES or name in objects or name == "id":
             continue
@@ -216,7 +224,7 @@ def _refuse_unknown(props: Any, objects: Collection[str]) -> None:
         raise DiffractionError(f"unknown parameter '{name}'; {hint}Allowed: {', '.join(NAMES)}")
 
 
-def _orientation(props: Any) -> Orientation:
+def _orientation(props: Properties) -> Orientation:
     objects = dict(props.objects())
     if "orientation" in objects:
         texture = objects["orientation"]
@@ -229,7 +237,7 @@ def _orientation(props: Any) -> Orientation:
     return Constant(_number(props, "orientation", 0.0))
 
 
-def _layering(props: Any, reflectance: Reflectance, nested: bool) -> Layering:
+def _layering(props: Properties, reflectance: Reflectance, nested: bool) -> Layering:
     if _choice(props, "layering", LAYERINGS) == "transmission":
         if "diffuse_weight" in props:
             raise DiffractionError("diffuse_weight belongs to layering='thesis'; leave it out")
@@ -242,7 +250,7 @@ def _layering(props: Any, reflectance: Reflectance, nested: bool) -> Layering:
     return Blend(reflectance, weight)
 
 
-def _choice(props: Any, name: str, choices: tuple[str, ...]) -> str:
+def _choice(props: Properties, name: str, choices: tuple[str, ...]) -> str:
     """One of some words; the first is the default."""
     value = props.get(name, choices[0])
     if value not in choices:
@@ -250,14 +258,14 @@ def _choice(props: Any, name: str, choices: tuple[str, ...]) -> str:
     return str(value)
 
 
-def _flag(props: Any, name: str, default: bool) -> bool:
+def _flag(props: Properties, name: str, default: bool) -> bool:
     value = props.get(name, default)
     if not isinstance(value, bool):
         raise DiffractionError(f"{name}={value!r} must be true or false")
     return value
 
 
-def _number(props: Any, name: str, default: float) -> float:
+def _number(props: Properties, name: str, default: float) -> float:
     if name not in props:
         return default
     value = props.get(name)

@@ -1,24 +1,46 @@
-"""What a variant of Mitsuba knows of a wavelength: four of them a ray, a fixed one, or colours.
+"""The diffracted power in a variant's own channels, and a density to draw directions from.
 
-The BSDF asks for two things here, the diffracted power in the variant's own channels and a density
-to draw directions from, and is the same for all variants otherwise.
+The BSDF asks for these two, and is the same for all variants otherwise. This is the model of
+variants with wavelengths, `rgb_power` that of variants with colours.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Protocol
 
 import drjit as dr
 import mitsuba as mi
 
 from ..tables.table import DiffractionTable
 from .lookup import device_table
-from .rgb_power import Colours, rgb_light
+from .pair import Pair
+from .rgb_power import rgb_power
+from .roles import Colour, Float, Interaction, Vector2f
 from .sampling import order_sampler
 
 
-class Wavelengths:
+class PowerModel(Protocol):
+    """What the BSDF asks of the diffracted power."""
+
+    def power(self, pair: Pair, height_scale: Float, si: Interaction) -> Colour:
+        """⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm², per channel."""
+
+    def density(self, pair: Pair, height_scale: Float, si: Interaction) -> Float:
+        """Density per solid angle of drawing ωo: by `draw`, then `sampling.fold`."""
+
+    def power_and_density(
+        self, pair: Pair, height_scale: Float, si: Interaction
+    ) -> tuple[Colour, Float]:
+        """Both at once."""
+
+    def draw(
+        self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
+    ) -> Vector2f:
+        """The tangential part of an ωi + ωo in the patch's frame, from three uniform numbers."""
+
+
+class SpectralPower:
     """Spectral variants, whose rays carry wavelengths, and mono variants, which have one for all.
 
     Parameters
@@ -37,47 +59,42 @@ class Wavelengths:
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
-    def power(self, uv: Any, scaled_w: Any, si: Any) -> Any:
-        """⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm² per channel, mi.UnpolarizedSpectrum.
+    def power(self, pair: Pair, height_scale: Float, si: Interaction) -> Colour:
+        """See `PowerModel.power`."""
+        scaled_w = pair.w * height_scale
 
-        uv : tangential part of ωi + ωo in the patch's frame.
-        scaled_w : normal part times height_scale.
-        """
+        def of_wavelength(k: Float) -> tuple[Float, Float]:
+            return self._power(k, pair, scaled_w), mi.Float(0.0)
 
-        def of_wavelength(wavelength: Any) -> Any:
-            k = dr.rcp(wavelength) * (2e3 * dr.pi)
-            power = self.device.window_sum(k * uv.x, k * uv.y, k * scaled_w)
-            return power * dr.square(k * (0.5 / dr.pi))
+        differentiable = dr.grad_enabled(pair.uv, scaled_w)
+        return mi.UnpolarizedSpectrum(self._each(of_wavelength, si, differentiable)[0])
 
-        wavelengths = self._wavelengths(si)
-        return mi.UnpolarizedSpectrum(
-            _each(of_wavelength, wavelengths, dr.grad_enabled(uv, scaled_w))
-        )
+    def density(self, pair: Pair, height_scale: Float, si: Interaction) -> Float:
+        """See `PowerModel.density`; the mean of all wavelengths'."""
 
-    def density(
-        self, uv: Any, folded: Any, cos_i: Any, cos_o: Any, height_scale: Any, si: Any
-    ) -> Any:
-        """Density per solid angle of an ωo that `draw` gives with its uv, or with `folded`.
+        def of_wavelength(k: Float) -> tuple[Float, Float]:
+            return mi.Float(0.0), self._density(k, pair, height_scale)
 
-        folded : the ωi + ωo beyond the horizon which `sampling.fold` makes the same ωo of.
-        """
+        differentiable = dr.grad_enabled(pair.uv, pair.cos_i, pair.cos_o)
+        return self._each(of_wavelength, si, differentiable)[1]
 
-        def of_wavelength(wavelength: Any) -> Any:
-            k = dr.rcp(wavelength) * (2e3 * dr.pi)
-            strategy = self._sampler.strategy(k, cos_i, height_scale)
-            direct = self._sampler.density(k * uv.x, k * uv.y, *strategy)
-            beyond = self._sampler.density(k * folded.x, k * folded.y, *strategy)
-            return dr.fma(direct, cos_o, 0.5 * beyond) * dr.square(k)
+    def power_and_density(
+        self, pair: Pair, height_scale: Float, si: Interaction
+    ) -> tuple[Colour, Float]:
+        """See `PowerModel.power_and_density`."""
+        scaled_w = pair.w * height_scale
 
-        wavelengths = self._wavelengths(si)
-        densities = _each(of_wavelength, wavelengths, dr.grad_enabled(uv, cos_i, cos_o))
-        return sum(densities, mi.Float(0.0)) * (1.0 / len(densities))
+        def of_wavelength(k: Float) -> tuple[Float, Float]:
+            return self._power(k, pair, scaled_w), self._density(k, pair, height_scale)
 
-    def draw(self, cos_i: Any, height_scale: Any, sample1: Any, sample2: Any, si: Any) -> Any:
-        """The tangential part of an ωi + ωo in the patch's frame, for a wavelength drawn too.
+        differentiable = dr.grad_enabled(pair.uv, scaled_w, pair.cos_i, pair.cos_o)
+        powers, density = self._each(of_wavelength, si, differentiable)
+        return mi.UnpolarizedSpectrum(powers), density
 
-        sample1 : 0 … 1, uniform.
-        """
+    def draw(
+        self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
+    ) -> Vector2f:
+        """See `PowerModel.draw`; for a wavelength that is drawn too."""
         wavelengths = self._wavelengths(si)
         count = len(wavelengths)
         hero = dr.clip(mi.UInt32(sample1 * count), 0, count - 1)
@@ -88,31 +105,53 @@ class Wavelengths:
         remaining = sample1 * count - hero
         return self._sampler.draw(k, cos_i, height_scale, remaining, sample2) * dr.rcp(k)
 
-    def _wavelengths(self, si: Any) -> list[Any]:
+    def _power(self, k: Float, pair: Pair, scaled_w: Float) -> Float:
+        power = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w)
+        return power * dr.square(k * (0.5 / dr.pi))
+
+    def _density(self, k: Float, pair: Pair, height_scale: Float) -> Float:
+        strategy = self._sampler.strategy(k, pair.cos_i, dr.detach(height_scale))
+        direct = self._sampler.density(k * pair.uv.x, k * pair.uv.y, *strategy)
+        beyond = self._sampler.density(k * pair.folded.x, k * pair.folded.y, *strategy)
+        return dr.fma(direct, pair.cos_o, 0.5 * beyond) * dr.square(k)
+
+    def _wavelengths(self, si: Interaction) -> list[Float]:
         if not mi.is_spectral:
             return [self._fixed]
         return [si.wavelengths[n] for n in range(len(si.wavelengths))]
 
+    def _each(
+        self,
+        function: Callable[[Float], tuple[Float, Float]],
+        si: Interaction,
+        differentiable: bool,
+    ) -> tuple[list[Float], Float]:
+        """What function(k) gives first for each wavelength, and the mean of what it gives second.
 
-def variant_light(table: DiffractionTable, wavelength: float) -> Wavelengths | Colours:
-    """The light of the current variant."""
-    if mi.is_rgb:
-        return rgb_light(table)
-    return Wavelengths(table, wavelength)
+        In a loop, which makes a smaller and faster kernel. Derivatives do not flow through loops
+        without further ado, so then it is unrolled; so it is where there is no kernel.
+        """
+        wavenumbers = [dr.rcp(wavelength) * (2e3 * dr.pi) for wavelength in self._wavelengths(si)]
+        count = len(wavenumbers)
+        first, second = [mi.Float(0.0)] * count, mi.Float(0.0)
+        if differentiable or count == 1 or not dr.is_jit_v(mi.Float):
+            for n, k in enumerate(wavenumbers):
+                first[n], more = function(k)
+                second = second + more
+            return first, second * (1.0 / count)
+
+        def body(
+            n: Float, inputs: list[Float], first: list[Float], second: Float
+        ) -> tuple[Float, list[Float], list[Float], Float]:
+            value, more = function(inputs[0])
+            return n + 1, [*inputs[1:], inputs[0]], [*first[1:], value], second + more
+
+        first = [mi.Float(0.0) for _ in first]
+        state = (mi.UInt32(0), wavenumbers, first, second)
+        _, _, first, second = dr.while_loop(state, lambda n, *_: n < count, body)
+        return first, second * (1.0 / count)
 
 
-def _each(function: Callable[[Any], Any], inputs: list[Any], differentiable: bool) -> list[Any]:
-    """function(λ) for each wavelength: in a loop, which makes a smaller and faster kernel.
-
-    Derivatives do not flow through loops without further ado, so then it is unrolled; so it is
-    where there is no kernel.
-    """
-    if differentiable or len(inputs) == 1 or not dr.is_jit_v(mi.Float):
-        return [function(wavelength) for wavelength in inputs]
-
-    def body(n: Any, inputs: list[Any], outputs: list[Any]) -> tuple[Any, list[Any], list[Any]]:
-        result = function(inputs[0])
-        return n + 1, [*inputs[1:], inputs[0]], [*outputs[1:], result]
-
-    state = (mi.UInt32(0), inputs, [mi.Float(0.0) for _ in inputs])
-    return dr.while_loop(state, lambda n, *_: n < len(inputs), body)[2]
+def power_model(table: DiffractionTable, wavelength: float) -> PowerModel:
+    """That of the current variant."""
+    return rgb_power(table) if mi.is_rgb else SpectralPower(table, wavelength)

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import difflib
 from pathlib import Path
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from .roles import BSDF, Callback, Colour, Float, Interaction, Mask, Texture
 from .traversal import children
 
 
 class Perfect:
     """R = 1 at every angle, `material="none"`."""
 
-    def reflectance(self, cos_theta: Any, si: Any, active: Any) -> Any:
+    def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R for the cosine (mi.Float) of the angle to the half vector, mi.UnpolarizedSpectrum."""
         return mi.UnpolarizedSpectrum(1.0)
 
-    def traverse(self, callback: Any) -> None:
+    def traverse(self, callback: Callback) -> None:
         """Nothing to expose."""
 
     def update(self) -> None:
@@ -39,11 +39,11 @@ class Dielectric:
         self.eta = mi.Float(mi.traverse(probe)["eta"])
         dr.make_opaque(self.eta)
 
-    def reflectance(self, cos_theta: Any, si: Any, active: Any) -> Any:
+    def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R for the cosine of the angle to the half vector, the same at every wavelength."""
         return mi.UnpolarizedSpectrum(mi.fresnel(cos_theta, self.eta)[0])
 
-    def traverse(self, callback: Any) -> None:
+    def traverse(self, callback: Callback) -> None:
         """Expose the relative index of refraction."""
         callback.put("eta", self.eta, mi.ParamFlags.Differentiable)
 
@@ -58,7 +58,7 @@ class Dielectric:
 class Conductor:
     """Fresnel reflectance of a conductor, eta and k as textures over wavelength."""
 
-    def __init__(self, eta: Any, k: Any, name: str) -> None:
+    def __init__(self, eta: Texture, k: Texture, name: str) -> None:
         self.eta, self.k, self.name = eta, k, name
 
     @classmethod
@@ -72,7 +72,7 @@ class Conductor:
             objects = {name: _at(material, name, wavelength) for name in ("eta", "k")}
         return cls(objects["eta"], objects["k"], material)
 
-    def reflectance(self, cos_theta: Any, si: Any, active: Any) -> Any:
+    def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R for the cosine of the angle to the half vector, at si.wavelengths."""
         eta, k = self.eta.eval(si, active), self.k.eval(si, active)
         return mi.UnpolarizedSpectrum(
@@ -82,7 +82,7 @@ class Conductor:
             ]
         )
 
-    def traverse(self, callback: Any) -> None:
+    def traverse(self, callback: Callback) -> None:
         """Expose both spectra."""
         callback.put("eta", self.eta, mi.ParamFlags.Differentiable)
         callback.put("k", self.k, mi.ParamFlags.Differentiable)
@@ -97,7 +97,7 @@ class Conductor:
 Reflectance = Perfect | Dielectric | Conductor
 
 
-def _load(plugin: str, **parameters: Any) -> Any:
+def _load(plugin: str, **parameters: float | str) -> BSDF:
     """One of Mitsuba's own BSDFs, which know the names of materials."""
     try:
         return mi.load_dict({"type": plugin, **parameters})
@@ -134,7 +134,7 @@ def _conductors() -> list[str]:
     )
 
 
-def _at(material: str, name: str, wavelength: float) -> Any:
+def _at(material: str, name: str, wavelength: float) -> Texture:
     """Part of a material's index at one wavelength, as a texture."""
     file = str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd"))
     nodes, values = np.loadtxt(file).T

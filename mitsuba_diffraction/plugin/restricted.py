@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from .roles import Float, Index, Mask
 
-def within(qx: Any, qy: Any, radii: tuple[float, float]) -> Any:
+if TYPE_CHECKING:
+    from .lookup import DeviceTable
+
+
+def within(qx: Float, qy: Float, radii: tuple[float, float]) -> Mask:
     """Whether frequencies lie in an ellipse, to rounding in single precision."""
     return dr.square(qx * (1.0 / radii[0])) + dr.square(qy * (1.0 / radii[1])) <= 1.0 + 2e-6
 
@@ -41,17 +46,17 @@ class RestrictedTable:
     """
 
     def __init__(
-        self, fine: Any, coarse: Any, radii: tuple[float, float], kappa_max: float
+        self, fine: DeviceTable, coarse: DeviceTable, radii: tuple[float, float], kappa_max: float
     ) -> None:
         self.fine, self.coarse = fine, coarse
         self._radii, self._kappa_max = radii, kappa_max * (1 + 1e-6)
         self._jit = dr.is_jit_v(mi.Float)
-        self._count: Any = mi.UInt32(0)
-        self._farthest: Any = mi.Float(0.0)
-        self._deepest: Any = mi.Float(0.0)
+        self._count: Index = mi.UInt32(0)
+        self._farthest: Float = mi.Float(0.0)
+        self._deepest: Float = mi.Float(0.0)
         self.take()
 
-    def window_sum(self, qx: Any, qy: Any, kappa: Any) -> Any:
+    def window_sum(self, qx: Float, qy: Float, kappa: Float) -> Float:
         """See `DeviceTable.window_sum`."""
         square = dr.square(qx) + dr.square(qy)
         inside = within(qx, qy, self._radii) & (kappa <= self._kappa_max)
@@ -65,7 +70,7 @@ class RestrictedTable:
         # A NaN, as from a degenerate mesh, is no look-up, and stays one
         outside = ~inside & dr.isfinite(square) & dr.isfinite(kappa)
 
-        def beyond(qx: Any, qy: Any, kappa: Any, result: Any) -> Any:
+        def beyond(qx: Float, qy: Float, kappa: Float, result: Float) -> Float:
             far = dr.detach(dr.square(qx) + dr.square(qy))
             # Not a copy of the counters a thread, as Dr.Jit would choose for small arrays: a frozen
             # function that is called again brings counters without them
@@ -85,7 +90,7 @@ class RestrictedTable:
             lambda qx, qy, kappa, result: result,
         )
 
-    def order_0(self, kappa: Any) -> Any:
+    def order_0(self, kappa: Float) -> Float:
         """See `DeviceTable.order_0`."""
         return dr.select(
             kappa <= self._kappa_max, self.fine.order_0(kappa), self.coarse.order_0(kappa)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import weakref
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -18,16 +17,18 @@ from ..tables.colour.table import ColourTable
 from ..tables.store.cache import cached_colours
 from ..tables.table import DiffractionTable
 from .memory import index_between, read, upload
+from .pair import Pair
 from .rgb_lookup import ColourLookup
+from .roles import Buffer, Colour, Float, Index, Interaction, Vector2f
 from .sampling import BELOW_ONE, invert, order_0_share
 
-_lights: weakref.WeakKeyDictionary[DiffractionTable, dict[str, Colours]] = (
+_models: weakref.WeakKeyDictionary[DiffractionTable, dict[str, RGBPower]] = (
     weakref.WeakKeyDictionary()
 )
 
 
-class Colours:
-    """The interface of `plugin.light.Wavelengths` for variants without wavelengths."""
+class RGBPower:
+    """The `power.PowerModel` of variants without wavelengths, which are summed."""
 
     def __init__(self, table: ColourTable) -> None:
         self._lookup = ColourLookup(table)
@@ -44,18 +45,23 @@ class Colours:
         # 1/(2·variance) of the lobes in (u, v)
         self._sharpness = [(2.0 * math.pi * table.sigma / lam) ** 2 for lam in LOBES]
 
-    def power(self, uv: Any, scaled_w: Any, si: Any) -> Any:
-        """See `Wavelengths.power`; the wavelengths are summed."""
-        return self._lookup.colour(uv, scaled_w)
+    def power(self, pair: Pair, height_scale: Float, si: Interaction) -> Colour:
+        """See `PowerModel.power`."""
+        return self._lookup.colour(pair.uv, pair.w * height_scale)
 
-    def density(
-        self, uv: Any, folded: Any, cos_i: Any, cos_o: Any, height_scale: Any, si: Any
-    ) -> Any:
-        """See `Wavelengths.density`."""
-        strategy = self._strategy(cos_i, height_scale)
-        return dr.fma(self._density(uv, *strategy), cos_o, 0.5 * self._density(folded, *strategy))
+    def density(self, pair: Pair, height_scale: Float, si: Interaction) -> Float:
+        """See `PowerModel.density`."""
+        strategy = self._strategy(pair.cos_i, dr.detach(height_scale))
+        direct, beyond = (self._density(uv, *strategy) for uv in (pair.uv, pair.folded))
+        return dr.fma(direct, pair.cos_o, 0.5 * beyond)
 
-    def _density(self, uv: Any, share: Any, band: Any) -> Any:
+    def power_and_density(
+        self, pair: Pair, height_scale: Float, si: Interaction
+    ) -> tuple[Colour, Float]:
+        """See `PowerModel.power_and_density`."""
+        return self.power(pair, height_scale, si), self.density(pair, height_scale, si)
+
+    def _density(self, uv: Vector2f, share: Float, band: Index) -> Float:
         """Density of `draw` per du dv."""
         squared_radius = dr.squared_norm(uv)
         glossy = mi.Float(0.0)
@@ -76,8 +82,10 @@ class Colours:
         cell = dr.select(inside, cell * mi.Float(count) / dr.select(inside, area, 1.0), 0.0)
         return dr.lerp(cell, glossy, share)
 
-    def draw(self, cos_i: Any, height_scale: Any, sample1: Any, sample2: Any, si: Any) -> Any:
-        """The tangential part of an ωi + ωo in the patch's frame."""
+    def draw(
+        self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
+    ) -> Vector2f:
+        """See `PowerModel.draw`."""
         share, band = self._strategy(cos_i, height_scale)
         lobe = dr.clip(sample1 / share * len(self._sharpness), 0, len(self._sharpness) - 1)
         lobe = mi.UInt32(lobe)
@@ -100,7 +108,7 @@ class Colours:
             sample1 < share, mi.Vector2f(glossy), mi.Vector2f(radius * cos, radius * sin)
         )
 
-    def _strategy(self, cos_i: Any, height_scale: Any) -> tuple[Any, Any]:
+    def _strategy(self, cos_i: Float, height_scale: Float) -> tuple[Float, Index]:
         """Share of the samples that order 0 gets, and the band of the other orders."""
         bands = BANDS / (BANDED * self._z_max)
         band = mi.UInt32(index_between(height_scale * (cos_i + 0.5) * bands, 0.0, BANDS - 1.0))
@@ -110,18 +118,18 @@ class Colours:
         share = order_0_share(brightness, cos_i)
         return dr.select(read(mi.Float, self._occupied, band) > 0.0, share, 1.0), band
 
-    def _ring(self, ring: Any) -> tuple[Any, Any]:
+    def _ring(self, ring: Index) -> tuple[Index, Index]:
         """First bin of a ring, and its azimuths."""
         start = self._coordinates.start(ring)
         return start, self._coordinates.start(ring + 1) - start - 1
 
-    def _difference(self, sums: Any, index: Any) -> Any:
+    def _difference(self, sums: Buffer, index: Index) -> Float:
         return read(mi.Float, sums, index + 1) - read(mi.Float, sums, index)
 
 
-def rgb_light(table: DiffractionTable) -> Colours:
+def rgb_power(table: DiffractionTable) -> RGBPower:
     """The colours in the current variant's memory, shared by all BSDFs of the table."""
-    variants = _lights.setdefault(table, {})
+    variants = _models.setdefault(table, {})
     if mi.variant() not in variants:
-        variants[mi.variant()] = Colours(cached_colours(table))
+        variants[mi.variant()] = RGBPower(cached_colours(table))
     return variants[mi.variant()]

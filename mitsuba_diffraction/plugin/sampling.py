@@ -16,7 +16,6 @@ weights would have no bound. Meanwhile frequencies just beyond the horizon belon
 from __future__ import annotations
 
 import weakref
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -26,6 +25,7 @@ from ..tables.sampling.proposals import BANDED, BANDS, proposals
 from ..tables.table import DiffractionTable
 from .lookup import device_table
 from .memory import index_between, read, upload
+from .roles import Buffer, Float, Index, Vector2f, Vector3f
 
 #: Share of the samples drawn from the cosine density.
 COSINE = 0.03
@@ -61,7 +61,7 @@ class OrderSampler:
         """Size in memory."""
         return 4 * sum(len(a) for a in (self._row_sums, self._column_sums, self._occupied))
 
-    def strategy(self, k: Any, cos_i: Any, height_scale: Any) -> tuple[Any, Any]:
+    def strategy(self, k: Float, cos_i: Float, height_scale: Float) -> tuple[Float, Index]:
         """Share of the samples that order 0 gets, and the band of the other orders."""
         band = mi.UInt32(
             index_between(
@@ -73,7 +73,7 @@ class OrderSampler:
             read(mi.Float, self._occupied, band) > 0.0, order_0_share(power, cos_i), 1.0
         ), band
 
-    def density(self, qx: Any, qy: Any, share: Any, band: Any) -> Any:
+    def density(self, qx: Float, qy: Float, share: Float, band: Index) -> Float:
         """Density of drawing the frequency (qx, qy), per (rad/µm)²."""
         variance = self._sigma**2
         glossy = variance / dr.pi * dr.exp(-variance * (dr.square(qx) + dr.square(qy)))
@@ -87,7 +87,9 @@ class OrderSampler:
         cell = dr.select(inside, cell * (1.0 / self._cell**2), 0.0)
         return dr.lerp(cell, glossy, share)
 
-    def draw(self, k: Any, cos_i: Any, height_scale: Any, sample1: Any, sample2: Any) -> Any:
+    def draw(
+        self, k: Float, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f
+    ) -> Vector2f:
         """A frequency (mi.Vector2f, rad/µm) for wavenumber k from three uniform numbers."""
         share, band = self.strategy(k, cos_i, height_scale)
         sample2 = dr.minimum(sample2, BELOW_ONE)
@@ -100,11 +102,11 @@ class OrderSampler:
         position += mi.Vector2f(self._origin[0], self._origin[1])
         return dr.select(sample1 < share, mi.Vector2f(glossy), position)
 
-    def _difference(self, sums: Any, index: Any) -> Any:
+    def _difference(self, sums: Buffer, index: Index) -> Float:
         return read(mi.Float, sums, index + 1) - read(mi.Float, sums, index)
 
 
-def order_0_share(power: Any, cos_i: Any) -> Any:
+def order_0_share(power: Float, cos_i: Float) -> Float:
     """Share of the samples for order 0, from its share of the power towards the mirror direction.
 
     Other directions see a larger κ, towards the normal (1 + cosθi)/(2 cosθi) times as large, and
@@ -116,7 +118,7 @@ def order_0_share(power: Any, cos_i: Any) -> Any:
     return dr.clip(share, LEAST_SHARE, 1.0 - LEAST_SHARE)
 
 
-def fold(tangential: Any) -> Any:
+def fold(tangential: Vector2f) -> Vector3f:
     """A unit vector from its tangential part; one from beyond the horizon is laid near it.
 
     Beyond the horizon, ρ² = |tangential|² > 1, the direction has the same azimuth and
@@ -131,14 +133,16 @@ def fold(tangential: Any) -> Any:
     )
 
 
-def unfolded(direction: Any) -> Any:
+def unfolded(direction: Vector3f) -> Vector2f:
     """The tangential part beyond the horizon that `fold` makes this direction of."""
     sin_squared = dr.maximum(1.0 - dr.square(direction.z), _SMALLEST)
     scale = dr.sqrt((1.0 + direction.z) * dr.rcp(sin_squared))
     return mi.Vector2f(direction.x * scale, direction.y * scale)
 
 
-def invert(sums: Any, start: Any, count: Any, most: int, sample: Any) -> tuple[Any, Any]:
+def invert(
+    sums: Buffer, start: Index, count: Index | int, most: int, sample: Float
+) -> tuple[Index, Float]:
     """Index whose cumulative interval holds the sample, and where in it (0 … 1).
 
     Parameters

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +21,29 @@ from ..heights.options import LoadOptions
 from ..heights.read import is_recipe, treat
 from ..heights.recipes import Recipe
 from ..tables.exr import is_table
-from ..tables.store.cache import cached_table, content_key, loaded_table
+from ..tables.store.cache import cached_table, loaded_table
 from ..tables.table import DiffractionTable
-from .dictionary import as_given
-from .session import note_table, restricted_arguments, timed
+from .dictionary import HeightData
 
 #: A table serves heights scaled by up to this times max(1, height_scale).
 HEIGHT_SCALE_ROOM = 1.5
 #: Mitsuba samples its spectral variants' wavelengths from here on, nm.
 SHORTEST_WAVELENGTH = 360.0
+
+#: Gets the table of heights by their digest, from `DiffractionTable.build`'s arguments and from
+#: what builds it of such arguments.
+TableProvider = Callable[
+    [str, dict[str, Any], Callable[[dict[str, Any]], DiffractionTable]], DiffractionTable
+]
+
+
+def from_cache(
+    digest: str,
+    arguments: dict[str, Any],
+    build: Callable[[dict[str, Any]], DiffractionTable],
+) -> DiffractionTable:
+    """The `TableProvider` of all scenes that are not being planned."""
+    return cached_table(digest, arguments, lambda: build(arguments))
 
 
 def table_of_file(
@@ -37,6 +52,7 @@ def table_of_file(
     options: LoadOptions,
     asked: Mapping[str, Any],
     height_scale: float,
+    provider: TableProvider,
 ) -> DiffractionTable:
     """The table that a file is or makes: a table, a recipe, or a height field of any format.
 
@@ -47,6 +63,7 @@ def table_of_file(
     options : how to read heights.
     asked : parameters of `DiffractionTable.build` that the scene sets.
     height_scale : the largest factor on the heights that is asked for.
+    provider : gets the tables of heights.
     """
     if must_be_table or is_table(path):
         table = loaded_table(path)
@@ -63,6 +80,7 @@ def table_of_file(
             lambda: recipe.fields(options),
             {**recipe.table_arguments(), **asked},
             height_scale,
+            provider,
         )
     else:
         table = _built(
@@ -70,6 +88,7 @@ def table_of_file(
             lambda: [load_heights(path, options)],
             asked,
             height_scale,
+            provider,
         )
     _warn(table)
     return table
@@ -94,13 +113,20 @@ def heights_of_file(path: Path, must_be_table: bool, options: LoadOptions) -> He
 
 
 def heights_of_tensor(data: Any, options: LoadOptions) -> HeightField:
-    """Heights (ny, nx) in µm, given as an array.
+    """Heights (ny, nx) in µm, given as an array, or as what `bsdf_dict` makes of a HeightField.
 
     Raises
     ------
     DiffractionError
         If pixel_size is missing, max_height is given, or the array holds no heights.
     """
+    if isinstance(data, HeightData):
+        given = replace(options, crop=None, level=None, clip=None, periodic=None).given()
+        if given:
+            raise DiffractionError(
+                f"{next(iter(given))} is for files; a HeightField has its own already"
+            )
+        return treat(data.field, options)
     if options.max_height is not None:
         raise DiffractionError("max_height is for images; the heights in data are in µm already")
     if options.pixel_size is None:
@@ -108,15 +134,15 @@ def heights_of_tensor(data: Any, options: LoadOptions) -> HeightField:
     values = np.array(data, np.float64)
     if values.ndim == 3 and values.shape[2] == 1:
         values = values[..., 0]
-    return treat(as_given(HeightField(values, options.pixel_size, name="data")), options)
+    return treat(HeightField(values, options.pixel_size, name="data"), options)
 
 
 def table_of_heights(
-    heights: HeightField, asked: Mapping[str, Any], height_scale: float
+    heights: HeightField, asked: Mapping[str, Any], height_scale: float, provider: TableProvider
 ) -> DiffractionTable:
     """The table of a height field."""
     digest = heights.digest() + (" cut out" if heights.cut_out else "")  # warned of otherwise
-    table = _built(digest, lambda: [heights], asked, height_scale)
+    table = _built(digest, lambda: [heights], asked, height_scale, provider)
     _warn(table, heights.name)
     return table
 
@@ -126,19 +152,15 @@ def _built(
     load: Callable[[], list[HeightField]],
     asked: Mapping[str, Any],
     height_scale: float,
+    provider: TableProvider,
 ) -> DiffractionTable:
-    arguments = {**asked, "height_scale_max": HEIGHT_SCALE_ROOM * max(1.0, height_scale)}
-    key = content_key(digest, arguments)
-    restricted = restricted_arguments(key, arguments)
-
-    def build() -> DiffractionTable:
+    def build(arguments: dict[str, Any]) -> DiffractionTable:
         heights = load()
         mi.Log(mi.LogLevel.Info, f"diffraction: building the table of {heights[0].name}")
-        return DiffractionTable.build(heights, **restricted)
+        return DiffractionTable.build(heights, **arguments)
 
-    table = cached_table(digest, restricted, timed(key, build))
-    note_table(key, table)
-    return table
+    arguments = {**asked, "height_scale_max": HEIGHT_SCALE_ROOM * max(1.0, height_scale)}
+    return provider(digest, arguments, build)
 
 
 def _warn(table: DiffractionTable, name: str | None = None) -> None:

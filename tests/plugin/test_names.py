@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import pytest
 
 from mitsuba_diffraction.plugin.names import name_of, own_id
-from mitsuba_diffraction.plugin.session import Session, enrol
 
 
 class Element:
@@ -46,12 +43,3 @@ def test_without_an_id_it_is_the_file_or_the_kind_and_place(element, number, nam
 
 def test_ids_that_mitsuba_makes_up_are_none():
     assert [own_id(given) for given in ("foil", "_unnamed_12", "")] == ["foil", "", ""]
-
-
-def test_a_session_calls_a_bsdf_without_id_by_its_heights():
-    bsdf = SimpleNamespace(table=SimpleNamespace(source={"name": "grating.npy"}))
-    with Session() as session:
-        enrol(bsdf, "_unnamed_3")
-        enrol(bsdf, "foil")
-    names = [name for name, _ in session.bsdfs]
-    assert names == ["a diffraction BSDF without id (of grating.npy)", "foil"]

@@ -36,5 +36,5 @@ def saved_bsdf(table: str | os.PathLike[str], **parameters: Any) -> Any:
 def documents_bsdf(table: str | os.PathLike[str], **parameters: Any) -> Any:
     """The same, looked up by `documents.TermImages`; the table is a coherent Taylor series."""
     bsdf = saved_bsdf(table, **parameters)
-    bsdf.light.device = TermImages(bsdf.table)
+    bsdf.power.device = TermImages(bsdf.table)
     return bsdf

@@ -162,7 +162,7 @@ def _by_plugin(bsdf: Any, sample: Sample) -> NDArray[np.float64]:
     """The window sums (n,) that the plugin finds, all in single precision."""
     k = 2e3 * np.pi / sample.wavelength
     total = mi.Vector3f((sample.wi + sample.wo).T)
-    device = bsdf.light.device
+    device = bsdf.power.device
     wavenumber = mi.Float(k)
     found = device.window_sum(wavenumber * total.x, wavenumber * total.y, wavenumber * total.z)
     return np.array(found, float)

@@ -123,7 +123,7 @@ def pack_surface(material: Material) -> Packed:
     if hasattr(bsdf.layering, "weight"):
         definitions["THESIS"] = ""
         uniforms["diffuse_weight"] = float(bsdf.layering.weight)
-    return packed | _reflectance(bsdf.surface)
+    return packed | _reflectance(bsdf.fresnel)
 
 
 def height_scale(material: Material) -> float:

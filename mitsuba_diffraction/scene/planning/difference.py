@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from ...optics.colour import delta_e, linear_srgb
 from ...plugin.sampling import forget_sampler
-from ...plugin.session import Session
 from ...progress import Progress
 from ...tables.table import DiffractionTable
 from .plan import Plan
+from .session import Session
 
 #: Width at most, and samples per pixel.
 WIDTH, SPP = 160, 64

@@ -9,13 +9,13 @@ from typing import Any
 import drjit as dr
 
 from ...errors import DiffractionError
-from ...plugin.session import Session
 from ...progress import Progress
 from ...tables.table import DiffractionTable
 from .difference import Difference, difference
 from .domain import LookupStatistics, domain_for
 from .paths import Seen, trace
 from .plan import Plan, PlannedTable
+from .session import Session
 
 Load = Callable[[], Any]
 

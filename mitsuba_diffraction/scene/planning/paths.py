@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...optics.colour import response
-from ...plugin.session import Session
+from .session import Session
 
 #: Longest paths that are followed, vertices and camera included.
 MOST_BOUNCES = 12
@@ -193,12 +193,12 @@ def _follow(
         asked.time = mi.Float(lane)  # no BSDF looks at the time: it tells which lane a call is of
         sample, radiance = scene.sample_emitter_direction(si, sampler.next_2d(), True, active)
         lit = active & (sample.pdf > 0.0) & dr.any(radiance > 0.0)
-        value, by_bsdf, heard = _listened(session, bsdf, context, asked, si.to_local(sample.d), lit)
+        value, by_bsdf, heard = _recorded(session, bsdf, context, asked, si.to_local(sample.d), lit)
         share = dr.select(sample.delta, 1.0, _heuristic(sample.pdf, by_bsdf))
         direct = dr.select(lit, throughput * radiance * value * share, 0.0)
         drawn, weight = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(), active)
         delta = mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta)
-        onward, _, heard_on = _listened(session, bsdf, context, asked, drawn.wo, active & ~delta)
+        onward, _, heard_on = _recorded(session, bsdf, context, asked, drawn.wo, active & ~delta)
         vertices.append(
             _Vertex(
                 _lanes(direct, paths), heard, _lanes(value, paths),
@@ -216,16 +216,16 @@ def _follow(
     return wavelengths, vertices, emitted, turns
 
 
-def _listened(
+def _recorded(
     session: Session, bsdf: Any, context: Any, si: Any, wo: Any, active: Any
 ) -> tuple[Any, Any, list[Any]]:
     """eval and pdf, and what BSDFs of ours were asked."""
-    session.listen(dr.width(si))
+    session.start(dr.width(si))
     try:
         value, pdf = bsdf.eval_pdf(context, si, wo, active)
         dr.eval(value, pdf)
     finally:
-        heard = session.heard()
+        heard = session.records()
     return mi.unpolarized_spectrum(value), pdf, heard
 
 

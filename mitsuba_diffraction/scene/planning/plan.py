@@ -56,7 +56,7 @@ class Plan:
     tables: Mapping[str, PlannedTable] = field(default_factory=dict)
 
     def limits(self) -> dict[str, dict[str, Any]]:
-        """What `plugin.session.Session` follows."""
+        """What `session.Session` follows."""
         return {
             key: table.domain.arguments()
             for key, table in self.tables.items()

@@ -1,12 +1,13 @@
-"""What a scene is loaded with, beyond its own parameters: a plan to follow, or a record to keep.
+"""What a scene is loaded with beyond its own parameters: a plan to follow, or a record to keep.
 
-A BSDF cannot be given more than its scene says. A session that is open while a scene loads is
-asked by every `diffraction` plugin which part of its table the scene needs, and may have the
-plugin record what it is asked. Scenes load in several threads, so it is one for the process.
+A BSDF cannot be given more than its scene says. While a session is open, the plugin `diffraction`
+makes BSDFs that get their tables from it, as the plan restricts them, and that it has recorded:
+then as `RecordedDiffraction`, which writes down every look-up.
 """
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -17,10 +18,15 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DiffractionError
-from ..tables.table import DiffractionTable
-from .names import own_id
-from .sampling import share_sampler
+from ...errors import DiffractionError
+from ...plugin.names import own_id
+from ...plugin.pair import Pair
+from ...plugin.roles import BSDF, Colour, Float, Interaction, Mask, Properties, Vector2f
+from ...plugin.sampling import share_sampler
+from ...tables.store.cache import cached_table, content_key
+from ...tables.table import DiffractionTable
+
+_one_at_a_time = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -54,14 +60,13 @@ class Session:
     sample_like : tables by the key of another, which is to draw directions as they do: pictures of
         both then differ by what they look up, and by nothing else.
     timing : build tables that the cache may have, too, and note how long that takes.
-    recording : whether BSDFs are to record what they are asked, between `listen` and `heard`.
+    recording : whether BSDFs are to record what they are asked, between `start` and `records`.
 
     Attributes
     ----------
     tables : key of every table that was built from heights, in the order of loading.
     seconds : that each took to build, with `timing`.
     bsdfs : every `diffraction` BSDF that was loaded, with its name for people.
-    listening : whether calls are recorded at the moment.
     """
 
     limits: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
@@ -71,44 +76,78 @@ class Session:
     tables: dict[str, DiffractionTable] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     bsdfs: list[tuple[str, Any]] = field(default_factory=list)
-    listening: bool = False
     _buffers: list[list[Any]] = field(default_factory=list)
 
     def __enter__(self) -> Self:
-        global _open
-        if _open is not None:
+        if not _one_at_a_time.acquire(blocking=False):
             raise DiffractionError("a scene is being planned already; load one at a time")
-        _open = self
+        mi.register_bsdf("diffraction", self._make)
         return self
 
     def __exit__(self, *_: object) -> None:
-        global _open
-        _open = None
+        from ...plugin.bsdf import Diffraction
+
+        mi.register_bsdf("diffraction", Diffraction)
+        _one_at_a_time.release()
+
+    def _make(self, props: Properties) -> BSDF:
+        bsdf = _kind(self)(props, self.table)
+        self.register(bsdf, props.id())
+        return bsdf
 
     def key_of(self, table: DiffractionTable) -> str | None:
         """The key of a table, or None for one that came from a file."""
         return next((key for key, mine in self.tables.items() if mine is table), None)
 
-    def listen(self, lanes: int) -> None:
+    def register(self, bsdf: BSDF, given: str) -> None:
+        """Note a BSDF that was loaded, by its id or else by its heights."""
+        heights = bsdf.table.source.get("name") or "heights without a name"
+        name = own_id(given) or f"a diffraction BSDF without id (of {heights})"
+        self.bsdfs.append((name, bsdf))
+
+    def table(
+        self,
+        digest: str,
+        arguments: dict[str, Any],
+        build: Callable[[dict[str, Any]], DiffractionTable],
+    ) -> DiffractionTable:
+        """The table of heights with this digest, as far as the plan needs it."""
+        key = content_key(digest, arguments)
+        restricted = {**arguments, **self.limits.get(key, {})}
+        made = []
+        if self.timing:
+            start = time.perf_counter()
+            made.append(build(restricted))
+            self.seconds[key] = time.perf_counter() - start
+        table = cached_table(digest, restricted, lambda: made[0] if made else build(restricted))
+        self.tables[key] = table
+        if key in self.sample_like:
+            share_sampler(table, self.sample_like[key])
+        return table
+
+    def start(self, lanes: int) -> None:
         """Record from now on what `lanes` lanes ask, each a BSDF once at most."""
         channels = len(dr.zeros(mi.UnpolarizedSpectrum))
         self._buffers = [
             [dr.opaque(mi.Float, 0.0, lanes) for _ in range(3 + channels)] for _ in self.bsdfs
         ]
-        self.listening = True
 
-    def hear(self, bsdf: int, si: Any, uv: Any, scaled_w: Any, value: Any) -> None:
+    def record(
+        self, bsdf: BSDF, si: Interaction, uv: Vector2f, scaled_w: Float, value: Colour
+    ) -> None:
         """Keep what a BSDF was asked and what it answered; for the BSDF to call."""
+        if not self._buffers:
+            return
+        number = next(n for n, (_, mine) in enumerate(self.bsdfs) if mine is bsdf)
         lane = mi.UInt32(si.time)
         columns = (uv.x, uv.y, scaled_w, *value)
-        buffers = self._buffers[bsdf]
+        buffers = self._buffers[number]
         lit = dr.any(value > 0.0) & (lane < dr.width(buffers[0]))
         for buffer, column in zip(buffers, columns, strict=True):
             dr.scatter(buffer, mi.Float(column), lane, lit)
 
-    def heard(self) -> list[Recorded]:
+    def records(self) -> list[Recorded]:
         """What was recorded; nothing more is."""
-        self.listening = False
         found = []
         for number, buffers in enumerate(self._buffers):
             u, v, w, *value = (np.array(buffer) for buffer in buffers)
@@ -125,39 +164,19 @@ class Session:
         self.tables.clear()
 
 
-_open: Session | None = None
+def _kind(session: Session) -> type[BSDF]:
+    """The plugin of the current variant; one that records, where the session does."""
+    from ...plugin.bsdf import Diffraction
 
+    if not session.recording:
+        return Diffraction
 
-def restricted_arguments(key: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """The arguments to build a table with, as the open session has them restricted."""
-    if _open is None:
-        return dict(arguments)
-    return {**arguments, **_open.limits.get(key, {})}
+    class RecordedDiffraction(Diffraction):
+        """Writes down every look-up of `eval` and `eval_pdf`."""
 
+        def diffracted(self, si: Interaction, pair: Pair, power: Colour, active: Mask) -> Colour:
+            value = super().diffracted(si, pair, power, active)
+            session.record(self, si, pair.uv, pair.w * self.height_scale, value)
+            return value
 
-def timed(key: str, build: Callable[[], DiffractionTable]) -> Callable[[], DiffractionTable]:
-    """How to get a table that the cache has not; built at once where time is taken."""
-    if _open is None or not _open.timing:
-        return build
-    start = time.perf_counter()
-    table = build()
-    _open.seconds[key] = time.perf_counter() - start
-    return lambda: table
-
-
-def note_table(key: str, table: DiffractionTable) -> None:
-    """Tell the open session which table a key stands for."""
-    if _open is not None:
-        _open.tables[key] = table
-        if key in _open.sample_like:
-            share_sampler(table, _open.sample_like[key])
-
-
-def enrol(bsdf: Any, given: str) -> tuple[Session, int] | None:
-    """Tell the open session of a BSDF, by its id or else by its heights; what it records with."""
-    if _open is None:
-        return None
-    heights = bsdf.table.source.get("name") or "heights without a name"
-    name = own_id(given) or f"a diffraction BSDF without id (of {heights})"
-    _open.bsdfs.append((name, bsdf))
-    return (_open, len(_open.bsdfs) - 1) if _open.recording else None
+    return RecordedDiffraction

@@ -1,0 +1,69 @@
+"""What the model asks of a pair of directions, in the patch's frame (Dr.Jit)."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import drjit as dr
+import mitsuba as mi
+
+from .roles import Float, Interaction, Mask, Rotation, Vector2f, Vector3f
+from .sampling import unfolded
+
+
+class Pair:
+    """ωi and ωo, both on the surface's front; where they are not active, harmless ones.
+
+    Attributes
+    ----------
+    cos_i, cos_o : of the angles to the normal.
+    uv : tangential part of ωi + ωo, in the patch's frame.
+    w : its normal part.
+    one_plus_dot : 1 + ωi·ωo.
+    """
+
+    def __init__(self, si: Interaction, wo: Vector3f, rotation: Rotation, active: Mask) -> None:
+        self._wi, self._wo, self._rotation = si.wi, wo, rotation
+        total = si.wi + wo
+        self.uv = in_patch(total, rotation)
+        self.w = dr.select(active, total.z, 1.0)
+        # from the sum's length: accurate for opposite grazing directions too
+        self.one_plus_dot = 0.5 * dr.squared_norm(total)
+        self.cos_i = dr.select(active, mi.Frame3f.cos_theta(si.wi), 1.0)
+        self.cos_o = dr.select(active, mi.Frame3f.cos_theta(wo), 1.0)
+
+    @property
+    def cos_half(self) -> Float:
+        """Cosine of the angle between either direction and the half vector."""
+        return dr.safe_sqrt(0.5 * self.one_plus_dot)
+
+    @cached_property
+    def incident(self) -> Vector2f:
+        """Tangential part of ωi, in the patch's frame."""
+        return in_patch(self._wi, self._rotation)
+
+    @cached_property
+    def outgoing(self) -> Vector2f:
+        """Tangential part of ωo, in the patch's frame."""
+        return in_patch(self._wo, self._rotation)
+
+    @cached_property
+    def folded(self) -> Vector2f:
+        """Tangential part of the ωi + ωo beyond the horizon which `fold` makes the same ωo of."""
+        tangential = mi.Vector2f(self._wi.x, self._wi.y) + unfolded(self._wo)
+        return in_patch(tangential, self._rotation)
+
+
+def in_patch(direction: Vector2f | Vector3f, rotation: Rotation) -> Vector2f:
+    """A vector's tangential part, turned from the shading frame to the patch's."""
+    cos, sin = rotation
+    return mi.Vector2f(
+        dr.fma(cos, direction.x, sin * direction.y),
+        dr.fma(cos, direction.y, -sin * direction.x),
+    )
+
+
+def from_patch(q: Vector2f, rotation: Rotation) -> Vector2f:
+    """The inverse of `in_patch`."""
+    cos, sin = rotation
+    return mi.Vector2f(dr.fma(cos, q.x, -sin * q.y), dr.fma(cos, q.y, sin * q.x))
