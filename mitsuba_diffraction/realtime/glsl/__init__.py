@@ -12,13 +12,11 @@ packing      tables as textures
 thesis       the methods of the thesis as textures
 textures     what a shader reads, as plain NumPy
 source       the shaders' text
-context      OpenGL without a window
+context      OpenGL without a window: programs, textures, pictures to draw into
 prepared     a method's tables and programs
-target       a picture to draw into
 timing       how long fragments take
 viewer       a window on a scene (extra `view`)
 panel        its panel
-screenshots  numbered files of what it shows
 navigation   the camera and the light, moved by hand
 """
 

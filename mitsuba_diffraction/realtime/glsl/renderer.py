@@ -13,6 +13,7 @@ from ...tables.store.bounds import cached_bound
 from .camera import Camera
 from .context import (
     Bindings,
+    Target,
     check_version,
     clock_of,
     headless_context,
@@ -25,7 +26,6 @@ from .packing import pack_bounds, pack_responses
 from .prepared import Prepared, window
 from .scene import RealtimeScene, load, read_scene
 from .source import LIGHTS
-from .target import Target
 from .textures import Uniform
 
 Image = NDArray[np.float32]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -131,9 +132,7 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
         material = read_material(shape.bsdf(), omissions, name, lighting.mean_spectrum)
         vertices = _vertices(triangles, material, shape)
         surfaces.append(Surface(name, vertices, material, shape, len(omissions) == before))
-    positions = [s.vertices[:, :3] for s in surfaces]
-    low = np.min([p.min(axis=0) for p in positions], axis=0).astype(float)
-    high = np.max([p.max(axis=0) for p in positions], axis=0).astype(float)
+    low, high = box_of([s.vertices[:, :3] for s in surfaces])
     return RealtimeScene(
         tuple(surfaces), camera, lighting, low, high, (*omissions, *lighting.omissions)
     )
@@ -146,9 +145,15 @@ def _middle(triangles: list[Triangles]) -> Array:
             "nothing in the scene diffracts that could be shown; give a mesh, rectangle, sphere, "
             "disk or cylinder a <bsdf type='diffraction'>"
         )
-    low = np.min([t.positions.min(axis=0) for t in triangles], axis=0)
-    high = np.max([t.positions.max(axis=0) for t in triangles], axis=0)
-    return np.asarray(0.5 * (low + high), np.float64)
+    low, high = box_of([t.positions for t in triangles])
+    return 0.5 * (low + high)
+
+
+def box_of(positions: Sequence[NDArray[np.floating]]) -> tuple[Array, Array]:
+    """The lowest and highest corner (3,) of a box around all positions (n, 3)."""
+    low = np.min([p.min(axis=0) for p in positions], axis=0)
+    high = np.max([p.max(axis=0) for p in positions], axis=0)
+    return low.astype(float), high.astype(float)
 
 
 def _vertices(triangles: Triangles, material: Material, shape: Any) -> NDArray[np.float32]:

@@ -11,14 +11,16 @@ from typing import Any
 import moderngl_window
 import numpy as np
 from imgui_bundle import imgui
+from numpy.typing import NDArray
+from PIL import Image
 
+from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...optics.colour import encode_srgb
 from ..comparison.progressive import Progressive
 from .navigation import Orbit, dragged
 from .panel import TITLE, PanelWindow
 from .renderer import Renderer
-from .screenshots import write_screenshot
 from .source import METHODS, THESIS_METHODS
 
 HELP = (
@@ -308,3 +310,24 @@ def open_viewer(kind: type[Viewer], arguments: list[str]) -> Viewer:
             "use ssh -X, or render pictures with 'compare'"
         ) from error
     return viewer
+
+
+def write_screenshot(shown: NDArray[np.floating], folder: Path, stem: str) -> Path:
+    """Write a picture as `stem_000.png`, or the next number that is free.
+
+    Parameters
+    ----------
+    shown : (height, width, 3) sRGB, 0 to 1; what is beyond is cut.
+
+    Raises
+    ------
+    DiffractionError
+        If it cannot be written.
+    """
+    number = 0
+    while (path := folder / f"{stem}_{number:03d}.png").exists():
+        number += 1
+    eight_bits = (np.clip(shown, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    with atomic_path(path) as temporary:
+        Image.fromarray(eight_bits).save(temporary)
+    return path

@@ -17,7 +17,7 @@ from ...tables.table import DiffractionTable
 from ..glsl.lights import light_definitions
 from ..glsl.materials import height_scale, pack_albedo_bounds, pack_surface
 from ..glsl.packing import pack_responses
-from ..glsl.scene import RealtimeScene
+from ..glsl.scene import RealtimeScene, box_of
 from ..glsl.source import fragment_source, vertex_source
 from ..glsl.textures import Packed, Texture
 from .geometry import packed_mesh, sections_of
@@ -122,7 +122,7 @@ def web_scene(
             "offset": list(scene.camera.offset),
         },
         "box": [scene.low.tolist(), scene.high.tolist()],
-        "subject": _box([s.vertices[:, :3] for s in scene.diffracting]),
+        "subject": [x.tolist() for x in box_of([s.vertices[:, :3] for s in scene.diffracting])],
     }
     lit = light_definitions(len(lights), any(x != 0.0 for x in header["sky"]))
     _add_programs(header, surfaces, shown, packed, lit)
@@ -238,9 +238,3 @@ def _zenith(sky: NDArray[np.float64]) -> list[float]:
     """The brightest of a sky: its own where it lights one half, the mean where it is all around."""
     slope = np.linalg.norm(sky[1:], axis=0)
     return [float(x) for x in np.maximum(sky[0] + slope, 0.0)]
-
-
-def _box(positions: Sequence[NDArray[np.float32]]) -> list[list[float]]:
-    low = np.min([p.min(axis=0) for p in positions], axis=0)
-    high = np.max([p.max(axis=0) for p in positions], axis=0)
-    return [low.tolist(), high.tolist()]

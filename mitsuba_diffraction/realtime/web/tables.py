@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...progress import Progress
 from ...tables.colour.colour_difference import colour_loss, power_loss
+from ...tables.energy.powers import power_series
 from ...tables.store.cache import cached_colours
 from ...tables.table import DiffractionTable
 from ..glsl.packing import pack_colours, pack_powers
-from ..glsl.textures import Packed
-from .rounding import power_table, rounded_colours, rounded_table
+from ..glsl.textures import Packed, shortened
 from .sections import Section, packed_array
 
 #: What a page can draw with.
@@ -48,15 +49,21 @@ class WebTable:
 
 
 def web_table(method: str, table: DiffractionTable, digits: int) -> WebTable:
-    """A table with fewer digits, for one of `WEB_METHODS`."""
+    """A table with fewer binary digits, for one of `WEB_METHODS`; not `spectral` where coherent."""
     if method == "lut":
         colours = cached_colours(table)
-        fewer = rounded_colours(colours, digits)
+        # halves that the shader can read
+        coefficients = shortened(rounded(colours.coefficients, digits)).astype(np.float16)
+        fewer = replace(colours, coefficients=coefficients, order_0=shortened(colours.order_0))
         packed, loss = pack_colours(fewer), colour_loss(colours, fewer)
         width = fewer.coefficients.shape[-1] // 2  # two numbers a word
     else:
-        powers = power_table(table)
-        less = rounded_table(powers, digits)
+        series, order_0, scale, expansion = power_series(table)
+        powers = replace(
+            table, coefficients=series[:, :, :, None], order_0=order_0[:, None], scale=scale,
+            expansion=expansion,
+        )  # fmt: skip
+        less = replace(powers, coefficients=rounded(powers.coefficients, digits))
         packed, loss = pack_powers(less), power_loss(powers, less)
         width = 4 * int(packed.definitions["TEXELS"])
     sections = {}
@@ -66,6 +73,18 @@ def web_table(method: str, table: DiffractionTable, digits: int) -> WebTable:
             as_columns(texture.data, width if texture.data.size > _LARGE else channels)
         )
     return WebTable(packed, sections, (float(loss.mean()), float(np.percentile(loss, 99.0))))
+
+
+def rounded(values: NDArray[np.floating], bits: int) -> NDArray[np.float16]:
+    """Each row (…, n) rounded to multiples of 2^-bits of its largest number's power of two.
+
+    A row is one series: what is added up has one absolute error. As half floats the results end in
+    zeros, which compress.
+    """
+    exact = values.astype(np.float32)
+    largest = np.abs(exact).max(axis=-1, keepdims=True)
+    step = np.exp2(np.ceil(np.log2(np.maximum(largest, 2.0**-24))) - bits)
+    return (np.round(exact / step) * step).astype(np.float16)
 
 
 def as_columns(data: Any, width: int) -> Any:

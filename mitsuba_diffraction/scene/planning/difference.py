@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ...optics.colour import delta_e, linear_srgb
 from ...plugin.sampling import forget_sampler
-from ...progress import Progress
 from ...tables.table import DiffractionTable
 from .plan import Plan
 from .session import Session
@@ -39,39 +38,36 @@ class Difference:
     spp: int
 
 
+Picture = tuple[NDArray[np.float64], bool]
+
+
 def difference(
-    scene: Any,
+    whole: Picture,
     tables: Mapping[str, DiffractionTable],
     load: Callable[[], Any],
     plan: Plan,
     sensor: Callable[[Any], Any],
-    tell: Progress,
 ) -> Difference:
-    """Render both ways, small, with the same random numbers and the same directions drawn.
+    """Render with planned tables, with the random numbers and directions of the whole ones.
 
     Parameters
     ----------
-    scene, tables : with whole tables, and those by key.
+    whole, tables : `small_picture` of the scene with whole tables, and those by key.
     load : loads the scene anew, in the variant that is set.
     plan : what it is to be loaded with.
     sensor : the sensor of a scene.
-    tell : called as tell(done, total, text).
     """
-    whole = {key: tables[key] for key in plan.limits()}
-    session = Session(limits=plan.limits(), sample_like=whole)
+    like = {key: tables[key] for key in plan.limits()}
+    session = Session(limits=plan.limits(), sample_like=like)
     with session:
         planned = load()
     try:
-        pictures = []
-        for n, other in enumerate((scene, planned)):
-            tell(n, 2, "comparing pictures")
-            pictures.append(_picture(other, sensor(other)))
-        tell(2, 2, "comparing pictures")
+        second, _ = small_picture(planned, sensor(planned))
     finally:
         for table in session.tables.values():
             forget_sampler(table)
         session.close()
-    (first, xyz), (second, _) = pictures
+    first, xyz = whole
     mean = float(first.mean())
     values = np.full(1, np.nan)
     if xyz:
@@ -87,7 +83,7 @@ def difference(
     )
 
 
-def _picture(scene: Any, sensor: Any) -> tuple[NDArray[np.float64], bool]:
+def small_picture(scene: Any, sensor: Any) -> Picture:
     """A small picture (height, width, channels), and whether it is in XYZ."""
     film = sensor.film()
     size = np.array(film.size(), int)

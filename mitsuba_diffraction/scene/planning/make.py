@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,7 +12,7 @@ import drjit as dr
 from ...errors import DiffractionError
 from ...progress import Progress
 from ...tables.table import DiffractionTable
-from .difference import Difference, difference
+from .difference import Difference, difference, small_picture
 from .domain import LookupStatistics, domain_for
 from .paths import Seen, trace
 from .plan import Plan, PlannedTable
@@ -23,6 +24,10 @@ Load = Callable[[], Any]
 WORTH = 0.8
 #: A picture that differs by more than the tolerance is planned anew with a smaller share outside.
 ATTEMPTS, TIGHTER = 3, 0.3
+#: No further one is drafted if a third of the light outside leaves more than this of the error.
+HELPS = 0.8
+#: Share of its terms that a table with a larger tolerance keeps at least.
+FEWEST_TERMS = 0.5
 #: A plan is refused where this many times its tolerance lies outside: paths differ from the last.
 MOST_OUTSIDE = 3.0
 
@@ -244,20 +249,43 @@ def find_plan(
 
     Orders that cells average may be far apart, as those of gratings are, and a flat surface under
     one light asks between them: the light outside then says little of the error, so it is measured.
+    Nothing is built where light asks for nearly all of every table, and where less light outside
+    does not help, no further plan is drafted.
     """
-    share = tolerance
+    share, before, whole = tolerance, math.inf, None
     for _ in range(ATTEMPTS):
+        drafted = promising(draft_plan(name, loaded, tolerance, share), loaded)
+        if not drafted.limits():
+            return TestedPlan(drafted, dict(loaded.session.tables), {}, None)
         tell(0, 0, "building tables")
-        drafted = draft_plan(name, loaded, tolerance, share)
         session = load_planned(load, drafted, timing=timing)[1]
         planned, seconds = dict(session.tables), dict(session.seconds)
         session.close()
         plan = worthwhile(drafted, planned)
         if not plan.limits():
             return TestedPlan(plan, planned, seconds, None)
-        changed = difference(loaded.scene, loaded.session.tables, load, plan, sensor, tell)
+        tell(0, 0, "comparing pictures")
+        whole = whole or small_picture(loaded.scene, sensor(loaded.scene))
+        changed = difference(whole, loaded.session.tables, load, plan, sensor)
         found = TestedPlan(plan, planned, seconds, changed)
-        if found.suits:
-            return found
-        share *= TIGHTER
-    return replace(found, plan=worthwhile(plan, {}))
+        if found.suits or changed.relative > HELPS * before:
+            break
+        share, before = share * TIGHTER, changed.relative
+    return found if found.suits else replace(found, plan=worthwhile(plan, {}))
+
+
+def promising(plan: Plan, loaded: RecordedScene) -> Plan:
+    """The plan without tables that are hardly made smaller, as far as their bins say.
+
+    The memory goes with the area of frequencies and with the terms; a larger tolerance saves terms,
+    of which at least `FEWEST_TERMS` of the whole table's remain.
+    """
+    tables = {}
+    for key, mine in plan.tables.items():
+        whole, domain = loaded.session.tables[key], mine.domain
+        if domain is not None:
+            area = domain.crop[0] * domain.crop[1] / whole.reach**2
+            spared = FEWEST_TERMS if domain.tolerance > whole.tolerance else 1.0
+            domain = domain if area * spared < WORTH else None
+        tables[key] = replace(mine, domain=domain)
+    return replace(plan, tables=tables)

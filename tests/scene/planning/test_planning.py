@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import mitsuba as mi
@@ -11,6 +12,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import linear_srgb, response
+from mitsuba_diffraction.progress import silent
 from mitsuba_diffraction.scene.planning.domain import (
     LookupStatistics,
     domain_for,
@@ -20,6 +22,7 @@ from mitsuba_diffraction.scene.planning.domain import (
 from mitsuba_diffraction.scene.planning.make import (
     check_light,
     draft_plan,
+    find_plan,
     load_planned,
     record_scene,
     worthwhile,
@@ -190,6 +193,24 @@ def test_what_saves_too_little_is_left_whole(looked):
     found = worthwhile(plan, {key: smaller})
     assert set(found.limits()) == {key}
     assert found.tables[key].memory == (whole.nbytes, smaller.nbytes)
+
+
+def test_where_all_of_a_table_is_asked_for_nothing_is_built(looked):
+    (key,) = looked.session.tables
+    angle = np.linspace(0.0, 2.0 * np.pi, 360)
+    u, v = 2.0 * np.cos(angle), 2.0 * np.sin(angle)  # light and view at the horizon
+    ones = np.ones(360)
+    asked = asked_of(u, v, ones, 360.0 * ones, ones / 360.0)
+    everywhere = dataclasses.replace(looked, statistics={key: asked})
+
+    def load():
+        raise AssertionError("a table is built")
+
+    found = find_plan("plate", everywhere, load, sensor, 1e-3, silent)
+    assert found.plan.limits() == {}
+    assert found.difference is None
+    (table,) = found.plan.tables.values()
+    assert table.memory[0] == table.memory[1]
 
 
 def test_scenes_without_anything_to_plan_are_refused(tmp_path):
