@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
+import platform
+import re
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import DiffractionError
 
+# A temporary file is .STEM.HOST-PID-RANDOM.SUFFIX, so that a later run can tell whether the process
+# that made it still lives. The stem is cut: the whole name may have 255 bytes.
+_HOST = hashlib.sha256(platform.node().encode()).hexdigest()[:6]
+_STEM = 60
+_in_use: set[Path] = set()
+
 
 @contextlib.contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Give a temporary path beside `path`; rename it there on success, remove it otherwise.
 
-    The temporary name keeps the suffix of `path`, since image writers choose a format by it.
+    The temporary name keeps the suffix of `path`, since image writers choose a format by it. What a
+    killed process left of the same file is removed.
 
     Raises
     ------
@@ -25,9 +35,12 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(path)
     if target.is_dir():
         raise DiffractionError(f"cannot write '{target}': it is a folder; name a file in it")
+    _remove_abandoned(target)
     try:
         handle, name = tempfile.mkstemp(
-            dir=target.parent, prefix=f".{target.stem}.", suffix=target.suffix
+            dir=target.parent,
+            prefix=f".{target.stem[:_STEM]}.{_HOST}-{os.getpid()}-",
+            suffix=target.suffix,
         )
     except OSError as error:
         raise DiffractionError(
@@ -36,6 +49,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         ) from error
     os.close(handle)
     temporary = Path(name)
+    _in_use.add(temporary)
     try:
         yield temporary
         # mkstemp makes private files; a finished result follows the user's umask like any other
@@ -49,3 +63,33 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         ) from error
     finally:
         temporary.unlink(missing_ok=True)
+        _in_use.discard(temporary)
+
+
+def remove_temporaries() -> None:
+    """Remove the temporary files of this process, which is about to end without unwinding."""
+    for temporary in tuple(_in_use):
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def _remove_abandoned(target: Path) -> None:
+    """Remove temporary files of the same target whose process was killed."""
+    name = re.compile(
+        rf"\.{re.escape(target.stem[:_STEM])}\.{_HOST}-(\d+)-\w+{re.escape(target.suffix)}"
+    )
+    with contextlib.suppress(OSError):  # a folder that cannot be read is reported by the writer
+        for entry in target.parent.iterdir():
+            found = name.fullmatch(entry.name)
+            if found and not _lives(int(found[1])):
+                entry.unlink(missing_ok=True)
+
+
+def _lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True  # somebody else's
+    return True

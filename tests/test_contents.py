@@ -33,7 +33,7 @@ def test_every_name_is_a_module_or_exported(name):
     exported = {
         value.value
         for node in tree.body
-        if isinstance(node, ast.Assign) and node.targets[0].id == "__all__"
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
         for value in node.value.elts
     }
     folder = file.parent

@@ -20,6 +20,7 @@ arguments              types of arguments
 output                 output files, checked before the work
 progress               bars
 console                lines on stderr, Mitsuba's among them
+interrupts             Ctrl-C and SIGTERM
 report                 nested plain data as text
 """
 

@@ -12,11 +12,10 @@ from pathlib import Path
 from ..scene.animation import values_of_frames
 from ..scene.frames import FILMS, MISSING, Frame, digest_of
 from .console import mitsuba_warnings, say
+from .interrupts import INTERRUPTED
 from .options import scene_parameters
 from .output import check_writable
 from .progress import Bar
-
-_INTERRUPTED = 130
 
 
 def run_frames(args: argparse.Namespace) -> int:
@@ -47,7 +46,7 @@ def run_frames(args: argparse.Namespace) -> int:
             f"interrupted; {there} of {len(frames)} frames are done, run the command again to "
             "continue"
         )
-        return _INTERRUPTED
+        return INTERRUPTED
     print(
         f"{folder}: {len(frames)} frames, {done} of them new, {time.perf_counter() - start:.1f} s"
     )

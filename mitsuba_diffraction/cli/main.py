@@ -8,13 +8,10 @@ so that `--help` and `--version` answer at once.
 from __future__ import annotations
 
 import argparse
-import contextlib
 import os
-import signal
 import sys
-import threading
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from importlib.metadata import version
 
 from ..errors import DiffractionError
@@ -33,7 +30,8 @@ from . import (
     tradeoff,
     view,
 )
-from .console import PROGRAM, say, say_error, warnings_in_one_line
+from .console import PROGRAM, say_error, warnings_in_one_line
+from .interrupts import INTERRUPTED, ended_at_once, say_interrupted
 from .options import STDOUT
 from .output import check_writable
 
@@ -43,8 +41,6 @@ COMMANDS = (
 )  # fmt: skip
 
 FAILED = 1
-INTERRUPTED = 130  # 128 + SIGINT, as shells report it
-TERMINATED = 143  # 128 + SIGTERM
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -53,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         args = build_parser().parse_args(argv)
     except SystemExit as stop:  # argparse: --help, --version and usage errors
         return _code_of(stop)
-    with warnings_in_one_line(), _terminated_cleanly():
+    with warnings_in_one_line(), ended_at_once():
         return _run(args)
 
 
@@ -109,7 +105,7 @@ def _run(args: argparse.Namespace) -> int:
     except DiffractionError as error:
         return _fail(error, str(error), args.debug)
     except KeyboardInterrupt:
-        say("interrupted; nothing half-written was left behind")
+        say_interrupted()
         return INTERRUPTED
     except BrokenPipeError:
         # whoever read our output has enough; Python must not try to flush the rest at exit
@@ -136,16 +132,3 @@ def _fail(error: Exception, text: str, debug: bool) -> int:
 
 def _code_of(stop: SystemExit) -> int:
     return stop.code if isinstance(stop.code, int) else FAILED
-
-
-@contextlib.contextmanager
-def _terminated_cleanly() -> Iterator[None]:
-    """Inside, SIGTERM unwinds like Ctrl-C, so that no temporary file is left behind."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread may set handlers
-        return
-    before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import DiffractionError
 from .arguments import change, number_between, whole_number
 from .console import mitsuba_warnings, say, say_warning
+from .interrupts import INTERRUPTED
 from .options import add_exposure, add_samples, add_scene, scene_parameters
 from .output import check_writable
 from .plan import add_plan_options, plan_or_json
@@ -18,8 +19,6 @@ from .progress import Bar
 
 if TYPE_CHECKING:
     from ..scene.passes import Result
-
-_INTERRUPTED = 130
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -153,7 +152,7 @@ def _run_one(args: argparse.Namespace) -> int:
     )
     if result.interrupted:
         say(f"interrupted; the picture has {result.spp} of {spp} samples per pixel")
-        return _INTERRUPTED
+        return INTERRUPTED
     return 0
 
 

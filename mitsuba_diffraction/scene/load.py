@@ -10,7 +10,7 @@ from typing import Any
 from ..errors import DiffractionError, DiffractionWarning
 from ..plugin.attributes import check_attributes
 from ..plugin.names import name_of
-from .mitsuba_text import plain_text
+from .mitsuba_text import error_of
 from .parameters import check_parameters
 
 # mi.load_file's own arguments: a scene parameter of that name could not be passed.
@@ -75,7 +75,7 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
     try:
         scene = mi.load_file(str(file), **parameters)
     except RuntimeError as error:
-        raise DiffractionError(f"cannot load the scene: {plain_text(error)}") from error
+        raise error_of("cannot load the scene", error) from error
     if not isinstance(scene, mi.Scene):
         raise DiffractionError(f"'{file}' is not a scene; its outermost element must be <scene>")
     # "Diffraction[" is found inside twosided, blendbsdf and the like, too

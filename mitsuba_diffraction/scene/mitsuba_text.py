@@ -13,7 +13,7 @@ from __future__ import annotations
 import re
 from pathlib import PurePath
 
-from ..errors import one_line
+from ..errors import DiffractionError, one_line
 
 _SOURCE_LINE = re.compile(r"\[[\w./]+\.(?:cpp|h|py):\d+\]\s*")
 _LOADING = re.compile(
@@ -21,7 +21,9 @@ _LOADING = re.compile(
 )
 _INSTANTIATE = re.compile(r'failed to instantiate (?P<kind>\w+) plugin of type "(?P<type>[^"]+)": ')
 _NOT_FOUND = re.compile(r'\[PluginManager\] Plugin "[^"]+" not found!')
-_TRACEBACK = re.compile(r"Traceback \(most recent call last\):\n(?:[ \t].*\n)*(?:[\w.]+: )?")
+_TRACEBACK = re.compile(r"Traceback \(most recent call last\):\n(?:[ \t].*\n)*(?:[\w.]+: (?=\S))?")
+# What a Python plugin raises that says nothing of the scene
+_NO_ERROR = re.compile(r"^(KeyboardInterrupt|MemoryError|SystemExit): ?(\d*)", re.M)
 _UNREAD = re.compile(
     r'Found \d+ unreferenced (?:property|properties) in (\w+) plugin of type "([^"]+)":'
 )
@@ -58,6 +60,20 @@ def plain_text(error: BaseException) -> str:
         file, line = places[-1]
         text = f"'{file}', {line}: {text}"
     return text
+
+
+def error_of(what: str, error: BaseException) -> BaseException:
+    """What to raise for one of Mitsuba's exceptions.
+
+    Mitsuba makes a RuntimeError of whatever a Python plugin raises: Ctrl-C, an exit and lack of
+    memory are themselves again, anything else is a DiffractionError that begins with `what`.
+    """
+    found = _NO_ERROR.search(str(error))
+    if found is None:
+        return DiffractionError(f"{what}: {plain_text(error)}")
+    if found[1] == "SystemExit":
+        return SystemExit(int(found[2] or 1))
+    return KeyboardInterrupt() if found[1] == "KeyboardInterrupt" else MemoryError()
 
 
 def _no_ply(found: re.Match[str]) -> str:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..progress import Progress
-from .mitsuba_text import plain_text
+from .mitsuba_text import error_of
 
 # Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
 # wavefronts exhaust the memory. Fixed, so that a seed gives the same picture on every machine.
@@ -139,4 +139,4 @@ def render_passes(
         film.put_block(mi.ImageBlock(storage, offset))
         return Result(film.bitmap(), done, stop.asked)
     except RuntimeError as error:
-        raise DiffractionError(f"cannot render: {plain_text(error)}") from error
+        raise error_of("cannot render", error) from error

@@ -54,7 +54,7 @@ def test_version_is_printed(run):
 
 def test_the_package_runs_as_a_module():
     words = [sys.executable, "-m", "mitsuba_diffraction", "--version"]
-    ran = subprocess.run(words, capture_output=True, text=True, timeout=60, check=True)
+    ran = subprocess.run(words, capture_output=True, text=True, timeout=120, check=True)
     assert ran.stdout == f"mitsuba-diffraction {__version__}\n"
     assert ran.stderr == ""
 
@@ -135,7 +135,7 @@ def test_a_closed_pipe_is_no_traceback(heights):
     words = [sys.executable, "-m", "mitsuba_diffraction", "info", str(heights)]
     command = shlex.join([*words, "--pixel-size", "0.1", "--json"])
     ran = subprocess.run(
-        ["bash", "-c", f"{command} | true"], capture_output=True, text=True, timeout=60
+        ["bash", "-c", f"{command} | true"], capture_output=True, text=True, timeout=120
     )
     assert ran.stderr == ""
 

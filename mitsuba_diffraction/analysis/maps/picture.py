@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 
 from .result import BrdfMap
+
+if TYPE_CHECKING:  # rendering needs none of it
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
 
 #: Polar angles of the thin circles, degrees; the horizon, 90, is drawn stronger.
 _CIRCLES = (30, 60)
@@ -52,6 +53,8 @@ def draw(
     if brdf_map.xyz is None:
         values = np.ma.masked_less(brdf_map.luminance, np.finfo(np.float32).tiny)
         largest = float(values.max()) if values.count() else 1.0
+        from matplotlib.colors import LogNorm
+
         norm = LogNorm(largest * 10**-_DECADES, largest, clip=True)
         shown = axes.imshow(values, norm=norm, cmap="inferno", **common)
         axes.patch.set_visible(False)
@@ -80,6 +83,8 @@ def figure(brdf_map: BrdfMap, exposure: float | None, *, title: str, notes: str)
     left, right, bottom, top = _MARGINS
     right += _COLOUR_BAR if single else 0.0
     width, height = left + side + right, bottom + side + top
+    from matplotlib.figure import Figure
+
     result = Figure(figsize=(width, height), dpi=_DPI, facecolor="white")
     axes = result.add_axes((left / width, bottom / height, side / width, side / height))
     image = draw(axes, brdf_map, stops)

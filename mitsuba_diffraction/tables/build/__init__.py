@@ -1,0 +1,15 @@
+"""Building a table: which series, how many terms and taps, and the proof that they suffice.
+
+Contents
+--------
+build           tries until the tolerance is met: `build_table`
+attempt         one try, and its error
+choose          how many terms and intervals a tolerance takes
+checks          what cannot be built
+spectrum        DFT of exp(iκh) at some κ, cropped to the orders that light can reach
+coefficients    of the series, from transforms of the heights
+half_precision  these as half floats
+error           the one error measure of the project
+coarse          what a table of a restricted domain has everywhere else
+describe        what a table remembers of its heights
+"""
