@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -120,15 +119,12 @@ def heights_of_tensor(data: Any, options: LoadOptions) -> HeightField:
     DiffractionError
         If pixel_size is missing, max_height is given, or the array holds no heights.
     """
-    if isinstance(data, HeightData):
-        given = replace(options, crop=None, level=None, clip=None, periodic=None).given()
-        if given:
-            raise DiffractionError(
-                f"{next(iter(given))} is for files; a HeightField has its own already"
-            )
-        return treat(data.field, options)
     if options.max_height is not None:
         raise DiffractionError("max_height is for images; the heights in data are in µm already")
+    if isinstance(data, HeightData):
+        if options.pixel_size not in (None, data.field.pixel_size):
+            raise DiffractionError("pixel_size is for arrays; a HeightField has its own already")
+        return treat(data.field, options)
     if options.pixel_size is None:
         raise DiffractionError("data needs pixel_size, the distance between its heights in µm")
     values = np.array(data, np.float64)

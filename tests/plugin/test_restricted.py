@@ -66,7 +66,7 @@ def test_scalar_variants_do_the_same(table):
     x, y, kappa = lookups(60)
     device = device_table(table)
     device.take()
-    found = [device.window_sum(*values) for values in zip(x, y, kappa, strict=True)]
+    found = [device.window_sum(*map(float, q)) for q in zip(x, y, kappa, strict=True)]
     expected = table.window_sum(x, y, kappa)
     assert found == pytest.approx(expected, rel=1e-4, abs=1e-6 * expected.max())
     assert device.take().count == (~table.covers(x, y, kappa)).sum()

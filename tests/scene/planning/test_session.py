@@ -5,12 +5,13 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import mitsuba as mi
+import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.scene.planning.session import Session
 
-PATCH = md.gratings.sinusoidal(period=1.5, depth=0.1, pixel_size=0.25, extent=6.0)
+PATCH = md.HeightField(0.005 * np.random.default_rng(1).random((24, 24)), 0.25)
 
 
 def test_a_bsdf_without_id_is_called_by_its_heights():
