@@ -10,7 +10,10 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.scene.planning.session import Session
 
-PATCH = md.gratings.sinusoidal(period=1.5, depth=0.1, pixel_size=0.25, extent=6.0)
+# a coarse one, which the plugin warns of
+pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
+
+PATCH = md.gratings.sinusoidal(1.5, 0.1, periods=4, pixels_per_period=6)
 
 
 def test_a_bsdf_without_id_is_called_by_its_heights():
