@@ -62,10 +62,12 @@ def run(args: argparse.Namespace) -> int:
 
     from ..realtime.comparison.run import Comparison
     from ..realtime.comparison.table import markdown
+    from ..realtime.glsl.scene import check_variant
     from ..scene.load import load_scene, sensor_of, set_variant
 
     start = time.perf_counter()
     variant = set_variant(args.mode)
+    check_variant(variant)
     every = "all" in args.method
     with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
         bar(0, args.spp, "loading")

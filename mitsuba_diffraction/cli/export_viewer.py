@@ -40,11 +40,12 @@ def run(args: argparse.Namespace) -> int:
     parameters = scene_parameters(args)
     check_writable(args.output)
 
+    from ..realtime.glsl.scene import check_variant
     from ..realtime.web import export_viewer
     from ..scene.load import load_scene, sensor_of, set_variant
 
     start = time.perf_counter()
-    set_variant(args.mode)
+    check_variant(set_variant(args.mode))
     with mitsuba_warnings(), Bar(args, delay=0) as bar:
         bar(0, 0, "loading")
         scene = load_scene(args.scene, parameters)

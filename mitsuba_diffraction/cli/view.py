@@ -57,9 +57,10 @@ def run(args: argparse.Namespace) -> int:
         raise DiffractionError(
             f"view needs {error.name}: pip install 'mitsuba-diffraction[view]'"
         ) from error
+    from ..realtime.glsl.scene import check_variant
     from ..scene.load import load_scene, sensor_of, set_variant
 
-    set_variant(args.mode)
+    check_variant(set_variant(args.mode))
     with mitsuba_warnings():
         scene = load_scene(args.scene, parameters)
         sensor_of(scene, args.sensor)

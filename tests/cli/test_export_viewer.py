@@ -46,6 +46,28 @@ def test_a_page_is_written_and_its_loss_is_named(
     assert "spectral" not in said
 
 
+def test_a_title_is_text_in_the_page(scene: Path, tmp_path: Path, some_variant: str) -> None:
+    named = scene.rename(tmp_path / "<!--<script>.xml")
+    out = tmp_path / "plate.html"
+    assert main(["export-viewer", str(named), str(out), "--method", "lut"]) == 0
+    text = out.read_text(encoding="utf-8")
+    assert "<!--<script" not in text
+    assert r"\u003c!--\u003cscript>" in text
+
+
+@pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_mono"])
+def test_variants_that_the_shaders_cannot_read_are_refused_in_one_line(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], variant: str
+) -> None:
+    for command in (
+        ["export-viewer", str(scene), str(tmp_path / "a.html")],
+        ["compare", str(scene), "-o", str(tmp_path / "compared")],
+    ):
+        assert main([*command, "-m", variant]) == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert "set llvm_ad_rgb or llvm_ad_spectral (--mode)" in line
+
+
 @pytest.mark.parametrize(
     ("out", "words"),
     [("missing/a.html", "cannot write"), ("folder.html", "it is a folder")],

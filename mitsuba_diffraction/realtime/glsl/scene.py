@@ -78,10 +78,12 @@ def load(scene: Any) -> Any:
     Raises
     ------
     DiffractionError
-        If it is neither, or the file cannot be loaded.
+        If it is neither, the file cannot be loaded, or as of `check_variant`.
     """
     import mitsuba as mi
 
+    if mi.variant() is not None:
+        check_variant(mi.variant())
     if not isinstance(scene, str | os.PathLike):
         if mi.variant() is None or not isinstance(scene, mi.Scene):
             raise DiffractionError(
@@ -94,6 +96,16 @@ def load(scene: Any) -> Any:
     if mi.variant() is None:
         set_variant(None)
     return load_scene(Path(scene), {})
+
+
+def check_variant(variant: str) -> None:
+    """Raise a DiffractionError for a variant that reads values one by one, or knows no colours."""
+    kind, _, colours = variant.partition("_")
+    if kind == "scalar" or "mono" in colours:
+        raise DiffractionError(
+            f"the shaders draw in colours, and read all of a scene's lights and textures at once, "
+            f"which {variant} does not: set llvm_ad_rgb or llvm_ad_spectral (--mode)"
+        )
 
 
 def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:

@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from ...heights.field import HeightField
 from ...progress import Progress
+from ..expansion import Expansion
+from ..window import FULL_REACH
 from .checks import check_size
 from .coefficients import coefficients_of
 from .error import FLOOR, ErrorMeter, Grid, Parts, worst
-from ..expansion import Expansion
 from .half_precision import halved
 from .spectrum import Spectrum
-from ..window import FULL_REACH
 
 #: Below it single precision transforms would spend a share of the tolerance themselves.
 DOUBLE_BELOW = 2e-4

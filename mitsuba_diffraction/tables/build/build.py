@@ -9,20 +9,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import DiffractionError
-from ...optics.geometry import sigma_of
 from ...heights.field import HeightField
+from ...heights.validity import units_question
+from ...optics.geometry import sigma_of
 from ...progress import Progress, silent
 from ...reference import check_coherence
-from ...heights.validity import units_question
-from .attempt import Attempt
-from .checks import check_parameters, check_patches, check_taylor, check_units, restricted
-from .choose import MAX_INTERVALS, PACKET, chebyshev_expansion, svd_expansion, taylor_expansion, too_many_intervals
-from .coarse import coarse_table
-from .describe import describe
-from .error import Grid
 from ..expansion import Expansion
 from ..table import DiffractionTable, reach_of, refuse
 from ..window import MAX_TAPS, reach_error, taps_for, trims_for
+from .attempt import Attempt
+from .checks import check_parameters, check_patches, check_taylor, check_units, restricted
+from .choose import (
+    MAX_INTERVALS,
+    PACKET,
+    chebyshev_expansion,
+    svd_expansion,
+    taylor_expansion,
+    too_many_intervals,
+)
+from .coarse import coarse_table
+from .describe import describe
+from .error import Grid
 
 #: What taps may use up of the tolerance when their number is chosen, and series of what they leave.
 TAPS_SHARE, SERIES_SHARE = 0.5, 0.8

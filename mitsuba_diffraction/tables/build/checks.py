@@ -9,11 +9,11 @@ import numpy as np
 from ...errors import DiffractionError
 from ...heights.field import HeightField
 from ...heights.validity import units_question
-from .choose import taylor_rounding, taylor_truncation
-from .error import Grid
 from ..expansion import BASES, Expansion
 from ..table import refuse
 from ..window import MAX_TAPS
+from .choose import taylor_rounding, taylor_truncation
+from .error import Grid
 
 #: Largest table, bytes: beyond it no renderer would want it.
 MAX_BYTES = 4 << 30

@@ -13,10 +13,10 @@ from scipy.special import gammaln
 
 from ...errors import DiffractionError
 from ...heights.field import HeightField
-from .error import FLOOR
 from ..expansion import Expansion, principal_functions
-from .spectrum import Spectrum
 from ..table import refuse
+from .error import FLOOR
+from .spectrum import Spectrum
 
 #: Terms of one interval when the user does not say: a packet of 8 is what processors gather at
 #: best; shallow surfaces do with 4.

@@ -20,16 +20,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...optics.geometry import sigma_of
 from ...heights.field import HeightField
+from ...optics.geometry import sigma_of
 from ...progress import Progress
-from .choose import svd_expansion
-from .error import Grid
 from ..expansion import Expansion, principal_functions
-from .half_precision import half_scale
-from .spectrum import Spectrum
 from ..table import DiffractionTable, reach_of
 from ..window import taps_for
+from .choose import svd_expansion
+from .error import Grid
+from .half_precision import half_scale
+from .spectrum import Spectrum
 
 #: Width of a cell in units of 1/σ, and fewest cells from the middle to the edge.
 CELL, FEWEST = 16.0, 24

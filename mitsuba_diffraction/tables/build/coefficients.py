@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .error import NEAR, Grid, alternate
 from ..expansion import Expansion, principal_functions
+from .error import NEAR, Grid, alternate
 from .spectrum import Spectrum
 
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ...optics.geometry import wavenumber
 from ...heights.field import HeightField
 from ...heights.validity import window_line
+from ...optics.geometry import wavenumber
 from .spectrum import Spectrum
 
 _SLOW = 150  # orders read in a look-up; 16 are usual

@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..expansion import Expansion
-from .spectrum import Spectrum
 from ..window import apply_window, rows_by_trim, tap_matrix
+from .spectrum import Spectrum
 
 #: Radius of the bins counted as the glossy reflection, in units of 1/σ.
 NEAR = 3.0

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-
-from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
-from mitsuba_diffraction import reference
 from mitsuba_diffraction.tables.build.build.choose import taylor_rounding
+
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, reference
 from tests.directions import rough_patch
 from tests.tables.patches import DEEP, DEFAULTS, PATCH
 

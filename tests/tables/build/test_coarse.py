@@ -8,8 +8,8 @@ from scipy.special import jv
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.heights import gratings
-from mitsuba_diffraction.tables.energy.albedo import AlbedoModel
 from mitsuba_diffraction.tables.colour.table import ColourTable
+from mitsuba_diffraction.tables.energy.albedo import AlbedoModel
 from mitsuba_diffraction.tables.energy.powers import power_series
 from tests.directions import rough_patch
 
