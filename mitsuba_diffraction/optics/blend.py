@@ -1,23 +1,19 @@
 """How much of each boundary: the small-slope model's Jones matrix, (1−s) K + s B (NumPy, float64).
 
-The local curvature approximation (Elfouhaily, Guignard, Awadallah and Thompson 2003, "Local and
-non-local curvature approximation", Waves in Random Media 13, 321) corrects Kirchhoff's K towards
-the small-slope B by the local slope: with ⟨·⟩ the mean under the phase screen that makes the
-order q, the order's matrix is
+Perturbation's B is right where the surface is smooth against the wavelength, at any angle;
+Kirchhoff's K where it is rough and gentle, so that facets reflect. What counts is how rough it is
+at the scales that make the order q: waves much longer than 2π/q tilt and shift what makes the
+order, and do not make it; roughness much finer dims it. So
 
-    K + (B − K) (1 − t),   t = ⟨(κ q̂·∇h)²⟩ / q².
+    s = exp(−(κσ_q)⁴/3),   σ_q² = Σ_q' |h_q'|² (1 − exp(−(4q'/q)⁴)) exp(−(q'/2q)⁴),
 
-For a sinusoid's first order t = κ²σ²/2 − …: a smooth surface follows B, one that is rough against
-the wavelength K. What counts is how rough it is at the scales that make the order q: waves much
-longer than 2π/q tilt and shift what makes the order, and do not make it; roughness much finer
-dims it. So s = exp(−κ²σ_q²/2), where σ_q² is the height variance of the components q' near and
-below q,
-
-    σ_q² = Σ_q' |h_q'|² (1 − exp(−(4q'/q)⁴)) exp(−(q'/2q)⁴).
-
-The band's limits, from an eighth to about twice the order's frequency, are chosen against rigorous
-solutions (docs/validation.md). s is 1 − κ²σ_q²/2 at first, as the theory has it, symmetric in ωi
-and ωo, and smooth in both and in the wavelength.
+where σ_q² is the height variance of the components q' from about a fifth to twice the order's
+frequency; at κσ_q ≈ 1.3 both have half a share. The first correction to B, of order (κσ)², is not
+in s. The local curvature approximation has it (Elfouhaily, Guignard, Awadallah and Thompson 2003,
+Waves in Random Media 13, 321), as s = 1 − (κσ)²/2 for a sinusoid's first order, but K is so far
+from B in oblique light that a small share of it does more harm than good. Band and power are chosen
+against rigorous solutions, see docs/validation.md. s is symmetric in ωi and ωo, and smooth in both
+and in the wavelength.
 """
 
 from __future__ import annotations
@@ -32,7 +28,7 @@ from .boundary import Complex, Real
 
 #: Components are told apart to this part of an octave; lines of a grating stay where they are.
 _BINS_PER_OCTAVE = 256
-#: Nodes of `ScaleRoughness.table`: linear interpolation is then within 5e-4 of the variance.
+#: Nodes of `ScaleRoughness.table`: linear interpolation is then within 5e-4 of the largest.
 NODES_PER_OCTAVE = 32
 
 
@@ -88,9 +84,9 @@ class ScaleRoughness:
 
 
 def weight(kappa: ArrayLike, variance: ArrayLike) -> Real:
-    """s = exp(−κ²σ_q²/2); κ in rad/µm, σ_q² in µm² (`ScaleRoughness.at`)."""
-    exponent = -0.5 * np.square(np.asarray(kappa, np.float64)) * np.asarray(variance, np.float64)
-    return np.exp(exponent)
+    """s = exp(−(κσ_q)⁴/3); κ in rad/µm, σ_q² in µm² (`ScaleRoughness.at`)."""
+    roughness = np.square(np.asarray(kappa, np.float64)) * np.asarray(variance, np.float64)
+    return np.exp(-np.square(roughness) / 3)
 
 
 def jones(wi: ArrayLike, wo: ArrayLike, index: ArrayLike, s: ArrayLike) -> Complex:
