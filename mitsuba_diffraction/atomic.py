@@ -35,7 +35,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     target = Path(path)
     if target.is_dir():
         raise DiffractionError(f"cannot write '{target}': it is a folder; name a file in it")
-    _remove_abandoned(target)
+    remove_abandoned(target.parent, re.escape(target.stem[:_STEM]), target.suffix)
     try:
         handle, name = tempfile.mkstemp(
             dir=target.parent,
@@ -73,13 +73,11 @@ def remove_temporaries() -> None:
             temporary.unlink(missing_ok=True)
 
 
-def _remove_abandoned(target: Path) -> None:
-    """Remove temporary files of the same target whose process was killed."""
-    name = re.compile(
-        rf"\.{re.escape(target.stem[:_STEM])}\.{_HOST}-(\d+)-\w+{re.escape(target.suffix)}"
-    )
+def remove_abandoned(folder: Path, stem: str, suffix: str) -> None:
+    """Remove temporary files whose process was killed, of targets called `stem` (a pattern)."""
+    name = re.compile(rf"\.{stem}\.{_HOST}-(\d+)-\w+{re.escape(suffix)}")
     with contextlib.suppress(OSError):  # a folder that cannot be read is reported by the writer
-        for entry in target.parent.iterdir():
+        for entry in folder.iterdir():
             found = name.fullmatch(entry.name)
             if found and not _lives(int(found[1])):
                 entry.unlink(missing_ok=True)

@@ -29,8 +29,9 @@ from .errors import DiffractionError
 from .heights.field import HeightField
 from .optics import blend, boundary
 from .optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
+from .settings import COHERENCES as COHERENCES
+from .settings import checked
 
-COHERENCES = ("ensemble", "patch")
 MODELS = ("kirchhoff", "small_slope")
 
 # exp(−8.6²/2) = 9e-17: further orders are below the last bit of the sum
@@ -73,7 +74,8 @@ def brdf(
         For an unknown coherence or model, a width that is not positive and finite, an index that
         is missing or none, or arrays whose shapes do not fit.
     """
-    check_coherence(coherence_width, coherence)
+    coherence_width = checked("coherence_width", coherence_width)
+    checked("coherence", coherence)
     incident, outgoing, lam = _broadcast(wi, wo, wavelength)
     index = _index(model, eta, k, lam.shape)
     sigma = sigma_of(coherence_width)
@@ -101,7 +103,8 @@ def mueller(
     They take Stokes vectors of light along −ωi to those of light along ωo, both about the axes of
     `optics.boundary.polarisation_axes`. Entry (0, 0) is `brdf`.
     """
-    check_coherence(coherence_width, coherence)
+    coherence_width = checked("coherence_width", coherence_width)
+    checked("coherence", coherence)
     incident, outgoing, lam = _broadcast(wi, wo, wavelength)
     index = _index(model, eta, k, lam.shape)
     if index is None:
@@ -156,18 +159,6 @@ def screen_power(
         centre_y = np.exp(-0.5j * qy * ny * pixel_size[1])
         total = np.abs((window_y * centre_y) @ amplitude @ (window_x * centre_x)) ** 2
     return float(4 * np.pi**2 * sigma**4 * total)
-
-
-def check_coherence(coherence_width: float, coherence: str) -> None:
-    """Refuse a coherence that the model does not have."""
-    if coherence not in COHERENCES:
-        raise DiffractionError(
-            f"coherence='{coherence}' is unknown; choose one of {', '.join(COHERENCES)}"
-        )
-    if not (np.isfinite(coherence_width) and coherence_width > 0):
-        raise DiffractionError(
-            f"coherence_width={coherence_width} must be a positive number of µm (65 is usual)"
-        )
 
 
 def _jones(

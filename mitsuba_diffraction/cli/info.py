@@ -149,7 +149,7 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     from ..heights.recipes import Recipe
 
     recipe = Recipe.load(file)
-    table = recipe.table_arguments()
+    table = recipe.table
     with Bar(args) as bar:
         bar(0, 0, "making heights")
         fields = recipe.fields(load_options(args))

@@ -11,8 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..reference import COHERENCES
-from ..tables import expansion
+from ..settings import TableSettings, checked, described_setting
 from .arguments import definition, number_between, path_ending_in, whole_number
 
 if TYPE_CHECKING:
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 Group = argparse._ActionsContainer
 
 #: Default of --wavelength-range and of --step, nm.
-WAVELENGTH_RANGE, STEP = (360.0, 830.0), 5.0
+WAVELENGTH_RANGE, STEP = TableSettings.wavelength_range, 5.0
 #: `--json` without a file, which only `info` has: printed instead of the text.
 STDOUT = Path("-")
 
@@ -46,34 +45,9 @@ _HEIGHTS: dict[str, tuple[str, str]] = {
     "periodic": ("METHOD", "smooth or taper: make the patch tile without seams; default: none"),
 }
 
-_TABLE: dict[str, dict[str, Any]] = {
-    "coherence_width": {
-        "metavar": "W", "type": float, "help": "µm, 4σ of the amplitude window; default: 65",
-    },
-    "coherence": {
-        "choices": COHERENCES,
-        "help": "ensemble: average over window positions; patch: one window; default: ensemble",
-    },
-    "basis": {
-        "choices": ("auto", *expansion.BASES), "help": "series in κ; default: auto, which is svd",
-    },
-    "tolerance": {
-        "metavar": "E", "type": float,
-        "help": "relative error of a table, which is met or refused; default: 1e-3",
-    },
-    "terms": {
-        "metavar": "N", "type": whole_number(1),
-        "help": "terms of the series; default: as many as the tolerance needs",
-    },
-    "taps": {
-        "metavar": "N", "type": whole_number(1),
-        "help": "orders read in each direction; default: as many as the tolerance needs",
-    },
-    "height_scale_max": {
-        "metavar": "S", "type": number_between(1e-6, 1000),
-        "help": "largest height_scale that the table serves; default: 1.5",
-    },
-}  # fmt: skip
+_TABLE = (
+    "coherence_width", "coherence", "basis", "tolerance", "terms", "taps", "height_scale_max",
+)  # fmt: skip
 
 
 def add_heights(parser: argparse.ArgumentParser) -> None:
@@ -123,21 +97,29 @@ def own_patch(args: argparse.Namespace) -> HeightField | None:
     return None if args.heights is None else load_heights(args.heights, load_options(args))
 
 
-def add_table(group: Group, names: Sequence[str] = tuple(_TABLE), **defaults: str) -> None:
+def add_table(group: Group, names: Sequence[str] = _TABLE, **defaults: str) -> None:
     """The settings of a table; `defaults` are texts that replace what the help says of one's."""
     for name in names:
-        described = dict(_TABLE[name])
-        if name in defaults:
-            described["help"] = (
-                f"{described['help'].split('; default')[0]}; default: " + (defaults[name])
-            )
-        group.add_argument(_option(name), **described)
+        item = described_setting(name)
+        kind: dict[str, Any] = {"choices": item.choices}
+        if item.choices is None:
+            kind = {"metavar": item.metavar, "type": whole_number(1) if item.whole else float}
+        if isinstance(item.metavar, tuple):
+            kind["nargs"] = len(item.metavar)
+        default = defaults.get(name, item.default_text)
+        group.add_argument(_option(name), help=f"{item.help}; default: {default}", **kind)
 
 
 def table_options(args: argparse.Namespace) -> dict[str, Any]:
-    """The settings of a table that were given, by name."""
-    names = [*_TABLE, "wavelength_range"]
-    return {n: getattr(args, n) for n in names if getattr(args, n, None) is not None}
+    """The settings of a table that were given, by name.
+
+    Raises
+    ------
+    DiffractionError
+        If a value is not allowed.
+    """
+    given = {name: getattr(args, name, None) for name in (*_TABLE, "wavelength_range")}
+    return {name: checked(name, value) for name, value in given.items() if value is not None}
 
 
 def add_direction(group: Group, *, theta: float = 0.0) -> None:
@@ -154,11 +136,7 @@ def add_direction(group: Group, *, theta: float = 0.0) -> None:
 
 def add_wavelength_range(group: Group) -> None:
     """The spectrum, nm."""
-    low, high = WAVELENGTH_RANGE
-    group.add_argument(
-        "--wavelength-range", metavar=("MIN", "MAX"), nargs=2, type=float,
-        help=f"nm; default: {low:g} {high:g}",
-    )  # fmt: skip
+    add_table(group, ("wavelength_range",))
 
 
 def add_wavelengths(group: Group) -> None:

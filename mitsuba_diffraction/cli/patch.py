@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
-from .options import WAVELENGTH_RANGE, load_options, table_options
+from .options import load_options, table_options
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
@@ -26,7 +26,6 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
     from ..heights.load import load_heights
     from ..heights.read import is_recipe
     from ..heights.recipes import Recipe
-    from ..tables.build.checks import check_parameters
     from ..tables.exr import is_table
 
     options = load_options(args)
@@ -36,12 +35,9 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
             f"'{source}' is a table; this needs the heights it was made of, or their recipe"
         )
     settings = table_options(args)
-    check_parameters(
-        "auto", settings.get("tolerance", 1e-3), settings.get("terms"), WAVELENGTH_RANGE, 1.0, None
-    )
     if is_recipe(source):
         recipe = Recipe.load(source)
-        settings = recipe.table_arguments() | settings
+        settings = {**recipe.table, **settings}
         patch = recipe.field(options)
     else:
         patch = load_heights(source, options)

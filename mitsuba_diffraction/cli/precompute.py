@@ -12,8 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionWarning
 from .arguments import path_ending_in
-from .options import add_heights, add_json, add_table, add_wavelength_range, load_options
-from .options import table_options as options_of_table
+from .options import (
+    add_heights,
+    add_json,
+    add_table,
+    add_wavelength_range,
+    load_options,
+    table_options,
+)
 from .output import check_outputs
 from .progress import Bar
 from .report import save_report
@@ -74,18 +80,20 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
     from ..heights.preprocess.edges import edge_lines
     from ..heights.read import is_recipe
     from ..heights.recipes import Recipe
-    from ..tables import DiffractionTable
+    from ..settings import TableSettings
+    from ..tables.build.build import build_with
 
     start = time.perf_counter()
     options = load_options(args)
-    table_options = options_of_table(args)
+    given = table_options(args)
     recipe = Recipe.load(sources[0]) if is_recipe(sources[0]) else None
     inputs = list(sources)
     if recipe is not None:
-        table_options = recipe.table_arguments() | table_options
+        given = {**recipe.table, **given}
         inputs += recipe.sources
     elif len(sources) > 1 and args.output is None:
         args.parser.error("argument -o/--output: name the one table of these files")
+    settings = TableSettings(**given)
     by_recipe = recipe is not None and args.output is None
     output = args.output or (recipe.output if recipe else Path(f"{sources[0].stem}.exr"))
     check_outputs([output], inputs, "table", make_folder=by_recipe)
@@ -96,15 +104,13 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
         else:
             fields = [load_heights(source, options) for source in sources]
     # Before the table is waited for: whoever treats the heights will not want this one
-    shortest = min(table_options.get("wavelength_range", (360.0,))) / 1000
+    shortest = settings.wavelength_range[0] / 1000
     cut_out = (field for field in fields if field.cut_out)
     said = [line for field in cut_out for line in edge_lines(field, shortest)]
     for line in said:
         warnings.warn(line, DiffractionWarning, stacklevel=1)
     with Bar(args) as bar:
-        table = DiffractionTable.build(
-            fields[0] if len(fields) == 1 else fields, progress=bar, **table_options
-        )
+        table = build_with(fields, settings, bar)
         if by_recipe:
             output.parent.mkdir(parents=True, exist_ok=True)
         table.save(output)

@@ -23,16 +23,16 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError
+from ..settings import RECIPE_SETTINGS, checked
 from . import gratings
 from .field import HeightField
 from .formats.raw import existing_file, first_line
 from .options import LoadOptions
 from .read import is_recipe, read_heights, treat
 
-TABLE_KEYS = ("coherence_width", "coherence", "basis", "tolerance", "terms", "wavelength_range")
 LOAD_KEYS = tuple(option.name for option in fields(LoadOptions))
 _OWN_KEYS = ("source", "generator", "arguments", "seeds", "output")
-_KEYS = (*_OWN_KEYS, *LOAD_KEYS, *TABLE_KEYS)
+_KEYS = (*_OWN_KEYS, *LOAD_KEYS, *RECIPE_SETTINGS)
 # What makes no sense for heights that are computed.
 _SOURCE_ONLY = ("pixel_size", "max_height", "channel", "fill")
 
@@ -57,7 +57,7 @@ class Recipe:
     options
         How sources are read and all patches treated.
     table
-        Parameters of `DiffractionTable.build`, those that the recipe sets.
+        The fields of `TableSettings` that the recipe sets, checked.
     output
         Where the table goes; by default the recipe's name with .exr in the current folder.
     """
@@ -152,10 +152,6 @@ class Recipe:
             )
         return self.fields(options)[0]
 
-    def table_arguments(self) -> dict[str, Any]:
-        """Keyword arguments for `DiffractionTable.build`: those that the recipe sets."""
-        return dict(self.table)
-
     def _made(self, make: Callable[..., HeightField], arguments: Mapping[str, Any]) -> HeightField:
         try:
             return make(**arguments)
@@ -233,24 +229,11 @@ def _arguments(content: Mapping[str, Any], shown: str) -> tuple[Mapping[str, Any
 
 
 def _table(content: Mapping[str, Any], shown: str) -> dict[str, Any]:
-    """Table parameters in the types that the builder takes; it checks their values."""
-    table = {key: content[key] for key in TABLE_KEYS if key in content}
-    kinds: dict[str, tuple[type, ...]] = {
-        "coherence_width": (int, float), "coherence": (str,), "basis": (str,),
-        "tolerance": (int, float), "terms": (int,), "wavelength_range": (list,),
-    }  # fmt: skip
-    for key, value in table.items():
-        if isinstance(value, bool) or not isinstance(value, kinds[key]):
-            expected = " or ".join(kind.__name__ for kind in kinds[key])
-            raise DiffractionError(f"{shown}: {key}: expected {expected}, got {value!r}")
-    if "wavelength_range" in table:
-        pair = table["wavelength_range"]
-        if len(pair) != 2 or not all(type(value) in (int, float) for value in pair):
-            raise DiffractionError(
-                f"{shown}: wavelength_range: expected [shortest, longest] in nm, got {pair!r}"
-            )
-        table["wavelength_range"] = tuple(pair)
-    return table
+    """Table parameters, checked one by one."""
+    try:
+        return {key: checked(key, content[key]) for key in RECIPE_SETTINGS if key in content}
+    except DiffractionError as error:
+        raise DiffractionError(f"{shown}: {error}") from error
 
 
 def _output(content: Mapping[str, Any], file: Path, shown: str) -> Path:

@@ -37,21 +37,7 @@ def marks(table: DiffractionTable, *constants: object) -> list[Any]:
 
     Types, because Dr.Jit compares those, and stops comparing values once they have changed.
     """
-    described = repr(
-        (
-            table.expansion,
-            table.tolerance,
-            table.grid,
-            table.spacing,
-            table.scale,
-            table.sigma,
-            table.radii,
-        )
-    )
-    if table.coarse is not None:
-        constants += (table.coarse.expansion, table.coarse.grid, table.coarse.spacing)
-    checksum = zlib.crc32(repr(constants).encode(), zlib.crc32(described.encode()))
-    checksum = zlib.crc32(table.order_0.tobytes(), checksum)
+    checksum = zlib.crc32(repr((table.digest(), *constants)).encode())
     kinds = (
         mi.Bool, mi.Int32, mi.UInt32, mi.Int64, mi.UInt64, mi.Float16, mi.Float32, mi.Float64,
     )  # fmt: skip

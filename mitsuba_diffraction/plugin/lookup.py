@@ -44,7 +44,7 @@ class DeviceTable:
 
     def __init__(self, table: DiffractionTable) -> None:
         self.expansion, self.grid = table.expansion, table.grid
-        self.spacing, self.radii = table.spacing, table.radii
+        self.spacing, self.radii = table.spacing, table.q_max
         self.components = table.coefficients.shape[3]
         self.terms = padded(table.expansion.terms)
         self.half = table.coefficients.dtype == np.float16
@@ -188,7 +188,7 @@ def device_table(table: DiffractionTable) -> DeviceTable | RestrictedTable:
         variants[mi.variant()] = device
         if table.coarse is not None:
             coarse, kappa_max = DeviceTable(table.coarse), table.expansion.kappa_max
-            variants[mi.variant()] = RestrictedTable(device, coarse, table.radii, kappa_max)
+            variants[mi.variant()] = RestrictedTable(device, coarse, table.q_max, kappa_max)
     return variants[mi.variant()]
 
 

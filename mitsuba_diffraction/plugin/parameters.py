@@ -14,6 +14,7 @@ from ..errors import DiffractionError
 from ..heights.field import HeightField
 from ..heights.lengths import is_auto
 from ..heights.options import LoadOptions
+from ..settings import SCENE_SETTINGS, checked
 from ..tables.table import DiffractionTable
 from .layers import LAYERINGS, Blend, Layering, Transmission
 from .orientation import Constant, Orientation, Textured
@@ -30,13 +31,12 @@ from .sources import (
 
 SOURCES = ("heightfield", "table", "data")
 READING = tuple(field.name for field in fields(LoadOptions))
-TABLE_PARAMETERS = ("coherence_width", "coherence", "basis", "tolerance", "terms")
 #: Of mono variants, nm.
 DEFAULT_WAVELENGTH = 550.0
 NAMES = (
     *SOURCES,
     *READING,
-    *TABLE_PARAMETERS,
+    *SCENE_SETTINGS,
     "material",
     "eta",
     "k",
@@ -129,14 +129,10 @@ def _table(
         raise DiffractionError(
             f"give exactly one of {', '.join(SOURCES)}; got {' and '.join(given) or 'none'}"
         )
-    asked = {name: props.get(name) for name in TABLE_PARAMETERS if name in props}
-    if is_auto(asked.get("coherence_width", 0.0)):
-        del asked["coherence_width"]
-    for name in ("coherence_width", "tolerance"):
-        if name in asked:
-            asked[name] = _number(props, name, 0.0)
-    if "terms" in asked and not isinstance(asked["terms"], int):
-        raise DiffractionError(f"terms={asked['terms']!r} must be a whole number")
+    given_settings = {name: props.get(name) for name in SCENE_SETTINGS if name in props}
+    if is_auto(given_settings.get("coherence_width", 0.0)):
+        del given_settings["coherence_width"]
+    asked = {name: checked(name, value) for name, value in given_settings.items()}
     options = LoadOptions.of(**{name: props.get(name) for name in READING if name in props})
     value = props.get(given[0])
     if given[0] == "data":

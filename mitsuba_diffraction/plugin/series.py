@@ -68,7 +68,7 @@ class Tabulated:
         # Without the factor they fade with as κ → 0, where a parabola would lose it
         plain = expansion.weights(kappa) / expansion.fading(kappa)[..., None]
         # one record a cell, so that few packets fetch all of it
-        both = np.concatenate([plain, table.centre(kappa)], axis=-1)
+        both = np.concatenate([plain, table.order_0_at(kappa)], axis=-1)
         record = np.einsum("pn,cnt->cpt", parabola, both).reshape(len(start), -1)
         self._floats = -(-record.shape[1] // PACKET) * PACKET
         self._record = upload(mi.Float, pad(record.astype(np.float32), self._floats))

@@ -19,6 +19,8 @@ from ..heights.load import load_heights
 from ..heights.options import LoadOptions
 from ..heights.read import is_recipe, treat
 from ..heights.recipes import Recipe
+from ..settings import MAX_HEIGHT_SCALE, TableSettings
+from ..tables.build.build import build_with
 from ..tables.exr import is_table
 from ..tables.store.cache import cached_table, loaded_table
 from ..tables.table import DiffractionTable
@@ -29,20 +31,17 @@ HEIGHT_SCALE_ROOM = 1.5
 #: Mitsuba samples its spectral variants' wavelengths from here on, nm.
 SHORTEST_WAVELENGTH = 360.0
 
-#: Gets the table of heights by their digest, from `DiffractionTable.build`'s arguments and from
-#: what builds it of such arguments.
+#: Gets the table of heights by their digest, from its settings and from what builds it with such.
 TableProvider = Callable[
-    [str, dict[str, Any], Callable[[dict[str, Any]], DiffractionTable]], DiffractionTable
+    [str, TableSettings, Callable[[TableSettings], DiffractionTable]], DiffractionTable
 ]
 
 
 def from_cache(
-    digest: str,
-    arguments: dict[str, Any],
-    build: Callable[[dict[str, Any]], DiffractionTable],
+    digest: str, settings: TableSettings, build: Callable[[TableSettings], DiffractionTable]
 ) -> DiffractionTable:
     """The `TableProvider` of all scenes that are not being planned."""
-    return cached_table(digest, arguments, lambda: build(arguments))
+    return cached_table(digest, settings, lambda: build(settings))
 
 
 def table_of_file(
@@ -60,7 +59,7 @@ def table_of_file(
     path : the file.
     must_be_table : refuse anything but a table.
     options : how to read heights.
-    asked : parameters of `DiffractionTable.build` that the scene sets.
+    asked : the fields of `TableSettings` that the scene sets, checked.
     height_scale : the largest factor on the heights that is asked for.
     provider : gets the tables of heights.
     """
@@ -77,7 +76,7 @@ def table_of_file(
         table = _built(
             _recipe_digest(recipe, options),
             lambda: recipe.fields(options),
-            {**recipe.table_arguments(), **asked},
+            {**recipe.table, **asked},
             height_scale,
             provider,
         )
@@ -150,13 +149,13 @@ def _built(
     height_scale: float,
     provider: TableProvider,
 ) -> DiffractionTable:
-    def build(arguments: dict[str, Any]) -> DiffractionTable:
+    def build(settings: TableSettings) -> DiffractionTable:
         heights = load()
         mi.Log(mi.LogLevel.Info, f"diffraction: building the table of {heights[0].name}")
-        return DiffractionTable.build(heights, **arguments)
+        return build_with(heights, settings)
 
-    arguments = {**asked, "height_scale_max": HEIGHT_SCALE_ROOM * max(1.0, height_scale)}
-    return provider(digest, arguments, build)
+    most = min(HEIGHT_SCALE_ROOM * max(1.0, height_scale), MAX_HEIGHT_SCALE)
+    return provider(digest, TableSettings(**asked, height_scale_max=most), build)
 
 
 def _warn(table: DiffractionTable, name: str | None = None) -> None:

@@ -35,7 +35,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import linalg
 from scipy.special import gammaln
 
-BASES = ("svd", "chebyshev", "taylor")
+from ..settings import BASES as BASES
+
 KINDS = ("power", "amplitude")
 
 _DARK = 1e-3  # the share of the brightest that tables.error compares the darkest κ with
@@ -83,7 +84,7 @@ class Expansion:
         index = np.floor(np.asarray(kappa, float) / self.length).astype(np.int64)
         return np.clip(index, 0, self.intervals - 1)
 
-    def specular(self, interval: ArrayLike) -> NDArray[np.float64]:
+    def order_0_offset(self, interval: ArrayLike) -> NDArray[np.float64]:
         """How much of δ_j0 is added to the series: 1 where it was taken out, else 0."""
         return np.where(self._factored(interval), 1.0, 0.0)
 
@@ -129,8 +130,8 @@ class Expansion:
     def fit(self, interval: int) -> NDArray[np.float64]:
         """Matrix (nodes, series_terms) that takes values at the nodes to Chebyshev coefficients.
 
-        The values are those of the power or amplitude less `specular`·δ_j0; the matrix divides out
-        the factor κ̂² or κ̂ of the first interval.
+        The values are those of the power or amplitude less `order_0_offset`·δ_j0; the matrix
+        divides out the factor κ̂² or κ̂ of the first interval.
         """
         nodes = self.nodes(interval)
         count = self.series_terms

@@ -4,12 +4,12 @@ A pixel is a bin; bin (0, 0), order 0, is in the middle, x runs along the rows, 
 holds the lowest frequency along y. The channel `power.I.T` holds term T of interval I of a power,
 `re.I.T` and `im.I.T` those of an amplitude. Order 0 itself and the functions of κ that the terms of
 basis "svd" are multiplied with are in the attribute, in full precision. The cells around a table of
-a restricted domain are a second part of the file.
+a restricted domain are a second part of the file. A second attribute has the SHA-256 of it all.
 """
 
 from __future__ import annotations
 
-import dataclasses
+import hashlib
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping
@@ -21,29 +21,23 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from ..atomic import atomic_path
-from ..errors import DiffractionError
+from ..errors import DiffractionError, one_line
 from ..heights.formats.native import native_messages
-from .build.error import Grid
-from .expansion import BASES, KINDS, Expansion
+from .document import Described, described, document_of, plain
+from .expansion import Expansion
 from .table import FORMAT_VERSION, DiffractionTable
 
 #: What every EXR begins with.
 EXR_BEGINS = b"\x76\x2f\x31\x01"
 #: The attribute with everything but the coefficients. One string: OpenEXR keeps numbers as floats.
 ATTRIBUTE = "mitsuba_diffraction"
+#: SHA-256 of that string and of all channels, in the order of `_channels`.
+CHECKSUM = "mitsuba_diffraction_sha256"
 
-_COMPONENTS = {"power": ("power",), "amplitude": ("re", "im")}
-_PLAIN = (
-    "scale",
-    "spacing",
-    "coherence_width",
-    "coherence",
-    "tolerance",
-    "wavelength_range",
-    "height_scale_max",
-    "error",
-    "source",
-)
+_PREFIXES = {"power": ("power",), "amplitude": ("re", "im")}
+#: Coefficients as large as this are nothing to worry about; a larger table's file is not much
+#: smaller than they are: a few bytes that claim to be gigabytes are no table.
+_SMALL, _BEST_COMPRESSION = 1 << 26, 200
 
 
 def save_table(table: DiffractionTable, path: str | os.PathLike[str]) -> None:
@@ -56,20 +50,31 @@ def save_table(table: DiffractionTable, path: str | os.PathLike[str]) -> None:
     """
     if Path(path).suffix.lower() != ".exr":
         raise DiffractionError(f"cannot write '{path}': a table's file name must end with .exr")
-    document = {"version": FORMAT_VERSION, **_document(table)}
-    _, rows, columns, _, _ = table.coefficients.shape
+    text = json.dumps({"version": FORMAT_VERSION, **document_of(table)}, default=plain)
+    names = ("orders",) if table.coarse is None else ("orders", "coarse")
+    tables = (table,) if table.coarse is None else (table, table.coarse)
+    channels = [
+        {
+            name: np.ascontiguousarray(one.coefficients[index])
+            for name, index in _channels(one.expansion)
+        }
+        for one in tables
+    ]
+    rows, columns = table.grid.shape
     # Parts of a file must agree on it
-    corners = np.array([[0, 0], [columns - 1, rows - 1]], np.int32)
-    shared = {"displayWindow": (corners[0], corners[1])}
-    text = json.dumps(document, default=_plain)
-    parts = [_part(table, "orders", {**shared, ATTRIBUTE: text})]
-    if table.coarse is not None:
-        parts.append(_part(table.coarse, "coarse", shared))
+    shared = {
+        "displayWindow": (np.zeros(2, np.int32), np.array([columns - 1, rows - 1], np.int32)),
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+    }
+    headers = [{"name": name, **shared} for name in names]
+    headers[0] |= {ATTRIBUTE: text, CHECKSUM: _checksum(text, channels)}
     with atomic_path(path) as temporary:
         try:
+            parts = [OpenEXR.Part(*one) for one in zip(headers, channels, strict=True)]
             OpenEXR.File(parts).write(str(temporary))
         except RuntimeError as error:  # what OpenEXR makes of a full disk
-            raise OSError(None, f"OpenEXR: {' '.join(str(error).split())}") from error
+            raise OSError(None, f"OpenEXR: {one_line(str(error))}") from error
 
 
 def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
@@ -80,93 +85,38 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
     DiffractionError
         If the file is missing, no table, damaged, or of another format version.
     """
-    document = read_document(path)
+    headers = _headers(path)
+    text = headers[0].get(ATTRIBUTE)
+    document = _parsed(text, path)
     if document is None:
         raise DiffractionError(
             f"'{path}' is an EXR image but no table; make one of it with "
             f"'mitsuba-diffraction precompute {path} -o OUT.exr', or give it as heightfield"
         )
-    version = document.get("version")
+    version = document.pop("version", None)
     if version != FORMAT_VERSION:
         raise DiffractionError(
             f"'{path}' is a table of format version {version}, this program reads version "
             f"{FORMAT_VERSION}; build it again with 'mitsuba-diffraction precompute'"
         )
     try:
-        table = _table(path, document, 0)
-        if "coarse" in document:
-            table = dataclasses.replace(table, coarse=_table(path, document["coarse"], 1))
-        return table
-    except DiffractionError:
-        raise
-    except (KeyError, TypeError, ValueError) as error:
+        found = described(document)
+        parts = [found] if found.coarse is None else [found, found.coarse]
+        _check_headers(headers, parts, os.path.getsize(path))
+        channels = _read(path, lambda file: [file.channels(n) for n in range(len(parts))])
+        planes = [_planes(*one) for one in zip(channels, parts, strict=True)]
+        if headers[0].get(CHECKSUM) != _checksum(str(text), planes):
+            raise ValueError("its checksum is that of another one")
+        return found.table(_coefficients(*one) for one in zip(planes, parts, strict=True))
+    except (DiffractionError, ValueError, MemoryError) as error:
         raise DiffractionError(
-            f"'{path}' is a damaged table ({' '.join(str(error).split())}); build it again with "
+            f"'{path}' is a damaged table ({one_line(str(error))[:200]}); build it again with "
             "'mitsuba-diffraction precompute'"
         ) from error
 
 
-def _document(table: DiffractionTable) -> dict[str, Any]:
-    """Everything but the coefficients; what a table need not have is left out where it has not."""
-    document = {
-        **{name: getattr(table, name) for name in _PLAIN},
-        "expansion": _given(table.expansion),
-        "grid": _given(table.grid),
-        "order_0": table.order_0.tolist(),
-    }
-    if table.crop is not None:
-        document["crop"] = table.crop
-    if table.coarse is not None:
-        document["coarse"] = _document(table.coarse)
-    return document
-
-
-def _given(record: Expansion | Grid) -> dict[str, Any]:
-    """Its fields, without those that are None."""
-    fields = dataclasses.asdict(record)
-    return {name: value for name, value in fields.items() if value is not None}
-
-
-def _part(table: DiffractionTable, name: str, attributes: dict[str, Any]) -> OpenEXR.Part:
-    header = {
-        "name": name,
-        "compression": OpenEXR.ZIP_COMPRESSION,
-        "type": OpenEXR.scanlineimage,
-        **attributes,
-    }
-    channels = {
-        name: np.ascontiguousarray(table.coefficients[index])
-        for name, index in _channels(table.expansion)
-    }
-    return OpenEXR.Part(header, channels)
-
-
-def _table(path: str | os.PathLike[str], document: dict[str, Any], part: int) -> DiffractionTable:
-    """What `_document` describes, with the coefficients of a part of the file."""
-    expansion = _expansion(document["expansion"])
-    grid = Grid(**{k: _tuple(v) for k, v in dict(document["grid"]).items()})
-    if grid.trims and len(grid.trims) != grid.taps[1]:
-        raise ValueError(f"{len(grid.trims)} trims of {grid.taps[1]} rows")
-    order_0 = np.array(document["order_0"], float)
-    plain = {name: _tuple(document[name]) for name in _PLAIN}
-    coefficients = _read_coefficients(path, expansion, grid, part)
-    expected = (expansion.intervals, coefficients.shape[3], expansion.series_terms)
-    if expansion.basis not in BASES or expansion.kind not in KINDS:
-        raise ValueError(f"basis {expansion.basis!r} of {expansion.kind!r}")
-    if order_0.shape != expected:
-        raise ValueError(f"order_0 of shape {order_0.shape}, expected {expected}")
-    return DiffractionTable(
-        coefficients=coefficients,
-        order_0=order_0,
-        expansion=expansion,
-        grid=grid,
-        crop=_tuple(document.get("crop")),
-        **plain,
-    )
-
-
 def is_table(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is an EXR with a table's attribute, of any version, damaged or not."""
+    """Whether a file is a table, of whatever version; False if it cannot be read."""
     try:
         with open(path, "rb") as stream:
             if stream.read(len(EXR_BEGINS)) != EXR_BEGINS:
@@ -184,13 +134,15 @@ def read_document(path: str | os.PathLike[str]) -> dict[str, Any] | None:
     DiffractionError
         If the file is missing, a folder, or cannot be read as EXR.
     """
-    header = _read(path, lambda file: file.header(), header_only=True)
-    text = header.get(ATTRIBUTE)
+    return _parsed(_headers(path)[0].get(ATTRIBUTE), path)
+
+
+def _parsed(text: Any, path: str | os.PathLike[str]) -> dict[str, Any] | None:
     if not isinstance(text, str):
         return None
     try:
         document = json.loads(text)
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise DiffractionError(
             f"'{path}' is a damaged table (its attribute '{ATTRIBUTE}' is no JSON); build it again "
             "with 'mitsuba-diffraction precompute'"
@@ -198,72 +150,82 @@ def read_document(path: str | os.PathLike[str]) -> dict[str, Any] | None:
     return document if isinstance(document, dict) else None
 
 
-def _read_coefficients(
-    path: str | os.PathLike[str], expansion: Expansion, grid: Grid, part: int
+def _check_headers(headers: list[dict[str, Any]], parts: list[Described], size: int) -> None:
+    """Refuse a file whose parts are not the images described, before any is read."""
+    if len(headers) != len(parts):
+        raise ValueError(f"{len(headers)} parts, expected {len(parts)}")
+    for header, part in zip(headers, parts, strict=True):
+        _, rows, columns, _, _ = part.shape
+        low, high = header["dataWindow"]
+        window = [*low.tolist(), *high.tolist()]
+        if window != [0, 0, columns - 1, rows - 1] or header["type"] != OpenEXR.scanlineimage:
+            raise ValueError(f"pixels {window}, expected {columns} x {rows}")
+        names = sorted((c.name, c.xSampling, c.ySampling) for c in header["channels"])
+        if names != sorted((name, 1, 1) for name, _ in _channels(part.fields["expansion"])):
+            raise ValueError(f"{len(names)} channels other than those of its terms")
+    claimed = sum(2 * int(np.prod(part.shape)) for part in parts)
+    if claimed > max(_SMALL, _BEST_COMPRESSION * size):
+        raise ValueError(f"{size} bytes that claim to hold {claimed:.2g}")
+
+
+def _planes(channels: Mapping[str, Any], part: Described) -> dict[str, NDArray[np.floating]]:
+    """The pixels of each channel, in the order of `_channels`."""
+    expansion = part.fields["expansion"]
+    planes = {name: channels[name].pixels for name, _ in _channels(expansion)}
+    kinds = {plane.dtype for plane in planes.values()}
+    if len(kinds) > 1 or not kinds <= {np.dtype(np.float16), np.dtype(np.float32)}:
+        raise ValueError(f"channels of {', '.join(sorted(map(str, kinds)))}")
+    return planes
+
+
+def _coefficients(
+    planes: Mapping[str, NDArray[np.floating]], part: Described
 ) -> NDArray[np.floating]:
     """Coefficients (intervals, ny, nx, components, terms), in the precision of the file."""
-    channels = _read(path, lambda file: file.channels(part), separate_channels=True)
-    shape = (2 * grid.last[1] + 1, 2 * grid.last[0] + 1)
-    components = len(_COMPONENTS[expansion.kind])
-    result: NDArray[np.floating] | None = None
-    for name, (interval, _, _, component, term) in _channels(expansion):
-        pixels = channels[name].pixels
-        if pixels.shape != shape or pixels.dtype not in (np.float16, np.float32):
-            raise ValueError(f"channel {name} is {pixels.dtype} {pixels.shape}, expected {shape}")
-        if result is None:
-            result = np.empty(
-                (expansion.intervals, *shape, components, expansion.terms), pixels.dtype
-            )
-        result[interval, :, :, component, term] = pixels
-    if result is None:
-        raise ValueError("no coefficients")
+    names = list(_channels(part.fields["expansion"]))
+    result = np.empty(part.shape, planes[names[0][0]].dtype)
+    for name, index in names:
+        result[index] = planes[name]
     return result
+
+
+def _checksum(text: str, parts: list[dict[str, NDArray[np.floating]]]) -> str:
+    content = hashlib.sha256(text.encode())
+    for planes in parts:
+        for plane in planes.values():
+            content.update(np.ascontiguousarray(plane).data)
+    return content.hexdigest()
 
 
 def _channels(expansion: Expansion) -> Iterator[tuple[str, tuple[Any, ...]]]:
     """Channel names, and the index of each in the coefficients."""
     for interval in range(expansion.intervals):
-        for component, prefix in enumerate(_COMPONENTS[expansion.kind]):
+        for component, prefix in enumerate(_PREFIXES[expansion.kind]):
             for term in range(expansion.terms):
                 everywhere = slice(None)
                 index = (interval, everywhere, everywhere, component, term)
                 yield f"{prefix}.{interval}.{term}", index
 
 
+def _headers(path: str | os.PathLike[str]) -> list[dict[str, Any]]:
+    """Of every part of an EXR file."""
+    return _read(
+        path, lambda file: [file.header(n) for n in range(len(file.parts))], header_only=True
+    )
+
+
 def _read(
-    path: str | os.PathLike[str], what: Callable[[OpenEXR.File], dict[str, Any]], **options: bool
-) -> dict[str, Any]:
+    path: str | os.PathLike[str], what: Callable[[OpenEXR.File], Any], header_only: bool = False
+) -> Any:
     """Part of an EXR file; what OpenEXR prints about a damaged one is left out."""
     if not Path(path).is_file():
         why = "it is a folder" if Path(path).is_dir() else "there is no such file"
         raise DiffractionError(f"cannot read '{path}': {why}")
     try:
         with native_messages():
-            return what(OpenEXR.File(str(path), **options))
-    except (RuntimeError, ValueError, OSError, LookupError) as error:
+            return what(OpenEXR.File(str(path), separate_channels=True, header_only=header_only))
+    except (RuntimeError, ValueError, OSError, LookupError, TypeError, MemoryError) as error:
         raise DiffractionError(
             f"cannot read '{path}' as EXR: it is empty, cut short or no EXR file; "
             "give an .exr written by 'mitsuba-diffraction precompute'"
         ) from error
-
-
-def _expansion(document: dict[str, Any]) -> Expansion:
-    """The series, with the functions of basis "svd"."""
-    if "functions" not in document:
-        return Expansion(**document)
-    functions = np.array(document["functions"], float)
-    found = Expansion(**{**document, "functions": functions})
-    if functions.ndim != 3 or functions.shape[::2] != (found.intervals, found.terms):
-        raise ValueError(f"functions of shape {functions.shape}")
-    return found
-
-
-def _tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
-
-
-def _plain(value: Any) -> Any:
-    """JSON for what the table holds besides plain Python: NumPy scalars and read-only mappings."""
-    if isinstance(value, Mapping):
-        return dict(value)
-    return value.tolist()

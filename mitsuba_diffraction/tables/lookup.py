@@ -121,7 +121,7 @@ def weighted_sum(
         lobe = [_gaussian(exponent) for exponent in grid.order_0_exponents]
     else:
         lobe = list(kernels)
-    total = squared(table.centre(kappa)) * (lobe[0](x) * lobe[1](y))[:, None]
+    total = squared(table.order_0_at(kappa)) * (lobe[0](x) * lobe[1](y))[:, None]
     trims = grid.trims if taps == grid.taps and grid.trims else (0,) * taps[1]
     for j, trim in enumerate(trims):
         for i in range(trim, taps[0] - trim):

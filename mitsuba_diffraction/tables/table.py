@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+import hashlib
+import json
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,11 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
 from ..optics.geometry import sigma_of, wavenumber
-from .build.error import Grid
+from ..settings import TableSettings
 from .expansion import Expansion
+from .packing import Grid
 
 #: Raised whenever what the coefficients mean changes; tables of another version are refused.
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,11 +39,11 @@ class DiffractionTable:
     expansion : which series in κ.
     grid : bins, window and taps.
     spacing : (dqx, dqy), rad/µm between bins.
-    coherence_width, coherence, tolerance, wavelength_range, height_scale_max : as asked for.
-    error : the measured error (see `tables.error`): near, far, and where.
+    settings : what was asked for.
+    error : the measured error (see `build.error`): near order 0, far from it, and at which κ.
     source : the heights: name, digest, size, statistics, history.
-    crop : (x, y), half axes of the ellipse of orders, rad/µm, if less than what light can probe.
-    coarse : what a table of a restricted domain has beyond `crop` and its κ_max (`tables.coarse`).
+    coarse : of a table that ends before `q_limit` or its own `kappa_max`, the cells that go on
+        from there (`build.coarse`).
     """
 
     coefficients: NDArray[np.floating]
@@ -48,14 +52,9 @@ class DiffractionTable:
     expansion: Expansion
     grid: Grid
     spacing: tuple[float, float]
-    coherence_width: float
-    coherence: str
-    tolerance: float
-    wavelength_range: tuple[float, float]
-    height_scale_max: float
+    settings: TableSettings
     error: Mapping[str, float]
     source: Mapping[str, Any] = field(default_factory=dict)
-    crop: tuple[float, float] | None = None
     coarse: DiffractionTable | None = None
 
     # Set by the package `tables`, since what they do builds on this class
@@ -64,6 +63,31 @@ class DiffractionTable:
     save: ClassVar[Callable[..., None]]  #: to a file: `exr.save_table`
     window_sum: ClassVar[Callable[..., NDArray[np.float64]]]  #: ⟨|P|²⟩: `lookup.window_sum`
     brdf: ClassVar[Callable[..., NDArray[np.float64]]]  #: the model for R = 1: `lookup.brdf`
+
+    @property
+    def coherence_width(self) -> float:
+        """4σ of the Gaussian amplitude window, µm."""
+        return self.settings.coherence_width
+
+    @property
+    def coherence(self) -> str:
+        """ "ensemble" or "patch"."""
+        return self.settings.coherence
+
+    @property
+    def tolerance(self) -> float:
+        """The relative error that was asked for."""
+        return self.settings.tolerance
+
+    @property
+    def wavelength_range(self) -> tuple[float, float]:
+        """Shortest and longest wavelength, nm."""
+        return self.settings.wavelength_range
+
+    @property
+    def height_scale_max(self) -> float:
+        """Largest factor on the heights that the table serves."""
+        return self.settings.height_scale_max
 
     @property
     def largest_error(self) -> float:
@@ -76,14 +100,38 @@ class DiffractionTable:
         return sigma_of(self.coherence_width)
 
     @property
-    def reach(self) -> float:
+    def q_limit(self) -> float:
         """Largest spatial frequency k·|(u, v)| that light can probe, rad/µm."""
-        return reach_of(self.wavelength_range)
+        return q_limit_of(self.wavelength_range)
 
     @property
-    def radii(self) -> tuple[float, float]:
+    def q_max(self) -> tuple[float, float]:
         """Half axes (x, y) of the ellipse in which the table has the orders, rad/µm."""
-        return (self.reach, self.reach) if self.crop is None else self.crop
+        return self.settings.q_max or (self.q_limit, self.q_limit)
+
+    def digest(self) -> str:
+        """SHA-256 of all that look-ups depend on; not of names, statistics and measured errors."""
+        return self._digest
+
+    @cached_property
+    def _digest(self) -> str:
+        content = hashlib.sha256()
+        for numbers in self._numbers():
+            content.update(json.dumps([numbers.dtype.str, numbers.shape]).encode())
+            content.update(np.ascontiguousarray(numbers).data)
+        settings = asdict(self.settings)
+        expansion = {**asdict(self.expansion), "functions": None}
+        plain = [settings, expansion, asdict(self.grid), self.spacing, self.scale]
+        content.update(json.dumps(plain, sort_keys=True).encode())
+        if self.coarse is not None:
+            content.update(self.coarse.digest().encode())
+        return content.hexdigest()
+
+    def _numbers(self) -> Iterator[NDArray[Any]]:
+        yield self.coefficients
+        yield self.order_0
+        if self.expansion.functions is not None:
+            yield self.expansion.functions
 
     @property
     def nbytes(self) -> int:
@@ -101,19 +149,19 @@ class DiffractionTable:
         if self.coarse is not None:
             raise DiffractionError(
                 f"{what} all orders, but the table was made for frequencies up to "
-                f"{self.radii[0]:.4g} along x, {self.radii[1]:.4g} along y and κ up to "
-                f"{self.expansion.kappa_max:.4g} rad/µm only; give a table without crop and "
+                f"{self.q_max[0]:.4g} along x, {self.q_max[1]:.4g} along y and κ up to "
+                f"{self.expansion.kappa_max:.4g} rad/µm only; give a table without q_max and "
                 "kappa_max, or the height field"
             )
 
     def covers(self, qx: ArrayLike, qy: ArrayLike, kappa: ArrayLike) -> NDArray[np.bool_]:
         """Whether a look-up finds the orders (to rounding in single precision)."""
         slack = 1.0 + 1e-6
-        x, y = (np.asarray(q) / r for q, r in zip((qx, qy), self.radii, strict=True))
+        x, y = (np.asarray(q) / r for q, r in zip((qx, qy), self.q_max, strict=True))
         inside = np.hypot(x, y) <= slack
         return inside & (np.asarray(kappa) <= self.expansion.kappa_max * slack)
 
-    def centre(self, kappa: ArrayLike) -> NDArray[np.float64]:
+    def order_0_at(self, kappa: ArrayLike) -> NDArray[np.float64]:
         """Order 0 at κ (rad/µm): κ.shape + (components,), its power or the parts of a_0."""
         interval = self.expansion.interval(kappa)
         parts: NDArray[np.float64] = np.einsum(
@@ -121,7 +169,7 @@ class DiffractionTable:
             self.order_0[interval],
             self.expansion.series_weights(kappa),
         )
-        parts[..., 0] += self.expansion.specular(interval)
+        parts[..., 0] += self.expansion.order_0_offset(interval)
         return parts
 
     def summary(self) -> dict[str, Any]:
@@ -156,7 +204,7 @@ class DiffractionTable:
         _, ny, nx, _, _ = self.coarse.coefficients.shape
         return {
             "restricted_to": {
-                "frequency (rad/µm)": list(self.radii),
+                "frequency (rad/µm)": list(self.q_max),
                 "kappa (rad/µm)": self.expansion.kappa_max,
                 "cells beyond": [nx, ny],
             }
@@ -171,11 +219,11 @@ class DiffractionTable:
         )
 
 
-def reach_of(wavelength_range: tuple[float, float]) -> float:
+def q_limit_of(wavelength_range: tuple[float, float]) -> float:
     """2k at the shortest wavelength, rad/µm: |(u, v)| is at most 2."""
     return float(2.0 * wavenumber(wavelength_range[0]))
 
 
-def refuse(text: str) -> DiffractionError:
+def build_error(text: str) -> DiffractionError:
     """An error about a table that cannot be built."""
     return DiffractionError(f"cannot build the table: {text}")

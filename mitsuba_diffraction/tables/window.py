@@ -17,9 +17,6 @@ from scipy import sparse, special
 #: exp(−4.6²) = 6e-10: as good as all of the window.
 FULL_REACH = 4.6
 
-#: Beyond this the patch is so much larger than the window that a look-up would take minutes.
-MAX_TAPS = 64
-
 _MOST_TRIMMED = 64  # taps; more are read in a loop over whole rows
 
 

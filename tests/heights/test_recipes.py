@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.heights.recipes import LOAD_KEYS, TABLE_KEYS, Recipe
+from mitsuba_diffraction.heights.recipes import LOAD_KEYS, Recipe
+from mitsuba_diffraction.settings import RECIPE_SETTINGS
 
 PRECOMPUTE = Path(__file__).resolve().parent.parent.parent / "precompute"
 HEIGHTS = 0.01 * np.random.default_rng(6).random((8, 9))
@@ -77,14 +78,14 @@ wavelength_range = [400, 700]
 output = "../out/x.exr"
 """
     recipe = Recipe.load(write(folder, text))
-    assert recipe.table_arguments() == {
+    assert recipe.table == {
         "coherence_width": 30,
         "coherence": "patch",
         "wavelength_range": (400, 700),
     }
     assert recipe.output == folder / "../out/x.exr"
     plain = Recipe.load(write(folder, 'source = "a.npy"'))
-    assert plain.table_arguments() == {}
+    assert plain.table == {}
     assert plain.output == Path("patch.exr")  # in the current folder
 
 
@@ -170,7 +171,7 @@ values = st.sampled_from(
      '["a.npy"]', '"auto"', "{ period = 1, depth = 2, rows = 2 }", "1979-05-27", '""', "9" * 30]
 )  # fmt: skip
 keys = st.sampled_from(["source", "generator", "arguments", "seeds", "output", "x",
-                        *LOAD_KEYS, *TABLE_KEYS])  # fmt: skip
+                        *LOAD_KEYS, *RECIPE_SETTINGS])  # fmt: skip
 
 
 @settings(

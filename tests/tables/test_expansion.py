@@ -21,7 +21,7 @@ def series(expansion, function, kappa, specular):
     result = np.empty_like(kappa)
     for n, k in enumerate(kappa):
         interval = int(expansion.interval(k))
-        taken_out = float(expansion.specular(interval)) if specular else 0.0
+        taken_out = float(expansion.order_0_offset(interval)) if specular else 0.0
         values = function(expansion.nodes(interval)) - taken_out
         result[n] = expansion.weights(k) @ (values @ expansion.fit(interval)) + taken_out
     return result

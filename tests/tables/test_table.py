@@ -37,7 +37,7 @@ def test_tables_are_symmetric_and_one_sided():
 def test_no_value_is_negative_though_series_ripple():
     table = DiffractionTable.build(PATCH, tolerance=1e-2, **DEFAULTS)
     rng = np.random.default_rng(6)
-    q = rng.uniform(-1.0, 1.0, (2, 20000)) * table.reach / np.sqrt(2)
+    q = rng.uniform(-1.0, 1.0, (2, 20000)) * table.q_limit / np.sqrt(2)
     values = table.window_sum(*q, rng.uniform(0.0, table.expansion.kappa_max, 20000))
     assert values.min() >= 0.0
 

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...heights.field import HeightField
 from ...progress import Progress, silent
-from ...tables.table import DiffractionTable, reach_of
+from ...tables.table import DiffractionTable, q_limit_of
 
 #: Terms of the source documents' shaders.
 TERMS = 37
 #: Normal incidence and return at 380 nm: the largest κ of the visible.
-KAPPA = reach_of((380.0, 780.0))
+KAPPA = q_limit_of((380.0, 780.0))
 
 _SIDE, _PIXEL = 48, 0.1
 

@@ -18,8 +18,8 @@ from ...errors import DiffractionError
 from ...heights.field import HeightField
 from ...progress import Progress, silent
 from ...tables.build.half_precision import half_scale
-from ...tables.colour.colour_difference import power_loss
-from ...tables.table import DiffractionTable, reach_of
+from ...tables.colour.colour_difference import power_colour_difference
+from ...tables.table import DiffractionTable, q_limit_of
 from ..bench.contenders import Queries
 from ..bench.saved import saved_bsdf
 from ..bench.timing import kernel_seconds, ratio, rounds_of
@@ -123,7 +123,7 @@ def measure(
             bsdf = saved_bsdf(file, energy_conserving=False)
         calls[setting.name] = partial(bsdf.eval, context, queries.si, queries.wo)
         sample = samples[mode]
-        loss = power_loss(finest[mode], table)
+        loss = power_colour_difference(finest[mode], table)
         _, _, _, _, terms = table.coefficients.shape
         results.append(
             Measured(
@@ -148,7 +148,7 @@ def measure(
 def _table(field: HeightField, setting: Setting, coherence_width: float) -> DiffractionTable:
     arguments: dict[str, Any] = dict(setting.arguments)
     if setting.crop is not None:
-        arguments["crop"] = setting.crop * reach_of((360.0, 830.0))
+        arguments["q_max"] = setting.crop * q_limit_of((360.0, 830.0))
     table = DiffractionTable.build(field, coherence_width=coherence_width, **arguments)
     if setting.stored is None:
         return table

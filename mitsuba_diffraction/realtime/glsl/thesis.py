@@ -8,6 +8,8 @@ import numpy as np
 
 from ...errors import DiffractionError
 from ...heights.field import HeightField
+from ...settings import TableSettings
+from ...tables.build.build import build_with
 from ...tables.store.cache import cached_table
 from ...tables.table import DiffractionTable
 from ...thesis.methods import FullSpectrum, OrdersOnly, Repeated, make
@@ -49,11 +51,8 @@ def thesis_method(name: str, heights: HeightField, table: DiffractionTable) -> M
 def _kept(heights: HeightField, **arguments: Any) -> DiffractionTable:
     """`DiffractionTable.build`, once for a patch and its arguments."""
     progress = arguments.pop("progress", None)
-    return cached_table(
-        heights.digest(),
-        arguments,
-        lambda: DiffractionTable.build(heights, progress=progress, **arguments),
-    )
+    settings = TableSettings(**arguments)
+    return cached_table(heights.digest(), settings, lambda: build_with(heights, settings, progress))
 
 
 def pack_method(method: Method) -> Packed:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...progress import Progress
-from ...tables.colour.colour_difference import colour_loss, power_loss
+from ...tables.colour.colour_difference import colour_difference, power_colour_difference
 from ...tables.energy.powers import power_series
 from ...tables.store.cache import cached_colours
 from ...tables.table import DiffractionTable
@@ -55,7 +55,7 @@ def web_table(method: str, table: DiffractionTable, digits: int) -> WebTable:
         # halves that the shader can read
         coefficients = shortened(rounded(colours.coefficients, digits)).astype(np.float16)
         fewer = replace(colours, coefficients=coefficients, order_0=shortened(colours.order_0))
-        packed, loss = pack_colours(fewer), colour_loss(colours, fewer)
+        packed, loss = pack_colours(fewer), colour_difference(colours, fewer)
         width = fewer.coefficients.shape[-1] // 2  # two numbers a word
     else:
         series, order_0, scale, expansion = power_series(table)
@@ -64,7 +64,7 @@ def web_table(method: str, table: DiffractionTable, digits: int) -> WebTable:
             expansion=expansion,
         )  # fmt: skip
         less = replace(powers, coefficients=rounded(powers.coefficients, digits))
-        packed, loss = pack_powers(less), power_loss(powers, less)
+        packed, loss = pack_powers(less), power_colour_difference(powers, less)
         width = 4 * int(packed.definitions["TEXELS"])
     sections = {}
     for texture in packed.textures:

@@ -87,7 +87,7 @@ class Domain:
 
     def arguments(self) -> dict[str, Any]:
         """For `DiffractionTable.build`."""
-        return {"crop": self.crop, "kappa_max": self.kappa_max, "tolerance": self.tolerance}
+        return {"q_max": self.crop, "kappa_max": self.kappa_max, "tolerance": self.tolerance}
 
 
 def domain_for(
@@ -107,10 +107,10 @@ def domain_for(
     """
     light = asked.light
     crop = _ellipse(asked.along, light, tolerance)
-    crop = (min(crop[0] * ROOM, table.reach), min(crop[1] * ROOM, table.reach))
+    crop = (min(crop[0] * ROOM, table.q_limit), min(crop[1] * ROOM, table.q_limit))
     # All that these heights can make: the bound of the albedo looks at every direction, and next
     # to nothing is gained by less
-    kappa_max = table.reach * height_scale
+    kappa_max = table.q_limit * height_scale
     own = tolerance / max(float(light.sum()), 1e-6)
     return Domain(
         crop=crop,

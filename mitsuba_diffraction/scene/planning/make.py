@@ -284,7 +284,7 @@ def promising(plan: Plan, loaded: RecordedScene) -> Plan:
     for key, mine in plan.tables.items():
         whole, domain = loaded.session.tables[key], mine.domain
         if domain is not None:
-            area = domain.crop[0] * domain.crop[1] / whole.reach**2
+            area = domain.crop[0] * domain.crop[1] / whole.q_limit**2
             spared = FEWEST_TERMS if domain.tolerance > whole.tolerance else 1.0
             domain = domain if area * spared < WORTH else None
         tables[key] = replace(mine, domain=domain)

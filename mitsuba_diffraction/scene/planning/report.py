@@ -46,7 +46,7 @@ def _of_table(
     light = asked.light
     result["asked for"] = {
         "share of the surfaces' light that is diffracted": float(light.sum()),
-        "frequency (rad/µm)": _shares(asked.frequency, light, "light can probe", table.reach),
+        "frequency (rad/µm)": _shares(asked.frequency, light, "light can probe", table.q_limit),
         "frequency along x (rad/µm)": _shares(asked.along[0], light),
         "frequency along y (rad/µm)": _shares(asked.along[1], light),
         "kappa (rad/µm)": _shares(asked.kappa, light, "the table has", table.expansion.kappa_max),

@@ -10,7 +10,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import drjit as dr
@@ -23,7 +23,8 @@ from ...plugin.names import own_id
 from ...plugin.pair import Pair
 from ...plugin.roles import BSDF, Colour, Float, Interaction, Mask, Properties, Vector2f
 from ...plugin.sampling import share_sampler
-from ...tables.store.cache import cached_table, content_key
+from ...settings import TableSettings
+from ...tables.store.cache import cached_table, table_key
 from ...tables.table import DiffractionTable
 
 _one_at_a_time = threading.Lock()
@@ -56,7 +57,7 @@ class Session:
 
     Parameters
     ----------
-    limits : arguments of `DiffractionTable.build` by the key of the table that they restrict.
+    limits : fields of `TableSettings` by the key of the table that they restrict.
     sample_like : tables by the key of another, which is to draw directions as they do: pictures of
         both then differ by what they look up, and by nothing else.
     timing : build tables that the cache may have, too, and note how long that takes.
@@ -108,12 +109,12 @@ class Session:
     def table(
         self,
         digest: str,
-        arguments: dict[str, Any],
-        build: Callable[[dict[str, Any]], DiffractionTable],
+        settings: TableSettings,
+        build: Callable[[TableSettings], DiffractionTable],
     ) -> DiffractionTable:
         """The table of heights with this digest, as far as the plan needs it."""
-        key = content_key(digest, arguments)
-        restricted = {**arguments, **self.limits.get(key, {})}
+        key = table_key(digest, settings)
+        restricted = replace(settings, **self.limits.get(key, {}))
         made = []
         if self.timing:
             start = time.perf_counter()

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from ...heights.field import HeightField
 from ...progress import Progress
 from ..expansion import Expansion
+from ..packing import Grid
 from ..window import FULL_REACH
 from .checks import check_size
 from .coefficients import coefficients_of
-from .error import FLOOR, ErrorMeter, Grid, Parts, worst
-from .half_precision import halved
+from .error import FLOOR, ErrorMeter, Parts, worst
+from .half_precision import half_precision
 from .spectrum import Spectrum
 
 #: Below it single precision transforms would spend a share of the tolerance themselves.
@@ -73,7 +74,7 @@ class Attempt:
         )
         self.scale = 1.0
         if half:
-            self.coefficients, self.scale = halved(self.coefficients)
+            self.coefficients, self.scale = half_precision(self.coefficients)
 
     def error(self, trims: tuple[int, ...] = ()) -> float:
         """The larger of both errors, with some taps left out."""

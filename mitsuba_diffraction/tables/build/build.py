@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
-from ...errors import DiffractionError
+from ...errors import DiffractionError, DiffractionWarning
 from ...heights.field import HeightField
 from ...heights.validity import units_question
 from ...optics.geometry import sigma_of
 from ...progress import Progress, silent
-from ...reference import check_coherence
+from ...settings import MAX_TAPS, TableSettings, checked
 from ..expansion import Expansion
-from ..table import DiffractionTable, reach_of, refuse
-from ..window import MAX_TAPS, reach_error, taps_for, trims_for
+from ..packing import Grid
+from ..table import DiffractionTable, build_error, q_limit_of
+from ..window import reach_error, taps_for, trims_for
 from .attempt import Attempt
-from .checks import check_parameters, check_patches, check_taylor, check_units, restricted
+from .checks import check_patches, check_taylor, check_units
 from .choose import (
     MAX_INTERVALS,
     PACKET,
@@ -29,7 +32,8 @@ from .choose import (
 )
 from .coarse import coarse_table
 from .describe import describe
-from .error import Grid
+
+T = TypeVar("T")
 
 #: What taps may use up of the tolerance when their number is chosen, and series of what they leave.
 TAPS_SHARE, SERIES_SHARE = 0.5, 0.8
@@ -46,16 +50,7 @@ class _Wanted:
     """What is asked for, and what follows from it at once."""
 
     patches: Sequence[HeightField]
-    coherence_width: float
-    coherence: str
-    basis: str
-    tolerance: float
-    terms: int | None
-    wavelength_range: tuple[float, float]
-    height_scale_max: float
-    taps: int | None
-    radii: tuple[float, float]
-    kappa_max: float
+    settings: TableSettings
 
     @property
     def deepest(self) -> HeightField:
@@ -70,24 +65,27 @@ class _Wanted:
     @property
     def steps(self) -> tuple[float, float]:
         """The same in units of 1/σ."""
-        sigma = sigma_of(self.coherence_width)
+        sigma = sigma_of(self.settings.coherence_width)
         return (sigma * self.spacing[0], sigma * self.spacing[1])
 
     @property
-    def coherent(self) -> bool:
-        return self.coherence == "patch"
+    def q_max(self) -> tuple[float, float]:
+        """Half axes of the frequencies to tabulate, at most what light can probe."""
+        limit = q_limit_of(self.settings.wavelength_range)
+        x, y = self.settings.q_max or (limit, limit)
+        return (min(x, limit), min(y, limit))
 
     @property
-    def everywhere(self) -> bool:
-        """Whether all frequencies are wanted that light can probe."""
-        reach = reach_of(self.wavelength_range)
-        return self.radii == (reach, reach)
+    def kappa_max(self) -> float:
+        """Largest κ to tabulate, at most what light can probe."""
+        limit = q_limit_of(self.settings.wavelength_range) * self.settings.height_scale_max
+        return min(self.settings.kappa_max or limit, limit)
 
     @property
     def whole(self) -> bool:
-        """And all κ."""
-        reach = reach_of(self.wavelength_range)
-        return self.everywhere and self.kappa_max == reach * self.height_scale_max
+        """Whether that is all that light can probe."""
+        everything = _Wanted(self.patches, replace(self.settings, q_max=None, kappa_max=None))
+        return (self.q_max, self.kappa_max) == (everything.q_max, everything.kappa_max)
 
 
 @dataclass(frozen=True)
@@ -104,16 +102,17 @@ class _Setting:
 def build_table(
     heights: HeightField | Sequence[HeightField],
     *,
-    coherence_width: float = 65.0,
-    coherence: str = "ensemble",
-    basis: str = "auto",
-    tolerance: float = 1e-3,
+    coherence_width: float = TableSettings.coherence_width,
+    coherence: str = TableSettings.coherence,
+    basis: str = TableSettings.basis,
+    tolerance: float = TableSettings.tolerance,
     terms: int | None = None,
-    wavelength_range: tuple[float, float] = (360.0, 830.0),
-    height_scale_max: float = 1.5,
+    wavelength_range: tuple[float, float] = TableSettings.wavelength_range,
+    height_scale_max: float = TableSettings.height_scale_max,
     taps: int | None = None,
-    crop: float | tuple[float, float] | None = None,
+    q_max: float | tuple[float, float] | None = None,
     kappa_max: float | None = None,
+    crop: float | tuple[float, float] | None = None,
     progress: Progress | None = None,
 ) -> DiffractionTable:
     """Tabulate a height field to a tolerance, and measure that it is met.
@@ -122,18 +121,10 @@ def build_table(
     ----------
     heights : the patch, which tiles the plane; or several of one size, whose powers are
         averaged (`ensemble` only).
-    coherence_width : 4σ of the Gaussian amplitude window, µm.
-    coherence : "ensemble" (window power averaged over its position) or "patch" (one window).
-    basis : "svd" (also as "auto"), "chebyshev" or "taylor"; see `tables.expansion`.
-    tolerance : relative error of ⟨|P|²⟩ at the worst κ, as `tables.error` measures it.
-    terms : coefficients of a series; by default as many as the tolerance takes.
-    wavelength_range : nm; the shortest sets how far the table reaches.
-    height_scale_max : largest factor on the heights that the table serves.
-    taps : bins read in each direction; by default as many as the tolerance takes.
-    crop : largest spatial frequency k·|(u, v)| that is tabulated, rad/µm, or half axes of an
-        ellipse along x and y; by default all that light of the shortest wavelength can probe.
-    kappa_max : largest k·w·height_scale that is, rad/µm; by default likewise. Beyond either, a
-        table of coarse cells answers, which is right on average (`tables.coarse`).
+    coherence_width, coherence, basis, tolerance, terms, wavelength_range, height_scale_max, taps,
+    q_max, kappa_max : see `settings.TableSettings`. Beyond `q_max` or `kappa_max` a table of
+        coarse cells answers, which is right on average (`tables.build.coarse`).
+    crop : the former name of `q_max`, in rad/µm; heights have a treatment of that name, in µm.
     progress : called as progress(done, total, text) while it works.
 
     Raises
@@ -142,19 +133,26 @@ def build_table(
         If a parameter is out of range, or the tolerance cannot be met: the text names the
         error to expect and what would meet it.
     """
-    check_coherence(coherence_width, coherence)
-    check_parameters(basis, tolerance, terms, wavelength_range, height_scale_max, taps)
-    patches = [heights] if isinstance(heights, HeightField) else list(heights)
-    check_patches(patches, coherence, basis)
-    check_units(patches)
-    reach = reach_of(wavelength_range)
-    radii, kappa_max = restricted(crop, kappa_max, reach, reach * height_scale_max)
-    wanted = _Wanted(
-        patches, coherence_width, coherence, basis, tolerance, terms, wavelength_range,
-        height_scale_max, taps, radii, kappa_max,
+    if crop is not None:
+        q_max = _former_name(crop, q_max)
+    settings = TableSettings(
+        coherence_width, coherence, basis, tolerance, terms, taps, wavelength_range,
+        height_scale_max, checked("q_max", q_max), kappa_max,
     )  # fmt: skip
+    return build_with(heights, settings, progress)
+
+
+def build_with(
+    heights: HeightField | Sequence[HeightField],
+    settings: TableSettings,
+    progress: Progress | None = None,
+) -> DiffractionTable:
+    """`build_table` with its arguments in one record."""
+    patches = [heights] if isinstance(heights, HeightField) else list(heights)
+    check_patches(patches, settings)
+    check_units(patches)
     try:
-        return _built(wanted, progress or silent)
+        return _built(_Wanted(patches, settings), progress or silent)
     except DiffractionError as error:
         questions = [question for patch in patches if (question := units_question(patch))]
         if not questions:
@@ -162,9 +160,21 @@ def build_table(
         raise DiffractionError(f"{error}; or {questions[0]}") from error
 
 
+def _former_name(crop: T, q_max: T | None) -> T:
+    if q_max is not None:
+        raise DiffractionError("crop is the former name of q_max; give q_max alone")
+    warnings.warn(
+        f"crop={crop} of a table is its largest spatial frequency in rad/µm, now called q_max; to "
+        "keep the middle of a patch, in µm, crop the heights: heights.treated(crop=…)",
+        DiffractionWarning,
+        stacklevel=3,
+    )
+    return crop
+
+
 def _built(wanted: _Wanted, tell: Progress) -> DiffractionTable:
     """The first attempt that meets the tolerance."""
-    patches, tolerance = wanted.patches, wanted.tolerance
+    patches, tolerance = wanted.patches, wanted.settings.tolerance
     setting = _first(wanted)
     for _ in range(_ATTEMPTS):
         grid, expansion = _grid(wanted, setting.taps), setting.expansion
@@ -179,7 +189,7 @@ def _built(wanted: _Wanted, tell: Progress) -> DiffractionTable:
         found = attempt.error()
         del attempt  # before the next one takes as much memory
     expansion, functions = setting.expansion, setting.functions
-    raise refuse(
+    raise build_error(
         f"the error is still {found:.2g} with {expansion.intervals}×{functions or expansion.terms} "
         f"terms and {setting.taps[0]}×{setting.taps[1]} taps; raise tolerance={tolerance:g}"
     )
@@ -187,21 +197,22 @@ def _built(wanted: _Wanted, tell: Progress) -> DiffractionTable:
 
 def _first(wanted: _Wanted) -> _Setting:
     """The setting that should do, as trials on a cut-out of the patch have it."""
-    tolerance, steps, coherent = wanted.tolerance, wanted.steps, wanted.coherent
+    settings, steps = wanted.settings, wanted.steps
+    tolerance, coherent = settings.tolerance, settings.coherent
     trims: tuple[int, ...] = ()
-    if wanted.taps:
-        taps = (wanted.taps, wanted.taps)
+    if settings.taps:
+        taps = (settings.taps, settings.taps)
     else:
         taps = taps_for(steps, tolerance * TAPS_SHARE, coherent)
         trims = trims_for(steps, taps, tolerance * TRIMMED_SHARE, coherent)
     spare = tolerance - reach_error(steps, taps, coherent)
     budget = SERIES_SHARE * max(spare, tolerance * TAPS_SHARE)
-    asked = (wanted.deepest, wanted.coherence, wanted.kappa_max, budget, wanted.terms)
+    asked = (wanted.deepest, settings.coherence, wanted.kappa_max, budget, settings.terms)
     functions = None
-    if wanted.basis == "taylor":
+    if settings.basis == "taylor":
         expansion = taylor_expansion(*asked)
         check_taylor(wanted.deepest, expansion, tolerance)
-    elif wanted.basis == "chebyshev":
+    elif settings.basis == "chebyshev":
         expansion = chebyshev_expansion(*asked)
     else:
         expansion, functions = svd_expansion(*asked)
@@ -211,23 +222,22 @@ def _first(wanted: _Wanted) -> _Setting:
 
 def _next(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> _Setting:
     """What to try after an attempt that leaves too much; an error where the user forbids it."""
-    tolerance = wanted.tolerance
+    tolerance, terms = wanted.settings.tolerance, wanted.settings.terms
     if attempt.taps_error() > TAPS_SHARE * tolerance:
-        if wanted.taps is not None:
-            raise refuse(
-                f"taps={wanted.taps} leave an error of {attempt.error():.2g}, more than "
+        if wanted.settings.taps is not None:
+            raise build_error(
+                f"taps={wanted.settings.taps} leave an error of {attempt.error():.2g}, more than "
                 f"tolerance={tolerance:g}; leave taps out, or raise the tolerance"
             )
         return replace(setting, taps=(_more(setting.taps[0]), _more(setting.taps[1])))
     if setting.half:
         return replace(setting, half=False)
     functions = setting.functions
-    if functions is not None and wanted.terms is None and functions < PACKET:
+    if functions is not None and terms is None and functions < PACKET:
         # A cut-out looked simpler than the whole patch; series are longer than functions are many
-        terms = max(setting.expansion.terms, PACKET + 2)
-        longer = replace(setting.expansion, terms=terms)
+        longer = replace(setting.expansion, terms=max(setting.expansion.terms, PACKET + 2))
         return replace(setting, functions=PACKET, expansion=longer)
-    longer = _extended(setting.expansion, functions, wanted.terms, attempt.error(), tolerance)
+    longer = _extended(setting.expansion, functions, terms, attempt.error(), tolerance)
     return replace(setting, expansion=longer)
 
 
@@ -235,16 +245,8 @@ def _table(
     wanted: _Wanted, setting: _Setting, attempt: Attempt, tell: Progress
 ) -> DiffractionTable:
     """What an attempt made, with all that a table knows of itself."""
-    low, high = wanted.wavelength_range
-    coarse = None
-    if not wanted.whole:
-        coarse = coarse_table(
-            wanted.patches,
-            coherence_width=wanted.coherence_width,
-            wavelength_range=wanted.wavelength_range,
-            height_scale_max=wanted.height_scale_max,
-            progress=tell,
-        )
+    patches, settings = wanted.patches, wanted.settings
+    everywhere = wanted.q_max == (q_limit_of(settings.wavelength_range),) * 2
     return DiffractionTable(
         coefficients=attempt.coefficients,
         order_0=attempt.order_0,
@@ -252,36 +254,30 @@ def _table(
         expansion=attempt.expansion,
         grid=replace(attempt.grid, trims=setting.trims),
         spacing=wanted.spacing,
-        coherence_width=float(wanted.coherence_width),
-        coherence=wanted.coherence,
-        tolerance=float(wanted.tolerance),
-        wavelength_range=(float(low), float(high)),
-        height_scale_max=float(wanted.height_scale_max),
+        settings=replace(settings, q_max=None if everywhere else wanted.q_max),
         error=attempt.measured,
-        source=describe(
-            wanted.patches, wanted.coherence_width, wanted.wavelength_range, setting.taps
-        ),
-        crop=None if wanted.everywhere else wanted.radii,
-        coarse=coarse,
+        source=describe(patches, settings, setting.taps),
+        coarse=None if wanted.whole else coarse_table(patches, settings, tell),
     )
 
 
 def _grid(wanted: _Wanted, taps: tuple[int, int]) -> Grid:
     """The bins that these taps can read."""
-    patches, radii, spacing = wanted.patches, wanted.radii, wanted.spacing
+    q_max, spacing = wanted.q_max, wanted.spacing
     if max(taps) > MAX_TAPS:
-        raise refuse(
-            f"the patch is {max(patches[0].extent):.4g} µm wide, so much more than the coherence "
-            f"window that a look-up would read {taps[0]}×{taps[1]} orders; crop the patch, for "
-            f"instance crop={wanted.coherence_width:g} (--crop {wanted.coherence_width:g}), or "
+        width = wanted.settings.coherence_width
+        raise build_error(
+            f"the patch is {max(wanted.patches[0].extent):.4g} µm wide, so much more than the "
+            f"coherence window that a look-up would read {taps[0]}×{taps[1]} orders; crop the "
+            f"heights, for instance to {width:g} µm (crop={width:g} of a scene, --crop {width:g}), or "
             "raise coherence_width or tolerance"
         )
-    radius = (radii[0] / spacing[0], radii[1] / spacing[1])
-    ny, nx = np.max([patch.shape for patch in patches], axis=0)
+    radius = (q_max[0] / spacing[0], q_max[1] / spacing[1])
+    ny, nx = np.max([patch.shape for patch in wanted.patches], axis=0)
     # A margin as wide as the taps: see tables.lookup
     last_x = min(math.ceil(radius[0]), int(nx) // 2) + taps[0]
     last_y = min(math.ceil(radius[1]), int(ny) // 2) + taps[1]
-    return Grid((last_x, last_y), wanted.steps, radius, taps, wanted.coherent)
+    return Grid((last_x, last_y), wanted.steps, radius, taps, wanted.settings.coherent)
 
 
 def _more(taps: int) -> int:
@@ -300,7 +296,7 @@ def _extended(
             expansion, intervals=max(expansion.intervals + 1, expansion.intervals * 5 // 4)
         )
     if terms is not None:
-        raise refuse(
+        raise build_error(
             f"terms={terms} of basis='taylor' leave an error of {error:.2g}, more than "
             f"tolerance={tolerance:g}; leave terms out, raise it, or use basis='svd'"
         )

@@ -14,7 +14,7 @@ from scipy.special import gammaln
 from ...errors import DiffractionError
 from ...heights.field import HeightField
 from ..expansion import Expansion, principal_functions
-from ..table import refuse
+from ..table import build_error
 from .error import FLOOR
 from .spectrum import Spectrum
 
@@ -127,7 +127,7 @@ def _fewest_intervals(
 
 def too_many_intervals(expansion: Expansion, terms: int, error: float) -> DiffractionError:
     """What to say of a series that has been cut into as many intervals as make sense."""
-    return refuse(
+    return build_error(
         f"{expansion.intervals} intervals of κ with {terms} terms each still leave an "
         f"error of {error:.2g} for heights of {2 * expansion.half_range:.3g} µm; give more terms "
         "or a larger tolerance"
@@ -228,7 +228,7 @@ class _Trial:
         errors, exact = [], []
         for interval in np.unique(np.linspace(0, expansion.intervals - 1, count).round()):
             values = np.stack([self._value(k, expansion) for k in expansion.nodes(int(interval))])
-            specular = float(expansion.specular(interval))
+            specular = float(expansion.order_0_offset(interval))
             values[:, *self._centre] -= specular
             if functions is not None:
                 values = self._projected(values, expansion, int(interval), functions)

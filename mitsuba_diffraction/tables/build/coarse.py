@@ -1,8 +1,8 @@
 """A patch's diffraction in coarse cells: what a table of a restricted domain has everywhere else.
 
 A scene sends next to no light to most spatial frequencies that light could probe. A table that
-ends early (`DiffractionTable.build` with `crop` or `kappa_max`) goes on as this one, whose bins are
-cells of many orders each. A cell holds the power of all its orders, and a Gaussian about one cell
+ends early (`DiffractionTable.build` with `q_max` or `kappa_max`) goes on as this one, whose bins
+are cells of many orders each. A cell holds the power of all its orders, and a Gaussian about one cell
 wide carries it: sums over a few cells are right, the structure within a cell (speckle, the sharp
 orders of a grating) is averaged. Order 0 keeps its own lobe.
 
@@ -23,11 +23,12 @@ from numpy.typing import NDArray
 from ...heights.field import HeightField
 from ...optics.geometry import sigma_of
 from ...progress import Progress
+from ...settings import TableSettings
 from ..expansion import Expansion, principal_functions
-from ..table import DiffractionTable, reach_of
+from ..packing import Grid
+from ..table import DiffractionTable, q_limit_of
 from ..window import taps_for
 from .choose import svd_expansion
-from .error import Grid
 from .half_precision import half_scale
 from .spectrum import Spectrum
 
@@ -40,28 +41,30 @@ TOLERANCE = 1e-2
 
 
 def coarse_table(
-    patches: Sequence[HeightField],
-    *,
-    coherence_width: float,
-    wavelength_range: tuple[float, float],
-    height_scale_max: float,
-    progress: Progress,
+    patches: Sequence[HeightField], settings: TableSettings, progress: Progress
 ) -> DiffractionTable:
     """Sum a patch's orders over coarse cells, as far as light can probe."""
+    own_settings = TableSettings(
+        settings.coherence_width,
+        tolerance=TOLERANCE,
+        wavelength_range=settings.wavelength_range,
+        height_scale_max=settings.height_scale_max,
+    )
     deepest = max(patches, key=lambda patch: patch.range)
-    sigma, reach = sigma_of(coherence_width), reach_of(wavelength_range)
+    sigma = sigma_of(settings.coherence_width)
+    q_limit = q_limit_of(settings.wavelength_range)
     expansion, functions = svd_expansion(
-        deepest, "ensemble", reach * height_scale_max, 0.5 * TOLERANCE, None
+        deepest, "ensemble", q_limit * settings.height_scale_max, 0.5 * TOLERANCE, None
     )
     orders = [2.0 * np.pi / length for length in patches[0].extent]
-    wanted = min(CELL / sigma, reach / FEWEST)
+    wanted = min(CELL / sigma, q_limit / FEWEST)
     # An odd number of orders, so that order 0 is in the middle of a cell
     each = [2 * math.floor(0.5 * wanted / spacing) + 1 for spacing in orders]
     spacing = [n * dq for n, dq in zip(each, orders, strict=True)]
     own = [sigma * width for width in spacing]
     steps = tuple(s if n == 1 else min(s, STEP) for s, n in zip(own, each, strict=True))
     taps = taps_for((steps[0], steps[1]), TOLERANCE, False)
-    radius = (reach / spacing[0], reach / spacing[1])
+    radius = (q_limit / spacing[0], q_limit / spacing[1])
     ny, nx = np.max([patch.shape for patch in patches], axis=0)
     last = tuple(  # beyond Nyquist's frequency there are no orders
         min(math.ceil(r), int(pixels) // (2 * n) + 1) + tap
@@ -87,11 +90,7 @@ def coarse_table(
         expansion=expansion,
         grid=grid,
         spacing=(spacing[0], spacing[1]),
-        coherence_width=float(coherence_width),
-        coherence="ensemble",
-        tolerance=TOLERANCE,
-        wavelength_range=(float(wavelength_range[0]), float(wavelength_range[1])),
-        height_scale_max=float(height_scale_max),
+        settings=own_settings,
         error={},
     )
 
@@ -153,7 +152,7 @@ def _coefficients(
                 centre[n] += abs(zero) ** 2 + 2.0 * zero.real  # |1 + (a_0 − 1)|² − 1
             tell(interval * expansion.terms + n + 1, total, "summing what lies outside")
         fit = expansion.fit(interval)
-        centre = centre / len(spectra) + (1.0 - float(expansion.specular(interval)))
+        centre = centre / len(spectra) + (1.0 - float(expansion.order_0_offset(interval)))
         order_0[interval, 0] = centre @ fit
         mean = cells.reshape(expansion.terms, -1) / np.float32(len(spectra))
         if functions is not None:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..expansion import Expansion, principal_functions
-from .error import NEAR, Grid, alternate
+from ..packing import Grid
+from .error import NEAR, alternate
 from .spectrum import Spectrum
 
 
@@ -93,7 +94,7 @@ def _values_at(
     takes double precision.
     """
     centre = (grid.last[1], grid.last[0])
-    specular = float(expansion.specular(interval))
+    specular = float(expansion.order_0_offset(interval))
     values[...] = 0.0
     order_0 = np.zeros(values.shape[-1])
     for spectrum in spectra:

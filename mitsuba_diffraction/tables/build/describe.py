@@ -10,6 +10,7 @@ import numpy as np
 from ...heights.field import HeightField
 from ...heights.validity import window_line
 from ...optics.geometry import wavenumber
+from ...settings import TableSettings
 from .spectrum import Spectrum
 
 _SLOW = 150  # orders read in a look-up; 16 are usual
@@ -17,18 +18,15 @@ _GREEN = 550.0  # nm, where the variation between patches is stated
 
 
 def describe(
-    patches: Sequence[HeightField],
-    coherence_width: float,
-    wavelength_range: tuple[float, float],
-    taps: tuple[int, int],
+    patches: Sequence[HeightField], settings: TableSettings, taps: tuple[int, int]
 ) -> dict[str, Any]:
     """Statistics, digest and warnings of the patches, as plain data.
 
     With several patches, `variation` is the mean over orders of the standard deviation of |a_j|²
     between patches, over its mean, at 550 nm and normal incidence and reflection.
     """
-    first = patches[0]
-    warnings = [line for patch in patches for line in patch.validity(wavelength_range)]
+    first, coherence_width = patches[0], settings.coherence_width
+    warnings = [line for patch in patches for line in patch.validity(settings.wavelength_range)]
     small = window_line(first, coherence_width)
     if small:
         warnings.append(small)
@@ -36,8 +34,9 @@ def describe(
         warnings.append(
             f"{first.name}: the patch of {first.extent[0]:.4g} × {first.extent[1]:.4g} µm is so "
             f"much larger than the coherence width of {coherence_width:g} µm that every look-up "
-            f"reads {taps[0]}×{taps[1]} orders: rendering will be slow; crop the "
-            f"patch, for instance crop={coherence_width:g} (--crop {coherence_width:g})"
+            f"reads {taps[0]}×{taps[1]} orders: rendering will be slow; crop "
+            f"the heights, for instance to {coherence_width:g} µm (crop={coherence_width:g} of a "
+            f"scene, --crop {coherence_width:g})"
         )
     source = first.summary() | {"digest": first.digest(), "warnings": warnings}
     if len(patches) > 1:

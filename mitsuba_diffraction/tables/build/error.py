@@ -16,7 +16,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..expansion import Expansion
+from ..packing import Grid
 from ..window import apply_window, rows_by_trim, tap_matrix
 from .spectrum import Spectrum
 
@@ -39,49 +39,6 @@ _SMALL = 1 << 16  # coefficients
 _TOGETHER = 10  # κ whose series are summed at once: widening half floats takes longer than the sum
 
 Parts = NDArray[np.float64]  # [[|error| near, |error| far], [exact near, exact far]]
-
-
-@dataclass(frozen=True)
-class Grid:
-    """The bins of a table and the window around them.
-
-    Attributes
-    ----------
-    last : (jx, jy), outermost bins stored.
-    steps : (σ·dqx, σ·dqy), bin spacing in units of 1/σ.
-    reach : radius in bins (x, y) that light can reach.
-    taps : (x, y) bins read by a look-up.
-    coherent : amplitudes are added (`patch`) instead of powers.
-    order_0_steps : bin spacing in units of order 0's own 1/σ, where that differs (`coarse`).
-    trims : taps left out at both ends of each row, one number a row; empty if none are.
-    """
-
-    last: tuple[int, int]
-    steps: tuple[float, float]
-    reach: tuple[float, float]
-    taps: tuple[int, int]
-    coherent: bool
-    trims: tuple[int, ...] = ()
-    # Not part of repr, by which files in the cache are found
-    order_0_steps: tuple[float, float] | None = field(default=None, repr=False)
-
-    @property
-    def taps_read(self) -> int:
-        """Bins that one look-up reads."""
-        return self.taps[0] * self.taps[1] - 2 * sum(self.trims)
-
-    @property
-    def exponents(self) -> tuple[float, float]:
-        """Of exp(−exponent·Δ²), the weight of a bin Δ bins away."""
-        half = 0.5 if self.coherent else 1.0
-        return half * self.steps[0] ** 2, half * self.steps[1] ** 2
-
-    @property
-    def order_0_exponents(self) -> tuple[float, float]:
-        """The same for order 0."""
-        if self.order_0_steps is None:
-            return self.exponents
-        return self.order_0_steps[0] ** 2, self.order_0_steps[1] ** 2
 
 
 class ErrorMeter:
@@ -101,7 +58,7 @@ class ErrorMeter:
         tapped: list[list[sparse.csr_array]] = []
         rows = rows_by_trim(grid.taps, grid.trims)
         for axis in (0, 1):
-            outer = min(int(grid.reach[axis]), spectrum.last[axis])
+            outer = min(int(grid.radius[axis]), spectrum.last[axis])
             bins = np.arange(-outer, outer + 1)
             # Bins of a short period are far apart: half-way between them there is no light at all
             most = min(0.5, _WITHIN / grid.steps[axis])
@@ -121,7 +78,7 @@ class ErrorMeter:
             axes.append(bins)
         self._tapped = list(zip(*tapped, strict=True))
         x, y = np.meshgrid(axes[0], axes[1])
-        reached = (x / grid.reach[0]) ** 2 + (y / grid.reach[1]) ** 2 <= 1.0
+        reached = (x / grid.radius[0]) ** 2 + (y / grid.radius[1]) ** 2 <= 1.0
         self._near = reached & (np.hypot(x * grid.steps[0], y * grid.steps[1]) <= NEAR)
         self._far = reached & ~self._near
 
@@ -143,7 +100,7 @@ class ErrorMeter:
         """
         weights = self.expansion.weights(kappas).astype(self._real)
         centres = self.expansion.series_weights(kappas) @ order_0.T
-        centres[:, 0] += self.expansion.specular(self.expansion.interval(kappas))
+        centres[:, 0] += self.expansion.order_0_offset(self.expansion.interval(kappas))
         for start in range(0, len(kappas), _TOGETHER):
             few = slice(start, start + _TOGETHER)
             tables = self._tables(coefficients, weights[few].T / self._real(scale))

@@ -17,7 +17,7 @@ def half_scale(largest: float) -> float:
     return 2.0 ** math.floor(math.log2(_HALF_PEAK / largest)) if largest > 1e-30 else 1.0
 
 
-def halved(coefficients: NDArray[np.float32]) -> tuple[NDArray[np.float16], float]:
+def half_precision(coefficients: NDArray[np.float32]) -> tuple[NDArray[np.float16], float]:
     """The coefficients as half floats, scaled so that the largest is far from overflow."""
     scale = half_scale(float(max(coefficients.max(), -coefficients.min())))
     halves = np.empty(coefficients.shape, np.float16)

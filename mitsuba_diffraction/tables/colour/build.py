@@ -258,7 +258,7 @@ class _Source:
             for n, kappa in enumerate(new.nodes(interval)):
                 mine, weights = int(old.interval(kappa)), old.weights(kappa).astype(np.float32)
                 amplitude = parts[:, mine] @ weights * np.float32(1.0 / table.scale)
-                centre = table.centre(kappa)
+                centre = table.order_0_at(kappa)
                 # |o + c|² − |c|² = |o|² + 2 Re(o c*), c the part of order 0
                 values[:, n] = (amplitude**2).sum(axis=1) + 2.0 * lobe * (amplitude @ centre)
             result[:, interval] = values @ new.fit(interval).astype(np.float32)

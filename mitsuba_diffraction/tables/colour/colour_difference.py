@@ -14,13 +14,15 @@ _PAIRS = 1500  # of directions; the mean of their ΔE is known to some per cent
 _STEP = 2.0  # nm
 
 
-def colour_loss(table: ColourTable, other: ColourTable) -> NDArray[np.float64]:
+def colour_difference(table: ColourTable, other: ColourTable) -> NDArray[np.float64]:
     """ΔE2000 (n,) between two colour tables, over random pairs of directions."""
     u, v, z, factor = _pairs(_PAIRS)
     return _loss(table.colour(u, v, z), other.colour(u, v, z), factor)
 
 
-def power_loss(table: DiffractionTable, other: DiffractionTable) -> NDArray[np.float64]:
+def power_colour_difference(
+    table: DiffractionTable, other: DiffractionTable
+) -> NDArray[np.float64]:
     """ΔE2000 (n,) between two tables of powers, summed over daylight's wavelengths."""
     u, v, z, factor = _pairs(_PAIRS // 3)
     lam = np.arange(*VISIBLE, _STEP)[:, None]

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import maximum_filter1d
 
 from ...optics.geometry import wavenumber
-from ..sampling.order_mixture import Atoms, atoms_of
+from ..sampling.order_mixture import OrderMixture, order_mixture
 from ..table import DiffractionTable
 
 Array = NDArray[np.float32]
@@ -60,10 +60,10 @@ class AlbedoModel:
         self.spread = table.sigma  # exp(−spread²Δq²) is a lobe
         longest = float(wavenumber(table.wavelength_range[0]))
         spacing = longest * 0.5 * math.pi / RINGS
-        self.atoms: Atoms = atoms_of(table, height_scale, SMOOTHING * spacing)
+        self.mixture: OrderMixture = order_mixture(table, height_scale, SMOOTHING * spacing)
         self._nodes, self._weights = _directions()
-        self._length = np.hypot(*self.atoms.frequency.T)
-        self._azimuth = np.arctan2(*self.atoms.frequency.T[::-1])
+        self._length = np.hypot(*self.mixture.frequency.T)
+        self._azimuth = np.arctan2(*self.mixture.frequency.T[::-1])
         self._near: dict[float, _NearHorizon] = {}
         self._turned: tuple[NDArray[np.floating], Array] | None = None
 
@@ -85,7 +85,7 @@ class AlbedoModel:
         # In cosθo instead of sinθo: d(sinθo)/cosθo = d(cosθo)/sinθo has no pole at the horizon
         edges = math.sqrt(1.0 - high**2), math.sqrt(1.0 - low**2)
         if low == 0.0 or edges[1] - edges[0] < 1e-12:
-            return float(self.atoms.order_0(np.array([2.0 * k * cos_i]))[0])
+            return float(self.mixture.order_0(np.array([2.0 * k * cos_i]))[0])
         nodes = (np.arange(_GLOSSY_NODES) + 0.5) / _GLOSSY_NODES
         cos_o = edges[0] + nodes * (edges[1] - edges[0])
         sin_o = np.sqrt(1.0 - cos_o**2)
@@ -94,12 +94,12 @@ class AlbedoModel:
         across = width * _HERMITE[0][:, None]
         along = 1.0 + cos_i * cos_o - sin_i * np.sqrt(np.maximum(sin_o**2 - across**2, 0.0))
         square = _HERMITE[1] @ along**2 / math.sqrt(math.pi)
-        power = self.atoms.order_0(k * (cos_i + cos_o))
+        power = self.mixture.order_0(k * (cos_i + cos_o))
         return float(np.sum(radial * power * square / ((cos_i + cos_o) ** 2 * cos_i)))
 
     def weak(self, theta: float, phi: NDArray[np.floating], wavelength: float) -> Array:
         """All orders that are not worth a sum of their own, shape (n,)."""
-        atoms = self.atoms
+        mixture = self.mixture
         k = float(wavenumber(wavelength))
         sin_i, cos_i = math.sin(theta), math.cos(theta)
         x, y, cos_o = self._nodes
@@ -107,15 +107,15 @@ class AlbedoModel:
         # |ωi + ωo|² = 2(1 + ωi·ωo), with ωi in the plane y = 0
         one_plus_dot = 0.5 * ((x + sin_i) ** 2 + y**2 + w**2)
         factor = (k**2 * self._weights * (one_plus_dot / w) ** 2 / cos_i).astype(np.float32)
-        position = np.minimum(k * w / atoms.kappa_step, len(atoms.density) - 1.001)
+        position = np.minimum(k * w / mixture.kappa_step, len(mixture.density) - 1.001)
         lower = position.astype(np.int32)
         upper_share = (position - lower).astype(np.float32)
-        layer = atoms.density[0].size
+        layer = mixture.density[0].size
         base = lower * layer
-        scale = k / atoms.pitch
+        scale = k / mixture.pitch
         bx, by = (scale * (x + sin_i)).astype(np.float32), (scale * y).astype(np.float32)
         sin, cos = np.sin(phi).astype(np.float32)[:, None], np.cos(phi).astype(np.float32)[:, None]
-        rows, columns = atoms.density.shape[1:]
+        rows, columns = mixture.density.shape[1:]
         column = (cos * bx - sin * by + np.float32(0.5 * columns)).astype(np.int32)
         row = (sin * bx + cos * by + np.float32(0.5 * rows)).astype(np.int32)
         np.clip(column, 0, columns - 1, out=column)
@@ -123,7 +123,7 @@ class AlbedoModel:
         index = row * columns
         index += column
         index += base
-        flat = atoms.density.ravel()
+        flat = mixture.density.ravel()
         result = flat.take(index) @ (factor * (1.0 - upper_share))
         index += layer
         result += flat.take(index) @ (factor * upper_share)
@@ -137,13 +137,13 @@ class AlbedoModel:
         With `shift`, every order that could make a spike by moving that far (in direction cosines)
         is counted with its spike: a bound over neighbouring directions and wavelengths.
         """
-        atoms = self.atoms
-        if not len(atoms.frequency):
+        mixture = self.mixture
+        if not len(mixture.frequency):
             return np.zeros(len(phi), np.float32)
         k = float(wavenumber(wavelength))
         sin_i, cos_i = math.sin(theta), math.cos(theta)
-        horizon = self._horizon(k, cos_i, shift + atoms.uncertainty / k if shift > 0.0 else 0.0)
-        power = atoms.strong(k * (cos_i + np.arange(_COSINES + 1) / _COSINES))
+        horizon = self._horizon(k, cos_i, shift + mixture.uncertainty / k if shift > 0.0 else 0.0)
+        power = mixture.strong(k * (cos_i + np.arange(_COSINES + 1) / _COSINES))
         length = self._length / k
         # ωo's tangential part is q/k − ωi's; along = (q/k)·ωi
         along = (sin_i * length).astype(np.float32) * self._cosines(phi)

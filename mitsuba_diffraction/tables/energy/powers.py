@@ -45,7 +45,7 @@ def powers_of(
 
 def order_0_power(table: DiffractionTable, kappa: NDArray[np.float64]) -> NDArray[np.float64]:
     """|a_0(κ)|², the shape of κ."""
-    parts = table.centre(kappa)
+    parts = table.order_0_at(kappa)
     if table.expansion.kind == "power":
         return np.asarray(np.maximum(parts[..., 0], 0.0))
     return np.asarray(np.sum(parts**2, axis=-1))
@@ -71,6 +71,6 @@ def power_series(
     found = powers_of(table.coefficients.astype(np.float32), old, new)
     order_0 = np.empty((new.intervals, new.terms))
     for interval in range(new.intervals):
-        values = order_0_power(table, new.nodes(interval)) - new.specular(interval)
+        values = order_0_power(table, new.nodes(interval)) - new.order_0_offset(interval)
         order_0[interval] = values @ new.fit(interval)
     return found, order_0, table.scale**2, new

@@ -26,7 +26,7 @@ _PARTS = 8  # a side of a cell that the edge of a table's domain crosses
 
 
 @dataclass(frozen=True)
-class Atoms:
+class OrderMixture:
     """Powers as functions of κ = 0, step, 2·step, … (κ already divided by the height scale).
 
     Attributes
@@ -60,7 +60,7 @@ class Atoms:
         return (self.powers[lower].T * (1.0 - share)) + self.powers[lower + 1].T * share
 
 
-def atoms_of(table: DiffractionTable, height_scale: float, smoothing: float) -> Atoms:
+def order_mixture(table: DiffractionTable, height_scale: float, smoothing: float) -> OrderMixture:
     """Sort a table's orders.
 
     Parameters
@@ -70,7 +70,7 @@ def atoms_of(table: DiffractionTable, height_scale: float, smoothing: float) -> 
     smoothing : standard deviation of the density's smoothing, rad/µm, the lobe's own included.
     """
     expansion = table.expansion
-    kappa_max = table.reach * height_scale
+    kappa_max = table.q_limit * height_scale
     periods = kappa_max * expansion.half_range / math.pi
     count = int(np.clip(math.ceil(PER_PERIOD * periods), FEWEST_KAPPAS, MOST_KAPPAS)) + 1
     longest = expansion if table.coarse is None else table.coarse.expansion
@@ -80,7 +80,7 @@ def atoms_of(table: DiffractionTable, height_scale: float, smoothing: float) -> 
     smoothing = max(smoothing, own)
     axes = [_Axis(table, axis) for axis in (0, 1)]
     pitch = 0.5 * smoothing
-    half = math.ceil(table.reach / pitch) + 1
+    half = math.ceil(table.q_limit / pitch) + 1
     grid = pitch * (np.arange(2 * half, dtype=float) - half + 0.5)
     splats = [_splat(axis.frequency, grid, smoothing) for axis in axes]
     density = np.empty((count, 2 * half, 2 * half), np.float32)
@@ -118,7 +118,7 @@ def atoms_of(table: DiffractionTable, height_scale: float, smoothing: float) -> 
             density[n] -= chosen_splats.toarray()
     np.maximum(density, 0.0, out=density)
     frequency = np.stack([axes[0].frequency[columns], axes[1].frequency[rows]], axis=1)
-    return Atoms(
+    return OrderMixture(
         kappa_step=float(kappas[1]) / height_scale,
         frequency=frequency,
         powers=powers,
@@ -175,7 +175,7 @@ class _Powers:
             self._interval, self._coefficients = interval, flat.astype(np.float32)
         scaled = (expansion.weights(kappa) / table.scale).astype(np.float32)
         parts = (self._coefficients @ scaled).reshape(ny, nx, components)
-        centre = table.centre(kappa)
+        centre = table.order_0_at(kappa)
         if table.grid.coherent:
             amplitude = parts[..., 0] + 1j * parts[..., 1]
             amplitude[table.grid.last[1], table.grid.last[0]] = complex(*centre)
@@ -209,7 +209,7 @@ class _Beyond:
         self._splats = [_splat(middle, grid, smoothing) for middle in middles]
         # Which orders the table itself has, and the share of each cell that it has not
         x, y = (axis.frequency for axis in axes)
-        along_x, along_y = table.radii
+        along_x, along_y = table.q_max
         self.inside = (np.hypot(x / along_x, y[:, None] / along_y) <= 1.0).astype(np.float32)
         within = (np.arange(_PARTS) + 0.5) / _PARTS - 0.5
         x, y = (
@@ -230,7 +230,7 @@ class _Beyond:
         if kappa <= self._kappa_max:
             power = power * self._outside
         density = (self._splats[0] @ (self._splats[1] @ power).T).T
-        return density.astype(np.float32), max(float(coarse.centre(kappa)[0]), 0.0)
+        return density.astype(np.float32), max(float(coarse.order_0_at(kappa)[0]), 0.0)
 
 
 def _splat(

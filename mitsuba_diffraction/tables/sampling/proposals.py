@@ -54,7 +54,7 @@ def proposals(table: DiffractionTable) -> Proposals:
     """Tabulate the densities of all bands."""
     edge = [
         min(radius, n * spacing) + 2.0 / table.sigma
-        for radius, n, spacing in zip(table.radii, table.grid.last, table.spacing, strict=True)
+        for radius, n, spacing in zip(table.q_max, table.grid.last, table.spacing, strict=True)
     ]
     cell = max(CELL / table.sigma, 2.0 * max(edge) / MOST_CELLS)
     counts = [math.ceil(2.0 * e / cell) for e in edge]

@@ -2,7 +2,7 @@
 
 Contents
 --------
-cache        tables and colours
-bounds       bounds of the albedo
-colour_npz   colour tables as NPZ
+store    the files: key, checksum, locks, how large they may grow
+cache    tables and colours
+bounds   bounds of the albedo
 """

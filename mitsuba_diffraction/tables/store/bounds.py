@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
-import threading
 import weakref
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...atomic import atomic_path
-from ...errors import DiffractionError
 from ..energy.albedo import LEAST_SPIKE, RINGS, SMOOTHING, STEPS
 from ..energy.bound import AZIMUTHAL, LAST_ANGLE, MARGIN, POLAR, AlbedoBound, albedo_bound
 from ..sampling.order_mixture import MOST_STRONG, STRONG
 from ..table import DiffractionTable
-from .cache import cache_folder
+from .store import Record, kept, key_of
 
 #: Raised whenever the computation of a bound changes.
 VERSION = 2
-#: The oldest files go beyond this number.
-MOST_FILES = 512
 
 #: Bounds are computed for height scales n/steps: this phase (rad) changes at most in between. The
 #: power of an order bends by a fiftieth then, and by less at grazing angles, where there is most
@@ -39,10 +30,9 @@ _SETTINGS = (
     MOST_STRONG,
 )  # fmt: skip
 
-_known: weakref.WeakKeyDictionary[DiffractionTable, dict[float, AlbedoBound]] = (
+_known: weakref.WeakKeyDictionary[DiffractionTable, dict[str, AlbedoBound]] = (
     weakref.WeakKeyDictionary()
 )
-_lock = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -75,7 +65,7 @@ def bounds_around(
 
     interval : two nodes even if the scale is at one, for derivatives.
     """
-    phase = 2.0 * table.reach * table.expansion.half_range
+    phase = 2.0 * table.q_limit * table.expansion.half_range
     steps = max(_FEWEST_STEPS, math.ceil(phase / _PHASE))
     # Beyond the table's own limit nothing can be looked up, so the last interval is shorter
     most = max(table.height_scale_max, _FLAT)
@@ -103,55 +93,20 @@ def cached_bound(table: DiffractionTable, height_scale: float) -> AlbedoBound:
 
 
 def _at(table: DiffractionTable, height_scale: float) -> AlbedoBound:
-    with _lock:
-        bounds = _known.setdefault(table, {})
-        if height_scale not in bounds:
-            path = cache_folder() / f"albedo-{_key(table, height_scale)}.npy"
-            values = _read(path)
-            if values is None:
-                bound = albedo_bound(table, height_scale)
-                _write(path, bound.values)
-            else:
-                bound = AlbedoBound(values)
-            bounds[height_scale] = bound
-        return bounds[height_scale]
+    key = key_of(_SETTINGS, table.digest(), height_scale)
+    memory = _known.setdefault(table, {})
+    return kept(
+        "albedo",
+        key,
+        memory,
+        lambda: albedo_bound(table, height_scale),
+        lambda bound: Record(None, [bound.values]),
+        _bound_of,
+    )
 
 
-def _key(table: DiffractionTable, height_scale: float) -> str:
-    """Name of the bound: the table's content, the scale and how it is computed."""
-    described = json.dumps(
-        [
-            _SETTINGS, repr(height_scale), table.scale, repr(table.expansion), repr(table.grid),
-            list(table.spacing), table.coherence_width, list(table.wavelength_range),
-        ]
-    )  # fmt: skip
-    content = hashlib.sha256(described.encode())
-    content.update(np.ascontiguousarray(table.order_0).tobytes())
-    content.update(np.ascontiguousarray(table.coefficients).data)
-    if table.coarse is not None:
-        content.update(repr((table.radii, table.coarse.expansion, table.coarse.grid)).encode())
-        content.update(np.ascontiguousarray(table.coarse.coefficients).data)
-    return content.hexdigest()[:32]
-
-
-def _read(path: Path) -> NDArray[np.float32] | None:
-    """The values, or None if the file is missing or damaged: then they are computed anew."""
-    try:
-        values = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError):
-        return None
-    fits = values.shape == (POLAR + 1, AZIMUTHAL + 1) and values.dtype == np.float32
-    return values if fits and bool(np.all(np.isfinite(values))) else None
-
-
-def _write(path: Path, values: NDArray[np.float32]) -> None:
-    """A cache that cannot be written is no reason to fail."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with atomic_path(path) as temporary:
-            np.save(temporary, values)
-        files = sorted(path.parent.glob("albedo-*.npy"), key=lambda p: p.stat().st_mtime)
-        for old in files[:-MOST_FILES]:
-            old.unlink(missing_ok=True)
-    except (DiffractionError, OSError):
-        return
+def _bound_of(record: Record) -> AlbedoBound:
+    (values,) = record.arrays
+    if values.shape != (POLAR + 1, AZIMUTHAL + 1) or not np.isfinite(values).all():
+        raise ValueError(f"bounds of shape {values.shape}")
+    return AlbedoBound(values)

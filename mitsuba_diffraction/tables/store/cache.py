@@ -1,137 +1,100 @@
-"""Tables built from height fields given straight to the plugin: built once, found by content."""
+"""Tables and their colours, each made once and found by its content."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
-import threading
 import weakref
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from ...errors import DiffractionError
 from ...heights.validity import TEXTS_VERSION
+from ...settings import TableSettings
 from ..build import coarse
+from ..colour.polar import PolarGrid
 from ..colour.table import COLOUR_VERSION, ColourTable
+from ..document import described, document_of, plain
+from ..expansion import Expansion
 from ..table import FORMAT_VERSION, DiffractionTable
-from .colour_npz import load_colours, save_colours
+from .store import Record, kept, key_of
 
-#: Environment variable that moves the cache, e.g. to a larger disk.
-VARIABLE = "MITSUBA_DIFFRACTION_CACHE"
-#: The oldest tables go when the folder is larger than this.
-MAX_BYTES = 4 << 30
-
-_open_tables: weakref.WeakValueDictionary[str, DiffractionTable] = weakref.WeakValueDictionary()
-_colours: weakref.WeakKeyDictionary[DiffractionTable, ColourTable] = weakref.WeakKeyDictionary()
-_lock = threading.Lock()
+_tables: weakref.WeakValueDictionary[str, DiffractionTable] = weakref.WeakValueDictionary()
+_colours: weakref.WeakKeyDictionary[DiffractionTable, dict[str, ColourTable]] = (
+    weakref.WeakKeyDictionary()
+)
+_COLOUR_NUMBERS = ("scale", "radius_end", "sigma")
 
 
-def cache_folder() -> Path:
-    """Where tables are kept: $MITSUBA_DIFFRACTION_CACHE, or the user's cache folder."""
-    own = os.environ.get(VARIABLE)
-    if own:
-        return Path(own)
-    if os.name == "nt":
-        base = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
-    else:
-        base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    return Path(base) / "mitsuba_diffraction"
-
-
-def content_key(digest: str, arguments: dict[str, Any]) -> str:
-    """Name of the table of heights with this digest, built with these arguments."""
-    content: list[Any] = [FORMAT_VERSION, digest, sorted(arguments.items())]
-    if {"crop", "kappa_max"} & arguments.keys():  # it goes on in cells that no argument tells of
-        content.append([coarse.CELL, coarse.FEWEST, coarse.STEP, coarse.TOLERANCE])
-    return hashlib.sha256(json.dumps(content, default=list).encode()).hexdigest()[:32]
+def table_key(digest: str, settings: TableSettings) -> str:
+    """Name of the table of heights with this digest, built with these settings."""
+    cells: tuple[float, ...] = ()
+    if settings.q_max or settings.kappa_max:  # it goes on in cells that no setting tells of
+        cells = (coarse.CELL, coarse.FEWEST, coarse.STEP, coarse.TOLERANCE)
+    return key_of(FORMAT_VERSION, TEXTS_VERSION, digest, asdict(settings), cells)
 
 
 def cached_table(
-    digest: str, arguments: dict[str, Any], build: Callable[[], DiffractionTable]
+    digest: str, settings: TableSettings, build: Callable[[], DiffractionTable]
 ) -> DiffractionTable:
-    """The table for heights with this digest, from memory, from disk, or built and kept.
+    """The table for heights with this digest, from memory, from disk, or built and kept."""
+    key = table_key(digest, settings)
+    return kept("table", key, _tables, build, _table_record, _table_of)
 
-    A cache that cannot be written is no reason to fail: the table is then built every time.
-    """
-    key = content_key(digest, arguments)
-    path = cache_folder() / f"{key}-{TEXTS_VERSION}.exr"
-    with _lock:
-        table = _open_tables.get(key)
-        if table is None and path.is_file():
-            try:
-                table = DiffractionTable.load(path)
-                os.utime(path)  # recently used ones are kept longest
-            except (DiffractionError, OSError):
-                table = None  # left by another version or a dying disk: built anew below
-        if table is None:
-            table = build()
-            _keep(lambda: table.save(path), path)
-        _open_tables[key] = table
-        return table
+
+def _table_record(table: DiffractionTable) -> Record:
+    parts = [table] if table.coarse is None else [table, table.coarse]
+    document = json.loads(json.dumps(document_of(table), default=plain))
+    return Record(document, [part.coefficients for part in parts])
+
+
+def _table_of(record: Record) -> DiffractionTable:
+    found = described(record.document)
+    shapes = [part.shape for part in (found, found.coarse) if part is not None]
+    if [array.shape for array in record.arrays] != shapes:
+        raise ValueError(f"arrays of other shapes than {shapes}")
+    return found.table(record.arrays)
 
 
 def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:
     """`DiffractionTable.load`, once for all that use the same file at the same time."""
     try:
         status = os.stat(path)
-        key = f"{Path(path).resolve()} {status.st_mtime_ns} {status.st_size}"
     except OSError:
         return DiffractionTable.load(path)  # which says what is wrong
-    with _lock:
-        table = _open_tables.get(key)
-        if table is None:
-            table = DiffractionTable.load(path)
-            _open_tables[key] = table
-        return table
+    key = f"{Path(path).resolve()} {status.st_mtime_ns} {status.st_size}"
+    table = _tables.get(key)
+    if table is None:
+        table = _tables.setdefault(key, DiffractionTable.load(path))
+    return table
 
 
 def cached_colours(table: DiffractionTable) -> ColourTable:
     """The colours of a table, from memory, from disk, or summed and kept."""
-    with _lock:
-        colours = _colours.get(table)
-        if colours is None:
-            path = cache_folder() / f"{_colour_key(table)}.npz"
-            if path.is_file():
-                try:
-                    colours = load_colours(path)
-                    os.utime(path)
-                except (ValueError, OSError):
-                    colours = None  # as for diffraction tables
-            if colours is None:
-                colours = ColourTable.build(table)
-                _keep(lambda: save_colours(colours, path), path)
-            _colours[table] = colours
-        return colours
+    key = key_of(COLOUR_VERSION, table.digest())
+    memory = _colours.setdefault(table, {})
+    return kept("colours", key, memory, lambda: ColourTable.build(table), colour_record, colours_of)
 
 
-def _colour_key(table: DiffractionTable) -> str:
-    """Name of a table's colours: what they depend on is the table's numbers."""
-    plain = (table.scale, table.expansion, table.grid, table.spacing, table.sigma)
-    content = hashlib.sha256(repr((COLOUR_VERSION, table.height_scale_max, *plain)).encode())
-    content.update(np.ascontiguousarray(table.coefficients).data)
-    content.update(np.ascontiguousarray(table.order_0).data)
-    return content.hexdigest()[:32]
+def colour_record(colours: ColourTable) -> Record:
+    """What a file keeps of colours."""
+    document = {
+        "grid": asdict(colours.grid),
+        "expansion": asdict(colours.expansion),
+        **{name: getattr(colours, name) for name in _COLOUR_NUMBERS},
+    }
+    return Record(document, [colours.coefficients, colours.order_0])
 
 
-def _keep(save: Callable[[], None], path: Path) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        save()
-        _prune(path.parent)
-    except (DiffractionError, OSError):
-        return
-
-
-def _prune(folder: Path) -> None:
-    """Remove the tables unused for longest until the folder is small enough."""
-    tables = [*folder.glob("*.exr"), *folder.glob("*.npz")]
-    files = sorted(tables, key=lambda p: p.stat().st_mtime, reverse=True)
-    total = 0
-    for n, path in enumerate(files):
-        total += path.stat().st_size
-        if total > MAX_BYTES and n > 0:
-            path.unlink(missing_ok=True)
+def colours_of(record: Record) -> ColourTable:
+    """What was made into such a record."""
+    document = record.document
+    grid = document["grid"]
+    coefficients, order_0 = record.arrays
+    return ColourTable(
+        grid=PolarGrid(grid["smallest"], grid["step"], tuple(grid["counts"])),
+        expansion=Expansion(**document["expansion"]),
+        coefficients=coefficients,
+        order_0=order_0,
+        **{name: document[name] for name in _COLOUR_NUMBERS},
+    )

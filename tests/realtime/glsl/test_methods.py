@@ -41,7 +41,7 @@ from mitsuba_diffraction.realtime.glsl.textures import (
     shortened,
 )
 from mitsuba_diffraction.realtime.glsl.thesis import pack_method, thesis_method
-from mitsuba_diffraction.tables.colour.colour_difference import colour_loss
+from mitsuba_diffraction.tables.colour.colour_difference import colour_difference
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from mitsuba_diffraction.tables.energy.bound import AZIMUTHAL, POLAR, AlbedoBound
 from mitsuba_diffraction.tables.store import cache
@@ -97,7 +97,7 @@ def test_lut_reads_a_colour_table_as_its_numpy_twin_does(
     # single precision, in the logarithm of the radius above all
     assert difference(found, read.colour(*at.T[:3])) < 1e-4
     # and eight digits of each number: what the eye can tell apart is one
-    loss = colour_loss(colours, read)
+    loss = colour_difference(colours, read)
     assert loss.mean() < 0.1
     assert np.percentile(loss, 99) < 0.5
 

@@ -145,7 +145,7 @@ def test_the_reach_is_a_quantile_of_the_light():
     assert domain.crop[0] == pytest.approx(1.02 * 0.90, abs=2e-3)
     # all of it lies on one axis
     assert domain.crop[1] <= domain.crop[0] / 8
-    assert domain.kappa_max == pytest.approx(table.reach, rel=1e-5)
+    assert domain.kappa_max == pytest.approx(table.q_limit, rel=1e-5)
     assert domain.outside <= 0.1
     assert quantiles(u, light, [0.5]) == pytest.approx([0.5], abs=2e-3)
 

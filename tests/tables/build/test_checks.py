@@ -146,7 +146,7 @@ def test_any_table_meets_its_tolerance_or_is_refused(depth, ny, nx, arguments):
     assert table.largest_error <= arguments["tolerance"]
     assert np.all(np.isfinite(table.coefficients))
     rng = np.random.default_rng(1)
-    q = rng.uniform(-1.0, 1.0, (2, 500)) * table.reach / np.sqrt(2)
+    q = rng.uniform(-1.0, 1.0, (2, 500)) * table.q_limit / np.sqrt(2)
     values = table.window_sum(*q, rng.uniform(0.0, table.expansion.kappa_max, 500))
     # Σ|a|² = 1 bounds any sum of powers; |Σ a·g|² of amplitudes by as much as windows overlap
     most = max(1.0, np.prod([1 + 4 / step for step in table.grid.steps]))

@@ -22,7 +22,7 @@ def measured(table, kappas, seed):
     The bins are moved by up to a half at random, anew for every κ.
     """
     rng = np.random.default_rng(seed)
-    (jx, jy), (rx, ry) = table.grid.last, table.grid.reach
+    (jx, jy), (rx, ry) = table.grid.last, table.grid.radius
     x, y = np.meshgrid(np.arange(-jx, jx + 1), np.arange(-jy, jy + 1))
     reached = (x / rx) ** 2 + (y / ry) ** 2 <= 1.0
     x, y = x[reached], y[reached]
@@ -31,7 +31,7 @@ def measured(table, kappas, seed):
     for kappa in kappas:
         qx = (x + rng.uniform(-0.5, 0.5, x.size)) * table.spacing[0]
         qy = (y + rng.uniform(-0.5, 0.5, y.size)) * table.spacing[1]
-        inside = np.hypot(qx, qy) <= table.reach
+        inside = np.hypot(qx, qy) <= table.q_limit
         screen = np.exp(1j * kappa * PATCH.heights)
         exact = np.array(
             [

@@ -105,7 +105,7 @@ def test_right_or_refused(field, asked, seed):
         ]
     ) / (4.0 * np.pi**2 * sigma**4)
     # What all directions have on average: Σ|a_j|² = 1, each order spread over 1/(s_x s_y) bins
-    mean = min(1.0, 1.0 / np.prod([*table.grid.steps, *table.grid.reach]))
+    mean = min(1.0, 1.0 / np.prod([*table.grid.steps, *table.grid.radius]))
     mirror = slice(5, 15)
     for part in (mirror, np.setdiff1d(np.arange(SAMPLES), np.arange(SAMPLES)[mirror])):
         error = np.abs(found[part] - exact[part]).sum()

@@ -38,7 +38,7 @@ def test_their_cells_hold_the_power_of_the_orders():
         for o, n in zip(found.origin, cells.T.shape, strict=True)
     ]
     x, y = np.meshgrid(*centres)
-    inside = np.hypot(x, y) < table.reach
+    inside = np.hypot(x, y) < table.q_limit
     power = np.zeros_like(cells)
     power[inside] = table.window_sum(x[inside], y[inside], kappa)
     beside = np.hypot(x, y) > 4 / table.sigma  # order 0 has no part in the cells

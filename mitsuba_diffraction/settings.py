@@ -1,0 +1,235 @@
+"""The arguments of a table, declared once: names, defaults, allowed values and help.
+
+The builder, the plugin, recipes, the commands and the header of a table's file all read them here.
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Callable
+from dataclasses import Field, dataclass, field, fields
+from typing import Any
+
+from .errors import DiffractionError, quoted
+
+COHERENCES = ("ensemble", "patch")
+BASES = ("svd", "chebyshev", "taylor")
+#: Most bins that a look-up reads in each direction: more would take minutes.
+MAX_TAPS = 64
+#: Most terms of a series.
+MAX_TERMS = 400
+#: Largest factor on heights.
+MAX_HEIGHT_SCALE = 1e3
+#: Widest coherence window, µm: that of sunlight is 65 µm, of a star's light a few metres.
+MAX_COHERENCE_WIDTH = 1e6
+
+
+def _setting(default: Any, check: Callable[[Any], Any], help: str, must: str, **more: Any) -> Any:
+    """A field that `check` settles the type of, or raises ValueError for what is not `must`."""
+    return field(default=default, metadata={"check": check, "help": help, "must": must, **more})
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, (str, numbers.Real)):
+        raise ValueError
+    return float(value)
+
+
+def _whole(value: Any) -> int:
+    if isinstance(value, bool) or not isinstance(value, (str, numbers.Integral)):
+        raise ValueError
+    return int(value)
+
+
+def _among(*choices: str) -> Callable[[Any], str]:
+    def check(value: Any) -> str:
+        if not isinstance(value, str) or value not in choices:
+            raise ValueError
+        return value
+
+    return check
+
+
+def _between(low: float, high: float) -> Callable[[Any], float]:
+    """A number above `low`, up to `high`."""
+
+    def check(value: Any) -> float:
+        number = _number(value)
+        if not low < number <= high:
+            raise ValueError
+        return number
+
+    return check
+
+
+def _count(most: int) -> Callable[[Any], int | None]:
+    def check(value: Any) -> int | None:
+        if value is None:
+            return None
+        number = _whole(value)
+        if not 1 <= number <= most:
+            raise ValueError
+        return number
+
+    return check
+
+
+def _positive(value: Any) -> float | None:
+    return None if value is None else _between(0.0, math.inf)(value)
+
+
+def _pair(value: Any) -> tuple[float, float]:
+    low, high = (_number(one) for one in value)
+    return low, high
+
+
+def _wavelengths(value: Any) -> tuple[float, float]:
+    low, high = _pair(value)
+    if not 10.0 <= low < high <= 1e5:
+        raise ValueError
+    return low, high
+
+
+def _half_axes(value: Any) -> tuple[float, float] | None:
+    if value is None:
+        return None
+    x, y = (value, value) if isinstance(value, (str, numbers.Real)) else value
+    positive = _between(0.0, math.inf)
+    return positive(x), positive(y)
+
+
+def _choices(*names: str) -> dict[str, Any]:
+    return {"check": _among(*names), "must": f"one of {', '.join(names)}", "choices": names}
+
+
+@dataclass(frozen=True)
+class TableSettings:
+    """What a table is built with; lengths in µm, wavelengths in nm.
+
+    Values are checked, and their types settled, when one is made: of numbers also their text.
+
+    Attributes
+    ----------
+    coherence_width : 4σ of the Gaussian amplitude window, µm.
+    coherence : "ensemble" (window power averaged over its position) or "patch" (one window).
+    basis : "svd" (also as "auto"), "chebyshev" or "taylor"; see `tables.expansion`.
+    tolerance : relative error of ⟨|P|²⟩ at the worst κ, as `tables.build.error` measures it.
+    terms : coefficients of a series; None for as many as the tolerance takes.
+    taps : bins read in each direction; None for as many as the tolerance takes.
+    wavelength_range : nm; the shortest sets the largest frequency that light can probe.
+    height_scale_max : largest factor on the heights that the table serves.
+    q_max : largest spatial frequency k·|(u, v)| that is tabulated, rad/µm, as half axes of an
+        ellipse along x and y; None for all that light can probe.
+    kappa_max : largest k·w·height_scale that is, rad/µm; None likewise.
+
+    Raises
+    ------
+    DiffractionError
+        With the setting, its value and what is allowed.
+    """
+
+    coherence_width: float = _setting(
+        65.0, _between(0.0, MAX_COHERENCE_WIDTH), "µm, 4σ of the amplitude window",
+        f"a positive number of µm, at most {MAX_COHERENCE_WIDTH:g} (65 is usual)", metavar="W",
+    )  # fmt: skip
+    coherence: str = _setting(
+        "ensemble", help="average over window positions, or one window on the patch",
+        **_choices(*COHERENCES),
+    )  # fmt: skip
+    basis: str = _setting("auto", help="series in κ; auto is svd", **_choices(*BASES, "auto"))
+    tolerance: float = _setting(
+        1e-3, lambda value: _between(math.nextafter(1e-6, 0), math.nextafter(1.0, 0.0))(value),
+        "relative error that is met", "between 1e-6 (single precision) and 1 (1e-3 is usual)",
+        metavar="E",
+    )  # fmt: skip
+    terms: int | None = _setting(
+        None, _count(MAX_TERMS), "terms of the series", f"a whole number from 1 to {MAX_TERMS}",
+        metavar="N",
+    )  # fmt: skip
+    taps: int | None = _setting(
+        None, _count(MAX_TAPS), "orders read in each direction",
+        f"a whole number from 1 to {MAX_TAPS}", metavar="N",
+    )  # fmt: skip
+    wavelength_range: tuple[float, float] = _setting(
+        (360.0, 830.0), _wavelengths, "nm",
+        "two rising wavelengths in nm, between 10 and 100000", metavar=("MIN", "MAX"),
+    )  # fmt: skip
+    height_scale_max: float = _setting(
+        1.5, _between(0.0, MAX_HEIGHT_SCALE), "largest height_scale that the table serves",
+        f"a positive factor, at most {MAX_HEIGHT_SCALE:g}", metavar="S",
+    )  # fmt: skip
+    q_max: tuple[float, float] | None = _setting(
+        None, _half_axes, "largest spatial frequency", "a positive number, or two, in rad/µm"
+    )
+    kappa_max: float | None = _setting(None, _positive, "largest κ", "a positive number, in rad/µm")
+
+    def __post_init__(self) -> None:
+        for name in _BY_NAME:
+            object.__setattr__(self, name, checked(name, getattr(self, name)))
+
+    @property
+    def coherent(self) -> bool:
+        """Whether amplitudes are added, not powers."""
+        return self.coherence == "patch"
+
+    def given(self) -> dict[str, Any]:
+        """The settings by name, without those that are None: as JSON has them."""
+        values = ((name, getattr(self, name)) for name in _BY_NAME)
+        return {name: value for name, value in values if value is not None}
+
+
+_BY_NAME: dict[str, Field[Any]] = {item.name: item for item in fields(TableSettings)}
+
+#: Those that scenes and recipes may set.
+SCENE_SETTINGS = ("coherence_width", "coherence", "basis", "tolerance", "terms")
+RECIPE_SETTINGS = (*SCENE_SETTINGS, "wavelength_range")
+
+
+def checked(name: str, value: Any) -> Any:
+    """A setting's value in its own type.
+
+    Raises
+    ------
+    DiffractionError
+        If it is not allowed.
+    """
+    described = _BY_NAME[name].metadata
+    try:
+        return described["check"](value)
+    except (TypeError, ValueError, OverflowError):
+        shown = f"{value:g}" if isinstance(value, float) else quoted(value)
+        raise DiffractionError(f"{name}={shown} must be {described['must']}") from None
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A field of `TableSettings`, for people.
+
+    Attributes
+    ----------
+    help, default_text : what it is, and what it is by default.
+    choices : the words that it can be, or None.
+    metavar : names for its value, or for each of several.
+    whole : whether it is a whole number.
+    """
+
+    help: str
+    default_text: str
+    choices: tuple[str, ...] | None
+    metavar: str | tuple[str, ...] | None
+    whole: bool
+
+
+def described_setting(name: str) -> Setting:
+    """The field of this name."""
+    default, described = _BY_NAME[name].default, _BY_NAME[name].metadata
+    values = default if isinstance(default, tuple) else (default,)
+    text = " ".join(value if isinstance(value, str) else f"{value:g}" for value in values if value)
+    return Setting(
+        help=described["help"],
+        default_text=text or "as many as the tolerance takes",
+        choices=described.get("choices"),
+        metavar=described.get("metavar"),
+        whole=default is None,
+    )

@@ -1,0 +1,316 @@
+"""A table as plain data: all but its coefficients, for files and the cache; checked when read.
+
+Whatever `described` lets pass can be looked up anywhere without reading outside the table: every
+field has its type, size and range, and agrees with the others.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import quoted
+from ..settings import BASES, MAX_TAPS, MAX_TERMS, TableSettings
+from .expansion import KINDS, Expansion
+from .packing import Grid
+from .table import DiffractionTable
+
+#: Largest table, bytes: beyond it no renderer would want it.
+MAX_BYTES = 4 << 30
+
+_REQUIRED = ("coherence_width", "coherence", "tolerance", "wavelength_range", "height_scale_max")
+_SETTINGS = tuple(field.name for field in dataclasses.fields(TableSettings))
+_OWN = ("scale", "spacing", "error", "source", "expansion", "grid", "order_0")
+_COMPONENTS = {"power": 1, "amplitude": 2}
+_MOST_INTERVALS, _LONGEST_SERIES = 4096, 2048
+_ROUNDED = 1e-6  # relative: of what follows from other fields
+#: Of a share of the light: at most 1 but for the error of a coarse table.
+_LARGEST_POWER = 2.0
+#: Of a bin's series, the sum of its terms' sizes; Taylor's cancel.
+_LARGEST_SUM = {"svd": 1e4, "chebyshev": 1e4, "taylor": 1e9}
+
+
+def document_of(table: DiffractionTable) -> dict[str, Any]:
+    """Everything but the coefficients; what a table need not have is left out where it has not."""
+    return {
+        **table.settings.given(),
+        "scale": table.scale,
+        "spacing": table.spacing,
+        "error": dict(table.error),
+        "source": dict(table.source),
+        "expansion": _given(table.expansion),
+        "grid": _given(table.grid),
+        "order_0": table.order_0.tolist(),
+        **({} if table.coarse is None else {"coarse": document_of(table.coarse)}),
+    }
+
+
+def plain(value: Any) -> Any:
+    """JSON for what a table holds besides plain Python: NumPy's numbers, read-only mappings."""
+    return dict(value) if isinstance(value, Mapping) else value.tolist()
+
+
+def _given(record: Expansion | Grid) -> dict[str, Any]:
+    """Its fields, without those that are None."""
+    fields = dataclasses.asdict(record)
+    return {name: value for name, value in fields.items() if value is not None}
+
+
+@dataclasses.dataclass(frozen=True)
+class Described:
+    """A table without its coefficients.
+
+    Attributes
+    ----------
+    fields : arguments of `DiffractionTable`.
+    coarse : of the table around it, or None.
+    """
+
+    fields: Mapping[str, Any]
+    coarse: Described | None
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the coefficients."""
+        expansion, grid = self.fields["expansion"], self.fields["grid"]
+        components = _COMPONENTS[expansion.kind]
+        return expansion.intervals, *grid.shape, components, expansion.terms
+
+    def table(self, coefficients: Iterable[NDArray[Any]]) -> DiffractionTable:
+        """The table with its coefficients, and those of the coarse one.
+
+        Raises
+        ------
+        ValueError
+            If they are not finite, or larger than any surface's.
+        """
+        mine, *rest = coefficients
+        _check_sizes(mine, self.fields["expansion"], self.fields["scale"])
+        coarse = None if self.coarse is None else self.coarse.table(rest)
+        return DiffractionTable(coefficients=mine, coarse=coarse, **self.fields)
+
+
+def described(document: Any) -> Described:
+    """What `document_of` made, checked field by field and against each other.
+
+    Raises
+    ------
+    ValueError
+        With the field that does not fit.
+    """
+    fields = dict(_mapping(document, "the description"))
+    coarse = fields.pop("coarse", None)
+    found = _described(fields, whole=coarse is None)
+    if coarse is None:
+        return found
+    cells = _described(dict(_mapping(coarse, "coarse")), whole=True)
+    mine, theirs = found.fields["settings"], cells.fields["settings"]
+    for name in ("coherence_width", "wavelength_range", "height_scale_max"):
+        _require(getattr(mine, name) == getattr(theirs, name), f"{name} of coarse")
+    _require(not theirs.coherent, "coherence of coarse")
+    return dataclasses.replace(found, coarse=cells)
+
+
+def _described(fields: dict[str, Any], whole: bool) -> Described:
+    settings = _settings(fields)
+    _names(fields, (*_OWN, *_SETTINGS), _OWN)
+    expansion = _expansion(_mapping(fields["expansion"], "expansion"))
+    spacing = _pair(fields["spacing"], "spacing", 1e-9, 1e9)
+    grid = _grid(_mapping(fields["grid"], "grid"))
+    table = DiffractionTable(
+        coefficients=np.zeros((0, 0, 0, 0, 0), np.float32),
+        order_0=_numbers(
+            fields["order_0"],
+            "order_0",
+            (expansion.intervals, _COMPONENTS[expansion.kind], expansion.series_terms),
+        ),
+        scale=_number(fields["scale"], "scale", 1e-30, 1e30),
+        expansion=expansion,
+        grid=grid,
+        spacing=spacing,
+        settings=settings,
+        error=_error(fields["error"]),
+        source=_source(fields["source"]),
+    )
+    _check_agreement(table, whole)
+    shares = np.linspace(0.0, 1.0, 33)
+    kappa = expansion.length * (np.arange(expansion.intervals)[:, None] + shares).ravel()
+    largest = np.abs(table.order_0_at(kappa)).max()
+    _require(largest <= _LARGEST_POWER, f"order_0 of a size of {largest:.3g}")
+    size = 4 * math.prod(Described({"expansion": expansion, "grid": grid}, None).shape)
+    _require(size <= MAX_BYTES, f"{size:.3g} bytes of coefficients")
+    values = {field.name: getattr(table, field.name) for field in dataclasses.fields(table)}
+    return Described({k: v for k, v in values.items() if k not in ("coefficients", "coarse")}, None)
+
+
+def _check_agreement(table: DiffractionTable, whole: bool) -> None:
+    """What follows from other fields is what follows from them."""
+    grid, expansion, settings = table.grid, table.expansion, table.settings
+    _require(grid.coherent == settings.coherent, "coherent beside coherence")
+    _require(expansion.kind == "amplitude" or not grid.coherent, "coherence of powers")
+    steps = [table.sigma * spacing for spacing in table.spacing]
+    own = grid.steps if grid.order_0_steps is None else grid.order_0_steps
+    _require(np.allclose(own, steps, rtol=_ROUNDED, atol=0.0), "steps beside spacing")
+    radius = [q / spacing for q, spacing in zip(table.q_max, table.spacing, strict=True)]
+    _require(np.allclose(grid.radius, radius, rtol=1e-3, atol=0.0), "radius beside q_max")
+    limit = table.q_limit * table.height_scale_max
+    least = limit if whole else 0.0
+    _require(
+        least * (1 - _ROUNDED) <= expansion.kappa_max <= limit * (1 + _ROUNDED),
+        f"kappa_max={expansion.kappa_max:g} beside wavelength_range and height_scale_max",
+    )
+    _require(not whole or settings.q_max is None, "q_max without coarse")
+
+
+def _settings(fields: Mapping[str, Any]) -> TableSettings:
+    _names(fields, fields, _REQUIRED)
+    return TableSettings(**{name: fields[name] for name in _SETTINGS if name in fields})
+
+
+def _expansion(fields: Mapping[str, Any]) -> Expansion:
+    required = ("basis", "kind", "terms", "intervals", "kappa_max", "half_range")
+    _names(fields, (*required, "functions"), required)
+    _require(fields["basis"] in BASES, f"basis={quoted(fields['basis'])}")
+    _require(fields["kind"] in KINDS, f"kind={quoted(fields['kind'])}")
+    expansion = Expansion(
+        fields["basis"],
+        fields["kind"],
+        _whole(fields["terms"], "terms", 1, MAX_TERMS),
+        _whole(fields["intervals"], "intervals", 1, _MOST_INTERVALS),
+        _number(fields["kappa_max"], "kappa_max", 1e-9, 1e9),
+        _number(fields["half_range"], "half_range", 0.0, 1e9),
+    )
+    if expansion.basis == "taylor":
+        _require(expansion.kind == "amplitude" and expansion.intervals == 1, "basis='taylor'")
+    _require((expansion.basis == "svd") == ("functions" in fields), "functions beside basis")
+    if "functions" not in fields:
+        return expansion
+    functions = _numbers(
+        fields["functions"], "functions", (expansion.intervals, None, expansion.terms)
+    )
+    _require(1 <= functions.shape[1] <= _LONGEST_SERIES, f"{functions.shape[1]} series terms")
+    return dataclasses.replace(expansion, functions=functions)
+
+
+def _grid(fields: Mapping[str, Any]) -> Grid:
+    required = ("last", "steps", "radius", "taps", "coherent", "trims")
+    _names(fields, (*required, "order_0_steps"), required)
+    _require(isinstance(fields["coherent"], bool), "coherent")
+    own = fields.get("order_0_steps")
+    grid = Grid(
+        last=_whole_pair(fields["last"], "last", 1, 1 << 20),
+        steps=_pair(fields["steps"], "steps", 1e-9, 1e9),
+        radius=_pair(fields["radius"], "radius", 1e-9, 1e9),
+        taps=_whole_pair(fields["taps"], "taps", 1, MAX_TAPS),
+        coherent=fields["coherent"],
+        trims=tuple(_whole(n, "trims", 0, MAX_TAPS) for n in _list(fields["trims"], "trims")),
+        order_0_steps=None if own is None else _pair(own, "order_0_steps", 1e-9, 1e9),
+    )
+    for taps, bins in zip(grid.taps, grid.shape[::-1], strict=True):
+        _require(taps <= bins, f"{taps} taps of {bins} orders")
+    rows = grid.taps[1]
+    _require(len(grid.trims) in (0, rows), f"{len(grid.trims)} trims of {rows} rows")
+    _require(all(2 * n < grid.taps[0] for n in grid.trims), "trims beyond the taps")
+    return grid
+
+
+def _error(value: Any) -> dict[str, float]:
+    names = ("near", "far", "kappa_near", "kappa_far")
+    fields = _mapping(value, "error")
+    _names(fields, names, ())
+    return {name: _number(number, name, 0.0, 1e9) for name, number in fields.items()}
+
+
+def _source(value: Any) -> dict[str, Any]:
+    source = dict(_mapping(value, "source"))
+    _require(all(isinstance(source.get(name, ""), str) for name in ("name", "digest")), "source")
+    warnings = _list(source.get("warnings", []), "warnings")
+    _require(all(isinstance(line, str) for line in warnings), "warnings")
+    return source
+
+
+def _check_sizes(coefficients: NDArray[Any], expansion: Expansion, scale: float) -> None:
+    """Refuse coefficients of which a look-up would make no share of the light."""
+    shares = np.linspace(0.0, 1.0, 9)
+    for interval, mine in enumerate(coefficients):
+        largest = _largest(mine).max(axis=0) / scale
+        weights = np.abs(expansion.weights(expansion.length * (interval + shares))).max(axis=0)
+        total = float(largest @ weights)
+        _require(total <= _LARGEST_SUM[expansion.basis], f"coefficients up to {total:.3g}")
+
+
+def _largest(coefficients: NDArray[Any]) -> NDArray[np.float64]:
+    """Largest size (components, terms) over (ny, nx) orders; not finite if one is not."""
+    # Floats without their sign are ordered as whole numbers are, which NumPy is fast with
+    kind = np.dtype(f"u{coefficients.itemsize}")
+    flat = np.ascontiguousarray(coefficients).view(kind).reshape(-1, *coefficients.shape[2:])
+    without_sign = kind.type(np.iinfo(kind).max >> 1)
+    return np.bitwise_and(flat, without_sign).max(axis=0).view(coefficients.dtype).astype(float)
+
+
+# ------------------------------------------------------------------------ one value
+
+
+def _require(fits: bool | np.bool_, what: str) -> None:
+    if not fits:
+        raise ValueError(f"{what} does not fit")
+
+
+def _mapping(value: Any, name: str) -> Mapping[str, Any]:
+    _require(isinstance(value, dict), name)
+    return value
+
+
+def _list(value: Any, name: str) -> list[Any]:
+    _require(isinstance(value, list | tuple), name)
+    return list(value)
+
+
+def _names(fields: Iterable[str], allowed: Iterable[str], required: Iterable[str]) -> None:
+    missing, unknown = set(required) - set(fields), set(fields) - set(allowed)
+    if missing:
+        raise ValueError(f"no {', '.join(sorted(missing))}")
+    if unknown:
+        raise ValueError(f"unknown entry {quoted(min(unknown))}")
+
+
+def _number(value: Any, name: str, low: float, high: float) -> float:
+    real = isinstance(value, int | float) and not isinstance(value, bool)
+    _require(real and low <= value <= high, f"{name}={quoted(value)}")
+    return float(value)
+
+
+def _whole(value: Any, name: str, low: int, high: int) -> int:
+    _require(type(value) is int and low <= value <= high, f"{name}={quoted(value)}")
+    return int(value)
+
+
+def _two(value: Any, name: str) -> list[Any]:
+    found = _list(value, name)
+    _require(len(found) == 2, f"{name}={quoted(value)}")
+    return found
+
+
+def _pair(value: Any, name: str, low: float, high: float) -> tuple[float, float]:
+    x, y = (_number(one, name, low, high) for one in _two(value, name))
+    return x, y
+
+
+def _whole_pair(value: Any, name: str, low: int, high: int) -> tuple[int, int]:
+    x, y = (_whole(one, name, low, high) for one in _two(value, name))
+    return x, y
+
+
+def _numbers(value: Any, name: str, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
+    found = np.array(value)
+    right = len(shape) == found.ndim and all(
+        n in (None, m) for n, m in zip(shape, found.shape, strict=True)
+    )
+    _require(right and found.dtype.kind in "if", f"{name} of shape {found.shape}")
+    _require(np.isfinite(found).all() and np.abs(found).max(initial=0.0) < 1e12, name)
+    return found.astype(float)

@@ -1,0 +1,136 @@
+"""Where a table's numbers lie: what NumPy, the plugin and the shaders all read.
+
+Coefficients are an array (intervals, rows, columns, components, terms). Bin (0, 0), the zeroth
+order, is in the middle of (rows, columns), and zero; its series is kept apart (`order_0`). A
+renderer reads the numbers of one bin as a record: one component after the other, the terms of each
+filled up with zeros (`Record`). Functions of κ are sampled on equal cells of every interval,
+without the factor they fade with as κ → 0 (`cells_of`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .expansion import Expansion
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The bins of a table and the window around them.
+
+    Attributes
+    ----------
+    last : (jx, jy), outermost bins stored.
+    steps : (σ·dqx, σ·dqy), bin spacing in units of 1/σ.
+    radius : in bins (x, y), the frequencies that the table is for.
+    taps : (x, y) bins read by a look-up.
+    coherent : amplitudes are added (`patch`) instead of powers.
+    trims : taps left out at both ends of each row, one number a row; empty if none are.
+    order_0_steps : bin spacing in units of order 0's own 1/σ, where that differs (`build.coarse`).
+    """
+
+    last: tuple[int, int]
+    steps: tuple[float, float]
+    radius: tuple[float, float]
+    taps: tuple[int, int]
+    coherent: bool
+    trims: tuple[int, ...] = ()
+    order_0_steps: tuple[float, float] | None = None
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns) of bins."""
+        return 2 * self.last[1] + 1, 2 * self.last[0] + 1
+
+    @property
+    def middle(self) -> tuple[int, int]:
+        """(row, column) of order 0."""
+        return self.last[1], self.last[0]
+
+    def index(self, interval: Any, row: Any, column: Any) -> Any:
+        """Number of a bin's record, counted over intervals, rows and columns."""
+        rows, columns = self.shape
+        return (interval * rows + row) * columns + column
+
+    def tapped(self) -> list[range]:
+        """Of every row of taps, the columns that a look-up reads."""
+        columns, rows = self.taps
+        return [range(trim, columns - trim) for trim in self.trims or (0,) * rows]
+
+    @property
+    def taps_read(self) -> int:
+        """Bins that one look-up reads."""
+        return sum(map(len, self.tapped()))
+
+    @property
+    def exponents(self) -> tuple[float, float]:
+        """Of exp(−exponent·Δ²), the weight of a bin Δ bins away."""
+        half = 0.5 if self.coherent else 1.0
+        return half * self.steps[0] ** 2, half * self.steps[1] ** 2
+
+    @property
+    def order_0_exponents(self) -> tuple[float, float]:
+        """The same for order 0."""
+        if self.order_0_steps is None:
+            return self.exponents
+        return self.order_0_steps[0] ** 2, self.order_0_steps[1] ** 2
+
+
+@dataclass(frozen=True)
+class Record:
+    """The numbers of one bin in one interval, as renderers store them.
+
+    Attributes
+    ----------
+    components, terms : of the table.
+    stored : terms with the zeros that fill them up.
+    """
+
+    components: int
+    terms: int
+    stored: int
+
+    @property
+    def numbers(self) -> int:
+        """In all."""
+        return self.components * self.stored
+
+    def split(self, numbers: Sequence[Any]) -> list[Sequence[Any]]:
+        """The stored terms of each component, out of a record's numbers."""
+        return [numbers[n * self.stored : (n + 1) * self.stored] for n in range(self.components)]
+
+    def pack(self, coefficients: NDArray[Any]) -> NDArray[Any]:
+        """Coefficients (…, components, terms) as records (…, numbers)."""
+        missing = [(0, 0)] * (coefficients.ndim - 1) + [(0, self.stored - self.terms)]
+        return np.pad(coefficients, missing).reshape(*coefficients.shape[:-2], self.numbers)
+
+
+def filled_up(terms: int, unit: int) -> int:
+    """The least multiple of `unit` that is not below `terms`."""
+    return -(-terms // unit) * unit
+
+
+def cells_of(expansion: Expansion, phase: float) -> int:
+    """Equal cells of an interval of κ across which the phase of the heights changes this much.
+
+    phase : rad, at most.
+    """
+    return max(8, math.ceil(2.0 * expansion.half_range * expansion.length / phase))
+
+
+def kappas_of(expansion: Expansion, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """κ (intervals, …) at these shares (0 … 1) of every interval, kept on its own side."""
+    inside = np.clip(shares, 1e-6, 1.0 - 1e-6)
+    numbers = np.arange(expansion.intervals).reshape(-1, *(1,) * inside.ndim)
+    return np.asarray(expansion.length * (numbers + inside))
+
+
+def functions_at(expansion: Expansion, kappa: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What terms are multiplied with, κ.shape + (terms,), without the factor of κ̂ or κ̂²."""
+    return np.asarray(expansion.weights(kappa) / expansion.fading(kappa)[..., None])

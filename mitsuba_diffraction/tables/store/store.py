@@ -1,0 +1,214 @@
+"""The one cache: whatever is made once, in files that are found by what it is made of.
+
+A file is one line with what it is, its key and the SHA-256 of the rest; then JSON and arrays as
+they lie in memory. What is damaged, or stands under another's name, is made again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import hashlib
+import json
+import math
+import os
+import threading
+import warnings
+from collections.abc import Callable, Iterator, MutableMapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import platformdirs
+from numpy.typing import NDArray
+
+from ...atomic import atomic_path, remove_abandoned
+from ...errors import DiffractionError, DiffractionWarning, one_line
+
+#: Environment variable that moves the cache, e.g. to a larger disk.
+VARIABLE = "MITSUBA_DIFFRACTION_CACHE"
+#: The files unused for longest go when all are larger than this together.
+MAX_BYTES = 4 << 30
+
+SUFFIX = ".cache"
+#: Also of files that earlier versions kept.
+_PATTERNS = (f"*{SUFFIX}", "*.exr", "*.npz", "albedo-*.npy")
+_MAGIC = "mitsuba_diffraction cache"
+#: Bytes that the first line is filled up to, and the second, a number; arrays begin at multiples of
+#: the last.
+_HEAD, _ALIGNMENT = 256, 64
+
+T = TypeVar("T")
+_making: dict[tuple[str, str], threading.Lock] = {}
+
+
+def cache_folder() -> Path | None:
+    """$MITSUBA_DIFFRACTION_CACHE, or the user's cache folder; None for a user without a home."""
+    own = os.environ.get(VARIABLE)
+    folder = Path(own) if own else platformdirs.user_cache_path("mitsuba_diffraction", False)
+    return folder if own or folder.is_absolute() else None
+
+
+@dataclass(frozen=True)
+class Record:
+    """What a file holds.
+
+    Attributes
+    ----------
+    document : plain data, as JSON has it.
+    arrays : of any shape and type.
+    """
+
+    document: Any
+    arrays: Sequence[NDArray[Any]]
+
+
+def key_of(*parts: Any) -> str:
+    """A key: the SHA-256 of what something is made of, as JSON."""
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+
+
+def kept(
+    kind: str,
+    key: str,
+    memory: MutableMapping[str, T],
+    make: Callable[[], T],
+    pack: Callable[[T], Record],
+    unpack: Callable[[Record], T],
+) -> T:
+    """What is kept under a key, in memory or on disk; or made now, and kept.
+
+    Of several threads and processes that want one thing at a time, one makes it and the others
+    wait. A cache that cannot be written is no reason to fail: the thing is then made every time.
+
+    Parameters
+    ----------
+    kind : one word, of files for people.
+    key : of all that it is made of, see `key_of`.
+    memory : where this process keeps it.
+    make : makes it.
+    pack, unpack : to a record, and back; unpack raises ValueError for what does not fit.
+    """
+    found = memory.get(key)
+    if found is None:
+        with _making.setdefault((kind, key), threading.Lock()):
+            found = memory.get(key)
+            if found is None:
+                found = memory[key] = _from_disk(kind, key, make, pack, unpack)
+    return found
+
+
+def _from_disk(
+    kind: str,
+    key: str,
+    make: Callable[[], T],
+    pack: Callable[[T], Record],
+    unpack: Callable[[Record], T],
+) -> T:
+    folder = cache_folder()
+    if folder is None:
+        return make()
+    path, title = folder / f"{kind}-{key[:32]}{SUFFIX}", f"{_MAGIC} {kind} {key}"
+    found = _found(path, title, unpack)
+    if found is None:
+        with _locked(path):
+            found = _found(path, title, unpack)  # made by whoever was waited for
+            if found is None:
+                found = make()
+                _keep(path, title, pack(found))
+    return found
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Alone among all processes with this file; where there are no locks, not alone."""
+    lock = path.with_suffix(".lock")
+    with contextlib.ExitStack() as release:
+        with contextlib.suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            while True:
+                handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o600)
+                release.callback(os.close, handle)
+                fcntl.flock(handle, fcntl.LOCK_EX)
+                with contextlib.suppress(FileNotFoundError):
+                    if os.path.samestat(os.fstat(handle), os.stat(lock)):
+                        break  # else whoever had it has removed it
+            release.callback(lock.unlink, missing_ok=True)
+        yield
+
+
+def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
+    """What a file holds; None if there is none, and with a warning if it is damaged."""
+    try:
+        found = unpack(_read(path, title))
+        os.utime(path)  # recently used ones are kept longest
+        return found
+    except OSError:
+        return None
+    except (ValueError, LookupError, TypeError, MemoryError, RecursionError) as error:
+        warnings.warn(
+            f"'{path}' in the cache is damaged ({one_line(str(error))[:100]}) and made again",
+            DiffractionWarning,
+            stacklevel=2,
+        )
+        with contextlib.suppress(OSError):
+            path.unlink()
+        return None
+
+
+def _read(path: Path, title: str) -> Record:
+    content = np.fromfile(path, np.uint8)
+    head, *_ = content[:_HEAD].tobytes().split(b"\n")
+    if head.decode("ascii", "replace") != f"{title} {_checksum([content[_HEAD:]])}":
+        raise ValueError("its checksum or its key is another's")
+    length = int(content[_HEAD : 2 * _HEAD].tobytes())
+    place = 2 * _HEAD + _aligned(length)
+    described = json.loads(content[2 * _HEAD : 2 * _HEAD + length].tobytes())
+    arrays = []
+    for kind, shape in described["arrays"]:
+        size = math.prod(shape) * np.dtype(kind).itemsize
+        arrays.append(content[place : place + size].view(kind).reshape(shape))
+        place += _aligned(size)
+    return Record(described["document"], arrays)
+
+
+def _keep(path: Path, title: str, record: Record) -> None:
+    arrays = [np.ascontiguousarray(array) for array in record.arrays]
+    described = [[array.dtype.str, array.shape] for array in arrays]
+    text = json.dumps({"document": record.document, "arrays": described}).encode()
+    texts = [np.frombuffer(t, np.uint8) for t in (str(len(text)).encode().ljust(_HEAD), text)]
+    blocks = [*texts, *(array.reshape(-1).view(np.uint8) for array in arrays)]
+    padded = [np.pad(block, (0, _aligned(block.size) - block.size)) for block in blocks]
+    try:
+        with atomic_path(path) as temporary, open(temporary, "wb") as file:
+            file.write(f"{title} {_checksum(padded)}\n".encode().ljust(_HEAD))
+            for block in padded:
+                file.write(block.data)
+        _prune(path.parent)
+    except (DiffractionError, OSError):
+        return
+
+
+def _checksum(blocks: Sequence[NDArray[np.uint8]]) -> str:
+    content = hashlib.sha256()
+    for block in blocks:
+        content.update(block.data)
+    return content.hexdigest()
+
+
+def _aligned(size: int) -> int:
+    """The least multiple of `_ALIGNMENT` that is not below a size."""
+    return -(-size // _ALIGNMENT) * _ALIGNMENT
+
+
+def _prune(folder: Path) -> None:
+    """Remove the files unused for longest until the folder is small enough."""
+    remove_abandoned(folder, r"\w+-\w+", SUFFIX)
+    found = {path for pattern in _PATTERNS for path in folder.glob(pattern)}
+    newest = sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
+    total = 0
+    for n, path in enumerate(newest):
+        total += path.stat().st_size
+        if total > MAX_BYTES and n > 0:
+            path.unlink(missing_ok=True)
