@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.plugin.parameters import TABLE_PARAMETERS
+from mitsuba_diffraction.settings import SCENE_SETTINGS
 from tests.directions import polar, rough_patch
 from tests.lanes import evaluated, refusal
 
@@ -266,7 +266,7 @@ def test_what_contradicts_a_table_is_refused(some_variant, table_file, parameter
     text = refusal(loads(table=str(table_file), **parameters))
     assert message in text
     (name,) = parameters
-    if name in TABLE_PARAMETERS:
+    if name in SCENE_SETTINGS:
         assert "; leave it out, or " in text
         assert text.endswith("or build another table with 'mitsuba-diffraction precompute'")
         assert ("-D coherence_width=auto" in text) == (name == "coherence_width")

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.Diff
 
 def build(coherence):
     return md.DiffractionTable.build(
-        PATCH, coherence_width=18.0, coherence=coherence, crop=(6.0, 5.0), kappa_max=20.0
+        PATCH, coherence_width=18.0, coherence=coherence, q_max=(6.0, 5.0), kappa_max=20.0
     )
 
 

@@ -28,7 +28,7 @@ KINDS = {
     "single floats": {"tolerance": 1e-5},
     "amplitudes": {"coherence": "patch"},
     "taylor": {"basis": "taylor"},
-    "restricted": {"crop": 12.0, "kappa_max": 20.0},
+    "restricted": {"q_max": 12.0, "kappa_max": 20.0},
 }
 
 
@@ -115,7 +115,8 @@ def test_the_page_describes_every_field(tmp_path):
     DiffractionTable.build(PATCH, coherence_width=1.8, **KINDS["restricted"]).save(file)
     document = read_document(file)
     coarse = document["coarse"]
-    described = set(re.findall(r"^\| `(\w+)` \|", PAGE, re.M))
+    rows = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \|", PAGE, re.M)
+    described = set(re.findall(r"\w+", " ".join(rows)))
     fields = {*document, *coarse, *document["expansion"], *document["grid"], *coarse["grid"]}
     assert fields == described
     assert f"This page describes version\n{FORMAT_VERSION};" in PAGE

@@ -47,7 +47,7 @@ class Plan:
     scene : name of the file, for people.
     tolerance : relative error of the picture that it was made for.
     paths : that were traced.
-    tables : by the key of the whole table (`files.cache.content_key`): heights and parameters.
+    tables : by the key of the whole table (`tables.store.cache.table_key`): heights and parameters.
     """
 
     scene: str

@@ -269,8 +269,8 @@ def _grid(wanted: _Wanted, taps: tuple[int, int]) -> Grid:
         raise build_error(
             f"the patch is {max(wanted.patches[0].extent):.4g} µm wide, so much more than the "
             f"coherence window that a look-up would read {taps[0]}×{taps[1]} orders; crop the "
-            f"heights, for instance to {width:g} µm (crop={width:g} of a scene, --crop {width:g}), or "
-            "raise coherence_width or tolerance"
+            f"heights, for instance to {width:g} µm (crop={width:g} of a scene, --crop {width:g}), "
+            "or raise coherence_width or tolerance"
         )
     radius = (q_max[0] / spacing[0], q_max[1] / spacing[1])
     ny, nx = np.max([patch.shape for patch in wanted.patches], axis=0)

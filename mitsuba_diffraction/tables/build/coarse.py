@@ -2,9 +2,9 @@
 
 A scene sends next to no light to most spatial frequencies that light could probe. A table that
 ends early (`DiffractionTable.build` with `q_max` or `kappa_max`) goes on as this one, whose bins
-are cells of many orders each. A cell holds the power of all its orders, and a Gaussian about one cell
-wide carries it: sums over a few cells are right, the structure within a cell (speckle, the sharp
-orders of a grating) is averaged. Order 0 keeps its own lobe.
+are cells of many orders each. A cell holds the power of all its orders, and a Gaussian about one
+cell wide carries it: sums over a few cells are right, the structure within a cell (speckle, the
+sharp orders of a grating) is averaged. Order 0 keeps its own lobe.
 
 With cells of width D (rad/µm) in both directions and s = σ'D, the window σ' of the cells has the
 integral π/σ'² = πD²/s² where that of the orders has π/σ²; so a cell that holds the power p has the

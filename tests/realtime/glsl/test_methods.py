@@ -265,13 +265,13 @@ def test_the_documents_tables_are_built_once(
 ) -> None:
     monkeypatch.setenv("MITSUBA_DIFFRACTION_CACHE", str(tmp_path))
     first = thesis_method("flss", patch, table)
-    assert len([*tmp_path.glob("*.exr")]) == 1
+    assert len([*tmp_path.glob("*.cache")]) == 1
 
     def build(*_: object, **__: object) -> DiffractionTable:
         raise AssertionError("built again")
 
-    monkeypatch.setattr(DiffractionTable, "build", build)
-    monkeypatch.setattr(cache, "_open_tables", {})  # as in the next process
+    monkeypatch.setattr("mitsuba_diffraction.realtime.glsl.thesis.build_with", build)
+    monkeypatch.setattr(cache, "_tables", {})  # as in the next process
     second = thesis_method("flss", patch, table)
     np.testing.assert_array_equal(second.table.coefficients, first.table.coefficients)
     with pytest.raises(AssertionError, match="built again"):

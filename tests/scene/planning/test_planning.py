@@ -187,7 +187,7 @@ def test_what_saves_too_little_is_left_whole(looked):
     (key,) = plan.tables
     whole = looked.session.tables[key]
     assert worthwhile(plan, {key: whole}).limits() == {}
-    smaller = md.DiffractionTable.build(PATCH, coherence_width=18.0, crop=4.0, kappa_max=20.0)
+    smaller = md.DiffractionTable.build(PATCH, coherence_width=18.0, q_max=4.0, kappa_max=20.0)
     found = worthwhile(plan, {key: smaller})
     assert set(found.limits()) == {key}
     assert found.tables[key].memory == (whole.nbytes, smaller.nbytes)

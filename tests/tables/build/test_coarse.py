@@ -15,7 +15,7 @@ from tests.directions import rough_patch
 
 #: 19.2 µm wide: a coarse cell holds five by five orders. Nyquist's frequency is 10.5 rad/µm.
 PATCH = rough_patch((64, 64), (0.3, 0.3), 0.25, correlation=0.2)
-WIDTH, CROP, KAPPA_MAX = 18.0, 6.0, 20.0
+WIDTH, Q_MAX, KAPPA_MAX = 18.0, 6.0, 20.0
 
 
 @pytest.fixture(scope="module")
@@ -26,9 +26,9 @@ def whole():
 
 @pytest.fixture(scope="module", params=["ensemble", "patch"])
 def restricted(request):
-    """The same up to CROP and KAPPA_MAX."""
+    """The same up to Q_MAX and KAPPA_MAX."""
     return DiffractionTable.build(
-        PATCH, coherence_width=WIDTH, coherence=request.param, crop=CROP, kappa_max=KAPPA_MAX
+        PATCH, coherence_width=WIDTH, coherence=request.param, q_max=Q_MAX, kappa_max=KAPPA_MAX
     )
 
 
@@ -46,7 +46,7 @@ def test_within_the_domain_the_tolerance_is_met(restricted):
         PATCH, coherence_width=WIDTH, coherence=restricted.coherence, tolerance=1e-4
     )
     rng = np.random.default_rng(0)
-    angle, radius = rng.uniform(0, 2 * np.pi, 4000), CROP * np.sqrt(rng.uniform(0, 1, 4000))
+    angle, radius = rng.uniform(0, 2 * np.pi, 4000), Q_MAX * np.sqrt(rng.uniform(0, 1, 4000))
     x, y = radius * np.cos(angle), radius * np.sin(angle)
     assert restricted.covers(x, y, KAPPA_MAX).all()
     for kappa in (1.0, 8.0, 0.999 * KAPPA_MAX):
@@ -70,7 +70,7 @@ def test_no_light_is_lost(restricted, kappa):
     step = 0.1
     total = restricted.window_sum(*plane(14.0, step), kappa).sum() * step**2
     expected = np.pi / restricted.sigma**2
-    # Cells that straddle the edge of the crop are counted twice or not at all; speckle (`patch`)
+    # Cells that straddle the edge of the domain are counted twice or not at all; speckle (`patch`)
     # has twice its mean at its own centre, and averages only over the lobes there are (some 3000)
     assert total == pytest.approx(expected, rel=0.02 if restricted.coherence == "ensemble" else 0.1)
 
@@ -89,7 +89,7 @@ def test_order_0_keeps_its_lobe_beyond_kappa_max():
     grating = gratings.sinusoidal(
         period=2.0, depth=depth, periods=10, pixels_per_period=32, rows=256
     )
-    table = DiffractionTable.build(grating, coherence_width=18.0, crop=8.0, kappa_max=20.0)
+    table = DiffractionTable.build(grating, coherence_width=18.0, q_max=8.0, kappa_max=20.0)
     kappa = np.array([25.0, 40.0, 52.0])
     power = jv(0, 0.5 * kappa * depth) ** 2
     # The next order is 3.1 rad/µm = 14/σ away, more than two cells of 1.6 rad/µm
@@ -99,7 +99,7 @@ def test_order_0_keeps_its_lobe_beyond_kappa_max():
 
 
 def test_the_bound_of_the_albedo_counts_what_lies_outside(whole):
-    table = DiffractionTable.build(PATCH, coherence_width=WIDTH, crop=CROP)
+    table = DiffractionTable.build(PATCH, coherence_width=WIDTH, q_max=Q_MAX)
     azimuths = np.linspace(0.0, 2 * np.pi, 5)
     for theta in (0.0, 0.6, 1.2):
         exact, found = (AlbedoModel(t).albedo(theta, azimuths, 450.0) for t in (whole, table))
@@ -113,21 +113,21 @@ def test_what_sums_orders_on_its_own_refuses(restricted):
             read(restricted)
 
 
-@pytest.mark.parametrize("name", ["crop", "kappa_max"])
+@pytest.mark.parametrize("name", ["q_max", "kappa_max"])
 def test_a_domain_of_nothing_is_refused(name):
     with pytest.raises(DiffractionError, match=f"{name}=-1 must be a positive number"):
         DiffractionTable.build(PATCH, coherence_width=WIDTH, **{name: -1.0})
 
 
 def test_a_domain_beyond_what_light_can_probe_is_the_whole(whole):
-    table = DiffractionTable.build(PATCH, coherence_width=WIDTH, crop=1e3, kappa_max=1e3)
+    table = DiffractionTable.build(PATCH, coherence_width=WIDTH, q_max=1e3, kappa_max=1e3)
     assert table.coarse is None
-    assert table.crop is None
+    assert table.settings.q_max is None
     assert np.array_equal(table.coefficients, whole.coefficients)
 
 
 def test_the_domain_may_be_an_ellipse(whole):
-    table = DiffractionTable.build(PATCH, coherence_width=WIDTH, crop=(8.0, 3.0))
+    table = DiffractionTable.build(PATCH, coherence_width=WIDTH, q_max=(8.0, 3.0))
     _, ny, nx, _, _ = table.coefficients.shape
     assert ny < 0.6 * nx
     assert list(table.covers([7.9, 0.0, 7.0], [0.0, 2.9, 2.0], 5.0)) == [True, True, False]
@@ -141,7 +141,7 @@ def test_a_file_keeps_both_parts(restricted, tmp_path):
     file = tmp_path / "table.exr"
     restricted.save(file)
     loaded = DiffractionTable.load(file)
-    assert (loaded.crop, loaded.expansion) == ((CROP, CROP), restricted.expansion)
+    assert (loaded.q_max, loaded.expansion) == ((Q_MAX, Q_MAX), restricted.expansion)
     assert loaded.coarse.grid == restricted.coarse.grid
     for a, b in ((loaded, restricted), (loaded.coarse, restricted.coarse)):
         assert np.array_equal(a.coefficients, b.coefficients)
