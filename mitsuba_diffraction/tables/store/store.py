@@ -46,8 +46,13 @@ _making: dict[tuple[str, str], threading.Lock] = {}
 def cache_folder() -> Path | None:
     """$MITSUBA_DIFFRACTION_CACHE, or the user's cache folder; None for a user without a home."""
     own = os.environ.get(VARIABLE)
-    folder = Path(own) if own else platformdirs.user_cache_path("mitsuba_diffraction", False)
-    return folder if own or folder.is_absolute() else None
+    if own:
+        return Path(own)
+    try:
+        folder = platformdirs.user_cache_path("mitsuba_diffraction", appauthor=False)
+    except RuntimeError:
+        return None
+    return folder if folder.is_absolute() else None  # "~" as earlier versions leave it
 
 
 @dataclass(frozen=True)
@@ -159,8 +164,7 @@ def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
 
 def _read(path: Path, title: str) -> Record:
     content = np.fromfile(path, np.uint8)
-    head, *_ = content[:_HEAD].tobytes().split(b"\n")
-    if head.decode("ascii", "replace") != f"{title} {_checksum([content[_HEAD:]])}":
+    if content[:_HEAD].tobytes() != _head(title, [content[_HEAD:]]):
         raise ValueError("its checksum or its key is another's")
     length = int(content[_HEAD : 2 * _HEAD].tobytes())
     place = 2 * _HEAD + _aligned(length)
@@ -182,7 +186,7 @@ def _keep(path: Path, title: str, record: Record) -> None:
     padded = [np.pad(block, (0, _aligned(block.size) - block.size)) for block in blocks]
     try:
         with atomic_path(path) as temporary, open(temporary, "wb") as file:
-            file.write(f"{title} {_checksum(padded)}\n".encode().ljust(_HEAD))
+            file.write(_head(title, padded))
             for block in padded:
                 file.write(block.data)
         _prune(path.parent)
@@ -190,11 +194,12 @@ def _keep(path: Path, title: str, record: Record) -> None:
         return
 
 
-def _checksum(blocks: Sequence[NDArray[np.uint8]]) -> str:
+def _head(title: str, blocks: Sequence[NDArray[np.uint8]]) -> bytes:
+    """The first line, filled up."""
     content = hashlib.sha256()
     for block in blocks:
         content.update(block.data)
-    return content.hexdigest()
+    return f"{title} {content.hexdigest()}".encode().ljust(_HEAD - 1) + b"\n"
 
 
 def _aligned(size: int) -> int:

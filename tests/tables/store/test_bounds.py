@@ -9,7 +9,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.tables.energy.bound import AZIMUTHAL, POLAR, AlbedoBound, albedo_bound
 from mitsuba_diffraction.tables.store import bounds as bound_cache
 from mitsuba_diffraction.tables.store.bounds import bounds_around, cached_bound
-from mitsuba_diffraction.tables.store.cache import VARIABLE
+from mitsuba_diffraction.tables.store.store import VARIABLE
 
 
 @pytest.fixture
