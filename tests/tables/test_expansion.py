@@ -81,7 +81,7 @@ def test_at_kappa_zero_there_is_only_the_mirror():
     for basis in ("taylor", "chebyshev"):
         expansion = Expansion(basis, "amplitude", 6, 1, 30.0, 0.2)
         assert np.array_equal(expansion.weights(0.0), np.zeros(6))
-        assert expansion.specular(0) == 1.0
+        assert expansion.order_0_offset(0) == 1.0
 
 
 def test_taylor_weights_are_powers_over_factorials():

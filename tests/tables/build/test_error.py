@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mitsuba_diffraction.tables.build.build.error import FLOOR, NEAR, alternate, worst
+from mitsuba_diffraction.tables.build.error import FLOOR, NEAR, alternate, worst
 
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.heights import gratings
