@@ -141,7 +141,10 @@ def test_an_image_that_is_no_table(tmp_path):
 def test_a_table_of_another_version(saved, version):
     rewritten(saved, lambda document: document.update(version=version))
     text = refused(saved)
-    assert f"is a table of format version {version}, this program reads version {FORMAT_VERSION}" in text
+    assert (
+        f"is a table of format version {version}, this program reads version {FORMAT_VERSION}"
+        in text
+    )
     assert text.endswith("build it again with 'mitsuba-diffraction precompute'")
 
 
