@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from mitsuba_diffraction.tables.build.choose import taylor_rounding
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, reference
+from mitsuba_diffraction.tables.build.choose import taylor_rounding
 from tests.directions import rough_patch
 from tests.tables.patches import DEEP, DEFAULTS, PATCH
 
@@ -75,7 +75,10 @@ def test_too_few_taps_are_refused_with_the_error_they_leave():
         ({"terms": 0}, "terms=0 must be a whole number from 1 to 400"),
         ({"terms": 401}, "terms=401 must be a whole number from 1 to 400"),
         ({"taps": 65}, "taps=65 must be a whole number from 1 to 64"),
-        ({"wavelength_range": (700.0, 400.0)}, "wavelength_range=(700.0, 400.0) must be two rising"),
+        (
+            {"wavelength_range": (700.0, 400.0)},
+            "wavelength_range=(700.0, 400.0) must be two rising",
+        ),
         ({"wavelength_range": (0.36, 0.83)}, "in nm, between 10 and 100000"),
         ({"height_scale_max": 0.0}, "height_scale_max=0 must be a positive factor, at most 1000"),
         ({"height_scale_max": np.nan}, "height_scale_max=nan must be a positive factor"),

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mitsuba_diffraction.tables.build.error import FLOOR, NEAR, alternate, worst
 
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.reference import screen_power
+from mitsuba_diffraction.tables.build.error import FLOOR, NEAR, alternate, worst
 from tests.directions import rough_patch
 
 #: Odd and even, not square, nor are the pixels: 5.04 × 4.55 µm.
