@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError
-from ..heights.formats.native import native_messages
 from .build.error import Grid
 from .expansion import BASES, KINDS, Expansion
 from .table import FORMAT_VERSION, DiffractionTable
@@ -233,13 +232,12 @@ def _channels(expansion: Expansion) -> Iterator[tuple[str, tuple[Any, ...]]]:
 def _read(
     path: str | os.PathLike[str], what: Callable[[OpenEXR.File], dict[str, Any]], **options: bool
 ) -> dict[str, Any]:
-    """Part of an EXR file; what OpenEXR prints about a damaged one is left out."""
+    """Part of an EXR file."""
     if not Path(path).is_file():
         why = "it is a folder" if Path(path).is_dir() else "there is no such file"
         raise DiffractionError(f"cannot read '{path}': {why}")
     try:
-        with native_messages():
-            return what(OpenEXR.File(str(path), **options))
+        return what(OpenEXR.File(str(path), **options))
     except (RuntimeError, ValueError, OSError, LookupError) as error:
         raise DiffractionError(
             f"cannot read '{path}' as EXR: it is empty, cut short or no EXR file; "
