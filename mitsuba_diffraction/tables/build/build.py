@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import DiffractionError
 from ...heights.field import HeightField
-from ...heights.validity import units_question
+from ...heights.validity import units_warning
 from ...optics.geometry import sigma_of
 from ...progress import Progress, silent
 from ...reference import check_coherence
@@ -156,7 +156,7 @@ def build_table(
     try:
         return _built(wanted, progress or silent)
     except DiffractionError as error:
-        questions = [question for patch in patches if (question := units_question(patch))]
+        questions = [question for patch in patches if (question := units_warning(patch))]
         if not questions:
             raise
         raise DiffractionError(f"{error}; or {questions[0]}") from error

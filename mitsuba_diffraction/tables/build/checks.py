@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import DiffractionError
 from ...heights.field import HeightField
-from ...heights.validity import units_question
+from ...heights.validity import units_warning
 from ..expansion import BASES, Expansion
 from ..table import refuse
 from ..window import MAX_TAPS
@@ -96,7 +96,7 @@ def check_units(patches: Sequence[HeightField]) -> None:
         if patch.rms_slope > HOPELESS_SLOPE and patch.range > HOPELESS_RANGE:
             raise refuse(
                 f"'{patch.name}' has an RMS slope of {patch.rms_slope:.3g}, as no surface has: "
-                f"{units_question(patch)}"
+                f"{units_warning(patch)}"
             )
 
 
