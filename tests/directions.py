@@ -6,9 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import HeightField
-from mitsuba_diffraction.analysis.tradeoff.sample import as_single, lit_pairs, uniform_directions
-
-__all__ = ["as_single", "lit_pairs", "polar", "riemann_power", "rough_patch", "uniform_directions"]
 
 Array = NDArray[np.float64]
 
@@ -17,6 +14,60 @@ def polar(theta: float, phi: float = 0.0) -> Array:
     """Unit vector (3,) at these angles in degrees from the normal and from x."""
     theta, phi = np.radians(theta), np.radians(phi)
     return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+
+
+def as_single(values: Array) -> Array:
+    """The values that single precision can hold, so that both sides get the same input."""
+    return np.asarray(values, np.float32).astype(np.float64)
+
+
+def uniform_directions(n: int, rng: np.random.Generator, lowest: float = 0.1) -> Array:
+    """Unit vectors (n, 3), uniform over the hemisphere above cosθ = lowest, exact in float32."""
+    z, phi = rng.uniform(lowest, 1.0, n), rng.uniform(0.0, 2 * np.pi, n)
+    r = np.sqrt(1.0 - z**2)
+    return as_single(np.stack([r * np.cos(phi), r * np.sin(phi), z], axis=1))
+
+
+def lit_pairs(
+    field: HeightField, sigma: float, n: int, seed: int
+) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    """Pairs of directions with wavelengths: near order 0, at random, and in the lobes of orders.
+
+    Of every four pairs one lies in the lobe of order 0, one is uniform over the hemisphere, and two
+    lie in lobes of orders drawn by their power at 550 nm.
+
+    Returns
+    -------
+    wi, wo (n, 3), wavelength (n,) in nm, all exact in float32, and (n,) whether the pair lies
+    within 3/σ of order 0.
+    """
+    rng = np.random.default_rng(seed)
+    power = np.abs(np.fft.ifft2(np.exp(1j * 4 * np.pi / 0.55 * field.heights))) ** 2
+    power[0, 0] = 0.0
+    drawn = rng.choice(power.size, 50 * n, p=power.ravel() / power.sum())
+    axes = [
+        2 * np.pi * np.fft.fftfreq(m, d)
+        for m, d in zip(field.shape[::-1], field.pixel_size, strict=True)
+    ]
+    orders = iter(zip(axes[0][drawn % axes[0].size], axes[1][drawn // axes[0].size], strict=True))
+    pairs = [_lit_pair(rng, kind % 4, orders, sigma) for kind in range(n)]
+    wi, wo, lam = (np.array(part) for part in zip(*pairs, strict=True))
+    near = np.hypot(*(wi + wo)[:, :2].T) * 2e3 * np.pi / lam * sigma <= 3.0
+    return wi, wo, lam, near
+
+
+def _lit_pair(rng, kind, orders, sigma):
+    """One pair: kind 0 near order 0, 1 uniform, others in the lobe of the next order that exits."""
+    while True:
+        wi, wo = uniform_directions(2, rng)
+        lam = float(as_single(rng.uniform(380.0, 780.0)))
+        if kind == 1:
+            return wi, wo, lam
+        q = np.array((0.0, 0.0) if kind == 0 else next(orders))
+        q = q + rng.normal(0.0, np.sqrt(0.5) / sigma, 2)
+        sines = q * lam / (2e3 * np.pi) - wi[:2]
+        if sines @ sines < 0.99:  # neither evanescent nor along the surface
+            return wi, as_single(np.append(sines, np.sqrt(1.0 - sines @ sines))), lam
 
 
 def riemann_power(

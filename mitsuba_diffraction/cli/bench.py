@@ -15,7 +15,7 @@ from .options import add_json, add_own_patch, check_own_patch, own_patch
 from .progress import Bar
 from .report import save_report
 
-PARTS = ("build", "eval", "sample", "render", "snake", "noise", "efficiency", "colours", "scaling")
+PARTS = ("build", "eval", "sample", "snake", "noise", "efficiency", "colours")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -90,6 +90,5 @@ def _check_scenes(folder: Path) -> None:
     if not (folder / "snake.xml").is_file():
         raise DiffractionError(
             f"'{folder / 'snake.xml'}' does not exist; name the folder of the project's scenes "
-            "with --scenes, or measure a part without them: --only build, eval, sample, render "
-            "or noise"
+            "with --scenes, or measure a part without them: --only build, eval, sample or noise"
         )

@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
     from ..thesis.evaluation.files import save_csv, save_npz
     from ..thesis.evaluation.plot import figure
     from ..thesis.methods import make
-    from ..thesis.methods.full_spectrum import trapezoid_rule
+    from ..thesis.methods.method import trapezoid_rule
     from ..thesis.methods.period import check_period
 
     start = time.perf_counter()
@@ -173,7 +173,7 @@ def _windows(
     """What single windows show, and the thesis' procedure: lines, and entries of the NPZ."""
     if args.windows == 0:
         return [], {}
-    from ..thesis.evaluation import documents_fit, window_fits
+    from ..thesis.evaluation import thesis_fit, window_fits
     from ..thesis.methods import make
 
     few = steps[:: max(1, steps.size // _FEW)]
@@ -197,7 +197,7 @@ def _windows(
              f"{periods.max():.5g} nm")
         )  # fmt: skip
     try:
-        as_in_thesis = documents_fit(table, beam, steps, angles, args.order)
+        as_in_thesis = thesis_fit(table, beam, steps, angles, args.order)
     except DiffractionError as error:
         lines.append(("thesis", f"its procedure finds no period ({error})"))
     else:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
-from ..heights.validity import window_line
+from ..heights.validity import window_warning
 from .arguments import path_ending_in
 from .console import mitsuba_warnings
 from .options import STDOUT, add_heights, add_json, given_for_heights, load_options
@@ -134,14 +134,14 @@ def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     from ..heights.load import load_heights
 
     field = load_heights(file, load_options(args))
-    return {"kind": "height field", **field.summary(), "warnings": _doubts(field)}
+    return {"kind": "height field", **field.summary(), "warnings": _warnings_of(field)}
 
 
-def _doubts(
+def _warnings_of(
     field: HeightField, coherence_width: float = 65.0, **asked: Sequence[float]
 ) -> list[str]:
     """What a table of these heights will be warned of."""
-    small = window_line(field, coherence_width)
+    small = window_warning(field, coherence_width)
     return [*field.validity(**asked), *([small] if small else [])]
 
 
@@ -155,7 +155,7 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
         fields = recipe.fields(load_options(args))
     names = ("wavelength_range", "coherence_width")
     asked = {name: table[name] for name in names if name in table}
-    warnings = [line for field in fields for line in _doubts(field, **asked)]
+    warnings = [line for field in fields for line in _warnings_of(field, **asked)]
     return {
         "kind": "recipe",
         **({"generator": recipe.generator} if recipe.generator else {}),

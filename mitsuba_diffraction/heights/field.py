@@ -114,6 +114,18 @@ class HeightField:
             + _mean_square(np.diff(self.heights, axis=0)) / dy**2
         )
 
+    def changed(
+        self, heights: npt.ArrayLike, line: str, *, cut_out: bool | None = None
+    ) -> HeightField:
+        """The patch with other heights on the same pixels, and one more line of `history`."""
+        return HeightField(
+            heights,
+            self.pixel_size,
+            name=self.name,
+            history=(*self.history, line),
+            cut_out=self.cut_out if cut_out is None else cut_out,
+        )
+
     @cached_property
     def _digest(self) -> str:
         content = hashlib.sha256(repr((self.shape, self.pixel_size)).encode())

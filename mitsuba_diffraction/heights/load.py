@@ -42,7 +42,7 @@ def load(
         Name or index of the channel of an instrument file (name for an EXR); by default the
         one that holds heights.
     crop
-        Keep the middle of the patch only, so wide in µm: one number for a square, a pair
+        Crop to a central region (µm): one number for a square, a pair
         (width, height), or a string of either.
     fill
         What becomes of points without data: "nearest" or "harmonic" (see `missing`); by

@@ -47,7 +47,9 @@ def read_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightFi
     raw, measured = _read(file, options.channel)
     field = _settle(raw, file, options)
     if measured and options.level in (None, "none"):
-        field = _noting_tilt(field)
+        rise = plane_rise(field)  # seams repeat it
+        line = f"not levelled: the best plane rises {rise:.3g} µm across the patch"
+        field = field.changed(field.heights, line)
     return treat(field, replace(options, crop=None))  # cropped before gaps were filled
 
 
@@ -152,27 +154,11 @@ def _missing_lengths(shown: str, height: bool, pixel: bool) -> DiffractionError:
 def treat(field: HeightField, options: LoadOptions) -> HeightField:
     """Crop, level, clip and make periodic: dust stands out from a level surface only."""
     if options.crop is not None:
-        field, _ = crop(field, options.crop)
-    if options.level == "plane":
-        field, _ = level_plane(field)
-    elif options.level == "lines":
-        field, _ = level_lines(field)
+        field = crop(field, options.crop)
+    if options.level not in (None, "none"):
+        field = {"plane": level_plane, "lines": level_lines}[options.level](field)
     if options.clip is not None:
-        field, _ = clip_outliers(field, options.clip)
-    if options.periodic == "smooth":
-        field, _ = periodic_smooth(field)
-    elif options.periodic == "taper":
-        field, _ = periodic_taper(field)
+        field = clip_outliers(field, options.clip)
+    if options.periodic not in (None, "none"):
+        field = {"smooth": periodic_smooth, "taper": periodic_taper}[options.periodic](field)
     return field
-
-
-def _noting_tilt(field: HeightField) -> HeightField:
-    """Say in the history how tilted a scan is that was not levelled: seams repeat the tilt."""
-    line = f"not levelled: the best plane rises {plane_rise(field):.3g} µm across the patch"
-    return HeightField(
-        field.heights,
-        field.pixel_size,
-        name=field.name,
-        history=(*field.history, line),
-        cut_out=field.cut_out,
-    )

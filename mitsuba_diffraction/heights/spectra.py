@@ -6,15 +6,32 @@ frequency (0, 0) in the middle (`numpy.fft.fftshift`).
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.ndimage import gaussian_filter, map_coordinates, median
 
 from .field import HeightField
 
 FloatArray = npt.NDArray[np.float64]
+
+#: A peak of a grating stands this much above the median at its frequency, in any direction. Rough
+#: surfaces reach 20 by chance, measured snakes' fingers 1e4.
+CONTRAST = 200.0
+#: A peak with less of the variance than this is a detail of the surface, not what it is made of.
+LEAST_SHARE = 0.1
+# Fewer periods than this in a patch are not told from its tilt and bending.
+_FEWEST_PERIODS = 2.5
+# Peaks closer in direction than this are harmonics or the irregularity of one grating, degrees.
+_SAME = 15.0
+# Around a peak: bins of a Hann window's main lobe, and the spread of an irregular grating's
+# frequency (relative) and direction (radians).
+_LOBE, _SPREAD, _FAN = 2, 0.12, math.radians(8)
+# Pixels a side beyond which the central region says enough.
+_LARGEST = 1024
 
 
 def frequencies(field: HeightField) -> tuple[FloatArray, FloatArray]:
@@ -32,10 +49,87 @@ def height_spectrum(field: HeightField) -> FloatArray:
     compare.
     """
     (ny, nx), (dx, dy) = field.shape, field.pixel_size
-    window = np.hanning(ny)[:, None] * np.hanning(nx)
+    # without the zeros at its ends, which would be all of a patch of two rows
+    window = np.hanning(ny + 2)[1:-1, None] * np.hanning(nx + 2)[1:-1]
     window /= np.sqrt(np.mean(window**2))
     amplitude = np.fft.fft2((field.heights - field.heights.mean()) * window)
     return np.fft.fftshift(np.abs(amplitude) ** 2) * (dx * dy / (nx * ny))
+
+
+@dataclass(frozen=True)
+class Periodicity:
+    """A grating that a patch holds.
+
+    Attributes
+    ----------
+    period : µm, from one groove to the next, across them.
+    direction : degrees from x towards y across the grooves, −89.5 to 90.5.
+    share : of the variance of the heights, 0 to 1, without harmonics.
+    """
+
+    period: float
+    direction: float
+    share: float
+
+    def __str__(self) -> str:
+        return f"{self.period:.4g} µm along {self.direction:.0f}°, {self.share:.0%} of the variance"
+
+
+def dominant_periods(field: HeightField, most: int = 3) -> list[Periodicity]:
+    """The gratings that stand out of a patch's spectrum, the one with most of the variance first.
+
+    A peak counts that is `CONTRAST` times the median of all directions at its frequency and holds
+    `LEAST_SHARE` of the variance; its frequency is the centre of mass of what is around it.
+    Of peaks in one direction, as harmonics are, the strongest is taken; what repeats less than two
+    and a half times is left out.
+    """
+    central = field.heights[tuple(_central(n) for n in field.shape)]
+    patch = HeightField(central, field.pixel_size)
+    power = height_spectrum(patch)
+    total = float(power.sum())
+    if not total > 0.0:
+        return []
+    fx, fy = np.broadcast_arrays(*frequencies(patch))
+    (width, height), (ny, nx) = patch.extent, patch.shape
+    repeats = np.hypot(fx * width, fy * height)
+    radius = np.hypot(fx, fy)
+    # octaves: wide enough for the median not to be that of the peak itself
+    rings = np.log2(np.maximum(radius * max(width, height), 1.0)).astype(np.intp)
+    background = np.maximum(median(power, rings, np.arange(rings.max() + 1)), total * 1e-30)
+    half = (fy > 0) | ((fy == 0) & (fx > 0))
+    left = np.where(half & (repeats >= _FEWEST_PERIODS), power, 0.0)
+    left[power < CONTRAST * background[rings]] = 0.0
+    found: list[Periodicity] = []
+    while len(found) < most and left.any():
+        iy, ix = np.unravel_index(left.argmax(), left.shape)
+        peak = np.array([fx[iy, ix], fy[iy, ix]])
+        rows, columns = np.abs(np.arange(ny) - iy), np.abs(np.arange(nx) - ix)
+        near = (rows[:, None] <= _LOBE) & (columns <= _LOBE)
+        along, across = fx * peak[0] + fy * peak[1], fx * peak[1] - fy * peak[0]
+        near |= (np.abs(along / (peak @ peak) - 1) < _SPREAD) & (np.abs(across) < _FAN * along)
+        weight = power[near]
+        share = 2.0 * float(weight.sum()) / total  # and its mirror image
+        centre = np.array([weight @ fx[near], weight @ fy[near]]) / weight.sum()
+        repeated = np.hypot(*(centre * (width, height))) >= _FEWEST_PERIODS
+        if share >= LEAST_SHARE and repeated:
+            found.append(_periodicity(centre, min(share, 1.0)))
+        same = np.abs(across) <= math.tan(math.radians(_SAME)) * np.abs(along)
+        on_line = along / (peak @ peak)
+        aside = np.hypot((fx - on_line * peak[0]) * width, (fy - on_line * peak[1]) * height)
+        explained = same | (aside < _LOBE + 1)
+        left[explained] = power[explained] = 0.0
+    return sorted(found, key=lambda one: -one.share)
+
+
+def _central(count: int) -> slice:
+    kept = min(count, _LARGEST)
+    return slice((count - kept) // 2, (count - kept) // 2 + kept)
+
+
+def _periodicity(frequency: FloatArray, share: float) -> Periodicity:
+    direction = math.degrees(math.atan2(frequency[1], frequency[0]))
+    direction -= 180.0 * math.ceil((direction - 90.5) / 180.0)  # the same grooves seen from x
+    return Periodicity(float(1.0 / np.hypot(*frequency)), round(direction, 2) + 0.0, share)
 
 
 def order_powers(field: HeightField, wavelength: float) -> FloatArray:

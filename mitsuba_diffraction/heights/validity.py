@@ -45,8 +45,7 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
     lines = []
     if field.rms_slope > IMPOSSIBLE_SLOPE:
         lines.append(
-            f"{field.name}: RMS slope {field.rms_slope:.2g} is no surface's: "
-            f"{units_question(field)}"
+            f"{field.name}: RMS slope {field.rms_slope:.2g} is no surface's: {units_warning(field)}"
         )
     elif field.rms_slope > STEEP_SLOPE:
         lines.append(
@@ -68,7 +67,7 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
             f"{field.name}: pixels of {coarse:.3g} µm are coarser than a quarter of the "
             f"shortest wavelength, which is {shortest / 4:.3g} µm: nothing is known of directions "
             f"with |sinθi + sinθo| above {reach:.2g} at {shortest * 1000:g} nm"
-            + (f"; {units_question(field)}" if coarse > COARSEST_PIXEL else "")
+            + (f"; {units_warning(field)}" if coarse > COARSEST_PIXEL else "")
         )
     if 0 < field.range < SMALLEST_RANGE:
         lines.append(
@@ -80,7 +79,7 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
     return lines
 
 
-def units_question(field: HeightField) -> str:
+def units_warning(field: HeightField) -> str:
     """Whether lengths are nanometres taken for µm, as a question; "" if nothing speaks for it."""
     coarse = max(field.pixel_size)
     if coarse > COARSEST_PIXEL:
@@ -93,7 +92,7 @@ def units_question(field: HeightField) -> str:
     return ""
 
 
-def window_line(field: HeightField, coherence_width: float) -> str:
+def window_warning(field: HeightField, coherence_width: float) -> str:
     """What to say of a patch that is smaller than the coherence window; "" of others."""
     width, height = field.extent
     if min(width, height) >= _SMALLER * coherence_width:

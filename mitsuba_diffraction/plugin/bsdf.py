@@ -19,7 +19,7 @@ max_height : float or string [from the file]
 channel : string or integer [the heights]
     Which channel of an instrument file: its name or index; of an EXR image, its name.
 crop : float or string [none]
-    Keeps the middle of the patch only, so wide in µm: one number for a square, or "width, height".
+    Crop to a central region (µm): one number for a square, or "width, height".
 fill : string [none]
     How points without data are filled: `none` (they are refused), `nearest` (the nearest height)
     or `harmonic` (a membrane spanned over the gap).

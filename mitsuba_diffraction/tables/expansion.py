@@ -22,7 +22,7 @@ own, and a bin has one number for each of them. Order 0, which need not lie in t
 the plain Chebyshev series.
 
 **Taylor.** a_j(κ) = δ_j0 + Σ_n xⁿ/n! · DFT[iⁿ(2h/H)ⁿ]_j with x = κH/2 and centred heights
-(Stam 1999, eq. 12, after the source documents), one interval. The terms grow to e^x before they
+(Stam 1999, eq. 12, after the thesis), one interval. The terms grow to e^x before they
 cancel, which single precision survives for shallow surfaces only.
 """
 

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line
-from ..heights.formats.native import native_messages
 from .document import Described, described, document_of, plain
 from .expansion import Expansion
 from .table import FORMAT_VERSION, DiffractionTable
@@ -217,13 +216,12 @@ def _headers(path: str | os.PathLike[str]) -> list[dict[str, Any]]:
 def _read(
     path: str | os.PathLike[str], what: Callable[[OpenEXR.File], Any], header_only: bool = False
 ) -> Any:
-    """Part of an EXR file; what OpenEXR prints about a damaged one is left out."""
+    """Part of an EXR file."""
     if not Path(path).is_file():
         why = "it is a folder" if Path(path).is_dir() else "there is no such file"
         raise DiffractionError(f"cannot read '{path}': {why}")
     try:
-        with native_messages():
-            return what(OpenEXR.File(str(path), separate_channels=True, header_only=header_only))
+        return what(OpenEXR.File(str(path), separate_channels=True, header_only=header_only))
     except (RuntimeError, ValueError, OSError, LookupError, TypeError, MemoryError) as error:
         raise DiffractionError(
             f"cannot read '{path}' as EXR: it is empty, cut short or no EXR file; "

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.analysis.bench import colours, plan, scaling
+from mitsuba_diffraction.analysis.bench import colours, plan
 from mitsuba_diffraction.analysis.bench.figures import Goal, Row, Section
 from mitsuba_diffraction.analysis.bench.plan import Plan
 from mitsuba_diffraction.analysis.bench.timing import ratio, rounds_of
@@ -26,7 +26,6 @@ TINY = Plan(
     spp=1,
     reference_spp=2,
     map_resolution=8,
-    sides=(48,),
 )
 SCENES = Path(__file__).parents[2] / "scenes"
 
@@ -34,7 +33,6 @@ SCENES = Path(__file__).parents[2] / "scenes"
 @pytest.fixture(autouse=True)
 def tiny(monkeypatch):
     monkeypatch.setattr(plan, "QUICK", TINY)
-    monkeypatch.setattr(scaling, "TERMS", (4,))
     monkeypatch.setattr(colours, "MATERIALS", {"none": colours.MATERIALS["none"]})
 
 
@@ -47,13 +45,10 @@ def test_everything_is_measured_and_written(run, tmp_path):
         "eval",
         "sample",
         "pdf",
-        "render",
         "snake",
         "noise",
         "efficiency",
         "colours",
-        "scaling",
-        "pictures",
     )
     for part in ("processor", "llvm 1", "gathers", *(f"{part}:" for part in parts)):
         assert part in ran.out

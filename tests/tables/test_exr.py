@@ -122,11 +122,10 @@ def test_what_is_no_exr(tmp_path, content):
 
 
 @pytest.mark.parametrize("share", [0.01, 0.3, 0.6, 0.9, 0.999])
-def test_a_truncated_table(saved, share, capfd):
+def test_a_truncated_table(saved, share):
     content = saved.read_bytes()
     saved.write_bytes(content[: int(share * len(content))])
     refused(saved)
-    assert capfd.readouterr() == ("", "")  # nor does OpenEXR print anything beside our line
 
 
 def test_an_image_that_is_no_table(tmp_path):

@@ -28,10 +28,10 @@ from mitsuba_diffraction.thesis.evaluation import (
     Fit,
     Response,
     Ridge,
-    documents_fit,
     fit_period,
     measure,
     ridge_of,
+    thesis_fit,
     window_fits,
 )
 from mitsuba_diffraction.thesis.evaluation.plot import draw
@@ -111,7 +111,7 @@ def evaluate_patch(
     few = wavelengths[:: max(1, wavelengths.size // 20)]
     found = window_fits(single.table, beam, few, angles, count=windows)
     try:
-        thesis = documents_fit(single.table, beam, wavelengths, angles).period
+        thesis = thesis_fit(single.table, beam, wavelengths, angles).period
     except DiffractionError:
         thesis = float("nan")
     return Periods(

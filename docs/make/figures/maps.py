@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from mitsuba_diffraction.analysis.maps import Light, brdf_map, draw
@@ -56,7 +55,6 @@ def maps_figure(
     side = 1.02 * resolution / _DPI
     rows, columns = len(lights), len(fields)
     figure = Figure(figsize=((side + 0.25) * columns + 0.45, (side + 0.45) * rows + 0.45))
-    FigureCanvasAgg(figure)
     width, height = figure.get_size_inches()
     for column, field in enumerate(fields):
         bsdf = _perfect_reflector(field)

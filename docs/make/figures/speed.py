@@ -56,7 +56,7 @@ FIGURES = (
     Figure("eval", "principled, metal", "`principled` / `roughconductor`", _ROUGH, "{:.1f}"),
     Figure("eval", "measured", "`measured` / `roughconductor`", _ROUGH, "{:.0f}"),
     Figure("eval", _DEFAULT, "`eval` / bare gathers of its memory", "× gathers", "{:.2f}", 1),
-    Figure("eval", "documents", "the thesis' look-up / `eval`", "× defaults", "{:.0f}", 0),
+    Figure("eval", "thesis", "the thesis' look-up / `eval`", "× defaults", "{:.0f}", 0),
     Figure("sample", _DEFAULT, "`sample` / `roughconductor` (Al)", _ROUGH, "{:.1f}"),
     Figure("snake", "the skin", "the snake's scene / with `roughconductor`", _ROUGH, "{:.1f}", 0),
     Figure("noise", "0°", "noise of one sample, light from 0°", "most", "{:.2f}", 0),

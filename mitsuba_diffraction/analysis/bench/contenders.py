@@ -17,13 +17,13 @@ from ...progress import Progress
 from ...tables.table import DiffractionTable
 from .measured_file import write_measured
 from .plan import PIXEL, SEED, Plan
-from .saved import documents_bsdf, saved_bsdf
+from .saved import saved_bsdf, thesis_bsdf
 
 ALUMINIUM = "roughconductor, Al"
 DEFAULT = "diffraction, the defaults"
 DEFAULT_AL = "diffraction, Al"
 COARSE = "diffraction, tolerance 1e-2"
-DOCUMENTS = "documents: Taylor, 37 terms, 3×3, an image a term"
+THESIS = "thesis: Taylor, 37 terms, 3×3, an image a term"
 TAYLOR = "the same series, all terms of a bin together"
 
 
@@ -57,10 +57,8 @@ def build_tables(
     settings: dict[str, dict[str, Any]] = {
         "default": {},
         "1e-2": {"tolerance": 1e-2},
-        "1e-4": {"tolerance": 1e-4},
-        "patch": {"coherence": "patch"},
         # no tolerance could be met by this
-        "documents": {
+        "thesis": {
             "coherence": "patch", "basis": "taylor", "terms": 37, "taps": 3, "tolerance": 0.999,
         },
     }  # fmt: skip
@@ -74,11 +72,8 @@ def build_tables(
     return tables
 
 
-def bsdf_makers(tables: Tables) -> dict[str, Callable[[], Any]]:
+def bsdf_factories(tables: Tables) -> dict[str, Callable[[], Any]]:
     """Functions that make the contenders, by name, in the current variant."""
-
-    def rough(material: str) -> Callable[[], Any]:
-        return lambda: mi.load_dict({"type": "roughconductor", "material": material})
 
     def ours(table: str, **parameters: Any) -> Callable[[], Any]:
         return lambda: tables.bsdf(table, **parameters)
@@ -90,29 +85,22 @@ def bsdf_makers(tables: Tables) -> dict[str, Callable[[], Any]]:
         return mi.load_dict({"type": "measured", "filename": str(file)})
 
     return {
-        ALUMINIUM: rough("Al"),
-        "roughconductor, none": rough("none"),
+        ALUMINIUM: lambda: mi.load_dict({"type": "roughconductor", "material": "Al"}),
         "principled, metal": lambda: mi.load_dict(
             {"type": "principled", "metallic": 1.0, "roughness": 0.3}
-        ),
-        "principled, metal beneath a coat": lambda: mi.load_dict(
-            {"type": "principled", "metallic": 1.0, "roughness": 0.3, "clearcoat": 1.0}
         ),
         "measured": measured,
         DEFAULT: ours("default"),
         DEFAULT_AL: ours("default", material="Al"),
-        "diffraction, none": ours("default", material="none"),
         COARSE: ours("1e-2"),
-        "diffraction, tolerance 1e-4": ours("1e-4"),
-        "diffraction, patch": ours("patch"),
-        DOCUMENTS: lambda: documents_bsdf(tables.paths["documents"]),
-        TAYLOR: ours("documents"),
+        THESIS: lambda: thesis_bsdf(tables.paths["thesis"]),
+        TAYLOR: ours("thesis"),
     }
 
 
 def is_slow(name: str) -> bool:
     """Whether fewer calls do, for the sake of the user's time."""
-    return name in (DOCUMENTS, TAYLOR)
+    return name in (THESIS, TAYLOR)
 
 
 @dataclass(frozen=True)

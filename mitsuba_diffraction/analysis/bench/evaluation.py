@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 import statistics
-import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import mitsuba as mi
-import numpy as np
 
-from ... import reference
-from ...heights.field import HeightField
 from ...progress import Progress
 from .contenders import (
     ALUMINIUM,
     COARSE,
     DEFAULT,
     DEFAULT_AL,
-    DOCUMENTS,
+    THESIS,
     Queries,
     Tables,
     bare_gathers,
-    bsdf_makers,
+    bsdf_factories,
     is_slow,
 )
 from .figures import Goal, Row, Section
@@ -31,7 +27,6 @@ from .plan import Plan
 from .timing import kernel_seconds, ratio, rounds_of
 
 FLOOR = "bare gathers of the defaults"
-DIRECT = "a Fourier sum over all pixels for each direction (NumPy)"
 _TIMES = "ns/call"
 _BASELINES = {"× roughconductor": ALUMINIUM, "× defaults": DEFAULT, "× gathers": FLOOR}
 
@@ -42,7 +37,7 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
     context = mi.BSDFContext()
     calls: dict[str, Callable[[], Any]] = {}
     lanes: dict[str, int] = {}
-    for name, make in bsdf_makers(tables).items():
+    for name, make in bsdf_factories(tables).items():
         bsdf = make()
         asked = queries[is_slow(name)]
         lanes[name] = len(asked.sample1)
@@ -51,40 +46,25 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
             calls[FLOOR] = bare_gathers(bsdf.table, queries[False])
             lanes[FLOOR] = lanes[name]
     times = _nanoseconds(plan, calls, lanes, "eval", progress)
-    lanes[DIRECT] = 1
-    times[DIRECT] = _direct(tables.heights, plan.rounds)
     to_rough = ratio(times[DEFAULT], times[ALUMINIUM])
-    to_documents = ratio(times[DOCUMENTS], times[DEFAULT])
+    to_thesis = ratio(times[THESIS], times[DEFAULT])
     goals = {
         DEFAULT: [
             Goal("at most 4× roughconductor", to_rough <= 4.0),
             Goal("within 1.5× of bare gathers", ratio(times[DEFAULT], times[FLOOR]) <= 1.5),
         ],
         COARSE: [Goal("at most 3× roughconductor", ratio(times[COARSE], times[ALUMINIUM]) <= 3.0)],
-        DOCUMENTS: [Goal("at least 30× the defaults", to_documents >= 30.0)],
+        THESIS: [Goal("at least 30× the defaults", to_thesis >= 30.0)],
     }
     return _section(f"eval: {_conditions(plan, tables)}", times, lanes, goals)
-
-
-def _direct(heights: HeightField, rounds: int) -> list[float]:
-    """Nanoseconds of four wavelengths at one pair of directions, by `reference`."""
-    wi = np.array([[0.3, 0.1, np.sqrt(0.9)]] * 4)
-    wo = np.array([[-0.2, 0.4, np.sqrt(0.8)]] * 4)
-    wavelengths = np.array([420.0, 520.0, 620.0, 720.0])
-    taken = []
-    for _ in range(rounds):
-        start = time.perf_counter()
-        reference.brdf(heights, wi, wo, wavelengths)
-        taken.append(1e9 * (time.perf_counter() - start))
-    return taken
 
 
 def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Section]:
     """Nanoseconds for `sample` and for `pdf`, of the contenders that differ in them."""
     queries = _queries(plan, False)
     context = mi.BSDFContext()
-    makers = bsdf_makers(tables)
-    chosen = {name: makers[name]() for name in (ALUMINIUM, DEFAULT, DEFAULT_AL)}
+    factories = bsdf_factories(tables)
+    chosen = {name: factories[name]() for name in (ALUMINIUM, DEFAULT, DEFAULT_AL)}
     lanes = dict.fromkeys(chosen, plan.lanes)
     sections = []
     for what in ("sample", "pdf"):

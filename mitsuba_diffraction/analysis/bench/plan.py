@@ -20,12 +20,11 @@ class Plan:
     more_pixels : sides of further patches whose tables are built, with the same size of pixels.
     other_tables : build `patch` and Taylor tables too.
     lanes : calls at once.
-    slow_lanes : likewise, for the documents' configuration.
+    slow_lanes : likewise, for the thesis' configuration.
     rounds : timed calls of each contender.
     resolution, spp : of the rendered pictures.
     reference_spp : of pictures that are to have converged.
     map_resolution : directions of view along each axis, to compare colours at.
-    sides : of patches, in pixels, that the cost of `eval` is followed over.
     """
 
     pixels: int = 1332
@@ -38,7 +37,6 @@ class Plan:
     spp: int = 16
     reference_spp: int = 2048
     map_resolution: int = 256
-    sides: tuple[int, ...] = (333, 666, 1332, 2664)
 
 
 FULL = Plan()
@@ -52,5 +50,4 @@ QUICK = Plan(
     spp=4,
     reference_spp=256,
     map_resolution=96,
-    sides=(333, 666),
 )

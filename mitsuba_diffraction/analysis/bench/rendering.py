@@ -1,4 +1,4 @@
-"""Whole pictures: the same scenes with diffraction and with `roughconductor`."""
+"""Whole pictures: the snake with a skin that diffracts, and with one of `roughconductor`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ...progress import Progress
-from .contenders import ALUMINIUM, DEFAULT, DEFAULT_AL, Tables, bsdf_makers
+from .contenders import Tables
 from .figures import Goal, Row, Section
 from .plan import Plan
 from .scenes import share_of, skin_of, snake_scene
@@ -20,25 +20,6 @@ from .timing import ratio, rounds_of
 
 _COLUMNS = ("ms", "ns/sample", "× roughconductor")
 _SKIN, _ROUGH = "the skin diffracts, pigment beneath", "the skin is roughconductor, Al"
-
-
-def measure_rendering(plan: Plan, tables: Tables, progress: Progress) -> Section:
-    """Time to render a ball under a lamp and a sky, most of the picture, with each BSDF."""
-    makers = bsdf_makers(tables)
-    scenes = {name: ball_scene(plan, makers[name]()) for name in (ALUMINIUM, DEFAULT, DEFAULT_AL)}
-    calls = {name: partial(render_seconds, scene, plan) for name, scene in scenes.items()}
-    seconds = rounds_of(calls, plan.rounds, lambda done, total: progress(done, total, "render"))
-    rows = []
-    for name, taken in seconds.items():
-        median = statistics.median(taken)
-        each = 1e9 * median / (plan.resolution**2 * plan.spp)
-        values = (1e3 * median, each, ratio(taken, seconds[ALUMINIUM]))
-        rows.append(Row(name, dict(zip(_COLUMNS, values, strict=True)), raw={"seconds": taken}))
-    title = (
-        f"render: {mi.variant()}, a ball under a lamp and an even sky, {plan.resolution}² pixels, "
-        f"{plan.spp} samples per pixel, path integrator; medians of {plan.rounds} rounds"
-    )
-    return Section(title, _COLUMNS, rows)
 
 
 def measure_snake(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> Section:
@@ -73,37 +54,3 @@ def render_seconds(scene: Any, plan: Plan) -> float:
     dr.eval(mi.render(scene, spp=plan.spp))
     dr.sync_thread()
     return time.perf_counter() - start
-
-
-def ball_scene(plan: Plan, bsdf: Any) -> Any:
-    """A ball under a lamp and an even sky."""
-    look = mi.ScalarTransform4f().look_at(origin=[0, -4, 0], target=[0, 0, 0], up=[0, 0, 1])
-    lamp = mi.ScalarTransform4f().look_at(origin=[2, -3, 3], target=[0, 0, 0], up=[0, 0, 1])
-    return mi.load_dict(
-        {
-            "type": "scene",
-            "integrator": {"type": "path", "max_depth": 5},
-            "sensor": {
-                "type": "perspective",
-                "fov": 30,
-                "to_world": look,
-                "film": {
-                    "type": "hdrfilm",
-                    "width": plan.resolution,
-                    "height": plan.resolution,
-                    "rfilter": {"type": "box"},
-                },
-                "sampler": {"type": "independent"},
-            },
-            "ball": {"type": "sphere", "bsdf": bsdf},
-            "lamp": {
-                "type": "rectangle",
-                "to_world": lamp @ mi.ScalarTransform4f().scale(0.2),
-                "emitter": {
-                    "type": "area",
-                    "radiance": {"type": "d65", "scale": 20.0},
-                },
-            },
-            "sky": {"type": "constant", "radiance": {"type": "d65", "scale": 0.5}},
-        }
-    )

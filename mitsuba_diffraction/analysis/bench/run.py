@@ -42,8 +42,7 @@ def sections(
     from .colours import measure_colours
     from .contenders import build_tables
     from .evaluation import measure_eval, measure_sampling
-    from .rendering import measure_rendering, measure_snake
-    from .scaling import measure_lookups, measure_pictures
+    from .rendering import measure_snake
     from .variance import measure_efficiency, measure_noise
 
     tables = build_tables(plan, folder, progress, patch)
@@ -55,8 +54,6 @@ def sections(
             yield measure_eval(plan, tables, progress)
         if "sample" in parts:
             yield from measure_sampling(plan, tables, progress)
-        if "render" in parts:
-            yield measure_rendering(plan, tables, progress)
         if "snake" in parts:
             yield measure_snake(plan, tables, scenes, progress)
         if "noise" in parts:
@@ -65,7 +62,3 @@ def sections(
             yield measure_efficiency(plan, tables, scenes, progress)
         if "colours" in parts:
             yield from measure_colours(plan, tables, scenes, backend, progress)
-        if "scaling" in parts:
-            set_variant(f"{backend}_ad_spectral")
-            yield measure_lookups(plan, folder, progress)
-            yield measure_pictures(plan, tables, progress)

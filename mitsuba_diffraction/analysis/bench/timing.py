@@ -26,7 +26,7 @@ def rounds_of(
 ) -> dict[str, list[float]]:
     """Seconds of every call in every round; each round goes through all of them in turn.
 
-    So whatever else the machine does hits all alike, and ratios within a round can be trusted.
+    So background load affects all candidates alike, and ratios within a round can be trusted.
     """
     seconds: dict[str, list[float]] = {name: [] for name in calls}
     for n in range(WARM_UP + rounds):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from .picture import LEGEND, draw, signed
@@ -37,7 +36,6 @@ def contact_sheet(
     side = max(1.02 * max(m.resolution for m in maps) / _DPI, _SMALLEST_SIDE)
     width, height = (side + 0.2) * columns + 0.6, (side + 0.55) * rows + 0.8
     figure = Figure(figsize=(width, height), dpi=_DPI, facecolor="white")
-    FigureCanvasAgg(figure)
     for n, (one, name) in enumerate(zip(maps, titles, strict=True)):
         row, column = divmod(n, columns)
         left, bottom = 0.6 + (side + 0.2) * column, 0.65 + (side + 0.55) * (rows - 1 - row)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 from numpy.typing import NDArray
@@ -36,7 +35,6 @@ def albedo_figure(table: DiffractionTable) -> Figure:
         [[model.albedo(angle, azimuths, w) for angle in np.radians(theta)] for w in wavelengths]
     )
     figure = Figure(figsize=(12, 5.2), layout="constrained")
-    FigureCanvasAgg(figure)
     name = table.source.get("name", "table")
     figure.suptitle(f"{name}: raw directional albedo, R = 1")
     _curves(figure.add_subplot(1, 2, 1), theta, albedo[:, :, : len(AZIMUTHS)], wavelengths)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ...heights.field import HeightField
@@ -33,7 +32,6 @@ def patches_figure(fields: Sequence[HeightField]) -> Figure:
     normal at 450, 550 and 650 nm, shown as blue, green and red (not colorimetric), logarithmic.
     """
     figure = Figure(figsize=(19, 3.7 * len(fields)), layout="constrained")
-    FigureCanvasAgg(figure)
     panels = figure.subplots(len(fields), 5, squeeze=False, width_ratios=[1.12, 1.12, 1, 1.15, 1])
     for row, field in zip(panels, fields, strict=True):
         others = fields[:1] if field is not fields[0] else []

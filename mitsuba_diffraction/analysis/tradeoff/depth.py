@@ -12,7 +12,7 @@ from ...heights.field import HeightField
 from ...progress import Progress, silent
 from ...tables.table import DiffractionTable, q_limit_of
 
-#: Terms of the source documents' shaders.
+#: Terms of the thesis' shaders.
 TERMS = 37
 #: Normal incidence and return at 380 nm: the largest κ of the visible.
 KAPPA = q_limit_of((380.0, 780.0))
@@ -78,7 +78,7 @@ def taylor_error(heights: NDArray[np.float64], kappa: float, terms: int) -> floa
     ----------
     heights : (ny, nx) µm.
     kappa : rad/µm.
-    terms : n = 0 … terms − 1, as the source documents count them.
+    terms : n = 0 … terms − 1, as the thesis counts them.
     """
     exact = np.abs(np.fft.ifft2(np.exp(1j * kappa * heights))) ** 2
     total = np.zeros(heights.shape, np.complex64)

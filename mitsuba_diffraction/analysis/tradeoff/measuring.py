@@ -180,10 +180,8 @@ def _with_times(one: Measured, taken: dict[str, list[float]], lanes: int) -> Mea
 def rows(results: Sequence[Measured]) -> Iterator[dict[str, Any]]:
     """Plain data, one flat record a setting."""
     for one in results:
-        record: dict[str, Any] = {"group": one.setting.group, "setting": one.setting.name}
-        record |= {"arguments": one.setting.arguments, "usable": one.setting.usable}
-        names = (
-            "refused", "error", "error_single", "delta_e", "delta_e_99", "nanoseconds",
-            "relative", "taps", "terms", "intervals", "precision", "megabytes", "seconds",
-        )  # fmt: skip
-        yield record | {name: getattr(one, name) for name in names}
+        setting = one.setting
+        names = {"group": setting.group, "setting": setting.name}
+        arguments = {"arguments": setting.arguments, "usable": setting.usable}
+        measured = {name: value for name, value in vars(one).items() if name != "setting"}
+        yield names | arguments | measured

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ...atomic import atomic_path
@@ -20,7 +19,6 @@ def draw_trade(results: Sequence[Measured], path: Path, title: str) -> None:
     """Error against time, the area of a mark for its memory, and the best of all at each error."""
     shown = [one for one in results if not one.refused and one.setting.group != "coherence"]
     figure = Figure(figsize=(7.6, 5.0), layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     groups = list(dict.fromkeys(one.setting.group for one in shown))
     for n, group in enumerate(groups):
@@ -59,7 +57,6 @@ def draw_trade(results: Sequence[Measured], path: Path, title: str) -> None:
 def draw_depths(depths: Depths, path: Path) -> None:
     """Where Taylor's series breaks down, beside those that do not."""
     figure = Figure(figsize=(7.6, 4.2), layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     for n, (name, errors) in enumerate(depths.errors.items()):
         axes.plot(

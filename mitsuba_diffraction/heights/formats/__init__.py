@@ -7,5 +7,4 @@ arrays   NPY
 text     grids of numbers
 afm      instrument files (extra `afm`)
 raw      what a reader takes out of a file
-native   what native libraries print
 """

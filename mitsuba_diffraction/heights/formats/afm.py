@@ -188,22 +188,24 @@ def _is_height(channel: Any) -> bool:
     )
 
 
+def _check_map(source: Any, what: str) -> None:
+    """Refuse a channel or topography that is no map on a uniform grid."""
+    if source.dim == 1:
+        raise DiffractionError(f"{what} is a line scan; a height field needs a map (ny, nx)")
+    if source.is_uniform is False:
+        raise DiffractionError(f"{what} is not on a uniform grid; interpolate it to one first")
+
+
 def _read_channel(reader: Any, channel: Any, shown: str) -> RawHeights:
     what = f"{shown}, channel {channel.name!r}"
-    if channel.dim == 1:
-        raise DiffractionError(f"{what} is a line scan; a height field needs a map (ny, nx)")
-    if channel.is_uniform is False:
-        raise DiffractionError(f"{what} is not on a uniform grid; interpolate it to one first")
+    _check_map(channel, what)
     sized = channel.physical_sizes is not None
     if channel.nb_grid_pts is not None:
         nx, ny = channel.nb_grid_pts
         check_pixel_count(ny, nx, what)
     options = {} if sized else {"physical_sizes": (1.0, 1.0)}
     topography = reader.topography(channel_index=channel.index, **options)
-    if topography.dim != 2:
-        raise DiffractionError(f"{what} is a line scan; a height field needs a map (ny, nx)")
-    if not topography.is_uniform:
-        raise DiffractionError(f"{what} is not on a uniform grid; interpolate it to one first")
+    _check_map(topography, what)  # some readers know only now
     lateral, height = _units(channel)
     if lateral is None and height is None:
         raise _unknown_units(shown)

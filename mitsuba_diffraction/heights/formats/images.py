@@ -6,6 +6,7 @@ import struct
 import warnings
 import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,6 @@ from PIL import Image, UnidentifiedImageError
 
 from ...errors import DiffractionError
 from ..field import check_pixel_count
-from .native import Messages, native_messages
 from .raw import RawHeights, first_line
 
 # Full scale of Pillow's integer modes, and how people call the colour ones.
@@ -50,9 +50,8 @@ def read_image(path: Path) -> RawHeights:
         If the file is not such an image, is damaged, has colours or several pages.
     """
     shown = repr(str(path))
-    printed = Messages()
     try:
-        with warnings.catch_warnings(), native_messages() as printed:
+        with warnings.catch_warnings():
             # The size is checked below, against a limit of our own and before anything is decoded.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             warnings.simplefilter("ignore", UserWarning)  # damaged TIFF tags: decoding decides
@@ -67,8 +66,7 @@ def read_image(path: Path) -> RawHeights:
     except Image.DecompressionBombError as error:
         raise DiffractionError(f"{shown} is too large: {first_line(error)}") from error
     except _DAMAGED as error:
-        reason = printed.last_reason() or first_line(error)
-        raise DiffractionError(f"{shown} is damaged or incomplete: {reason}") from error
+        raise DiffractionError(f"{shown} is damaged or incomplete: {first_line(error)}") from error
 
 
 def is_park_tiff(path: Path) -> bool:
@@ -129,33 +127,45 @@ def _grey_levels(image: Image.Image, shown: str) -> npt.NDArray[np.uint8]:
 def read_exr(path: Path, channel: str | None = None) -> RawHeights:
     """Read an EXR with one channel of heights in µm; the top row is the largest y.
 
-    `channel` names the channel to take where there are several.
+    `channel` names the channel to take where there are several. OpenEXR decodes the whole file for
+    it, so files of several parts are refused, and so is what would take too much memory.
 
     Raises
     ------
     DiffractionError
-        If it is not an EXR, is damaged, has no pixels or several channels and no choice.
+        If it is not an EXR, is damaged, has no pixels, several parts, or several channels and no
+        choice.
     """
     shown = repr(str(path))
-    printed = Messages()
     try:
-        with native_messages() as printed:
-            header = OpenEXR.File(str(path), header_only=True).header()
-            low, high = header["dataWindow"]
-            check_pixel_count(int(high[1] - low[1] + 1), int(high[0] - low[0] + 1), shown)
-            names = [str(entry.name) for entry in header["channels"]]
-            chosen = _choose_channel(names, channel, shown)
-            with OpenEXR.File(str(path), separate_channels=True) as file:
-                pixels = file.channels()[chosen].pixels
+        header = _only_header(path, shown)
+        low, high = header["dataWindow"]
+        names = [str(entry.name) for entry in header["channels"]]
+        height, width = int(high[1] - low[1] + 1), int(high[0] - low[0] + 1)
+        check_pixel_count(height, width, shown)
+        check_pixel_count(height * len(names), width, f"{shown}, {len(names)} channels")
+        chosen = _choose_channel(names, channel, shown)
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            pixels = file.channels()[chosen].pixels
     except DiffractionError:
         raise
     # OpenEXR raises plain RuntimeError and ValueError; the others come of headers that lie
     except (RuntimeError, ValueError, OSError, KeyError, IndexError, TypeError, MemoryError) as e:
-        reason = printed.last_reason() or first_line(e)
-        raise DiffractionError(f"{shown} is not a readable EXR image: {reason}") from e
+        raise DiffractionError(f"{shown} is not a readable EXR image: {first_line(e)}") from e
     if pixels is None or pixels.ndim != 2:
         raise DiffractionError(f"{shown}: channel {chosen!r} has no two-dimensional pixels")
     return RawHeights(np.asarray(pixels, dtype=np.float64)[::-1])
+
+
+def _only_header(path: Path, shown: str) -> dict[str, Any]:
+    """Header of the only part."""
+    file = OpenEXR.File(str(path), header_only=True)
+    if len(file.parts) > 1:
+        raise DiffractionError(
+            f"{shown} has {len(file.parts)} parts; save the one with the heights alone"
+        )
+    header: dict[str, Any] = file.header()
+    return header
 
 
 def _choose_channel(names: list[str], channel: str | None, shown: str) -> str:

@@ -48,6 +48,8 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
         file = Path(path)
         if file.is_dir():
             raise DiffractionError(f"{shown} is a folder, not a height field; name a file in it")
+        if file.exists() and not file.is_file():  # opening a pipe would wait for its writer
+            raise DiffractionError(f"{shown} is a pipe or a device; write what it gives to a file")
         with file.open("rb") as stream:
             first = stream.read(1)
     except DiffractionError:

@@ -1,11 +1,12 @@
 """Treatments of heights before a table is made of them.
 
+Each takes a `HeightField` and gives a new one, with a line in its `history` that says what changed.
+
 Contents
 --------
-cropping    the middle of a patch
+cropping    the central region of a patch
 missing     points without data, filled
 levelling   tilt, scan lines and outliers
 periodic    opposite edges made to meet
 edges       how far they are from meeting
-treatment   what a treatment reports
 """

@@ -1,10 +1,9 @@
-"""The middle of a patch: less than was measured, where that is more than light can tell."""
+"""Cropping to a central region: less than was measured."""
 
 from __future__ import annotations
 
 from ...errors import DiffractionError
 from ..field import HeightField
-from .treatment import Change
 
 Size = tuple[float, float]
 
@@ -49,10 +48,8 @@ def crop_line(before: tuple[int, int], after: tuple[int, int], pixel_size: Size)
     )
 
 
-def crop(field: HeightField, size: Size) -> tuple[HeightField, Change]:
-    """The middle of a patch, `size` = (width, height) in µm; its edges need not meet any more.
-
-    Figures: `width` and `height`, µm.
+def crop(field: HeightField, size: Size) -> HeightField:
+    """The central region of `size` = (width, height) in µm; its edges need not meet any more.
 
     Raises
     ------
@@ -62,10 +59,6 @@ def crop(field: HeightField, size: Size) -> tuple[HeightField, Change]:
     rows, columns = middle(field.shape, field.pixel_size, size, field.name)
     heights = field.heights[rows, columns]
     if heights.shape == field.shape:
-        return field, Change("", 0.0)
+        return field
     line = crop_line(field.shape, (heights.shape[0], heights.shape[1]), field.pixel_size)
-    cropped = HeightField(
-        heights, field.pixel_size, name=field.name, history=(*field.history, line), cut_out=True
-    )
-    width, height = cropped.extent
-    return cropped, Change(line, 0.0, {"width": width, "height": height})
+    return field.changed(heights, line, cut_out=True)

@@ -63,7 +63,7 @@ def edge_lines(field: HeightField, shortest: float) -> list[str]:
     """
     if field.range == 0:
         return []
-    level, _ = level_plane(field)
+    level = level_plane(field)
     if level.rms_height < FACET * field.rms_height:
         return []
     lines = []

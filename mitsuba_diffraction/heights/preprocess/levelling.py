@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from ...errors import DiffractionError
 from ..field import HeightField
-from .treatment import Change, changed
 
 # Makes the median absolute deviation of normally distributed heights their standard deviation:
 # 1/Φ⁻¹(3/4) (Hampel, Journal of the American Statistical Association 69, 1974).
@@ -30,42 +29,34 @@ def plane_of(field: HeightField) -> tuple[float, float]:
     return slope_x, slope_y
 
 
-def level_plane(field: HeightField) -> tuple[HeightField, Change]:
-    """Subtract the least-squares plane; the mean height stays.
-
-    Figures: `tilt_x`, `tilt_y`, how much the plane rises across the patch, µm.
-    """
+def level_plane(field: HeightField) -> HeightField:
+    """Subtract the least-squares plane; the mean height stays."""
     heights, tilt_x, tilt_y = _without_plane(field)
     what = f"plane removed: it rose {tilt_x:.3g} µm along x and {tilt_y:.3g} µm along y"
-    return changed(field, heights, what, tilt_x=tilt_x, tilt_y=tilt_y)
+    return field.changed(heights, what + rms_change(field, heights))
 
 
-def level_lines(field: HeightField) -> tuple[HeightField, Change]:
+def level_lines(field: HeightField) -> HeightField:
     """Subtract each row's median (scan lines run along x), then the plane that is left.
 
     What is alike along a whole row is lost with the offsets: ridges parallel to x, above all.
-    Figures: `line_rms`, the standard deviation of the offsets, and the plane's `tilt_x`, `tilt_y`,
-    all in µm.
     """
     medians = np.median(field.heights, axis=1)
     aligned = HeightField(
         field.heights - (medians - medians.mean())[:, None], field.pixel_size, name=field.name
     )
     heights, tilt_x, tilt_y = _without_plane(aligned)
-    line_rms = float(medians.std())
     what = (
-        f"scan lines aligned by their medians, which scattered by {line_rms:.3g} µm RMS, and the "
-        f"plane removed, which rose {tilt_x:.3g} µm along x and {tilt_y:.3g} µm along y"
+        f"scan lines aligned by their medians, which scattered by {medians.std():.3g} µm RMS, and "
+        f"the plane removed, which rose {tilt_x:.3g} µm along x and {tilt_y:.3g} µm along y"
     )
-    return changed(field, heights, what, line_rms=line_rms, tilt_x=tilt_x, tilt_y=tilt_y)
+    return field.changed(heights, what + rms_change(field, heights))
 
 
-def clip_outliers(field: HeightField, sigmas: float) -> tuple[HeightField, Change]:
+def clip_outliers(field: HeightField, sigmas: float) -> HeightField:
     """Cut off heights further than `sigmas` robust standard deviations from the median.
 
     The deviation is 1.4826 times the median absolute deviation, which dust does not move.
-    Figures: `points` clipped, the limits `low` and `high`, and `largest`, the most that one point
-    moved, µm.
 
     Raises
     ------
@@ -84,17 +75,22 @@ def clip_outliers(field: HeightField, sigmas: float) -> tuple[HeightField, Chang
             f"{field.name}: clip cannot tell outliers, as more than half of the heights are equal; "
             "leave clip out"
         )
-    low, high = middle - sigmas * sigma, middle + sigmas * sigma
-    heights = np.clip(field.heights, low, high)
+    heights = np.clip(field.heights, middle - sigmas * sigma, middle + sigmas * sigma)
     moved = np.abs(heights - field.heights)
-    points, largest = int(np.count_nonzero(moved)), float(moved.max())
+    points = np.count_nonzero(moved)
     limit = f"{sigmas:g} robust standard deviations of {sigma:.3g} µm"
     what = (
-        f"{points} of {heights.size} points clipped to {limit}, the furthest by {largest:.3g} µm"
+        f"{points} of {heights.size} points clipped to {limit}, "
+        f"the furthest by {moved.max():.3g} µm"
         if points
         else f"nothing to clip: all points are within {limit}"
     )
-    return changed(field, heights, what, points=points, low=low, high=high, largest=largest)
+    return field.changed(heights, what + rms_change(field, heights))
+
+
+def rms_change(field: HeightField, heights: npt.NDArray[np.float64]) -> str:
+    """The end of a history line: RMS change of height, not counting an offset."""
+    return f"; RMS change {(heights - field.heights).std():.3g} µm"
 
 
 def _without_plane(field: HeightField) -> tuple[npt.NDArray[np.float64], float, float]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import DiffractionError, DiffractionWarning
 from ...heights.field import HeightField
-from ...heights.validity import units_question
+from ...heights.validity import units_warning
 from ...optics.geometry import sigma_of
 from ...progress import Progress, silent
 from ...settings import MAX_TAPS, TableSettings, checked
@@ -154,7 +154,7 @@ def build_with(
     try:
         return _built(_Wanted(patches, settings), progress or silent)
     except DiffractionError as error:
-        questions = [question for patch in patches if (question := units_question(patch))]
+        questions = [question for patch in patches if (question := units_warning(patch))]
         if not questions:
             raise
         raise DiffractionError(f"{error}; or {questions[0]}") from error

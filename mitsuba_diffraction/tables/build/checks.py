@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...heights.field import HeightField
-from ...heights.validity import units_question
+from ...heights.validity import units_warning
 from ...settings import TableSettings
 from ..document import MAX_BYTES
 from ..expansion import Expansion
@@ -47,7 +47,7 @@ def check_units(patches: Sequence[HeightField]) -> None:
         if patch.rms_slope > HOPELESS_SLOPE and patch.range > HOPELESS_RANGE:
             raise build_error(
                 f"'{patch.name}' has an RMS slope of {patch.rms_slope:.3g}, as no surface has: "
-                f"{units_question(patch)}"
+                f"{units_warning(patch)}"
             )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...heights.field import HeightField
-from ...heights.validity import window_line
+from ...heights.validity import window_warning
 from ...optics.geometry import wavenumber
 from ...settings import TableSettings
 from .spectrum import Spectrum
@@ -27,7 +27,7 @@ def describe(
     """
     first, coherence_width = patches[0], settings.coherence_width
     warnings = [line for patch in patches for line in patch.validity(settings.wavelength_range)]
-    small = window_line(first, coherence_width)
+    small = window_warning(first, coherence_width)
     if small:
         warnings.append(small)
     if taps[0] * taps[1] > _SLOW:

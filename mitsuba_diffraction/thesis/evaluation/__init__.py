@@ -10,15 +10,18 @@ ridge_of        the ridge of one order
 Fit             period of the grating equation that fits a ridge
 fit_period      that fit
 window_fits     the same for windows all over the patch
-documents_fit   the procedure behind the source documents' published periods
+thesis_fit      the procedure behind the thesis' published periods
 """
 
 from __future__ import annotations
 
 from .beam import Beam, Response, measure
-from .procedure import documents_fit
+from .procedure import thesis_fit
 from .ridge import Fit, Ridge, fit_period, ridge_of
 from .windows import window_fits
+
+#: The name that `thesis_fit` had before.
+documents_fit = thesis_fit
 
 __all__ = [
     "Beam",
@@ -29,5 +32,6 @@ __all__ = [
     "fit_period",
     "measure",
     "ridge_of",
+    "thesis_fit",
     "window_fits",
 ]

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...analysis.maps.light import Light
 from ...errors import DiffractionError
-from ...optics.geometry import check_angles
 from ...progress import Progress
 
 Array = NDArray[np.float64]
@@ -21,35 +21,15 @@ MOST_POINTS = 20_000_000
 
 
 @dataclass(frozen=True)
-class Beam:
-    """Direction of the light, and with it the plane of incidence.
-
-    Parameters
-    ----------
-    theta : degrees from the normal, 0 to below 90.
-    phi : azimuth of the light, degrees from the patch's x axis towards y.
-
-    Raises
-    ------
-    DiffractionError
-        If an angle is out of range.
-    """
+class Beam(Light):
+    """Direction of the light, and with it the plane of incidence; parameters as of `Light`."""
 
     theta: float = 75.0
-    phi: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_angles(self.theta, self.phi)
 
     @property
     def sine(self) -> float:
         """sinθi."""
         return math.sin(math.radians(self.theta))
-
-    @property
-    def direction(self) -> Array:
-        """ωi, unit vector (3,) towards the light."""
-        return self.views(np.array([self.theta]))[0]
 
     def views(self, angles: Array) -> Array:
         """ωo, (n, 3), for viewing angles in degrees, positive on the light's side of the normal."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
@@ -14,7 +13,7 @@ from .ridge import Fit, Ridge
 
 #: The picture spans this many powers of ten below its brightest point.
 DECADES = 5.0
-# The source documents' colours: yellow is bright, green is dark; ridge red, grating equation blue.
+# The thesis' colours: yellow is bright, green is dark; ridge red, grating equation blue.
 _MAP, _RIDGE, _GRATING = "viridis", "#e02020", "#3040ff"
 _DASHES = (0, (4, 3))
 
@@ -67,7 +66,6 @@ def figure(
 ) -> Figure:  # fmt: skip
     """One response with axes, units, both curves, and below them how far they are apart."""
     result = Figure(figsize=(7.4, 7.2), dpi=110, layout="constrained")
-    FigureCanvasAgg(result)
     upper, lower = result.subplots(2, 1, height_ratios=(4, 1), sharex=True)
     shown = draw(upper, response, ridge, period, order)
     result.colorbar(shown, ax=upper, label="angle-resolved scatter f·cos θₒ  [1/sr]")

@@ -1,8 +1,8 @@
-"""The procedure behind the source documents' published periods, so that they can be understood.
+"""The procedure behind the thesis' published periods, so that they can be understood.
 
 It differs from the model in three ways: the phase is exp(ikh) where it should be exp(ikwh), the
 window sits on the patch's first pixel, and what is followed is the brightest speckle of that one
-window. What is plotted is their relative reflectance. For an exact grating none of that matters.
+window. What is plotted is its relative reflectance. For an exact grating none of that matters.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from .ridge import Fit, fit_period, ridge_of
 from .windows import moved_window
 
 
-def documents_response(
+def thesis_response(
     table: DiffractionTable, beam: Beam, wavelengths: Array, angles: Array
 ) -> Response:
-    """Their response: C·S at κ = k, the window on the corner; in `values`, times cosθo.
+    """Its response: C·S at κ = k, the window on the corner; in `values`, times cosθo.
 
     Parameters
     ----------
@@ -34,16 +34,16 @@ def documents_response(
         u, v, _ = diffraction_coordinates(wi, wo)
         return gain.factor(wi, wo) * corner.window_sum(k * u, k * v, np.asarray(k))
 
-    label = "documents' procedure"
+    label = "thesis' procedure"
     return measure(relative, beam, wavelengths, angles, sigma=table.sigma, label=label)
 
 
-def documents_fit(
+def thesis_fit(
     table: DiffractionTable, beam: Beam, wavelengths: Array, angles: Array, order: int = 1
 ) -> Fit:
-    """The period that their procedure finds, at viewing angles across the normal from the light.
+    """The period that its procedure finds, at viewing angles across the normal from the light.
 
-    That is where they look; on the light's own side their response grows towards the horizon.
+    That is where it looks; on the light's own side its response grows towards the horizon.
     """
     across = angles[angles <= 0.0]
-    return fit_period(ridge_of(documents_response(table, beam, wavelengths, across), order))
+    return fit_period(ridge_of(thesis_response(table, beam, wavelengths, across), order))

@@ -72,7 +72,7 @@ def ridge_of(response: Response, order: int = 1) -> Ridge:
     """At each wavelength, where the patch sends most light on the side of that order.
 
     Order 0 is left out up to where its lobe ends, |u| = 5/(σk), and so is the other side of it: the
-    brightest point of what remains is taken, as in the source documents, between samples by a
+    brightest point of what remains is taken, as in the thesis, between samples by a
     parabola through the logarithms of three neighbours, which is exact for a Gaussian lobe. A
     maximum at the end of the range is none.
 

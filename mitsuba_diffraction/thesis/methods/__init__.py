@@ -1,6 +1,6 @@
-"""Ways to spend the wavelength loop: those of the source documents beside the package's own.
+"""Ways to spend the wavelength loop: those of the thesis beside the package's own.
 
-One interface (`Method`): `brdf` in 1/sr at single wavelengths, `relative` as the documents define
+One interface (`Method`): `brdf` in 1/sr at single wavelengths, `relative` as the thesis defines
 reflectance, `xyz` and `linear_srgb` under D65, all for arrays of direction pairs (NumPy only).
 
 Contents
@@ -13,7 +13,7 @@ FullSpectrum       default and flss: uniform sampling of the whole spectrum
 OrdersOnly         nmm: only the wavelengths whose orders reach the view direction
 Repeated           pq: the patch repeated, with linear or sinc interpolation
 Rainbow            rainbow: the grating equation alone
-Gain               the documents' gain factor C
+Gain               the thesis' gain factor C
 method_map         a method over the hemisphere (in `maps`)
 estimate_periods   the period of a patch, with its confidence
 """

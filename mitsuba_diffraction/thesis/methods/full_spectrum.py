@@ -5,27 +5,20 @@ Both sum the same integral over the same wavelengths; they differ in the series 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import numpy as np
-from numpy.typing import NDArray
-
 from ...errors import DiffractionError
 from ...optics.geometry import diffraction_coordinates, wavenumber
 from ...tables.table import DiffractionTable
-from .method import Array, Method
-
-_FINEST_STEP = 0.1  # nm
+from .method import Array, UniformMethod
 
 
-class FullSpectrum(Method):
+class FullSpectrum(UniformMethod):
     """S from a table at every wavelength of a uniform grid, summed by the trapezoidal rule.
 
     For a direction pair with (u, v, w) = ωi + ωo and each λ_k = λ_min + k·step up to λ_max
-    (documents, fragment shader, lines 4–26; Stam 1999, eq. 7–12):
+    (thesis, fragment shader, lines 4–26; Stam 1999, eq. 7–12):
 
     1. k = 2π/λ_k with λ in µm; the look-up position in bins is x = k·u·Lx/2π, y = k·v·Ly/2π, with
-       the patch's extents Lx, Ly in µm (documents, eq. for s(u) = u·N·dH/λ).
+       the patch's extents Lx, Ly in µm (thesis, eq. for s(u) = u·N·dH/λ).
     2. `flss`: P = Σ_j exp(−(s_x²(x − j_x)² + s_y²(y − j_y)²)/2) · a_j, s_x = σ·2π/Lx, over the
        `taps` bins j nearest to (x, y) (counted from floor(x) for even, round(x) for odd `taps`,
        `tables.window`), with the Taylor series
@@ -63,8 +56,7 @@ class FullSpectrum(Method):
     ) -> None:
         self.name, self.table = name, table
         self.sigma = table.sigma
-        self.wavelength_range = wavelength_range
-        self.wavelengths, self.weights = trapezoid_rule(wavelength_range, step)
+        self._sum_over(wavelength_range, step)
         if wavelength_range[0] < table.wavelength_range[0] * (1.0 - 1e-9):
             raise DiffractionError(
                 f"wavelength_range begins at {wavelength_range[0]:g} nm, below the table's "
@@ -76,41 +68,3 @@ class FullSpectrum(Method):
         k = wavenumber(wavelength)
         u, v, w = diffraction_coordinates(wi, wo)
         return self.table.window_sum(k * u, k * v, k * w)
-
-    def samples(self, wi: Array, wo: Array) -> Iterator[tuple[Array, Array]]:
-        """Every wavelength of the grid, for all pairs alike."""
-        ones = np.ones(len(wi))
-        for wavelength, weight in zip(self.wavelengths, self.weights, strict=True):
-            yield wavelength * ones, weight * ones
-
-
-def trapezoid_rule(
-    wavelength_range: tuple[float, float], step: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Wavelengths λ_min, λ_min + step, … and their weights, nm; the last interval may be shorter.
-
-    Raises
-    ------
-    DiffractionError
-        If the range is empty or the step does not fit it.
-    """
-    low, high = wavelength_range
-    if not (0.0 < low < high < np.inf):
-        raise DiffractionError(
-            f"wavelength_range={low:g}, {high:g} nm is none; give the shortest first, both above "
-            "0, e.g. 380 780"
-        )
-    if not _FINEST_STEP <= step <= (high - low) * (1.0 + 1e-12):
-        raise DiffractionError(
-            f"step={step:g} nm does not fit the range of {low:g} to {high:g} nm; it must be from "
-            f"{_FINEST_STEP:g} to {high - low:g} nm"
-        )
-    count = int((high - low) / step * (1.0 + 1e-12))
-    nodes = low + step * np.arange(count + 1, dtype=np.float64)
-    if high - nodes[-1] > 1e-9 * high:
-        nodes = np.append(nodes, high)
-    gaps = np.diff(nodes)
-    weights = np.zeros(len(nodes))
-    weights[:-1] += 0.5 * gaps
-    weights[1:] += 0.5 * gaps
-    return nodes, weights

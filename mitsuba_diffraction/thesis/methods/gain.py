@@ -1,6 +1,6 @@
-"""Relative reflectance, as the source documents define it (NumPy only).
+"""Relative reflectance, as the thesis defines it (NumPy only).
 
-They divide the reflected radiance by that of a flat mirror of the same material lit and seen along
+It divides the reflected radiance by that of a flat mirror of the same material lit and seen along
 the normal. With S(ωi, ωo; λ) = ⟨|P|²⟩ under the window, normalised to 1 for that mirror, what is
 left of the BRDF (Stam 1999, eq. 7) is
 
@@ -8,7 +8,7 @@ left of the BRDF (Stam 1999, eq. 7) is
 
 with w = cosθi + cosθo and Schlick's F. So ρ has neither 1/λ² nor the window's area: in it blue is
 weaker against red, by up to (λ_blue/λ_red)², than in the BRDF f(λ) = (1 + ωi·ωo)² 4πσ²·S /
-(λ² w² cosθi cosθo). The documents wrote F², although Schlick's F already is a power, and
+(λ² w² cosθi cosθo). The thesis wrote F², although Schlick's F already is a power, and
 always multiplied by the shadowing G of V-shaped grooves: both are kept here, since that is what
 makes their pictures; the BRDF proper has neither.
 """
@@ -32,7 +32,7 @@ class Gain:
     Parameters
     ----------
     int_ior : index of refraction of the material against air, above 1; 1.5 for shed snake skin.
-    shadowing : "vcavity", as in the documents, or "none".
+    shadowing : "vcavity", as in the thesis, or "none".
 
     Raises
     ------

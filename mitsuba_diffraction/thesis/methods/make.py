@@ -11,8 +11,8 @@ from ...progress import Progress
 from ...tables.build.build import TAPS_SHARE
 from ...tables.table import DiffractionTable
 from ...tables.window import taps_for
-from .full_spectrum import FullSpectrum, trapezoid_rule
-from .method import Method
+from .full_spectrum import FullSpectrum
+from .method import Method, trapezoid_rule
 from .nmm import OrdersOnly
 from .period import check_period, estimate_periods, required_period
 from .pq import Repeated
@@ -59,11 +59,11 @@ def make_all(
     coherence_width : 4σ of the Gaussian amplitude window, µm; for `pq`, the width that is filled
         with copies of the patch.
     coherence : "patch", one window on the patch's centre, or "ensemble", the mean power of all its
-        positions. By default "ensemble" for `default`, and "patch", as in the documents, for `flss`
+        positions. By default "ensemble" for `default`, and "patch", as in the thesis, for `flss`
         and `nmm`. `pq` always adds amplitudes; `rainbow` has neither.
     tolerance : of the tables.
     terms, taps : of the Taylor series and the window of `flss`, `nmm` and `pq`; by default as many
-        as the tolerance takes. The documents have 30 and 3: fewer than the tolerance takes
+        as the tolerance takes. The thesis has 30 and 3: fewer than the tolerance takes
         are accepted if it is raised.
     wavelength_range, step : nm, of the colours.
     period : µm, for `nmm` (along the axis where the patch is most periodic) and `rainbow`; by
@@ -153,14 +153,14 @@ class _Tables:
         return self._build(f"own {coherence}", coherence=coherence)
 
     def taylor(self, coherence: str) -> DiffractionTable:
-        """The documents' series."""
+        """The thesis' series."""
         return self._build(
             f"taylor {coherence}", coherence=coherence, basis="taylor", terms=self.terms,
             taps=self.taps,
         )  # fmt: skip
 
     def for_copies(self) -> DiffractionTable:
-        """The documents' series with taps for `pq`; its own window does not matter."""
+        """The thesis' series with taps for `pq`; its own window does not matter."""
         width = max(self.heights.extent)
         steps = [0.5 * 3.141592653589793 * width / extent for extent in self.heights.extent]
         least = taps_for((steps[0], steps[1]), self.tolerance * TAPS_SHARE, True)

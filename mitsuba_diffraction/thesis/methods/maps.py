@@ -39,7 +39,7 @@ def method_map(
     samples : directions in a pixel. The wavelengths are the same for all of them, unlike in
         `brdf_map`: what a step leaves out of the spectrum shows.
     cosine : map f·cosθo instead of f.
-    gain : map the documents' relative reflectance with this gain factor instead of f.
+    gain : map the thesis' relative reflectance with this gain factor instead of f.
     progress : called as progress(done, total, text).
 
     Raises

@@ -19,6 +19,7 @@ from .gain import Gain
 
 Array = NDArray[np.float64]
 
+_FINEST_STEP = 0.1  # nm
 _PAIRS = 4096  # direction pairs at a time, per thread
 
 
@@ -67,7 +68,7 @@ class Method(ABC):
     def relative(
         self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, gain: Gain | None = None
     ) -> Array:
-        """ρ = C·S, the documents' relative reflectance (see `gain`), shape (n,)."""
+        """ρ = C·S, the thesis' relative reflectance (see `gain`), shape (n,)."""
         return self._value(wi, wo, wavelength, gain or Gain())
 
     def xyz(
@@ -168,3 +169,57 @@ class Method(ABC):
                 f"wi has shape {np.shape(wi)} and wo {np.shape(wo)}; both must be (n, 3) or (3,)"
             )
         return incident, outgoing
+
+
+class UniformMethod(Method):
+    """A method that sums over a uniform grid of wavelengths, for all pairs alike.
+
+    Attributes
+    ----------
+    wavelengths, weights : (n,), nm, of the trapezoidal rule.
+    """
+
+    wavelengths: Array
+    weights: Array
+
+    def _sum_over(self, wavelength_range: tuple[float, float], step: float) -> None:
+        self.wavelength_range = wavelength_range
+        self.wavelengths, self.weights = trapezoid_rule(wavelength_range, step)
+
+    def samples(self, wi: Array, wo: Array) -> Iterator[tuple[Array, Array]]:
+        """Every wavelength of the grid, for all pairs alike."""
+        ones = np.ones(len(wi))
+        for wavelength, weight in zip(self.wavelengths, self.weights, strict=True):
+            yield wavelength * ones, weight * ones
+
+
+def trapezoid_rule(
+    wavelength_range: tuple[float, float], step: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Wavelengths λ_min, λ_min + step, … and their weights, nm; the last interval may be shorter.
+
+    Raises
+    ------
+    DiffractionError
+        If the range is empty or the step does not fit it.
+    """
+    low, high = wavelength_range
+    if not (0.0 < low < high < np.inf):
+        raise DiffractionError(
+            f"wavelength_range={low:g}, {high:g} nm is none; give the shortest first, both above "
+            "0, e.g. 380 780"
+        )
+    if not _FINEST_STEP <= step <= (high - low) * (1.0 + 1e-12):
+        raise DiffractionError(
+            f"step={step:g} nm does not fit the range of {low:g} to {high:g} nm; it must be from "
+            f"{_FINEST_STEP:g} to {high - low:g} nm"
+        )
+    count = int((high - low) / step * (1.0 + 1e-12))
+    nodes = low + step * np.arange(count + 1, dtype=np.float64)
+    if high - nodes[-1] > 1e-9 * high:
+        nodes = np.append(nodes, high)
+    gaps = np.diff(nodes)
+    weights = np.zeros(len(nodes))
+    weights[:-1] += 0.5 * gaps
+    weights[1:] += 0.5 * gaps
+    return nodes, weights

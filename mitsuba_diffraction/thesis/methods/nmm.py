@@ -1,4 +1,4 @@
-"""The documents' n_min–n_max method: only wavelengths whose orders reach the view direction."""
+"""The thesis' n_min–n_max method: only wavelengths whose orders reach the view direction."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SPECULAR_WAVELENGTH = 555.0
 class OrdersOnly(Method):
     """`nmm`: S of `flss`, at the wavelengths λₙ = d·|u|/n (and d·|v|/n) alone.
 
-    For a direction pair with (u, v, w) = ωi + ωo (documents, "NMM approach", with the period d
+    For a direction pair with (u, v, w) = ωi + ωo (thesis, "NMM approach", with the period d
     where one draft has the pixel size):
 
     1. Where hypot(u, v) < ε the colour is white, as bright as at 555 nm: near the mirror direction
@@ -31,9 +31,9 @@ class OrdersOnly(Method):
        0's lobe ends at the longest wavelength.
     2. Elsewhere, for n from n_min = ⌈d|u|/λ_max⌉ (at least 1) to n_max = ⌊d|u|/λ_min⌋, every
        λₙ = d|u|/n adds f(λₙ)·s̄(λₙ)·Δλₙ; likewise for v where there is a period along y. A
-       wavelength that both reach is added twice, as in the documents.
+       wavelength that both reach is added twice, as in the thesis.
 
-    `weights` says what Δλₙ is. "step", the documents' own, is the step of the full sum (5 nm) for
+    `weights` says what Δλₙ is. "step", the thesis' own, is the step of the full sum (5 nm) for
     every wavelength alike: since the λₙ lie closer together, and their lobes are narrower, the
     shorter they are, the sum is too blue, and red is lost: the known purple shift. "lobe" is
     ∫exp(−σ²(k·u − 2πn/d)²)dλ = λₙ²/(2√π·σ·|u|), the width in wavelength of the lobe that a perfect

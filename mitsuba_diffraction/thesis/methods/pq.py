@@ -1,8 +1,6 @@
-"""The documents' PQ method: the patch repeated N₁ × N₂ times, without any other window."""
+"""The thesis' PQ method: the patch repeated N₁ × N₂ times, without any other window."""
 
 from __future__ import annotations
-
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -10,27 +8,26 @@ from ...errors import DiffractionError
 from ...optics.geometry import diffraction_coordinates, wavenumber
 from ...tables.lookup import Kernel, weighted_sum
 from ...tables.table import DiffractionTable
-from .full_spectrum import trapezoid_rule
-from .method import Array, Method
+from .method import Array, UniformMethod
 
 INTERPOLATIONS = ("linear", "sinc")
 
 
-class Repeated(Method):
+class Repeated(UniformMethod):
     """`pq`: light is coherent over a rectangle of whole patches.
 
-    With the patch's extents Lx, Ly and x = k·u·Lx/2π, y = k·v·Ly/2π in bins (documents, "PQ
+    With the patch's extents Lx, Ly and x = k·u·Lx/2π, y = k·v·Ly/2π in bins (thesis, "PQ
     factors"; the sum over copies is a geometric series):
 
         S = |B(x, y)|² · D(2πx; N₁)² · D(2πy; N₂)²,
         D(t; N) = |sin(N t/2) / (N sin(t/2))|, and 1 where t is a multiple of 2π,
 
-    the stable form of the documents' p + iq, with their N + 1 copies called N here. B is the
+    the stable form of the thesis' p + iq, with their N + 1 copies called N here. B is the
     Fourier transform of exp(iκh) over one patch, from its DFT a_j about the patch's centre (without
     that phase neighbours would cancel):
 
     - "sinc": B = Σ_j a_j sinc(x − j_x) sinc(y − j_y), exact if all bins are summed; `taps` of them
-      nearest to (x, y) are, and order 0 always (the documents take 3);
+      nearest to (x, y) are, and order 0 always (the thesis takes 3);
     - "linear": the same with (1 − |x − j_x|)(1 − |y − j_y|) for the two nearest bins along each
       axis: wrong between bins, where a wide patch's B is not smooth.
 
@@ -40,7 +37,7 @@ class Repeated(Method):
 
     Parameters
     ----------
-    table : of any series, with coherence="patch" and enough taps; the documents' is Taylor's.
+    table : of any series, with coherence="patch" and enough taps; the thesis' is Taylor's.
     repeats : (N₁, N₂), at least 1 each.
     interpolation : "linear" or "sinc".
     taps : bins read along each axis for "sinc".
@@ -76,8 +73,7 @@ class Repeated(Method):
         extents = [2.0 * np.pi / spacing for spacing in table.spacing]
         self.area = repeats[0] * extents[0] * repeats[1] * extents[1]
         self.sigma = float(np.sqrt(self.area / (4.0 * np.pi)))
-        self.wavelength_range = wavelength_range
-        self.wavelengths, self.weights = trapezoid_rule(wavelength_range, step)
+        self._sum_over(wavelength_range, step)
 
     def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
         """|B|²·D₁²·D₂²."""
@@ -90,12 +86,6 @@ class Repeated(Method):
         for frequency, spacing, n in zip((u, v), self.table.spacing, self.repeats, strict=True):
             power = power * copies(k * frequency / spacing, n) ** 2
         return power
-
-    def samples(self, wi: Array, wo: Array) -> Iterator[tuple[Array, Array]]:
-        """Every wavelength of the grid, for all pairs alike."""
-        ones = np.ones(len(wi))
-        for wavelength, weight in zip(self.wavelengths, self.weights, strict=True):
-            yield wavelength * ones, weight * ones
 
 
 def copies(x: Array, n: int) -> Array:

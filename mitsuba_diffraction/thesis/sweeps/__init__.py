@@ -1,4 +1,4 @@
-"""The source documents' sweeps: one parameter of a BRDF map after the other, compared.
+"""The thesis' sweeps: one parameter of a BRDF map after the other, compared.
 
 Contents
 --------

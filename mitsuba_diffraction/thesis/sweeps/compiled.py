@@ -28,7 +28,7 @@ class Compiled:
     ----------
     spectral : the package's own look-up, at every wavelength.
     colours : as in RGB variants: one look-up in the table of the whole spectrum's colours.
-    flss : the documents' loop over wavelengths, terms and taps, an image a term.
+    flss : the thesis' loop over wavelengths, terms and taps, an image a term.
     """
 
     spectral: float
@@ -69,7 +69,7 @@ def time_compiled(
     """
     import mitsuba as mi
 
-    from ...analysis.bench.saved import documents_bsdf, saved_bsdf
+    from ...analysis.bench.saved import saved_bsdf, thesis_bsdf
 
     common: dict[str, Any] = {
         "coherence_width": coherence_width, "tolerance": tolerance, "wavelength_range": _RANGE,
@@ -101,5 +101,5 @@ def time_compiled(
         raw: dict[str, Any] = {"material": "none", "energy_conserving": False}
         best = seconds({"colours": saved_bsdf(own, **raw)})
         mi.set_variant(f"{backend}_ad_spectral")
-        best |= seconds({"spectral": saved_bsdf(own, **raw), "flss": documents_bsdf(flss, **raw)})
+        best |= seconds({"spectral": saved_bsdf(own, **raw), "flss": thesis_bsdf(flss, **raw)})
     return Compiled(best["spectral"], best["colours"], best["flss"])

@@ -9,11 +9,11 @@ import pytest
 
 from mitsuba_diffraction.analysis.bench.contenders import (
     DEFAULT,
-    DOCUMENTS,
     TAYLOR,
+    THESIS,
     Queries,
     bare_gathers,
-    bsdf_makers,
+    bsdf_factories,
     build_tables,
 )
 from mitsuba_diffraction.analysis.bench.plan import Plan
@@ -22,10 +22,10 @@ from mitsuba_diffraction.tables.window import base_bin, first_tap
 
 
 @pytest.fixture(scope="module")
-def makers(tmp_path_factory):
+def factories(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tables")
     tables = build_tables(Plan(pixels=160), folder, lambda done, total, text: None)
-    return bsdf_makers(tables)
+    return bsdf_factories(tables)
 
 
 @pytest.fixture
@@ -33,17 +33,17 @@ def queries(variant):
     return Queries.random(500)
 
 
-def test_an_image_a_term_is_the_same_series(makers, queries):
+def test_an_image_a_term_is_the_same_series(factories, queries):
     values = [
-        np.array(makers[name]().eval(mi.BSDFContext(), queries.si, queries.wo))
-        for name in (DOCUMENTS, TAYLOR)
+        np.array(factories[name]().eval(mi.BSDFContext(), queries.si, queries.wo))
+        for name in (THESIS, TAYLOR)
     ]
     # 37 terms in another order, in single precision
     assert np.abs(values[0] - values[1]).sum() < 1e-5 * values[1].sum()
 
 
-def test_bare_gathers_read_what_a_look_up_reads(makers, queries):
-    bsdf = makers[DEFAULT]()
+def test_bare_gathers_read_what_a_look_up_reads(factories, queries):
+    bsdf = factories[DEFAULT]()
     table = bsdf.table
     total = np.array(queries.si.wi + queries.wo, np.float32).astype(float)
     expected = np.zeros(total.shape[1])
@@ -65,8 +65,8 @@ def test_bare_gathers_read_what_a_look_up_reads(makers, queries):
     assert off.mean() < 0.01
 
 
-def test_the_measured_surface_reflects_what_its_file_says(makers, queries):
-    values = np.array(makers["measured"]().eval(mi.BSDFContext(), queries.si, queries.wo))
+def test_the_measured_surface_reflects_what_its_file_says(factories, queries):
+    values = np.array(factories["measured"]().eval(mi.BSDFContext(), queries.si, queries.wo))
     np.testing.assert_allclose(values, 1.0, rtol=1e-6)  # single precision
 
 

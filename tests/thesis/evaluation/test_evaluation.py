@@ -13,10 +13,10 @@ from mitsuba_diffraction.thesis import methods
 from mitsuba_diffraction.thesis.evaluation import (
     Beam,
     Response,
-    documents_fit,
     fit_period,
     measure,
     ridge_of,
+    thesis_fit,
     window_fits,
 )
 from mitsuba_diffraction.thesis.evaluation.windows import moved_window
@@ -122,9 +122,9 @@ def test_windows_of_a_grating_agree_and_those_of_a_scale_do_not(blazed):
     assert 0.9 < found.mean < 1.3  # fingers some 1 µm apart
 
 
-def test_the_documents_procedure_finds_the_blazed_period(of_blazed, blazed):
+def test_the_thesis_procedure_finds_the_blazed_period(of_blazed, blazed):
     table = methods.make("default", blazed, coherence="patch").table
-    fit = documents_fit(table, Beam(), WAVELENGTHS, ANGLES)
+    fit = thesis_fit(table, Beam(), WAVELENGTHS, ANGLES)
     assert fit.period == pytest.approx(2.5, rel=1e-3)  # they report 2500 nm
 
 
@@ -139,9 +139,7 @@ def test_a_measured_scale_has_the_period_of_its_fingers(shared_afm):
     assert 1.0 < found.mean < 1.3
     assert 0.02 < found.spread < 0.1
     # published: 1144 nm, from one window on the corner
-    assert documents_fit(table, Beam(), WAVELENGTHS, angles).period == pytest.approx(
-        1.144, abs=0.003
-    )
+    assert thesis_fit(table, Beam(), WAVELENGTHS, angles).period == pytest.approx(1.144, abs=0.003)
 
 
 def test_a_mirror_has_no_orders_to_fit():

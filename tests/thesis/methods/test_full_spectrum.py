@@ -11,7 +11,7 @@ from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.colour import response
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.thesis import methods
-from mitsuba_diffraction.thesis.methods.full_spectrum import trapezoid_rule
+from mitsuba_diffraction.thesis.methods.method import trapezoid_rule
 from tests.directions import lit_pairs, uniform_directions
 from tests.thesis.methods.conftest import WIDTH
 

@@ -1,4 +1,4 @@
-"""Relative reflectance, as the source documents define it."""
+"""Relative reflectance, as the thesis defines it."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def test_nmm_with_the_width_of_lobes_is_the_whole_spectrum(grating, pairs_of_a_s
     assert np.abs(found - exact).sum() < 0.01 * exact.sum()
 
 
-def test_nmm_of_the_documents_is_too_blue(grating, pairs_of_a_sweep):
+def test_nmm_of_the_thesis_is_too_blue(grating, pairs_of_a_sweep):
     wi, wo = pairs_of_a_sweep
     of = methods.make_all(("flss", "nmm"), grating, coherence_width=60.0)
     away = ~of["nmm"].special(np.broadcast_to(wi, wo.shape), wo)[0]

@@ -77,7 +77,7 @@ def test_a_truncated_series_is_the_shorter_series(grating):
     assert truncated(long.table, 99).expansion.terms == 14
 
 
-def test_relative_maps_are_the_documents_value(grating):
+def test_relative_maps_are_the_thesis_value(grating):
     method = methods.make("flss", grating, coherence_width=20.0)
     light = Light(20.0)
     found = method_map(method, light, wavelength=500.0, resolution=16, gain=Gain())

@@ -1,0 +1,80 @@
+"""Gratings in a patch are found with their period and direction; none where there are none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mitsuba_diffraction import HeightField
+from mitsuba_diffraction.heights import gratings
+from mitsuba_diffraction.heights.spectra import dominant_periods
+from tests.directions import rough_patch
+
+PIXEL = (0.05, 0.06)
+
+
+def waves(shape, *gratings_, profile=np.cos):
+    """Sum of gratings (period in µm, direction in degrees, depth in µm) on PIXEL."""
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    total = np.zeros(shape)
+    for period, direction, depth in gratings_:
+        turn = np.radians(direction)
+        along = x * PIXEL[0] * np.cos(turn) + y * PIXEL[1] * np.sin(turn)
+        total += depth * profile(2 * np.pi * along / period)
+    return HeightField(total, PIXEL, cut_out=True)
+
+
+def sawtooth(phase):
+    return (phase / (2 * np.pi)) % 1.0
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.floats(0.5, 3.5), st.floats(-89.0, 90.0), st.sampled_from([np.cos, sawtooth]),
+    st.tuples(st.integers(300, 360), st.integers(300, 360)),
+)  # fmt: skip
+def test_periods_to_one_per_cent_and_directions_to_a_degree(period, direction, profile, shape):
+    field = waves(shape, (period, direction, 0.1), profile=profile)
+    (found,) = dominant_periods(field)
+    assert found.period == pytest.approx(period, rel=0.01)
+    assert abs((found.direction - direction + 90) % 180 - 90) < 1.0
+    # a sawtooth's harmonics hold 1 − 6/π² of its variance
+    assert found.share == pytest.approx(1.0 if profile is np.cos else 6 / np.pi**2, abs=0.06)
+
+
+def test_crossed_gratings_are_two_the_stronger_first():
+    found = dominant_periods(waves((400, 380), (1.2, 80.0, 0.05), (0.8, -5.0, 0.1)))
+    assert [one.period for one in found] == pytest.approx([0.8, 1.2], rel=0.01)
+    assert [one.share for one in found] == pytest.approx([0.8, 0.2], abs=0.02)
+
+
+def test_a_tilt_and_a_scale_s_bending_do_not_hide_its_fingers():
+    y, x = np.mgrid[:512, :512] / 512
+    scale = gratings.elaphe_like(32.0, 512).heights
+    bent = HeightField(scale + 0.3 * x + 0.1 * np.sin(3 * y), 32.0 / 512)
+    first = dominant_periods(bent)[0] if dominant_periods(bent) else None
+    level = dominant_periods(HeightField(scale, 32.0 / 512))
+    assert [round(one.direction) for one in level] == [0]
+    assert level[0].period == pytest.approx(1.03, rel=0.05)  # stretched by some per cent
+    assert first is None or first.period == pytest.approx(level[0].period, rel=0.01)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rough_surfaces_have_none(seed):
+    assert dominant_periods(rough_patch((160, 200), (0.1, 0.1), 0.2, seed=seed)) == []
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (2, 400), (400, 2), (3, 5)])
+def test_tiny_and_flat_patches_are_answered(shape):
+    assert dominant_periods(HeightField(np.zeros(shape), 0.1)) == []
+    found = dominant_periods(waves(shape, (2.0, 0.0 if shape[1] > 5 else 90.0, 0.1)))
+    assert [one.period for one in found] == pytest.approx([2.0] if max(shape) > 5 else [], rel=0.01)
+
+
+def test_the_measured_scale_has_its_fingers(shared_afm):
+    patch = HeightField.load(shared_afm / "elaphe-65um.png", pixel_size=65 / 1332, max_height=0.375)
+    (found,) = dominant_periods(patch)
+    assert found.period == pytest.approx(1.04, rel=0.03)  # a plain FFT shows some 1 µm
+    assert abs(found.direction) < 3.0
