@@ -46,6 +46,29 @@ def test_a_page_is_written_and_its_loss_is_named(
     assert "spectral" not in said
 
 
+def test_a_name_cannot_open_an_element_of_the_page(
+    scene: Path, tmp_path: Path, some_variant: str
+) -> None:
+    named = scene.with_name("<!--<script>.xml")
+    named.write_text(scene.read_text())
+    out = tmp_path / "plate.html"
+    assert main(["export-viewer", str(named), str(out), "--method", "lut"]) == 0
+    page = out.read_text(encoding="utf-8")
+    assert "<!--<script>" not in page
+    assert "\\u003c!--\\u003cscript>" in page
+
+
+@pytest.mark.parametrize("command", ["export-viewer", "compare"])
+def test_a_scalar_variant_is_refused_in_one_line(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    pytest.importorskip("moderngl")
+    words = {"export-viewer": [str(tmp_path / "a.html")], "compare": ["-o", str(tmp_path / "c")]}
+    assert main([command, str(scene), *words[command], "-m", "scalar_rgb"]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "scalar_rgb has no arrays" in line
+
+
 @pytest.mark.parametrize(
     ("out", "words"),
     [("missing/a.html", "cannot write"), ("folder.html", "it is a folder")],

@@ -82,6 +82,11 @@ def load(scene: Any) -> Any:
     """
     import mitsuba as mi
 
+    if (mi.variant() or "").startswith("scalar"):
+        raise DiffractionError(
+            f"the variant {mi.variant()} has no arrays to fill textures from; set one of llvm_* or "
+            "cuda_* (--mode)"
+        )
     if not isinstance(scene, str | os.PathLike):
         if mi.variant() is None or not isinstance(scene, mi.Scene):
             raise DiffractionError(

@@ -121,8 +121,8 @@ def _filled(scene: WebScene) -> str:
     parts: dict[str, Callable[[], str]] = {
         "style": lambda: _asset("style.css"),
         "script": lambda: "\n".join(_asset(name) for name in _SCRIPTS),
-        # "</" would end the element
-        "header": lambda: json.dumps(scene.header, ensure_ascii=False).replace("</", "<\\/"),
+        # "</" would end the element, and "<!--" with "<script" open one in it
+        "header": lambda: json.dumps(scene.header, ensure_ascii=False).replace("<", "\\u003c"),
         "data": lambda: base64.b64encode(scene.data).decode(),
     }
     pieces = []
