@@ -8,7 +8,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator
 
-from ..errors import DiffractionWarning, one_line
+from ..errors import DiffractionWarning, one_line, shortened
 
 PROGRAM = "mitsuba-diffraction"
 
@@ -20,7 +20,7 @@ _INTERRUPTED = "Received interrupt signal"
 
 def say(text: str) -> None:
     """Print one line on stderr, above a progress bar if there is one."""
-    line = f"{PROGRAM}: {one_line(text)}"
+    line = f"{PROGRAM}: {shortened(one_line(text))}"
     if "tqdm" in sys.modules:
         from tqdm import tqdm
 

@@ -13,8 +13,9 @@ import sys
 import traceback
 from collections.abc import Sequence
 from importlib.metadata import version
+from typing import NoReturn
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, shortened
 from . import (
     bench,
     brdf_map,
@@ -43,6 +44,13 @@ COMMANDS = (
 FAILED = 1
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser that shortens what it quotes."""
+
+    def error(self, message: str) -> NoReturn:
+        super().error(shortened(message))
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 done, 1 failed, 2 usage, 130 Ctrl-C."""
     try:
@@ -55,7 +63,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def build_parser() -> argparse.ArgumentParser:
     """The parser with all sub-commands."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog=PROGRAM,
         description="Diffraction of measured height fields, for Mitsuba 3.",
     )

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import os
 import sys
 from types import TracebackType
 from typing import Any, Self
+
+# Of a terminal that reports no size, as in some containers and editors.
+_SIZE = 80, 24
 
 # Below it a bar would only flash by.
 _DELAY = 0.5  # seconds
@@ -47,9 +52,11 @@ class Bar:
             self._bar.close()
         # where it cannot be redrawn in place, a line a second is plenty
         interval = 0.1 if sys.stderr.isatty() else 1.0
+        size = _size()
         self._bar = tqdm(
             total=total, desc=text, unit=self._unit, delay=self._delay if total else 0,
-            mininterval=interval, leave=False, file=sys.stderr, dynamic_ncols=True,
+            mininterval=interval, leave=False, file=sys.stderr, ncols=size[0], nrows=size[1],
+            dynamic_ncols=size[0] is None,
             bar_format=None if total else "{desc} ...",
         )  # fmt: skip
 
@@ -64,3 +71,11 @@ class Bar:
     ) -> None:
         if self._bar is not None:
             self._bar.close()
+
+
+def _size() -> tuple[int, int] | tuple[None, None]:
+    """Columns and rows to draw in, or None for those of the terminal, which may change."""
+    with contextlib.suppress(OSError, ValueError):
+        if 0 in os.get_terminal_size(sys.stderr.fileno()):
+            return _SIZE
+    return None, None

@@ -80,6 +80,18 @@ def test_a_scene_without_a_light_to_compare_under_is_refused(run, scene, some_va
     assert not Path("plate_compare").exists()
 
 
+def test_a_method_that_does_not_suit_is_refused_before_anything_is_rendered(
+    run, scene, some_variant, gl_works, monkeypatch
+):
+    from mitsuba_diffraction.realtime.comparison import run as comparison
+
+    monkeypatch.setattr(comparison, "render_passes", lambda *_, **__: pytest.fail("rendered"))
+    # the scene's table is of powers; nmm needs heights
+    line = run("compare", scene, "--method", "nmm").failed_in_one_line()
+    assert "nmm" in line or "heights" in line
+    assert not Path("plate_compare").exists()
+
+
 def test_a_file_in_the_folders_place_is_refused_before_any_work(run, scene):
     Path("taken").write_text("")
     assert (

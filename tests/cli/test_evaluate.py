@@ -55,6 +55,8 @@ def test_a_given_period_is_compared_with(run, heights):
     ("options", "text"),
     [
         (["--theta", "95"], "theta=95 must be"),
+        (["--method", "pq", "--tolerance", "0"], "tolerance=0"),
+        (["--coherence-width", "1e300"], "coherence_width=1e+300"),
         (["--step", "900"], "step=900 nm does not fit"),
         (["--angles", "20", "10"], "angles=20 to 10 degrees are none"),
         (["--angle-step", "0"], "angle-step=0 does not fit"),

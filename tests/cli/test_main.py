@@ -108,6 +108,14 @@ def test_the_machine_s_limits_are_one_line(run, command, error):
     assert ("out of memory" in line) or ("No space left on device 'f.npy'" in line)
 
 
+@pytest.mark.parametrize("name", ["x" * 5000, "a b " * 1500, f"/tmp/{'y' * 200}/z"])
+@pytest.mark.parametrize("words", [["info"], ["render"], ["precompute"], ["render", "a.xml", "-s"]])
+def test_long_names_are_not_echoed_whole(run, here, words, name):
+    ran = run(*words, name)
+    assert ran.code in (1, 2)
+    assert len(ran.err.splitlines()[-1]) < 560
+
+
 def test_ctrl_c_exits_with_130(run, command):
     ran = run(*command(raising(KeyboardInterrupt())))
     assert ran.code == 130

@@ -89,6 +89,7 @@ def test_contradictions_are_usage_errors(run, heights, here, command, options, t
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
+        (["sweep", "terms", "--coherence-width", "1e300"], "coherence_width"),
         (["sweep", "terms", "--values", "a"], "--values: expected numbers, got 'a'"),
         (["sweep", "terms", "--method", "nmm"], "needs method 'flss'"),
         (["sweep", "light-angle", "--values", "95"], "theta=95 must be"),
