@@ -6,7 +6,10 @@ Renderer     draws a scene of Mitsuba by shaders, without a window (in `renderer
 scene        a scene as the shaders know it, made of the next four
 shapes       triangles and their tangents
 materials    BSDFs and textures
-lights       directions, points, a smooth sky
+lights       directions, points, spots, a smooth sky
+emitters     all emitters as a sequence of lights
+shadows      shadow maps
+progressive  frames with one light each, accumulated
 camera       sensors
 packing      tables as textures
 thesis       the methods of the thesis as textures

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import DiffractionError
-from .source import fragment_parts, vertex_source
+from .source import fragment_parts, plain_source, vertex_source
 from .textures import Packed, Texture, Uniform
 
 #: OpenGL 3.3.
@@ -119,6 +119,13 @@ def compile_program(
             parts = [(vertex, stage)]
         words = compiler_words(log, parts)
         raise DiffractionError(f"the driver cannot compile method {method}: {words}") from None
+
+
+def compile_plain(context: Any, vertex: str, fragment: str) -> Any:
+    """A program of two files that know neither surfaces nor tables."""
+    return context.program(
+        vertex_shader=plain_source(vertex), fragment_shader=plain_source(fragment)
+    )
 
 
 def compiler_words(log: str, parts: Sequence[tuple[str, str]]) -> str:

@@ -29,12 +29,17 @@ class Light:
     wavelengths : (n,) nm.
     spectrum : irradiance (direction) or intensity (point) relative to D65 of luminance 1, (n,), or
         (n, 3) where the renderer knows three colours only.
+    axis : (3,) what a light shines along, or zeros where it shines alike to all sides.
+    cone : cutoff and beam of a spot, angles from its axis in rad; None for a piece of a plane,
+        whose intensity falls with the cosine.
     """
 
     name: str
     place: Array
     wavelengths: Array
     spectrum: Array
+    axis: Array = field(default_factory=lambda: np.zeros(3))
+    cone: tuple[float, float] | None = None
 
     @property
     def colour(self) -> Array:
@@ -108,14 +113,9 @@ def _add(found: Lighting, emitter: Any, middle: Array) -> None:
 
     kind, parameters = emitter.class_name(), mi.traverse(emitter)
     name = name_of(emitter)
-    if kind == "DirectionalEmitter":
-        wavelengths, spectrum, towards, _ = _sampled(emitter, middle, 1)
-        found.lights.append(Light(name, np.append(towards, 0.0), wavelengths, spectrum))
-    elif kind == "PointLight":
-        position = np.array(parameters["position"], float).ravel()
-        beside = position + np.array([0.0, 0.0, 1.0])
-        wavelengths, spectrum, _, _ = _sampled(emitter, beside, 1)
-        found.lights.append(Light(name, np.append(position, 1.0), wavelengths, spectrum))
+    light = without_extent(emitter, middle)
+    if light is not None and light.cone is None:
+        found.lights.append(light)
     elif kind == "AreaLight":
         wavelengths, spectrum, towards, distance = _sampled(emitter, middle, _SAMPLES)
         place = np.append(middle + towards * distance, 1.0)
@@ -139,6 +139,28 @@ def _add(found: Lighting, emitter: Any, middle: Array) -> None:
         found.omissions.append(f"{name} ({kind})")
 
 
+def without_extent(emitter: Any, middle: Array) -> Light | None:
+    """A direction, a point or a spot; None for an emitter of another kind."""
+    import mitsuba as mi
+
+    kind, parameters, name = emitter.class_name(), mi.traverse(emitter), name_of(emitter)
+    if kind == "DirectionalEmitter":
+        wavelengths, spectrum, towards, _ = _sampled(emitter, middle, 1)
+        return Light(name, np.append(towards, 0.0), wavelengths, spectrum)
+    if kind == "PointLight":
+        position = np.array(parameters["position"], float).ravel()
+        wavelengths, spectrum, _, _ = _sampled(emitter, position + np.array([0.0, 0.0, 1.0]), 1)
+        return Light(name, np.append(position, 1.0), wavelengths, spectrum)
+    if kind == "SpotLight":
+        to_world = np.array(parameters["to_world"].matrix, float).reshape(4, 4)
+        position, axis = to_world[:3, 3], to_world[:3, 2] / np.linalg.norm(to_world[:3, 2])
+        wavelengths, spectrum, _, _ = _sampled(emitter, position + axis, 1)
+        angles = (float(np.array(parameters[n]).ravel()[0]) for n in ("cutoff_angle", "beam_width"))
+        cutoff, beam = (float(np.radians(angle)) for angle in angles)
+        return Light(name, np.append(position, 1.0), wavelengths, spectrum, axis, (cutoff, beam))
+    return None
+
+
 def _sampled(
     emitter: Any, at: Array, samples: int, sun: Array | None = None
 ) -> tuple[Array, Array, Array, float]:
@@ -148,7 +170,7 @@ def _sampled(
     -------
     wavelengths (n,), spectrum (n,) or (n, 3), mean direction towards it (3,), mean distance.
     """
-    values, directions, distances, wavelengths = _samples(emitter, at, samples)
+    values, directions, distances, wavelengths = sampled_directions(emitter, at, samples)
     if sun is not None:
         values = values * (directions @ sun > _SUN_COSINE)[:, None, None]
     weight = values.sum(axis=(1, 2))
@@ -171,7 +193,7 @@ def _sky(emitter: Any, at: Array, without: Array | None = None) -> Array:
     Hanrahan 2001), so E/π = ∫L dω/4π + n·∫L ω dω/2π: exact for a constant sky over one half, whose
     other even orders and all of whose odd ones beyond 1 add nothing.
     """
-    values, directions, _, wavelengths = _samples(emitter, at, _SAMPLES)
+    values, directions, _, wavelengths = sampled_directions(emitter, at, _SAMPLES)
     keep = np.ones(len(values)) if without is None else directions @ without <= _SUN_COSINE
     factors = np.column_stack([keep / (4.0 * np.pi), keep[:, None] * directions / (2.0 * np.pi)])
     spectra = np.einsum("sf,swc->fwc", factors, values) / len(values)
@@ -180,35 +202,102 @@ def _sky(emitter: Any, at: Array, without: Array | None = None) -> Array:
     )
 
 
-def _samples(emitter: Any, at: Array, samples: int) -> tuple[Array, Array, Array, Array]:
-    """Values (samples, wavelengths, 1 or 3) relative to D65, directions, distances, wavelengths."""
+def sampled_directions(
+    emitter: Any, at: Array, samples: int, start: int = 0
+) -> tuple[Array, Array, Array, Array]:
+    """An emitter as directions from a point, drawn by Mitsuba in proportion to what they bring.
+
+    Parameters
+    ----------
+    at : (3,) the point.
+    samples, start : how many, and the number of the first in a sequence that fills the emitter
+        evenly.
+
+    Returns
+    -------
+    irradiance over density (samples, wavelengths, 1 or 3) relative to D65, directions (samples, 3),
+    distances (samples,), wavelengths (n,) in nm.
+    """
     import drjit as dr
     import mitsuba as mi
 
-    # the plastic number's sequence fills the square evenly, from its middle on (Roberts 2018)
-    random = (0.5 + np.arange(samples)[:, None] * [0.7548776662, 0.5698402910]) % 1.0
-    quads = 24 if mi.is_spectral else 1
-    wavelengths = np.linspace(360.0, 830.0, 4 * quads)
-    lanes = samples * quads
-    si = dr.zeros(mi.SurfaceInteraction3f, lanes)
+    lanes = _Lanes(samples)
+    si = dr.zeros(mi.SurfaceInteraction3f, lanes.count)
     si.p = mi.Point3f(*(mi.Float(float(x)) for x in at))
-    if mi.is_spectral:
-        four = wavelengths.reshape(4, quads)
-        si.wavelengths = mi.Spectrum(*(mi.Float(np.tile(w, samples)) for w in four))
-    points = np.repeat(random, quads, axis=0).astype(np.float32)
-    sample = mi.Point2f(*(mi.Float(np.ascontiguousarray(p)) for p in points.T))
-    drawn, weight = emitter.sample_direction(si, sample)
-    directions = np.array(drawn.d, np.float64).T.reshape(-1, 3)
-    distances = np.array(drawn.dist, np.float64).ravel()
-    values = np.array(mi.unpolarized_spectrum(weight), np.float64)
-    values = np.broadcast_to(values.reshape(values.shape[0], -1), (values.shape[0], lanes))
-    directions = np.broadcast_to(directions, (lanes, 3))[::quads]
-    distances = np.broadcast_to(distances, (lanes,))[::quads]
-    if mi.is_spectral:
-        spectra = values.reshape(4, samples, quads).transpose(1, 0, 2).reshape(samples, -1)
-        return (spectra / daylight(wavelengths))[:, :, None], directions, distances, wavelengths
-    ends = np.array([360.0, 830.0])
-    return np.repeat(values.T[:, None], 2, axis=1), directions, distances, ends
+    lanes.set_wavelengths(si)
+    drawn, weight = emitter.sample_direction(si, lanes.points(start))
+    directions = lanes.vectors(drawn.d)
+    distances = np.broadcast_to(np.array(drawn.dist, np.float64).ravel(), (lanes.count,))
+    values, wavelengths = lanes.spectra(weight)
+    return values, directions, distances[:: lanes.quads], wavelengths
+
+
+def sampled_positions(
+    emitter: Any, samples: int, start: int = 0
+) -> tuple[Array, Array, Array, Array]:
+    """An area light as points on it, even over its area.
+
+    Returns
+    -------
+    radiance times area (samples, wavelengths, 1 or 3) relative to D65, positions (samples, 3),
+    normals (samples, 3), wavelengths (n,) in nm.
+    """
+    import drjit as dr
+    import mitsuba as mi
+
+    lanes = _Lanes(samples)
+    drawn, weight = emitter.sample_position(0.0, lanes.points(start))
+    si = dr.zeros(mi.SurfaceInteraction3f, lanes.count)
+    si.p, si.n, si.uv = drawn.p, drawn.n, drawn.uv
+    si.wi = mi.Vector3f(0.0, 0.0, 1.0)
+    lanes.set_wavelengths(si)
+    values, wavelengths = lanes.spectra(emitter.eval(si) * weight)
+    return values, lanes.vectors(drawn.p), lanes.vectors(drawn.n), wavelengths
+
+
+class _Lanes:
+    """Samples side by side, each once for every four wavelengths."""
+
+    def __init__(self, samples: int) -> None:
+        import mitsuba as mi
+
+        self.samples, self.quads = samples, 24 if mi.is_spectral else 1
+        self.count = samples * self.quads
+        self._waves = np.linspace(360.0, 830.0, 4 * self.quads)
+
+    def set_wavelengths(self, si: Any) -> None:
+        """Those of each lane."""
+        import mitsuba as mi
+
+        if mi.is_spectral:
+            four = self._waves.reshape(4, self.quads)
+            si.wavelengths = mi.Spectrum(*(mi.Float(np.tile(w, self.samples)) for w in four))
+
+    def points(self, start: int) -> Any:
+        """The plastic number's sequence, even over the square from its middle on (Roberts 2018)."""
+        import mitsuba as mi
+
+        number = np.arange(start, start + self.samples)[:, None]
+        points = (0.5 + number * [0.7548776662, 0.5698402910]) % 1.0
+        points = np.repeat(points, self.quads, axis=0).astype(np.float32)
+        return mi.Point2f(*(mi.Float(np.ascontiguousarray(p)) for p in points.T))
+
+    def vectors(self, values: Any) -> Array:
+        """(samples, 3)."""
+        vectors = np.array(values, np.float64).T.reshape(-1, 3)
+        return np.broadcast_to(vectors, (self.count, 3))[:: self.quads]
+
+    def spectra(self, values: Any) -> tuple[Array, Array]:
+        """(samples, wavelengths, 1 or 3) relative to D65, and the wavelengths."""
+        import mitsuba as mi
+
+        found = np.array(mi.unpolarized_spectrum(values), np.float64)
+        found = np.broadcast_to(found.reshape(found.shape[0], -1), (found.shape[0], self.count))
+        if not mi.is_spectral:
+            return np.repeat(found.T[:, None], 2, axis=1), np.array([360.0, 830.0])
+        spectra = found.reshape(4, self.samples, self.quads).transpose(1, 0, 2)
+        relative = spectra.reshape(self.samples, -1) / daylight(self._waves)
+        return relative[:, :, None], self._waves
 
 
 def _irradiance(light: Light, at: Array) -> float:

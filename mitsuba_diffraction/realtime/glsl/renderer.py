@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,9 @@ from .lights import Light, light_definitions
 from .materials import height_scale, pack_albedo_bounds, pack_surface
 from .packing import pack_bounds, pack_responses
 from .prepared import Prepared, window
+from .progressive import ProgressiveLight
 from .scene import RealtimeScene, load, read_scene
+from .shadows import SIZE
 from .source import LIGHTS
 from .textures import Uniform
 
@@ -35,8 +38,9 @@ class Renderer:
     """Draws a scene of Mitsuba with a method of the shaders.
 
     Meshes, rectangles, spheres, disks and cylinders; diffraction over a diffuse BSDF, and diffuse
-    ones; directional and point lights, and one radiance from everywhere. There are no shadows and
-    no light between surfaces. All else is named in one warning, and in `scene.omissions`.
+    ones. `render` and `draw` know directional and point lights, and a smooth sky, without shadows;
+    `progressive` all emitters, with shadows. There is no light between surfaces. All else is named
+    in one warning, and in `scene.omissions`.
 
     Parameters
     ----------
@@ -51,7 +55,8 @@ class Renderer:
     """
 
     def __init__(self, scene: Any, *, sensor: int = 0, context: Any = None) -> None:
-        self.scene: RealtimeScene = read_scene(load(scene), sensor)
+        self.mitsuba_scene = load(scene)
+        self.scene: RealtimeScene = read_scene(self.mitsuba_scene, sensor)
         if self.scene.omissions:
             listed = "; ".join(dict.fromkeys(self.scene.omissions))
             warnings.warn(
@@ -63,14 +68,14 @@ class Renderer:
         self._own_context = context is None
         self.context = headless_context() if context is None else context
         check_version(self.context)
-        self._buffers = [self.context.buffer(s.vertices.tobytes()) for s in self.scene.surfaces]
+        self.buffers = [self.context.buffer(s.vertices.tobytes()) for s in self.scene.surfaces]
         self.bindings = [
             Bindings(self.context, pack_surface(s.material) | pack_albedo_bounds(s.material))
             for s in self.scene.surfaces
         ]
         self._methods: dict[str, Prepared] = {}
         self._responses: Bindings | None = None
-        self._lit_by: tuple[int, ...] = ()
+        self._lit_by: list[NDArray[np.float64]] = []
 
     @property
     def driver(self) -> str:
@@ -143,16 +148,83 @@ class Renderer:
         scale : height scale of all patches, instead of their own; see `bound_for`.
         coherence_width : µm, instead of their own; not for `lut` and `pq`, whose tables hold it.
         """
-        moderngl = require_moderngl()
+        self._draw(
+            frame, method, camera or self.camera, self.lights,
+            light_definitions(
+                len(self.lights), bool(np.any(self.sky != 0.0)), exposure is not None
+            ),
+            {"sky": np.asarray(self.sky, np.float32), "exposure": exposure or 1.0},
+            scale=scale, coherence_width=coherence_width,
+        )  # fmt: skip
+
+    def draw_light(
+        self,
+        frame: Any,
+        method: str,
+        camera: Camera,
+        light: Light,
+        shadow_map: Any,
+        shadows: dict[str, Uniform],
+    ) -> None:
+        """Draw one light, with its shadows, into a framebuffer.
+
+        Parameters
+        ----------
+        frame, method, camera : as of `draw`.
+        light : without extent.
+        shadow_map, shadows : texture, and what `ShadowMap.draw` returned with it.
+        """
+        definitions = light_definitions(1, False) | {"SHADOWED": ""}
+        self._draw(frame, method, camera, [light], definitions, shadows, shadow_map=shadow_map)
+
+    def progressive(
+        self,
+        method: str = "lut",
+        *,
+        size: tuple[int, int] | None = None,
+        camera: Camera | None = None,
+        shadow_size: int = SIZE,
+    ) -> ProgressiveLight:
+        """A picture of all emitters' direct light, with shadows, that gets better by frames.
+
+        Parameters
+        ----------
+        method : one of `source.METHODS`.
+        size : width and height; the camera's by default.
+        camera : the scene's by default.
+        shadow_size : texels along either side of a shadow map.
+
+        Raises
+        ------
+        DiffractionError
+            If no emitter brings light, or as of `prepared`.
+        """
         camera = camera or self.camera
-        prepared = self.prepared(method)
+        resized = camera.resized(*(size or camera.size))
+        return ProgressiveLight(self, method, resized, shadow_size=shadow_size)
+
+    def _draw(
+        self,
+        frame: Any,
+        method: str,
+        camera: Camera,
+        lights: Sequence[Light],
+        definitions: dict[str, str],
+        uniforms: dict[str, Uniform],
+        *,
+        scale: float | None = None,
+        coherence_width: float | None = None,
+        shadow_map: Any = None,
+    ) -> None:
+        moderngl = require_moderngl()
+        parts = self.prepared(method).parts(definitions)
         frame.use()
         frame.clear(0.0, 0.0, 0.0, 0.0)
         self.context.enable_only(moderngl.DEPTH_TEST)
         matrix = camera.view_projection(self.scene.low, self.scene.high)
         places = np.zeros((LIGHTS, 4), np.float32)
         colours = np.zeros((LIGHTS, 3), np.float32)
-        for n, light in enumerate(self.lights):
+        for n, light in enumerate(lights):
             place = np.array(light.place, float)
             if place[3] == 0.0:
                 place[:3] /= np.linalg.norm(place[:3])
@@ -163,26 +235,23 @@ class Renderer:
             "view_axis": (0.0, 0.0, 0.0),
             "light_place": places,
             "light_colour": colours,
-            "sky": np.asarray(self.sky, np.float32),
-            "exposure": 1.0 if exposure is None else exposure,
+            **uniforms,
         }
-        lit = light_definitions(
-            len(self.lights), bool(np.any(self.sky != 0.0)), exposure is not None
-        )
-        for surface, own, part in zip(
-            self.scene.surfaces, self.bindings, prepared.parts(lit), strict=True
-        ):
-            program, array = part.program, part.array
+        for surface, own, part in zip(self.scene.surfaces, self.bindings, parts, strict=True):
+            program = part.program
             set_uniforms(program, shared)
-            unit = own.use(program)
-            unit = part.tables.use(program, unit)
-            self.use_responses(program, unit)
+            unit = part.tables.use(program, own.use(program))
+            if shadow_map is not None:
+                shadow_map.use(unit)
+                program["shadow_map"].value = unit
+                unit += 1
+            self.use_responses(program, unit, lights)
             if surface.material.bsdf is not None:
                 factor = scale if scale is not None else height_scale(surface.material)
                 set_uniforms(program, {"height_scale": factor})
                 if coherence_width is not None:
                     set_uniforms(program, window(part.tables, coherence_width))
-            array.render(moderngl.TRIANGLES)
+            part.array.render(moderngl.TRIANGLES)
 
     def bound_for(self, scale: float) -> None:
         """Take the albedo's bound for another height scale: a second or so, where it is new."""
@@ -195,7 +264,7 @@ class Renderer:
         """Free what lies in the graphics card's memory."""
         for prepared in self._methods.values():
             prepared.release()
-        for thing in (*self.bindings, *self._buffers):
+        for thing in (*self.bindings, *self.buffers):
             thing.release()
         if self._responses is not None:
             self._responses.release()
@@ -212,21 +281,24 @@ class Renderer:
         """
         if method not in self._methods:
             self._methods[method] = Prepared(
-                self.context, self.scene, method, self.bindings, self._buffers
+                self.context, self.scene, method, self.bindings, self.buffers
             )
         return self._methods[method]
 
-    def use_responses(self, program: Any, unit: int) -> None:
+    def use_responses(self, program: Any, unit: int, lights: Sequence[Light] | None = None) -> None:
         """The lights' spectra, uploaded anew when other lights are set."""
         if "responses" not in program:
             return
-        lit_by = tuple(id(light.spectrum) for light in self.lights)
-        if self._responses is None or lit_by != self._lit_by:
+        pairs = [(light.wavelengths, light.spectrum) for light in lights or self.lights]
+        spectra = [spectrum for _, spectrum in pairs]
+        same = len(spectra) == len(self._lit_by) and all(
+            one is other for one, other in zip(spectra, self._lit_by, strict=True)
+        )
+        if self._responses is None or not same:
             if self._responses is not None:
                 self._responses.release()
-            pairs = [(light.wavelengths, light.spectrum) for light in self.lights]
             self._responses = Bindings(self.context, pack_responses(pairs))
-            self._lit_by = lit_by
+            self._lit_by = spectra
         self._responses.use(program, unit)
 
     def target(self, width: int, height: int) -> Target:

@@ -71,6 +71,12 @@ class RealtimeScene:
         """The surfaces that diffract."""
         return tuple(s for s in self.surfaces if s.material.bsdf is not None)
 
+    @property
+    def middle(self) -> Array:
+        """(3,) of the box around what diffracts."""
+        low, high = box_of([s.vertices[:, :3] for s in self.diffracting])
+        return 0.5 * (low + high)
+
 
 def load(scene: Any) -> Any:
     """A Mitsuba scene, of itself or of its file, in the variant that is set or llvm_ad_spectral.

@@ -75,5 +75,14 @@ def fragment_parts(
     constants |= {"SURFACE_KIND": "0", "LIGHTS_LIT": "1", **definitions}
     lines = [f"#define {name} {value}\n" for name, value in constants.items()]
     parts = [("preamble", _PREAMBLES[dialect] + "".join(lines))]
-    shared = ("library.glsl", "taylor.glsl") if method in THESIS_METHODS else ("library.glsl",)
+    shared = ["library.glsl"]
+    if method in THESIS_METHODS:
+        shared.append("taylor.glsl")
+    if "SHADOWED" in constants:
+        shared.append("shadow.glsl")
     return parts + [(name, _file(name)) for name in (*shared, f"{method}.glsl", main)]
+
+
+def plain_source(name: str) -> str:
+    """A stage that knows neither surfaces nor tables, for the desktop."""
+    return _PREAMBLES["desktop"] + _file(name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,14 @@ def patch() -> HeightField:
 def table(patch: HeightField) -> DiffractionTable:
     """Its table of powers, for a window a little narrower than the patch."""
     return DiffractionTable.build(patch, coherence_width=6.5)
+
+
+@pytest.fixture(scope="session")
+def table_file(table: DiffractionTable, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The rough patch's table."""
+    file = tmp_path_factory.mktemp("table") / "rough.exr"
+    table.save(file)
+    return file
 
 
 def probed(gl: Any, method: str, packed: Packed, places: NDArray[Any]) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
-from mitsuba_diffraction import DiffractionError, DiffractionTable, DiffractionWarning
+from mitsuba_diffraction import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.realtime.comparison.measures import regions
 from mitsuba_diffraction.realtime.comparison.truth import box_sensor, seen, with_lights
@@ -20,14 +20,6 @@ from mitsuba_diffraction.realtime.glsl.renderer import Renderer
 from mitsuba_diffraction.tables.energy.bound import AZIMUTHAL, POLAR, AlbedoBound
 
 mi = pytest.importorskip("mitsuba")
-
-
-@pytest.fixture(scope="session")
-def table_file(table: DiffractionTable, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The rough patch's table."""
-    file = tmp_path_factory.mktemp("table") / "rough.exr"
-    table.save(file)
-    return file
 
 
 def sensor(width: int = 72, height: int = 48) -> dict[str, Any]:

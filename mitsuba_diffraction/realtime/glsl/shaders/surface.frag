@@ -95,6 +95,11 @@ void main()
     float turned = length(rotation);
     rotation = turned > 1e-6 ? rotation / turned : vec2(1.0, 0.0);
 
+#ifdef SHADOWED
+    vec3 flat_normal = cross(dFdx(v_position), dFdy(v_position));
+    flat_normal *= inversesqrt(max(dot(flat_normal, flat_normal), 1e-30));
+#endif
+
     vec3 radiance = vec3(0.0);
     for (int i = 0; i < LIGHTS_LIT; ++i) {
         vec3 away = light_place[i].xyz - light_place[i].w * v_position;
@@ -118,6 +123,9 @@ void main()
         added += diffracting;
 #endif
         float falloff = light_place[i].w > 0.0 ? 1.0 / square : 1.0;
+#ifdef SHADOWED
+        falloff *= emitted(direction) * reached(v_position, flat_normal);
+#endif
         radiance += lit ? falloff * added : vec3(0.0);
     }
 #ifdef SKY

@@ -1,0 +1,161 @@
+"""All emitters of a scene as a sequence of lights without extent, for light that is accumulated.
+
+The direct light of a scene is an integral over all its emitters. Each frame draws one light of it
+with the shadows that it casts, and the mean over frames converges to all direct light with soft
+shadows (Haeberli and Akeley 1990, *The accumulation buffer*, section 4.4).
+
+Which light that is: an emitter e is chosen with a probability p_e in proportion to what it brings
+to the middle of the scene, and a place on it with a density p:
+
+- directions, points and spots are lights without extent themselves;
+- skies, suns and environment maps give a direction, drawn by Mitsuba in proportion to their
+  radiance, and its irradiance L/(p p_e), the same all over the scene;
+- area lights give a place, even over their area, and its intensity L/(p p_e) along the normal,
+  which falls with the cosine. So the estimate is right at every place of the scene, not only where
+  it is drawn from.
+
+The choice follows the golden ratio, the places on one emitter the plastic number (Roberts 2018):
+both fill what they are drawn from evenly, whenever the sequence is stopped.
+
+What no light without extent shows are mirror images of lights with an extent: they are as many
+images as there were frames, until the lobe is wider than their distance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import DiffractionError
+from ...plugin.names import name_of
+from .lights import Light, sampled_directions, sampled_positions, without_extent
+
+Array = NDArray[np.float64]
+
+_BLOCK = 256  # samples that an emitter draws at once
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+_EVEN = 0.1  # share of the choices for all emitters alike: some light other places than the middle
+
+
+class Emitters:
+    """A scene's emitters, and the lights that are drawn from them.
+
+    Parameters
+    ----------
+    scene : a `mi.Scene` of the variant that is set.
+    middle : (3,) where their contributions are weighed against each other.
+
+    Attributes
+    ----------
+    names : of the emitters that are drawn from.
+    probabilities : (n,) of each.
+    omissions : emitters of other kinds, in a few words each.
+
+    Raises
+    ------
+    DiffractionError
+        If no emitter brings light.
+    """
+
+    def __init__(self, scene: Any, middle: Array) -> None:
+        self.omissions: list[str] = []
+        self.names: list[str] = []
+        self._drawn: list[_Drawn] = []
+        brought = []
+        for emitter in scene.emitters():
+            drawn = _Drawn(emitter, middle)
+            if drawn.kind == "":
+                self.omissions.append(f"{name_of(emitter)} ({emitter.class_name()})")
+            elif (brings := drawn.irradiance()) > 0.0:
+                self._drawn.append(drawn)
+                self.names.append(name_of(emitter))
+                brought.append(brings)
+        if not brought:
+            raise DiffractionError(
+                "no emitter of the scene brings light to what diffracts; add one, or brighten it"
+            )
+        shares = np.array(brought) / sum(brought)
+        self.probabilities = (1.0 - _EVEN) * shares + _EVEN / len(shares)
+
+    def lights(self) -> Iterator[Light]:
+        """One after another without end; the mean over them is all of the scene's direct light."""
+        below = np.cumsum(self.probabilities)
+        taken = [0] * len(self._drawn)
+        number = 0
+        while True:
+            place = (0.5 + number * _GOLDEN) % 1.0
+            chosen = min(int(np.searchsorted(below, place, side="right")), len(taken) - 1)
+            light = self._drawn[chosen].light(taken[chosen])
+            yield replace(light, spectrum=light.spectrum / self.probabilities[chosen])
+            taken[chosen] += 1
+            number += 1
+
+
+class _Drawn:
+    """One emitter, and the lights that stand for it."""
+
+    def __init__(self, emitter: Any, middle: Array) -> None:
+        self._emitter, self._middle = emitter, middle
+        self._fixed = without_extent(emitter, middle)
+        self._blocks: dict[int, list[Light]] = {}
+        self.kind = "fixed" if self._fixed is not None else _kind_of(emitter)
+
+    def light(self, number: int) -> Light:
+        """The number-th of its sequence."""
+        if self._fixed is not None:
+            return self._fixed
+        block, inside = divmod(number, _BLOCK)
+        if block not in self._blocks:
+            self._blocks[block] = self._block(block * _BLOCK)
+        return self._blocks[block][inside]
+
+    def irradiance(self) -> float:
+        """Of a sphere's cross-section in the middle, summed over the colours."""
+        lights = [self._fixed] if self._fixed is not None else [self.light(n) for n in range(64)]
+        return float(np.mean([_brought(light, self._middle) for light in lights]))
+
+    def _block(self, start: int) -> list[Light]:
+        name = name_of(self._emitter)
+        if self.kind == "area":
+            values, places, normals, waves = sampled_positions(self._emitter, _BLOCK, start)
+            points = np.pad(places, [(0, 0), (0, 1)], constant_values=1.0)
+        else:
+            values, places, _, waves = sampled_directions(
+                self._emitter, self._middle, _BLOCK, start
+            )
+            points, normals = np.pad(places, [(0, 0), (0, 1)]), np.zeros((_BLOCK, 3))
+        return [
+            Light(name, point, waves, value[:, 0] if value.shape[1] == 1 else value, normal)
+            for point, value, normal in zip(points, values, normals, strict=True)
+        ]
+
+
+def _kind_of(emitter: Any) -> str:
+    if emitter.class_name() == "AreaLight":
+        return "area"
+    return "environment" if emitter.is_environment() else ""
+
+
+def _brought(light: Light, middle: Array) -> float:
+    """What a light brings to the middle, summed over the colours."""
+    colour = max(float(light.colour.sum()), 0.0)
+    if light.place[3] == 0.0:
+        return colour
+    away = middle - light.place[:3]
+    square = max(float(away @ away), 1e-12)
+    return colour * emission(light, away / square**0.5) / square
+
+
+def emission(light: Light, direction: Array) -> float:
+    """Share of its intensity that a light without extent sends along a unit vector."""
+    if not light.axis.any():
+        return 1.0
+    cosine = float(np.clip(light.axis @ direction, -1.0, 1.0))
+    if light.cone is None:
+        return max(cosine, 0.0)
+    cutoff, beam = light.cone
+    return float(np.clip((cutoff - np.arccos(cosine)) / max(cutoff - beam, 1e-6), 0.0, 1.0))
