@@ -7,7 +7,6 @@ aligned, so that one packet load fetches them: this alignment alone is worth a f
 from __future__ import annotations
 
 import math
-import weakref
 from collections.abc import Callable
 
 import drjit as dr
@@ -18,8 +17,7 @@ from ..errors import DiffractionError
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
 from .memory import index_between, packet_size, read_packets, upload
-from .restricted import RestrictedTable, within
-from .roles import Float, Index, Packet
+from .roles import Float, Index, Mask, Packet
 from .series import inner, pad, padded, series_of
 
 #: Look-ups of more taps run through their rows in a loop instead of one long program.
@@ -34,9 +32,10 @@ _MOST_PACKETS = 2**31
 #: The weight of a tap, by its number.
 Weight = Callable[[Float], Float]
 
-_uploaded: weakref.WeakKeyDictionary[DiffractionTable, dict[str, DeviceTable | RestrictedTable]] = (
-    weakref.WeakKeyDictionary()
-)
+
+def within(qx: Float, qy: Float, radii: tuple[float, float]) -> Mask:
+    """Whether frequencies lie in an ellipse, to rounding in single precision."""
+    return dr.square(qx * (1.0 / radii[0])) + dr.square(qy * (1.0 / radii[1])) <= 1.0 + 2e-6
 
 
 class DeviceTable:
@@ -178,18 +177,6 @@ class DeviceTable:
         """|a_j|² of one bin."""
         real, imaginary = (inner(part, weights) for part in self._components(packets))
         return [dr.fma(real, real, dr.square(imaginary))]
-
-
-def device_table(table: DiffractionTable) -> DeviceTable | RestrictedTable:
-    """The table in the current variant's memory, uploaded once for all BSDFs that share it."""
-    variants = _uploaded.setdefault(table, {})
-    if mi.variant() not in variants:
-        device = DeviceTable(table)
-        variants[mi.variant()] = device
-        if table.coarse is not None:
-            coarse, kappa_max = DeviceTable(table.coarse), table.expansion.kappa_max
-            variants[mi.variant()] = RestrictedTable(device, coarse, table.q_max, kappa_max)
-    return variants[mi.variant()]
 
 
 def _taps(position: Float, last: int, taps: int, exponent: float) -> tuple[Index, Weight]:

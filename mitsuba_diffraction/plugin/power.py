@@ -13,8 +13,8 @@ import drjit as dr
 import mitsuba as mi
 
 from ..tables.table import DiffractionTable
-from .lookup import device_table
 from .pair import Pair
+from .restricted import device_table
 from .rgb_power import rgb_power
 from .roles import Colour, Float, Interaction, Vector2f
 from .sampling import order_sampler

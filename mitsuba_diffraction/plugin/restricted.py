@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import math
+import weakref
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from .roles import Float, Index, Mask
+from ..tables.table import DiffractionTable
+from .lookup import DeviceTable, within
+from .roles import Float, Index
 
-if TYPE_CHECKING:
-    from .lookup import DeviceTable
-
-
-def within(qx: Float, qy: Float, radii: tuple[float, float]) -> Mask:
-    """Whether frequencies lie in an ellipse, to rounding in single precision."""
-    return dr.square(qx * (1.0 / radii[0])) + dr.square(qy * (1.0 / radii[1])) <= 1.0 + 2e-6
+_uploaded: weakref.WeakKeyDictionary[DiffractionTable, dict[str, DeviceTable | RestrictedTable]] = (
+    weakref.WeakKeyDictionary()
+)
 
 
 @dataclass(frozen=True)
@@ -108,3 +106,15 @@ class RestrictedTable:
         ):  # fmt: skip
             setattr(self, counter, dr.opaque(kind, 0))
         return Outside(int(values[0]), math.sqrt(values[1]), values[2])
+
+
+def device_table(table: DiffractionTable) -> DeviceTable | RestrictedTable:
+    """The table in the current variant's memory, uploaded once for all BSDFs that share it."""
+    variants = _uploaded.setdefault(table, {})
+    if mi.variant() not in variants:
+        device = DeviceTable(table)
+        variants[mi.variant()] = device
+        if table.coarse is not None:
+            coarse, kappa_max = DeviceTable(table.coarse), table.expansion.kappa_max
+            variants[mi.variant()] = RestrictedTable(device, coarse, table.q_max, kappa_max)
+    return variants[mi.variant()]

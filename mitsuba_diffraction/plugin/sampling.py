@@ -23,8 +23,8 @@ import numpy as np
 
 from ..tables.sampling.proposals import BANDED, BANDS, proposals
 from ..tables.table import DiffractionTable
-from .lookup import device_table
 from .memory import index_between, read, upload
+from .restricted import device_table
 from .roles import Buffer, Float, Index, Vector2f, Vector3f
 
 #: Share of the samples drawn from the cosine density.

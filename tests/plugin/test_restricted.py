@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.plugin.lookup import device_table
+from mitsuba_diffraction.plugin.restricted import device_table
 from tests.directions import polar, rough_patch, uniform_directions
 from tests.lanes import evaluated, interaction, refusal, vectors
 

@@ -12,7 +12,8 @@ import mitsuba as mi
 
 from ...heights import gratings
 from ...heights.field import HeightField
-from ...plugin.lookup import DeviceTable, device_table
+from ...plugin.lookup import DeviceTable
+from ...plugin.restricted import device_table
 from ...progress import Progress
 from ...tables.table import DiffractionTable
 from .measured_file import write_measured

@@ -9,8 +9,7 @@ import mitsuba as mi
 import numpy as np
 
 from ...optics.geometry import wavenumber
-from ...plugin.lookup import device_table
-from ...plugin.restricted import Outside, RestrictedTable
+from ...plugin.restricted import Outside, RestrictedTable, device_table
 from ...tables.table import DiffractionTable
 from .domain import LookupStatistics
 

@@ -28,7 +28,7 @@ pytestmark = [
 
 def quadrature(table, theta: float, phi: float, wavelength: float) -> float:
     """∫f cosθo dωo of the raw table with R = 1, on a grid of directions finer than a lobe."""
-    from mitsuba_diffraction.plugin.lookup import device_table
+    from mitsuba_diffraction.plugin.restricted import device_table
 
     k, wi = float(wavenumber(wavelength)), polar(theta, phi)
     step = 0.45 / (table.sigma * k)
