@@ -164,6 +164,7 @@ class Diffraction(mi.BSDF):
         self.table = parameters.table
         self.heights = parameters.heights
         self.fresnel = parameters.reflectance
+        self.boundary = parameters.boundary
         self.nested: BSDF = parameters.nested  # or None
         self.height_scale = mi.Float(parameters.height_scale)
         self.orientation = parameters.orientation
@@ -191,7 +192,7 @@ class Diffraction(mi.BSDF):
         if above:
             pair = self._pair(si, wo, active)
             power = self.power.power(pair, self.height_scale, si)
-            value = self.layering.above * mi.depolarizer(self.diffracted(si, pair, power, active))
+            value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
         if nested is not None:
             beneath = mi.Spectrum(self.layering.beneath(si, wo, active))
             value += beneath * self.nested.eval(nested, si, wo, active)
@@ -220,7 +221,7 @@ class Diffraction(mi.BSDF):
         if above:
             pair = self._pair(si, wo, active)
             power, density = self.power.power_and_density(pair, self.height_scale, si)
-            value = self.layering.above * mi.depolarizer(self.diffracted(si, pair, power, active))
+            value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
             density = _with_cosine(density, wo)
         if nested is not None:
             beneath = mi.Spectrum(self.layering.beneath(si, wo, active))
@@ -312,8 +313,12 @@ class Diffraction(mi.BSDF):
         dr.make_opaque(self.height_scale)
         self.orientation.update()
         self.fresnel.update()
-        held = arrays_within(self.power, self._energy, self.orientation, self.fresnel)
-        self._for_freezing = held + marks(self.table, self.vcavity, str(self.layering))
+        held = arrays_within(
+            self.power, self._energy, self.orientation, self.fresnel, self.boundary
+        )
+        self._for_freezing = held + marks(
+            self.table, self.vcavity, str(self.layering), str(self.boundary)
+        )
 
     @property
     def energy_conserving(self) -> bool:
@@ -329,6 +334,7 @@ class Diffraction(mi.BSDF):
             f"  coherence_width = {self.table.coherence_width:g} µm,\n"
             f"  tolerance = {self.table.tolerance:g},\n"
             f"  surface = {self.fresnel},\n"
+            f"  model = {self.boundary},\n"
             f"  height_scale = {dr.slice(self.height_scale):g},\n"
             f"  energy_conserving = {'false' if self._energy is None else 'true'},\n"
             f"  orientation = {self.orientation},\n"
@@ -339,18 +345,21 @@ class Diffraction(mi.BSDF):
 
     # ------------------------------------------------------------------ the model
 
-    def diffracted(self, si: Interaction, pair: Pair, power: Colour, active: Mask) -> Colour:
-        """R (1 + ωi·ωo)² / (λ² A w² cosθi) · ⟨|P|²⟩, that is f·cosθo of diffraction alone.
+    def diffracted(
+        self, ctx: Context, si: Interaction, pair: Pair, power: Colour, active: Mask
+    ) -> Spectrum:
+        """N' / (λ² A w² cosθi) · ⟨|P|²⟩, that is f·cosθo of diffraction alone (see `boundary`).
 
         power : what the power model says of this pair of directions.
         """
-        outside = self._area_factor * dr.square(pair.one_plus_dot / pair.w) / pair.cos_i
+        outside = self._area_factor * dr.rcp(dr.square(pair.w) * pair.cos_i)
         if self._energy is not None:
             outside /= self._energy.divisor(pair, self.height_scale)
         if self.vcavity:
             outside *= vcavity(pair.cos_i, pair.cos_o, pair.one_plus_dot)
-        reflectance = self.fresnel.reflectance(pair.cos_half, si, active)
-        return dr.select(active, outside * reflectance * power, 0.0)
+        wavenumbers = self.power.wavenumbers(si)
+        factor = self.boundary.factor(pair, self.height_scale, wavenumbers, si, active, ctx.mode)
+        return dr.select(active, mi.Spectrum(outside * power) * factor, 0.0)
 
     def _pair(self, si: Interaction, wo: Vector3f, active: Mask) -> Pair:
         return Pair(si, wo, self.orientation.rotation(si, active), active)

@@ -16,6 +16,7 @@ class Pair:
 
     Attributes
     ----------
+    wi, wo : in the shading frame.
     cos_i, cos_o : of the angles to the normal.
     uv : tangential part of ωi + ωo, in the patch's frame.
     w : its normal part.
@@ -23,7 +24,7 @@ class Pair:
     """
 
     def __init__(self, si: Interaction, wo: Vector3f, rotation: Rotation, active: Mask) -> None:
-        self._wi, self._wo, self._rotation = si.wi, wo, rotation
+        self.wi, self.wo, self._rotation = si.wi, wo, rotation
         total = si.wi + wo
         self.uv = in_patch(total, rotation)
         self.w = dr.select(active, total.z, 1.0)
@@ -40,17 +41,17 @@ class Pair:
     @cached_property
     def incident(self) -> Vector2f:
         """Tangential part of ωi, in the patch's frame."""
-        return in_patch(self._wi, self._rotation)
+        return in_patch(self.wi, self._rotation)
 
     @cached_property
     def outgoing(self) -> Vector2f:
         """Tangential part of ωo, in the patch's frame."""
-        return in_patch(self._wo, self._rotation)
+        return in_patch(self.wo, self._rotation)
 
     @cached_property
     def folded(self) -> Vector2f:
         """Tangential part of the ωi + ωo beyond the horizon which `fold` makes the same ωo of."""
-        tangential = mi.Vector2f(self._wi.x, self._wi.y) + unfolded(self._wo)
+        tangential = mi.Vector2f(self.wi.x, self.wi.y) + unfolded(self.wo)
         return in_patch(tangential, self._rotation)
 
 

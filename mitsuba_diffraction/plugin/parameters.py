@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import mitsuba as mi
+import numpy as np
 
 from ..errors import DiffractionError
 from ..heights.field import HeightField
@@ -16,10 +17,11 @@ from ..heights.lengths import is_auto
 from ..heights.options import LoadOptions
 from ..settings import SCENE_SETTINGS, checked
 from ..tables.table import DiffractionTable
+from .boundary import MODELS, Boundary, Kirchhoff, SmallSlope
 from .layers import LAYERINGS, Blend, Layering, Transmission
 from .orientation import Constant, Orientation, Textured
 from .reflectance import Conductor, Dielectric, Perfect, Reflectance
-from .roles import BSDF, Properties
+from .roles import BSDF, Properties, Texture
 from .shadowing import SHADOWINGS
 from .sources import (
     TableProvider,
@@ -42,6 +44,7 @@ NAMES = (
     "k",
     "int_ior",
     "ext_ior",
+    "model",
     "orientation",
     "height_scale",
     "wavelength",
@@ -61,6 +64,7 @@ class Parameters:
     table : the diffraction table.
     heights : reads the heights that it was made of.
     reflectance : the surface's own reflectance.
+    boundary : what the material makes of the light, by model.
     orientation : from the first tangent to the patch's x axis.
     height_scale : factor on all heights.
     energy_conserving : whether to divide by a bound of the albedo.
@@ -73,6 +77,7 @@ class Parameters:
     table: DiffractionTable
     heights: Callable[[], HeightField]
     reflectance: Reflectance
+    boundary: Boundary
     orientation: Orientation
     height_scale: float
     energy_conserving: bool
@@ -111,6 +116,7 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
         table=table,
         heights=heights,
         reflectance=reflectance,
+        boundary=_boundary(props, reflectance, table),
         orientation=_orientation(props),
         height_scale=height_scale,
         energy_conserving=_flag(props, "energy_conserving", True),
@@ -193,11 +199,41 @@ def _reflectance(props: Properties) -> Reflectance:
     if conductor:
         if len(conductor) == 1:
             raise DiffractionError(f"{conductor[0]} alone is no conductor; give both eta and k")
-        return Conductor(
-            props.get_unbounded_texture("eta"), props.get_unbounded_texture("k"), "eta, k"
-        )
+        return Conductor(_index_part(props, "eta"), _index_part(props, "k"), "eta, k")
     iors = {name: _index(props, name) for name in dielectric}
     return Dielectric(iors.get("int_ior", 1.5), iors.get("ext_ior", 1.000277))
+
+
+def _boundary(props: Properties, material: Reflectance, table: DiffractionTable) -> Boundary:
+    """By default small slope where there is an index, as the thesis of 2014 had it where it rules."""
+    without_index = isinstance(material, Perfect)
+    scalar = without_index or props.get("layering", LAYERINGS[0]) == "thesis"
+    if _choice(props, "model", MODELS[::-1] if scalar else MODELS) == "kirchhoff":
+        return Kirchhoff(material)
+    if without_index:
+        raise DiffractionError(
+            "model='small_slope' needs a refractive index, which material='none' has not; give "
+            "model='kirchhoff', a conductor, or int_ior"
+        )
+    return SmallSlope(material, table.roughness)
+
+
+def _index_part(props: Properties, name: str) -> Texture:
+    """Part of a complex index: a spectrum or texture whose numbers fit, as far as it shows them."""
+    texture = props.get_unbounded_texture(name)
+    shown = mi.traverse(texture)
+    keys = {"values", "data"}
+    if not (mi.is_spectral and props.type(name) == mi.Properties.Type.Color):
+        keys.add("value")  # else coefficients of a spectrum
+    for key in keys.intersection(name for name, _ in shown):
+        values = np.ravel(np.array(shown[key], float))
+        wrong = values[~(np.isfinite(values) & (values >= 0.0) & ((values > 0.0) | (name == "k")))]
+        if wrong.size:
+            least = "at least 0" if name == "k" else "above 0"
+            raise DiffractionError(
+                f"{name}={wrong[0]:g} must be finite and {least}: the index is eta + ik"
+            )
+    return texture
 
 
 def _index(props: Properties, name: str) -> float | str:

@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
-from .roles import BSDF, Callback, Colour, Float, Interaction, Mask, Texture
+from .roles import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Texture
 from .traversal import children
 
 
@@ -37,11 +37,15 @@ class Dielectric:
     def __init__(self, int_ior: float | str, ext_ior: float | str) -> None:
         probe = _load("dielectric", int_ior=int_ior, ext_ior=ext_ior)
         self.eta = mi.Float(mi.traverse(probe)["eta"])
-        dr.make_opaque(self.eta)
+        self.update()
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R for the cosine of the angle to the half vector, the same at every wavelength."""
         return mi.UnpolarizedSpectrum(mi.fresnel(cos_theta, self.eta)[0])
+
+    def indices(self, si: Interaction, active: Mask) -> list[Number]:
+        """The relative index, one for all channels; complex where there is total reflection."""
+        return [mi.Complex2f(self.eta, 0.0) if self._reflects_all else self.eta]
 
     def traverse(self, callback: Callback) -> None:
         """Expose the relative index of refraction."""
@@ -50,6 +54,7 @@ class Dielectric:
     def update(self) -> None:
         """Keep the index a variable, so that a new value needs no new kernel."""
         dr.make_opaque(self.eta)
+        self._reflects_all = bool(dr.slice(dr.detach(self.eta)) < 1.0)
 
     def __str__(self) -> str:
         return f"dielectric[eta = {dr.slice(self.eta):.5g}]"
@@ -74,13 +79,13 @@ class Conductor:
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R for the cosine of the angle to the half vector, at si.wavelengths."""
+        indices = self.indices(si, active)
+        return mi.UnpolarizedSpectrum([mi.fresnel_conductor(cos_theta, n) for n in indices])
+
+    def indices(self, si: Interaction, active: Mask) -> list[Number]:
+        """The complex index n + ik of each channel."""
         eta, k = self.eta.eval(si, active), self.k.eval(si, active)
-        return mi.UnpolarizedSpectrum(
-            [
-                mi.fresnel_conductor(cos_theta, mi.Complex2f(e, x))
-                for e, x in zip(eta, k, strict=True)
-            ]
-        )
+        return [mi.Complex2f(n, x) for n, x in zip(eta, k, strict=True)]
 
     def traverse(self, callback: Callback) -> None:
         """Expose both spectra."""
