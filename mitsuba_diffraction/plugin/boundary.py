@@ -18,9 +18,10 @@ import mitsuba as mi
 import numpy as np
 
 from ..optics.blend import NODES_PER_OCTAVE, RoughnessTable
+from .coat import CoatedPair, transmittances
 from .memory import index_between, read_record, upload
 from .pair import Pair
-from .reflectance import Perfect, Reflectance
+from .reflectance import Conductor, Dielectric, Perfect, Reflectance
 from .roles import Float, Interaction, Mask, Number, Spectrum, Vector3f
 
 #: The first is the default of a material with an index.
@@ -55,10 +56,11 @@ class Kirchhoff:
         wavenumbers : of the channels, rad/µm.
         mode : whether light comes along ωo (radiance) or along ωi (importance).
         """
-        if mi.is_polarized and not isinstance(self.material, Perfect):
+        coated = isinstance(pair, CoatedPair)
+        if (mi.is_polarized or coated) and not isinstance(self.material, Perfect):
             light = _Path(pair, mode)
             found = [light.kirchhoff(index) for index in self.material.indices(si, active)]
-            return light.mueller(found)
+            return light.of_jones(found)
         reflectance = self.material.reflectance(pair.cos_half, si, active)
         return mi.depolarizer(reflectance * dr.square(pair.one_plus_dot))
 
@@ -69,7 +71,7 @@ class Kirchhoff:
 class SmallSlope:
     """Small slope, blended with Kirchhoff where the surface is rough at the scale of an order."""
 
-    def __init__(self, material: Reflectance, roughness: RoughnessTable) -> None:
+    def __init__(self, material: Dielectric | Conductor, roughness: RoughnessTable) -> None:
         self.material = material
         self._first = roughness.first
         nodes = roughness.nodes.astype(np.float32)
@@ -97,9 +99,7 @@ class SmallSlope:
             tuple(dr.fma(b - k, s, k) for k, b in zip(*both, strict=True))
             for both, s in zip(matrices, shares, strict=True)
         ]
-        if mi.is_polarized:
-            return light.mueller(blended)
-        return mi.UnpolarizedSpectrum([0.5 * sum(map(_square, jones)) for jones in blended])
+        return light.of_jones(blended)
 
     def _shares(self, pair: Pair, height_scale: Float, wavenumbers: list[Float]) -> list[Float]:
         """s = exp(−(κσ_q)⁴/3) for each channel."""
@@ -134,6 +134,14 @@ class _Path:
         forwards = mode == mi.TransportMode.Importance
         first, second = (pair.wi, pair.wo) if forwards else (pair.wo, pair.wi)
         self._first, self._second = first, second
+        self._coat, self._frames = None, (-first, second)
+        if isinstance(pair, CoatedPair):
+            ends = ((outer := pair.outer).wi, outer.wo)
+            cosines = (outer.cos_i, outer.cos_o)
+            if not forwards:
+                ends, cosines = ends[::-1], cosines[::-1]
+            self._coat = tuple(transmittances(cosine, pair.n) for cosine in cosines)
+            self._frames = (-ends[0], ends[1])
         cosines = (pair.cos_i, pair.cos_o)
         self._q0, self._q = cosines if forwards else cosines[::-1]
         self._cos_half, self._one_plus_dot = pair.cos_half, pair.one_plus_dot
@@ -205,9 +213,27 @@ class _Path:
             contrast * bent * bent0 * self._dot - into * p0 * epsilon * self._sines,
         )
 
-    def mueller(self, matrices: list[Jones]) -> Spectrum:
-        """The Mueller matrices of Jones matrices, for each channel, between Mitsuba's bases."""
-        incident, outgoing = -self._first, self._second
+    def of_jones(self, matrices: list[Jones]) -> Spectrum:
+        """What Jones matrices make of light, for each channel; one may stand for all.
+
+        ½ Σ|J|², or in polarised variants the Mueller matrix between Mitsuba's bases; through the
+        faces of a coat, where there is one.
+        """
+        if self._coat is not None:
+            matrices = [self._transmitted(jones) for jones in matrices]
+        if mi.is_polarized:
+            return self._mueller(matrices)
+        powers = [0.5 * sum(map(_square, jones)) for jones in matrices]
+        return mi.UnpolarizedSpectrum(powers if len(powers) > 1 else powers[0])
+
+    def _transmitted(self, jones: Jones) -> Jones:
+        """√T J √T of the coat's face, light coming and going."""
+        (s0, p0), (s, p) = ([dr.sqrt(t) for t in ts] for ts in self._coat)
+        ss, sp, ps, pp = jones
+        return ss * (s * s0), sp * (s * p0), ps * (p * s0), pp * (p * p0)
+
+    def _mueller(self, matrices: list[Jones]) -> Spectrum:
+        incident, outgoing = self._frames
         turn0 = _turn(self._axis(incident), mi.mueller.stokes_basis(incident), incident)
         turn = _turn(mi.mueller.stokes_basis(outgoing), self._axis(outgoing), outgoing)
         entries = [_mueller(_turned(jones, turn, turn0)) for jones in matrices]

@@ -1,4 +1,4 @@
-"""The models `small_slope` and `kirchhoff`: values, reciprocity, derivatives, and what is refused."""
+"""The models `small_slope` and `kirchhoff`: values, reciprocity, derivatives, refusals."""
 
 from __future__ import annotations
 

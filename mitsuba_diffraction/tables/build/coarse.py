@@ -93,7 +93,7 @@ def coarse_table(
         spacing=(spacing[0], spacing[1]),
         settings=own_settings,
         error={},
-        roughness=roughness_of(patches, reach),
+        roughness=roughness_of(patches, q_limit),
     )
 
 
