@@ -205,4 +205,4 @@ def _taps(
 
 def _log2(exponent: float) -> float:
     """Factor of the exponent of 2 that makes exp(−exponent·Δ²)."""
-    return -exponent / float(np.log(2.0))
+    return -float(exponent) / math.log(2.0)
