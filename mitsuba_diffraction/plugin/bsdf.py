@@ -126,6 +126,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..errors import DiffractionError
+from .bounded import Bounded
 from .energy import EnergyBound
 from .frozen import arrays_within, marks
 from .llvm import require_loaded_llvm
@@ -150,6 +151,8 @@ from .sampling import COSINE, fold
 from .shadowing import vcavity
 from .sources import TableProvider, from_cache
 
+#: Flatter would be lost in single precision.
+_LEAST_SCALE = 1e-30
 #: The component of a context that asks for all of them.
 _ALL = 0xFFFFFFFF
 
@@ -165,7 +168,14 @@ class Diffraction(mi.BSDF):
         self.heights = parameters.heights
         self.fresnel = parameters.reflectance
         self.nested: BSDF = parameters.nested  # or None
-        self.height_scale = mi.Float(parameters.height_scale)
+        self._scale = Bounded(
+            "height_scale",
+            parameters.height_scale,
+            _LEAST_SCALE,
+            self.table.height_scale_max,
+            self._scale_refusal,
+        )
+        self.height_scale = self._scale.value
         self.orientation = parameters.orientation
         self.layering = parameters.layering
         self.vcavity = parameters.vcavity
@@ -286,12 +296,11 @@ class Diffraction(mi.BSDF):
 
     def traverse(self, callback: Callback) -> None:
         """Expose what may change between renderings without another table."""
-        differentiable = mi.ParamFlags.Differentiable
-        callback.put("height_scale", self.height_scale, differentiable)
+        self._scale.traverse(callback)
         self.orientation.traverse(callback)
         self.fresnel.traverse(callback)
         if self.nested is not None:
-            callback.put("nested", self.nested, differentiable)
+            callback.put("nested", self.nested, mi.ParamFlags.Differentiable)
 
     def parameters_changed(self, keys: list[str]) -> None:
         """Check what changed, and keep it out of the kernels' code.
@@ -299,21 +308,24 @@ class Diffraction(mi.BSDF):
         Raises
         ------
         DiffractionError
-            If height_scale is beyond what the table serves.
+            If one is out of bounds, as a height_scale that the table does not serve: it keeps
+            the value that it had.
         """
-        largest = dr.slice(dr.max(dr.detach(self.height_scale)))
-        if not 0.0 < largest <= self.table.height_scale_max:
-            raise DiffractionError(
-                f"height_scale={largest:g} is outside what the table serves, above 0 and up to "
-                f"{self.table.height_scale_max:g}; load the plugin anew with that height_scale"
-            )
+        changing = (self._scale, self.orientation, self.fresnel)
+        refused = [line for line in [one.settle() for one in changing] if line]
         if self._energy is not None:
+            largest = dr.slice(dr.max(dr.detach(self.height_scale)))
             self._energy.update(largest, dr.grad_enabled(self.height_scale))
-        dr.make_opaque(self.height_scale)
-        self.orientation.update()
-        self.fresnel.update()
         held = arrays_within(self.power, self._energy, self.orientation, self.fresnel)
         self._for_freezing = held + marks(self.table, self.vcavity, str(self.layering))
+        if refused:
+            raise DiffractionError("; ".join(refused))
+
+    def _scale_refusal(self, height_scale: float) -> str:
+        return (
+            f"height_scale={height_scale:g} is outside what the table serves, above 0 and up to "
+            f"{self.table.height_scale_max:g}; load the plugin anew with that height_scale"
+        )
 
     @property
     def energy_conserving(self) -> bool:
@@ -364,13 +376,12 @@ class Diffraction(mi.BSDF):
         above = ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0)
         if self.nested is None or ctx.component == 0:
             return above, None
+        lobes = self.nested.flags()
         asked = mi.BSDFContext(ctx.mode, ctx.type_mask, ctx.component)
         if ctx.component != _ALL:
             asked.component -= 1
-        lobes = range(self.nested.component_count())
-        if not any(asked.is_enabled(self.nested.flags(n) & mi.BSDFFlags.All, n) for n in lobes):
-            return above, None
-        return above, asked
+            lobes = self.nested.flags(asked.component)
+        return above, asked if ctx.type_mask & int(lobes) & int(mi.BSDFFlags.All) else None
 
     def _draw(self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask) -> Vector3f:
         """A direction, possibly below the surface (then it has no density and no value)."""

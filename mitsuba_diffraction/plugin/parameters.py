@@ -97,6 +97,11 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
         )
     nested = next(iter(beneath.values()), None)
     _refuse_unknown(props, beneath)
+    if nested is not None and nested.flags() & mi.BSDFFlags.Transmission:
+        raise DiffractionError(
+            f"the nested BSDF {_kind(nested)} lets light through, which would be lost beneath; "
+            "nest one that only reflects"
+        )
     height_scale = _number(props, "height_scale", 1.0)
     if not 0.0 < height_scale <= 1e3:
         raise DiffractionError(f"height_scale={height_scale:g} must be above 0 and at most 1000")
@@ -168,6 +173,8 @@ def _found(name: str, parameter: str) -> Path:
 def _wavelength(props: Properties, table: DiffractionTable) -> float:
     """The wavelength of mono variants in nm: a scene for all variants may give it in all."""
     wavelength = _number(props, "wavelength", DEFAULT_WAVELENGTH)
+    if not mi.is_monochromatic and "wavelength" not in props:
+        return wavelength  # nobody asks for it
     shortest, longest = table.wavelength_range
     if not shortest <= wavelength <= longest:
         raise DiffractionError(
@@ -226,11 +233,16 @@ def _orientation(props: Properties) -> Orientation:
         texture = objects["orientation"]
         if not isinstance(texture, mi.Texture):
             raise DiffractionError(
-                f"orientation={type(texture).__name__} must be degrees, or a raw texture or mesh "
+                f"orientation={_kind(texture)} must be degrees, or a raw texture or mesh "
                 "attribute whose first two channels are (cos, sin)"
             )
         return Textured(texture)
     return Constant(_number(props, "orientation", 0.0))
+
+
+def _kind(element: BSDF) -> str:
+    """What an element of a scene is: `SmoothDielectric`, say."""
+    return str(element.class_name())
 
 
 def _layering(props: Properties, reflectance: Reflectance, nested: bool) -> Layering:

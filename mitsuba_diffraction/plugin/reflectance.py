@@ -10,8 +10,12 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from .bounded import Bounded
 from .roles import BSDF, Callback, Colour, Float, Interaction, Mask, Texture
 from .traversal import children
+
+#: Ratios of refractive indices that are taken when one changes.
+INDICES = (1e-3, 1e3)
 
 
 class Perfect:
@@ -24,8 +28,8 @@ class Perfect:
     def traverse(self, callback: Callback) -> None:
         """Nothing to expose."""
 
-    def update(self) -> None:
-        """Nothing to keep up to date."""
+    def settle(self) -> None:
+        """Nothing to settle."""
 
     def __str__(self) -> str:
         return "none"
@@ -36,23 +40,23 @@ class Dielectric:
 
     def __init__(self, int_ior: float | str, ext_ior: float | str) -> None:
         probe = _load("dielectric", int_ior=int_ior, ext_ior=ext_ior)
-        self.eta = mi.Float(mi.traverse(probe)["eta"])
-        dr.make_opaque(self.eta)
+        eta = float(dr.slice(mi.traverse(probe)["eta"]))
+        self._index = Bounded("eta", eta, *INDICES, _eta_refusal)
+        self.eta = self._index.value
+        self.traverse, self.settle = self._index.traverse, self._index.settle
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R for the cosine of the angle to the half vector, the same at every wavelength."""
         return mi.UnpolarizedSpectrum(mi.fresnel(cos_theta, self.eta)[0])
 
-    def traverse(self, callback: Callback) -> None:
-        """Expose the relative index of refraction."""
-        callback.put("eta", self.eta, mi.ParamFlags.Differentiable)
-
-    def update(self) -> None:
-        """Keep the index a variable, so that a new value needs no new kernel."""
-        dr.make_opaque(self.eta)
-
     def __str__(self) -> str:
         return f"dielectric[eta = {dr.slice(self.eta):.5g}]"
+
+
+def _eta_refusal(eta: float) -> str:
+    return (
+        f"eta={eta:g}, the ratio of refractive indices, must be above 0 and at most {INDICES[1]:g}"
+    )
 
 
 class Conductor:
@@ -87,7 +91,7 @@ class Conductor:
         callback.put("eta", self.eta, mi.ParamFlags.Differentiable)
         callback.put("k", self.k, mi.ParamFlags.Differentiable)
 
-    def update(self) -> None:
+    def settle(self) -> None:
         """The textures look after themselves."""
 
     def __str__(self) -> str:
