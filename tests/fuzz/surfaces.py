@@ -1,4 +1,4 @@
-"""Random height fields as tables: right to their tolerance in NumPy and in the plugin, or refused."""
+"""Random height fields as tables: right to their tolerance in NumPy and the plugin, or refused."""
 
 from __future__ import annotations
 
