@@ -21,8 +21,9 @@ MAX_TAPS = 64
 MAX_TERMS = 400
 #: Largest factor on heights.
 MAX_HEIGHT_SCALE = 1e3
-#: Widest coherence window, µm: that of sunlight is 65 µm, of a star's light a few metres.
-MAX_COHERENCE_WIDTH = 1e6
+#: Widest coherence window, µm. That of sunlight is 65 µm; the lobes of much wider ones are narrower
+#: than the cells that directions are drawn from.
+MAX_COHERENCE_WIDTH = 500.0
 
 
 def _setting(default: Any, check: Callable[[Any], Any], help: str, must: str, **more: Any) -> Any:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
 from ..heights.validity import window_warning
+from ..settings import TableSettings
 from .arguments import path_ending_in
 from .console import mitsuba_warnings
 from .options import STDOUT, add_heights, add_json, given_for_heights, load_options
@@ -134,15 +134,24 @@ def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     from ..heights.load import load_heights
 
     field = load_heights(file, load_options(args))
-    return {"kind": "height field", **field.summary(), "warnings": _warnings_of(field)}
+    return {
+        "kind": "height field",
+        **field.summary(),
+        "warnings": _warnings_of(field, TableSettings()),
+    }
 
 
-def _warnings_of(
-    field: HeightField, coherence_width: float = 65.0, **asked: Sequence[float]
-) -> list[str]:
-    """What a table of these heights will be warned of."""
-    small = window_warning(field, coherence_width)
-    return [*field.validity(**asked), *([small] if small else [])]
+def _warnings_of(field: HeightField, settings: TableSettings) -> list[str]:
+    """What a table of these heights will be warned of, or be refused for by its size alone."""
+    from ..tables.build.checks import check_window
+
+    lines = field.validity(settings.wavelength_range)
+    small = window_warning(field, settings.coherence_width)
+    try:
+        check_window(field.extent, settings)
+    except DiffractionError as error:
+        return [*lines, f"{field.name}: {error}"]
+    return [*lines, *([small] if small else [])]
 
 
 def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
@@ -153,9 +162,8 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     with Bar(args) as bar:
         bar(0, 0, "making heights")
         fields = recipe.fields(load_options(args))
-    names = ("wavelength_range", "coherence_width")
-    asked = {name: table[name] for name in names if name in table}
-    warnings = [line for field in fields for line in _warnings_of(field, **asked)]
+    settings = TableSettings(**table)
+    warnings = [line for field in fields for line in _warnings_of(field, settings)]
     return {
         "kind": "recipe",
         **({"generator": recipe.generator} if recipe.generator else {}),

@@ -8,7 +8,7 @@ order, and do not make it; roughness much finer dims it. So
     s = exp(−(κσ_q)⁴/3),   σ_q² = Σ_q' |h_q'|² (1 − exp(−(4q'/q)⁴)) exp(−(q'/2q)⁴),
 
 where σ_q² is the height variance of the components q' from about a fifth to twice the order's
-frequency; at κσ_q ≈ 1.3 both have half a share. The first correction to B, of order (κσ)², is not
+frequency; at κσ_q = 1.2 both have half a share. The first correction to B, of order (κσ)², is not
 in s. The local curvature approximation has it (Elfouhaily, Guignard, Awadallah and Thompson 2003,
 Waves in Random Media 13, 321), as s = 1 − (κσ)²/2 for a sinusoid's first order, but K is so far
 from B in oblique light that a small share of it does more harm than good. Band and power are chosen

@@ -88,7 +88,7 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: ArrayLike) -> Complex:
     r_s, r_p = amplitudes(np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0)), index)
     zero = np.zeros_like(r_s)
     facet = _matrix(ss=r_s, sp=zero, ps=zero, pp=r_p)
-    turned = _turn(s_out, axis, outgoing) @ facet @ _turn(axis, s_in, -incident)
+    turned = turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident)
     scale = one_plus_dot / (2 * incident[..., 2] * outgoing[..., 2])
     return np.asarray(scale[..., None, None] * turned)
 
@@ -146,7 +146,7 @@ def _facet_axis(incident: Real, outgoing: Real, fallback: Real) -> Real:
     return np.where(found, normal / np.where(found, length, 1.0), fallback)
 
 
-def _turn(to: Real, start: Real, direction: Real) -> Complex:
+def turn(to: Real, start: Real, direction: Real) -> Complex:
     """Matrix (..., 2, 2) from components along (start, d×start) to those along (to, d×to)."""
     cosine = np.sum(to * start, axis=-1)
     sine = np.sum(to * np.cross(direction, start), axis=-1)

@@ -134,7 +134,8 @@ class _Path:
         forwards = mode == mi.TransportMode.Importance
         first, second = (pair.wi, pair.wo) if forwards else (pair.wo, pair.wi)
         self._first, self._second = first, second
-        self._coat, self._frames = None, (-first, second)
+        self._coat: tuple[tuple[Float, Float], ...] = ()
+        self._frames = (-first, second)
         if isinstance(pair, CoatedPair):
             ends = ((outer := pair.outer).wi, outer.wo)
             cosines = (outer.cos_i, outer.cos_o)
@@ -219,7 +220,7 @@ class _Path:
         ½ Σ|J|², or in polarised variants the Mueller matrix between Mitsuba's bases; through the
         faces of a coat, where there is one.
         """
-        if self._coat is not None:
+        if self._coat:
             matrices = [self._transmitted(jones) for jones in matrices]
         if mi.is_polarized:
             return self._mueller(matrices)

@@ -126,6 +126,9 @@ import drjit as dr
 import mitsuba as mi
 
 from ..errors import DiffractionError
+from .boundary import Kirchhoff
+from .bounded import Bounded
+from .coat import CoatedPair
 from .energy import EnergyBound
 from .frozen import arrays_within, marks
 from .llvm import require_loaded_llvm
@@ -150,6 +153,8 @@ from .sampling import COSINE, fold
 from .shadowing import vcavity
 from .sources import TableProvider, from_cache
 
+#: Flatter would be lost in single precision.
+_LEAST_SCALE = 1e-30
 #: The component of a context that asks for all of them.
 _ALL = 0xFFFFFFFF
 
@@ -164,14 +169,24 @@ class Diffraction(mi.BSDF):
         self.table = parameters.table
         self.heights = parameters.heights
         self.fresnel = parameters.reflectance
-        self.boundary = parameters.boundary
+        self.boundary, self.coat = parameters.boundary, parameters.coat
+        self.mirror = Kirchhoff(self.coat) if self.coat is not None else None
         self.nested: BSDF = parameters.nested  # or None
-        self.height_scale = mi.Float(parameters.height_scale)
+        self._scale = Bounded(
+            "height_scale",
+            parameters.height_scale,
+            _LEAST_SCALE,
+            self.table.height_scale_max / (1.0 if self.coat is None else dr.slice(self.coat.eta)),
+            self._scale_refusal,
+        )
+        self.height_scale = self._scale.value
         self.orientation = parameters.orientation
         self.layering = parameters.layering
         self.vcavity = parameters.vcavity
         self.power = power_model(self.table, parameters.wavelength)
-        self._energy = EnergyBound(self.table) if parameters.energy_conserving else None
+        self._energy = (
+            EnergyBound(self.table) if parameters.energy_conserving and not self.coat else None
+        )
         self._area_factor = 4.0 * dr.pi * self.table.sigma**2  # 4π²σ⁴ over the window's area πσ²
         front = mi.BSDFFlags.FrontSide
         glossy = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.Anisotropic | front
@@ -205,7 +220,8 @@ class Diffraction(mi.BSDF):
         density = mi.Float(0.0)
         if above:
             pair = self._pair(si, wo, active)
-            density = _with_cosine(self.power.density(pair, self.height_scale, si), wo)
+            density = self.power.density(pair.outer, self._drawing_scale, si)
+            density = _with_cosine(density, wo)
         if nested is not None:
             beneath = self.nested.pdf(nested, si, wo, active)
             density = dr.lerp(beneath, density, self._glossy_share(above, si, active))
@@ -220,7 +236,7 @@ class Diffraction(mi.BSDF):
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         if above:
             pair = self._pair(si, wo, active)
-            power, density = self.power.power_and_density(pair, self.height_scale, si)
+            power, density = self._power_and_density(pair, si)
             value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
             density = _with_cosine(density, wo)
         if nested is not None:
@@ -287,12 +303,11 @@ class Diffraction(mi.BSDF):
 
     def traverse(self, callback: Callback) -> None:
         """Expose what may change between renderings without another table."""
-        differentiable = mi.ParamFlags.Differentiable
-        callback.put("height_scale", self.height_scale, differentiable)
+        self._scale.traverse(callback)
         self.orientation.traverse(callback)
         self.fresnel.traverse(callback)
         if self.nested is not None:
-            callback.put("nested", self.nested, differentiable)
+            callback.put("nested", self.nested, mi.ParamFlags.Differentiable)
 
     def parameters_changed(self, keys: list[str]) -> None:
         """Check what changed, and keep it out of the kernels' code.
@@ -300,24 +315,27 @@ class Diffraction(mi.BSDF):
         Raises
         ------
         DiffractionError
-            If height_scale is beyond what the table serves.
+            If one is out of bounds, as a height_scale that the table does not serve: it keeps
+            the value that it had.
         """
-        largest = dr.slice(dr.max(dr.detach(self.height_scale)))
-        if not 0.0 < largest <= self.table.height_scale_max:
-            raise DiffractionError(
-                f"height_scale={largest:g} is outside what the table serves, above 0 and up to "
-                f"{self.table.height_scale_max:g}; load the plugin anew with that height_scale"
-            )
+        changing = (self._scale, self.orientation, self.fresnel)
+        refused = [line for line in [one.settle() for one in changing] if line]
         if self._energy is not None:
+            largest = dr.slice(dr.max(dr.detach(self.height_scale)))
             self._energy.update(largest, dr.grad_enabled(self.height_scale))
-        dr.make_opaque(self.height_scale)
-        self.orientation.update()
-        self.fresnel.update()
         held = arrays_within(
-            self.power, self._energy, self.orientation, self.fresnel, self.boundary
+            self.power, self._energy, self.orientation, self.fresnel, self.boundary, self.mirror
         )
         self._for_freezing = held + marks(
-            self.table, self.vcavity, str(self.layering), str(self.boundary)
+            self.table, self.vcavity, str(self.layering), str(self.boundary), self.coat is None
+        )
+        if refused:
+            raise DiffractionError("; ".join(refused))
+
+    def _scale_refusal(self, height_scale: float) -> str:
+        return (
+            f"height_scale={height_scale:g} is outside what the table serves, above 0 and up to "
+            f"{self._scale.high:g}; load the plugin anew with that height_scale"
         )
 
     @property
@@ -350,19 +368,43 @@ class Diffraction(mi.BSDF):
     ) -> Spectrum:
         """N' / (λ² A w² cosθi) · ⟨|P|²⟩, that is f·cosθo of diffraction alone (see `boundary`).
 
+        Under a coat that of its face too, the lobe of a flat patch.
+
         power : what the power model says of this pair of directions.
         """
-        outside = self._area_factor * dr.rcp(dr.square(pair.w) * pair.cos_i)
+        w = pair.cos_i + pair.cos_o
+        outside = self._area_factor * dr.rcp(dr.square(w) * pair.cos_i)
+        if self.coat is not None:
+            outside *= pair.outer.cos_o * dr.rcp(pair.cos_o)
         if self._energy is not None:
             outside /= self._energy.divisor(pair, self.height_scale)
         if self.vcavity:
             outside *= vcavity(pair.cos_i, pair.cos_o, pair.one_plus_dot)
-        wavenumbers = self.power.wavenumbers(si)
-        factor = self.boundary.factor(pair, self.height_scale, wavenumbers, si, active, ctx.mode)
-        return dr.select(active, mi.Spectrum(outside * power) * factor, 0.0)
+        wavenumbers, scale = self.power.wavenumbers(si), self.height_scale
+        factor = self.boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)
+        value = mi.Spectrum(outside * power) * factor
+        if self.mirror is not None:
+            pair = pair.outer
+            outside = self._area_factor * dr.rcp(dr.square(pair.w) * pair.cos_i)
+            factor = self.mirror.factor(pair, scale, wavenumbers, si, active, ctx.mode)
+            value += mi.Spectrum(outside * self.power.flat(pair, si)) * factor
+        return dr.select(active, value, 0.0)
+
+    def _power_and_density(self, pair: Pair, si: Interaction) -> tuple[Colour, Float]:
+        """Of a pair, and of drawing it."""
+        if self.coat is None:
+            return self.power.power_and_density(pair, self.height_scale, si)
+        power = self.power.power(pair, self.height_scale, si)
+        return power, self.power.density(pair.outer, self._drawing_scale, si)
+
+    @property
+    def _drawing_scale(self) -> Float:
+        """What directions are drawn for: under a coat κ is as if heights were larger."""
+        return self.height_scale if self.coat is None else self.height_scale * self.coat.eta
 
     def _pair(self, si: Interaction, wo: Vector3f, active: Mask) -> Pair:
-        return Pair(si, wo, self.orientation.rotation(si, active), active)
+        pair = Pair(si, wo, self.orientation.rotation(si, active), active)
+        return pair if self.coat is None else CoatedPair(pair, self.coat.eta)
 
     def _above(self, si: Interaction, wo: Vector3f, active: Mask) -> Mask:
         cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
@@ -373,19 +415,18 @@ class Diffraction(mi.BSDF):
         above = ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0)
         if self.nested is None or ctx.component == 0:
             return above, None
+        lobes = self.nested.flags()
         asked = mi.BSDFContext(ctx.mode, ctx.type_mask, ctx.component)
         if ctx.component != _ALL:
             asked.component -= 1
-        lobes = range(self.nested.component_count())
-        if not any(asked.is_enabled(self.nested.flags(n) & mi.BSDFFlags.All, n) for n in lobes):
-            return above, None
-        return above, asked
+            lobes = self.nested.flags(asked.component)
+        return above, asked if ctx.type_mask & int(lobes) & int(mi.BSDFFlags.All) else None
 
     def _draw(self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask) -> Vector3f:
         """A direction, possibly below the surface (then it has no density and no value)."""
         uv = self.power.draw(
             mi.Frame3f.cos_theta(si.wi),
-            dr.detach(self.height_scale),
+            dr.detach(self._drawing_scale),
             dr.maximum((sample1 - COSINE) * (1.0 / (1.0 - COSINE)), 0.0),
             sample2,
             si,

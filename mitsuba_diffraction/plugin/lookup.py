@@ -22,7 +22,7 @@ from .series import inner, pad, padded, series_of
 
 #: Look-ups of more taps run through their rows in a loop instead of one long program.
 _UNROLLED_TAPS = 36
-#: Taps on an axis whose Gaussians follow from each other; more may run in a loop, as functions.
+#: Taps on an axis whose Gaussians follow from each other; more would add up their rounding.
 _LONGEST_RATIOS = 6
 #: Exponents up to which the first of them is far from the smallest number there is.
 _SHALLOW = 30.0
@@ -59,6 +59,7 @@ class DeviceTable:
         kind = mi.Float16 if self.half else mi.Float
         self._coefficients = upload(kind, pad(table.coefficients, self.terms))
         self.series = series_of(table)
+        self._looped = not table.grid.trims and table.grid.taps_read > _UNROLLED_TAPS
 
     def window_sum(self, qx: Float, qy: Float, kappa: Float) -> Float:
         """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`).
@@ -120,7 +121,7 @@ class DeviceTable:
         """Index of the first bin read at (x, y) in bins; weights along x and y as functions."""
         grid = self.grid
         column, weight_x = _taps(x, grid.last[0], grid.taps[0], grid.exponents[0])
-        row, weight_y = _taps(y, grid.last[1], grid.taps[1], grid.exponents[1])
+        row, weight_y = _taps(y, grid.last[1], grid.taps[1], grid.exponents[1], self._looped)
         return (interval * self.rows + row) * self.columns + column, weight_x, weight_y
 
     def _over_taps(
@@ -143,7 +144,7 @@ class DeviceTable:
                     total = [dr.fma(p, weights_x[i], t) for p, t in zip(found, total, strict=True)]
             return total
 
-        if not self.grid.trims and self.grid.taps_read > _UNROLLED_TAPS:
+        if self._looped:
             every = list(range(self.grid.taps[0]))
             start = (mi.UInt32(0), first, [p * 0.0 for p in row_sum(first, every)])
             _, _, total = dr.while_loop(
@@ -179,14 +180,19 @@ class DeviceTable:
         return [dr.fma(real, real, dr.square(imaginary))]
 
 
-def _taps(position: Float, last: int, taps: int, exponent: float) -> tuple[Index, Weight]:
-    """Array index of the first tap, and the weight of tap n as a function."""
+def _taps(
+    position: Float, last: int, taps: int, exponent: float, looped: bool = False
+) -> tuple[Index, Weight]:
+    """Array index of the first tap, and the weight of tap n as a function.
+
+    looped : the function is to take variables, too.
+    """
     base = dr.floor(position) if taps % 2 == 0 else dr.floor(position + 0.5)
     first = base + first_tap(taps)
     # Frequencies beyond the bins see the zeros at the margin, which is as wide as the taps
     index = mi.UInt32(index_between(first + last, 0.0, 2.0 * last + 1 - taps))
     offset = position - first
-    if taps > _LONGEST_RATIOS or exponent * (0.5 * taps) ** 2 > _SHALLOW:
+    if looped or taps > _LONGEST_RATIOS or exponent * (0.5 * taps) ** 2 > _SHALLOW:
         return index, lambda n: dr.exp2(_log2(exponent) * dr.square(offset - n))
     # exp(−e(Δ − n)²) of n, n + 1, …: their ratios are a geometric series
     weights = [dr.exp2(_log2(exponent) * dr.square(offset))]
@@ -199,4 +205,4 @@ def _taps(position: Float, last: int, taps: int, exponent: float) -> tuple[Index
 
 def _log2(exponent: float) -> float:
     """Factor of the exponent of 2 that makes exp(−exponent·Δ²)."""
-    return -exponent / float(np.log(2.0))
+    return -float(exponent) / math.log(2.0)

@@ -4,31 +4,35 @@ from __future__ import annotations
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
+from ..errors import DiffractionError
+from .bounded import Bounded
 from .roles import Callback, Interaction, Mask, Rotation, Texture
+
+#: Degrees; much larger ones leave no digits of the angle in single precision.
+MOST_DEGREES = 36_000.0
 
 
 class Constant:
     """The same angle everywhere, degrees from the first tangent to the patch's x axis."""
 
     def __init__(self, degrees: float) -> None:
-        self.degrees = mi.Float(degrees)
+        self._angle = Bounded("orientation", degrees, -MOST_DEGREES, MOST_DEGREES, _refusal)
+        self.degrees = self._angle.value
+        self.traverse, self.settle = self._angle.traverse, self._angle.settle
 
     def rotation(self, si: Interaction, active: Mask) -> Rotation:
         """(cos, sin) of the angle."""
         sin, cos = dr.sincos(dr.deg2rad(self.degrees))
         return cos, sin
 
-    def traverse(self, callback: Callback) -> None:
-        """Expose the angle."""
-        callback.put("orientation", self.degrees, mi.ParamFlags.Differentiable)
-
-    def update(self) -> None:
-        """Keep the angle a variable, so that a new value needs no new kernel."""
-        dr.make_opaque(self.degrees)
-
     def __str__(self) -> str:
         return f"{dr.slice(self.degrees):g}°"
+
+
+def _refusal(degrees: float) -> str:
+    return f"orientation={degrees:g} must be between -{MOST_DEGREES:g} and {MOST_DEGREES:g} degrees"
 
 
 class Textured:
@@ -40,6 +44,7 @@ class Textured:
 
     def __init__(self, texture: Texture) -> None:
         self.texture = texture
+        _check(texture)
 
     def rotation(self, si: Interaction, active: Mask) -> Rotation:
         """(cos, sin) of the angle at the surface point."""
@@ -53,11 +58,42 @@ class Textured:
         """Expose the texture."""
         callback.put("orientation", self.texture, mi.ParamFlags.Differentiable)
 
-    def update(self) -> None:
+    def settle(self) -> None:
         """The texture looks after itself."""
 
     def __str__(self) -> str:
         return " ".join(str(self.texture).split())
+
+
+def _check(texture: Texture) -> None:
+    """Refuse a texture whose values are not the directions that somebody saved.
+
+    Raises
+    ------
+    DiffractionError
+        If it has one channel, is taken for colours, or cannot hold negative numbers.
+    """
+    described = str(texture)
+    if not described.startswith("BitmapTexture["):
+        return  # attributes of meshes are checked where there is a mesh
+    data = np.array(mi.traverse(texture)["data"])
+    if data.shape[-1] < 3:
+        raise DiffractionError(
+            f"orientation: the bitmap has {data.shape[-1]} channel, but directions take three: "
+            "cos, sin, and one that is not read"
+        )
+    if "raw = 1" not in described:
+        raise DiffractionError(
+            "orientation: the bitmap is not raw, so that Mitsuba takes (cos, sin) for a colour; "
+            'add <boolean name="raw" value="true"/> to the texture ("raw": True in Python)'
+        )
+    levels, lengths = data[..., :2] * 65535.0, np.hypot(data[..., 0], data[..., 1])
+    from_integers = np.all(np.abs(levels - np.rint(levels)) < 0.02) and levels.min() >= 0.0
+    if from_integers and np.any((lengths > 0.0) & (np.abs(lengths - 1.0) > 0.02)):
+        raise DiffractionError(
+            "orientation: the bitmap comes from a picture of 8 or 16 bits, which cannot hold "
+            "negative numbers; save (cos, sin) in a float format, as EXR"
+        )
 
 
 Orientation = Constant | Textured

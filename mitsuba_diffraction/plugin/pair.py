@@ -34,6 +34,11 @@ class Pair:
         self.cos_o = dr.select(active, mi.Frame3f.cos_theta(wo), 1.0)
 
     @property
+    def outer(self) -> Pair:
+        """The pair outside of a coat."""
+        return self
+
+    @property
     def cos_half(self) -> Float:
         """Cosine of the angle between either direction and the half vector."""
         return dr.safe_sqrt(0.5 * self.one_plus_dot)

@@ -37,6 +37,9 @@ class PowerModel(Protocol):
     def wavenumbers(self, si: Interaction) -> list[Float]:
         """2π/λ of each channel, rad/µm."""
 
+    def flat(self, pair: Pair, si: Interaction) -> Colour:
+        """What `power` is of a flat surface."""
+
     def draw(
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
     ) -> Vector2f:
@@ -59,6 +62,7 @@ class SpectralPower:
     def __init__(self, table: DiffractionTable, wavelength: float) -> None:
         self.device = device_table(table)
         self._sampler = order_sampler(table)
+        self._sigma = table.sigma
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
@@ -111,6 +115,14 @@ class SpectralPower:
     def wavenumbers(self, si: Interaction) -> list[Float]:
         """See `PowerModel.wavenumbers`."""
         return [dr.rcp(wavelength) * (2e3 * dr.pi) for wavelength in self._wavelengths(si)]
+
+    def flat(self, pair: Pair, si: Interaction) -> Colour:
+        """See `PowerModel.flat`: exp(−σ²k²|(u, v)|²)/λ²."""
+        apart = -(self._sigma**2) * dr.squared_norm(pair.uv)
+        squares = [dr.square(k) for k in self.wavenumbers(si)]
+        return mi.UnpolarizedSpectrum(
+            [dr.exp(apart * square) * (square * (0.5 / dr.pi) ** 2) for square in squares]
+        )
 
     def _power(self, k: Float, pair: Pair, scaled_w: Float) -> Float:
         power = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w)

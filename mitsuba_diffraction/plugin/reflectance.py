@@ -10,8 +10,12 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from .bounded import Bounded
 from .roles import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Texture
 from .traversal import children
+
+#: Ratios of refractive indices that are taken when one changes.
+INDICES = (1e-3, 1e3)
 
 
 class Perfect:
@@ -24,8 +28,8 @@ class Perfect:
     def traverse(self, callback: Callback) -> None:
         """Nothing to expose."""
 
-    def update(self) -> None:
-        """Nothing to keep up to date."""
+    def settle(self) -> None:
+        """Nothing to settle."""
 
     def __str__(self) -> str:
         return "none"
@@ -34,10 +38,13 @@ class Perfect:
 class Dielectric:
     """Fresnel reflectance of an interface between two dielectrics, unpolarised."""
 
-    def __init__(self, int_ior: float | str, ext_ior: float | str) -> None:
+    def __init__(self, int_ior: float | str, ext_ior: float | str, name: str = "eta") -> None:
         probe = _load("dielectric", int_ior=int_ior, ext_ior=ext_ior)
-        self.eta = mi.Float(mi.traverse(probe)["eta"])
-        self.update()
+        eta = float(dr.slice(mi.traverse(probe)["eta"]))
+        self._index = Bounded(name, eta, *INDICES, _eta_refusal)
+        self.eta = self._index.value
+        self.traverse = self._index.traverse
+        self.settle()
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R for the cosine of the angle to the half vector, the same at every wavelength."""
@@ -47,17 +54,20 @@ class Dielectric:
         """The relative index, one for all channels; complex where there is total reflection."""
         return [mi.Complex2f(self.eta, 0.0) if self._reflects_all else self.eta]
 
-    def traverse(self, callback: Callback) -> None:
-        """Expose the relative index of refraction."""
-        callback.put("eta", self.eta, mi.ParamFlags.Differentiable)
-
-    def update(self) -> None:
-        """Keep the index a variable, so that a new value needs no new kernel."""
-        dr.make_opaque(self.eta)
+    def settle(self) -> str | None:
+        """See `Bounded.settle`."""
+        refused = self._index.settle()
         self._reflects_all = bool(dr.slice(dr.detach(self.eta)) < 1.0)
+        return refused
 
     def __str__(self) -> str:
         return f"dielectric[eta = {dr.slice(self.eta):.5g}]"
+
+
+def _eta_refusal(eta: float) -> str:
+    return (
+        f"eta={eta:g}, the ratio of refractive indices, must be above 0 and at most {INDICES[1]:g}"
+    )
 
 
 class Conductor:
@@ -65,6 +75,7 @@ class Conductor:
 
     def __init__(self, eta: Texture, k: Texture, name: str) -> None:
         self.eta, self.k, self.name = eta, k, name
+        self.medium: Dielectric | None = None  #: what lies above, if not air
 
     @classmethod
     def of_material(cls, material: str, wavelength: float) -> Conductor:
@@ -83,8 +94,10 @@ class Conductor:
         return mi.UnpolarizedSpectrum([mi.fresnel_conductor(cos_theta, n) for n in indices])
 
     def indices(self, si: Interaction, active: Mask) -> list[Number]:
-        """The complex index n + ik of each channel."""
+        """The complex index n + ik of each channel, over that of the medium above."""
         eta, k = self.eta.eval(si, active), self.k.eval(si, active)
+        if self.medium is not None:
+            eta, k = eta / self.medium.eta, k / self.medium.eta
         return [mi.Complex2f(n, x) for n, x in zip(eta, k, strict=True)]
 
     def traverse(self, callback: Callback) -> None:
@@ -92,7 +105,7 @@ class Conductor:
         callback.put("eta", self.eta, mi.ParamFlags.Differentiable)
         callback.put("k", self.k, mi.ParamFlags.Differentiable)
 
-    def update(self) -> None:
+    def settle(self) -> None:
         """The textures look after themselves."""
 
     def __str__(self) -> str:

@@ -68,6 +68,10 @@ class RGBPower:
         """See `PowerModel.wavenumbers`; of the wavelength that is a channel's mean."""
         return self._wavenumbers
 
+    def flat(self, pair: Pair, si: Interaction) -> Colour:
+        """See `PowerModel.flat`."""
+        return self._lookup.flat(pair.uv)
+
     def _density(self, uv: Vector2f, share: Float, band: Index) -> Float:
         """Density of `draw` per du dv."""
         squared_radius = dr.squared_norm(uv)

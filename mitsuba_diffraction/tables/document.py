@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import quoted
-from ..settings import BASES, MAX_TAPS, MAX_TERMS, TableSettings
 from ..optics.blend import RoughnessTable
+from ..settings import BASES, MAX_TAPS, MAX_TERMS, TableSettings
 from .expansion import KINDS, Expansion
 from .packing import Grid
 from .table import DiffractionTable

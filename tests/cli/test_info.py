@@ -186,3 +186,9 @@ def test_only_a_table_has_an_albedo(run, heights, tmp_path):
     ran = run("info", heights, "--pixel-size", "0.08", "--albedo", tmp_path / "albedo.png")
     assert ran.code == 2
     assert "not a table" in ran.err
+
+
+def test_a_patch_too_wide_for_its_window_is_mentioned(run, tmp_path):
+    np.save(tmp_path / "wide.npy", np.random.default_rng(1).random((8, 600)) * 0.01)
+    data = json.loads(run("info", tmp_path / "wide.npy", "--pixel-size", "10", "--json").out)
+    assert any("so much more than the coherence window" in line for line in data["warnings"])

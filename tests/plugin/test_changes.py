@@ -54,6 +54,32 @@ def test_a_height_scale_beyond_the_table_is_a_named_error(some_variant, scale):
     assert "is outside what the table serves, above 0 and up to 1.5; load the plugin anew" in line
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("height_scale", 2.0),
+        ("height_scale", -1.0),
+        ("height_scale", float("nan")),
+        ("orientation", 1e30),
+        ("orientation", float("inf")),
+        ("eta", 0.0),
+        ("eta", float("nan")),
+    ],
+)
+def test_a_refused_value_leaves_the_last_one(variant, name, value):
+    bsdf = load(int_ior=1.5)
+    wi, wo, lam = pairs(20)
+    good = {"height_scale": 1.2, "orientation": 10.0, "eta": 1.4}
+    parameters = mi.traverse(bsdf)
+    parameters.update(good)
+    before = brdf_values(bsdf, wi, wo, lam[:, None])
+    parameters[name] = value
+    with pytest.raises((md.DiffractionError, RuntimeError), match=name):
+        parameters.update()
+    assert parameters[name][0] == pytest.approx(good[name])
+    assert np.array_equal(brdf_values(bsdf, wi, wo, lam[:, None]), before)
+
+
 def test_values_are_differentiable_in_the_scale_and_the_orientation(variant):
     wi, wo, lam = pairs(60)
     for name, at, step in (("height_scale", 0.9, 1e-2), ("orientation", 20.0, 5e-2)):

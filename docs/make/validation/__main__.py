@@ -2,6 +2,7 @@
 
 python -m docs.make.validation report -o docs
 python -m docs.make.validation solve perfect      # minutes to an hour; extra `validation`
+python -m docs.make.validation patches keratin    # in two dimensions; extra `validation`
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ _DATA = Path(__file__).parent / "data"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one of the two commands, and return the exit code: 0, 1 (failed) or 2 (usage)."""
+    """Run one of the commands, and return the exit code: 0, 1 (failed) or 2 (usage)."""
     parser = argparse.ArgumentParser(
         prog="python -m docs.make.validation", description=__doc__.split("\n")[0]
     )
@@ -37,7 +38,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     solve.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
     solve.add_argument("-j", "--jobs", metavar="N", type=_jobs, help="processes; all processors")
     solve.set_defaults(run=_solve)
-    for command in (report, solve):
+    patches = commands.add_parser("patches", help="make those in two dimensions anew")
+    patches.add_argument("material", choices=("keratin", "aluminium"))
+    patches.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
+    patches.set_defaults(run=_patches)
+    for command in (report, solve, patches):
         command.add_argument(
             "--progress", action=argparse.BooleanOptionalAction, default=None,
             help="show progress bars; by default on a terminal",
@@ -75,6 +80,19 @@ def _solve(args: argparse.Namespace) -> int:
         f"wrote {os.fspath(path)}: {len(found.rows)} orders; the last refinement changed them by "
         f"{found.change.max():.1g} at most"
     )
+    return 0
+
+
+def _patches(args: argparse.Namespace) -> int:
+    from .patch_solutions import about, patch_file, solve_patches
+    from .solutions import save_rows
+
+    path = args.output / patch_file(args.material)
+    check_writable(path)
+    with Bar(args, unit=" cases") as bar:
+        rows = solve_patches(args.material, bar)
+    save_rows(rows, about(args.material), path)
+    print(f"wrote {os.fspath(path)}: {len(rows)} orders")
     return 0
 
 

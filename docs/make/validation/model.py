@@ -15,12 +15,10 @@ For a mirror this is R; for m = 0 of any grating R·|a_0|². The small-slope mod
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_diffraction import reference
+from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 
@@ -48,19 +46,44 @@ def order_efficiencies(
     """
     _, sines = order_sines(grating.period, wavelength, theta)
     wi, wo = in_plane(np.sin(np.radians(theta))), in_plane(sines)
-    sigma, k = lobe_sigma(grating), float(wavenumber(wavelength))
-    per_brdf = np.pi / (sigma * k) ** 2
-    if material == "perfect":
-        return lobe_peaks(grating, wi, wo, wavelength) * per_brdf
-    index = index_of(material, wavelength)
-    material_of = {"eta": index.real, "k": index.imag}
-    if model in reference.MODELS:
-        peaks = lobe_peaks(grating, wi, wo, wavelength, model=model, **material_of)
-        return peaks * per_brdf
+    index = None if material == "perfect" else index_of(material, wavelength)
+    return efficiencies(
+        grating.heights(), index, wi, wo, wavelength, model, sigma=lobe_sigma(grating)
+    )
+
+
+def efficiencies(
+    field: HeightField,
+    index: complex | None,
+    wi: NDArray[np.float64],
+    wo: NDArray[np.float64],
+    wavelength: float,
+    model: str,
+    *,
+    sigma: float,
+) -> NDArray[np.float64]:
+    """η of the orders of a periodic surface that leave along `wo`, for unpolarised light.
+
+    Parameters
+    ----------
+    index : n + ik; none is a perfect conductor, which is Kirchhoff's alone.
+    wi, wo : (3,) and (n, 3), unit vectors away from the surface.
+    model : of `MODELS`.
+    sigma : of a window (µm) through which the lobes are separate.
+    """
+    width = WIDTHS_PER_SIGMA * sigma
+    per_brdf = np.pi / (sigma * float(wavenumber(wavelength))) ** 2
+    if index is None:
+        return per_brdf * reference.brdf(field, wi, wo, wavelength, coherence_width=width)
+    known = model if model in reference.MODELS else "kirchhoff"
+    brdf = per_brdf * reference.brdf(
+        field, wi, wo, wavelength, coherence_width=width, model=known, eta=index.real, k=index.imag
+    )
+    if model == known:
+        return brdf
     # what Kirchhoff's matrix weighs, replaced
-    peaks = lobe_peaks(grating, wi, wo, wavelength, model="kirchhoff", **material_of)
     alone = boundary.unpolarised(boundary.small_slope(wi, wo, index))
-    return peaks * per_brdf * alone / boundary.unpolarised(boundary.kirchhoff(wi, wo, index))
+    return brdf * alone / boundary.unpolarised(boundary.kirchhoff(wi, wo, index))
 
 
 def lobe_sigma(grating: Grating) -> float:
@@ -74,24 +97,21 @@ def lobe_peaks(
     wo: NDArray[np.float64],
     wavelength: float,
     pixels: int = PIXELS,
-    **material: Any,
 ) -> NDArray[np.float64]:
-    """The BRDF at the centres of lobes, through a window of `lobe_sigma`.
+    """The BRDF (R = 1) at the centres of lobes, through a window of `lobe_sigma`.
 
     Parameters
     ----------
     wi, wo : (3,) and (n, 3), unit vectors away from the surface.
     wavelength : nm.
     pixels : a period.
-    material : model and index as `reference.brdf` takes them; Kirchhoff with R = 1 by default.
 
     Returns
     -------
     (n,) in 1/sr.
     """
     width = WIDTHS_PER_SIGMA * lobe_sigma(grating)
-    field = grating.heights(pixels)
-    return reference.brdf(field, wi, wo, wavelength, coherence_width=width, **material)
+    return reference.brdf(grating.heights(pixels), wi, wo, wavelength, coherence_width=width)
 
 
 def in_plane(sine: ArrayLike) -> NDArray[np.float64]:

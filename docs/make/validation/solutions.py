@@ -119,10 +119,7 @@ def save(solutions: Solutions, path: str | os.PathLike[str]) -> None:
     DiffractionError
         If it cannot be written.
     """
-    about = json.dumps(dict(solutions.about), indent=1, ensure_ascii=False)
-    columns = {name: solutions.rows[name] for name in ROW.names or ()}
-    with atomic_path(path) as temporary:
-        np.savez_compressed(temporary, allow_pickle=False, about=np.array(about), **columns)
+    save_rows(solutions.rows, solutions.about, path)
 
 
 def load(path: str | os.PathLike[str]) -> Solutions:
@@ -133,9 +130,26 @@ def load(path: str | os.PathLike[str]) -> Solutions:
     DiffractionError
         If the file is missing or no set of solutions.
     """
+    return Solutions(*load_rows(path, ROW))
+
+
+def save_rows(
+    rows: NDArray[np.void], about: Mapping[str, Any], path: str | os.PathLike[str]
+) -> None:
+    """Write rows of any type as columns, and what made them, as `save`."""
+    text = json.dumps(dict(about), indent=1, ensure_ascii=False)
+    columns = {name: rows[name] for name in rows.dtype.names or ()}
+    with atomic_path(path) as temporary:
+        np.savez_compressed(temporary, allow_pickle=False, about=np.array(text), **columns)
+
+
+def load_rows(
+    path: str | os.PathLike[str], dtype: np.dtype[np.void]
+) -> tuple[NDArray[np.void], Mapping[str, Any]]:
+    """Read rows of this type, and what made them, as `load`."""
     try:
         with np.load(path, allow_pickle=False) as file:
-            columns = {name: file[name] for name in ROW.names or ()}
+            columns = {name: file[name] for name in dtype.names or ()}
             about = json.loads(str(file["about"]))
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:
         reason = " ".join(str(error).split())
@@ -143,10 +157,10 @@ def load(path: str | os.PathLike[str]) -> Solutions:
             f"cannot read solutions from '{os.fspath(path)}': {reason}; "
             "make them with `python -m docs.make.validation solve`"
         ) from error
-    rows = np.empty(len(columns["order"]), ROW)
+    rows = np.empty(len(next(iter(columns.values()))), dtype)
     for name, column in columns.items():
         rows[name] = column
-    return Solutions(rows, about)
+    return rows, about
 
 
 def shipped(material: str, solver: str = "integral") -> Solutions:

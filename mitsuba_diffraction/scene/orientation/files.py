@@ -20,6 +20,9 @@ from .trimesh import TriangleMesh
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+# what Mitsuba throws, text that is not UTF-8, and sizes beyond the memory
+_UNREAD = (RuntimeError, ValueError, MemoryError)
+
 KINDS = {".ply": "ply", ".obj": "obj", ".serialized": "serialized"}
 
 
@@ -68,11 +71,10 @@ def load_mesh(
 def _load(file: Path, kind: str, face_normals: bool) -> mi.Mesh:
     try:
         return _read(file, kind, face_normals)
-    # what Mitsuba throws, text that is not UTF-8, and sizes beyond the memory
-    except (RuntimeError, ValueError, MemoryError) as error:
+    except _UNREAD as error:
         triangles = triangulated_ply(file.read_bytes()) if kind == "ply" else None
         if triangles is not None:
-            with tempfile.TemporaryDirectory() as folder, contextlib.suppress(RuntimeError):
+            with tempfile.TemporaryDirectory() as folder, contextlib.suppress(*_UNREAD):
                 cut = Path(folder, file.name)
                 cut.write_bytes(triangles)
                 return _read(cut, kind, face_normals)

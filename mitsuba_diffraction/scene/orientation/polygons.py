@@ -24,6 +24,14 @@ def triangulated_ply(data: bytes) -> bytes | None:
     bytes or None
         Of a file with vertices and triangles alone; None where the file is no such PLY.
     """
+    try:
+        return _triangulated(data)
+    # what a damaged header or body makes of its numbers and names
+    except (struct.error, ValueError, LookupError, OverflowError, MemoryError):
+        return None
+
+
+def _triangulated(data: bytes) -> bytes | None:
     found = re.match(rb"ply\r?\n(?:.*\n)*?end_header\r?\n", data)
     if found is None:
         return None
@@ -34,10 +42,7 @@ def triangulated_ply(data: bytes) -> bytes | None:
         return None
     read = _read_ascii if any("format ascii" in line for line in header) else _read_binary
     order = ">" if any("binary_big_endian" in line for line in header) else "<"
-    try:
-        vertices, polygons = read(data[found.end() :], elements[0], elements[1], order)
-    except (struct.error, ValueError, IndexError, KeyError):
-        return None
+    vertices, polygons = read(data[found.end() :], elements[0], elements[1], order)
     triangles = [(p[0], p[n], p[n + 1]) for p in polygons for n in range(1, len(p) - 1)]
     kept = [
         *header[: starts[1]], f"element face {len(triangles)}",

@@ -21,7 +21,14 @@ from ..packing import Grid
 from ..table import DiffractionTable, build_error, q_limit_of
 from ..window import reach_error, taps_for, trims_for
 from .attempt import Attempt
-from .checks import check_patches, check_taylor, check_units
+from .checks import (
+    TAPS_SHARE,
+    check_patches,
+    check_taylor,
+    check_units,
+    check_window,
+    too_wide,
+)
 from .choose import (
     MAX_INTERVALS,
     PACKET,
@@ -35,8 +42,8 @@ from .describe import describe, roughness_of
 
 T = TypeVar("T")
 
-#: What taps may use up of the tolerance when their number is chosen, and series of what they leave.
-TAPS_SHARE, SERIES_SHARE = 0.5, 0.8
+#: What series may use up of what the taps leave of the tolerance.
+SERIES_SHARE = 0.8
 #: What the taps may use up, if leaving out corners then still meets the tolerance.
 TRIMMED_SHARE = 0.8
 #: Half floats (rounding 2⁻¹², a few of them added) are tried from this tolerance on.
@@ -152,6 +159,7 @@ def build_with(
     check_patches(patches, settings)
     check_units(patches)
     try:
+        check_window(patches[0].extent, settings)
         return _built(_Wanted(patches, settings), progress or silent)
     except DiffractionError as error:
         questions = [question for patch in patches if (question := units_warning(patch))]
@@ -266,13 +274,7 @@ def _grid(wanted: _Wanted, taps: tuple[int, int]) -> Grid:
     """The bins that these taps can read."""
     q_max, spacing = wanted.q_max, wanted.spacing
     if max(taps) > MAX_TAPS:
-        width = wanted.settings.coherence_width
-        raise build_error(
-            f"the patch is {max(wanted.patches[0].extent):.4g} µm wide, so much more than the "
-            f"coherence window that a look-up would read {taps[0]}×{taps[1]} orders; crop the "
-            f"heights, for instance to {width:g} µm (crop={width:g} of a scene, --crop {width:g}), "
-            "or raise coherence_width or tolerance"
-        )
+        raise too_wide(wanted.patches[0].extent, wanted.settings, taps)
     radius = (q_max[0] / spacing[0], q_max[1] / spacing[1])
     ny, nx = np.max([patch.shape for patch in wanted.patches], axis=0)
     # A margin as wide as the taps: see tables.lookup

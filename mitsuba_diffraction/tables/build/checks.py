@@ -6,14 +6,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...errors import DiffractionError
 from ...heights.field import HeightField
 from ...heights.validity import units_warning
-from ...settings import TableSettings
+from ...optics.geometry import sigma_of
+from ...settings import MAX_TAPS, TableSettings
 from ..document import MAX_BYTES
 from ..expansion import Expansion
 from ..packing import Grid
 from ..table import build_error
+from ..window import taps_for
 from .choose import taylor_rounding, taylor_truncation
+
+#: The coherence window is at most so many patches wide: a patch of one period is tiled.
+MOST_PATCHES = 400
+#: What taps may use up of the tolerance when their number is chosen.
+TAPS_SHARE = 0.5
 
 #: Heights of both, a slope of 89.4° and a range in µm, are some hundred nm taken for µm.
 HOPELESS_SLOPE, HOPELESS_RANGE = 100.0, 50.0
@@ -49,6 +57,42 @@ def check_units(patches: Sequence[HeightField]) -> None:
                 f"'{patch.name}' has an RMS slope of {patch.rms_slope:.3g}, as no surface has: "
                 f"{units_warning(patch)}"
             )
+
+
+def check_window(extent: tuple[float, float], settings: TableSettings) -> None:
+    """Refuse a patch that is much smaller or larger than the coherence window, by its size alone.
+
+    extent : µm, along x and y.
+
+    Raises
+    ------
+    DiffractionError
+        If no table of such a patch could be rendered with.
+    """
+    width = settings.coherence_width
+    if width > MOST_PATCHES * min(extent):
+        raise build_error(
+            f"coherence_width={width:g} µm is more than {MOST_PATCHES} times as wide as the patch "
+            f"of {extent[0]:.4g} × {extent[1]:.4g} µm; check both units, or give a larger patch "
+            "(of a grating: more periods)"
+        )
+    steps = tuple(sigma_of(width) * 2.0 * np.pi / length for length in extent)
+    taps = taps_for((steps[0], steps[1]), settings.tolerance * TAPS_SHARE, settings.coherent)
+    if settings.taps is None and max(taps) > MAX_TAPS:
+        raise too_wide(extent, settings, taps)
+
+
+def too_wide(
+    extent: tuple[float, float], settings: TableSettings, taps: tuple[int, int]
+) -> DiffractionError:
+    """An error about a patch so wide that a look-up would read more taps than there may be."""
+    width = settings.coherence_width
+    return build_error(
+        f"the patch is {max(extent):.4g} µm wide, so much more than the coherence window that a "
+        f"look-up would read {taps[0]}×{taps[1]} orders; crop the heights, for instance to "
+        f"{width:g} µm (crop={width:g} of a scene, --crop {width:g}), or raise coherence_width or "
+        "tolerance"
+    )
 
 
 def check_taylor(heights: HeightField, expansion: Expansion, tolerance: float) -> None:

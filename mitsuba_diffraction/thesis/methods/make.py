@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from ...errors import DiffractionError
 from ...heights.field import HeightField
 from ...progress import Progress
-from ...tables.build.build import TAPS_SHARE
+from ...tables.build.checks import TAPS_SHARE
 from ...tables.table import DiffractionTable
 from ...tables.window import taps_for
 from .full_spectrum import FullSpectrum

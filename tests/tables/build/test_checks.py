@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, reference
+from mitsuba_diffraction import (
+    DiffractionError,
+    DiffractionTable,
+    DiffractionWarning,
+    HeightField,
+    reference,
+)
 from mitsuba_diffraction.tables.build.choose import taylor_rounding
 from tests.directions import rough_patch
 from tests.tables.patches import DEEP, DEFAULTS, PATCH
@@ -91,6 +99,40 @@ def test_too_few_taps_are_refused_with_the_error_they_leave():
 )
 def test_bad_parameters_are_refused_in_one_line(arguments, message):
     assert message in refused(**arguments)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"coherence_width": 65e3},  # nm for µm
+        {"coherence_width": 1e300},
+        {"coherence_width": 499.0, "heights": rough_patch((24, 24), (0.02, 0.02), 0.1)},
+        {"coherence_width": 1.0, "heights": rough_patch((512, 512), (0.4, 0.4), 0.4)},
+        {"coherence_width": 1.0, "heights": rough_patch((2, 512), (0.1, 0.4), 0.4)},
+    ],
+    ids=["65000 µm", "1e300 µm", "a thousand patches", "a wide patch", "a long patch"],
+)
+def test_windows_that_do_not_suit_a_patch_are_refused_at_once(arguments):
+    start = time.perf_counter()
+    text = refused(**arguments)
+    assert time.perf_counter() - start < 0.5
+    assert "coherence" in text
+
+
+def test_what_a_wide_patch_is_advised_to_do_helps():
+    wide = rough_patch((256, 256), (0.4, 0.4), 0.2)
+    text = refused(heights=wide, coherence_width=1.5)
+    assert "crop the heights, for instance to 1.5 µm" in text
+    table = DiffractionTable.build(wide.treated(crop=1.5), coherence_width=1.5)
+    assert table.coarse is None
+
+
+def test_the_former_name_of_q_max_says_what_it_is():
+    with pytest.warns(DiffractionWarning, match=r"rad/µm.*µm, crop the heights"):
+        former = DiffractionTable.build(PATCH, crop=12.0, **DEFAULTS)
+    assert former.digest() == DiffractionTable.build(PATCH, q_max=12.0, **DEFAULTS).digest()
+    with pytest.raises(DiffractionError, match="former name"):
+        DiffractionTable.build(PATCH, crop=12.0, q_max=12.0, **DEFAULTS)
 
 
 def test_a_series_too_short_for_any_number_of_intervals_is_refused():

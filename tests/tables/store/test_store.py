@@ -166,7 +166,7 @@ def test_of_eight_processes_one_makes_it(tmp_path, folder):
 def test_what_a_killed_process_left_is_removed(folder):
     get([])
     (file,) = folder.iterdir()
-    child(KILLED, str(folder / "other.cache"), str(file))
+    child(KILLED, str(folder / "values-other.cache"), str(file))
     assert len(list(folder.iterdir())) == 3
     get([], key="5" * 64)
     assert len([path for path in folder.iterdir() if path.name.startswith(".")]) == 0

@@ -1,0 +1,185 @@
+"""Rigorous solutions in two dimensions by coupled waves in layers: `grcwa` (extra `validation`).
+
+Liu and Fan 2012 ("S4", Computer Physics Communications 183, 2233). It gives complex amplitudes of
+both polarisations at any incidence. Two things are ours: in a layer through a slope, ε is the mean
+over the layer's height along the surface, and the harmonic mean across, so that the error goes with
+the square of the layers' thickness; and the harmonics are those nearest to the normal of the
+*light's* frequencies, so that oblique light needs no more of them.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_diffraction import HeightField
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.optics import boundary
+
+#: Orders closer to the horizon than this cosine are not returned.
+_HORIZON = 0.01
+# modes whose |Im q| is below this share of |Re q| travel: the rest is rounding
+_TRAVELLING = 1e-6
+
+
+@dataclass(frozen=True)
+class Orders:
+    """Reflected orders of a cell.
+
+    Attributes
+    ----------
+    order : (n, 2) numbers (mx, my).
+    wo : (n, 3) directions.
+    jones : (n, 2, 2) amplitudes about `boundary.polarisation_axes`, phases from height 0.
+    """
+
+    order: NDArray[np.int64]
+    wo: NDArray[np.float64]
+    jones: NDArray[np.complex128]
+
+
+def name() -> str:
+    """The solver's name and version."""
+    return f"grcwa {importlib.metadata.version('grcwa')}, coupled waves"
+
+
+def available() -> bool:
+    """Whether grcwa can be imported."""
+    return importlib.util.find_spec("grcwa") is not None
+
+
+def solve(
+    field: HeightField,
+    index: complex,
+    wavelength: float,
+    wi: NDArray[np.float64],
+    harmonics: int,
+    layers: int,
+) -> Orders:
+    """Amplitudes of every reflected order.
+
+    Parameters
+    ----------
+    field : the cell; where all rows are the same, a grating along x.
+    index : n + ik of the material under vacuum.
+    wavelength : nm.
+    wi : (3,) unit vector to the light.
+    harmonics : how many spatial frequencies the field is expanded in.
+    layers : that the heights are cut into.
+
+    Raises
+    ------
+    DiffractionError
+        If grcwa is not installed.
+    """
+    if not available():
+        raise DiffractionError(
+            "grcwa is not installed; install the extra: pip install '.[validation]'"
+        )
+    import grcwa
+
+    lam = wavelength / 1000
+    width, height = field.extent
+    # grcwa's z points along the light: its frame is ours turned about x by half a turn
+    along = -wi * _TURNED
+    chosen = _harmonics(along, lam, (width, height), is_crossed(field), harmonics)
+    grcwa.rcwa.SolveLayerEigensystem = _eigenmodes
+    grcwa.rcwa.Lattice_getG = lambda *_, **__: (chosen, len(chosen))
+    polar, azimuth = np.arccos(along[2]), np.arctan2(along[1], along[0])
+    cell = grcwa.obj(harmonics, [width, 0], [0, height], 1 / lam, polar, azimuth, verbose=0)
+    _stack(cell, field, index**2, layers)
+    return _amplitudes(cell, chosen, wi, lam, float(field.heights.max()))
+
+
+def is_crossed(field: HeightField) -> bool:
+    """Whether the heights change along y too."""
+    return bool(np.any(field.heights != field.heights[0]))
+
+
+#: From our frame to grcwa's and back.
+_TURNED = np.array([1.0, -1.0, -1.0])
+
+
+def _harmonics(
+    along: NDArray[np.float64],
+    lam: float,
+    extent: tuple[float, float],
+    crossed: bool,
+    count: int,
+) -> NDArray[np.int64]:
+    """Order numbers (count, 2) of the lowest spatial frequencies of the field, light's included."""
+    reach = np.arange(-count, count + 1) if not crossed else np.arange(-40, 41)
+    mx, my = np.meshgrid(reach, reach if crossed else [0], indexing="ij")
+    orders = np.stack([mx.ravel(), my.ravel()], axis=1)
+    frequency = along[:2] / lam + orders / np.array(extent)
+    return orders[np.argsort(np.hypot(*frequency.T), kind="stable")[:count]]
+
+
+def _stack(cell: Any, field: HeightField, epsilon: complex, layers: int) -> None:
+    """Vacuum, layers through the heights, and the material."""
+    ny, nx = field.shape
+    heights = field.heights[-np.arange(ny) % ny, :].T  # grcwa's y points the other way
+    top, thickness = heights.max(), np.ptp(heights) / layers
+    cell.Add_LayerUniform(0.0, 1.0)
+    for _ in range(layers):
+        cell.Add_LayerGrid(thickness, nx, ny)
+    cell.Add_LayerUniform(0.0, epsilon)
+    cell.Init_Setup()
+    bottoms = top - thickness * np.arange(1, layers + 1)
+    filled = np.clip((heights - bottoms[:, None, None]) / thickness, 0, 1).ravel()
+    mean = 1 + filled * (epsilon - 1)
+    cell.GridLayer_geteps([mean, mean, 1 / (1 - filled + filled / epsilon)])
+
+
+def _amplitudes(
+    cell: Any, orders: NDArray[np.int64], wi: NDArray[np.float64], lam: float, top: float
+) -> Orders:
+    """Reflected fields of light polarised along s and p, from the stack's scattering matrix."""
+    from grcwa.rcwa import GetSMatrix
+
+    omega, count = cell.omega.real, cell.nG
+    kx, ky = np.real(cell.kx), np.real(cell.ky)
+    up = np.sqrt(np.maximum(omega**2 - kx**2 - ky**2, 0)) / omega
+    kept = up > _HORIZON
+    wo = np.stack([kx / omega, -ky / omega, up], axis=1)[kept]
+    s_in, s_out = boundary.polarisation_axes(wi, wo)
+    p_out = np.cross(wo, s_out)
+    layers = len(cell.thickness_list)
+    lists = cell.q_list, cell.phi_list, cell.kp_list, cell.thickness_list
+    reflection = GetSMatrix(0, layers - 1, *lists)[2]
+    zeroth = int(np.flatnonzero((orders == 0).all(axis=1))[0])
+    fields = []
+    basis = boundary.polarisation_axes(wi, wi * [-1, -1, 1])[0]
+    for electric in (basis, np.cross(-wi, basis)):
+        magnetic = np.cross(-wi * _TURNED, electric * _TURNED)
+        incident = np.zeros(2 * count, complex)
+        incident[[zeroth, count + zeroth]] = magnetic[:2]
+        outgoing = -(reflection @ incident) / omega / cell.q_list[0]
+        # grcwa has (−Ey, Ex), and its y points the other way
+        y, x = (half[kept] for half in np.split(cell.kp_list[0] @ outgoing, 2))
+        z = -(wo[:, 0] * x + wo[:, 1] * y) / wo[:, 2]
+        found = np.stack([x, y, z], axis=1)
+        fields.append([np.sum(found * s_out, axis=1), np.sum(found * p_out, axis=1)])
+    jones = np.moveaxis(np.array(fields), 2, 0).swapaxes(1, 2)
+    # from the zeroth order's axes to those that `boundary` has for each pair of directions
+    turned = jones @ boundary.turn(basis, s_in, -wi)
+    # the solver's phases are those at the highest point
+    phase = np.exp(-1j * omega * (wi[2] + wo[:, 2]) * top)
+    return Orders(orders[kept] * [1, -1], wo, phase[:, None, None] * turned)
+
+
+def _eigenmodes(
+    omega: Any, kx: Any, ky: Any, kp: Any, epsilon: Any
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Modes of a layer; grcwa's own takes a travelling mode whose Im q is −1e-17 for a returning
+    one, which makes its scattering matrices singular."""
+    k = np.vstack((np.diag(kx), np.diag(ky)))
+    squared, modes = np.linalg.eig(epsilon @ kp - k @ k.T)
+    q = np.sqrt(squared)
+    travels = np.abs(q.imag) < _TRAVELLING * np.abs(q.real)
+    return np.where(np.where(travels, q.real < 0, q.imag < 0), -q, q), modes

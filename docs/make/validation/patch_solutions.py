@@ -1,0 +1,152 @@
+"""Making and keeping the rigorous solutions in two dimensions."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_diffraction import HeightField
+from mitsuba_diffraction.optics import boundary
+from mitsuba_diffraction.progress import Progress, silent
+
+from . import crossed
+from .patches import SURFACES, PatchCase, cell, patch_cases, patch_index
+from .solutions import load_rows
+
+#: A row is one order (mx, my) of one case: wavelength in nm, angles in degrees, `surface` the place
+#: in `SURFACES`; `jones` as `crossed.Orders` has it; `change` is by how much the efficiency for
+#: unpolarised light changed with the resolution.
+PATCH_ROW = np.dtype(
+    [
+        ("surface", "i1"),
+        ("wavelength", "f4"),
+        ("theta", "f4"),
+        ("phi", "f4"),
+        ("mx", "i2"),
+        ("my", "i2"),
+        ("jones", "c8", (2, 2)),
+        ("change", "f4"),
+    ]
+)
+
+_NAMES = list(SURFACES)
+
+#: (harmonics, layers), first and finally: of gratings, and of cells.
+RESOLUTIONS = {
+    "keratin": (((41, 12), (61, 24)), ((101, 8), (165, 14))),
+    "aluminium": (((81, 32), (121, 64)), ((121, 10), (165, 18))),
+}
+
+
+@dataclass(frozen=True)
+class Solved:
+    """One case: rows (n,) of `PATCH_ROW`."""
+
+    case: PatchCase
+    rows: NDArray[np.void]
+
+    @property
+    def wi(self) -> NDArray[np.float64]:
+        """Unit vector to the light, (3,)."""
+        theta, phi = np.radians([self.case.theta, self.case.phi])
+        sine = np.sin(theta)
+        return np.array([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)])
+
+    def wo(self, field: HeightField) -> NDArray[np.float64]:
+        """Directions of the orders, (n, 3)."""
+        numbers = np.stack([self.rows["mx"], self.rows["my"]], axis=1)
+        tangential = self.case.wavelength / 1000 * numbers / field.extent - self.wi[:2]
+        upward = np.sqrt(1 - np.sum(tangential**2, axis=1))
+        return np.column_stack([tangential, upward])
+
+    def efficiency(self, field: HeightField) -> NDArray[np.float64]:
+        """Efficiencies of the orders for unpolarised light, (n,)."""
+        power = boundary.unpolarised(self.rows["jones"])
+        return power * self.wo(field)[:, 2] / self.wi[2]
+
+
+def solve_patches(material: str, progress: Progress | None = None) -> NDArray[np.void]:
+    """Rows of all cases of a material; a quarter of an hour.
+
+    Raises
+    ------
+    DiffractionError
+        If the solver or the measured patch is not here.
+    """
+    tell = progress or silent
+    cases = patch_cases(material)
+    rows = []
+    for n, case in enumerate(cases):
+        tell(n, len(cases), f"solving {case.surface.name}")
+        rows.append(solve_case(case))
+    tell(len(cases), len(cases), "done")
+    return np.concatenate(rows)
+
+
+def about(material: str) -> dict[str, Any]:
+    """What made the solutions."""
+    return {
+        "command": f"python -m docs.make.validation patches {material}",
+        "date": datetime.date.today().isoformat(),
+        "solver": crossed.name(),
+        "material": material,
+        "surfaces": _NAMES,
+        "harmonics and layers of gratings and of cells": RESOLUTIONS[material],
+    }
+
+
+def solve_case(
+    case: PatchCase, resolutions: tuple[tuple[int, int], tuple[int, int]] | None = None
+) -> NDArray[np.void]:
+    """Rows of one case, at two resolutions (of `RESOLUTIONS` by default)."""
+    field = cell(case.surface)
+    line_or_cell = int(crossed.is_crossed(field))
+    first, final = resolutions or RESOLUTIONS[case.material][line_or_cell]
+    index = patch_index(case.material, case.wavelength)
+    solved = Solved(case, np.empty(0, PATCH_ROW))
+    coarse, fine = (
+        crossed.solve(field, index, case.wavelength, solved.wi, *resolution)
+        for resolution in (first, final)
+    )
+    rows = np.zeros(len(fine.order), PATCH_ROW)
+    rows["surface"] = _NAMES.index(case.surface.name)
+    rows["wavelength"], rows["theta"], rows["phi"] = case.wavelength, case.theta, case.phi
+    rows["mx"], rows["my"] = fine.order.T
+    rows["jones"] = fine.jones
+    before = {tuple(key): power for key, power in zip(coarse.order, _powers(coarse), strict=True)}
+    powers = zip(fine.order, _powers(fine), strict=True)
+    ratio = fine.wo[:, 2] / solved.wi[2]
+    changes = [abs(power - before.get(tuple(key), 0.0)) for key, power in powers]
+    rows["change"] = np.array(changes) * ratio
+    return rows
+
+
+def solved(material: str) -> tuple[list[Solved], Mapping[str, Any]]:
+    """The solutions that are kept, case by case, and what made them."""
+    data = resources.files(__package__) / "data"
+    with resources.as_file(data / patch_file(material)) as path:
+        rows, made = load_rows(path, PATCH_ROW)
+    return list(_cases_of(rows, material)), made
+
+
+def patch_file(material: str) -> str:
+    """What the file of a material's solutions is called."""
+    return f"{material}_patches.npz"
+
+
+def _cases_of(rows: NDArray[np.void], material: str) -> Iterator[Solved]:
+    key = ["surface", "wavelength", "theta", "phi"]
+    unique, inverse = np.unique(rows[key], return_inverse=True)
+    for n, (surface, wavelength, theta, phi) in enumerate(unique.tolist()):
+        case = PatchCase(SURFACES[_NAMES[surface]], material, wavelength, theta, phi)
+        yield Solved(case, rows[inverse.ravel() == n])
+
+
+def _powers(orders: crossed.Orders) -> NDArray[np.float64]:
+    return boundary.unpolarised(orders.jones)

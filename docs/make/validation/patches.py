@@ -1,0 +1,174 @@
+"""Surfaces in two dimensions that the model is held against rigorous solutions for.
+
+Small periodic cells: conical mounts of a sinusoid, a crossed grating, and cuts
+of scales and of a CD. A cut is made periodic, smoothed and scaled to a given slope, so that it can
+be solved with a few hundred harmonics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_diffraction import HeightField, gratings
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.heights.preprocess.periodic import periodic_smooth
+
+from .cases import ALUMINIUM, KERATIN
+
+#: The measured patch that cuts are made of; it is no part of the project.
+MEASURED = Path(__file__).parents[3].parent / "shared" / "afm" / "elaphe-65um.png"
+
+#: Pixels along each side of a cut or a crossed grating, and along a sinusoid.
+PIXELS = 64
+_LINE = 256
+#: Standard deviation (µm) of the Gaussian that cuts are smoothed by: what is finer than the light
+#: is no matter for the model, and takes many harmonics.
+_SMOOTHING = 0.05
+#: Sinusoids have two rows, this far apart (µm): they are the same along y.
+_ROW = 0.01
+
+
+@dataclass(frozen=True)
+class Surface:
+    """One cell that tiles the plane.
+
+    `kind` is sinusoid, crossed, elaphe, elaphe_like or cd_pits. `size` is the period or the cut's
+    side in µm, `place` its corner in pixels of what it is cut from. `slope` is the RMS of |∇h|,
+    `wavelength` (nm) what it is solved at.
+    """
+
+    name: str
+    kind: str
+    size: float
+    slope: float
+    place: tuple[int, int] = (0, 0)
+    wavelength: float = 550.0
+
+
+@dataclass(frozen=True)
+class PatchCase:
+    """A surface of a material in light from (theta, phi), degrees, at one wavelength, nm."""
+
+    surface: Surface
+    material: str
+    wavelength: float
+    theta: float
+    phi: float
+
+
+#: Slopes of the sinusoids are those of 2.5/0.05 and 1.6/0.1 µm.
+SURFACES = {
+    surface.name: surface
+    for surface in (
+        Surface("sinusoid 2.5/0.05 µm", "sinusoid", 2.5, np.pi * 0.05 / 2.5 / np.sqrt(2)),
+        Surface("sinusoid 1.6/0.1 µm", "sinusoid", 1.6, np.pi * 0.1 / 1.6 / np.sqrt(2)),
+        Surface("crossed grating", "crossed", 1.5, 0.1),
+        Surface("Elaphe, cut 1", "elaphe", 2.6, 0.2, (640, 500)),
+        Surface("Elaphe, cut 2", "elaphe", 2.6, 0.2, (900, 850), 460.0),
+        Surface("Elaphe, cut 3", "elaphe", 2.6, 0.2, (200, 1000)),
+        Surface("Elaphe, cut 1, flattened", "elaphe", 2.6, 0.09, (640, 500)),
+        Surface("look-alike of Elaphe", "elaphe_like", 2.6, 0.2, (100, 100)),
+        Surface("CD's pits, flattened", "cd_pits", 3.2, 0.2, (600, 590)),
+    )
+}
+
+_OBLIQUE = ((0.0, 0.0), (30.0, 0.0), (30.0, 90.0), (60.0, 0.0), (60.0, 45.0), (60.0, 90.0))
+_FEW = ((0.0, 0.0), (60.0, 0.0), (60.0, 45.0))
+
+
+def patch_cases(material: str) -> list[PatchCase]:
+    """What is solved for a material, in a fixed order."""
+    return list(_cases(material))
+
+
+def patch_index(material: str, wavelength: float) -> complex:
+    """Index n + ik at a wavelength (nm) of the cases."""
+    if material == "keratin":
+        return complex(KERATIN)
+    # Mitsuba's table is smooth there
+    nodes = sorted(ALUMINIUM)
+    return complex(np.interp(wavelength, nodes, [ALUMINIUM[node] for node in nodes]))
+
+
+@cache
+def cell(surface: Surface) -> HeightField:
+    """Heights of a surface, mean 0.
+
+    Raises
+    ------
+    DiffractionError
+        If it is cut from the measured patch and that is not there.
+    """
+    if surface.kind == "sinusoid":
+        line = np.cos(2 * np.pi * np.arange(_LINE) / _LINE)[None, :]
+        depth = surface.slope * surface.size * np.sqrt(2) / np.pi
+        heights = np.repeat(0.5 * depth * line, 2, axis=0)
+        return HeightField(heights, (surface.size / _LINE, _ROW), name=surface.name)
+    if surface.kind == "crossed":
+        line = np.cos(2 * np.pi * np.arange(PIXELS) / PIXELS)
+        heights = line[None, :] + line[:, None]
+        side = surface.size
+    else:
+        heights, side = _cut(surface)
+    heights = heights - heights.mean()
+    heights *= surface.slope / _slope(heights, side)
+    return HeightField(heights, side / PIXELS, name=surface.name)
+
+
+def _cases(material: str) -> Iterator[PatchCase]:
+    for surface in SURFACES.values():
+        grating = surface.kind == "sinusoid"
+        if material != "keratin" and not grating and surface.slope > 0.1:
+            continue  # light in a metal takes more harmonics than there is memory for
+        wavelengths = (460.0, 610.0) if surface.name == "Elaphe, cut 1" else (surface.wavelength,)
+        for wavelength in wavelengths:
+            for theta, phi in _OBLIQUE if material == "keratin" or grating else _FEW:
+                yield PatchCase(surface, material, wavelength, theta, phi)
+
+
+def _cut(surface: Surface) -> tuple[NDArray[np.float64], float]:
+    """Heights (`PIXELS`, `PIXELS`) of a cut, periodic and smooth, and its side in µm."""
+    field = _source(surface.kind)
+    pixel = field.pixel_size[0]
+    count = 2 * round(surface.size / pixel / 2)
+    row, column = surface.place
+    piece = field.heights[row : row + count, column : column + count]
+    periodic, _ = periodic_smooth(HeightField(piece, field.pixel_size))
+    side = count * pixel
+    return _smoothed(periodic.heights, side), side
+
+
+def _source(kind: str) -> HeightField:
+    if kind == "elaphe_like":
+        return gratings.elaphe_like(extent=20.0, pixels=410, seed=1)
+    if kind == "cd_pits":
+        return gratings.cd(extent=64.0, pixels=1312, seed=0)
+    if not MEASURED.is_file():
+        raise DiffractionError(f"the measured patch is not here: {MEASURED}")
+    return HeightField.load(MEASURED, pixel_size=65 / 1332, max_height=0.375)
+
+
+def _smoothed(heights: NDArray[np.float64], side: float) -> NDArray[np.float64]:
+    """Low frequencies at `PIXELS` samples a side, weighed by the Gaussian `_SMOOTHING`."""
+    count = len(heights)
+    kept = min(count, PIXELS) // 2 - 1  # harmonics either way, without Nyquist's
+    few = np.arange(-kept, kept + 1)
+    weight = np.exp(-0.5 * (2 * np.pi * few / side * _SMOOTHING) ** 2)
+    spectrum = np.zeros((PIXELS, PIXELS), complex)
+    found = np.fft.fft2(heights)[np.ix_(few, few)] * np.outer(weight, weight)
+    spectrum[np.ix_(few, few)] = found * (PIXELS / count) ** 2
+    return np.fft.ifft2(spectrum).real
+
+
+def _slope(heights: NDArray[np.float64], side: float) -> float:
+    """RMS of |∇h| of the band-limited surface."""
+    count = len(heights)
+    q = 2 * np.pi * np.fft.fftfreq(count, side / count)
+    power = np.abs(np.fft.fft2(heights) / heights.size) ** 2
+    return float(np.sqrt(np.sum(power * (q[None, :] ** 2 + q[:, None] ** 2))))

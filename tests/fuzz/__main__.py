@@ -1,0 +1,149 @@
+"""`python -m tests.fuzz`: random cases until the time is up; exit code 1 if any of them failed."""
+
+from __future__ import annotations
+
+import argparse
+import faulthandler
+import json
+import secrets
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from tests.fuzz import command_lines, damage, surfaces
+
+KINDS: dict[str, Callable[[np.random.Generator], None]] = {
+    "tables": damage.check_table,
+    "heights": damage.check_heights,
+    "texts": damage.check_text,
+    "commands": command_lines.check,
+    "surfaces": surfaces.check,
+}
+#: Share of the time that each kind gets.
+_SHARES = {"tables": 0.2, "heights": 0.15, "texts": 0.05, "commands": 0.3, "surfaces": 0.3}
+_HANG = 10  # seconds that a case may take
+_SHOWN = 300  # characters of a failure
+
+
+def run_case(kind: str, seed: int, number: int) -> None:
+    """One case; the same numbers make the same case.
+
+    Raises
+    ------
+    AssertionError
+        Or whatever else the case raises, if it fails.
+    """
+    rng = np.random.default_rng([seed, sorted(KINDS).index(kind), number])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        KINDS[kind](rng)
+
+
+def main() -> int:
+    """Start the workers, and collect what they found."""
+    parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--seed", type=int, default=None, help="default: a new one, printed")
+    parser.add_argument("--kind", choices=KINDS, action="append", help="default: all")
+    parser.add_argument("--case", type=int, help="this one only, with --seed and --kind")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--worker", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--log", type=Path, help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    kinds = args.kind or list(KINDS)
+    if args.case is not None:
+        _prepare()
+        run_case(kinds[0], args.seed or 0, args.case)
+        return 0
+    seed = secrets.randbelow(2**31) if args.seed is None else args.seed
+    if args.worker is not None:
+        return _work(args, kinds, seed)
+    print(f"seed {seed}", flush=True)
+    return _supervise(args, kinds, seed)
+
+
+def _supervise(args: argparse.Namespace, kinds: list[str], seed: int) -> int:
+    """Run the workers in processes of their own, which may die."""
+    failed, counts = [], dict.fromkeys(kinds, 0)
+    with tempfile.TemporaryDirectory() as folder:
+        workers = []
+        for n in range(args.jobs):
+            log = Path(folder, f"{n}.jsonl")
+            words = ["--seed", seed, "--seconds", args.seconds, "--jobs", args.jobs]
+            words += ["--worker", n, "--log", log, *(w for k in kinds for w in ("--kind", k))]
+            command = [sys.executable, "-m", "tests.fuzz", *map(str, words)]
+            workers.append((log, subprocess.Popen(command)))
+        for log, worker in workers:
+            code = worker.wait()
+            entries = [json.loads(line) for line in log.read_text("utf-8").splitlines()]
+            for entry in entries:
+                counts[entry["kind"]] += "text" not in entry
+            failed += [entry for entry in entries if "text" in entry]
+            if code < 0 or (code > 0 and entries):
+                failed.append(entries[-1] | {"text": f"the process ended with exit code {code}"})
+            elif code:
+                failed.append({"kind": kinds[0], "number": 0, "text": "no case was run"})
+    for entry in failed:
+        repeat = f"--kind {entry['kind']} --seed {seed} --case {entry['number']}"
+        print(f"FAILED python -m tests.fuzz {repeat}: {entry['text']}")
+    print(", ".join(f"{count} {kind}" for kind, count in counts.items()), end="")
+    print(f" in {args.seconds:.0f} s: {len(failed)} failed")
+    return 1 if failed else 0
+
+
+def _work(args: argparse.Namespace, kinds: list[str], seed: int) -> int:
+    """Cases until the time is up: each is logged before it begins, and again if it fails."""
+    _prepare()
+    start = time.monotonic()
+    spent = dict.fromkeys(kinds, 0.0)
+    number = dict.fromkeys(kinds, args.worker)
+    with args.log.open("w", encoding="utf-8", buffering=1) as log:
+        while time.monotonic() - start < args.seconds:
+            kind = min(kinds, key=lambda k: spent[k] / _SHARES[k])
+            entry = {"kind": kind, "number": number[kind]}
+            print(json.dumps(entry), file=log)
+            begin = time.monotonic()
+            text = _failure(kind, seed, number[kind])
+            if text:
+                print(json.dumps(entry | {"text": text}), file=log)
+            spent[kind] += time.monotonic() - begin
+            number[kind] += args.jobs
+    return 0
+
+
+def _failure(kind: str, seed: int, number: int) -> str:
+    """What went wrong in a case, or nothing."""
+    signal.alarm(_HANG)
+    faulthandler.dump_traceback_later(3 * _HANG, exit=True)  # where Python's alarm is not heard
+    try:
+        run_case(kind, seed, number)
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"[:_SHOWN].replace("\n", " ")
+    finally:
+        signal.alarm(0)
+        faulthandler.cancel_dump_traceback_later()
+    return ""
+
+
+def _prepare() -> None:
+    """A variant; an alarm that raises; a cache of this run's own is the caller's."""
+    import mitsuba as mi
+
+    mi.set_variant("llvm_ad_spectral")
+    signal.signal(signal.SIGALRM, _hangs)
+    import SurfaceTopography  # noqa: F401  takes seconds, which no case shall be charged for
+
+
+def _hangs(*_: object) -> None:
+    raise TimeoutError(f"takes over {_HANG} s")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

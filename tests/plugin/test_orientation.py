@@ -1,0 +1,54 @@
+"""What `orientation` refuses, in all variants, and that what it takes means the same."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from tests.lanes import evaluated, refusal
+from tests.plugin.gentle import load, pairs
+
+VARIANTS = ("scalar_rgb", "scalar_spectral", "llvm_ad_rgb", "llvm_ad_mono", "llvm_ad_spectral")
+
+
+def bitmap(degrees, raw=True, channels=3, levels=None):
+    """Four directions; of an integer format, which clips, where it has so many `levels`."""
+    angles = np.deg2rad(np.reshape(degrees, (2, 2, 1)))
+    data = np.concatenate([np.cos(angles), np.sin(angles), 0 * angles], axis=2)[..., :channels]
+    if levels:
+        data = np.rint(np.clip(data, 0.0, 1.0) * levels) / levels
+    return {"type": "bitmap", "raw": raw, "data": mi.TensorXf(data.astype(np.float32))}
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+@pytest.mark.parametrize(
+    ("texture", "mend"),
+    [
+        ({"raw": False}, "raw"),
+        ({"channels": 1}, "take three"),
+        ({"levels": 255}, "save .* as EXR"),
+        ({"levels": 65535}, "save .* as EXR"),
+    ],
+)
+def test_a_picture_that_holds_no_directions_is_refused(name, texture, mend):
+    mi.set_variant(name)
+    said = refusal(lambda: load(orientation=bitmap([10.0, 120.0, 200.0, 300.0], **texture)))
+    assert said.startswith("orientation: ")
+    assert __import__("re").search(mend, said)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 53.13010235, 90.0, 45.0])
+def test_directions_that_integers_could_hold_are_taken(some_variant, degrees):
+    """(0.6, 0.8) is a multiple of 1/255: no reason to refuse it."""
+    wi, wo, lam = pairs(20)
+    textured = load(orientation=bitmap([degrees] * 4))
+    expected = evaluated(load(orientation=degrees), wi, wo, lam[:, None])
+    found = evaluated(textured, wi, wo, lam[:, None])
+    # the angle's sine in single precision, times kσ = 16
+    assert found == pytest.approx(expected, rel=1e-4, abs=1e-5 * expected.max())
+
+
+@pytest.mark.parametrize("degrees", [1e30, -40_000.0])
+def test_angles_without_digits_are_refused(some_variant, degrees):
+    assert "must be between -36000 and 36000 degrees" in refusal(lambda: load(orientation=degrees))

@@ -1,0 +1,230 @@
+"""Damaged and hostile tables: refused in one line, or harmless wherever they are looked up."""
+
+from __future__ import annotations
+
+import copy
+import json
+import os
+import random
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from mitsuba_diffraction import DiffractionError, DiffractionTable
+from mitsuba_diffraction.tables.exr import ATTRIBUTE, CHECKSUM, _checksum
+from tests.directions import rough_patch
+
+#: Tables and files of each kind; `MITSUBA_DIFFRACTION_DAMAGE=10000` for as many as one likes.
+TRIALS = int(os.environ.get("MITSUBA_DIFFRACTION_DAMAGE", "80"))
+PATCH = rough_patch((20, 24), (0.08, 0.09), 0.15)
+KINDS = {
+    "svd": {},
+    "patch": {"coherence": "patch"},
+    "taylor": {"basis": "taylor"},
+    "restricted": {"q_max": 12.0, "kappa_max": 20.0},
+}
+VALUES = (
+    0, 1, -1, 2, 3, 4, 7, 41, 64, 1000, 2**31, 2**63, 10**400, 0.5, -0.5, 1e-300, 1e9, 1e308,
+    float("nan"), float("inf"), True, False, None, "", "svd", "taylor", "amplitude", "patch", [],
+    {}, [1, 2], [1e9, 1e9], [4, 1000], [0.1, 0.1], [[[1.0]]], "1" * 5000, [[[]]], [None, None],
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def file(request, tmp_path_factory) -> Path:
+    """A table of each kind, in a file."""
+    path = tmp_path_factory.mktemp("tables") / "table.exr"
+    DiffractionTable.build(PATCH, coherence_width=1.8, **KINDS[request.param]).save(path)
+    return path
+
+
+class Contents:
+    """What is in a table's file, to be changed and written with a checksum that fits."""
+
+    def __init__(self, path: Path) -> None:
+        with OpenEXR.File(str(path), separate_channels=True) as exr:
+            self.headers = [dict(part.header) for part in exr.parts]
+            self.parts = [
+                {name: np.array(c.pixels) for name, c in part.channels.items()}
+                for part in exr.parts
+            ]
+        self.document = json.loads(self.headers[0][ATTRIBUTE])
+
+    def write(self, path: Path) -> None:
+        """A file that nothing but what it says gives away."""
+        text = json.dumps(self.document)
+        rows, columns = next(iter(self.parts[0].values())).shape
+        shared = {
+            "type": OpenEXR.scanlineimage,
+            "compression": OpenEXR.ZIP_COMPRESSION,
+            "displayWindow": (np.zeros(2, np.int32), np.array([columns - 1, rows - 1], np.int32)),
+        }
+        names = ("orders", "coarse")
+        headers = [{**shared, "name": name} for name in names[: len(self.parts)]]
+        # the order in which a reader goes through the channels
+        ordered = [{name: part[name] for name in sorted(part, key=_place)} for part in self.parts]
+        headers[0] |= {ATTRIBUTE: text, CHECKSUM: _checksum(text, ordered)}
+        parts = [OpenEXR.Part(*one) for one in zip(headers, self.parts, strict=True)]
+        OpenEXR.File(parts).write(str(path))
+
+
+def _place(channel: str) -> tuple[int, bool, int]:
+    prefix, interval, term = channel.split(".")
+    return int(interval), prefix == "im", int(term)
+
+
+def _mutated(node: Any, rng: random.Random) -> Any:
+    """The same JSON with one value, anywhere, exchanged, changed, removed or added."""
+    if isinstance(node, dict) and node and rng.random() < 0.93:
+        node = dict(node)
+        name = rng.choice(sorted(node))
+        if rng.random() < 0.06:
+            del node[name]
+        elif rng.random() < 0.03:
+            node["another"] = node[name]
+        else:
+            node[name] = _mutated(node[name], rng)
+        return node
+    if isinstance(node, list) and node and rng.random() < 0.8:
+        node = list(node)
+        place = rng.randrange(len(node))
+        kind = rng.random()
+        if kind < 0.1:
+            del node[place]
+        elif kind < 0.2:
+            node.append(copy.deepcopy(node[place]))
+        else:
+            node[place] = _mutated(node[place], rng)
+        return node
+    if isinstance(node, int | float) and not isinstance(node, bool) and rng.random() < 0.6:
+        factor = rng.choice([0, -1, 2, 0.5, 1.001, 1.5, 10, 1000, 1e-3, 1e9])
+        return type(node)(node * factor) if rng.random() < 0.8 else node + rng.choice([1, -1])
+    return copy.deepcopy(rng.choice(VALUES))
+
+
+def _damage(contents: Contents, rng: random.Random) -> None:
+    """One or two fields or channels."""
+    for _ in range(rng.choice([1, 1, 2])):
+        if rng.random() < 0.8:
+            contents.document = _mutated(contents.document, rng)
+            continue
+        part = rng.choice(contents.parts)
+        plane = part[rng.choice(sorted(part))]
+        value = rng.choice([np.nan, np.inf, 1e4, -6e4, 0.0, 1.0])
+        plane[rng.randrange(plane.shape[0]), rng.randrange(plane.shape[1])] = value
+
+
+def _loaded(path: Path) -> DiffractionTable | None:
+    """The table, or None if it is refused; nothing else may be raised."""
+    try:
+        return DiffractionTable.load(path)
+    except DiffractionError as error:
+        assert "\n" not in str(error)
+        assert len(str(error)) < 500
+        return None
+
+
+def _check_look_ups(table: DiffractionTable) -> None:
+    """Finite numbers of a sane size, in NumPy and in the plugin."""
+    from mitsuba_diffraction.plugin.lookup import device_table
+
+    rng = np.random.default_rng(0)
+    radius, turn = table.q_limit * np.sqrt(rng.random(300)), rng.uniform(0, 2 * np.pi, 300)
+    limit = table.q_limit * table.height_scale_max
+    kappa = np.concatenate([[0.0, limit], rng.uniform(0.0, limit, 298)])
+    q = (radius * np.cos(turn), radius * np.sin(turn))
+    found = table.window_sum(*q, kappa)
+    assert np.isfinite(found).all()
+    assert np.abs(found).max() < 1e9
+    import mitsuba as mi
+
+    mi.set_variant("scalar_rgb")
+    device = device_table(table)
+    some = [float(device.window_sum(*(float(a[n]) for a in (*q, kappa)))) for n in range(5, 12)]
+    assert np.isfinite(some).all()
+    assert np.abs(some).max() < 1e9
+
+
+def test_a_table_with_any_field_or_channel_changed_is_refused_or_harmless(file, tmp_path):
+    rng = random.Random(7)
+    refused = 0
+    for _ in range(TRIALS // len(KINDS)):
+        contents = Contents(file)
+        _damage(contents, rng)
+        contents.write(tmp_path / "changed.exr")
+        table = _loaded(tmp_path / "changed.exr")
+        refused += table is None
+        if table is not None:
+            _check_look_ups(table)
+    assert refused > 0
+
+
+def test_a_bit_that_is_flipped_anywhere_is_noticed(file, tmp_path):
+    content, rng = file.read_bytes(), random.Random(3)
+    before = DiffractionTable.load(file)
+    text = content.index(b'{"version"')
+    changed = tmp_path / "changed.exr"
+    for n in range(TRIALS // len(KINDS)):
+        # half of them in the attribute, which EXR itself has no checksum of
+        place = rng.randrange(len(content)) if n % 2 else text + rng.randrange(2000)
+        damaged = bytearray(content)
+        damaged[place] ^= 1 << rng.randrange(8)
+        changed.write_bytes(damaged)
+        table = _loaded(changed)
+        if table is not None:
+            assert table.digest() == before.digest()
+            assert table.source == before.source
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda d: d["grid"].update(taps=[4, 1000]),
+        lambda d: d["grid"].update(trims=[-1] * d["grid"]["taps"][1]),
+        lambda d: d["grid"].update(last=[5000, 5000]),
+        lambda d: d["expansion"].update(intervals=1 << 40),
+        lambda d: d["expansion"].update(terms=10**9),
+        lambda d: d.update(scale=0.0),
+        lambda d: d.update(spacing=[0.0, 1.0]),
+        lambda d: d.update(order_0=[[[1e30]]]),
+        lambda d: d.update(coherence_width=1e300),
+        lambda d: d["source"].update(warnings="one"),
+    ],
+    ids=str,
+)
+def test_what_would_read_outside_or_fill_the_memory_is_refused_at_once(file, tmp_path, change):
+    contents = Contents(file)
+    change(contents.document)
+    contents.write(tmp_path / "changed.exr")
+    start = time.perf_counter()
+    assert _loaded(tmp_path / "changed.exr") is None
+    assert time.perf_counter() - start < 2.0
+
+
+def test_nests_of_brackets_and_long_numbers_are_refused(file, tmp_path):
+    content = file.read_bytes()
+    begin = content.index(b'{"version"')
+    for text in (b"[" * 3000, b"9" * 6000):
+        if len(text) < len(content) - begin - 1000:
+            changed = content[:begin] + text + content[begin + len(text) :]
+            (tmp_path / "changed.exr").write_bytes(changed)
+            assert _loaded(tmp_path / "changed.exr") is None
+
+
+def test_a_small_file_that_claims_gigabytes_is_refused_before_they_are_taken(tmp_path):
+    table = DiffractionTable.build(PATCH, coherence_width=1.8)
+    table.save(tmp_path / "table.exr")
+    contents = Contents(tmp_path / "table.exr")
+    last = [1100, 1100]
+    contents.document["grid"]["last"] = last
+    shape = (2 * last[1] + 1, 2 * last[0] + 1)
+    contents.parts[0] = dict.fromkeys(contents.parts[0], np.zeros(shape, np.float16))
+    contents.write(tmp_path / "large.exr")
+    assert (tmp_path / "large.exr").stat().st_size < 5e5
+    start = time.perf_counter()
+    assert _loaded(tmp_path / "large.exr") is None
+    assert time.perf_counter() - start < 2.0
