@@ -61,7 +61,18 @@ eta, k : spectra ∂
     The same by its complex refractive index.
 int_ior, ext_ior : float or string [1.5, 1.000277]
     A dielectric, which the surface is unless it is a conductor (1.5: shed snake skin).
-    Their ratio is the differentiable parameter `eta`.
+    Their ratio is the differentiable parameter `eta`; under a coat that of int_ior and coat_ior.
+coat_ior : float or string [none]
+    A flat clear layer over the structure, too thick to interfere: 1.58 is the polycarbonate of a
+    CD. Light is refracted into it and out again, and its own face is a mirror of the same
+    coherence width. Light that bounces between face and structure is left out, so coats lose it
+    and never gain; energy_conserving has nothing to do. Over that of the medium above it is the
+    differentiable parameter `coat_eta`.
+model : string [small_slope]
+    `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
+    where the surface is rough at the scale of an order; polarised variants have its Mueller
+    matrices. `kirchhoff`: the tangent plane, also the default of material `none`, which has no
+    index, and of layering `thesis`.
 energy_conserving : boolean [true]
     Divides by max(1, a(ωi), a(ωo)), where a bounds the directional albedo for R = 1 from above at
     all wavelengths: reciprocal, never brighter than white. `false` is raw Kirchhoff, which gains
@@ -90,10 +101,13 @@ Variants
 wavelength : float [550]
     nm, in mono variants; the others have their own.
 
-The model is scalar Kirchhoff diffraction (Beckmann and Spizzichino 1963; Stam 1999) under a
-Gaussian coherence window, looked up in a table of the patch's diffraction orders:
+The model is that of diffraction orders under a Gaussian coherence window (Stam 1999), looked up in
+a table of the patch, times what the material makes of them:
 
-    f = R (1 + ωi·ωo)² / (λ² A w² cosθi cosθo) · ⟨|P|²⟩
+    f = 4 cosθi cosθo N / (λ² A w²) · ⟨|P|²⟩
+
+N is the mean power of a Jones matrix for unpolarised light; by Kirchhoff (Beckmann and Spizzichino
+1963) it is R (1 + ωi·ωo)² / (2 cosθi cosθo)².
 
 XML and the same in Python:
 
@@ -160,7 +174,7 @@ _ALL = 0xFFFFFFFF
 
 
 class Diffraction(mi.BSDF):
-    """Scalar Kirchhoff diffraction of a measured height field."""
+    """Diffraction by a measured height field."""
 
     def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
         require_loaded_llvm()

@@ -254,7 +254,7 @@ def _reflectance(props: Properties, coat: Dielectric | None) -> Reflectance:
 
 
 def _boundary(props: Properties, material: Reflectance, table: DiffractionTable) -> Boundary:
-    """By default small slope where there is an index, as the thesis of 2014 had it where it rules."""
+    """By default small slope where there is an index, unless it is the thesis' layering."""
     scalar = isinstance(material, Perfect) or props.get("layering", LAYERINGS[0]) == "thesis"
     if _choice(props, "model", MODELS[::-1] if scalar else MODELS) == "kirchhoff":
         return Kirchhoff(material)

@@ -68,9 +68,10 @@ def table_of_file(
         _check_agreement(path, table, options, asked)
         if height_scale > table.height_scale_max:
             raise DiffractionError(
-                f"height_scale={height_scale:g} (times coat_ior, under a coat) is beyond the "
-                f"table's {table.height_scale_max:g}; give the height field instead of the table, "
-                f"or build it with '--height-scale-max {height_scale:.4g}' or more"
+                f"height_scale={height_scale:g} is beyond the table's "
+                f"{table.height_scale_max:g} (a coat counts as its index times the heights); give "
+                "the height field instead of the table, or build it with '--height-scale-max "
+                f"{height_scale:.4g}' or more"
             )
     elif is_recipe(path):
         recipe = Recipe.load(path)
