@@ -11,6 +11,9 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.scene.planning.session import Session
 
+# of coarse pixels, which the plugin warns of
+pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
+
 PATCH = md.HeightField(0.005 * np.random.default_rng(1).random((24, 24)), 0.25)
 
 
