@@ -103,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
         report = {
             "scene": str(args.scene),
             "variant": variant,
-            "paths": loaded.seen.paths,
+            "paths": loaded.traced.paths,
             "tolerance": tolerance,
             **describe(loaded, found),
         }

@@ -15,7 +15,11 @@ to the middle of the scene, and a place on it with a density p:
   it is drawn from.
 
 The choice follows the golden ratio, the places on one emitter the plastic number (Roberts 2018):
-both fill what they are drawn from evenly, whenever the sequence is stopped.
+both fill what they are drawn from evenly. Of each block of lights, the next is the one that brings
+the mean so far nearest to the block's, by colour and by spherical harmonics of the direction up to
+order 2, which is nearly all of what a matt surface sees (Chen, Welling and Smola 2010,
+*Super-samples from kernel herding*; Ramamoorthi and Hanrahan 2001). So the first few lights look
+like all of them.
 
 What no light without extent shows are mirror images of lights with an extent: they are as many
 images as there were frames, until the lobe is wider than their distance.
@@ -23,6 +27,7 @@ images as there were frames, until the lobe is wider than their distance.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -65,6 +70,7 @@ class Emitters:
         self.omissions: list[str] = []
         self.names: list[str] = []
         self._drawn: list[_Drawn] = []
+        self._middle = middle
         brought = []
         for emitter in scene.emitters():
             drawn = _Drawn(emitter, middle)
@@ -85,14 +91,36 @@ class Emitters:
         """One after another without end; the mean over them is all of the scene's direct light."""
         below = np.cumsum(self.probabilities)
         taken = [0] * len(self._drawn)
-        number = 0
-        while True:
-            place = (0.5 + number * _GOLDEN) % 1.0
-            chosen = min(int(np.searchsorted(below, place, side="right")), len(taken) - 1)
-            light = self._drawn[chosen].light(taken[chosen])
-            yield replace(light, spectrum=light.spectrum / self.probabilities[chosen])
-            taken[chosen] += 1
-            number += 1
+        for block in itertools.count():
+            places = (0.5 + np.arange(block * _BLOCK, (block + 1) * _BLOCK) * _GOLDEN) % 1.0
+            choices = np.minimum(np.searchsorted(below, places, side="right"), len(taken) - 1)
+            found = []
+            for chosen in choices:
+                light = self._drawn[chosen].light(taken[chosen])
+                spectrum = light.spectrum / self.probabilities[chosen]
+                found.append(replace(light, spectrum=spectrum))
+                taken[chosen] += 1
+            for number in _nearest_to_mean(np.stack([self._features(one) for one in found])):
+                yield found[number]
+
+    def _features(self, light: Light) -> Array:
+        """What a light brings to the middle, by colour and spherical harmonics, (27,)."""
+        direction = light.place[:3] - light.place[3] * self._middle
+        x, y, z = direction / max(float(np.linalg.norm(direction)), 1e-12)
+        harmonics = [1.0, x, y, z, x * y, y * z, z * x, 0.5 * (x * x - y * y), z * z - 1.0 / 3.0]
+        return np.outer(_colour_at(light, self._middle), harmonics).ravel()
+
+
+def _nearest_to_mean(features: Array) -> list[int]:
+    """An order of rows (n, m) in which the mean of the first few is near the mean of all."""
+    mean, total = features.mean(axis=0), np.zeros(features.shape[1])
+    left, order = list(range(len(features))), list[int]()
+    while left:
+        off = total + features[left] - (len(order) + 1) * mean
+        chosen = left.pop(int((off**2).sum(axis=1).argmin()))
+        total += features[chosen]
+        order.append(chosen)
+    return order
 
 
 class _Drawn:
@@ -116,7 +144,7 @@ class _Drawn:
     def irradiance(self) -> float:
         """Of a sphere's cross-section in the middle, summed over the colours."""
         lights = [self._fixed] if self._fixed is not None else [self.light(n) for n in range(64)]
-        return float(np.mean([_brought(light, self._middle) for light in lights]))
+        return float(np.mean([_colour_at(light, self._middle).sum() for light in lights]))
 
     def _block(self, start: int) -> list[Light]:
         name = name_of(self._emitter)
@@ -140,14 +168,13 @@ def _kind_of(emitter: Any) -> str:
     return "environment" if emitter.is_environment() else ""
 
 
-def _brought(light: Light, middle: Array) -> float:
-    """What a light brings to the middle, summed over the colours."""
-    colour = max(float(light.colour.sum()), 0.0)
+def _colour_at(light: Light, middle: Array) -> Array:
+    """What a light brings to the middle, linear sRGB (3,)."""
     if light.place[3] == 0.0:
-        return colour
+        return light.colour
     away = middle - light.place[:3]
     square = max(float(away @ away), 1e-12)
-    return colour * emission(light, away / square**0.5) / square
+    return np.asarray(light.colour * (emission(light, away / square**0.5) / square))
 
 
 def emission(light: Light, direction: Array) -> float:

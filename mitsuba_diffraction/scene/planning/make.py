@@ -14,7 +14,7 @@ from ...progress import Progress
 from ...tables.table import DiffractionTable
 from .difference import Difference, difference, small_picture
 from .domain import LookupStatistics, domain_for
-from .paths import Seen, trace
+from .paths import TracedPaths, trace
 from .plan import Plan, PlannedTable
 from .session import Session
 
@@ -38,7 +38,7 @@ class RecordedScene:
 
     scene: Any
     session: Session
-    seen: Seen
+    traced: TracedPaths
     statistics: dict[str, LookupStatistics]
 
 
@@ -81,29 +81,29 @@ def record_scene(
             f"the tables of {_names(session)} come from files and stay as they are; give the scene "
             "the height field, or its recipe, to have smaller ones planned"
         )
-    seen = trace(scene, sensor(scene), session, paths, seed)
-    if not len(seen.light):
+    traced = trace(scene, sensor(scene), session, paths, seed)
+    if not len(traced.lookups):
         raise DiffractionError(
             f"none of {paths} paths carries light of a surface that diffracts ({_names(session)}): "
             "the camera does not see it lit; check camera and lights, or raise --paths"
         )
-    return RecordedScene(scene, session, seen, _statistics(session, seen))
+    return RecordedScene(scene, session, traced, _statistics(session, traced))
 
 
 def _names(session: Session) -> str:
     return ", ".join(sorted({name for name, _ in session.bsdfs}))
 
 
-def _statistics(session: Session, seen: Seen) -> dict[str, LookupStatistics]:
+def _statistics(session: Session, traced: TracedPaths) -> dict[str, LookupStatistics]:
     """What each table is asked; tables from files, which cannot be made smaller, are left out."""
     found = {}
     for key, table in session.tables.items():
         mine = [n for n, (_, bsdf) in enumerate(session.bsdfs) if bsdf.table is table]
-        chosen = seen.of(mine)
-        if chosen.any():
+        asked = traced.of(mine)
+        if len(asked):
             found[key] = LookupStatistics(
-                seen.u[chosen], seen.v[chosen], seen.w[chosen], seen.wavelength[chosen],
-                seen.xyz[chosen], float(min(seen.total[mine].sum(), 1.0)),
+                asked["u"], asked["v"], asked["w"], asked["wavelength"], asked["xyz"],
+                float(min(traced.total[mine].sum(), 1.0)),
             )  # fmt: skip
     return found
 
@@ -131,7 +131,7 @@ def draft_plan(
             domain=domain,
             memory=(table.nbytes, table.nbytes),
         )
-    return Plan(name, tolerance, loaded.seen.paths, tables)
+    return Plan(name, tolerance, loaded.traced.paths, tables)
 
 
 def worthwhile(plan: Plan, planned: dict[str, DiffractionTable]) -> Plan:

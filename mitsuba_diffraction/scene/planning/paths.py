@@ -28,17 +28,22 @@ MOST_BOUNCES = 12
 BRIGHTEST = 99.0
 
 
+#: One look-up: of which BSDF among the session's, u, v, w = ωi + ωo in the patch's frame with w
+#: times height_scale, wavelength in nm, and the X, Y and Z that it adds to the picture, the light
+#: of all paths being 1.
+LOOKUP = np.dtype(
+    [("bsdf", np.int64), ("u", float), ("v", float), ("w", float), ("wavelength", float),
+     ("xyz", float, 3)]
+)  # fmt: skip
+
+
 @dataclass(frozen=True)
-class Seen:
+class TracedPaths:
     """What diffracting surfaces are asked, weighted with the light of the picture.
 
     Attributes
     ----------
-    bsdf : (n,) index of the BSDF among the session's.
-    u, v, w : (n,) ωi + ωo in the patch's frame, w times height_scale.
-    wavelength : (n,) nm.
-    light : (n,) X + Y + Z that this look-up adds to the picture, relative to `total`.
-    xyz : (n, 3) the same in colours.
+    lookups : (n,) of type `LOOKUP`.
     total : (bsdfs,) light of all paths that meet each BSDF, nested BSDFs' included; the light of
         all paths is 1.
     paths : how many were traced.
@@ -46,23 +51,17 @@ class Seen:
         cosines; NaN where the camera does not see the BSDF.
     """
 
-    bsdf: NDArray[np.int64]
-    u: NDArray[np.float64]
-    v: NDArray[np.float64]
-    w: NDArray[np.float64]
-    wavelength: NDArray[np.float64]
-    light: NDArray[np.float64]
-    xyz: NDArray[np.float64]
+    lookups: NDArray[np.void]
     total: NDArray[np.float64]
     paths: int
     lobe_turn: NDArray[np.float64]
 
-    def of(self, bsdfs: list[int]) -> NDArray[np.bool_]:
-        """Which look-ups are those of some BSDFs."""
-        return np.isin(self.bsdf, bsdfs)
+    def of(self, bsdfs: list[int]) -> NDArray[np.void]:
+        """The look-ups of some BSDFs."""
+        return self.lookups[np.isin(self.lookups["bsdf"], bsdfs)]
 
 
-def trace(scene: Any, sensor: Any, session: Session, paths: int, seed: int = 0) -> Seen:
+def trace(scene: Any, sensor: Any, session: Session, paths: int, seed: int = 0) -> TracedPaths:
     """Trace paths through a scene that was loaded in a recording session.
 
     Parameters
@@ -91,42 +90,30 @@ def trace(scene: Any, sensor: Any, session: Session, paths: int, seed: int = 0) 
     most = np.percentile(whole[lit], BRIGHTEST)
     weight = np.minimum(1.0, np.divide(most, whole, out=np.ones_like(whole), where=lit))
     weight /= weight @ whole
-    parts: list[list[NDArray[Any]]] = [[] for _ in range(7)]
+    parts = [np.empty(0, LOOKUP)]
     met = np.zeros((len(session.bsdfs), paths), bool)
     for number, vertex in enumerate(vertices):
         onward = reaching[len(vertices) - 1 - number]
-        for heard, returned, light in (
+        for records, returned, light in (
             (vertex.lit, vertex.lit_value, vertex.direct),
             (vertex.sampled, vertex.sampled_value, onward),
         ):
-            for record in heard:
+            for record in records:
                 lane = record.lane
                 met[record.bsdf, lane] = True
-                whole_value = returned[lane]
                 share = np.divide(
-                    record.value, whole_value, out=np.zeros_like(whole_value),
-                    where=whole_value > 0.0,
+                    record.value, returned[lane], out=np.zeros_like(returned[lane]),
+                    where=returned[lane] > 0.0,
                 )  # fmt: skip
-                xyz = (share * light[lane])[..., None] * colours[lane] * weight[lane, None, None]
-                shape = wavelengths[lane].shape
-                carries = xyz.sum(axis=2) > 0.0
-                asked = (record.u, record.v, record.w)
-                spread = (np.broadcast_to(a[:, None], shape) for a in asked)
-                columns = (
-                    np.full(shape, record.bsdf), *spread, wavelengths[lane], xyz.sum(axis=2), xyz,
-                )  # fmt: skip
-                for part, column in zip(parts, columns, strict=True):
-                    part.append(column[carries])
-    empty = [np.zeros((0, 3) if n == 6 else 0) for n in range(7)]
-    joined = [np.concatenate([nothing, *part]) for nothing, part in zip(empty, parts, strict=True)]
-    return Seen(
-        bsdf=joined[0].astype(np.int64),
-        u=joined[1],
-        v=joined[2],
-        w=joined[3],
-        wavelength=joined[4],
-        light=joined[5],
-        xyz=joined[6],
+                asked = np.empty(share.shape, LOOKUP)
+                asked["bsdf"], asked["wavelength"] = record.bsdf, wavelengths[lane]
+                for name in ("u", "v", "w"):
+                    asked[name] = getattr(record, name)[:, None]
+                asked["xyz"] = (share * light[lane])[..., None] * colours[lane]
+                asked["xyz"] *= weight[lane, None, None]
+                parts.append(asked[asked["xyz"].sum(axis=2) > 0.0])
+    return TracedPaths(
+        lookups=np.concatenate(parts),
         total=met @ (weight * whole),
         paths=paths,
         lobe_turn=_turns(turns, vertices[0], len(session.bsdfs)) if vertices else np.zeros(0),

@@ -40,7 +40,7 @@ def _of_table(
         return result | {"asked for": "nothing: no path meets it; it stays whole", "whole": whole}
     bsdfs = [n for n, (_, bsdf) in enumerate(loaded.session.bsdfs) if bsdf.table is table]
     lobes = max(
-        (lobes_in_a_pixel(float(loaded.seen.lobe_turn[n]), table.sigma) for n in bsdfs),
+        (lobes_in_a_pixel(float(loaded.traced.lobe_turn[n]), table.sigma) for n in bsdfs),
         default=math.nan,
     )
     light = asked.light

@@ -103,7 +103,7 @@ def test_a_plate_is_asked_for_one_direction_only(looked):
     # there is nothing else in the picture
     assert asked.light.sum() == pytest.approx(1.0, abs=1e-5)
     # flat: all of a pixel, and all of the plate, sees the light at one angle
-    assert looked.seen.lobe_turn == pytest.approx(0.0, abs=1e-5)
+    assert looked.traced.lobe_turn == pytest.approx(0.0, abs=1e-5)
 
 
 def test_its_table_ends_where_the_light_does(looked):
