@@ -17,6 +17,7 @@ series          weights of the terms at a κ
 restricted      a planned table, and its coarse cells beyond
 rgb_power       the same in the RGB variants' colours
 rgb_lookup      a colour table inside a kernel
+bounded         a parameter that changes between renderings, and keeps its value when anoth
 energy          the bound of the albedo that conserves energy
 reflectance     of the surface itself: dielectric, conductor, mirror
 layers          how much light reaches what lies beneath

@@ -52,9 +52,7 @@ def originals() -> dict[str, bytes]:
         Image.fromarray(grey.astype(np.uint16) * 257).save(at / "deep.png")
         np.save(at / "heights.npy", field.heights)
         np.savetxt(at / "heights.txt", field.heights)
-        (at / "scan.spm").write_bytes(
-            nanoscope(np.int16(1000 * field.heights), scan_size="2 2 ~m")
-        )
+        (at / "scan.spm").write_bytes(nanoscope(np.int16(1000 * field.heights), scan_size="2 2 ~m"))
         (at / "recipe.toml").write_text(_RECIPE)
         (at / "mesh.ply").write_text(_PLY)
         return {path.name: path.read_bytes() for path in sorted(at.iterdir())}
