@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks validation realtime lint clean help
+.PHONY: setup demo test fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks validation realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -34,6 +34,12 @@ demo: setup  ## tabulate a snake scale, render three scenes with it, the snake i
 # one thread for linear algebra in each of the two processes
 test: setup .venv/browser  ## run the tests
 	@OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest -n 2
+
+# for as long as you like: make fuzz SECONDS=600; the same cases again: make fuzz SEED=1
+fuzz: setup  ## try random surfaces, damaged files and command lines for a minute
+	@mkdir -p out/fuzz
+	@MITSUBA_DIFFRACTION_CACHE=out/fuzz OPENBLAS_NUM_THREADS=1 $(PYTHON3) -W ignore -m tests.fuzz \
+	    --seconds $(or $(SECONDS),60) $(if $(SEED),--seed $(SEED))
 
 package: setup .venv/browser  ## build wheel and sdist, and test them in an empty environment
 	@.ci/package

@@ -10,21 +10,22 @@ parameters      read from Mitsuba's Properties, checked
 sources         from what a scene names to a table, built once
 attributes      whether a mesh has what its BSDF reads
 names           what messages call an element of a scene
-session         plans to follow and records to keep while a scene loads
 power           the diffracted power at single wavelengths; asks the next two
 lookup          a table inside a kernel: `DeviceTable`
 sampling        directions drawn where the orders are
 series          weights of the terms at a κ
 restricted      a planned table, and its coarse cells beyond
-scalar_lookup   one look-up at a time, in scalar variants
 rgb_power       the same in the RGB variants' colours
 rgb_lookup      a colour table inside a kernel
+bounded         a parameter that changes between renderings, and keeps its value when anoth
 energy          the bound of the albedo that conserves energy
 reflectance     of the surface itself: dielectric, conductor, mirror
 layers          how much light reaches what lies beneath
 orientation     how the patch is turned in the tangent plane
 shadowing       V-shaped grooves
 memory          arrays in the variant's memory
+pair            what the model asks of a pair of directions
+roles           names for what arguments are
 traversal       what Mitsuba's objects show of themselves
 frozen          what `dr.freeze` must know of a BSDF
 """

@@ -85,7 +85,7 @@ def test_a_truncated_table_is_one_line(run, table):
 
 def test_a_table_of_another_format_version_is_one_line(run, table, monkeypatch):
     monkeypatch.setattr("mitsuba_diffraction.tables.exr.FORMAT_VERSION", 99)
-    assert "format version 2" in run("info", table).failed_in_one_line()
+    assert "format version 3" in run("info", table).failed_in_one_line()
 
 
 def test_an_exr_that_is_no_table_is_heights(run, tmp_path):

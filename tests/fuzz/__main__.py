@@ -82,7 +82,8 @@ def _supervise(args: argparse.Namespace, kinds: list[str], seed: int) -> int:
             workers.append((log, subprocess.Popen(command)))
         for log, worker in workers:
             code = worker.wait()
-            entries = [json.loads(line) for line in log.read_text("utf-8").splitlines()]
+            written = log.read_text("utf-8") if log.exists() else ""
+            entries = [json.loads(line) for line in written.splitlines()]
             for entry in entries:
                 counts[entry["kind"]] += "text" not in entry
             failed += [entry for entry in entries if "text" in entry]

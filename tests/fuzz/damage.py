@@ -103,7 +103,7 @@ def check_heights(rng: np.random.Generator) -> None:
 
 def check_text(rng: np.random.Generator) -> None:
     """Recipes and meshes."""
-    _check(rng, ["recipe.toml"], lambda path: Recipe.load(path).table_arguments())
+    _check(rng, ["recipe.toml"], lambda path: Recipe.load(path))
     _check(rng, ["mesh.ply"], lambda path: load_mesh(path))
 
 
