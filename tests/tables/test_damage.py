@@ -194,7 +194,6 @@ def test_a_bit_that_is_flipped_anywhere_is_noticed(file, tmp_path):
         lambda d: d.update(coherence_width=1e300),
         lambda d: d["source"].update(warnings="one"),
     ],
-    ids=str,
 )
 def test_what_would_read_outside_or_fill_the_memory_is_refused_at_once(file, tmp_path, change):
     contents = Contents(file)
