@@ -141,7 +141,7 @@ def _cut(surface: Surface) -> tuple[NDArray[np.float64], float]:
     count = 2 * round(surface.size / pixel / 2)
     row, column = surface.place
     piece = field.heights[row : row + count, column : column + count]
-    periodic, _ = periodic_smooth(HeightField(piece, field.pixel_size))
+    periodic = periodic_smooth(HeightField(piece, field.pixel_size))
     side = count * pixel
     return _smoothed(periodic.heights, side), side
 
