@@ -18,6 +18,7 @@ and in the wavelength.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,6 +63,14 @@ class ScaleRoughness:
         moment = np.bincount(which, weight * length).astype(np.float64)
         found = total > 0
         return cls(moment[found] / total[found], total[found])
+
+    @classmethod
+    def mean(cls, patches: Sequence[ScaleRoughness]) -> ScaleRoughness:
+        """That of several patches of one surface, whose powers are averaged."""
+        frequency = np.concatenate([patch.frequency for patch in patches])
+        variance = np.concatenate([patch.variance for patch in patches]) / len(patches)
+        order = np.argsort(frequency, kind="stable")
+        return cls(frequency[order], variance[order])
 
     def at(self, q: ArrayLike) -> Real:
         """σ_q² in µm², shaped as q, the length of an order's spatial frequency in rad/µm."""
