@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.plugin.lookup import _UNROLLED_TAPS, device_table
+from mitsuba_diffraction.plugin.lookup import _UNROLLED_TAPS
+from mitsuba_diffraction.plugin.restricted import device_table
 from tests.directions import rough_patch
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
