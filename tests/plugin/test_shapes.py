@@ -30,7 +30,7 @@ def drawn(seed):
         wavelength_range=(500, 600),
     )
     angle, share = rng.uniform(0, 2 * np.pi, 40), np.sqrt(rng.uniform(0, 0.95, 40))
-    radii = table.radii
+    radii = table.q_max
     asked = radii[0] * share * np.cos(angle), radii[1] * share * np.sin(angle)
     return table, (*asked, rng.uniform(0.5, 0.99, 40) * table.expansion.kappa_max)
 

@@ -130,7 +130,7 @@ def _loaded(path: Path) -> DiffractionTable | None:
 
 def _check_look_ups(table: DiffractionTable) -> None:
     """Finite numbers of a sane size, in NumPy and in the plugin."""
-    from mitsuba_diffraction.plugin.lookup import device_table
+    from mitsuba_diffraction.plugin.restricted import device_table
 
     rng = np.random.default_rng(0)
     radius, turn = table.q_limit * np.sqrt(rng.random(300)), rng.uniform(0, 2 * np.pi, 300)
