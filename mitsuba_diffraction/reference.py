@@ -27,7 +27,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import DiffractionError
 from .heights.field import HeightField
-from .optics import blend, boundary
+from .optics import blend, boundary, fresnel
+from .optics.coat import refracted, transmitted
 from .optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
 from .settings import COHERENCES as COHERENCES
 from .settings import checked
@@ -49,6 +50,7 @@ def brdf(
     model: str = "kirchhoff",
     eta: ArrayLike | None = None,
     k: ArrayLike = 0.0,
+    coat: float | None = None,
 ) -> NDArray[np.float64]:
     """BRDF of a surface with these heights for unpolarised light, in 1/sr, shape (n,).
 
@@ -67,6 +69,8 @@ def brdf(
     model : "kirchhoff", or "small_slope", which needs an index.
     eta, k : (n,) or scalar, the index eta + ik of the material over that of the medium above it;
         without eta R = 1.
+    coat : index of a flat clear coat over the surface, relative likewise (`optics.coat`); it needs
+        eta, and its own reflection is the lobe of a flat patch.
 
     Raises
     ------
@@ -80,8 +84,12 @@ def brdf(
     index = _index(model, eta, k, lam.shape)
     sigma = sigma_of(coherence_width)
     power = window_power(field, incident, outgoing, lam, sigma, coherence)
+    if index is None and coat is not None:
+        raise DiffractionError(f"coat={coat} needs an index beneath it: give eta (and k)")
     if index is None:
         return kirchhoff_factor(incident, outgoing, lam, sigma) * power
+    if coat is not None:
+        return _coated(field, incident, outgoing, lam, model, index, coat, sigma, coherence)
     jones = _jones(field, incident, outgoing, lam, model, index)
     return _order_factor(incident, outgoing, lam, sigma) * boundary.unpolarised(jones) * power
 
@@ -159,6 +167,33 @@ def screen_power(
         centre_y = np.exp(-0.5j * qy * ny * pixel_size[1])
         total = np.abs((window_y * centre_y) @ amplitude @ (window_x * centre_x)) ** 2
     return float(4 * np.pi**2 * sigma**4 * total)
+
+
+def _coated(
+    field: HeightField,
+    wi: NDArray[np.float64],
+    wo: NDArray[np.float64],
+    wavelength: NDArray[np.float64],
+    model: str,
+    index: NDArray[np.complex128],
+    coat: float,
+    sigma: float,
+    coherence: str,
+) -> NDArray[np.float64]:
+    """The BRDF under a coat of this index, and of the coat's face (`optics.coat`)."""
+    if not (np.isfinite(coat) and coat >= 1.0):
+        raise DiffractionError(f"coat={coat} must be an index of at least 1")
+    below, above = refracted(wi, coat), refracted(wo, coat)
+    below, above = (np.where(w[:, 2:] > 0, r, -r) for w, r in ((wi, below), (wo, above)))
+    within = wavelength / coat
+    power = window_power(field, below, above, within, sigma, coherence)
+    jones = _jones(field, below, above, within, model, index / coat)
+    through = boundary.unpolarised(transmitted(jones, wi, wo, coat))
+    structure = _order_factor(below, above, within, sigma) * through * power / coat**2
+    flat = np.exp(-((sigma * wavenumber(wavelength)) ** 2) * np.sum((wi + wo)[:, :2] ** 2, axis=1))
+    face = kirchhoff_factor(wi, wo, wavelength, sigma) * 4 * np.pi**2 * sigma**4 * flat
+    half = np.sqrt(np.clip(0.5 + 0.5 * np.sum(wi * wo, axis=1), 0.0, 1.0))
+    return np.asarray(structure + face * fresnel.reflectance(half, coat))
 
 
 def _jones(

@@ -29,7 +29,7 @@ from .boundary import Complex, Real
 
 #: Components are told apart to this part of an octave; lines of a grating stay where they are.
 _BINS_PER_OCTAVE = 256
-#: Nodes of `ScaleRoughness.table`: linear interpolation is then within 5e-4 of the largest.
+#: Nodes of a `RoughnessTable`: linear interpolation is then within 5e-4 of the largest.
 NODES_PER_OCTAVE = 32
 
 
@@ -80,16 +80,35 @@ class ScaleRoughness:
             share = -np.expm1(-256.0 * ratio) * np.exp(-ratio / 16.0)
         return np.asarray(share @ self.variance, np.float64)
 
-    def table(self, q_max: float) -> tuple[float, Real]:
-        """σ_q² at nodes log2 q = first + n/`NODES_PER_OCTAVE`, up to q_max (rad/µm) or just above.
-
-        Below the first node, an eighth of the lowest frequency, σ_q² is 0. Returns (first, nodes).
-        """
+    def table(self, q_max: float) -> RoughnessTable:
+        """σ_q² at nodes, up to q_max (rad/µm) or just above."""
         if not len(self.frequency):
-            return 0.0, np.zeros(2)
+            return RoughnessTable(0.0, np.zeros(2))
+        # Below an eighth of the lowest frequency σ_q² is 0
         first = float(np.log2(self.frequency[0] / 8))
         count = max(1, int(np.ceil((np.log2(q_max) - first) * NODES_PER_OCTAVE)))
-        return first, self.at(2.0 ** (first + np.arange(count + 1) / NODES_PER_OCTAVE))
+        nodes = self.at(2.0 ** (first + np.arange(count + 1) / NODES_PER_OCTAVE))
+        return RoughnessTable(first, nodes)
+
+
+@dataclass(frozen=True, eq=False)
+class RoughnessTable:
+    """σ_q² at log2 q = first + n/`NODES_PER_OCTAVE`, linear in between.
+
+    Attributes
+    ----------
+    first : log2 of the lowest node's q in rad/µm; below it σ_q² is the first node's.
+    nodes : (n,) µm², at least two; beyond the last it is that one's.
+    """
+
+    first: float
+    nodes: Real
+
+    def at(self, q: ArrayLike) -> Real:
+        """σ_q² in µm², shaped as q, in rad/µm."""
+        order = np.maximum(np.abs(np.asarray(q, np.float64)), np.finfo(np.float64).tiny)
+        place = (np.log2(order) - self.first) * NODES_PER_OCTAVE
+        return np.asarray(np.interp(place, np.arange(len(self.nodes)), self.nodes), np.float64)
 
 
 def weight(kappa: ArrayLike, variance: ArrayLike) -> Real:

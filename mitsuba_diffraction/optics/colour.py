@@ -23,6 +23,11 @@ SHORTEST, LONGEST = 360.0, 830.0
 _OBSERVER = "CIE 1931 2 Degree Standard Observer"
 
 
+#: Mean wavelength of what makes linear red, green and blue under D65, nm: ∫λ s̄ dλ / ∫s̄ dλ. What is
+#: even in λ has there its value in the channel.
+RGB_WAVELENGTHS = (642.4, 543.0, 440.8)
+
+
 def check_illuminant(illuminant: str) -> None:
     """Raise a DiffractionError for an illuminant that is not one of `ILLUMINANTS`."""
     if illuminant not in ILLUMINANTS:

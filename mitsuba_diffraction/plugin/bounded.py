@@ -23,6 +23,7 @@ class Bounded:
 
     Attributes
     ----------
+    high : as given.
     value : mi.Float, the same object ever after: Mitsuba assigns to it.
     """
 
@@ -30,13 +31,14 @@ class Bounded:
         self, name: str, value: float, low: float, high: float, refusal: Callable[[float], str]
     ) -> None:
         self.value: Float = mi.Float(value)
-        self._name, self._low, self._high, self._refusal = name, low, high, refusal
+        self.high = high
+        self._name, self._low, self._refusal = name, low, refusal
         self._last: Float = mi.Float(value)
 
     def settle(self) -> str | None:
         """Take the value given, as a variable, so that kernels stay; or say why it is refused."""
         given = np.array(dr.detach(self.value), float).ravel()
-        wrong = given[~((given >= self._low) & (given <= self._high))]
+        wrong = given[~((given >= self._low) & (given <= self.high))]
         if len(wrong):
             if dr.is_jit_v(self.value):
                 mi.set_property(self.value, self._last)

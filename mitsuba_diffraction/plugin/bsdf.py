@@ -63,7 +63,18 @@ eta, k : spectra ∂
     The same by its complex refractive index.
 int_ior, ext_ior : float or string [1.5, 1.000277]
     A dielectric, which the surface is unless it is a conductor (1.5: shed snake skin).
-    Their ratio is the differentiable parameter `eta`.
+    Their ratio is the differentiable parameter `eta`; under a coat that of int_ior and coat_ior.
+coat_ior : float or string [none]
+    A flat clear layer over the structure, too thick to interfere: 1.58 is the polycarbonate of a
+    CD. Light is refracted into it and out again, and its own face is a mirror of the same
+    coherence width. Light that bounces between face and structure is left out, so coats lose it
+    and never gain; energy_conserving has nothing to do. Over that of the medium above it is the
+    differentiable parameter `coat_eta`.
+model : string [small_slope]
+    `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
+    where the surface is rough at the scale of an order; polarised variants have its Mueller
+    matrices. `kirchhoff`: the tangent plane, also the default of material `none`, which has no
+    index, and of layering `thesis`.
 energy_conserving : boolean [true]
     Divides by max(1, a(ωi), a(ωo)), where a bounds the directional albedo for R = 1 from above at
     all wavelengths: reciprocal, never brighter than white. `false` is raw Kirchhoff, which gains
@@ -92,10 +103,13 @@ Variants
 wavelength : float [550]
     nm, in mono variants; the others have their own.
 
-The model is scalar Kirchhoff diffraction (Beckmann and Spizzichino 1963; Stam 1999) under a
-Gaussian coherence window, looked up in a table of the patch's diffraction orders:
+The model is that of diffraction orders under a Gaussian coherence window (Stam 1999), looked up in
+a table of the patch, times what the material makes of them:
 
-    f = R (1 + ωi·ωo)² / (λ² A w² cosθi cosθo) · ⟨|P|²⟩
+    f = 4 cosθi cosθo N / (λ² A w²) · ⟨|P|²⟩
+
+N is the mean power of a Jones matrix for unpolarised light; by Kirchhoff (Beckmann and Spizzichino
+1963) it is R (1 + ωi·ωo)² / (2 cosθi cosθo)².
 
 XML and the same in Python:
 
@@ -128,7 +142,9 @@ import drjit as dr
 import mitsuba as mi
 
 from ..errors import DiffractionError
+from .boundary import Kirchhoff
 from .bounded import Bounded
+from .coat import CoatedPair
 from .energy import EnergyBound
 from .frozen import arrays_within, marks
 from .llvm import require_loaded_llvm
@@ -160,7 +176,7 @@ _ALL = 0xFFFFFFFF
 
 
 class Diffraction(mi.BSDF):
-    """Scalar Kirchhoff diffraction of a measured height field."""
+    """Diffraction by a measured height field."""
 
     def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
         require_loaded_llvm()
@@ -169,12 +185,14 @@ class Diffraction(mi.BSDF):
         self.table = parameters.table
         self.heights = parameters.heights
         self.fresnel = parameters.reflectance
+        self.boundary, self.coat = parameters.boundary, parameters.coat
+        self.mirror = Kirchhoff(self.coat) if self.coat is not None else None
         self.nested: BSDF = parameters.nested  # or None
         self._scale = Bounded(
             "height_scale",
             parameters.height_scale,
             _LEAST_SCALE,
-            self.table.height_scale_max,
+            self.table.height_scale_max / (1.0 if self.coat is None else dr.slice(self.coat.eta)),
             self._scale_refusal,
         )
         self.height_scale = self._scale.value
@@ -182,7 +200,9 @@ class Diffraction(mi.BSDF):
         self.layering = parameters.layering
         self.vcavity = parameters.vcavity
         self.power = power_model(self.table, parameters.wavelength)
-        self._energy = EnergyBound(self.table) if parameters.energy_conserving else None
+        self._energy = (
+            EnergyBound(self.table) if parameters.energy_conserving and not self.coat else None
+        )
         self._area_factor = 4.0 * dr.pi * self.table.sigma**2  # 4π²σ⁴ over the window's area πσ²
         front = mi.BSDFFlags.FrontSide
         glossy = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.Anisotropic | front
@@ -203,7 +223,7 @@ class Diffraction(mi.BSDF):
         if above:
             pair = self._pair(si, wo, active)
             power = self.power.power(pair, self.height_scale, si)
-            value = self.layering.above * mi.depolarizer(self.diffracted(si, pair, power, active))
+            value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
         if nested is not None:
             beneath = mi.Spectrum(self.layering.beneath(si, wo, active))
             value += beneath * self.nested.eval(nested, si, wo, active)
@@ -216,7 +236,8 @@ class Diffraction(mi.BSDF):
         density = mi.Float(0.0)
         if above:
             pair = self._pair(si, wo, active)
-            density = _with_cosine(self.power.density(pair, self.height_scale, si), wo)
+            density = self.power.density(pair.outer, self._drawing_scale, si)
+            density = _with_cosine(density, wo)
         if nested is not None:
             beneath = self.nested.pdf(nested, si, wo, active)
             density = dr.lerp(beneath, density, self._glossy_share(above, si, active))
@@ -231,8 +252,8 @@ class Diffraction(mi.BSDF):
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         if above:
             pair = self._pair(si, wo, active)
-            power, density = self.power.power_and_density(pair, self.height_scale, si)
-            value = self.layering.above * mi.depolarizer(self.diffracted(si, pair, power, active))
+            power, density = self._power_and_density(pair, si)
+            value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
             density = _with_cosine(density, wo)
         if nested is not None:
             beneath = mi.Spectrum(self.layering.beneath(si, wo, active))
@@ -318,15 +339,19 @@ class Diffraction(mi.BSDF):
         if self._energy is not None:
             largest = dr.slice(dr.max(dr.detach(self.height_scale)))
             self._energy.update(largest, dr.grad_enabled(self.height_scale))
-        held = arrays_within(self.power, self._energy, self.orientation, self.fresnel)
-        self._for_freezing = held + marks(self.table, self.vcavity, str(self.layering))
+        held = arrays_within(
+            self.power, self._energy, self.orientation, self.fresnel, self.boundary, self.mirror
+        )
+        self._for_freezing = held + marks(
+            self.table, self.vcavity, str(self.layering), str(self.boundary), self.coat is None
+        )
         if refused:
             raise DiffractionError("; ".join(refused))
 
     def _scale_refusal(self, height_scale: float) -> str:
         return (
             f"height_scale={height_scale:g} is outside what the table serves, above 0 and up to "
-            f"{self.table.height_scale_max:g}; load the plugin anew with that height_scale"
+            f"{self._scale.high:g}; load the plugin anew with that height_scale"
         )
 
     @property
@@ -343,6 +368,7 @@ class Diffraction(mi.BSDF):
             f"  coherence_width = {self.table.coherence_width:g} µm,\n"
             f"  tolerance = {self.table.tolerance:g},\n"
             f"  surface = {self.fresnel},\n"
+            f"  model = {self.boundary},\n"
             f"  height_scale = {dr.slice(self.height_scale):g},\n"
             f"  energy_conserving = {'false' if self._energy is None else 'true'},\n"
             f"  orientation = {self.orientation},\n"
@@ -353,21 +379,48 @@ class Diffraction(mi.BSDF):
 
     # ------------------------------------------------------------------ the model
 
-    def diffracted(self, si: Interaction, pair: Pair, power: Colour, active: Mask) -> Colour:
-        """R (1 + ωi·ωo)² / (λ² A w² cosθi) · ⟨|P|²⟩, that is f·cosθo of diffraction alone.
+    def diffracted(
+        self, ctx: Context, si: Interaction, pair: Pair, power: Colour, active: Mask
+    ) -> Spectrum:
+        """N' / (λ² A w² cosθi) · ⟨|P|²⟩, that is f·cosθo of diffraction alone (see `boundary`).
+
+        Under a coat that of its face too, the lobe of a flat patch.
 
         power : what the power model says of this pair of directions.
         """
-        outside = self._area_factor * dr.square(pair.one_plus_dot / pair.w) / pair.cos_i
+        w = pair.cos_i + pair.cos_o
+        outside = self._area_factor * dr.rcp(dr.square(w) * pair.cos_i)
+        if self.coat is not None:
+            outside *= pair.outer.cos_o * dr.rcp(pair.cos_o)
         if self._energy is not None:
             outside /= self._energy.divisor(pair, self.height_scale)
         if self.vcavity:
             outside *= vcavity(pair.cos_i, pair.cos_o, pair.one_plus_dot)
-        reflectance = self.fresnel.reflectance(pair.cos_half, si, active)
-        return dr.select(active, outside * reflectance * power, 0.0)
+        wavenumbers, scale = self.power.wavenumbers(si), self.height_scale
+        factor = self.boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)
+        value = mi.Spectrum(outside * power) * factor
+        if self.mirror is not None:
+            pair = pair.outer
+            outside = self._area_factor * dr.rcp(dr.square(pair.w) * pair.cos_i)
+            factor = self.mirror.factor(pair, scale, wavenumbers, si, active, ctx.mode)
+            value += mi.Spectrum(outside * self.power.flat(pair, si)) * factor
+        return dr.select(active, value, 0.0)
+
+    def _power_and_density(self, pair: Pair, si: Interaction) -> tuple[Colour, Float]:
+        """Of a pair, and of drawing it."""
+        if self.coat is None:
+            return self.power.power_and_density(pair, self.height_scale, si)
+        power = self.power.power(pair, self.height_scale, si)
+        return power, self.power.density(pair.outer, self._drawing_scale, si)
+
+    @property
+    def _drawing_scale(self) -> Float:
+        """What directions are drawn for: under a coat κ is as if heights were larger."""
+        return self.height_scale if self.coat is None else self.height_scale * self.coat.eta
 
     def _pair(self, si: Interaction, wo: Vector3f, active: Mask) -> Pair:
-        return Pair(si, wo, self.orientation.rotation(si, active), active)
+        pair = Pair(si, wo, self.orientation.rotation(si, active), active)
+        return pair if self.coat is None else CoatedPair(pair, self.coat.eta)
 
     def _above(self, si: Interaction, wo: Vector3f, active: Mask) -> Mask:
         cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
@@ -389,7 +442,7 @@ class Diffraction(mi.BSDF):
         """A direction, possibly below the surface (then it has no density and no value)."""
         uv = self.power.draw(
             mi.Frame3f.cos_theta(si.wi),
-            dr.detach(self.height_scale),
+            dr.detach(self._drawing_scale),
             dr.maximum((sample1 - COSINE) * (1.0 / (1.0 - COSINE)), 0.0),
             sample2,
             si,

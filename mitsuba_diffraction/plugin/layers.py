@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
+from .coat import UnderCoat
 from .reflectance import Reflectance
 from .roles import Colour, Interaction, Mask, Vector3f
 
@@ -20,7 +21,7 @@ class Transmission:
     A white pair reflects no more than it gets: what f_diffraction sends back is about R(cosθi).
     """
 
-    fresnel: Reflectance
+    fresnel: Reflectance | UnderCoat
     above = 1.0
 
     def beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
@@ -42,7 +43,7 @@ class Blend:
     constant for which it gives no value. A white pair gains energy, towards grazing angles most.
     """
 
-    fresnel: Reflectance
+    fresnel: Reflectance | UnderCoat
     weight: float
 
     @property

@@ -16,6 +16,7 @@ class Pair:
 
     Attributes
     ----------
+    wi, wo : in the shading frame.
     cos_i, cos_o : of the angles to the normal.
     uv : tangential part of ωi + ωo, in the patch's frame.
     w : its normal part.
@@ -23,7 +24,7 @@ class Pair:
     """
 
     def __init__(self, si: Interaction, wo: Vector3f, rotation: Rotation, active: Mask) -> None:
-        self._wi, self._wo, self._rotation = si.wi, wo, rotation
+        self.wi, self.wo, self._rotation = si.wi, wo, rotation
         total = si.wi + wo
         self.uv = in_patch(total, rotation)
         self.w = dr.select(active, total.z, 1.0)
@@ -33,6 +34,11 @@ class Pair:
         self.cos_o = dr.select(active, mi.Frame3f.cos_theta(wo), 1.0)
 
     @property
+    def outer(self) -> Pair:
+        """The pair outside of a coat."""
+        return self
+
+    @property
     def cos_half(self) -> Float:
         """Cosine of the angle between either direction and the half vector."""
         return dr.safe_sqrt(0.5 * self.one_plus_dot)
@@ -40,17 +46,17 @@ class Pair:
     @cached_property
     def incident(self) -> Vector2f:
         """Tangential part of ωi, in the patch's frame."""
-        return in_patch(self._wi, self._rotation)
+        return in_patch(self.wi, self._rotation)
 
     @cached_property
     def outgoing(self) -> Vector2f:
         """Tangential part of ωo, in the patch's frame."""
-        return in_patch(self._wo, self._rotation)
+        return in_patch(self.wo, self._rotation)
 
     @cached_property
     def folded(self) -> Vector2f:
         """Tangential part of the ωi + ωo beyond the horizon which `fold` makes the same ωo of."""
-        tangential = mi.Vector2f(self._wi.x, self._wi.y) + unfolded(self._wo)
+        tangential = mi.Vector2f(self.wi.x, self.wi.y) + unfolded(self.wo)
         return in_patch(tangential, self._rotation)
 
 

@@ -8,7 +8,9 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, fields
 from pathlib import Path
 
+import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from ..errors import DiffractionError
 from ..heights.field import HeightField
@@ -16,10 +18,12 @@ from ..heights.lengths import is_auto
 from ..heights.options import LoadOptions
 from ..settings import SCENE_SETTINGS, checked
 from ..tables.table import DiffractionTable
+from .boundary import MODELS, Boundary, Kirchhoff, SmallSlope
+from .coat import UnderCoat
 from .layers import LAYERINGS, Blend, Layering, Transmission
 from .orientation import Constant, Orientation, Textured
 from .reflectance import Conductor, Dielectric, Perfect, Reflectance
-from .roles import BSDF, Properties
+from .roles import BSDF, Properties, Texture
 from .shadowing import SHADOWINGS
 from .sources import (
     TableProvider,
@@ -42,6 +46,8 @@ NAMES = (
     "k",
     "int_ior",
     "ext_ior",
+    "coat_ior",
+    "model",
     "orientation",
     "height_scale",
     "wavelength",
@@ -60,7 +66,9 @@ class Parameters:
     ----------
     table : the diffraction table.
     heights : reads the heights that it was made of.
-    reflectance : the surface's own reflectance.
+    reflectance : the surface's own reflectance, that of the faces of coat and structure together.
+    coat : the clear layer over the structure, or None.
+    boundary : what the material makes of the light, by model.
     orientation : from the first tangent to the patch's x axis.
     height_scale : factor on all heights.
     energy_conserving : whether to divide by a bound of the albedo.
@@ -72,7 +80,9 @@ class Parameters:
 
     table: DiffractionTable
     heights: Callable[[], HeightField]
-    reflectance: Reflectance
+    reflectance: Reflectance | UnderCoat
+    coat: Dielectric | None
+    boundary: Boundary
     orientation: Orientation
     height_scale: float
     energy_conserving: bool
@@ -105,22 +115,30 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
     height_scale = _number(props, "height_scale", 1.0)
     if not 0.0 < height_scale <= 1e3:
         raise DiffractionError(f"height_scale={height_scale:g} must be above 0 and at most 1000")
-    reflectance = _reflectance(props)
+    coat = _coat(props)
+    reflectance = _reflectance(props, coat)
     if nested is not None and isinstance(reflectance, Perfect | Conductor):
         raise DiffractionError(
             f"a nested BSDF lies beneath a surface that lets no light through (material="
             f"'{reflectance}'); give int_ior instead, or remove the nested BSDF"
         )
-    table, heights = _table(props, height_scale, provider)
+    # κ grows by the coat's index, as if heights did
+    optical = 1.0 if coat is None else dr.slice(coat.eta)
+    table, heights = _table(props, height_scale * optical, provider)
+    flat: Reflectance | UnderCoat = reflectance
+    if coat is not None and not isinstance(reflectance, Perfect):
+        flat = UnderCoat(reflectance, coat)
     return Parameters(
         table=table,
         heights=heights,
-        reflectance=reflectance,
+        reflectance=flat,
+        coat=coat,
+        boundary=_boundary(props, reflectance, table),
         orientation=_orientation(props),
         height_scale=height_scale,
         energy_conserving=_flag(props, "energy_conserving", True),
         vcavity=_choice(props, "shadowing", SHADOWINGS) == "vcavity",
-        layering=_layering(props, reflectance, nested is not None),
+        layering=_layering(props, flat, nested is not None),
         wavelength=_wavelength(props, table),
         nested=nested,
     )
@@ -183,7 +201,28 @@ def _wavelength(props: Properties, table: DiffractionTable) -> float:
     return wavelength
 
 
-def _reflectance(props: Properties) -> Reflectance:
+def _coat(props: Properties) -> Dielectric | None:
+    if "coat_ior" not in props:
+        return None
+    coat = Dielectric(
+        _index(props, "coat_ior"), _index(props, "ext_ior", _above(props)), "coat_eta"
+    )
+    if dr.slice(coat.eta) < 1.0:
+        raise DiffractionError(
+            f"coat_ior={props.get('coat_ior')} is below the index of the medium above the coat; "
+            "a coat's is at least as large"
+        )
+    if props.get("layering", LAYERINGS[0]) == "thesis":
+        raise DiffractionError("layering='thesis' knows no coat; leave coat_ior or layering out")
+    return coat
+
+
+def _above(props: Properties) -> float:
+    """Index of the medium above: air; conductors have theirs given relative to it."""
+    return 1.0 if any(name in props for name in ("material", "eta", "k")) else 1.000277
+
+
+def _reflectance(props: Properties, coat: Dielectric | None) -> Reflectance:
     conductor = [n for n in ("material", "eta", "k") if n in props]
     dielectric = [n for n in ("int_ior", "ext_ior") if n in props]
     if conductor and dielectric:
@@ -194,21 +233,59 @@ def _reflectance(props: Properties) -> Reflectance:
         raise DiffractionError("material and eta, k both say what the conductor is; give one")
     if "material" in conductor:
         material = str(props.get("material"))
+        if material == "none" and coat is not None:
+            raise DiffractionError(
+                "coat_ior needs a refractive index beneath it, which material='none' has not; give "
+                "a conductor, or int_ior"
+            )
         if material == "none":
             return Perfect()
-        return Conductor.of_material(material, _number(props, "wavelength", DEFAULT_WAVELENGTH))
+        metal = Conductor.of_material(material, _number(props, "wavelength", DEFAULT_WAVELENGTH))
+        metal.medium = coat
+        return metal
     if conductor:
         if len(conductor) == 1:
             raise DiffractionError(f"{conductor[0]} alone is no conductor; give both eta and k")
-        return Conductor(
-            props.get_unbounded_texture("eta"), props.get_unbounded_texture("k"), "eta, k"
+        metal = Conductor(_index_part(props, "eta"), _index_part(props, "k"), "eta, k")
+        metal.medium = coat
+        return metal
+    medium = _index(props, "ext_ior", 1.000277) if coat is None else _index(props, "coat_ior")
+    return Dielectric(_index(props, "int_ior", 1.5), medium)
+
+
+def _boundary(props: Properties, material: Reflectance, table: DiffractionTable) -> Boundary:
+    """By default small slope where there is an index, unless it is the thesis' layering."""
+    scalar = isinstance(material, Perfect) or props.get("layering", LAYERINGS[0]) == "thesis"
+    if _choice(props, "model", MODELS[::-1] if scalar else MODELS) == "kirchhoff":
+        return Kirchhoff(material)
+    if isinstance(material, Perfect):
+        raise DiffractionError(
+            "model='small_slope' needs a refractive index, which material='none' has not; give "
+            "model='kirchhoff', a conductor, or int_ior"
         )
-    iors = {name: _index(props, name) for name in dielectric}
-    return Dielectric(iors.get("int_ior", 1.5), iors.get("ext_ior", 1.000277))
+    return SmallSlope(material, table.roughness)
 
 
-def _index(props: Properties, name: str) -> float | str:
-    value = props.get(name)
+def _index_part(props: Properties, name: str) -> Texture:
+    """Part of a complex index: a spectrum or texture whose numbers fit, as far as it shows them."""
+    texture = props.get_unbounded_texture(name)
+    shown = mi.traverse(texture)
+    keys = {"values", "data"}
+    if not (mi.is_spectral and props.type(name) == mi.Properties.Type.Color):
+        keys.add("value")  # else coefficients of a spectrum
+    for key in keys.intersection(name for name, _ in shown):
+        values = np.ravel(np.array(shown[key], float))
+        wrong = values[~(np.isfinite(values) & (values >= 0.0) & ((values > 0.0) | (name == "k")))]
+        if wrong.size:
+            least = "at least 0" if name == "k" else "above 0"
+            raise DiffractionError(
+                f"{name}={wrong[0]:g} must be finite and {least}: the index is eta + ik"
+            )
+    return texture
+
+
+def _index(props: Properties, name: str, default: float = 1.0) -> float | str:
+    value = props.get(name, default)
     if isinstance(value, str):
         return value
     if not (isinstance(value, int | float) and math.isfinite(value) and value >= 1.0):
@@ -245,7 +322,7 @@ def _kind(element: BSDF) -> str:
     return str(element.class_name())
 
 
-def _layering(props: Properties, reflectance: Reflectance, nested: bool) -> Layering:
+def _layering(props: Properties, reflectance: Reflectance | UnderCoat, nested: bool) -> Layering:
     if _choice(props, "layering", LAYERINGS) == "transmission":
         if "diffuse_weight" in props:
             raise DiffractionError("diffuse_weight belongs to layering='thesis'; leave it out")

@@ -34,6 +34,12 @@ class PowerModel(Protocol):
     ) -> tuple[Colour, Float]:
         """Both at once."""
 
+    def wavenumbers(self, si: Interaction) -> list[Float]:
+        """2π/λ of each channel, rad/µm."""
+
+    def flat(self, pair: Pair, si: Interaction) -> Colour:
+        """What `power` is of a flat surface."""
+
     def draw(
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
     ) -> Vector2f:
@@ -56,6 +62,7 @@ class SpectralPower:
     def __init__(self, table: DiffractionTable, wavelength: float) -> None:
         self.device = device_table(table)
         self._sampler = order_sampler(table)
+        self._sigma = table.sigma
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
@@ -105,6 +112,18 @@ class SpectralPower:
         remaining = sample1 * count - hero
         return self._sampler.draw(k, cos_i, height_scale, remaining, sample2) * dr.rcp(k)
 
+    def wavenumbers(self, si: Interaction) -> list[Float]:
+        """See `PowerModel.wavenumbers`."""
+        return [dr.rcp(wavelength) * (2e3 * dr.pi) for wavelength in self._wavelengths(si)]
+
+    def flat(self, pair: Pair, si: Interaction) -> Colour:
+        """See `PowerModel.flat`: exp(−σ²k²|(u, v)|²)/λ²."""
+        apart = -(self._sigma**2) * dr.squared_norm(pair.uv)
+        squares = [dr.square(k) for k in self.wavenumbers(si)]
+        return mi.UnpolarizedSpectrum(
+            [dr.exp(apart * square) * (square * (0.5 / dr.pi) ** 2) for square in squares]
+        )
+
     def _power(self, k: Float, pair: Pair, scaled_w: Float) -> Float:
         power = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w)
         return power * dr.square(k * (0.5 / dr.pi))
@@ -131,7 +150,7 @@ class SpectralPower:
         In a loop, which makes a smaller and faster kernel. Derivatives do not flow through loops
         without further ado, so then it is unrolled; so it is where there is no kernel.
         """
-        wavenumbers = [dr.rcp(wavelength) * (2e3 * dr.pi) for wavelength in self._wavelengths(si)]
+        wavenumbers = self.wavenumbers(si)
         count = len(wavenumbers)
         first, second = [mi.Float(0.0)] * count, mi.Float(0.0)
         if differentiable or count == 1 or not dr.is_jit_v(mi.Float):

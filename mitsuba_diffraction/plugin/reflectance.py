@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import DiffractionError
 from .bounded import Bounded
-from .roles import BSDF, Callback, Colour, Float, Interaction, Mask, Texture
+from .roles import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Texture
 from .traversal import children
 
 #: Ratios of refractive indices that are taken when one changes.
@@ -38,16 +38,27 @@ class Perfect:
 class Dielectric:
     """Fresnel reflectance of an interface between two dielectrics, unpolarised."""
 
-    def __init__(self, int_ior: float | str, ext_ior: float | str) -> None:
+    def __init__(self, int_ior: float | str, ext_ior: float | str, name: str = "eta") -> None:
         probe = _load("dielectric", int_ior=int_ior, ext_ior=ext_ior)
         eta = float(dr.slice(mi.traverse(probe)["eta"]))
-        self._index = Bounded("eta", eta, *INDICES, _eta_refusal)
+        self._index = Bounded(name, eta, *INDICES, _eta_refusal)
         self.eta = self._index.value
-        self.traverse, self.settle = self._index.traverse, self._index.settle
+        self.traverse = self._index.traverse
+        self.settle()
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R for the cosine of the angle to the half vector, the same at every wavelength."""
         return mi.UnpolarizedSpectrum(mi.fresnel(cos_theta, self.eta)[0])
+
+    def indices(self, si: Interaction, active: Mask) -> list[Number]:
+        """The relative index, one for all channels; complex where there is total reflection."""
+        return [mi.Complex2f(self.eta, 0.0) if self._reflects_all else self.eta]
+
+    def settle(self) -> str | None:
+        """See `Bounded.settle`."""
+        refused = self._index.settle()
+        self._reflects_all = bool(dr.slice(dr.detach(self.eta)) < 1.0)
+        return refused
 
     def __str__(self) -> str:
         return f"dielectric[eta = {dr.slice(self.eta):.5g}]"
@@ -64,6 +75,7 @@ class Conductor:
 
     def __init__(self, eta: Texture, k: Texture, name: str) -> None:
         self.eta, self.k, self.name = eta, k, name
+        self.medium: Dielectric | None = None  #: what lies above, if not air
 
     @classmethod
     def of_material(cls, material: str, wavelength: float) -> Conductor:
@@ -78,13 +90,15 @@ class Conductor:
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R for the cosine of the angle to the half vector, at si.wavelengths."""
+        indices = self.indices(si, active)
+        return mi.UnpolarizedSpectrum([mi.fresnel_conductor(cos_theta, n) for n in indices])
+
+    def indices(self, si: Interaction, active: Mask) -> list[Number]:
+        """The complex index n + ik of each channel, over that of the medium above."""
         eta, k = self.eta.eval(si, active), self.k.eval(si, active)
-        return mi.UnpolarizedSpectrum(
-            [
-                mi.fresnel_conductor(cos_theta, mi.Complex2f(e, x))
-                for e, x in zip(eta, k, strict=True)
-            ]
-        )
+        if self.medium is not None:
+            eta, k = eta / self.medium.eta, k / self.medium.eta
+        return [mi.Complex2f(n, x) for n, x in zip(eta, k, strict=True)]
 
     def traverse(self, callback: Callback) -> None:
         """Expose both spectra."""

@@ -61,6 +61,11 @@ class ColourLookup:
         order_0 = self._zeroth_order(dr.sqrt(dr.maximum(squared_radius, 1e-14)), z)
         return mi.Color3f(*(a + b for a, b in zip(colours, order_0, strict=True)))
 
+    def flat(self, uv: Vector2f) -> Colour:
+        """That of a flat surface: of order 0 where no phase tells heights apart, z = 0."""
+        radius = dr.sqrt(dr.maximum(dr.squared_norm(uv), 1e-14))
+        return mi.Color3f(*self._zeroth_order(radius, mi.Float(0.0)))
+
     def _other_orders(self, uv: Vector2f, squared_radius: Float, z: Float) -> list[Float]:
         offset, interval = series_interval(self.expansion, z)
         weights = series_weights(self.expansion, TERMS, offset, interval, z)

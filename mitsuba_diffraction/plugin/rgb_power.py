@@ -12,6 +12,8 @@ import weakref
 import drjit as dr
 import mitsuba as mi
 
+from ..optics.colour import RGB_WAVELENGTHS
+from ..optics.geometry import wavenumber
 from ..tables.colour.proposals import BANDED, BANDS, LOBES, colour_proposals
 from ..tables.colour.table import ColourTable
 from ..tables.store.cache import cached_colours
@@ -42,6 +44,7 @@ class RGBPower:
         self._occupied = upload(mi.Float, found.occupied.astype("float32"))
         self._zs = len(found.order_0)
         self._order_0 = upload(mi.Float, found.order_0)
+        self._wavenumbers = [mi.Float(k) for k in wavenumber(RGB_WAVELENGTHS).tolist()]
         # 1/(2·variance) of the lobes in (u, v)
         self._sharpness = [(2.0 * math.pi * table.sigma / lam) ** 2 for lam in LOBES]
 
@@ -60,6 +63,14 @@ class RGBPower:
     ) -> tuple[Colour, Float]:
         """See `PowerModel.power_and_density`."""
         return self.power(pair, height_scale, si), self.density(pair, height_scale, si)
+
+    def wavenumbers(self, si: Interaction) -> list[Float]:
+        """See `PowerModel.wavenumbers`; of the wavelength that is a channel's mean."""
+        return self._wavenumbers
+
+    def flat(self, pair: Pair, si: Interaction) -> Colour:
+        """See `PowerModel.flat`."""
+        return self._lookup.flat(pair.uv)
 
     def _density(self, uv: Vector2f, share: Float, band: Index) -> Float:
         """Density of `draw` per du dv."""

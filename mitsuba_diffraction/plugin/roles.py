@@ -11,6 +11,9 @@ from typing import Any, TypeAlias
 Float: TypeAlias = Any
 """`mi.Float`: an angle's cosine, a frequency (rad/µm), a random number, a density (1/sr)."""
 
+Number: TypeAlias = Any
+"""`mi.Float` or `mi.Complex2f`: a refractive index, an entry of a Jones matrix."""
+
 Index: TypeAlias = Any
 """`mi.UInt32`."""
 

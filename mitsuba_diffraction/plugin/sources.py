@@ -69,7 +69,9 @@ def table_of_file(
         if height_scale > table.height_scale_max:
             raise DiffractionError(
                 f"height_scale={height_scale:g} is beyond the table's "
-                f"{table.height_scale_max:g}; give the height field instead of the table"
+                f"{table.height_scale_max:g} (a coat counts as its index times the heights); give "
+                "the height field instead of the table, or build it with '--height-scale-max "
+                f"{height_scale:.4g}' or more"
             )
     elif is_recipe(path):
         recipe = Recipe.load(path)

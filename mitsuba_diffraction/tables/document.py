@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import quoted
+from ..optics.blend import RoughnessTable
 from ..settings import BASES, MAX_TAPS, MAX_TERMS, TableSettings
 from .expansion import KINDS, Expansion
 from .packing import Grid
@@ -26,10 +27,11 @@ MAX_BYTES = 4 << 30
 
 _REQUIRED = ("coherence_width", "coherence", "tolerance", "wavelength_range", "height_scale_max")
 _SETTINGS = tuple(field.name for field in dataclasses.fields(TableSettings))
-_OWN = ("scale", "spacing", "error", "source", "expansion", "grid", "order_0")
+_OWN = ("scale", "spacing", "error", "roughness", "source", "expansion", "grid", "order_0")
 _COMPONENTS = {"power": 1, "amplitude": 2}
 _MOST_INTERVALS, _LONGEST_SERIES = 4096, 2048
 _MOST_SERIES = 1 << 16  # terms over all intervals
+_MOST_NODES = 1 << 12
 _ROUNDED = 1e-6  # relative: of what follows from other fields
 #: Of the light in one order: at most 1 but for the error of a coarse table.
 _LARGEST_POWER = 2.0
@@ -43,6 +45,7 @@ def document_of(table: DiffractionTable) -> dict[str, Any]:
         "scale": table.scale,
         "spacing": table.spacing,
         "error": dict(table.error),
+        "roughness": {"first": table.roughness.first, "nodes": table.roughness.nodes.tolist()},
         "source": dict(table.source),
         "expansion": _given(table.expansion),
         "grid": _given(table.grid),
@@ -136,6 +139,7 @@ def _described(fields: dict[str, Any], whole: bool) -> Described:
         spacing=spacing,
         settings=settings,
         error=_error(fields["error"]),
+        roughness=_roughness(_mapping(fields["roughness"], "roughness")),
         source=_source(fields["source"]),
     )
     _check_agreement(table, whole)
@@ -235,6 +239,13 @@ def _error(value: Any) -> dict[str, float]:
     fields = _mapping(value, "error")
     _names(fields, names, ())
     return {name: _number(number, name, 0.0, 1e9) for name, number in fields.items()}
+
+
+def _roughness(fields: Mapping[str, Any]) -> RoughnessTable:
+    _names(fields, ("first", "nodes"), ("first", "nodes"))
+    nodes = _numbers(fields["nodes"], "nodes", (None,))
+    _require(2 <= len(nodes) <= _MOST_NODES and bool(np.all(nodes >= 0.0)), "nodes of roughness")
+    return RoughnessTable(_number(fields["first"], "first", -64.0, 64.0), nodes)
 
 
 def _source(value: Any) -> dict[str, Any]:

@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
+from ..optics.blend import RoughnessTable
 from ..optics.geometry import sigma_of, wavenumber
 from ..settings import TableSettings
 from .expansion import Expansion
 from .packing import Grid
 
 #: Raised whenever what the coefficients mean changes; tables of another version are refused.
-FORMAT_VERSION = 3
+FORMAT_VERSION = 4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,6 +42,7 @@ class DiffractionTable:
     spacing : (dqx, dqy), rad/µm between bins.
     settings : what was asked for.
     error : the measured error (see `build.error`): near order 0, far from it, and at which κ.
+    roughness : height variance by spatial frequency, up to `q_limit`; the mean of several patches'.
     source : the heights: name, digest, size, statistics, history.
     coarse : of a table that ends before `q_limit` or its own `kappa_max`, the cells that go on
         from there (`build.coarse`).
@@ -54,6 +56,7 @@ class DiffractionTable:
     spacing: tuple[float, float]
     settings: TableSettings
     error: Mapping[str, float]
+    roughness: RoughnessTable
     source: Mapping[str, Any] = field(default_factory=dict)
     coarse: DiffractionTable | None = None
 

@@ -47,12 +47,18 @@ def test_ripples_of_an_order_count_and_long_waves_and_fine_roughness_do_not():
 
 def test_a_table_of_nodes_interpolates_to_it():
     exact = roughness()
-    first, nodes = exact.table(35.0)
+    table = exact.table(35.0)
     q = np.geomspace(0.01, 35.0, 2000)
-    place = (np.log2(q) - first) * NODES_PER_OCTAVE
-    found = np.interp(place, np.arange(len(nodes)), nodes, left=0.0)
-    assert place.max() <= len(nodes) - 1
-    assert found == pytest.approx(exact.at(q), abs=5e-4 * nodes.max())
+    assert table.first + (len(table.nodes) - 1) / NODES_PER_OCTAVE >= np.log2(35.0)
+    assert table.at(q) == pytest.approx(exact.at(q), abs=5e-4 * table.nodes.max())
+    assert table.at(0.0) == 0.0
+
+
+def test_the_mean_of_several_is_that_of_their_variances():
+    other = ScaleRoughness.of(2 * PATCH.heights, PATCH.pixel_size)
+    q = np.geomspace(0.1, 30.0, 20)
+    mean = ScaleRoughness.mean([roughness(), other])
+    assert mean.at(q) == pytest.approx(2.5 * roughness().at(q), rel=1e-12)
 
 
 def test_several_patches_have_the_mean_of_their_roughness():
@@ -66,9 +72,9 @@ def test_several_patches_have_the_mean_of_their_roughness():
 def test_a_flat_surface_has_no_roughness_at_any_scale():
     flat = ScaleRoughness.of(np.full((4, 6), 0.3), (0.1, 0.1))
     assert np.all(flat.at([0.0, 1.0, 30.0]) < 1e-30)
-    first, nodes = flat.table(35.0)
-    assert np.isfinite(first)
-    assert np.all(nodes < 1e-30)
+    table = flat.table(35.0)
+    assert np.isfinite(table.first)
+    assert np.all(table.nodes < 1e-30)
 
 
 @pytest.mark.parametrize("index", [1.56, 0.65 + 5.6j])

@@ -1,4 +1,4 @@
-"""The surface's own reflectance: Fresnel's, once, at the half vector."""
+"""The surface's own reflectance: in the model `kirchhoff` Fresnel's, once, at the half vector."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ WIDTH = 2.4
 
 def load(field=FLAT, **parameters):
     """A mirror with these parameters."""
-    return mi.load_dict(md.bsdf_dict(field, coherence_width=WIDTH, **parameters))
+    return mi.load_dict(md.bsdf_dict(field, coherence_width=WIDTH, model="kirchhoff", **parameters))
 
 
 def ratios(wi, wo, wavelengths, **parameters):

@@ -162,18 +162,6 @@ def test_one_wavelength_is_the_spectrum_there() -> None:
     assert mono == pytest.approx(spectral[:, :1], rel=1e-4, abs=1e-6 * spectral.max())
 
 
-def test_polarised_light_is_depolarised(name: str) -> None:
-    if not mi.is_polarized:
-        pytest.skip(f"{name} knows no polarisation")
-    wi, wo, _ = pairs()
-    bsdf, lam = load(material="Al"), wavelengths()
-    scalar = not dr.is_jit_v(mi.Float)
-    si = interaction(wi[0], lam[0]) if scalar else interaction(wi, lam)
-    out = mi.Vector3f(wo[0].tolist()) if scalar else mi.Vector3f(wo.T)
-    mueller = np.array(bsdf.eval(mi.BSDFContext(), si, out))
-    assert np.mean(mueller[0, 0] > 0.0) > 0.9  # some pairs are beyond the patch's Nyquist limit
-    mueller[0, 0] = 0.0
-    assert np.all(mueller == 0.0)
 
 
 def test_a_wavelength_outside_the_table_is_refused(name: str) -> None:

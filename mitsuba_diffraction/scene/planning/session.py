@@ -21,7 +21,17 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...plugin.names import own_id
 from ...plugin.pair import Pair
-from ...plugin.roles import BSDF, Colour, Float, Interaction, Mask, Properties, Vector2f
+from ...plugin.roles import (
+    BSDF,
+    Colour,
+    Context,
+    Float,
+    Interaction,
+    Mask,
+    Properties,
+    Spectrum,
+    Vector2f,
+)
 from ...plugin.sampling import share_sampler
 from ...settings import TableSettings
 from ...tables.store.cache import cached_table, table_key
@@ -175,9 +185,12 @@ def _kind(session: Session) -> type[BSDF]:
     class RecordedDiffraction(Diffraction):
         """Writes down every look-up of `eval` and `eval_pdf`."""
 
-        def diffracted(self, si: Interaction, pair: Pair, power: Colour, active: Mask) -> Colour:
-            value = super().diffracted(si, pair, power, active)
-            session.record(self, si, pair.uv, pair.w * self.height_scale, value)
+        def diffracted(
+            self, ctx: Context, si: Interaction, pair: Pair, power: Colour, active: Mask
+        ) -> Spectrum:
+            value = super().diffracted(ctx, si, pair, power, active)
+            light = mi.unpolarized_spectrum(value)
+            session.record(self, si, pair.uv, pair.w * self.height_scale, light)
             return value
 
     return RecordedDiffraction

@@ -38,7 +38,7 @@ from .choose import (
     too_many_intervals,
 )
 from .coarse import coarse_table
-from .describe import describe
+from .describe import describe, roughness_of
 
 T = TypeVar("T")
 
@@ -264,6 +264,7 @@ def _table(
         spacing=wanted.spacing,
         settings=replace(settings, q_max=None if everywhere else wanted.q_max),
         error=attempt.measured,
+        roughness=roughness_of(patches, q_limit_of(settings.wavelength_range)),
         source=describe(patches, settings, setting.taps),
         coarse=None if wanted.whole else coarse_table(patches, settings, tell),
     )

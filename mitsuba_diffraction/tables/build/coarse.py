@@ -29,6 +29,7 @@ from ..packing import Grid
 from ..table import DiffractionTable, q_limit_of
 from ..window import taps_for
 from .choose import svd_expansion
+from .describe import roughness_of
 from .half_precision import half_scale
 from .spectrum import Spectrum
 
@@ -92,6 +93,7 @@ def coarse_table(
         spacing=(spacing[0], spacing[1]),
         settings=own_settings,
         error={},
+        roughness=roughness_of(patches, q_limit),
     )
 
 

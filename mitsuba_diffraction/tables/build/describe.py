@@ -9,6 +9,7 @@ import numpy as np
 
 from ...heights.field import HeightField
 from ...heights.validity import window_warning
+from ...optics.blend import RoughnessTable, ScaleRoughness
 from ...optics.geometry import wavenumber
 from ...settings import TableSettings
 from .spectrum import Spectrum
@@ -43,6 +44,12 @@ def describe(
         source["patches"] = [p.summary() | {"digest": p.digest()} for p in patches]
         source["variation"] = _variation(patches)
     return source
+
+
+def roughness_of(patches: Sequence[HeightField], q_max: float) -> RoughnessTable:
+    """Height variance by spatial frequency up to q_max (rad/µm), the mean of all patches'."""
+    each = [ScaleRoughness.of(patch.heights, patch.pixel_size) for patch in patches]
+    return ScaleRoughness.mean(each).table(q_max)
 
 
 def _variation(patches: Sequence[HeightField]) -> float:

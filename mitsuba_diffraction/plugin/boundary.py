@@ -1,0 +1,315 @@
+"""What the material makes of the light, by model: the factor of the diffracted power (Dr.Jit).
+
+The twin of `optics.boundary` and `optics.blend`, which give the formulas and their sources. With
+J = (1−s) K + s B of small slope (s = 0 is Kirchhoff) and J' = 2 cosθi cosθo J,
+
+    f cosθo = N' / (λ² A w² cosθi) · ⟨|P|²⟩,   N' = ½ Σ|J'|² = R (1 + ωi·ωo)² of Kirchhoff,
+
+and in polarised variants the Mueller matrix of J' takes the place of N'.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ..optics.blend import NODES_PER_OCTAVE, RoughnessTable
+from .coat import CoatedPair, transmittances
+from .memory import index_between, read_record, upload
+from .pair import Pair
+from .reflectance import Conductor, Dielectric, Perfect, Reflectance
+from .roles import Float, Interaction, Mask, Number, Spectrum, Vector3f
+
+#: The first is the default of a material with an index.
+MODELS = ("small_slope", "kirchhoff")
+
+#: Entries ss, sp, ps, pp of a Jones matrix: first the outgoing, then the incident polarisation.
+Jones = tuple[Number, Number, Number, Number]
+
+#: Of 2, that makes s.
+_EXPONENT = -1.0 / (3.0 * math.log(2.0))
+# Squared sines below which a direction is the normal itself, or two are one
+_NORMAL = 1e-20
+
+
+@dataclass(frozen=True)
+class Kirchhoff:
+    """The tangent plane: Fresnel's coefficients at the half vector."""
+
+    material: Reflectance
+
+    def factor(
+        self,
+        pair: Pair,
+        height_scale: Float,
+        wavenumbers: list[Float],
+        si: Interaction,
+        active: Mask,
+        mode: mi.TransportMode,
+    ) -> Spectrum:
+        """N' of a pair, or its Mueller matrix, for each channel.
+
+        wavenumbers : of the channels, rad/µm.
+        mode : whether light comes along ωo (radiance) or along ωi (importance).
+        """
+        coated = isinstance(pair, CoatedPair)
+        if (mi.is_polarized or coated) and not isinstance(self.material, Perfect):
+            light = _Path(pair, mode)
+            found = [light.kirchhoff(index) for index in self.material.indices(si, active)]
+            return light.of_jones(found)
+        reflectance = self.material.reflectance(pair.cos_half, si, active)
+        return mi.depolarizer(reflectance * dr.square(pair.one_plus_dot))
+
+    def __str__(self) -> str:
+        return "kirchhoff"
+
+
+class SmallSlope:
+    """Small slope, blended with Kirchhoff where the surface is rough at the scale of an order."""
+
+    def __init__(self, material: Dielectric | Conductor, roughness: RoughnessTable) -> None:
+        self.material = material
+        self._first = roughness.first
+        nodes = roughness.nodes.astype(np.float32)
+        self._last = len(nodes) - 2.0
+        # A node and the next one side by side, so that one packet load fetches both
+        self._nodes = upload(mi.Float, np.stack([nodes[:-1], nodes[1:]], axis=1))
+
+    def factor(
+        self,
+        pair: Pair,
+        height_scale: Float,
+        wavenumbers: list[Float],
+        si: Interaction,
+        active: Mask,
+        mode: mi.TransportMode,
+    ) -> Spectrum:
+        """See `Kirchhoff.factor`."""
+        light = _Path(pair, mode)
+        indices = self.material.indices(si, active)
+        matrices = [(light.kirchhoff(index), light.small_slope(index)) for index in indices]
+        if len(matrices) == 1:  # one index at all wavelengths
+            matrices *= len(wavenumbers)
+        shares = self._shares(pair, height_scale, wavenumbers)
+        blended = [
+            tuple(dr.fma(b - k, s, k) for k, b in zip(*both, strict=True))
+            for both, s in zip(matrices, shares, strict=True)
+        ]
+        return light.of_jones(blended)
+
+    def _shares(self, pair: Pair, height_scale: Float, wavenumbers: list[Float]) -> list[Float]:
+        """s = exp(−(κσ_q)⁴/3) for each channel."""
+        # An order of no frequency to speak of has the first node's roughness, as q → 0
+        squared = dr.maximum(dr.squared_norm(pair.uv), 1e-20)
+        start = dr.fma(dr.log2(squared), 0.5 * NODES_PER_OCTAVE, -self._first * NODES_PER_OCTAVE)
+        squared_w = dr.square(pair.w * height_scale)
+        shares = []
+        for k in wavenumbers:
+            place = dr.fma(dr.log2(k), NODES_PER_OCTAVE, start)
+            lower = index_between(dr.floor(place), 0.0, self._last)
+            low, high = read_record(self._nodes, mi.UInt32(lower), 2)
+            variance = dr.lerp(low, high, dr.clip(place - lower, 0.0, 1.0))
+            shares.append(dr.exp2(dr.square(squared_w * dr.square(k) * variance) * _EXPONENT))
+        return shares
+
+    def __str__(self) -> str:
+        return "small_slope"
+
+
+Boundary = Kirchhoff | SmallSlope
+
+
+class _Path:
+    """Light along −ω0, then along ω: what Jones matrices need of it besides the index.
+
+    Axes are s = ẑ×d/|ẑ×d| and p = d×s of the direction d of travel, as in `optics.boundary`.
+    """
+
+    def __init__(self, pair: Pair, mode: mi.TransportMode) -> None:
+        # Unpolarised light knows no difference
+        forwards = mode == mi.TransportMode.Importance
+        first, second = (pair.wi, pair.wo) if forwards else (pair.wo, pair.wi)
+        self._first, self._second = first, second
+        self._coat: tuple[tuple[Float, Float], ...] = ()
+        self._frames = (-first, second)
+        if isinstance(pair, CoatedPair):
+            ends = ((outer := pair.outer).wi, outer.wo)
+            cosines = (outer.cos_i, outer.cos_o)
+            if not forwards:
+                ends, cosines = ends[::-1], cosines[::-1]
+            self._coat = tuple(transmittances(cosine, pair.n) for cosine in cosines)
+            self._frames = (-ends[0], ends[1])
+        cosines = (pair.cos_i, pair.cos_o)
+        self._q0, self._q = cosines if forwards else cosines[::-1]
+        self._cos_half, self._one_plus_dot = pair.cos_half, pair.one_plus_dot
+        self._scale = 2.0 * self._q0 * self._q
+        self._square0 = dr.square(first.x) + dr.square(first.y)
+        self._square = dr.square(second.x) + dr.square(second.y)
+        self._level()
+        self._facet()
+
+    def _level(self) -> None:
+        """k̂·k̂0 and ẑ·(k̂0×k̂); one direction is the other where either is the normal."""
+        first, second = self._first, self._second
+        slanted = (self._square0 > _NORMAL) & (self._square > _NORMAL)
+        inverse = dr.rsqrt(dr.select(slanted, self._square0, 1.0)) * dr.rsqrt(
+            dr.select(slanted, self._square, 1.0)
+        )
+        # k̂0 points against ω0
+        dot = -dr.fma(first.x, second.x, first.y * second.y) * inverse
+        self._across = dr.fma(first.x, second.y, -first.y * second.x)
+        self._dot = dr.select(slanted, dot, 1.0)
+        self._cross = dr.select(slanted, -self._across * inverse, 0.0)
+        self._sines = dr.sqrt(dr.select(slanted, self._square0 * self._square, 0.0))
+
+    def _facet(self) -> None:
+        """Products of cosine and sine of the turns from s to the facet's s, and back.
+
+        The facet's is along n = ω0×ω; n·s0 and n·p0 make the first turn, n·s and n·p the second.
+        """
+        first, second, z = self._first, self._second, self._across
+        x = dr.fma(first.y, second.z, -first.z * second.y)
+        y = dr.fma(first.z, second.x, -first.x * second.z)
+        turn0 = dr.fma(x, first.y, -y * first.x)
+        turn = dr.fma(y, second.x, -x * second.y)
+        length0, length = (dr.fma(t, t, z * z) for t in (turn0, turn))
+        found = (length0 > _NORMAL) & (length > _NORMAL)
+        inverse = dr.rsqrt(dr.select(found, length0, 1.0)) * dr.rsqrt(dr.select(found, length, 1.0))
+        # Where both directions are one, any facet's axis does: s0
+        self._cc = dr.select(found, turn * turn0 * inverse, self._dot)
+        self._cs = dr.select(found, turn * z * inverse, 0.0)
+        self._sc = dr.select(found, -z * turn0 * inverse, self._cross)
+        self._ss = dr.select(found, -z * z * inverse, 0.0)
+
+    def kirchhoff(self, index: Number) -> Jones:
+        """2 cosθi cosθo K (`optics.boundary.kirchhoff`)."""
+        cosine, epsilon = self._cos_half, index * index
+        inside = _root(epsilon - dr.fma(-cosine, cosine, 1.0))
+        r_s = (cosine - inside) * dr.rcp(cosine + inside) * self._one_plus_dot
+        r_p = (epsilon * cosine - inside) * dr.rcp(epsilon * cosine + inside) * self._one_plus_dot
+        return (
+            r_s * self._cc - r_p * self._ss,
+            r_s * self._cs + r_p * self._sc,
+            -(r_s * self._sc + r_p * self._cs),
+            r_p * self._cc - r_s * self._ss,
+        )
+
+    def small_slope(self, index: Number) -> Jones:
+        """2 cosθi cosθo B (`optics.boundary.small_slope`)."""
+        epsilon = index * index
+        contrast = (epsilon - 1.0) * self._scale
+        inside0, inside = _root(epsilon - self._square0), _root(epsilon - self._square)
+        s0, s = dr.rcp(self._q0 + inside0), dr.rcp(self._q + inside)
+        p0, p = dr.rcp(epsilon * self._q0 + inside0), dr.rcp(epsilon * self._q + inside)
+        out, into = contrast * s, contrast * p
+        bent0, bent = inside0 * p0, inside * p
+        return (
+            -(out * s0 * self._dot),
+            out * bent0 * self._cross,
+            contrast * bent * s0 * self._cross,
+            contrast * bent * bent0 * self._dot - into * p0 * epsilon * self._sines,
+        )
+
+    def of_jones(self, matrices: list[Jones]) -> Spectrum:
+        """What Jones matrices make of light, for each channel; one may stand for all.
+
+        ½ Σ|J|², or in polarised variants the Mueller matrix between Mitsuba's bases; through the
+        faces of a coat, where there is one.
+        """
+        if self._coat:
+            matrices = [self._transmitted(jones) for jones in matrices]
+        if mi.is_polarized:
+            return self._mueller(matrices)
+        powers = [0.5 * sum(map(_square, jones)) for jones in matrices]
+        return mi.UnpolarizedSpectrum(powers if len(powers) > 1 else powers[0])
+
+    def _transmitted(self, jones: Jones) -> Jones:
+        """√T J √T of the coat's face, light coming and going."""
+        (s0, p0), (s, p) = ([dr.sqrt(t) for t in ts] for ts in self._coat)
+        ss, sp, ps, pp = jones
+        return ss * (s * s0), sp * (s * p0), ps * (p * s0), pp * (p * p0)
+
+    def _mueller(self, matrices: list[Jones]) -> Spectrum:
+        incident, outgoing = self._frames
+        turn0 = _turn(self._axis(incident), mi.mueller.stokes_basis(incident), incident)
+        turn = _turn(mi.mueller.stokes_basis(outgoing), self._axis(outgoing), outgoing)
+        entries = [_mueller(_turned(jones, turn, turn0)) for jones in matrices]
+        if len(entries) == 1:
+            return mi.Spectrum(*entries[0])
+        return mi.Spectrum(*(mi.UnpolarizedSpectrum(list(x)) for x in zip(*entries, strict=True)))
+
+    def _axis(self, direction: Vector3f) -> Vector3f:
+        """s of light along a direction; of the other's where it is the normal, y where both are."""
+        level = mi.Vector3f(0.0, 1.0, 0.0)
+        for one in (self._second, -self._first, direction):
+            square = dr.square(one.x) + dr.square(one.y)
+            slanted = square > _NORMAL
+            inverse = dr.rsqrt(dr.select(slanted, square, 1.0))
+            level = dr.select(slanted, mi.Vector3f(-one.y * inverse, one.x * inverse, 0.0), level)
+        return level
+
+
+def _turn(to: Vector3f, start: Vector3f, direction: Vector3f) -> tuple[Float, Float]:
+    """(cos, sin) from components along (start, d×start) to those along (to, d×to)."""
+    return dr.dot(to, start), dr.dot(to, dr.cross(direction, start))
+
+
+def _turned(jones: Jones, out: tuple[Float, Float], into: tuple[Float, Float]) -> Jones:
+    """[[c, s], [−s, c]] of `out`, times the matrix, times that of `into`."""
+    ss, sp, ps, pp = jones
+    (c, s), (c0, s0) = out, into
+    ss, sp, ps, pp = ss * c + ps * s, sp * c + pp * s, ps * c - ss * s, pp * c - sp * s
+    return ss * c0 - sp * s0, ss * s0 + sp * c0, ps * c0 - pp * s0, ps * s0 + pp * c0
+
+
+def _mueller(jones: Jones) -> list[Float]:
+    """The sixteen entries, row by row (`optics.boundary.mueller`)."""
+    ss, sp, ps, pp = jones
+    a, b, c, d = (0.5 * _square(x) for x in jones)
+    rows, columns = (_product(ss, sp), _product(ps, pp)), (_product(ss, ps), _product(sp, pp))
+    same, other = _product(ss, pp), _product(sp, ps)
+    real, imag = dr.real, dr.imag
+    return [
+        a + b + c + d,
+        a - b + c - d,
+        real(rows[0]) + real(rows[1]),
+        -imag(rows[0]) - imag(rows[1]),
+        a + b - c - d,
+        a - b - c + d,
+        real(rows[0]) - real(rows[1]),
+        imag(rows[1]) - imag(rows[0]),
+        real(columns[0]) + real(columns[1]),
+        real(columns[0]) - real(columns[1]),
+        real(same) + real(other),
+        imag(other) - imag(same),
+        imag(columns[0]) + imag(columns[1]),
+        imag(columns[0]) - imag(columns[1]),
+        imag(same) + imag(other),
+        real(same) - real(other),
+    ]
+
+
+def _product(x: Number, y: Number) -> Number:
+    """x y*."""
+    return x * dr.conj(y) if dr.is_complex_v(x) else x * y
+
+
+def _square(x: Number) -> Float:
+    """|x|²."""
+    return dr.fma(x.real, x.real, dr.square(x.imag)) if dr.is_complex_v(x) else dr.square(x)
+
+
+def _root(square: Number) -> Number:
+    """The root whose wave decays, or else travels, away from the surface."""
+    if not dr.is_complex_v(square):
+        return dr.safe_sqrt(square)
+    # The larger part from a sum, the other from the product: neither cancels
+    length = dr.sqrt(_square(square))
+    larger = dr.sqrt(0.5 * (length + dr.abs(square.real)))
+    smaller = 0.5 * square.imag / dr.maximum(larger, 1e-20)
+    travels = square.real >= 0.0
+    return mi.Complex2f(dr.select(travels, larger, smaller), dr.select(travels, smaller, larger))

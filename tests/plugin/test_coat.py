@@ -1,0 +1,159 @@
+"""A clear coat over the structure: values, limits, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import reference
+from mitsuba_diffraction.optics.fresnel import reflectance
+from tests.directions import Array, as_single, polar
+from tests.lanes import evaluated, refusal
+from tests.plugin.test_model import PATCH, WIDTH, pairs
+from tests.plugin.test_variants import ALL, evaluate, runs
+
+FLAT = md.HeightField(np.zeros((40, 40)), 0.08)
+COATED = {
+    "metal": ({"eta": 0.9, "k": 6.0, "coat_ior": 1.58}, {"eta": 0.9, "k": 6.0, "coat": 1.58}),
+    "dielectric": (
+        {"int_ior": 1.7, "ext_ior": 1.0, "coat_ior": 1.4},
+        {"eta": 1.7, "coat": 1.4},
+    ),
+}
+
+
+def load(field: md.HeightField = PATCH, **parameters: Any) -> Any:
+    raw = {"energy_conserving": False, "coherence_width": WIDTH, "tolerance": 1e-4}
+    return mi.load_dict(md.bsdf_dict(field, **(raw | parameters)))
+
+
+@pytest.mark.parametrize("kind", COATED)
+@pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
+def test_values_are_the_reference_s(some_variant, kind, model):
+    ours, theirs = COATED[kind]
+    wi, wo, lam = (a[:120] for a in pairs())
+    found = evaluated(load(model=model, **ours), wi, wo, lam)
+    exact = np.stack(
+        [
+            reference.brdf(PATCH, wi, wo, one, coherence_width=WIDTH, model=model, **theirs)
+            for one in lam.T
+        ],
+        axis=1,
+    ) * wo[:, 2:]  # fmt: skip
+    # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
+    assert found == pytest.approx(exact, rel=1e-3, abs=1e-5 * exact.max())
+
+
+@pytest.mark.parametrize("parameters", [{"eta": 0.9, "k": 6.0}, {"int_ior": 1.6, "ext_ior": 1.0}])
+def test_a_coat_of_air_is_none(some_variant, parameters):
+    wi, wo, lam = pairs(60)
+    bare = evaluated(load(**parameters), wi, wo, lam)
+    coated = evaluated(load(coat_ior=1.0, **parameters), wi, wo, lam)
+    # √T of each polarisation, in single precision
+    assert coated == pytest.approx(bare, rel=2e-5, abs=1e-6 * bare.max())
+
+
+def test_a_coat_of_the_material_s_own_index_is_its_flat_face(some_variant):
+    wi, wo, lam = pairs(60)
+    coated = evaluated(load(int_ior=1.6, coat_ior=1.6, ext_ior=1.0), wi, wo, lam)
+    face = evaluated(load(FLAT, int_ior=1.6, ext_ior=1.0, model="kirchhoff"), wi, wo, lam)
+    lit = face > 1e-3 * face.max()
+    assert coated[lit] == pytest.approx(face[lit], rel=1e-3)  # the other's table, at its tolerance
+
+
+def test_a_coated_mirror_s_specular_light_is_that_of_both_faces(some_variant):
+    # R_coat + mean of T² R over the polarisations, the light that bounces again left out
+    mirror, bsdf = load(FLAT, material="none"), load(FLAT, eta=0.9, k=6.0, coat_ior=1.58)
+    for theta in (0.0, 40.0, 70.0):
+        wi = as_single(polar(theta))[None]
+        wo, cosine = wi * [-1, -1, 1], np.cos(np.radians(theta))
+        found = evaluated(bsdf, wi, wo, 550.0)[0] / evaluated(mirror, wi, wo, 550.0)[0]
+        inside = np.sqrt(1 - (1 - cosine**2) / 1.58**2)
+        face = reflectance(cosine, 1.58)
+        beneath = reflectance(inside, (0.9 + 6.0j) / 1.58)
+        # the lobe inside is wider by cosines' quotient, and its peak lower
+        bulk = (1 - face) ** 2 * beneath
+        assert found[0] > face
+        if theta == 0.0:
+            assert found[0] == pytest.approx(face + bulk, rel=1e-3)
+
+
+def test_reciprocity(some_variant):
+    wi, wo, lam = pairs()
+    bsdf = load(**COATED["metal"][0])
+    there = evaluated(bsdf, wi, wo, lam) / wo[:, 2:]
+    back = evaluated(bsdf, wo, wi, lam) / wi[:, 2:]
+    assert there == pytest.approx(back, rel=1e-4, abs=1e-6 * there.max())
+
+
+@pytest.mark.parametrize("kind", COATED)
+@pytest.mark.parametrize("theta", [0.0, 45.0, 75.0])
+def test_it_reflects_no_more_than_it_gets_and_samples_what_it_says(some_variant, kind, theta):
+    count = 1 << 15
+    bsdf = load(**COATED[kind][0])
+    from tests.lanes import interaction
+
+    si = interaction(np.tile(as_single(polar(theta)), (count, 1)), 550.0)
+    rng = mi.PCG32(count)
+    one, two = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+    sample, weight = bsdf.sample(mi.BSDFContext(), si, one, two)
+    weights: Array = np.array(weight, float)[0]
+    value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, sample.wo)
+    assert np.array(sample.pdf) == pytest.approx(np.array(pdf), rel=1e-4)
+    assert weights * np.array(pdf) == pytest.approx(np.array(value, float)[0], rel=1e-3, abs=1e-6)
+    error = weights.std() / np.sqrt(count)
+    assert weights.mean() < 1.0 + 3 * error
+    uniform = mi.warp.square_to_cosine_hemisphere(two)
+    share = np.array(bsdf.eval(mi.BSDFContext(), si, uniform), float)[0]
+    share = share / np.maximum(np.array(mi.Frame3f.cos_theta(uniform)) / np.pi, 1e-6)
+    spread = np.hypot(error, share.std() / np.sqrt(count))
+    assert abs(weights.mean() - share.mean()) < 4 * spread  # 1 in 16 000
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_variants_evaluate_what_they_sample(name):
+    if not runs(name):
+        pytest.skip(f"{name}: Dr.Jit finds no device for it")
+    mi.set_variant(name)
+    wi, wo, _ = pairs(16)
+    lam = np.full((len(wi), 4), 600.0)
+    bsdf = load(wavelength=600.0, **COATED["metal"][0])
+    value, pdf, again, pdf_again, *_ = evaluate(bsdf, wi, wo, np.full((len(wi), 3), 0.5), lam)
+    assert np.all(np.isfinite(value))
+    assert again == pytest.approx(value, rel=1e-5)
+    assert pdf_again == pytest.approx(pdf, rel=1e-5)
+    if not mi.is_rgb:
+        exact = reference.brdf(
+            PATCH, wi, wo, 600.0, coherence_width=WIDTH, model="small_slope", **COATED["metal"][1]
+        )
+        exact = exact * wo[:, 2]
+        assert value[:, 0] == pytest.approx(exact, rel=1e-3, abs=1e-5 * float(exact.max()))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "line"),
+    [
+        ({"coat_ior": 0.9}, "coat_ior=0.9"),
+        ({"coat_ior": float("nan")}, "coat_ior=nan"),
+        ({"coat_ior": 1.2, "ext_ior": 1.33}, "below the index of the medium above"),
+        ({"coat_ior": 1.5, "material": "none"}, "needs a refractive index beneath it"),
+        (
+            {"coat_ior": 1.5, "layering": "thesis", "nested": {"type": "diffuse"}},
+            "layering='thesis' knows no coat",
+        ),
+    ],
+)
+def test_what_is_no_coat_is_one_line(some_variant, parameters, line):
+    assert line in refusal(lambda: load(**parameters))
+
+
+def test_a_table_that_does_not_reach_is_one_line(some_variant, tmp_path):
+    file = tmp_path / "table.exr"
+    md.DiffractionTable.build(PATCH, coherence_width=WIDTH).save(file)
+    plugin = {"type": "diffraction", "table": str(file), "material": "Al"}
+    mi.load_dict({**plugin, "coat_ior": 1.49, "energy_conserving": False})
+    assert "--height-scale-max 1.58" in refusal(lambda: mi.load_dict({**plugin, "coat_ior": 1.58}))

@@ -1,0 +1,182 @@
+"""The models `small_slope` and `kirchhoff`: values, reciprocity, derivatives, refusals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import reference
+from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, response
+from tests.directions import Array, as_single, rough_patch, uniform_directions
+from tests.lanes import evaluated, refusal
+from tests.plugin.test_variants import ALL, evaluate, runs
+
+PATCH = rough_patch((40, 44), (0.09, 0.09), 0.14, 0.8)
+WIDTH = 3.0
+MATERIALS = {
+    "dielectric": ({}, 1.5 / 1.000277, 0.0),
+    "less dense": ({"int_ior": 1.0, "ext_ior": 1.4}, 1.0 / 1.4, 0.0),
+    "conductor": ({"eta": 0.9, "k": 6.0}, 0.9, 6.0),
+    "nearly a dielectric": ({"eta": 1.56, "k": 1e-3}, 1.56, 1e-3),
+}
+
+
+def load(**parameters: Any) -> Any:
+    raw = {"energy_conserving": False, "coherence_width": WIDTH, "tolerance": 1e-4}
+    return mi.load_dict(md.bsdf_dict(PATCH, **(raw | parameters)))
+
+
+def pairs(n: int = 200) -> tuple[Array, Array, Array]:
+    """wi, wo (n, 3) and wavelengths (n, 4): at all angles, and where a plane is any plane."""
+    rng = np.random.default_rng(8)
+    wi, wo = uniform_directions(n, rng, 0.03), uniform_directions(n, rng, 0.03)
+    near = slice(0, n // 2)
+    wo[near] = wi[near] * [-1, -1, 1] + rng.normal(0.0, 0.03, (n // 2, 3))
+    wi[0], wo[1], wi[2], wi[3], wi[4] = (0, 0, 1), (0, 0, 1), wo[2], wo[3] + (1e-5, 0, 0), (0, 0, 1)
+    wo[4] = wi[4]
+    wi, wo = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in (wi, wo))
+    good = (wi[:, 2] > 0.02) & (wo[:, 2] > 0.02)
+    lam = as_single(rng.uniform(400.0, 700.0, (n, 4)))
+    return as_single(wi[good]), as_single(wo[good]), lam[good]
+
+
+@pytest.mark.parametrize("kind", MATERIALS)
+@pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
+def test_values_are_the_reference_s(variant, kind, model):
+    parameters, eta, k = MATERIALS[kind]
+    wi, wo, lam = pairs()
+    found = evaluated(load(model=model, **parameters), wi, wo, lam)
+    exact = np.stack(
+        [
+            reference.brdf(PATCH, wi, wo, one, coherence_width=WIDTH, model=model, eta=eta, k=k)
+            for one in lam.T
+        ],
+        axis=1,
+    ) * wo[:, 2:]  # fmt: skip
+    # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
+    assert found == pytest.approx(exact, rel=1e-3, abs=1e-5 * exact.max())
+
+
+def test_the_factor_alone_is_the_reference_s_in_single_precision(variant):
+    wi, wo, lam = pairs()
+    with_index, without = (
+        evaluated(load(**p), wi, wo, lam) for p in ({"eta": 0.9, "k": 6.0}, {"material": "none"})
+    )
+    lit = without > 1e-6 * without.max()
+    small = reference.brdf(PATCH, wi, wo, lam[:, 0], coherence_width=WIDTH, model="small_slope",
+                           eta=0.9, k=6.0)  # fmt: skip
+    perfect = reference.brdf(PATCH, wi, wo, lam[:, 0], coherence_width=WIDTH)
+    lit = lit[:, 0] & (perfect > 1e-6 * perfect.max())
+    found = with_index[lit, 0] / without[lit, 0]
+    # σ_q² is interpolated to 5e-4 of its largest value; the rest is rounding
+    assert found == pytest.approx(small[lit] / perfect[lit], rel=3e-4)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_variants_agree(name):
+    if not runs(name):
+        pytest.skip(f"{name}: Dr.Jit finds no device for it")
+    mi.set_variant(name)
+    wi, wo, _ = pairs(24)
+    count = len(wi)
+    lam = np.tile([600.0] if not mi.is_spectral else [480.0, 540.0, 600.0, 660.0], (count, 1))
+    samples = np.full((count, 3), 0.5)
+    small, mirror = (
+        evaluate(load(wavelength=600.0, **p), wi, wo, samples, lam)[0]
+        for p in ({}, {"material": "none"})
+    )
+    colours = RGB_WAVELENGTHS if mi.is_rgb else lam[0]
+    for n, one in enumerate(colours):
+        exact, perfect = (
+            reference.brdf(PATCH, wi, wo, one, coherence_width=WIDTH, **p)
+            for p in ({"model": "small_slope", "eta": 1.5 / 1.000277}, {})
+        )
+        lit = (perfect > 1e-4 * perfect.max()) & (np.abs(mirror[:, n]) > 1e-4 * mirror.max())
+        assert lit.sum() > count // 4
+        found = small[lit, n] / mirror[lit, n]
+        assert found == pytest.approx((exact / perfect)[lit], rel=1e-3)
+
+
+@pytest.mark.parametrize("kind", MATERIALS)
+def test_reciprocity(some_variant, kind):
+    wi, wo, lam = pairs()
+    bsdf = load(**MATERIALS[kind][0])
+    there = evaluated(bsdf, wi, wo, lam) / wo[:, 2:]
+    back = evaluated(bsdf, wo, wi, lam) / wi[:, 2:]
+    assert there == pytest.approx(back, rel=1e-4, abs=1e-6 * there.max())
+
+
+@pytest.mark.parametrize("key", ["eta", "height_scale"])
+def test_derivatives_are_difference_quotients(some_variant, key):
+    wi, wo, lam = (a[5:40] for a in pairs())
+    bsdf = load(height_scale=1.0)
+    from tests.lanes import interaction, vectors
+
+    si, out = interaction(wi, lam), vectors(wo)
+    parameters = mi.traverse(bsdf)
+    start, step = dr.slice(parameters[key]), 5e-3
+
+    def total() -> Any:
+        return dr.mean(dr.sum(bsdf.eval(mi.BSDFContext(), si, out)))
+
+    x = mi.Float(start)
+    dr.enable_grad(x)
+    parameters[key] = x
+    parameters.update()
+    value = total()
+    dr.forward(x)
+    slope = dr.slice(dr.grad(value))
+    ends = []
+    for shifted in (start + step, start - step):
+        parameters[key] = mi.Float(shifted)
+        parameters.update()
+        ends.append(dr.slice(total()))
+    # third derivatives over (5e-3)², and single precision's 1e-7 over the step
+    assert slope == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=5e-3)
+    assert np.isfinite(slope)
+    assert slope != 0.0
+
+
+@pytest.mark.parametrize(
+    ("parameters", "model"),
+    [
+        ({}, "small_slope"),
+        ({"material": "Al"}, "small_slope"),
+        ({"material": "none"}, "kirchhoff"),
+        ({"layering": "thesis", "nested": {"type": "diffuse"}}, "kirchhoff"),
+        ({"nested": {"type": "diffuse"}}, "small_slope"),
+        ({"model": "kirchhoff"}, "kirchhoff"),
+    ],
+)
+def test_the_default_model_is_that_of_the_material(some_variant, parameters, model):
+    assert f"model = {model}" in str(load(**parameters))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "line"),
+    [
+        ({"model": "smallslope"}, "choose one of small_slope, kirchhoff"),
+        ({"model": "small_slope", "material": "none"}, "needs a refractive index"),
+        ({"eta": 0.0, "k": 3.0}, "eta=0"),
+        ({"eta": -1.0, "k": 3.0}, "eta=-1"),
+        ({"eta": 1.0, "k": -3.0}, "k=-3"),
+        ({"eta": float("nan"), "k": 3.0}, "eta=nan"),
+        ({"int_ior": 0.0}, "int_ior=0"),
+        ({"int_ior": float("nan")}, "int_ior=nan"),
+        ({"ext_ior": -1.5}, "ext_ior=-1.5"),
+    ],
+)
+def test_what_is_no_index_or_model_is_one_line(some_variant, parameters, line):
+    assert line in refusal(lambda: load(**parameters))
+
+
+def test_the_wavelengths_of_rgb_are_the_means_of_its_channels():
+    lam = np.arange(360.0, 831.0)
+    weights = linear_srgb(response(lam))
+    means = (weights * lam[:, None]).sum(axis=0) / weights.sum(axis=0)
+    assert RGB_WAVELENGTHS == pytest.approx(means, abs=0.1)

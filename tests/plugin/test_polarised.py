@@ -1,0 +1,161 @@
+"""Polarised variants: Mueller matrices of the model, between Mitsuba's bases."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import reference
+from tests.directions import Array, as_single, polar, rough_patch, uniform_directions
+from tests.plugin.test_variants import interaction, runs
+
+PATCH = rough_patch((40, 44), (0.09, 0.09), 0.1, 0.6)
+WIDTH = 3.0
+LAM = np.array([450.0, 520.0, 610.0, 680.0])
+CONDUCTOR = {"eta": 0.9, "k": 6.0}
+#: Reversed light has the same s, so the other p.
+REVERSAL = np.diag([1.0, 1.0, -1.0, 1.0])
+
+
+@pytest.fixture
+def polarised() -> None:
+    """The fastest polarised variant that runs."""
+    names = ("llvm_ad_spectral_polarized", "scalar_spectral_polarized")
+    name = next((name for name in names if name in mi.variants() and runs(name)), None)
+    if name is None:
+        pytest.skip(f"none of {', '.join(names)} runs on this machine")
+    mi.set_variant(name)
+
+
+def load(field: md.HeightField = PATCH, **parameters: Any) -> Any:
+    raw = {"energy_conserving": False, "coherence_width": WIDTH, "tolerance": 1e-4}
+    return mi.load_dict(md.bsdf_dict(field, **(raw | parameters)))
+
+
+def pairs(n: int = 60) -> tuple[Array, Array]:
+    rng = np.random.default_rng(5)
+    wi, wo = uniform_directions(n, rng, 0.2), uniform_directions(n, rng, 0.2)
+    near = slice(0, n // 2)
+    wo[near] = wi[near] * [-1, -1, 1]
+    wi[0], wo[1] = (0, 0, 1), (0, 0, 1)  # the normal, where a plane of incidence is any
+    return as_single(wi), as_single(wo)
+
+
+def matrices(bsdf: Any, wi: Array, wo: Array, mode: Any = None) -> Array:
+    """f·cosθo, (n, 4, 4) a wavelength: (n, wavelengths, 4, 4)."""
+    context = mi.BSDFContext(mi.TransportMode.Radiance if mode is None else mode)
+
+    def once(si: Any, out: Any) -> Array:
+        return np.array(bsdf.eval(context, si, out), float)  # (4, 4, wavelengths, n)
+
+    if dr.is_jit_v(mi.Float):
+        lam = np.tile(LAM, (len(wi), 1))
+        return np.moveaxis(once(interaction(wi, lam), mi.Vector3f(wo.T)), (3, 2), (0, 1))
+    rows = [
+        np.moveaxis(once(interaction(i, LAM), mi.Vector3f(o.tolist())), 2, 0)
+        for i, o in zip(wi, wo, strict=True)
+    ]
+    return np.stack(rows)
+
+
+def bases(direction: Array) -> Array:
+    """Mitsuba's axes of Stokes vectors of light along directions (n, 3)."""
+    found = [mi.mueller.stokes_basis(mi.Vector3f(*d)) for d in direction.tolist()]
+    return np.array([np.array(basis, float).ravel() for basis in found])
+
+
+def rotation(start: Array, to: Array, direction: Array) -> Array:
+    """What takes Stokes vectors about axes `start` to those about `to`, (n, 4, 4)."""
+    cosine = np.sum(to * start, axis=-1)
+    sine = np.sum(to * np.cross(direction, start), axis=-1)
+    double = 2.0 * np.arctan2(sine, cosine)
+    found = np.tile(np.eye(4), (len(start), 1, 1))
+    found[:, 1, 1] = found[:, 2, 2] = np.cos(double)
+    found[:, 1, 2], found[:, 2, 1] = np.sin(double), -np.sin(double)
+    return found
+
+
+@pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
+@pytest.mark.parametrize("material", [{"int_ior": 1.56, "ext_ior": 1.0}, CONDUCTOR])
+def test_matrices_are_the_reference_s(polarised, model, material):
+    wi, wo = pairs()
+    found = matrices(load(model=model, **material), wi, wo)
+    index = {"eta": 1.56, "k": 0.0} if "int_ior" in material else CONDUCTOR
+    # light arrives along ωo where radiance is followed
+    s_in, s_out = md.optics.boundary.polarisation_axes(wo, wi)
+    before, after = rotation(bases(-wo), s_in, -wo), rotation(s_out, bases(wi), wi)
+    for n, lam in enumerate(LAM):
+        exact = reference.mueller(PATCH, wo, wi, lam, coherence_width=WIDTH, model=model, **index)
+        exact = after @ exact @ before * wo[:, 2, None, None]
+        # the table's tolerance, and a phase in single precision
+        allowed = 1e-3 * exact[:, :1, :1] + 1e-4 * np.abs(exact).max()
+        assert np.all(np.abs(found[:, n] - exact) < allowed), (n, lam)
+        assert np.abs(found[:, n, 0, 2:]).max() > 1e-3 * np.abs(found).max()
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs"),
+    [
+        ({"int_ior": 1.5, "ext_ior": 1.0}, {"type": "dielectric", "int_ior": 1.5, "ext_ior": 1.0}),
+        ({"material": "Al"}, {"type": "conductor", "material": "Al"}),
+        ({"material": "Au"}, {"type": "conductor", "material": "Au"}),
+    ],
+)
+@pytest.mark.parametrize("mode", ["Radiance", "Importance"])
+def test_a_flat_patch_s_specular_light_is_mitsuba_s(polarised, ours, theirs, mode):
+    flat = md.HeightField(np.zeros((40, 40)), 0.08)
+    mode = getattr(mi.TransportMode, mode)
+    smooth, bsdf, mirror = mi.load_dict(theirs), load(flat, **ours), load(flat, material="none")
+    for theta, phi in ((0.0, 0.0), (30.0, 10.0), (56.0, 100.0), (75.0, 200.0)):
+        wi = as_single(polar(theta, phi))[None]
+        wo = wi * [-1, -1, 1]
+        found = matrices(bsdf, wi, wo, mode) / matrices(mirror, wi, wo, mode)[..., :1, :1]
+        context = mi.BSDFContext(mode)
+        context.component = 0
+        scalar = not dr.is_jit_v(mi.Float)
+        si = interaction(wi[0], LAM) if scalar else interaction(wi, LAM[None])
+        weight = np.array(smooth.sample(context, si, 0.5, mi.Point2f(0.5))[1], float)
+        weight = np.moveaxis(weight.reshape(4, 4, 4), 2, 0)
+        assert found[0] == pytest.approx(weight, abs=1e-4)
+
+
+@pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
+def test_reversed_light_has_the_transposed_matrix(polarised, model):
+    wi, wo = pairs()
+    bsdf = load(model=model, **CONDUCTOR)
+    there = matrices(bsdf, wi, wo) / wo[:, None, 2, None, None]
+    back = matrices(bsdf, wo, wi) / wi[:, None, 2, None, None]
+    # the matrix of light from ωi to ωo, about the axes that light from ωo to ωi has
+    after = rotation(bases(wo), bases(-wo), wo)[:, None]
+    before = rotation(bases(-wi), bases(wi), -wi)[:, None]
+    same_axes = after @ back @ before
+    expected = REVERSAL @ there.swapaxes(-1, -2) @ REVERSAL
+    assert same_axes == pytest.approx(expected, rel=1e-4, abs=1e-5 * np.abs(there).max())
+
+
+def test_a_perfect_mirror_depolarises(polarised):
+    wi, wo = pairs()
+    found = matrices(load(material="none"), wi, wo)
+    found[..., 0, 0] = 0.0
+    assert np.all(found == 0.0)
+
+
+def test_the_first_entry_is_what_unpolarised_variants_have(polarised):
+    wi, wo = pairs()
+    found = matrices(load(**CONDUCTOR), wi, wo)[..., 0, 0]
+    mi.set_variant(mi.variant().removesuffix("_polarized"))
+    lam = np.tile(LAM, (len(wi), 1))
+    bsdf = load(**CONDUCTOR)
+    if dr.is_jit_v(mi.Float):
+        value = np.array(bsdf.eval(mi.BSDFContext(), interaction(wi, lam), mi.Vector3f(wo.T))).T
+    else:
+        pairs_ = zip(wi, wo, strict=True)
+        value = np.array(
+            [bsdf.eval(mi.BSDFContext(), interaction(i, LAM), mi.Vector3f(*o)) for i, o in pairs_]
+        )
+    assert found == pytest.approx(value, rel=1e-4, abs=1e-7 * float(value.max()))
