@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import math
 import time
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, DiffractionWarning
+from ..settings import TableSettings
 from .arguments import path_ending_in, whole_number
+from .console import say_warning
 from .options import (
     add_direction,
     add_heights,
@@ -21,13 +25,21 @@ from .options import (
     wavelengths,
 )
 from .output import check_outputs
-from .patch import TABLE_NAMES, load_patch
+from .patch import TABLE_NAMES, load_patch, table_warnings
 from .progress import Bar
 from .report import save_report
+
+if TYPE_CHECKING:
+    from ..heights.spectra import Periodicity
+    from ..thesis.evaluation import Fit, Response, Ridge
 
 _WINDOWS = 32
 # Single windows are fitted at about so many wavelengths: the period needs no more.
 _FEW = 20
+# A plane of incidence closer to the grooves than 78° from across them meets none of their orders.
+_LEAST_COSINE = 0.2
+# Viewing angles span this many degrees at least.
+_NARROWEST = 20.0
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -65,12 +77,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def _add_beam_options(group: argparse._ArgumentGroup) -> None:
-    add_direction(group, theta=75.0)
+    add_direction(group, theta=75.0, phi=None)
     add_wavelengths(group)
     group.add_argument(
         "--angles", metavar=("LOW", "HIGH"), nargs=2, type=float,
         help="viewing angles, degrees, positive on the light's side; default: from the mirror "
-        "direction to 80",
+        "direction to where the order of the patch's own period ends, or to 80",
     )  # fmt: skip
     group.add_argument("--angle-step", metavar="DEG", type=float, default=0.1, help="default: 0.1")
     group.add_argument(
@@ -83,7 +95,8 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from ..atomic import atomic_path
-    from ..thesis.evaluation import Beam, fit_period, measure, ridge_of
+    from ..heights.spectra import dominant_periods
+    from ..thesis.evaluation import Beam, measure
     from ..thesis.evaluation.beam import check_axes
     from ..thesis.evaluation.files import save_csv, save_npz
     from ..thesis.evaluation.plot import figure
@@ -95,55 +108,107 @@ def run(args: argparse.Namespace) -> int:
     output = args.output or Path(f"{args.source.stem}-evaluation.png")
     written = [output.with_suffix(suffix) for suffix in (".png", ".csv", ".npz")]
     check_outputs(written, [args.source], "evaluation")
-    beam = Beam(args.theta, args.phi)
+    beam = Beam(args.theta, args.phi or 0.0)
     if args.period is not None:
         check_period(args.period)
     spectrum = wavelengths(args)
     steps = trapezoid_rule(spectrum["wavelength_range"], spectrum["step"])[0]
-    angles = viewing_angles(args.angles, args.angle_step, args.theta, args.order)
-    check_axes(steps, angles)
+    viewing_angles(args.angles, args.angle_step, args.theta, args.order)
     patch, settings = load_patch(args)
+    width = settings.get("coherence_width", 65.0)
+    gratings = dominant_periods(patch)
+    if args.phi is None and gratings:
+        beam = Beam(args.theta, float(round(gratings[0].direction)))  # known to a degree
+    held = periods_along(gratings, beam.phi)
+    reach = args.order * 1e-3 * steps[-1] / max(held) if held else None  # mλ/d of its last colour
+    angles = viewing_angles(args.angles, args.angle_step, args.theta, args.order, reach)
+    check_axes(steps, angles)
     settings |= spectrum
     with Bar(args) as bar, warnings.catch_warnings():
-        warnings.simplefilter("ignore", DiffractionWarning)
+        warnings.simplefilter("ignore", DiffractionWarning)  # said above
         method = make(in_library(args.method), patch, period=args.period, progress=bar, **settings)
         response = measure(
             method.brdf, beam, steps, angles, sigma=method.sigma, label=args.method,
             progress=bar,
         )  # fmt: skip
-        ridge = ridge_of(response, args.order)
-        fit = fit_period(ridge)
-        lines, more = _windows(args, patch, settings, beam, steps, angles, bar)
-    period = fit.period if args.period is None else args.period
-    report = [_fitted(fit), *lines]
+        ridge, fit, line = _followed(response, args.order, held)
+        lines, more = _windows(args, patch, settings, beam, steps, angles, fit, bar)
+    fitted = np.nan if fit is None else fit.period
+    period = fitted if args.period is None else args.period
+    report = [("spectrum", str(grating)) for grating in gratings] + [line, *lines]
     with atomic_path(written[0]) as path:
         figure(
-            response, ridge, fit, period, order=args.order, title=patch.name,
+            response, ridge if fit else None, fit, None if np.isnan(period) else period,
+            order=args.order, title=patch.name,
             notes="\n".join(f"{name}: {text}" for name, text in report),
         ).savefig(path, format="png")  # fmt: skip
     save_csv(written[1], response, ridge, period, args.order)
-    more |= {"fitted_period": fit.period, "residual": fit.residual, "coherence_width":
-             settings.get("coherence_width", 65.0), "source": str(args.source)}  # fmt: skip
+    more |= {"fitted_period": fitted, "residual": np.nan if fit is None else fit.residual,
+             "coherence_width": width, "source": str(args.source)}  # fmt: skip
     save_npz(written[2], response, ridge, period, args.order, more)
     print(
         f"{', '.join(map(str, written))}: {patch.name}, method {args.method}, light at "
-        f"{args.theta:g}°, {steps.size} wavelengths, {angles.size} angles, "
+        f"{beam}, {steps.size} wavelengths, {angles.size} angles, "
         f"{time.perf_counter() - start:.1f} s"
     )
     if args.period is not None:
-        expected = beam.grating_angles(steps, period, args.order)
-        apart = np.abs(ridge.angles - expected)
+        apart = np.abs(ridge.angles - beam.grating_angles(steps, period, args.order))
         if np.isfinite(apart).any():
-            report.insert(1, ("given", f"{1e3 * period:.6g} nm, the ridge is within "
-                                       f"{np.nanmax(apart):.2g}° of it"))  # fmt: skip
+            report.insert(len(gratings) + 1, (
+                "given", f"{1e3 * period:.6g} nm, the ridge is within {np.nanmax(apart):.2g}° of it"
+            ))  # fmt: skip
     for name, text in report:
         print(f"  {name:<9} {text}")
-    save_report(args, {"patch": patch.name, "method": args.method, "theta": args.theta, **more})
+    asked = TableSettings(coherence_width=width, wavelength_range=spectrum["wavelength_range"])
+    for text in table_warnings(patch, asked):
+        say_warning(text)
+    save_report(args, {"patch": patch.name, "method": args.method, "theta": beam.theta,
+                       "phi": beam.phi, **more})  # fmt: skip
     return 0
 
 
-def viewing_angles(limits: Any, step: float, theta: float, order: int) -> Any:
+def periods_along(gratings: Sequence[Periodicity], phi: float) -> list[float]:
+    """Periods in µm that gratings have in a plane of incidence at an azimuth, in degrees."""
+    cosines = [abs(math.cos(math.radians(one.direction - phi))) for one in gratings]
+    # a plane along the grooves meets none of their orders
+    return [one.period / c for one, c in zip(gratings, cosines, strict=True) if c > _LEAST_COSINE]
+
+
+def _followed(
+    response: Response, order: int, held: Sequence[float]
+) -> tuple[Ridge, Fit | None, tuple[str, str]]:
+    """The ridge that obeys the grating equation and its fit, or an empty one and none; and a line.
+
+    Raises
+    ------
+    DiffractionError
+        If there are too few maxima to look for one.
+    """
+    import numpy as np
+
+    from ..thesis.evaluation import Ridge, find_period, fit_period, ridge_of
+
+    period = find_period(response, held, order)
+    ridge = ridge_of(response, order, period=period)
+    fit = fit_period(ridge)
+    if period is not None:
+        return ridge, fit, _fitted(fit)
+    nothing = np.full(response.wavelengths.size, np.nan)
+    why = (
+        "none: the light on this side follows no grating equation (the brightest angles alone "
+        f"would give {1e3 * fit.period:.4g} nm)"
+    )
+    return Ridge(response, order, nothing, nothing), None, ("fitted", why)
+
+
+def viewing_angles(
+    limits: Any, step: float, theta: float, order: int, reach: float | None = None
+) -> Any:
     """Viewing angles in degrees, (A,); by default from the mirror direction to the horizon's side.
+
+    Parameters
+    ----------
+    reach : mλ/d of the order's last colour, signed; the range ends a quarter beyond it.
 
     Raises
     ------
@@ -152,7 +217,13 @@ def viewing_angles(limits: Any, step: float, theta: float, order: int) -> Any:
     """
     import numpy as np
 
-    low, high = limits or ((-theta, 80.0) if order > 0 else (-80.0, -theta))
+    sign = 1 if order > 0 else -1
+    end = 80.0
+    if reach is not None:
+        # mirrored for negative orders: the sine on the order's own side
+        sine = 1.25 * abs(reach) - sign * math.sin(math.radians(theta))
+        end = min(end, max(math.degrees(math.asin(min(sine, 1.0))), _NARROWEST - sign * theta))
+    low, high = limits or sorted((-theta, sign * end))
     if not -90.0 < low < high < 90.0:
         raise DiffractionError(
             f"angles={low:g} to {high:g} degrees are none; give the lower first, both within -90 "
@@ -168,10 +239,10 @@ def viewing_angles(limits: Any, step: float, theta: float, order: int) -> Any:
 
 def _windows(
     args: argparse.Namespace, patch: Any, settings: dict[str, Any], beam: Any, steps: Any,
-    angles: Any, bar: Bar,
+    angles: Any, fit: Fit | None, bar: Bar,
 ) -> tuple[list[tuple[str, str]], dict[str, Any]]:  # fmt: skip
     """What single windows show, and the thesis' procedure: lines, and entries of the NPZ."""
-    if args.windows == 0:
+    if args.windows == 0 or fit is None:
         return [], {}
     from ..thesis.evaluation import thesis_fit, window_fits
     from ..thesis.methods import make
@@ -184,8 +255,9 @@ def _windows(
     more: dict[str, Any] = {}
     try:
         found = window_fits(
-            table, beam, few, angles, count=args.windows, order=args.order, progress=bar
-        )
+            table, beam, few, angles, count=args.windows, order=args.order,
+            period=None if fit is None else fit.period, progress=bar,
+        )  # fmt: skip
     except DiffractionError as error:
         lines.append(("windows", str(error)))
     else:

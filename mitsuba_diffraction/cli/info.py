@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
-from ..heights.validity import window_warning
 from ..settings import TableSettings
 from .arguments import path_ending_in
 from .console import mitsuba_warnings
 from .options import STDOUT, add_heights, add_json, given_for_heights, load_options
+from .patch import table_warnings
 from .progress import Bar
 from .report import lines_of, plain, save_report
 
@@ -137,21 +137,17 @@ def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     return {
         "kind": "height field",
         **field.summary(),
-        "warnings": _warnings_of(field, TableSettings()),
+        **_periods(field),
+        "warnings": table_warnings(field, TableSettings()),
     }
 
 
-def _warnings_of(field: HeightField, settings: TableSettings) -> list[str]:
-    """What a table of these heights will be warned of, or be refused for by its size alone."""
-    from ..tables.build.checks import check_window
+def _periods(field: HeightField) -> dict[str, list[str]]:
+    """The gratings that the patch holds, if any."""
+    from ..heights.spectra import dominant_periods
 
-    lines = field.validity(settings.wavelength_range)
-    small = window_warning(field, settings.coherence_width)
-    try:
-        check_window(field.extent, settings)
-    except DiffractionError as error:
-        return [*lines, f"{field.name}: {error}"]
-    return [*lines, *([small] if small else [])]
+    found = [str(grating) for grating in dominant_periods(field)]
+    return {"periods": found} if found else {}
 
 
 def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
@@ -163,7 +159,7 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
         bar(0, 0, "making heights")
         fields = recipe.fields(load_options(args))
     settings = TableSettings(**table)
-    warnings = [line for field in fields for line in _warnings_of(field, settings)]
+    warnings = [line for field in fields for line in table_warnings(field, settings)]
     return {
         "kind": "recipe",
         **({"generator": recipe.generator} if recipe.generator else {}),
@@ -171,7 +167,7 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
         "table": table,
         "output": str(recipe.output),
         "output exists": recipe.output.is_file(),
-        "patches": [field.summary() for field in fields],
+        "patches": [{**field.summary(), **_periods(field)} for field in fields],
         "warnings": list(dict.fromkeys(warnings)),
     }
 

@@ -32,8 +32,12 @@ _IN_LIBRARY = {"spectral": "default"}
 _IN_COMMANDS = {name: ours for ours, name in _IN_LIBRARY.items()}
 
 _HEIGHTS: dict[str, tuple[str, str]] = {
-    "pixel_size": ("DX[,DY]", "µm between samples, where the file does not say"),
-    "max_height": ("H", "µm, height of white in an image"),
+    "pixel_size": ("DX[,DY]", "µm between samples; overrides what the file states"),
+    "max_height": (
+        "H",
+        "µm, height of white in an image; other heights are scaled to span it from end to end",
+    ),
+    "height_unit": ("U", "unit of the numbers in the file, e.g. nm; overrides what it states"),
     "channel": ("C", "name or index of the channel; default: the heights"),
     "crop": ("W[,H]", "µm, crop to a central region; default: all of the patch"),
     "fill": ("METHOD", "points without data: nearest or harmonic; default: refuse them"),
@@ -122,15 +126,16 @@ def table_options(args: argparse.Namespace) -> dict[str, Any]:
     return {name: checked(name, value) for name, value in given.items() if value is not None}
 
 
-def add_direction(group: Group, *, theta: float = 0.0) -> None:
-    """The direction of the light, degrees."""
+def add_direction(group: Group, *, theta: float = 0.0, phi: float | None = 0.0) -> None:
+    """The direction of the light, degrees; without a `phi` it is across the patch's grooves."""
     group.add_argument(
         "--theta", metavar="DEG", type=float, default=theta,
         help=f"angle of the light from the normal, 0 to below 90; default: {theta:g}",
     )  # fmt: skip
     group.add_argument(
-        "--phi", metavar="DEG", type=float, default=0.0,
-        help="azimuth of the light, from the patch's x axis towards y; default: 0",
+        "--phi", metavar="DEG", type=float, default=phi,
+        help="azimuth of the light, from the patch's x axis towards y; default: "
+        + ("across the grooves if there are any, or 0" if phi is None else f"{phi:g}"),
     )  # fmt: skip
 
 

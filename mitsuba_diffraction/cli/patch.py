@@ -10,6 +10,7 @@ from .options import load_options, table_options
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
+    from ..settings import TableSettings
 
 #: The settings of a table that the evaluators of the thesis take.
 TABLE_NAMES = ("coherence_width", "coherence", "tolerance", "terms")
@@ -42,3 +43,17 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
     else:
         patch = load_heights(source, options)
     return patch, {name: settings[name] for name in TABLE_NAMES if name in settings}
+
+
+def table_warnings(field: HeightField, settings: TableSettings) -> list[str]:
+    """What a table of these heights will be warned of, or be refused for by its size alone."""
+    from ..heights.validity import window_warning
+    from ..tables.build.checks import check_window
+
+    lines = field.validity(settings.wavelength_range)
+    try:
+        check_window(field.extent, settings)
+    except DiffractionError as error:
+        return [*lines, f"{field.name}: {error}"]
+    small = window_warning(field, settings.coherence_width)
+    return [*lines, *([small] if small else [])]

@@ -29,7 +29,8 @@ class HeightField:
     ----------
     heights
         Heights in µm, shape (ny, nx), at least 2 × 2, finite. `heights[iy, ix]` lies at
-        x = ix·dx, y = iy·dy. They are copied, and read-only afterwards.
+        x = ix·dx, y = iy·dy. They are copied, and read-only afterwards. Only differences matter:
+        where a constant offset takes them beyond 10 mm, their mean is subtracted.
     pixel_size
         µm, one number for square pixels or a pair (dx, dy); "0.05" and "0.05, 0.1" also work.
     name
@@ -73,7 +74,10 @@ class HeightField:
                 f"{name}: pixel_size is missing; give the distance between samples in µm, "
                 "one number or (dx, dy)"
             )
-        object.__setattr__(self, "heights", _checked_heights(heights, name))
+        checked, offset = _checked_heights(heights, name)
+        if offset:
+            history = (*history, f"a constant offset of {offset:.6g} µm was subtracted")
+        object.__setattr__(self, "heights", checked)
         object.__setattr__(self, "pixel_size", size)
         object.__setattr__(self, "name", " ".join(str(name).split()))
         object.__setattr__(self, "history", tuple(history))
@@ -172,8 +176,11 @@ def check_pixel_count(ny: int, nx: int, name: str) -> None:
         )
 
 
-def _checked_heights(heights: npt.ArrayLike, name: str) -> FloatArray:
-    """Check and copy to a read-only C-ordered float64 array; one that is all this is not copied."""
+def _checked_heights(heights: npt.ArrayLike, name: str) -> tuple[FloatArray, float]:
+    """Check and copy to a read-only C-ordered float64 array; one that is all this is not copied.
+
+    With it comes the offset that was subtracted, µm.
+    """
     if np.ma.isMaskedArray(heights) and np.ma.is_masked(heights):
         raise DiffractionError(f"{name}: heights have masked points; fill them first")
     try:
@@ -197,12 +204,17 @@ def _checked_heights(heights: npt.ArrayLike, name: str) -> FloatArray:
     low, high = float(array.min()), float(array.max())  # NaN if any height is
     if not (math.isfinite(low) and math.isfinite(high)):
         raise DiffractionError(f"{name}: {_describe_missing(array)}")
-    if max(abs(low), abs(high)) > LONGEST_HEIGHT:
+    if high - low > LONGEST_HEIGHT:
         raise DiffractionError(
-            f"{name}: heights reach {max(abs(low), abs(high)):.3g} µm, at most "
-            f"{LONGEST_HEIGHT:g} is supported; heights are in µm"
+            f"{name}: heights span {high - low:.3g} µm, at most {LONGEST_HEIGHT:g} is supported; "
+            "heights are in µm"
         )
-    return array
+    if max(abs(low), abs(high)) <= LONGEST_HEIGHT:
+        return array, 0.0
+    offset = float(array.mean())
+    array = array - offset
+    array.setflags(write=False)
+    return array, offset
 
 
 def _describe_missing(array: FloatArray) -> str:

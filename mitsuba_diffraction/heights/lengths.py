@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import numbers
 import re
+import unicodedata
 from collections.abc import Iterable
 
 import numpy as np
@@ -15,6 +16,12 @@ from ..errors import DiffractionError, quoted
 SHORTEST_PIXEL = 1e-5
 LONGEST_PIXEL = 1e3
 LONGEST_HEIGHT = 1e4
+
+#: µm in one of each unit that heights may come in; names after NFKC, which unites µ and μ, Å and Å.
+UNITS = {
+    "m": 1e6, "cm": 1e4, "mm": 1e3, "\u03bcm": 1.0, "um": 1.0, "nm": 1e-3, "pm": 1e-6,
+    "\u00c5": 1e-4,
+}  # fmt: skip
 
 PixelSize = float | str | Iterable[float]
 Crop = PixelSize
@@ -63,6 +70,29 @@ def height_of(value: Height | None, where: str = "max_height") -> float | None:
             f"got {quoted(value)}"
         )
     return numbers_[0]
+
+
+def micrometres_of(unit: str) -> float | None:
+    """How many µm one `unit` of length is; `None` if it is none that is known."""
+    return UNITS.get(unicodedata.normalize("NFKC", unit.strip()))
+
+
+def height_unit_of(value: str | None, where: str = "height_unit") -> str | None:
+    """A unit of length; `None` and "auto" give `None`: the file has to know.
+
+    Raises
+    ------
+    DiffractionError
+        If it is no unit; `where` names the parameter.
+    """
+    if is_auto(value):
+        return None
+    if not isinstance(value, str) or micrometres_of(value) is None:
+        raise DiffractionError(
+            f"{where}: expected a unit of length, m, cm, mm, µm, um, nm, pm or Å, or 'auto'; got "
+            f"{quoted(value)}"
+        )
+    return value.strip()
 
 
 def crop_of(value: Crop | None, where: str = "crop") -> tuple[float, float] | None:

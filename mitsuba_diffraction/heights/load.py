@@ -17,6 +17,7 @@ def load(
     *,
     pixel_size: PixelSize | None = None,
     max_height: Height | None = None,
+    height_unit: str | None = None,
     channel: str | int | None = None,
     crop: Crop | None = None,
     fill: str | None = None,
@@ -33,11 +34,14 @@ def load(
         NPY (µm), TXT or CSV (a grid of heights in µm), TOML (a recipe), or an instrument
         file, which needs the extra `afm`.
     pixel_size
-        µm, where the file does not say; one number, a pair (dx, dy), or a string of either.
-        `None` and "auto" leave it to the file.
+        µm, one number, a pair (dx, dy), or a string of either. `None` and "auto" leave it to
+        the file; otherwise it overrides what the file states, and a warning and `history` say so.
     max_height
-        Full scale of an integer image in µm: black is 0, white is `max_height`. `None` and
-        "auto" leave it to the file.
+        Full scale of an integer image in µm: black is 0, white is `max_height`. Other heights are
+        scaled so that they span it from lowest to highest, whatever unit the file states.
+    height_unit
+        Unit of the numbers in the file, "nm" for instance, whatever the file states; not for
+        integer images.
     channel
         Name or index of the channel of an instrument file (name for an EXR); by default the
         one that holds heights.
@@ -65,6 +69,7 @@ def load(
     options = LoadOptions.of(
         pixel_size=pixel_size,
         max_height=max_height,
+        height_unit=height_unit,
         channel=channel,
         crop=crop,
         fill=fill,

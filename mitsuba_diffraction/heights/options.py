@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from ..errors import DiffractionError
-from .lengths import Crop, Height, PixelSize, crop_of, height_of, pixel_size_of
+from .lengths import Crop, Height, PixelSize, crop_of, height_of, height_unit_of, pixel_size_of
 from .preprocess.missing import METHODS as FILLS
 
 LEVELS = ("none", "plane", "lines")
@@ -25,6 +25,7 @@ class LoadOptions:
 
     pixel_size: tuple[float, float] | None = None
     max_height: float | None = None
+    height_unit: str | None = None
     channel: str | int | None = None
     crop: tuple[float, float] | None = None
     fill: str | None = None
@@ -38,6 +39,7 @@ class LoadOptions:
         *,
         pixel_size: PixelSize | None = None,
         max_height: Height | None = None,
+        height_unit: str | None = None,
         channel: str | int | None = None,
         crop: Crop | None = None,
         fill: str | None = None,
@@ -51,6 +53,7 @@ class LoadOptions:
         return cls(
             pixel_size=pixel_size_of(pixel_size),
             max_height=height_of(max_height),
+            height_unit=height_unit_of(height_unit),
             channel=channel,
             crop=crop_of(crop),
             fill=_choice(fill, "fill", ("none", *FILLS)),

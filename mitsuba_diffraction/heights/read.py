@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import os
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, DiffractionWarning
 from .field import HeightField
 from .formats.afm import read_instrument
 from .formats.arrays import read_npy
 from .formats.images import is_park_tiff, read_exr, read_image
 from .formats.raw import RawHeights, existing_file
 from .formats.text import read_text
+from .lengths import micrometres_of
 from .options import LoadOptions
 from .preprocess.cropping import crop, crop_line, middle
 from .preprocess.edges import plane_rise
@@ -91,30 +94,12 @@ def _read(file: Path, channel: str | int | None) -> tuple[RawHeights, bool]:
 
 
 def _settle(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
-    """Combine what the file says with what the user says, and refuse gaps and contradictions."""
+    """Combine what the file says with what the user says, who is right, and refuse gaps."""
     shown = repr(str(file))
-    max_height, pixel_size = options.max_height, options.pixel_size
-    values = raw.values
-    if raw.relative:
-        if max_height is None:
-            raise _missing_lengths(shown, True, pixel_size is None and raw.pixel_size is None)
-        values = values * np.float64(max_height)
-    elif max_height is not None:
-        raise DiffractionError(
-            f"{shown} holds heights in µm; max_height {max_height:g} contradicts it: leave it out"
-        )
-    if pixel_size is None:
-        pixel_size = raw.pixel_size
-    elif raw.pixel_size is not None and not np.allclose(
-        pixel_size, raw.pixel_size, rtol=_SAME_SIZE, atol=0
-    ):
-        raise DiffractionError(
-            f"{shown} states pixels of {raw.pixel_size[0]:.6g} x {raw.pixel_size[1]:.6g} µm; "
-            f"pixel_size {pixel_size[0]:g}, {pixel_size[1]:g} contradicts it: leave it out"
-        )
-    if pixel_size is None:
-        raise _missing_lengths(shown, False, True)
-    notes = raw.notes
+    scale, pixel_size, overrides = _lengths(raw, shown, options)
+    with np.errstate(over="ignore", invalid="ignore"):  # damage, which is found below
+        values = raw.values if scale == 1.0 else raw.values * np.float64(scale)
+    notes = (*raw.notes, *overrides)
     if options.crop is not None:
         before = (values.shape[0], values.shape[1])
         values = values[middle(before, pixel_size, options.crop, shown)]
@@ -128,6 +113,62 @@ def _settle(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
         heights.setflags(write=False)  # ours alone: HeightField need not copy it
     history = (*notes, note) if note else notes
     return HeightField(heights, pixel_size, name=file.name, history=history, cut_out=True)
+
+
+def _lengths(
+    raw: RawHeights, shown: str, options: LoadOptions
+) -> tuple[float, tuple[float, float], list[str]]:
+    """µm of one unit of the values, the pixel size in µm, and what the options override."""
+    pixel_size = options.pixel_size or raw.pixel_size
+    scale, lines = _height_scale(raw, shown, options, pixel_size is None)
+    if pixel_size is None:
+        raise _missing_lengths(shown, False, True)
+    stated = raw.pixel_size
+    if stated is not None and not np.allclose(pixel_size, stated, rtol=_SAME_SIZE, atol=0):
+        lines.append(
+            f"pixel_size overrides the file's: pixels of {pixel_size[0]:.6g} x "
+            f"{pixel_size[1]:.6g} µm, not {stated[0]:.6g} x {stated[1]:.6g} µm"
+        )
+    for line in lines:
+        warnings.warn(f"{shown}: {line}", DiffractionWarning, stacklevel=2)
+    return scale, pixel_size, lines
+
+
+def _height_scale(
+    raw: RawHeights, shown: str, options: LoadOptions, lacks_pixel: bool
+) -> tuple[float, list[str]]:
+    """µm of one unit of the values, and what the options override."""
+    max_height, unit = options.max_height, options.height_unit
+    if unit is not None and (raw.relative or max_height is not None):
+        raise DiffractionError(
+            f"{shown}: height_unit {unit!r} is for heights that are numbers of a unit, without "
+            "max_height; grey levels of an integer image have none: give max_height in µm alone"
+        )
+    if raw.relative:
+        if max_height is None:
+            raise _missing_lengths(shown, True, lacks_pixel)
+        return max_height, []
+    stated = f", not {raw.stated}" if raw.stated else ""
+    if unit is not None:
+        scale = micrometres_of(unit)
+        assert scale is not None  # LoadOptions checks it
+        same = raw.unit is not None and math.isclose(scale, raw.unit)
+        return scale, [] if same else [f"height_unit overrides the file's: in {unit}{stated}"]
+    if max_height is not None:
+        known = raw.values[np.isfinite(raw.values)]
+        with np.errstate(over="ignore"):
+            span = float(np.ptp(known)) if known.size else 0.0
+        if not span > 0.0:
+            raise DiffractionError(f"{shown} is flat: there is nothing that max_height could scale")
+        line = f"max_height overrides the file's unit{stated}: heights span {max_height:g} µm"
+        return max_height / span, [line]
+    if raw.unit is None:
+        what = f"states heights in {raw.stated!r}, no length" if raw.stated else "states no unit"
+        raise DiffractionError(
+            f"{shown} {what} for its heights; give height_unit, and pixel_size in µm if that is "
+            "missing, too, for instance --height-unit nm --pixel-size 0.05"
+        )
+    return raw.unit, []
 
 
 def _missing_lengths(shown: str, height: bool, pixel: bool) -> DiffractionError:

@@ -34,7 +34,7 @@ LOAD_KEYS = tuple(option.name for option in fields(LoadOptions))
 _OWN_KEYS = ("source", "generator", "arguments", "seeds", "output")
 _KEYS = (*_OWN_KEYS, *LOAD_KEYS, *RECIPE_SETTINGS)
 # What makes no sense for heights that are computed.
-_SOURCE_ONLY = ("pixel_size", "max_height", "channel", "fill")
+_SOURCE_ONLY = ("pixel_size", "max_height", "height_unit", "channel", "fill")
 
 # Recipes are a few lines; a file beyond this is something else with the suffix .toml.
 _LARGEST_RECIPE = 1_000_000

@@ -12,21 +12,27 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import gaussian_filter, map_coordinates, median
+from scipy.ndimage import gaussian_filter, map_coordinates
 
 from .field import HeightField
 
 FloatArray = npt.NDArray[np.float64]
 
-#: A peak of a grating stands this much above the median at its frequency, in any direction. Rough
-#: surfaces reach 20 by chance, measured snakes' fingers 1e4.
-CONTRAST = 200.0
+#: A peak of a grating stands this much above the median of all directions at its frequency, and of
+#: lower frequencies in its direction. Rough surfaces reach 20 by chance, snakes' fingers 1e4.
+CONTRAST = 50.0
 #: A peak with less of the variance than this is a detail of the surface, not what it is made of.
 LEAST_SHARE = 0.1
+# Share of the variance that does not change along an axis from which on a patch is a profile.
+_PROFILE = 0.9
 # Fewer periods than this in a patch are not told from its tilt and bending.
 _FEWEST_PERIODS = 2.5
 # Peaks closer in direction than this are harmonics or the irregularity of one grating, degrees.
 _SAME = 15.0
+# Frequencies below a peak that it is compared with: it is so many times theirs.
+_BESIDE = (1.25, 2.0)
+# Peaks that are looked at.
+_CANDIDATES = 12
 # Around a peak: bins of a Hann window's main lobe, and the spread of an irregular grating's
 # frequency (relative) and direction (radians).
 _LOBE, _SPREAD, _FAN = 2, 0.12, math.radians(8)
@@ -78,10 +84,11 @@ class Periodicity:
 def dominant_periods(field: HeightField, most: int = 3) -> list[Periodicity]:
     """The gratings that stand out of a patch's spectrum, the one with most of the variance first.
 
-    A peak counts that is `CONTRAST` times the median of all directions at its frequency and holds
-    `LEAST_SHARE` of the variance; its frequency is the centre of mass of what is around it.
-    Of peaks in one direction, as harmonics are, the strongest is taken; what repeats less than two
-    and a half times is left out.
+    A peak counts that stands `CONTRAST` times above its surroundings and holds `LEAST_SHARE` of the
+    variance; its frequency is the centre of mass of what is around it.
+    Of peaks in one direction, as harmonics are, the strongest is taken. What repeats less than two
+    and a half times counts only if the heights hardly change along the other axis: the patch tiles
+    the plane, so such a profile is a grating.
     """
     central = field.heights[tuple(_central(n) for n in field.shape)]
     patch = HeightField(central, field.pixel_size)
@@ -92,33 +99,48 @@ def dominant_periods(field: HeightField, most: int = 3) -> list[Periodicity]:
     fx, fy = np.broadcast_arrays(*frequencies(patch))
     (width, height), (ny, nx) = patch.extent, patch.shape
     repeats = np.hypot(fx * width, fy * height)
-    radius = np.hypot(fx, fy)
-    # octaves: wide enough for the median not to be that of the peak itself
-    rings = np.log2(np.maximum(radius * max(width, height), 1.0)).astype(np.intp)
-    background = np.maximum(median(power, rings, np.arange(rings.max() + 1)), total * 1e-30)
     half = (fy > 0) | ((fy == 0) & (fx > 0))
     left = np.where(half & (repeats >= _FEWEST_PERIODS), power, 0.0)
-    left[power < CONTRAST * background[rings]] = 0.0
     found: list[Periodicity] = []
-    while len(found) < most and left.any():
+    for _ in range(_CANDIDATES):
         iy, ix = np.unravel_index(left.argmax(), left.shape)
+        highest = float(left[iy, ix])
+        if len(found) == most or not highest > 0.0:
+            break
         peak = np.array([fx[iy, ix], fy[iy, ix]])
         rows, columns = np.abs(np.arange(ny) - iy), np.abs(np.arange(nx) - ix)
         near = (rows[:, None] <= _LOBE) & (columns <= _LOBE)
-        along, across = fx * peak[0] + fy * peak[1], fx * peak[1] - fy * peak[0]
-        near |= (np.abs(along / (peak @ peak) - 1) < _SPREAD) & (np.abs(across) < _FAN * along)
+        along = (fx * peak[0] + fy * peak[1]) / (peak @ peak)  # in units of the peak's frequency
+        across = (fx * peak[1] - fy * peak[0]) / (peak @ peak)
+        near |= (np.abs(along - 1) < _SPREAD) & (np.abs(across) < _FAN * along)
         weight = power[near]
         share = 2.0 * float(weight.sum()) / total  # and its mirror image
         centre = np.array([weight @ fx[near], weight @ fy[near]]) / weight.sum()
+        aside = np.hypot((fx - along * peak[0]) * width, (fy - along * peak[1]) * height)
+        line = aside < _LOBE + 1
+        ring = (np.abs(repeats - repeats[iy, ix]) < 1.5) & ~line & half
+        beside = line & (along > 1 / _BESIDE[1]) & (along < 1 / _BESIDE[0])
+        beside &= repeats < repeats[iy, ix] - _LOBE
+        background = [float(np.median(power[part])) for part in (ring, beside) if part.any()]
         repeated = np.hypot(*(centre * (width, height))) >= _FEWEST_PERIODS
-        if share >= LEAST_SHARE and repeated:
+        if share >= LEAST_SHARE and repeated and highest > CONTRAST * max(background, default=0.0):
             found.append(_periodicity(centre, min(share, 1.0)))
-        same = np.abs(across) <= math.tan(math.radians(_SAME)) * np.abs(along)
-        on_line = along / (peak @ peak)
-        aside = np.hypot((fx - on_line * peak[0]) * width, (fy - on_line * peak[1]) * height)
-        explained = same | (aside < _LOBE + 1)
-        left[explained] = power[explained] = 0.0
-    return sorted(found, key=lambda one: -one.share)
+            explained = line | (np.abs(across) <= math.tan(math.radians(_SAME)) * np.abs(along))
+            left[explained] = power[explained] = 0.0
+        else:
+            left[near] = 0.0
+    return sorted(found, key=lambda one: -one.share) or _repeated_profile(field)
+
+
+def _repeated_profile(field: HeightField) -> list[Periodicity]:
+    """The grating of a patch whose heights change along one axis only, however few its periods."""
+    for axis, direction in ((1, 0.0), (0, 90.0)):
+        profile = field.heights.mean(axis=1 - axis)
+        share = float(profile.var() / field.heights.var())
+        if share >= _PROFILE:
+            strongest = 1 + int(np.abs(np.fft.rfft(profile))[1:].argmax())
+            return [Periodicity(field.extent[1 - axis] / strongest, direction, share)]
+    return []
 
 
 def _central(count: int) -> slice:

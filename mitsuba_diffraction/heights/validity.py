@@ -23,6 +23,9 @@ IMPOSSIBLE_SLOPE = 10.0
 #: nm to a few hundred.
 COARSEST_PIXEL = 2.0
 
+# No window narrower than this has directions to speak of, µm: a wavelength and a half.
+_NARROWEST = 1.0
+
 # A patch this much smaller than the coherence width is worth a warning.
 _SMALLER = 0.9
 
@@ -98,11 +101,13 @@ def window_warning(field: HeightField, coherence_width: float) -> str:
     if min(width, height) >= _SMALLER * coherence_width:
         return ""
     fitting = _two_digits(min(width, height))
+    advice = f"take coherence_width={fitting:g} (--coherence-width {fitting:g}) or a larger patch"
+    if fitting < _NARROWEST:
+        advice = "take a larger patch, or check its pixel size, which is in µm"
     return (
         f"{field.name}: the patch of {width:.4g} × {height:.4g} µm is smaller than the coherence "
         f"width of {coherence_width:g} µm: it is tiled, and its repetition shows as a grating of "
-        f"its own; if it is none, take coherence_width={fitting:g} (--coherence-width "
-        f"{fitting:g}) or a larger patch"
+        f"its own; if it is none, {advice}"
     )
 
 

@@ -65,10 +65,10 @@ class ScaleRoughness:
         return cls(moment[found] / total[found], total[found])
 
     @classmethod
-    def mean(cls, several: Sequence[ScaleRoughness]) -> ScaleRoughness:
-        """The mean variance of several surfaces, whose powers are averaged."""
-        frequency = np.concatenate([one.frequency for one in several])
-        variance = np.concatenate([one.variance for one in several]) / len(several)
+    def mean(cls, patches: Sequence[ScaleRoughness]) -> ScaleRoughness:
+        """That of several patches of one surface, whose powers are averaged."""
+        frequency = np.concatenate([patch.frequency for patch in patches])
+        variance = np.concatenate([patch.variance for patch in patches]) / len(patches)
         order = np.argsort(frequency, kind="stable")
         return cls(frequency[order], variance[order])
 

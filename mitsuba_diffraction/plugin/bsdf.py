@@ -15,7 +15,9 @@ data : mi.TensorXf
 pixel_size : float or string [from the file]
     Distance between heights in µm: one number, "dx, dy", or "auto".
 max_height : float or string [from the file]
-    Height of white in an integer image, µm, or "auto".
+    Height of white in an integer image, µm, or "auto"; other heights are scaled to span it.
+height_unit : string [from the file]
+    Unit of the numbers in the file, `nm` for instance, where it states none or a wrong one.
 channel : string or integer [the heights]
     Which channel of an instrument file: its name or index; of an EXR image, its name.
 crop : float or string [none]

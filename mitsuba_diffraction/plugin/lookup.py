@@ -7,18 +7,19 @@ aligned, so that one packet load fetches them: this alignment alone is worth a f
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from ..tables.packing import Record
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
 from .memory import index_between, packet_size, read_packets, upload
 from .roles import Float, Index, Mask, Packet
-from .series import inner, pad, padded, series_of
+from .series import inner, series_of
 
 #: Look-ups of more taps run through their rows in a loop instead of one long program.
 _UNROLLED_TAPS = 36
@@ -44,20 +45,17 @@ class DeviceTable:
     def __init__(self, table: DiffractionTable) -> None:
         self.expansion, self.grid = table.expansion, table.grid
         self.spacing, self.radii = table.spacing, table.q_max
-        self.components = table.coefficients.shape[3]
-        self.terms = padded(table.expansion.terms)
+        self.record = Record.aligned(*table.coefficients.shape[3:])
         self.half = table.coefficients.dtype == np.float16
         self._inverse_scale = 1.0 / table.scale
-        self.rows, self.columns = (2 * n + 1 for n in table.grid.last[::-1])
-        self._floats = self.components * self.terms
-        packets_a_bin = self._floats // packet_size(self._floats)
+        packets_a_bin = self.record.numbers // packet_size(self.record.numbers)
         if table.coefficients.size // table.expansion.terms * packets_a_bin >= _MOST_PACKETS:
             raise DiffractionError(
                 f"a table of {table.nbytes / 1e9:.1f} GB is too large to index; raise tolerance "
                 "or use a smaller patch"
             )
         kind = mi.Float16 if self.half else mi.Float
-        self._coefficients = upload(kind, pad(table.coefficients, self.terms))
+        self._coefficients = upload(kind, self.record.pack(table.coefficients))
         self.series = series_of(table)
         self._looped = not table.grid.trims and table.grid.taps_read > _UNROLLED_TAPS
 
@@ -77,7 +75,7 @@ class DeviceTable:
         lobe_x, lobe_y = grid.order_0_exponents
         lobe = dr.exp2(dr.fma(_log2(lobe_x), dr.square(x), _log2(lobe_y) * dr.square(y)))
 
-        if self.components == 2 and not grid.coherent:
+        if self.record.components == 2 and not grid.coherent:
             total = self._over_taps(
                 first, weights_x, weight_y, lambda packets: self._squares(packets, weights)
             )[0]
@@ -100,20 +98,14 @@ class DeviceTable:
         x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
         return self._place(x, y, self.series.at(kappa)[0])[0]
 
-    def taps(self) -> list[tuple[int, list[int]]]:
-        """The rows of taps that a look-up reads, and the columns in each."""
-        columns, rows = self.grid.taps
-        trims = self.grid.trims or (0,) * rows
-        return [(row, list(range(trim, columns - trim))) for row, trim in enumerate(trims)]
-
     def read(self, index: Index) -> list[Packet]:
         """All floats of the bin with this index, in packets."""
-        return read_packets(self._coefficients, index, self._floats)
+        return read_packets(self._coefficients, index, self.record.numbers)
 
     def order_0(self, kappa: Float) -> Float:
         """|a_0(κ)|², the power of order 0."""
         centre = self.series.at(kappa)[2]
-        if self.components == 2:
+        if self.record.components == 2:
             return dr.square(centre[0]) + dr.square(centre[1])
         return dr.maximum(centre[0], 0.0)
 
@@ -122,7 +114,7 @@ class DeviceTable:
         grid = self.grid
         column, weight_x = _taps(x, grid.last[0], grid.taps[0], grid.exponents[0])
         row, weight_y = _taps(y, grid.last[1], grid.taps[1], grid.exponents[1], self._looped)
-        return (interval * self.rows + row) * self.columns + column, weight_x, weight_y
+        return grid.index(interval, row, column), weight_x, weight_y
 
     def _over_taps(
         self,
@@ -132,9 +124,9 @@ class DeviceTable:
         of: Callable[[list[Packet]], list[Float]],
     ) -> list[Float]:
         """Σ over the taps of their Gaussian weights times of(packets)."""
-        rows = self.grid.taps[1]
+        rows, columns_a_row = self.grid.taps[1], self.grid.shape[1]
 
-        def row_sum(start: Index, columns: list[int]) -> list[Float]:
+        def row_sum(start: Index, columns: range) -> list[Float]:
             total: list[Float] = []
             for i in columns:
                 found = of(self.read(start + i))
@@ -145,14 +137,14 @@ class DeviceTable:
             return total
 
         if self._looped:
-            every = list(range(self.grid.taps[0]))
+            every = range(self.grid.taps[0])
             start = (mi.UInt32(0), first, [p * 0.0 for p in row_sum(first, every)])
             _, _, total = dr.while_loop(
                 start,
                 lambda j, index, total: j < rows,
                 lambda j, index, total: (
                     j + 1,
-                    index + self.columns,
+                    index + columns_a_row,
                     [
                         dr.fma(p, weight_y(mi.Float(j)), t)
                         for p, t in zip(row_sum(index, every), total, strict=True)
@@ -161,18 +153,17 @@ class DeviceTable:
             )
             return total
         total = []
-        for j, columns in self.taps():
-            found = row_sum(first + j * self.columns, columns)
+        for j, columns in enumerate(self.grid.tapped()):
+            found = row_sum(first + j * columns_a_row, columns)
             if not total:
                 total = [p * weight_y(j) for p in found]
             else:
                 total = [dr.fma(p, weight_y(j), t) for p, t in zip(found, total, strict=True)]
         return total
 
-    def _components(self, packets: list[Packet]) -> list[list[Float]]:
+    def _components(self, packets: list[Packet]) -> list[Sequence[Float]]:
         """The terms of each component, from packets that hold one component after the other."""
-        values = [x for packet in packets for x in packet]
-        return [values[c * self.terms : (c + 1) * self.terms] for c in range(self.components)]
+        return self.record.split([x for packet in packets for x in packet])
 
     def _squares(self, packets: list[Packet], weights: list[Float]) -> list[Float]:
         """|a_j|² of one bin."""

@@ -21,10 +21,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..tables.sampling.proposals import BANDED, BANDS, proposals
+from ..tables.sampling.proposals import BANDED, BANDS, LEVEL, proposals
 from ..tables.table import DiffractionTable
 from .memory import index_between, read, upload
-from .restricted import device_table
 from .roles import Buffer, Float, Index, Vector2f, Vector3f
 
 #: Share of the samples drawn from the cosine density.
@@ -47,51 +46,55 @@ class OrderSampler:
 
     def __init__(self, table: DiffractionTable) -> None:
         found = proposals(table)
-        self._device = device_table(table)
         self._sigma = table.sigma
         self._origin, self._cell = found.origin, found.cell
         self._rows, self._columns = found.columns.shape[1], found.columns.shape[2] - 1
+        self._words = found.levels.shape[2] // 4
         self._row_sums = upload(mi.Float, found.rows)
         self._column_sums = upload(mi.Float, found.columns)
-        self._occupied = upload(mi.Float, found.occupied.astype("float32"))
+        self._levels = upload(mi.UInt32, found.levels.view(np.uint32))
+        self._units = upload(mi.Float, found.units * np.float32(1.0 / self._cell**2))
+        self._order_0 = upload(mi.Float, found.order_0)
         self._bands_per_kappa = BANDS / (BANDED * table.expansion.kappa_max)
+        self._last = len(found.order_0) - 1.0
+        self._steps_per_kappa = self._last / table.expansion.kappa_max
 
     @property
     def nbytes(self) -> int:
         """Size in memory."""
-        return 4 * sum(len(a) for a in (self._row_sums, self._column_sums, self._occupied))
+        return 4 * sum(len(a) for a in (self._row_sums, self._column_sums, self._levels))
 
-    def strategy(self, k: Float, cos_i: Float, height_scale: Float) -> tuple[Float, Index]:
-        """Share of the samples that order 0 gets, and the band of the other orders."""
-        band = mi.UInt32(
-            index_between(
-                k * height_scale * (cos_i + 0.5) * self._bands_per_kappa, 0.0, BANDS - 1.0
-            )
-        )
-        power = self._device.order_0(2.0 * k * height_scale * cos_i)
-        return dr.select(
-            read(mi.Float, self._occupied, band) > 0.0, order_0_share(power, cos_i), 1.0
-        ), band
+    def strategy(self, k: Float, cos_i: Float, height_scale: Float) -> tuple[Float, Index, Float]:
+        """Share of the samples that order 0 gets; the band of the other orders, and its unit."""
+        kappa = k * height_scale
+        position = kappa * (cos_i + 0.5) * self._bands_per_kappa
+        band = mi.UInt32(index_between(position, 0.0, BANDS - 1.0))
+        nearest = dr.fma(2.0 * kappa * cos_i, self._steps_per_kappa, 0.5)
+        power = read(mi.Float, self._order_0, mi.UInt32(index_between(nearest, 0.0, self._last)))
+        share = order_0_share(power, cos_i)
+        unit = read(mi.Float, self._units, band)
+        return dr.select(unit > 0.0, share, 1.0), band, unit
 
-    def density(self, qx: Float, qy: Float, share: Float, band: Index) -> Float:
+    def density(self, qx: Float, qy: Float, share: Float, band: Index, unit: Float) -> Float:
         """Density of drawing the frequency (qx, qy), per (rad/µm)²."""
         variance = self._sigma**2
-        glossy = variance / dr.pi * dr.exp(-variance * (dr.square(qx) + dr.square(qy)))
-        x = (qx - self._origin[0]) * (1.0 / self._cell)
-        y = (qy - self._origin[1]) * (1.0 / self._cell)
+        exponent = dr.fma(qx, qx, dr.square(qy)) * (-variance / np.log(2.0))
+        glossy = (variance / dr.pi) * dr.exp2(exponent)
+        per_cell = 1.0 / self._cell
+        x = dr.fma(qx, per_cell, -self._origin[0] * per_cell)
+        y = dr.fma(qy, per_cell, -self._origin[1] * per_cell)
         inside = (x >= 0.0) & (y >= 0.0) & (x < self._columns) & (y < self._rows)
         column, row = mi.UInt32(dr.select(inside, x, 0.0)), mi.UInt32(dr.select(inside, y, 0.0))
-        cell = self._difference(self._row_sums, band * (self._rows + 1) + row) * self._difference(
-            self._column_sums, (band * self._rows + row) * (self._columns + 1) + column
-        )
-        cell = dr.select(inside, cell * (1.0 / self._cell**2), 0.0)
-        return dr.lerp(cell, glossy, share)
+        word = read(mi.UInt32, self._levels, (band * self._rows + row) * self._words + column // 4)
+        level = (word >> (8 * (column & 3))) & 255
+        cell = unit * dr.exp2(dr.fma(mi.Float(level), 1.0 / LEVEL, -255.0 / LEVEL))
+        return dr.lerp(dr.select(inside & (level > 0), cell, 0.0), glossy, share)
 
     def draw(
         self, k: Float, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f
     ) -> Vector2f:
         """A frequency (mi.Vector2f, rad/µm) for wavenumber k from three uniform numbers."""
-        share, band = self.strategy(k, cos_i, height_scale)
+        share, band, _ = self.strategy(k, cos_i, height_scale)
         sample2 = dr.minimum(sample2, BELOW_ONE)
         glossy = mi.warp.square_to_std_normal(sample2) * (1.0 / (self._sigma * dr.sqrt(2.0)))
         start = band * (self._rows + 1)
@@ -101,9 +104,6 @@ class OrderSampler:
         position = mi.Vector2f(mi.Float(column) + x, mi.Float(row) + y) * self._cell
         position += mi.Vector2f(self._origin[0], self._origin[1])
         return dr.select(sample1 < share, mi.Vector2f(glossy), position)
-
-    def _difference(self, sums: Buffer, index: Index) -> Float:
-        return read(mi.Float, sums, index + 1) - read(mi.Float, sums, index)
 
 
 def order_0_share(power: Float, cos_i: Float) -> Float:

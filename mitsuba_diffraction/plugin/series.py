@@ -6,15 +6,14 @@ functions of basis "svd" have none: they are tabulated, as parabolas on equal ce
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from ..tables.expansion import Expansion
+from ..tables.packing import Record, cells_of, functions_at
 from ..tables.table import DiffractionTable
 from .memory import PACKET, index_between, read_record, upload
 from .roles import Float, Index
@@ -29,20 +28,15 @@ class Recurrence:
 
     def __init__(self, table: DiffractionTable) -> None:
         self._expansion = table.expansion
-        self._terms = padded(table.expansion.terms)
-        self._order_0 = upload(mi.Float, pad(table.order_0.astype(np.float32), self._terms))
-        self._components = table.order_0.shape[1]
+        self._record = Record.aligned(*table.order_0.shape[1:])
+        self._order_0 = upload(mi.Float, self._record.pack(table.order_0.astype(np.float32)))
 
     def at(self, kappa: Float) -> tuple[Index, list[Float], list[Float]]:
         """Interval, weights of a bin's terms, and order 0: its power, or the parts of a_0."""
         offset, interval = series_interval(self._expansion, kappa)
-        weights = series_weights(self._expansion, self._terms, offset, interval, kappa)
-        floats = self._components * self._terms
-        values = read_record(self._order_0, interval, floats)
-        centre = [
-            inner(values[n * self._terms : (n + 1) * self._terms], weights)
-            for n in range(self._components)
-        ]
+        weights = series_weights(self._expansion, self._record.stored, offset, interval, kappa)
+        values = read_record(self._order_0, interval, self._record.numbers)
+        centre = [inner(part, weights) for part in self._record.split(values)]
         factored = interval == 0 if self._expansion.basis == "chebyshev" else mi.Mask(True)
         centre[0] += dr.select(factored, mi.Float(1.0), 0.0)
         return interval, weights, centre
@@ -54,24 +48,20 @@ class Tabulated:
     def __init__(self, table: DiffractionTable) -> None:
         expansion = table.expansion
         self._expansion = expansion
-        self._terms = padded(expansion.terms)
         self._components = table.order_0.shape[1]
-        phase = 2.0 * expansion.half_range * expansion.length
-        step = (192.0 * _CELLS_SHARE * table.tolerance) ** (1 / 3)
-        self._cells = max(8, math.ceil(phase / step))
+        self._missing = Record.aligned(1, expansion.terms).stored - expansion.terms
+        self._cells = cells_of(expansion, (192.0 * _CELLS_SHARE * table.tolerance) ** (1 / 3))
         # Chebyshev's three nodes of every cell, and the parabola a + t (b + t c) through them
         t = 0.5 + 0.5 * np.cos(np.pi * (np.arange(3) + 0.5) / 3)
         start = np.arange(expansion.intervals * self._cells)
         kappa = expansion.length / self._cells * (start[:, None] + t)
         kappa = np.clip(kappa, 0.0, np.nextafter(expansion.kappa_max, 0.0))
         parabola = np.linalg.inv(t[:, None] ** np.arange(3))
-        # Without the factor they fade with as κ → 0, where a parabola would lose it
-        plain = expansion.weights(kappa) / expansion.fading(kappa)[..., None]
         # one record a cell, so that few packets fetch all of it
-        both = np.concatenate([plain, table.order_0_at(kappa)], axis=-1)
-        record = np.einsum("pn,cnt->cpt", parabola, both).reshape(len(start), -1)
-        self._floats = -(-record.shape[1] // PACKET) * PACKET
-        self._record = upload(mi.Float, pad(record.astype(np.float32), self._floats))
+        both = np.concatenate([functions_at(expansion, kappa), table.order_0_at(kappa)], axis=-1)
+        numbers = np.einsum("pn,cnt->cpt", parabola, both).reshape(len(start), 1, -1)
+        self._record = Record.of(1, numbers.shape[2], unit=PACKET)
+        self._parabolas = upload(mi.Float, self._record.pack(numbers.astype(np.float32)))
 
     def at(self, kappa: Float) -> tuple[Index, list[Float], list[Float]]:
         """Interval, weights of a bin's terms, and order 0: its power, or the parts of a_0."""
@@ -80,7 +70,7 @@ class Tabulated:
         lower = index_between(dr.floor(position), 0.0, last)
         t = dr.clip(position - lower, 0.0, 1.0)
         cell = mi.UInt32(lower)
-        values = read_record(self._record, cell, self._floats)
+        values = read_record(self._parabolas, cell, self._record.numbers)
         count = self._expansion.terms + self._components
         a, b, c = (values[n * count : (n + 1) * count] for n in range(3))
         found = [dr.fma(dr.fma(z, t, y), t, x) for x, y, z in zip(a, b, c, strict=True)]
@@ -92,7 +82,7 @@ class Tabulated:
             interval = cell // self._cells
             factor = dr.select(interval == 0, factor, 1.0)
         weights = [w * factor for w in weights]
-        return interval, weights + [mi.Float(0.0)] * (self._terms - len(weights)), centre
+        return interval, weights + [mi.Float(0.0)] * self._missing, centre
 
 
 def series_of(table: DiffractionTable) -> Recurrence | Tabulated:
@@ -132,17 +122,3 @@ def inner(terms: Sequence[Float], weights: Sequence[Float]) -> Float:
     for term, weight in zip(terms[1:], weights[1:], strict=True):
         total = dr.fma(term, weight, total)
     return total
-
-
-def padded(terms: int) -> int:
-    """Terms as stored on the device: 1, 2, 4 or a multiple of 4, of 8 from 17 on."""
-    if terms <= 2:
-        return terms
-    step = 4 if terms <= 16 else 8
-    return -(-terms // step) * step
-
-
-def pad(values: NDArray[np.floating], terms: int) -> NDArray[np.floating]:
-    """The last axis filled up with zeros."""
-    missing = terms - values.shape[-1]
-    return np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, missing)])

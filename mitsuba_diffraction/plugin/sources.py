@@ -120,8 +120,9 @@ def heights_of_tensor(data: Any, options: LoadOptions) -> HeightField:
     DiffractionError
         If pixel_size is missing, max_height is given, or the array holds no heights.
     """
-    if options.max_height is not None:
-        raise DiffractionError("max_height is for images; the heights in data are in µm already")
+    for name in ("max_height", "height_unit"):
+        if getattr(options, name) is not None:
+            raise DiffractionError(f"{name} is for files; the heights in data are in µm already")
     if isinstance(data, HeightData):
         if options.pixel_size not in (None, data.field.pixel_size):
             raise DiffractionError("pixel_size is for arrays; a HeightField has its own already")

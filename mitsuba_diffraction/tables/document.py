@@ -7,6 +7,7 @@ field has its type, size and range, and agrees with the others.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -29,12 +30,12 @@ _SETTINGS = tuple(field.name for field in dataclasses.fields(TableSettings))
 _OWN = ("scale", "spacing", "error", "roughness", "source", "expansion", "grid", "order_0")
 _COMPONENTS = {"power": 1, "amplitude": 2}
 _MOST_INTERVALS, _LONGEST_SERIES = 4096, 2048
+_MOST_SERIES = 1 << 16  # terms over all intervals
 _MOST_NODES = 1 << 12
 _ROUNDED = 1e-6  # relative: of what follows from other fields
-#: Of a share of the light: at most 1 but for the error of a coarse table.
+#: Of the light in one order: at most 1 but for the error of a coarse table.
 _LARGEST_POWER = 2.0
-#: Of a bin's series, the sum of its terms' sizes; Taylor's cancel.
-_LARGEST_SUM = {"svd": 1e4, "chebyshev": 1e4, "taylor": 1e9}
+_BLOCK = 1 << 22  # coefficients at a time
 
 
 def document_of(table: DiffractionTable) -> dict[str, Any]:
@@ -144,7 +145,8 @@ def _described(fields: dict[str, Any], whole: bool) -> Described:
     _check_agreement(table, whole)
     shares = np.linspace(0.0, 1.0, 33)
     kappa = expansion.length * (np.arange(expansion.intervals)[:, None] + shares).ravel()
-    largest = np.abs(table.order_0_at(kappa)).max()
+    with np.errstate(over="ignore"):
+        largest = np.abs(table.order_0_at(kappa)).max()
     _require(largest <= _LARGEST_POWER, f"order_0 of a size of {largest:.3g}")
     size = 4 * math.prod(Described({"expansion": expansion, "grid": grid}, None).shape)
     _require(size <= MAX_BYTES, f"{size:.3g} bytes of coefficients")
@@ -193,12 +195,21 @@ def _expansion(fields: Mapping[str, Any]) -> Expansion:
         _require(expansion.kind == "amplitude" and expansion.intervals == 1, "basis='taylor'")
     _require((expansion.basis == "svd") == ("functions" in fields), "functions beside basis")
     if "functions" not in fields:
-        return expansion
+        return _resolved(expansion)
     functions = _numbers(
         fields["functions"], "functions", (expansion.intervals, None, expansion.terms)
     )
     _require(1 <= functions.shape[1] <= _LONGEST_SERIES, f"{functions.shape[1]} series terms")
-    return dataclasses.replace(expansion, functions=functions)
+    return _resolved(dataclasses.replace(expansion, functions=functions))
+
+
+def _resolved(expansion: Expansion) -> Expansion:
+    """The series, if it can follow the phases of such heights; a few terms are one radian each."""
+    terms = expansion.series_terms
+    _require(expansion.intervals * terms <= _MOST_SERIES, f"{expansion.intervals}×{terms} terms")
+    phase = expansion.half_range * expansion.length
+    _require(phase <= 4.0 * terms + 8.0, f"half_range={expansion.half_range:g} beside terms")
+    return expansion
 
 
 def _grid(fields: Mapping[str, Any]) -> Grid:
@@ -246,22 +257,18 @@ def _source(value: Any) -> dict[str, Any]:
 
 
 def _check_sizes(coefficients: NDArray[Any], expansion: Expansion, scale: float) -> None:
-    """Refuse coefficients of which a look-up would make no share of the light."""
-    shares = np.linspace(0.0, 1.0, 9)
-    for interval, mine in enumerate(coefficients):
-        largest = _largest(mine).max(axis=0) / scale
-        weights = np.abs(expansion.weights(expansion.length * (interval + shares))).max(axis=0)
-        total = float(largest @ weights)
-        _require(total <= _LARGEST_SUM[expansion.basis], f"coefficients up to {total:.3g}")
-
-
-def _largest(coefficients: NDArray[Any]) -> NDArray[np.float64]:
-    """Largest size (components, terms) over (ny, nx) orders; not finite if one is not."""
-    # Floats without their sign are ordered as whole numbers are, which NumPy is fast with
-    kind = np.dtype(f"u{coefficients.itemsize}")
-    flat = np.ascontiguousarray(coefficients).view(kind).reshape(-1, *coefficients.shape[2:])
-    without_sign = kind.type(np.iinfo(kind).max >> 1)
-    return np.bitwise_and(flat, without_sign).max(axis=0).view(coefficients.dtype).astype(float)
+    """Refuse coefficients that are no numbers, or make an order brighter than all the light."""
+    shares = np.linspace(0.02, 1.0, 5)
+    _, ny, nx, components, terms = coefficients.shape
+    rows = max(1, _BLOCK // (nx * components * terms))
+    for interval, start in itertools.product(range(len(coefficients)), range(0, ny, rows)):
+        weights = expansion.weights(expansion.length * (interval + shares)).T / scale
+        mine = coefficients[interval, start : start + rows].astype(np.float32)
+        with np.errstate(all="ignore"):
+            values = mine @ weights.astype(np.float32)
+            powers = values[..., 0, :] if expansion.kind == "power" else (values**2).sum(axis=2)
+        largest = float(np.abs(powers).max())
+        _require(largest <= _LARGEST_POWER, f"an order with {largest:.3g} of the light")
 
 
 # ------------------------------------------------------------------------ one value

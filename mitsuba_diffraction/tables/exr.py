@@ -21,7 +21,7 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from ..atomic import atomic_path
-from ..errors import DiffractionError, one_line
+from ..errors import DiffractionError, one_line, quoted
 from .document import Described, described, document_of, plain
 from .expansion import Expansion
 from .table import FORMAT_VERSION, DiffractionTable
@@ -95,7 +95,7 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
     version = document.pop("version", None)
     if version != FORMAT_VERSION:
         raise DiffractionError(
-            f"'{path}' is a table of format version {version}, this program reads version "
+            f"'{path}' is a table of format version {quoted(version)}, this program reads version "
             f"{FORMAT_VERSION}; build it again with 'mitsuba-diffraction precompute'"
         )
     try:

@@ -96,6 +96,16 @@ class Record:
     terms: int
     stored: int
 
+    @classmethod
+    def of(cls, components: int, terms: int, unit: int = 1) -> Record:
+        """Terms filled up to a multiple of `unit`."""
+        return cls(components, terms, -(-terms // unit) * unit)
+
+    @classmethod
+    def aligned(cls, components: int, terms: int) -> Record:
+        """As processors gather them at best: 1, 2, or a multiple of 4 terms, of 8 from 17 on."""
+        return cls.of(components, terms, 1 if terms <= 2 else 4 if terms <= 16 else 8)
+
     @property
     def numbers(self) -> int:
         """In all."""
@@ -106,14 +116,9 @@ class Record:
         return [numbers[n * self.stored : (n + 1) * self.stored] for n in range(self.components)]
 
     def pack(self, coefficients: NDArray[Any]) -> NDArray[Any]:
-        """Coefficients (…, components, terms) as records (…, numbers)."""
+        """Coefficients (…, components, terms) as records (n, numbers)."""
         missing = [(0, 0)] * (coefficients.ndim - 1) + [(0, self.stored - self.terms)]
-        return np.pad(coefficients, missing).reshape(*coefficients.shape[:-2], self.numbers)
-
-
-def filled_up(terms: int, unit: int) -> int:
-    """The least multiple of `unit` that is not below `terms`."""
-    return -(-terms // unit) * unit
+        return np.pad(coefficients, missing).reshape(-1, self.numbers)
 
 
 def cells_of(expansion: Expansion, phase: float) -> int:
@@ -122,13 +127,6 @@ def cells_of(expansion: Expansion, phase: float) -> int:
     phase : rad, at most.
     """
     return max(8, math.ceil(2.0 * expansion.half_range * expansion.length / phase))
-
-
-def kappas_of(expansion: Expansion, shares: NDArray[np.float64]) -> NDArray[np.float64]:
-    """κ (intervals, …) at these shares (0 … 1) of every interval, kept on its own side."""
-    inside = np.clip(shares, 1e-6, 1.0 - 1e-6)
-    numbers = np.arange(expansion.intervals).reshape(-1, *(1,) * inside.ndim)
-    return np.asarray(expansion.length * (numbers + inside))
 
 
 def functions_at(expansion: Expansion, kappa: NDArray[np.float64]) -> NDArray[np.float64]:

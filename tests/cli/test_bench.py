@@ -13,8 +13,8 @@ import pytest
 from mitsuba_diffraction.analysis.bench import colours, plan
 from mitsuba_diffraction.analysis.bench.figures import Goal, Row, Section
 from mitsuba_diffraction.analysis.bench.plan import Plan
-from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.analysis.bench.timing import ratio, rounds_of
+from mitsuba_diffraction.cli import main
 from tests.directions import rough_patch
 
 # 96 pixels are 4.7 µm, 1/14 of the coherence window: wide taps, but no time to speak of
@@ -33,16 +33,26 @@ TINY = Plan(
 SCENES = Path(__file__).parents[2] / "scenes"
 
 
-@pytest.fixture(autouse=True)
-def tiny(monkeypatch):
-    monkeypatch.setattr(plan, "QUICK", TINY)
-    monkeypatch.setattr(colours, "MATERIALS", {"none": colours.MATERIALS["none"]})
+@pytest.fixture(scope="module", autouse=True)
+def tiny():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plan, "QUICK", TINY)
+        patch.setattr(colours, "MATERIALS", {"none": colours.MATERIALS["none"]})
+        yield
 
 
-def test_everything_is_measured_and_written(run, tmp_path):
-    file = tmp_path / "bench.json"
-    ran = run("bench", "--quick", "--json", file, "--scenes", SCENES)
-    assert ran.code == 0, ran.err
+@pytest.fixture(scope="module")
+def measured(tiny, tmp_path_factory):
+    """The file of one run of all parts, and what it printed."""
+    file = tmp_path_factory.mktemp("bench") / "bench.json"
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        assert main(["bench", "--quick", "--json", str(file), "--scenes", str(SCENES)]) == 0
+    return file, printed.getvalue()
+
+
+def test_everything_is_measured_and_written(measured):
+    file, printed = measured
     parts = (
         "build",
         "eval",

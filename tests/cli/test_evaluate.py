@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction.cli.options import METHODS
+from tests.directions import rough_patch
 
 QUICK = [
     "--pixel-size", "0.08", "--coherence-width", "12", "--step", "40", "--angle-step", "0.5",
@@ -43,6 +44,34 @@ def test_every_method_can_be_evaluated(run, heights, method):
     ran = run("evaluate", heights, *QUICK[:-1], "0", "--method", method, "-o", "a.png")
     assert ran.code == 0, ran.err
     assert f"method {method}" in ran.out
+
+
+def test_a_patch_without_a_grating_has_no_period(run, tmp_path):
+    np.save(tmp_path / "rough.npy", rough_patch((160, 160), (0.08, 0.08), 0.1, seed=4).heights)
+    ran = run("evaluate", tmp_path / "rough.npy", *QUICK)
+    assert ran.code == 0, ran.err
+    assert "fitted    none: the light on this side follows no grating equation" in ran.out
+    with np.load("rough-evaluation.npz") as saved:
+        assert np.isnan(saved["fitted_period"])
+        assert np.isnan(saved["ridge"]).all()
+
+
+def test_the_light_comes_across_the_grooves_and_steep_slopes_are_said(run, tmp_path):
+    y, x = np.mgrid[:240, :240] * 0.08
+    turn = np.radians(30.0)
+    waves = 0.1 * np.cos(2 * np.pi * (x * np.cos(turn) + y * np.sin(turn)) / 1.5)
+    np.save(tmp_path / "turned.npy", waves)
+    ran = run("evaluate", tmp_path / "turned.npy", *QUICK)
+    assert ran.code == 0
+    assert "RMS slope 0.3 is above 0.1" in ran.err
+    assert "φ = 30°" in ran.out
+    assert "spectrum  1.5 µm along 30°" in ran.out
+    with np.load("turned-evaluation.npz") as saved:
+        assert float(saved["fitted_period"]) == pytest.approx(1.5, rel=0.02)
+        assert saved["angles"].max() < 0.0  # sin = 1.25·0.83/1.5 − sin 75°
+    ran = run("evaluate", tmp_path / "turned.npy", *QUICK, "--phi", "120", "-o", "along.png")
+    assert "φ = 120°" in ran.out
+    assert "fitted    none" in ran.out
 
 
 def test_a_given_period_is_compared_with(run, heights):

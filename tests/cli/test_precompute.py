@@ -148,7 +148,7 @@ def test_unusable_options_are_usage_errors(run, heights, here, arguments):
         (["--pixel-size", "0"], "'0'"),
         (["--pixel-size=-0.1"], "'-0.1'"),
         (["--pixel-size", "nan"], "'nan'"),
-        (["--max-height", "0.3"], "contradicts"),
+        (["--max-height", "0.3", "--height-unit", "nm"], "without max_height"),
         (["--level", "tilt"], "'tilt'"),
         (["--tolerance=-1"], "tolerance"),
         (["--tolerance", "nan"], "tolerance"),

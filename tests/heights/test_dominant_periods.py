@@ -50,27 +50,27 @@ def test_crossed_gratings_are_two_the_stronger_first():
     assert [one.share for one in found] == pytest.approx([0.8, 0.2], abs=0.02)
 
 
-def test_a_tilt_and_a_scale_s_bending_do_not_hide_its_fingers():
-    y, x = np.mgrid[:512, :512] / 512
-    scale = gratings.elaphe_like(32.0, 512).heights
-    bent = HeightField(scale + 0.3 * x + 0.1 * np.sin(3 * y), 32.0 / 512)
-    first = dominant_periods(bent)[0] if dominant_periods(bent) else None
-    level = dominant_periods(HeightField(scale, 32.0 / 512))
-    assert [round(one.direction) for one in level] == [0]
-    assert level[0].period == pytest.approx(1.03, rel=0.05)  # stretched by some per cent
-    assert first is None or first.period == pytest.approx(level[0].period, rel=0.01)
+def test_a_scale_s_bending_does_not_hide_its_fingers():
+    scale = gratings.xenopeltis_like(32.0, 512)
+    bending = rough_patch((512, 512), (0.0625, 0.0625), 0.1, correlation=3.0).heights
+    for heights in (scale.heights, scale.heights + bending):
+        found = dominant_periods(HeightField(heights, 0.0625))[0]
+        assert found.period == pytest.approx(0.6, rel=0.05)  # stretched by some per cent
+        assert abs(found.direction) < 2.0
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_rough_surfaces_have_none(seed):
-    assert dominant_periods(rough_patch((160, 200), (0.1, 0.1), 0.2, seed=seed)) == []
+    rough = rough_patch((160, 200), (0.1, 0.1), 0.2, correlation=0.4 * (1 + seed % 3), seed=seed)
+    assert dominant_periods(rough) == []
 
 
 @pytest.mark.parametrize("shape", [(2, 2), (2, 400), (400, 2), (3, 5)])
 def test_tiny_and_flat_patches_are_answered(shape):
     assert dominant_periods(HeightField(np.zeros(shape), 0.1)) == []
     found = dominant_periods(waves(shape, (2.0, 0.0 if shape[1] > 5 else 90.0, 0.1)))
-    assert [one.period for one in found] == pytest.approx([2.0] if max(shape) > 5 else [], rel=0.01)
+    if max(shape) > 5:
+        assert [one.period for one in found] == pytest.approx([2.0], rel=0.01)
 
 
 def test_the_measured_scale_has_its_fingers(shared_afm):

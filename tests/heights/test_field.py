@@ -126,7 +126,7 @@ def test_each_cause_of_doubt_is_one_line(heights, pixel, word):
         (np.zeros((4, 4), dtype=bool), "bool"),
         ("surface", "expected real numbers"),
         ([[1, 2], [3]], "not an array"),
-        (np.full((4, 4), 1e9), "in µm"),
+        (np.diag([0, 0, 0, 1e9]), "in µm"),
         (np.ma.masked_less(np.arange(9.0).reshape(3, 3), 4), "masked"),
     ],
 )

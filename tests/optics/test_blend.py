@@ -61,6 +61,14 @@ def test_the_mean_of_several_is_that_of_their_variances():
     assert mean.at(q) == pytest.approx(2.5 * roughness().at(q), rel=1e-12)
 
 
+def test_several_patches_have_the_mean_of_their_roughness():
+    other = ScaleRoughness.of(2 * PATCH.heights[:, ::-1], PATCH.pixel_size)
+    q = np.geomspace(0.1, 35, 20)
+    both = ScaleRoughness.mean([roughness(), other])
+    assert both.at(q) == pytest.approx(2.5 * roughness().at(q), rel=1e-9)
+    assert np.all(np.diff(both.frequency) >= 0)
+
+
 def test_a_flat_surface_has_no_roughness_at_any_scale():
     flat = ScaleRoughness.of(np.full((4, 6), 0.3), (0.1, 0.1))
     assert np.all(flat.at([0.0, 1.0, 30.0]) < 1e-30)

@@ -130,7 +130,7 @@ def _loaded(path: Path) -> DiffractionTable | None:
 
 def _check_look_ups(table: DiffractionTable) -> None:
     """Finite numbers of a sane size, in NumPy and in the plugin."""
-    from mitsuba_diffraction.plugin.lookup import device_table
+    from mitsuba_diffraction.plugin.restricted import device_table
 
     rng = np.random.default_rng(0)
     radius, turn = table.q_limit * np.sqrt(rng.random(300)), rng.uniform(0, 2 * np.pi, 300)
@@ -194,7 +194,6 @@ def test_a_bit_that_is_flipped_anywhere_is_noticed(file, tmp_path):
         lambda d: d.update(coherence_width=1e300),
         lambda d: d["source"].update(warnings="one"),
     ],
-    ids=str,
 )
 def test_what_would_read_outside_or_fill_the_memory_is_refused_at_once(file, tmp_path, change):
     contents = Contents(file)

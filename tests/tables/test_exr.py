@@ -141,7 +141,7 @@ def test_a_table_of_another_version(saved, version):
     rewritten(saved, lambda document: document.update(version=version))
     text = refused(saved)
     assert (
-        f"is a table of format version {version}, this program reads version {FORMAT_VERSION}"
+        f"is a table of format version {version!r}, this program reads version {FORMAT_VERSION}"
         in text
     )
     assert text.endswith("build it again with 'mitsuba-diffraction precompute'")

@@ -11,9 +11,10 @@ from matplotlib.figure import Figure
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.progress import Progress, silent
 
-from . import models, plots, sections, statistics
+from . import models, patch_sections, plots, sections, statistics
 from .cases import FEW_WAVELENGTHS, MATERIALS, PROBE_GRATING, Grating
 from .compare import Comparison, compare
+from .patches import KINDS
 from .solutions import Solutions, shipped
 
 #: Period and depth (µm) of the gratings that closed forms are checked for.
@@ -74,6 +75,12 @@ def write_report(folder: Path, *, quick: bool = False, progress: Progress | None
         sections.polarisation(perfect),
         sections.materials(comparisons),
         models.section(models.compare_all(_few(comparisons) if quick else comparisons)),
+        patch_sections.section(
+            [
+                *patch_sections.compared("keratin", KINDS[:1] if quick else KINDS),
+                *patch_sections.compared("aluminium", KINDS[:1] if quick else KINDS),
+            ]
+        ),
         sections.random_surfaces(measured),
     ]
     page = folder / "validation.md"

@@ -21,6 +21,8 @@ from mitsuba_diffraction.heights.preprocess.periodic import periodic_smooth
 
 from .cases import ALUMINIUM, KERATIN
 
+KINDS = ("sinusoid", "crossed", "elaphe", "elaphe_like", "cd_pits")
+
 #: The measured patch that cuts are made of; it is no part of the project.
 MEASURED = Path(__file__).parents[3].parent / "shared" / "afm" / "elaphe-65um.png"
 
@@ -38,7 +40,7 @@ _ROW = 0.01
 class Surface:
     """One cell that tiles the plane.
 
-    `kind` is sinusoid, crossed, elaphe, elaphe_like or cd_pits. `size` is the period or the cut's
+    `kind` is one of `KINDS`. `size` is the period or the cut's
     side in µm, `place` its corner in pixels of what it is cut from. `slope` is the RMS of |∇h|,
     `wavelength` (nm) what it is solved at.
     """
@@ -139,7 +141,7 @@ def _cut(surface: Surface) -> tuple[NDArray[np.float64], float]:
     count = 2 * round(surface.size / pixel / 2)
     row, column = surface.place
     piece = field.heights[row : row + count, column : column + count]
-    periodic, _ = periodic_smooth(HeightField(piece, field.pixel_size))
+    periodic = periodic_smooth(HeightField(piece, field.pixel_size))
     side = count * pixel
     return _smoothed(periodic.heights, side), side
 

@@ -148,9 +148,9 @@ def bare_gathers(table: DiffractionTable, queries: Queries) -> Callable[[], Any]
     dr.eval(firsts)
 
     def body(n: Any, firsts: list[Any], total: Any) -> tuple[Any, list[Any], Any]:
-        for row, columns in device.taps():
+        for row, columns in enumerate(table.grid.tapped()):
             for column in columns:
-                for packet in device.read(firsts[0] + row * device.columns + column):
+                for packet in device.read(firsts[0] + table.grid.index(0, row, column)):
                     total += dr.sum(packet, axis=0)
         return n + 1, [*firsts[1:], firsts[0]], total
 

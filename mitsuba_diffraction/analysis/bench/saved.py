@@ -63,7 +63,7 @@ class TermImages(DeviceTable):
         x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
         first, weight_x, weight_y = self._place(x, y, mi.UInt32(0))
         weights = [
-            (column + row * self.columns, weight_x(column) * weight_y(row))
+            (grid.index(0, row, column), weight_x(column) * weight_y(row))
             for row in range(grid.taps[1])
             for column in range(grid.taps[0])
         ]
@@ -76,7 +76,7 @@ class TermImages(DeviceTable):
             windowed = mi.Complex2f(0.0)
             for offset, gaussian in weights:
                 windowed += gaussian * dr.gather(mi.Complex2f, self._images, image + offset)
-            return n + 1, image + self.rows * self.columns, weight, total + weight * windowed
+            return n + 1, image + grid.index(1, 0, 0), weight, total + weight * windowed
 
         state = (mi.UInt32(1), first, mi.Float(1.0), order_0)
         total = dr.while_loop(state, lambda n, *_: n <= expansion.terms, of_term)[3]

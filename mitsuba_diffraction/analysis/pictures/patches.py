@@ -92,8 +92,8 @@ def _light(axes: Axes, field: HeightField) -> None:
     light = colour_field(field)
     axes.imshow(light, origin="lower", extent=(-1, 1, -1, 1), interpolation="bilinear")
     axes.set(xlabel="u = sinθ cosφ", ylabel="v = sinθ sinφ")
-    mirror = [_mirror_share(field, wavelength) for wavelength in (BLUE, GREEN, RED)]
-    text = "unscattered: " + ", ".join(f"{share:.0%}" for share in mirror)
+    shares = [(w, _mirror_share(field, w)) for w in (BLUE, GREEN, RED)]
+    text = "unscattered: " + ", ".join(f"{share:.0%} at {w:g} nm" for w, share in shares)
     axes.text(0.5, 1.02, text, transform=axes.transAxes, ha="center", fontsize=8)
 
 

@@ -103,6 +103,8 @@ def _choose(channels: list[Any], wanted: str | int | None, shown: str) -> tuple[
         chosen = _named(channels, wanted, shown)
         return chosen, f"channel {chosen.name!r}, chosen among {listed}", ""
     heights = [c for c in channels if _is_height(c) and not _NOT_HEIGHT.search(c.name)]
+    if not heights:  # whose units the user may know
+        heights = [c for c in channels if c.dim == 2 and _units(c) == (None, None)]
     if not heights:
         raise _why_none(channels, shown)
     note = f"channel {heights[0].name!r}"
@@ -139,18 +141,9 @@ def _why_none(channels: list[Any], shown: str) -> DiffractionError:
         return DiffractionError(
             f"{shown} is not on a uniform grid; interpolate its points to one first"
         )
-    if all(_units(c) == (None, None) for c in channels if c.dim != 1):
-        return _unknown_units(shown)
     return DiffractionError(
         f"{shown} has no height channel among {_list(channels)}; if one of them holds heights "
         "after all, name it with channel"
-    )
-
-
-def _unknown_units(shown: str) -> DiffractionError:
-    return DiffractionError(
-        f"{shown} does not state its units; export the heights in µm as NPY or text instead and "
-        "give pixel_size"
     )
 
 
@@ -160,10 +153,6 @@ def _units(channel: Any) -> tuple[str | None, str | None]:
     if isinstance(unit, (tuple, list)):
         return unit[0], unit[-1]
     return unit, channel.data_unit if channel.data_unit is not None else unit
-
-
-def _in_unit(unit: str | None) -> str:
-    return "in no unit that the file states" if unit is None else f"in {unit!r}"
 
 
 def _in_micrometres(unit: str | None) -> float | None:
@@ -207,23 +196,17 @@ def _read_channel(reader: Any, channel: Any, shown: str) -> RawHeights:
     topography = reader.topography(channel_index=channel.index, **options)
     _check_map(topography, what)  # some readers know only now
     lateral, height = _units(channel)
-    if lateral is None and height is None:
-        raise _unknown_units(shown)
-    lateral_scale, height_scale = _in_micrometres(lateral), _in_micrometres(height)
-    if height_scale is None:
-        raise DiffractionError(f"{what} is {_in_unit(height)}, not a unit of length")
+    lateral_scale = _in_micrometres(lateral)
     values = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)
     nx, ny = values.shape
     check_pixel_count(ny, nx, what)
     pixel_size = None
-    if sized:
-        if lateral_scale is None:
-            raise DiffractionError(
-                f"{what}: its width is {_in_unit(lateral)}, not a unit of length"
-            )
+    if sized and lateral_scale is not None:
         width, length = (float(size) * lateral_scale for size in topography.physical_sizes)
         pixel_size = (width / nx, length / ny)
         if not all(math.isfinite(size) and size > 0 for size in pixel_size):
             raise DiffractionError(f"{what} states a size of {width:g} x {length:g} µm")
     # heights()[ix, iy] with iy downwards from the top of the picture, as instruments show it
-    return RawHeights(values.T[::-1] * height_scale, pixel_size)
+    return RawHeights(
+        values.T[::-1], pixel_size, unit=_in_micrometres(height), stated=str(height or "")
+    )

@@ -19,7 +19,7 @@ class RawHeights:
     Attributes
     ----------
     values
-        Shape (ny, nx), y upwards (`values[0]` is y = 0). In µm, or in [0, 1] if `relative`;
+        Shape (ny, nx), y upwards (`values[0]` is y = 0). In `unit`, or in [0, 1] if `relative`;
         points without data are NaN.
     pixel_size
         (dx, dy) in µm if the file says so.
@@ -27,12 +27,18 @@ class RawHeights:
         The values are fractions of a full scale that the file does not know.
     notes
         One line per choice that the reader made.
+    unit
+        µm in one unit of the values; `None` if the file does not say, or says no length.
+    stated
+        That unit as the file states it; "" if the values are in µm because files of this kind are.
     """
 
     values: npt.NDArray[np.floating]
     pixel_size: tuple[float, float] | None = None
     relative: bool = False
     notes: tuple[str, ...] = ()
+    unit: float | None = 1.0
+    stated: str = ""
 
 
 def existing_file(path: str | os.PathLike[str]) -> Path:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import unicodedata
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -13,14 +12,13 @@ import numpy.typing as npt
 
 from ...errors import DiffractionError
 from ..field import MAX_PIXELS, check_pixel_count
+from ..lengths import micrometres_of
 from .raw import RawHeights
 
 _MISSING = {"", "nan", "na", "n/a", "bad", "none", "null", "-", "--", "inf", "-inf"}
 # Lines that Gwyddion and others put above an exported matrix: "# Width: 10.00 µm".
 _SIZE = re.compile(r"[#;%\s]*(Width|Height)\s*[:=]\s*([-+.\deE]+)\s*(\S+)\s*$", re.IGNORECASE)
 _VALUES = re.compile(r"[#;%\s]*Value units\s*[:=]\s*(\S+)\s*$", re.IGNORECASE)
-_UNITS = {"m": 1e6, "cm": 1e4, "mm": 1e3, "\u03bcm": 1.0, "um": 1.0, "nm": 1e-3, "pm": 1e-6,
-          "\u00c5": 1e-4}  # fmt: skip  # after NFKC, which unites the two code points of µ and Å
 
 
 def read_text(path: Path) -> RawHeights:
@@ -47,18 +45,20 @@ def read_text(path: Path) -> RawHeights:
     if not rows:
         raise DiffractionError(f"{shown} has no line of numbers")
     values = np.array(rows)
+    pixel_size: tuple[float, float] | None
     if np.isnan(values[:, -1]).all():
         values = values[:, :-1]  # a separator at the end of every line, not a column
-    scale, size = _header_sizes(header, shown)
+    (unit, stated), size = _header_sizes(header, shown)
     ny, nx = values.shape
     if nx < 2 or ny < 2:
         raise DiffractionError(
             f"{shown} holds {nx} x {ny} numbers, a line scan; a height field needs a map (ny, nx)"
         )
-    if nx == 3 and ny > 3:
+    if nx == 3 and ny > 3 and size is None:  # a header with sizes belongs to a grid
         values, pixel_size = _from_points(values, shown)
-        return RawHeights(values[::-1] * scale, pixel_size)
-    return RawHeights(values[::-1] * scale, (size[0] / nx, size[1] / ny) if size else None)
+    else:
+        pixel_size = (size[0] / nx, size[1] / ny) if size else None
+    return RawHeights(values[::-1], pixel_size, unit=unit, stated=stated)
 
 
 def _parse(lines: Iterable[str], shown: str) -> tuple[list[list[float]], list[str]]:
@@ -112,28 +112,30 @@ def _number(cell: str, line: int, shown: str) -> float:
         ) from error
 
 
-def _header_sizes(header: list[str], shown: str) -> tuple[float, tuple[float, float] | None]:
-    """Factor from the file's unit of height to µm, and (width, height) of the patch in µm."""
-    scale = 1.0
+def _header_sizes(
+    header: list[str], shown: str
+) -> tuple[tuple[float, str], tuple[float, float] | None]:
+    """The unit of the heights in µm and by name, and (width, height) of the patch in µm."""
+    unit = 1.0, ""
     sizes: dict[str, float] = {}
     for line in header:
         if match := _VALUES.match(line):
-            scale = _factor(match[1], shown)
+            unit = _factor(match[1], shown), match[1]
         elif match := _SIZE.match(line):
             try:
                 sizes[match[1].lower()] = float(match[2]) * _factor(match[3], shown)
             except ValueError as error:
                 raise DiffractionError(f"{shown}: {line.strip()!r} is not a size") from error
     if len(sizes) < 2:
-        return scale, None
+        return unit, None
     size = sizes["width"], sizes["height"]
     if not all(math.isfinite(s) and s > 0 for s in size):
         raise DiffractionError(f"{shown} states a size of {size[0]:g} x {size[1]:g} µm")
-    return scale, size
+    return unit, size
 
 
 def _factor(unit: str, shown: str) -> float:
-    known = _UNITS.get(unicodedata.normalize("NFKC", unit))
+    known = micrometres_of(unit)
     if known is None:
         raise DiffractionError(
             f"{shown}: {unit!r} is not a unit of length; expected one of m, mm, µm, nm, pm, Å"

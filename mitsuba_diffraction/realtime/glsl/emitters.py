@@ -8,8 +8,8 @@ Which light that is: an emitter e is chosen with a probability p_e in proportion
 to the middle of the scene, and a place on it with a density p:
 
 - directions, points and spots are lights without extent themselves;
-- skies, suns and environment maps give a direction, drawn by Mitsuba in proportion to their
-  radiance, and its irradiance L/(p p_e), the same all over the scene;
+- skies, suns and environment maps give a direction, drawn in proportion to their radiance, and its
+  irradiance L/(p p_e), the same all over the scene;
 - area lights give a place, even over their area, and its intensity L/(p p_e) along the normal,
   which falls with the cosine. So the estimate is right at every place of the scene, not only where
   it is drawn from.
@@ -42,6 +42,7 @@ from .lights import Light, sampled_directions, sampled_positions, without_extent
 Array = NDArray[np.float64]
 
 _BLOCK = 256  # samples that an emitter draws at once
+_CANDIDATES = 16  # directions that are looked at for each that is drawn from a sky
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 _EVEN = 0.1  # share of the choices for all emitters alike: some light other places than the middle
 
@@ -70,6 +71,7 @@ class Emitters:
         self.omissions: list[str] = []
         self.names: list[str] = []
         self._drawn: list[_Drawn] = []
+        self._scene = scene  # area lights look their shapes up in it
         self._middle = middle
         brought = []
         for emitter in scene.emitters():
@@ -142,9 +144,14 @@ class _Drawn:
         return self._blocks[block][inside]
 
     def irradiance(self) -> float:
-        """Of a sphere's cross-section in the middle, summed over the colours."""
+        """In the middle, summed over the colours, if it faced and shone towards it everywhere."""
         lights = [self._fixed] if self._fixed is not None else [self.light(n) for n in range(64)]
-        return float(np.mean([_colour_at(light, self._middle).sum() for light in lights]))
+        found = []
+        for light in lights:
+            away = light.place[:3] - self._middle
+            square = max(float(away @ away), 1e-12) if light.place[3] else 1.0
+            found.append(max(float(light.colour.sum()), 0.0) / square)
+        return float(np.mean(found))
 
     def _block(self, start: int) -> list[Light]:
         name = name_of(self._emitter)
@@ -153,13 +160,44 @@ class _Drawn:
             points = np.pad(places, [(0, 0), (0, 1)], constant_values=1.0)
         else:
             values, places, _, waves = sampled_directions(
-                self._emitter, self._middle, _BLOCK, start
+                self._emitter, self._middle, _BLOCK * _CANDIDATES, start * _CANDIDATES
             )
-            points, normals = np.pad(places, [(0, 0), (0, 1)]), np.zeros((_BLOCK, 3))
+            kept, values = _evenly_bright(values, places, start)
+            points, normals = np.pad(places[kept], [(0, 0), (0, 1)]), np.zeros((_BLOCK, 3))
         return [
             Light(name, point, waves, value[:, 0] if value.shape[1] == 1 else value, normal)
             for point, value, normal in zip(points, values, normals, strict=True)
         ]
+
+
+def _evenly_bright(values: Array, directions: Array, start: int) -> tuple[NDArray[np.int64], Array]:
+    """Of candidates, one in `_CANDIDATES`, chosen in proportion to what they bring.
+
+    Stratified resampling along a curve through all directions, so that each part of the sky is
+    chosen as often as it is bright (Talbot, Cline and Egbert 2005, *Importance resampling for
+    global illumination*). What is chosen brings about the same, where candidates differ by twenty
+    times near a sun.
+
+    Returns
+    -------
+    (n,) numbers of those that are chosen, and their values.
+    """
+    bright = values.mean(axis=(1, 2))
+    if not bright.any():
+        return np.arange(len(values) // _CANDIDATES), values[::_CANDIDATES]
+    azimuth = np.arctan2(directions[:, 1], directions[:, 0]) / (2.0 * np.pi) + 0.5
+    cells = (np.stack([azimuth, 0.5 * (directions[:, 2] + 1.0)]) * 255.99).astype(np.int64)
+    # bits of both in turn: near in this order is near in the sky (Morton 1966)
+    curve = sum((cells[n] >> bit & 1) << (2 * bit + n) for bit in range(8) for n in (0, 1))
+    order = np.argsort(curve, kind="stable")
+    below = np.cumsum(bright[order])
+    count = len(values) // _CANDIDATES
+    inside = (0.5 + (start + np.arange(count)) * _GOLDEN) % 1.0
+    places = (np.arange(count) + inside) / count * below[-1]
+    kept = order[np.minimum(np.searchsorted(below, places), len(order) - 1)]
+    kept = kept[np.argsort(np.argsort(inside))]  # the first few lie all along the curve
+    share = bright.mean() / bright[kept]
+    return kept, values[kept] * share[:, None, None]
 
 
 def _kind_of(emitter: Any) -> str:

@@ -17,6 +17,7 @@ from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
 from ...tables.energy.bound import AZIMUTHAL, LAST_ANGLE, POLAR, SHARE, AlbedoBound
 from ...tables.energy.powers import order_0_power, power_series
+from ...tables.packing import Record, cells_of, functions_at
 from ...tables.table import DiffractionTable
 from .textures import Packed, Texture, as_half, listed, paired, texels
 
@@ -80,11 +81,12 @@ def pack_powers(table: DiffractionTable) -> Packed:
             "interfere; use method lut"
         )
     series, _, scale, expansion = power_series(table)
-    packed = as_half(texels(series.reshape(-1, expansion.terms)))
-    cells = max(8, math.ceil(2.0 * expansion.half_range * expansion.length / _CELL))
+    record = Record.of(1, expansion.terms, unit=4)
+    packed = as_half(record.pack(series[..., None, :]).reshape(-1, 4))
+    cells = cells_of(expansion, _CELL)
     share = np.clip(np.arange(cells + 1) / cells, 1e-6, 1.0 - 1e-6)
     kappa = expansion.length * (np.arange(expansion.intervals)[:, None] + share).ravel()
-    functions = texels(expansion.weights(kappa) / expansion.fading(kappa)[:, None])
+    functions = texels(functions_at(expansion, kappa))
     order_0 = np.zeros((len(kappa), 1, 4))
     order_0[:, 0, 0] = order_0_power(table, kappa)
     of_kappa = np.concatenate([functions.reshape(len(kappa), -1, 4), order_0], axis=1)
@@ -103,7 +105,7 @@ def pack_powers(table: DiffractionTable) -> Packed:
             "inverse_scale": 1.0 / scale,
             "area_factor": area_factor(table.sigma),
         },
-        definitions={"TEXELS": str(-(-expansion.terms // 4))},
+        definitions={"TEXELS": str(record.stored // 4)},
     )
 
 

@@ -25,8 +25,12 @@ CELL = 1.5
 MOST_CELLS = 1024
 #: Bands of κ, up to 3/4 of κ_max: κ is at most k(cosθi + 1), and k(cosθi + 1/2) picks the band.
 BANDS, BANDED = 6, 0.75
+#: Levels of a cell's density in an octave, a byte a cell. Directions are drawn by the levels, so
+#: that their density is exact; the rounding, 4.4 % at most, adds 0.1 % to the samples' variance.
+LEVEL = 8
 
 _KAPPAS = 4  # averaged in a band
+_ORDER_0_KAPPAS = 2048
 _SPREAD = 0.25  # half width of a band's average, as a share of κ_max: κ spreads over k
 
 
@@ -38,16 +42,21 @@ class Proposals:
     ----------
     origin : (x, y), lower corner of cell (0, 0), rad/µm.
     cell : width of a cell, rad/µm.
+    levels : (bands, ny, 4·n) of a cell's density, n ≥ nx / 4: LEVEL of them double it; 0 is none.
+    units : (bands,) probability of a cell of the highest level, 255; 0 where there is no power
+        besides order 0.
     rows : (bands, ny + 1) cumulative probability of rows, from 0 to 1.
     columns : (bands, ny, nx + 1) cumulative probability within a row, from 0 to 1.
-    occupied : (bands,) whether there is any power besides order 0.
+    order_0 : (κs,) power of order 0 over κ, even from 0 to the table's largest κ.
     """
 
     origin: tuple[float, float]
     cell: float
+    levels: NDArray[np.uint8]
+    units: NDArray[np.float32]
     rows: NDArray[np.float32]
     columns: NDArray[np.float32]
-    occupied: NDArray[np.bool_]
+    order_0: NDArray[np.float32]
 
 
 def proposals(table: DiffractionTable) -> Proposals:
@@ -62,13 +71,35 @@ def proposals(table: DiffractionTable) -> Proposals:
     matrices = [_cell_matrix(table, axis, origin[axis], cell, counts[axis]) for axis in (0, 1)]
     rows = np.zeros((BANDS, counts[1] + 1), np.float32)
     columns = np.zeros((BANDS, counts[1], counts[0] + 1), np.float32)
+    levels = np.zeros((BANDS, counts[1], -(-counts[0] // 4) * 4), np.uint8)
+    units = np.zeros(BANDS, np.float32)
     for band in range(BANDS):
-        power = _cell_power(table, matrices, band)
+        found = _levels(_cell_power(table, matrices, band))
+        levels[band, :, : counts[0]] = found
+        power = np.where(found > 0, np.exp2((found - 255.0) / LEVEL), 0.0)
         of_row = power.sum(axis=1)
         if of_row.sum() > 0.0:
+            units[band] = 1.0 / of_row.sum()
             rows[band] = _cumulative(of_row)
             columns[band] = _cumulative(power)
-    return Proposals(origin, cell, rows, columns, rows[:, -1] > 0.0)
+    return Proposals(origin, cell, levels, units, rows, columns, _order_0(table))
+
+
+def _levels(power: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Levels of the cells' powers, 255 for the largest: within 4.4 %, down to 2⁻³² of it."""
+    most = power.max(initial=0.0)
+    if most == 0.0:
+        return np.zeros(power.shape, np.uint8)
+    octaves = np.log2(np.maximum(power / most, 2.0**-64))
+    return np.clip(np.rint(LEVEL * octaves) + 255.0, 0.0, 255.0).astype(np.uint8)
+
+
+def _order_0(table: DiffractionTable) -> NDArray[np.float32]:
+    """Power of order 0 at κs close enough together for a share of the samples."""
+    kappas = np.linspace(0.0, table.expansion.kappa_max, _ORDER_0_KAPPAS)
+    parts = table.order_0_at(kappas)
+    power = parts[:, 0] if parts.shape[1] == 1 else np.sum(np.square(parts), axis=1)
+    return np.clip(power, 0.0, 1.0).astype(np.float32)
 
 
 def _cell_power(

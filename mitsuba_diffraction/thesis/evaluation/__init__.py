@@ -9,6 +9,7 @@ Ridge           viewing angle of the maximum at each wavelength
 ridge_of        the ridge of one order
 Fit             period of the grating equation that fits a ridge
 fit_period      that fit
+find_period     period of the strongest ridge that obeys the grating equation, if there is one
 window_fits     the same for windows all over the patch
 thesis_fit      the procedure behind the thesis' published periods
 """
@@ -17,7 +18,7 @@ from __future__ import annotations
 
 from .beam import Beam, Response, measure
 from .procedure import thesis_fit
-from .ridge import Fit, Ridge, fit_period, ridge_of
+from .ridge import Fit, Ridge, find_period, fit_period, ridge_of
 from .windows import window_fits
 
 #: The name that `thesis_fit` had before.
@@ -29,6 +30,7 @@ __all__ = [
     "Response",
     "Ridge",
     "documents_fit",
+    "find_period",
     "fit_period",
     "measure",
     "ridge_of",

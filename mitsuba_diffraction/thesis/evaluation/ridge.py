@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +16,20 @@ from .beam import Array, Response
 #: Fewer maxima than this determine no period.
 FEWEST = 5
 
+#: Share of the light on an order's side that a grating sends into the order, at least; and how much
+#: brighter its lobe is than what is within an octave.
+LEAST_SHARE, LEAST_RATIO = 0.05, 4.0
+
+# Relative half widths of an irregular grating's order and of what it is compared with.
+_SPREAD, _AROUND = 0.07, 0.5
+# A period found in the heights and one found in the light agree to this factor.
+_AGREES = 1.15
 # In units of 1/σ: beyond it exp(−25), 1e-11, is left of order 0's power.
 _ORDER_0 = 5.0
 # Light this much weaker than the brightest order is the window's own tail, not a maximum.
 _FAINT = 1e-12
+# Periods that are tried, evenly spaced in frequency.
+_LINES = 4000
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +79,13 @@ class Fit:
     wavelengths: int
 
 
-def ridge_of(response: Response, order: int = 1) -> Ridge:
+def ridge_of(
+    response: Response, order: int = 1, *, period: float | None = None, within: float = 1.1
+) -> Ridge:
     """At each wavelength, where the patch sends most light on the side of that order.
+
+    With a `period` in µm, only where the grating equation has a period up to `within` times larger
+    or smaller.
 
     Order 0 is left out up to where its lobe ends, |u| = 5/(σk), and so is the other side of it: the
     brightest point of what remains is taken, as in the thesis, between samples by a
@@ -81,11 +97,13 @@ def ridge_of(response: Response, order: int = 1) -> Ridge:
     DiffractionError
         If `order` is 0.
     """
-    if order == 0:
-        raise DiffractionError("order=0 is the mirror's, at every wavelength; give 1, -1, 2, ...")
-    u = response.beam.sine + np.sin(np.radians(response.angles))
-    lobe = _ORDER_0 / (response.sigma * wavenumber(response.wavelengths))
-    allowed = np.sign(order) * u[None, :] > lobe[:, None]
+    u = _frequencies(response, order)
+    lobe = _ORDER_0 / (response.sigma * wavenumber(response.wavelengths))[:, None]
+    allowed = u[None, :] > lobe
+    if period is not None:
+        expected = abs(order) * response.wavelengths[:, None] * 1e-3 / period
+        allowed &= u[None, :] > np.minimum(expected / within, expected - lobe)
+        allowed &= u[None, :] < np.maximum(expected * within, expected + lobe)
     values = np.where(allowed, response.values, -1.0)
     peak = values.argmax(axis=1)
     rows = np.arange(len(peak))
@@ -105,6 +123,82 @@ def ridge_of(response: Response, order: int = 1) -> Ridge:
     angles = np.where(good, response.angles[inner] + shift * step, np.nan)
     heights = np.where(good, around[1] * np.exp(-0.25 * (before - after) * shift), np.nan)
     return Ridge(response, order, angles, heights)
+
+
+def find_period(response: Response, expected: Sequence[float], order: int = 1) -> float | None:
+    """Period of the strongest ridge that obeys the grating equation, µm; None if there is none.
+
+    Light that a grating sends lies at one u/λ for all wavelengths. So the response is averaged over
+    the wavelengths at each u/λ, and the ridge is that with the largest share of the light on the
+    order's side whose lobe also stands out of its surroundings.
+
+    Parameters
+    ----------
+    expected : periods in µm along the plane of incidence that the heights hold, as
+        `heights.spectra.dominant_periods` finds them. The light alone does not tell: the few orders
+        of a small rough patch obey the equation, too, and one of them is the brightest.
+
+    Raises
+    ------
+    DiffractionError
+        If `order` is 0.
+    """
+    u = _frequencies(response, order)
+    wavelengths = response.wavelengths * 1e-3
+    first = _ORDER_0 / (2.0 * np.pi * response.sigma)
+    last = u.max() / wavelengths.min()
+    if not last > first:
+        return None
+    lines = np.linspace(first, last, _LINES)  # u/λ, 1/µm
+    upward = np.argsort(u)
+    # in the grating equation's own units light falls with λ² (Stam 1999, eq. 7)
+    light = np.array([
+        np.interp(lines * wavelength, u[upward], row[upward], left=np.nan, right=np.nan)
+        * wavelength**2
+        for wavelength, row in zip(wavelengths, response.values, strict=True)
+    ])  # fmt: skip
+    seen = np.isfinite(light).sum(axis=0) >= min(FEWEST, wavelengths.size)
+    if seen.sum() < FEWEST:
+        return None
+    lines, light = lines[seen], np.nanmean(light[:, seen], axis=0)
+    share, ratio = _standing_out(lines, light, response.sigma)
+    periods = abs(order) / lines
+    agrees = np.zeros(periods.shape, bool)
+    for period in expected:
+        agrees |= (periods < _AGREES * period) & (periods * _AGREES > period)
+    strong = agrees & (share >= LEAST_SHARE) & (ratio >= LEAST_RATIO)
+    if not strong.any():
+        return None
+    return float(periods[np.where(strong, share, 0.0).argmax()])
+
+
+def _standing_out(lines: Array, light: Array, sigma: float) -> tuple[Array, Array]:
+    """Share of the light in a lobe around each of `lines` (n,), and its brightness over that of the
+    surroundings, both (n,).
+    """
+    step = lines[1] - lines[0]
+    edges = np.append(lines, lines[-1] + step) - 0.5 * step
+    total = np.append(0.0, np.cumsum(light)) * step
+
+    def within(low: Array, high: Array) -> tuple[Array, Array]:
+        low, high = np.clip(low, edges[0], edges[-1]), np.clip(high, edges[0], edges[-1])
+        return np.interp(high, edges, total) - np.interp(low, edges, total), high - low
+
+    # three standard deviations of the window's own lobe, or the spread of an irregular grating
+    half = np.maximum(_SPREAD * lines, 3.0 / (2.0**1.5 * np.pi * sigma))
+    lobe, width = within(lines - half, lines + half)
+    far = np.maximum(_AROUND * lines, 1.5 * half)
+    around, length = within(lines - far, lines + far)
+    beside = np.maximum((around - lobe) / np.maximum(length - width, step), 1e-300)
+    return lobe / max(total[-1], 1e-300), lobe / width / beside
+
+
+def _frequencies(response: Response, order: int) -> Array:
+    """u = sinθi + sinθo (A,), positive on the side of an order."""
+    if order == 0:
+        raise DiffractionError("order=0 is the mirror's, at every wavelength; give 1, -1, 2, ...")
+    u = response.beam.sine + np.sin(np.radians(response.angles))
+    return np.asarray(np.sign(order) * u)
 
 
 def fit_period(ridge: Ridge) -> Fit:

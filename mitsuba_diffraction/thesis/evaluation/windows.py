@@ -55,6 +55,7 @@ def window_fits(
     *,
     count: int,
     order: int = 1,
+    period: float | None = None,
     progress: Progress | None = None,
 ) -> WindowFits:
     """Fit a period to each of `count` windows, spread over the patch with one offset (fixed seed).
@@ -62,6 +63,7 @@ def window_fits(
     Parameters
     ----------
     table : with coherence="patch".
+    period : µm; ridges are followed where the grating equation has up to half as much again.
 
     Raises
     ------
@@ -79,7 +81,7 @@ def window_fits(
             moved.brdf, beam, wavelengths, angles, sigma=table.sigma, label=f"window {n + 1}"
         )
         try:
-            fits.append(fit_period(ridge_of(response, order)))
+            fits.append(fit_period(ridge_of(response, order, period=period, within=1.5)))
         except DiffractionError:
             fits.append(None)  # this window shows too few maxima; counted below
         if progress is not None:

@@ -76,14 +76,7 @@ def test_channels_of_one_name_need_the_index(tmp_path):
 def test_files_without_heights_say_what_they_have(tmp_path):
     assert "no height channel among 0 'Phase'" in refusal(write(tmp_path, [("Phase", "deg")]))
     path = write(tmp_path, [("Phase", "deg")])
-    assert "not a unit of length" in refusal(path, channel=0)
-
-
-def test_what_the_file_states_cannot_be_contradicted(tmp_path):
-    path = write(tmp_path)
-    assert "contradicts" in refusal(path, pixel_size=0.1)
-    assert "contradicts" in refusal(path, max_height=0.1)
-    HeightField.load(path, pixel_size=0.5)  # the same
+    assert "no length for its heights" in refusal(path, channel=0)
 
 
 def test_treatments_are_applied_in_order_and_reported(tmp_path):
@@ -123,7 +116,12 @@ def test_undefined_points_are_refused_or_filled(tmp_path):
 
 def test_units_that_are_not_stated_are_not_guessed(tmp_path):
     surface_topography.Topography(np.eye(4), (1, 1)).to_netcdf(str(tmp_path / "a.nc"))
-    assert "does not state its units" in refusal(tmp_path / "a.nc")
+    assert "states no unit for its heights; give height_unit" in refusal(tmp_path / "a.nc")
+    known = {"height_unit": "nm", "pixel_size": 0.05}
+    with pytest.warns(DiffractionWarning, match="height_unit overrides"):
+        field = HeightField.load(tmp_path / "a.nc", **known)
+    assert field.range == pytest.approx(1e-3)
+    assert field.pixel_size == (0.05, 0.05)
 
 
 def test_line_scans_and_scattered_points_are_refused(tmp_path):

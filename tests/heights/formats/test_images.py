@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import warnings
 import zlib
 
 import numpy as np
@@ -12,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.heights.field import HeightField
 from tests.heights.formats.refusals import refusal
 
@@ -81,8 +82,6 @@ def test_elaphe_patch_has_its_recorded_range(shared_afm):
 def test_a_large_image_is_not_a_bomb(tmp_path):
     path = tmp_path / "a.png"
     Image.new("L", (9600, 9600)).save(path)  # above Pillow's own limit of 89 million, a warning
-    import warnings
-
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         field = HeightField.load(path, pixel_size=0.01, max_height=1)
@@ -144,13 +143,6 @@ def test_lengths_that_an_image_lacks_are_asked_for(tmp_path):
     both = refusal(path)
     assert "--max-height 0.375 --pixel-size 0.05" in both
     assert "-D max_height=0.375 -D pixel_size=0.05" in both
-
-
-def test_max_height_contradicts_heights_in_micrometres(tmp_path):
-    write_exr(tmp_path / "a.exr", {"Y": FLOATS})
-    np.save(tmp_path / "a.npy", FLOATS)
-    for name in ("a.exr", "a.npy"):
-        assert "contradicts" in refusal(tmp_path / name, **SIZES)
 
 
 @pytest.mark.parametrize("bad", [0, -1, float("nan"), float("inf"), "high", "", True, 1e9, (1, 2)])
@@ -237,7 +229,9 @@ def test_random_bytes_are_one_clear_line(tmp_path, head, tail, suffix):
     path.write_bytes(head + tail)
     for options in ({}, {"pixel_size": 0.1}, SIZES):
         try:
-            HeightField.load(path, **options)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", DiffractionWarning)  # of what SIZES override
+                HeightField.load(path, **options)
         except DiffractionError as error:
             assert "\n" not in str(error)
 

@@ -43,6 +43,14 @@ def test_an_exported_header_gives_size_and_unit(tmp_path):
     assert field.heights[1] == pytest.approx([0.001, 0.002, 0.003, 0.004], rel=1e-12)
 
 
+def test_a_grid_three_pixels_wide_with_a_header_is_no_list_of_points(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_text("# Width: 3 um\n# Height: 4 um\n" + "1 2 3\n" * 4, encoding="utf-8")
+    field = HeightField.load(path)
+    assert field.shape == (4, 3)
+    assert field.pixel_size == (1.0, 1.0)
+
+
 def test_points_on_a_regular_grid_are_arranged(tmp_path):
     path = tmp_path / "a.csv"
     points = [(x * 0.5, y * 0.25, 10 * y + x) for y in range(3) for x in range(4)]

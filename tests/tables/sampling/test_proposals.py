@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionTable, HeightField
 from mitsuba_diffraction.heights import gratings
-from mitsuba_diffraction.tables.sampling.proposals import BANDED, BANDS, proposals
+from mitsuba_diffraction.tables.sampling.proposals import BANDED, BANDS, LEVEL, proposals
 from tests.directions import rough_patch
 
 PATCH = rough_patch((50, 41), (0.08, 0.09), 0.2)
@@ -18,12 +18,21 @@ PATCH = rough_patch((50, 41), (0.08, 0.09), 0.2)
 def test_they_are_cumulative_distributions(coherence, basis):
     table = DiffractionTable.build(PATCH, coherence_width=3.7, coherence=coherence, basis=basis)
     found = proposals(table)
-    assert found.occupied.all()
+    assert np.all(found.units > 0.0)
     assert found.rows.shape == (BANDS, found.columns.shape[1] + 1)
     for sums in (found.rows, found.columns):
         assert np.all(sums[..., 0] == 0.0)
         assert np.all(np.diff(sums, axis=-1) >= 0.0)
         assert np.all((sums[..., -1] == 1.0) | (sums[..., -1] == 0.0))
+
+
+def test_levels_are_the_densities_of_the_sums():
+    found = proposals(DiffractionTable.build(PATCH, coherence_width=3.7))
+    cells = np.diff(found.rows, axis=1)[..., None] * np.diff(found.columns, axis=2)
+    levels = found.levels[..., : cells.shape[2]]
+    expected = np.where(levels, found.units[:, None, None] * 2.0 ** ((levels - 255.0) / LEVEL), 0.0)
+    # differences of sums near 1 in single precision
+    assert cells == pytest.approx(expected, rel=1e-3, abs=2e-7)
 
 
 def test_their_cells_hold_the_power_of_the_orders():
@@ -58,4 +67,4 @@ def test_a_grating_s_cells_lie_along_its_axis():
 
 def test_a_mirror_has_none():
     flat = HeightField(np.zeros((20, 20)), 0.08)
-    assert not proposals(DiffractionTable.build(flat, coherence_width=1.6)).occupied.any()
+    assert not proposals(DiffractionTable.build(flat, coherence_width=1.6)).units.any()

@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 
 from mitsuba_diffraction import DiffractionError, HeightField, reference
 from mitsuba_diffraction.heights import gratings
+from mitsuba_diffraction.heights.spectra import dominant_periods
 from mitsuba_diffraction.thesis import methods
 from mitsuba_diffraction.thesis.evaluation import (
     Beam,
     Response,
+    find_period,
     fit_period,
     measure,
     ridge_of,
@@ -140,6 +142,48 @@ def test_a_measured_scale_has_the_period_of_its_fingers(shared_afm):
     assert 0.02 < found.spread < 0.1
     # published: 1144 nm, from one window on the corner
     assert thesis_fit(table, Beam(), WAVELENGTHS, angles).period == pytest.approx(1.144, abs=0.003)
+
+
+def test_light_that_follows_no_grating_equation_is_passed_over():
+    """A broad and brighter maximum near the mirror, as a bent scale has, beside the grating's."""
+    beam, sigma = Beam(), 16.0
+    line = (beam.sine + np.sin(np.radians(ANGLES))) / (WAVELENGTHS[:, None] * 1e-3)
+    values = np.exp(-((2 * np.pi * sigma * (line - 1 / 0.9)) ** 2))
+    values += 3.0 * np.exp(-(((line - 0.15) / 0.05) ** 2))
+    response = Response(beam, WAVELENGTHS, ANGLES, values, sigma, "bent")
+    assert fit_period(ridge_of(response)).period > 5.0  # what is brightest
+    fit = fit_period(ridge_of(response, period=find_period(response, [0.93])))
+    assert fit.period == pytest.approx(0.9, rel=1e-3)
+    assert find_period(response, [1.5]) is None
+    assert find_period(response, []) is None
+
+
+def test_a_bent_scale_has_the_period_of_its_fingers_across_them_only():
+    bending = rough_patch((512, 512), (0.0625, 0.0625), 0.1, correlation=3.0).heights
+    heights = gratings.xenopeltis_like(32.0, 512).heights + bending
+    bent = HeightField(heights, 0.0625)
+    held = [one.period for one in dominant_periods(bent)]
+    method = methods.make("default", bent, tolerance=1e-2)
+    response = response_of(method)
+    fit = fit_period(ridge_of(response, period=find_period(response, held)))
+    assert fit.period == pytest.approx(0.6, rel=0.05)  # 0.6 µm, stretched to fit the patch
+    assert fit.residual < 0.5
+    assert find_period(response_of(method, beam=Beam(phi=80.0)), held) is None
+
+
+def test_a_rough_patch_has_no_period_though_one_order_of_its_tile_is_brightest():
+    rough = rough_patch((256, 256), (0.1, 0.1), 0.1, seed=4)
+    response = response_of(methods.make("default", rough, tolerance=1e-2))
+    assert fit_period(ridge_of(response)).residual < 0.01  # on a perfect line
+    assert find_period(response, [one.period for one in dominant_periods(rough)]) is None
+
+
+def test_the_second_order_is_told_from_the_first(of_blazed):
+    response = response_of(of_blazed["flss"])
+    assert fit_period(ridge_of(response, 2)).period > 4.0  # that of the brighter first
+    period = find_period(response, [2.5], 2)
+    fit = fit_period(ridge_of(response, 2, period=period))
+    assert fit.period == pytest.approx(2.5, rel=1e-3)
 
 
 def test_a_mirror_has_no_orders_to_fit():

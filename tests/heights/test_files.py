@@ -1,0 +1,49 @@
+"""Files from several threads at once, and what is no file."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import OpenEXR
+import pytest
+from PIL import Image
+
+from mitsuba_diffraction import DiffractionError, HeightField
+
+
+def test_loading_in_threads_leaves_the_streams_of_the_process_alone(tmp_path):
+    pixels = np.random.default_rng(0).random((64, 64)).astype(np.float32)
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, {"Y": pixels}).write(str(tmp_path / "a.exr"))
+    Image.fromarray(np.uint8(255 * pixels)).save(tmp_path / "a.png")
+    whole = (tmp_path / "a.exr").read_bytes()
+    (tmp_path / "cut.exr").write_bytes(whole[: len(whole) // 2])
+    streams, number = (sys.stdout, sys.stderr), os.fstat(2).st_ino
+    seen = []
+
+    def load(n):
+        with contextlib.suppress(DiffractionError):
+            name = ("a.exr", "cut.exr", "a.png")[n % 3]
+            HeightField.load(tmp_path / name, pixel_size=0.1, max_height=1 if n % 3 == 2 else None)
+        seen.append((sys.stdout, sys.stderr) == streams and os.fstat(2).st_ino == number)
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(load, range(200)))
+    assert all(seen)
+    assert (sys.stdout, sys.stderr) == streams
+    assert os.fstat(2).st_ino == number
+
+
+@pytest.mark.parametrize("name", ["pipe.npy", "pipe.toml", "pipe"])
+def test_a_pipe_is_refused_at_once(tmp_path, name):
+    os.mkfifo(tmp_path / name)
+    code = "import mitsuba_diffraction as md, sys; md.HeightField.load(sys.argv[1])"
+    ran = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / name)],
+        capture_output=True, text=True, timeout=60, check=False,
+    )  # fmt: skip
+    assert "is a pipe or a device" in ran.stderr.splitlines()[-1]
