@@ -162,8 +162,6 @@ def test_one_wavelength_is_the_spectrum_there() -> None:
     assert mono == pytest.approx(spectral[:, :1], rel=1e-4, abs=1e-6 * spectral.max())
 
 
-
-
 def test_a_wavelength_outside_the_table_is_refused(name: str) -> None:
     with pytest.raises(RuntimeError, match="wavelength=900 nm is outside the table's 360 to 830"):
         load(wavelength=900.0)
