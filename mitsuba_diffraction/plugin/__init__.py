@@ -20,6 +20,8 @@ rgb_lookup      a colour table inside a kernel
 bounded         a parameter that changes between renderings, and keeps its value when anoth
 energy          the bound of the albedo that conserves energy
 reflectance     of the surface itself: dielectric, conductor, mirror
+boundary        what the material makes of the light, with its polarisation
+coat            a clear coat over the structure
 layers          how much light reaches what lies beneath
 orientation     how the patch is turned in the tangent plane
 shadowing       V-shaped grooves
