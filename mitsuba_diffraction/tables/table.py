@@ -127,7 +127,9 @@ class DiffractionTable:
         for part in self.parts:
             expansion = {**asdict(part.expansion), "functions": None}
             plain = [asdict(part.settings), expansion, asdict(part.grid), part.spacing, part.scale]
-            for numbers in (part.coefficients, part.order_0, part.expansion.functions):
+            plain.append(part.roughness.first)
+            arrays = (part.coefficients, part.order_0, part.roughness.nodes)
+            for numbers in (*arrays, part.expansion.functions):
                 if numbers is not None:
                     plain.append([numbers.dtype.str, numbers.shape])
                     content.update(np.ascontiguousarray(numbers).data)
