@@ -36,9 +36,11 @@ _TABLE = {
     "tolerance": f"{_KEPT}1e-3", "terms": "as many as the tolerance needs",
 }  # fmt: skip
 # Options that are parameters of the BSDF, by the plugin's own names.
-_SURFACE = ("material", "int_ior", "orientation", "height_scale")
+_SURFACE = ("material", "int_ior", "coat_ior", "model", "orientation", "height_scale")
 # What only the renderer's BSDF knows.
-_OF_THE_BSDF = ("mode", "material", "orientation", "height_scale", "basis")
+_OF_THE_BSDF = (
+    "mode", "material", "coat_ior", "model", "orientation", "height_scale", "basis",
+)  # fmt: skip
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -109,6 +111,13 @@ def _add_surface_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--int-ior", metavar="N", help="a dielectric of this index (or name) instead, e.g. 1.5"
     )
+    group.add_argument(
+        "--coat-ior", metavar="N", type=float, help="a flat clear coat of this index over it"
+    )
+    group.add_argument(
+        "--model", choices=("small_slope", "kirchhoff"),
+        help="what the material makes of the light; default: small_slope where there is an index",
+    )  # fmt: skip
     group.add_argument("--orientation", metavar="DEG", type=float, help="turns the patch")
     group.add_argument(
         "--height-scale", metavar="S", type=number_between(1e-6, 1000), help="multiplies heights"
@@ -295,7 +304,7 @@ def _surface(bsdf: Any) -> str:
     table, scale, turn = bsdf.table, bsdf.height_scale[0], bsdf.orientation.degrees[0]
     return "; ".join(
         [
-            "R = 1" if str(bsdf.fresnel) == "none" else str(bsdf.fresnel),
+            "R = 1" if str(bsdf.fresnel) == "none" else f"{bsdf.fresnel}, {bsdf.boundary}",
             f"{table.coherence}, coherence width {table.coherence_width:g} µm",
             *([f"heights × {scale:g}"] if scale != 1.0 else []),
             *([f"turned by {turn:g}°"] if turn != 0.0 else []),

@@ -23,6 +23,8 @@ from .saved import saved_bsdf, thesis_bsdf
 ALUMINIUM = "roughconductor, Al"
 DEFAULT = "diffraction, the defaults"
 DEFAULT_AL = "diffraction, Al"
+KIRCHHOFF = "diffraction, kirchhoff"
+KIRCHHOFF_AL = "diffraction, Al, kirchhoff"
 COARSE = "diffraction, tolerance 1e-2"
 THESIS = "thesis: Taylor, 37 terms, 3×3, an image a term"
 TAYLOR = "the same series, all terms of a bin together"
@@ -92,7 +94,9 @@ def bsdf_factories(tables: Tables) -> dict[str, Callable[[], Any]]:
         ),
         "measured": measured,
         DEFAULT: ours("default"),
+        KIRCHHOFF: ours("default", model="kirchhoff"),
         DEFAULT_AL: ours("default", material="Al"),
+        KIRCHHOFF_AL: ours("default", material="Al", model="kirchhoff"),
         COARSE: ours("1e-2"),
         THESIS: lambda: thesis_bsdf(tables.paths["thesis"]),
         TAYLOR: ours("thesis"),

@@ -15,6 +15,8 @@ from .contenders import (
     COARSE,
     DEFAULT,
     DEFAULT_AL,
+    KIRCHHOFF,
+    KIRCHHOFF_AL,
     THESIS,
     Queries,
     Tables,
@@ -48,11 +50,15 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
     times = _nanoseconds(plan, calls, lanes, "eval", progress)
     to_rough = ratio(times[DEFAULT], times[ALUMINIUM])
     to_thesis = ratio(times[THESIS], times[DEFAULT])
+    to_kirchhoff = ratio(times[DEFAULT], times[KIRCHHOFF])
+    metals = ratio(times[DEFAULT_AL], times[KIRCHHOFF_AL])
     goals = {
         DEFAULT: [
             Goal("at most 4× roughconductor", to_rough <= 4.0),
             Goal("within 1.5× of bare gathers", ratio(times[DEFAULT], times[FLOOR]) <= 1.5),
+            Goal("at most 1.15× kirchhoff", to_kirchhoff <= 1.15),
         ],
+        DEFAULT_AL: [Goal("at most 1.25× kirchhoff", metals <= 1.25)],
         COARSE: [Goal("at most 3× roughconductor", ratio(times[COARSE], times[ALUMINIUM]) <= 3.0)],
         THESIS: [Goal("at least 30× the defaults", to_thesis >= 30.0)],
     }

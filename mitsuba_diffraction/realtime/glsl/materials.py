@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...optics.colour import linear_srgb, response
+from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, response
+from ...optics.geometry import wavenumber
 from ...plugin.traversal import children
 from ...tables.store.bounds import cached_bound
 from ...tables.table import DiffractionTable
-from .packing import pack_bounds, pack_conductor
+from .packing import pack_bounds, pack_conductor, pack_roughness
 from .textures import Packed, Texture, Uniform, as_half
 
 Array = NDArray[np.float64]
@@ -123,7 +124,17 @@ def pack_surface(material: Material) -> Packed:
     if hasattr(bsdf.layering, "weight"):
         definitions["THESIS"] = ""
         uniforms["diffuse_weight"] = float(bsdf.layering.weight)
-    return packed | _reflectance(bsdf.fresnel)
+    from ...plugin.boundary import SmallSlope  # which only a variant has
+
+    surface = bsdf.fresnel
+    if bsdf.coat is not None:
+        surface = surface.material
+        definitions["COATED"] = ""
+        uniforms["coat"] = _number(bsdf.coat.eta)
+        uniforms["channel_wavenumbers"] = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
+    if isinstance(bsdf.boundary, SmallSlope):
+        packed |= pack_roughness(material.table.roughness)
+    return packed | _reflectance(surface)
 
 
 def height_scale(material: Material) -> float:
@@ -131,13 +142,21 @@ def height_scale(material: Material) -> float:
     return float(np.array(material.bsdf.height_scale).ravel()[0])
 
 
+def _number(value: Any) -> float:
+    return float(np.array(value).ravel()[0])
+
+
 def _reflectance(surface: Any) -> Packed:
     kind = type(surface).__name__
     if kind == "Dielectric":
-        eta = float(np.array(surface.eta).ravel()[0])
-        return Packed(uniforms={"eta": eta}, definitions={"SURFACE_KIND": "1"})
+        ratio = _number(surface.eta)
+        if ratio < 1.0:  # total reflection has phases, as a conductor's
+            return pack_conductor(np.array([360.0, 830.0]), np.full(2, ratio), np.zeros(2))
+        return Packed(uniforms={"eta": ratio}, definitions={"SURFACE_KIND": "1"})
     if kind == "Conductor":
-        return pack_conductor(*_spectra(surface.eta, surface.k))
+        lam, eta, k = _spectra(surface.eta, surface.k)
+        medium = 1.0 if surface.medium is None else _number(surface.medium.eta)
+        return pack_conductor(lam, eta / medium, k / medium)
     return Packed()
 
 

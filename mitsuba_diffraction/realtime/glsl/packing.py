@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...optics.colour import linear_srgb, response
+from ...optics.blend import NODES_PER_OCTAVE, RoughnessTable
+from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from ...optics.fresnel import reflectance
+from ...optics.geometry import wavenumber
 from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
 from ...tables.energy.bound import AZIMUTHAL, LAST_ANGLE, POLAR, SHARE, AlbedoBound
@@ -186,9 +188,33 @@ def pack_conductor(
 
     rows = np.zeros((_WAVELENGTHS + 1, _ANGLES, 4), np.float32)
     rows[:-1, :, 0] = over(lam)
+    rows[:-1, :, 1] = np.interp(lam, wavelengths, eta)[:, None]
+    rows[:-1, :, 2] = np.interp(lam, wavelengths, k)[:, None]
     fine = np.arange(360.0, 830.5, 1.0)
     weights = linear_srgb(response(fine))
     rows[-1, :, :3] = over(fine).T @ (weights / weights.sum(axis=0))
     return Packed(
-        (Texture("reflectances", rows),), {"wavenumbers": WAVENUMBERS}, {"SURFACE_KIND": "2"}
+        (Texture("reflectances", rows),),
+        {
+            "wavenumbers": WAVENUMBERS,
+            "channel_eta": tuple(np.interp(RGB_WAVELENGTHS, wavelengths, eta).tolist()),
+            "channel_k": tuple(np.interp(RGB_WAVELENGTHS, wavelengths, k).tolist()),
+        },
+        {"SURFACE_KIND": "2"},
+    )
+
+
+def pack_roughness(roughness: RoughnessTable) -> Packed:
+    """What small slope is blended by with Kirchhoff."""
+    nodes = roughness.nodes.astype(np.float32)
+    pairs = np.zeros((len(nodes) - 1, 4), np.float32)
+    pairs[:, 0], pairs[:, 1] = nodes[:-1], nodes[1:]
+    return Packed(
+        (listed("roughness", pairs),),
+        {
+            "first_octave": roughness.first,
+            "last_node": float(len(nodes) - 1),
+            "channel_wavenumbers": tuple(wavenumber(RGB_WAVELENGTHS).tolist()),
+        },
+        {"SMALL_SLOPE": "", "NODES_PER_OCTAVE": f"{NODES_PER_OCTAVE}.0"},
     )

@@ -75,7 +75,7 @@ def fragment_parts(
     constants |= {"SURFACE_KIND": "0", "LIGHTS_LIT": "1", **definitions}
     lines = [f"#define {name} {value}\n" for name, value in constants.items()]
     parts = [("preamble", _PREAMBLES[dialect] + "".join(lines))]
-    shared = ["library.glsl"]
+    shared = ["library.glsl", "boundary.glsl"]
     if method in THESIS_METHODS:
         shared.append("taylor.glsl")
     if "SHADOWED" in constants:

@@ -70,7 +70,10 @@ def several_surfaces(table_file: Path, directory: Path) -> dict[str, Any]:
         },
         "ball": {
             "type": "sphere", "center": [0, 0.3, 0.8], "radius": 0.8,
-            "bsdf": {**skin, "material": "Au", "shadowing": "vcavity", "orientation": 40.0},
+            "bsdf": {
+                **skin, "material": "Au", "coat_ior": 1.4, "shadowing": "vcavity",
+                "orientation": 40.0,
+            },
         },
         "plate": {
             "type": "rectangle",

@@ -44,6 +44,7 @@ uniform vec3 light_colour[LIGHTS];  // irradiance, or intensity of a point light
 #define CONDUCTOR 2
 
 uniform vec2 wavenumbers;        // ends of what the eye sees, rad/µm
+uniform vec3 channel_wavenumbers;  // of the mean wavelengths of red, green and blue
 
 #if SURFACE_KIND == DIELECTRIC
 
@@ -70,7 +71,10 @@ float reflectance_at(float cos_i, float k) { return 1.0; }
 
 #elif SURFACE_KIND == CONDUCTOR
 
-uniform sampler2D reflectances;  // columns over cosθ, rows over k, colours in the last
+uniform sampler2D reflectances;  // columns over cosθ, rows over k, colours in the last; beside
+                                 // them the index n + ik of a row
+uniform vec3 channel_eta;        // the index at the mean wavelengths of red, green and blue
+uniform vec3 channel_k;
 
 vec4 conductor_row(float cos_i, int row)
 {

@@ -95,5 +95,9 @@ vec3 diffracted(vec2 uv, float z, float cos_half, int light)
 {
     float squared_radius = dot(uv, uv);
     vec3 colour = other_orders(uv, squared_radius, z) + order_0(sqrt(squared_radius), z);
-    return reflectance(cos_half) * light_colour[light] * colour;
+    colour *= boundary(cos_half, sqrt(squared_radius), z);
+#ifdef COATED
+    colour += face_reflected * order_0(sqrt(squared_radius), 0.0);
+#endif
+    return light_colour[light] * colour;
 }

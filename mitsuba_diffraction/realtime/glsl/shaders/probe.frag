@@ -1,11 +1,19 @@
 // A method's own function at given places, one a fragment: for checks and timings.
 
+#ifdef PAIRED
+uniform sampler2D directions;  // ωi in the first row, ωo in the second
+#endif
 uniform sampler2D places;  // u, v, z = w·height_scale, cosine at the half vector
 
 out vec4 fragment;
 
 void main()
 {
+#ifdef PAIRED
+    ivec2 column = ivec2(gl_FragCoord.x, 0);
+    vec3 wi = texelFetch(directions, column, 0).xyz;
+    begin_pair(wi, texelFetch(directions, column + ivec2(0, 1), 0).xyz, vec4(1.0));
+#endif
     vec4 place = texelFetch(places, ivec2(gl_FragCoord.xy), 0);
     fragment = vec4(diffracted(place.xy, place.z, place.w, 0), 1.0);
 }

@@ -120,8 +120,8 @@ vec3 from_order_to_order(vec2 uv, float r, float z, float cos_half, int light)
         }
         vec2 mean = clamp(moment / max(power, 1e-20), -reach, reach);
         vec2 at = k + mean * shift + vec2(-deviation, deviation);
-        sum += power.x * reflectance_at(cos_half, at.x) * response(at.x, light)
-             + power.y * reflectance_at(cos_half, at.y) * response(at.y, light);
+        sum += power.x * boundary_at(cos_half, at.x, r, z) * response(at.x, light)
+             + power.y * boundary_at(cos_half, at.y, r, z) * response(at.y, light);
     }
     return sum * (0.5 * inverse_scale * sqrt(PI) / (sigma * r));
 }
@@ -165,7 +165,11 @@ vec3 from_wavelength_to_wavelength(vec2 uv, float r, float z, float cos_half, in
         power *= inverse_scale;
         float apart = sigma * k * r;
         power += exp(-apart * apart) * specular;
-        sum += power * reflectance_at(cos_half, k) * response(k, light);
+        float reflected = power * boundary_at(cos_half, k, r, z);
+#ifdef COATED
+        reflected += exp(-apart * apart) * face_reflected;
+#endif
+        sum += reflected * response(k, light);
     }
     return sum * delta;
 }
@@ -177,5 +181,5 @@ vec3 diffracted(vec2 uv, float z, float cos_half, int light)
     vec3 sum;
     if (r * sigma * WIDEST_LOBE > sqrt(0.5)) sum = from_order_to_order(uv, r, z, cos_half, light);
     else sum = from_wavelength_to_wavelength(uv, r, z, cos_half, light);
-    return reflectance_at_all(cos_half) * sum;
+    return boundary_at_all(cos_half) * sum;
 }

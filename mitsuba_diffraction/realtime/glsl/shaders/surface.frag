@@ -44,9 +44,25 @@ const float LOWEST = 1e-6;  // cosine of what is seen or lit, so that all is fin
 vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
 {
     vec3 sum = wi + wo;
+    vec2 uv = in_patch(sum, rotation);
     float one_plus_dot = 0.5 * dot(sum, sum);
     float ratio = one_plus_dot / sum.z;
     float outside = area_factor * ratio * ratio / wi.z;
+    vec4 through = vec4(1.0);
+#ifdef COATED
+    vec2 there = sqrt(transmittances(wi.z)), back = sqrt(transmittances(wo.z));
+    through = vec4(back.x * there, back.y * there);
+    float face = outside * face_reflectance(sqrt(min(0.5 * one_plus_dot, 1.0)));
+    float leaving = wo.z;
+    wi = refracted(wi);
+    wo = refracted(wo);
+    sum = wi + wo;
+    one_plus_dot = 0.5 * dot(sum, sum);
+    ratio = one_plus_dot / sum.z;
+    outside = area_factor * ratio * ratio / wi.z * leaving / wo.z;
+    sum.z *= coat;  // κ grows by the index
+#endif
+    begin_pair(wi, wo, through);
 #ifdef ENERGY_CONSERVING
     outside /= max(albedo_bound(in_patch(wi, rotation), wi.z),
                    albedo_bound(in_patch(wo, rotation), wo.z));
@@ -54,8 +70,11 @@ vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
 #ifdef VCAVITY
     outside *= groove_shadow(wi.z, wo.z, one_plus_dot);
 #endif
+#ifdef COATED
+    face_reflected = face / outside;
+#endif
     float cos_half = sqrt(min(0.5 * one_plus_dot, 1.0));
-    return outside * diffracted(in_patch(sum, rotation), sum.z * height_scale, cos_half, light);
+    return outside * diffracted(uv, sum.z * height_scale, cos_half, light);
 }
 
 #endif
@@ -68,7 +87,7 @@ vec3 transmission(vec3 wi, vec3 wo)
 #elif defined(THESIS)
     return 1.0 - reflectance(0.5 * length(wi + wo)) + diffuse_weight;
 #else
-    return (1.0 - reflectance(wi.z)) * (1.0 - reflectance(wo.z));
+    return (1.0 - flat_reflectance(wi.z)) * (1.0 - flat_reflectance(wo.z));
 #endif
 }
 
@@ -134,7 +153,7 @@ void main()
     vec3 above = sky[0] + facing.x * sky[1] + facing.y * sky[2] + facing.z * sky[3];
     vec3 returned = pigment * transmission(wi, vec3(0.0, 0.0, 1.0));
 #ifdef DIFFRACTING
-    returned += reflectance(wi.z);
+    returned += flat_reflectance(wi.z);
 #endif
     radiance += seen ? max(above, 0.0) * returned : vec3(0.0);
 #endif

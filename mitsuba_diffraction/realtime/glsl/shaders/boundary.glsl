@@ -1,0 +1,231 @@
+// What the material makes of the light: N' / (1 + ωi·ωo)², the twin of plugin/boundary.py and
+// plugin/coat.py. Kirchhoff's is the reflectance at the half vector.
+
+#ifdef COATED
+
+uniform float coat;               // index of the layer over the structure, over that outside
+
+vec3 refracted(vec3 w)
+{
+    vec2 tangential = w.xy / coat;
+    return vec3(tangential, sqrt(max(1.0 - dot(tangential, tangential), 1e-12)));
+}
+
+// T_s and T_p of the layer's face.
+vec2 transmittances(float cosine)
+{
+    float inside = sqrt(max(cosine * cosine + coat * coat - 1.0, 0.0));
+    vec2 below = vec2(cosine + inside, coat * coat * cosine + inside);
+    return vec2(1.0, coat * coat) * 4.0 * cosine * inside / (below * below);
+}
+
+// What the face reflects, over what `outside` has for the structure.
+float face_reflected;
+
+float face_reflectance(float cosine) { return 1.0 - 0.5 * dot(transmittances(cosine), vec2(1.0)); }
+
+// 1 − T T of both faces.
+vec3 flat_reflectance(float cosine)
+{
+    float inside = sqrt(max(cosine * cosine + coat * coat - 1.0, 0.0)) / coat;
+    return 1.0 - (1.0 - face_reflectance(cosine)) * (1.0 - reflectance(inside));
+}
+
+#else
+
+vec3 flat_reflectance(float cosine) { return reflectance(cosine); }
+
+#endif
+
+#if !defined(SMALL_SLOPE) && !defined(COATED)
+
+void begin_pair(vec3 wi, vec3 wo, vec4 through) {}
+
+vec3 boundary(float cos_half, float r, float z) { return reflectance(cos_half); }
+float boundary_at_all(float cos_half) { return reflectance_at_all(cos_half); }
+float boundary_at(float cos_half, float k, float r, float z) { return reflectance_at(cos_half, k); }
+
+#else
+
+// A dielectric's matrices are real.
+#if SURFACE_KIND == DIELECTRIC
+#define NUMBER float
+#else
+#define NUMBER vec2
+#endif
+
+float times(float a, float b) { return a * b; }
+vec2 times(vec2 a, vec2 b) { return vec2(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x); }
+float inverse_of(float a) { return 1.0 / a; }
+vec2 inverse_of(vec2 a) { return vec2(a.x, -a.y) / dot(a, a); }
+float plus(float a, float b) { return a + b; }
+vec2 plus(vec2 a, float b) { return vec2(a.x + b, a.y); }
+float root(float a) { return sqrt(max(a, 0.0)); }
+
+// The root whose wave decays, or else travels, away from the surface.
+vec2 root(vec2 a)
+{
+    float larger = sqrt(0.5 * (length(a) + abs(a.x)));
+    float smaller = 0.5 * a.y / max(larger, 1e-20);
+    return a.x >= 0.0 ? vec2(larger, smaller) : vec2(smaller, larger);
+}
+
+// Of the pair: cosines and squared sines, products of the turns to the facet's axis and back, ...
+vec2 pair_cosines, pair_squares;
+vec4 pair_turns;
+float pair_dot, pair_cross, pair_sines, pair_half, pair_one_plus_dot;
+vec4 pair_through;                // ... and √T of a coat, there and back, for each entry
+
+const float NORMAL = 1e-20;       // squared sine
+
+void matrices(NUMBER index, out NUMBER tangent[4], out NUMBER gentle[4])
+{
+    NUMBER epsilon = times(index, index);
+    NUMBER inside = root(plus(epsilon, pair_half * pair_half - 1.0));
+    NUMBER raised = epsilon * pair_half;
+    NUMBER r_s = -times(plus(inside, -pair_half), inverse_of(plus(inside, pair_half)));
+    NUMBER r_p = times(raised - inside, inverse_of(raised + inside));
+    r_s *= pair_one_plus_dot;
+    r_p *= pair_one_plus_dot;
+    tangent[0] = r_s * pair_turns.x - r_p * pair_turns.w;
+    tangent[1] = r_s * pair_turns.y + r_p * pair_turns.z;
+    tangent[2] = -(r_s * pair_turns.z + r_p * pair_turns.y);
+    tangent[3] = r_p * pair_turns.x - r_s * pair_turns.w;
+
+    NUMBER contrast = plus(epsilon, -1.0) * (2.0 * pair_cosines.x * pair_cosines.y);
+    NUMBER in0 = root(plus(epsilon, -pair_squares.x)), in1 = root(plus(epsilon, -pair_squares.y));
+    NUMBER s0 = inverse_of(plus(in0, pair_cosines.x)), s1 = inverse_of(plus(in1, pair_cosines.y));
+    NUMBER p0 = inverse_of(epsilon * pair_cosines.x + in0);
+    NUMBER p1 = inverse_of(epsilon * pair_cosines.y + in1);
+    NUMBER bent0 = times(in0, p0), bent1 = times(in1, p1);
+    gentle[0] = -times(contrast, times(s1, s0)) * pair_dot;
+    gentle[1] = times(contrast, times(s1, bent0)) * pair_cross;
+    gentle[2] = times(contrast, times(bent1, s0)) * pair_cross;
+    gentle[3] = times(contrast, times(bent1, bent0) * pair_dot
+                                - times(epsilon, times(p1, p0)) * pair_sines);
+}
+
+// ½ Σ|(1 − s) K + s B|² over (1 + ωi·ωo)².
+float mean_power(NUMBER tangent[4], NUMBER gentle[4], float s)
+{
+    float sum = 0.0;
+    for (int n = 0; n < 4; ++n) {
+        NUMBER blended = mix(tangent[n], gentle[n], s) * (pair_through[n] / pair_one_plus_dot);
+        sum += dot(blended, blended);
+    }
+    return 0.5 * sum;
+}
+
+#ifdef SMALL_SLOPE
+
+uniform sampler2D roughness;      // σ_q² at a node in log2 q and at the next
+uniform float first_octave;       // of the first node
+uniform float last_node;
+
+// s = exp(−(κσ_q)⁴/3)
+float gentle_share(float k, float r, float z)
+{
+    float place = (log2(max(k * r, 1e-10)) - first_octave) * NODES_PER_OCTAVE;
+    place = clamp(place, 0.0, last_node);
+    float lower = min(floor(place), last_node - 1.0);
+    vec2 ends = entry(roughness, int(lower)).xy;
+    float squared = k * k * z * z * mix(ends.x, ends.y, place - lower);
+    return exp(squared * squared * (-1.0 / 3.0));
+}
+
+#else
+
+float gentle_share(float k, float r, float z) { return 0.0; }
+
+#endif
+
+#if SURFACE_KIND == DIELECTRIC
+
+float pair_tangent[4], pair_gentle[4];  // at all wavelengths
+
+void of_material() { matrices(eta, pair_tangent, pair_gentle); }
+
+float boundary_at_all(float cos_half) { return 1.0; }
+
+float boundary_at(float cos_half, float k, float r, float z)
+{
+    return mean_power(pair_tangent, pair_gentle, gentle_share(k, r, z));
+}
+
+vec3 boundary(float cos_half, float r, float z)
+{
+    vec3 found;
+    for (int n = 0; n < 3; ++n) found[n] = boundary_at(cos_half, channel_wavenumbers[n], r, z);
+    return found;
+}
+
+#else
+
+void of_material() {}
+
+float of_index(vec2 index, float s)
+{
+    vec2 tangent[4], gentle[4];
+    matrices(index, tangent, gentle);
+    return mean_power(tangent, gentle, s);
+}
+
+float boundary_at_all(float cos_half) { return 1.0; }
+
+float boundary_at(float cos_half, float k, float r, float z)
+{
+    float last = float(textureSize(reflectances, 0).y - 2);
+    float y = clamp((k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x), 0.0, 1.0) * last;
+    return of_index(texelFetch(reflectances, ivec2(0, int(y + 0.5)), 0).yz, gentle_share(k, r, z));
+}
+
+// A channel's reflectance is that of daylight, what is beside it that at the channel's mean.
+vec3 boundary(float cos_half, float r, float z)
+{
+    vec3 found;
+    for (int n = 0; n < 3; ++n) {
+        float k = channel_wavenumbers[n];
+        vec2 index = vec2(channel_eta[n], channel_k[n]);
+        vec2 tangent[4], gentle[4];
+        matrices(index, tangent, gentle);
+        float own = 0.0;
+        for (int m = 0; m < 4; ++m) own += dot(tangent[m], tangent[m]);
+        own *= 0.5 / (pair_one_plus_dot * pair_one_plus_dot);
+        found[n] = mean_power(tangent, gentle, gentle_share(k, r, z)) / max(own, 1e-20);
+    }
+    return found * reflectance(cos_half);
+}
+
+#endif
+
+// What all wavelengths share, of directions above the structure.
+void begin_pair(vec3 wi, vec3 wo, vec4 through)
+{
+    vec3 sum = wi + wo;
+    pair_one_plus_dot = max(0.5 * dot(sum, sum), 1e-12);
+    pair_half = sqrt(min(0.5 * pair_one_plus_dot, 1.0));
+    pair_cosines = vec2(wi.z, wo.z);
+    pair_squares = vec2(dot(wi.xy, wi.xy), dot(wo.xy, wo.xy));
+    pair_through = through;
+
+    bool slanted = min(pair_squares.x, pair_squares.y) > NORMAL;
+    vec2 squares = slanted ? pair_squares : vec2(1.0);
+    float inverse = inversesqrt(squares.x) * inversesqrt(squares.y);
+    float across = wi.x * wo.y - wi.y * wo.x;
+    pair_dot = slanted ? -dot(wi.xy, wo.xy) * inverse : 1.0;
+    pair_cross = slanted ? -across * inverse : 0.0;
+    pair_sines = slanted ? sqrt(squares.x) * sqrt(squares.y) : 0.0;
+
+    float x = wi.y * wo.z - wi.z * wo.y;
+    float y = wi.z * wo.x - wi.x * wo.z;
+    vec2 turns = vec2(x * wi.y - y * wi.x, y * wo.x - x * wo.y);
+    vec2 lengths = turns * turns + across * across;
+    bool found = min(lengths.x, lengths.y) > NORMAL;
+    lengths = found ? lengths : vec2(1.0);
+    inverse = inversesqrt(lengths.x) * inversesqrt(lengths.y);
+    vec4 turned = vec4(turns.y * turns.x, turns.y * across, -across * turns.x, -across * across);
+    pair_turns = found ? turned * inverse : vec4(pair_dot, 0.0, pair_cross, 0.0);
+    of_material();
+}
+
+#endif

@@ -1,0 +1,112 @@
+"""The shaders' small slope against the NumPy code that it is a twin of."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mitsuba_diffraction import DiffractionTable
+from mitsuba_diffraction.optics import blend, boundary
+from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, response
+from mitsuba_diffraction.optics.geometry import wavenumber
+from mitsuba_diffraction.realtime.glsl.packing import (
+    pack_colours,
+    pack_conductor,
+    pack_powers,
+    pack_responses,
+    pack_roughness,
+)
+from mitsuba_diffraction.realtime.glsl.textures import Packed, Texture
+from mitsuba_diffraction.tables.colour.table import ColourTable
+from tests.directions import as_single, uniform_directions
+from tests.realtime.glsl.conftest import probed
+from tests.realtime.glsl.test_methods import DAYLIGHT, difference
+
+METAL = (np.array([360.0, 830.0]), np.array([1.4, 0.4]), np.array([2.0, 5.0]))
+MATERIALS = {
+    "dielectric": Packed(uniforms={"eta": 1.5}, definitions={"SURFACE_KIND": "1"}),
+    "conductor": pack_conductor(*METAL),
+}
+
+
+def index(kind: str, wavelength: NDArray[np.float64]) -> NDArray[np.complex128]:
+    if kind == "dielectric":
+        return np.full(len(wavelength), 1.5 + 0j)
+    lam, eta, k = METAL
+    return np.interp(wavelength, lam, eta) + 1j * np.interp(wavelength, lam, k)
+
+
+def pairs(n: int) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """ωi, ωo (n, 3), the first along the normal, and places (n, 4)."""
+    rng = np.random.default_rng(4)
+    wi, wo = uniform_directions(n, rng, 0.1), uniform_directions(n, rng, 0.1)
+    wi[0], wo[1], wi[2] = (0, 0, 1), (0, 0, 1), wo[2]
+    wi, wo = as_single(wi), as_single(wo)
+    cos_half = np.sqrt(0.5 + 0.5 * np.sum(wi * wo, axis=1))
+    return wi, wo, np.concatenate([wi + wo, cos_half[:, None]], axis=1)
+
+
+def factor(
+    table: DiffractionTable, kind: str, wi: NDArray[Any], wo: NDArray[Any], lam: NDArray[Any]
+) -> NDArray[np.float64]:
+    """N' / (1 + ωi·ωo)² at wavelengths (m,), shape (n, m)."""
+    total = wi + wo
+    k = wavenumber(lam)
+    q = np.hypot(total[:, 0], total[:, 1])[:, None] * k
+    s = blend.weight(total[:, 2:] * k, table.roughness.at(q))
+    jones = blend.jones(wi[:, None], wo[:, None], index(kind, lam), s)
+    scale = 2 * wi[:, 2] * wo[:, 2] / (1 + np.sum(wi * wo, axis=1))
+    return boundary.unpolarised(jones) * scale[:, None] ** 2
+
+
+def shaded(
+    gl: Any, method: str, table: DiffractionTable, parts: Packed, pair: tuple[Any, ...]
+) -> NDArray[np.float64]:
+    wi, wo, at = pair
+    directions = np.zeros((2, len(wi), 4), np.float32)
+    directions[0, :, :3], directions[1, :, :3] = wi, wo
+    paired = Packed((Texture("directions", directions),), definitions={"PAIRED": ""})
+    return probed(gl, method, parts | pack_roughness(table.roughness) | paired, at)
+
+
+@pytest.mark.parametrize("kind", MATERIALS)
+def test_lut_has_the_factor_of_each_channel(gl: Any, table: DiffractionTable, kind: str) -> None:
+    pair = pairs(300)
+    colours = pack_colours(ColourTable.build(table))
+    plain = probed(gl, "lut", colours | Packed(definitions={"SURFACE_KIND": "0"}), pair[2])
+    found = shaded(gl, "lut", table, colours | MATERIALS[kind], pair)
+    expected = factor(table, kind, *pair[:2], np.array(RGB_WAVELENGTHS))
+    if kind == "conductor":  # its colour is that of daylight, Kirchhoff's at each mean is taken out
+        own = index(kind, np.array(RGB_WAVELENGTHS))
+        tangent = boundary.kirchhoff(pair[0][:, None], pair[1][:, None], own)
+        scale = 2 * pair[0][:, 2] * pair[1][:, 2] / (2 * pair[2][:, 3] ** 2)
+        expected /= boundary.unpolarised(tangent) * scale[:, None] ** 2
+        expected *= probed_reflectance(gl, colours, plain, pair[2])
+    lit = np.abs(plain) > 1e-3 * np.abs(plain).max()
+    # single precision, and lut's reading of reflectances between 129 angles
+    assert found[lit] / plain[lit] == pytest.approx(expected[lit], rel=1e-3)
+
+
+def probed_reflectance(
+    gl: Any, colours: Packed, plain: NDArray[Any], at: NDArray[Any]
+) -> NDArray[np.float64]:
+    found = probed(gl, "lut", colours | MATERIALS["conductor"], at)
+    return np.divide(found, plain, out=np.ones_like(plain), where=plain != 0.0)
+
+
+@pytest.mark.parametrize("kind", MATERIALS)
+def test_spectral_has_the_factor_of_each_wavelength(
+    gl: Any, table: DiffractionTable, kind: str
+) -> None:
+    pair = wi, wo, at = pairs(120)
+    parts = pack_powers(table) | pack_responses(DAYLIGHT) | MATERIALS[kind]
+    found = shaded(gl, "spectral", table, parts, pair)
+    lam = np.arange(376.0, 744.0, 0.5) + 0.25
+    k = wavenumber(lam)
+    weights = linear_srgb(response(lam)) * 0.5 / (lam[:, None] * 1e-3) ** 2
+    powers = table.window_sum(*(at[:, n, None] * k for n in range(3)))
+    exact = (powers * factor(table, kind, wi, wo, lam)) @ weights
+    assert difference(found, exact) < 8e-3  # as for a perfect mirror
