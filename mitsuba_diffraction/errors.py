@@ -6,7 +6,8 @@ import re
 
 # Characters of a word or quotation, and of a message, at most.
 _WORD, _MESSAGE = 160, 500
-_LONG = re.compile(rf"'[^'\n]{{{_WORD - 1},}}'|[^\s']{{{_WORD + 1},}}")
+# a quotation begins after white space, "(" or "=": what lies between two of them is none
+_LONG = re.compile(rf"(?<![^\s(=])'[^'\n]{{{_WORD - 1},}}'|[^\s']{{{_WORD + 1},}}")
 
 
 class DiffractionError(ValueError):

@@ -175,11 +175,12 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
 def _mesh(file: Path) -> dict[str, Any]:
     import mitsuba as mi
 
-    from ..scene.orientation.files import load_mesh, load_orientation
+    from ..scene.orientation.files import has_own_normals, load_mesh, load_orientation
     from ..scene.orientation.tangents import check_tangents
 
     if mi.variant() is None:
         mi.set_variant("scalar_rgb")  # any reads meshes; this one needs neither GPU nor LLVM
     with mitsuba_warnings():
         report = check_tangents(*load_mesh(file), load_orientation(file))
-    return {"kind": "mesh", **report.summary()}
+    summary = report.summary()
+    return {"kind": "mesh", **summary, "normals": summary["normals"] and has_own_normals(file)}

@@ -120,7 +120,7 @@ def dominant_periods(field: HeightField, most: int = 3) -> list[Periodicity]:
         line = aside < _LOBE + 1
         ring = (np.abs(repeats - repeats[iy, ix]) < 1.5) & ~line & half
         beside = line & (along > 1 / _BESIDE[1]) & (along < 1 / _BESIDE[0])
-        beside &= repeats < repeats[iy, ix] - _LOBE
+        beside &= repeats < repeats[iy, ix] - _LOBE - 0.5  # the lobe lies between two bins
         background = [float(np.median(power[part])) for part in (ring, beside) if part.any()]
         repeated = np.hypot(*(centre * (width, height))) >= _FEWEST_PERIODS
         if share >= LEAST_SHARE and repeated and highest > CONTRAST * max(background, default=0.0):

@@ -6,5 +6,6 @@ geometry   directions, wave numbers, the coherence window, the Kirchhoff factor
 fresnel    amplitudes and reflectance of a smooth interface
 boundary   Jones and Mueller matrices of a pair of directions: small slope, Kirchhoff
 blend      which of the two an order of a surface follows
+coat       a clear coat over a structure
 colour     from spectra to XYZ and sRGB; differences of colours
 """

@@ -7,9 +7,12 @@ registration    it is registered in every variant
 dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives
 parameters      read from Mitsuba's Properties, checked
+bounded         a parameter that changes, and what it refuses
 sources         from what a scene names to a table, built once
 attributes      whether a mesh has what its BSDF reads
 names           what messages call an element of a scene
+roles           what arguments are, one name a role
+pair            a pair of directions in the patch's frame
 power           the diffracted power at single wavelengths; asks the next two
 lookup          a table inside a kernel: `DeviceTable`
 sampling        directions drawn where the orders are
@@ -17,15 +20,14 @@ series          weights of the terms at a κ
 restricted      a planned table, and its coarse cells beyond
 rgb_power       the same in the RGB variants' colours
 rgb_lookup      a colour table inside a kernel
-bounded         a parameter that changes between renderings, and keeps its value when anoth
 energy          the bound of the albedo that conserves energy
 reflectance     of the surface itself: dielectric, conductor, mirror
+boundary        what the material makes of the light, with its polarisation
+coat            a clear coat over the structure
 layers          how much light reaches what lies beneath
 orientation     how the patch is turned in the tangent plane
 shadowing       V-shaped grooves
-memory          arrays in the variant's memory
-pair            what the model asks of a pair of directions
-roles           names for what arguments are
+memory          arrays in the variant's memory, and reading them
 traversal       what Mitsuba's objects show of themselves
 frozen          what `dr.freeze` must know of a BSDF
 """

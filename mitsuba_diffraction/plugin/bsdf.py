@@ -11,7 +11,8 @@ heightfield : string
 table : string
     A table made by `mitsuba-diffraction precompute` instead.
 data : mi.TensorXf
-    Heights in µm instead, shape (ny, nx); dictionaries only, where `md.bsdf_dict` fills it in.
+    Heights in µm instead, shape (ny, nx); dictionaries only. `md.bsdf_dict` fills it in with a
+    whole HeightField, which needs no pixel_size.
 pixel_size : float or string [from the file]
     Distance between heights in µm: one number, "dx, dy", or "auto".
 max_height : float or string [from the file]
@@ -34,9 +35,9 @@ periodic : string [none]
     component, Moisan 2011) or `taper` (heights fade towards the edges); `none`. The
     treatments are applied in the order crop, fill, level, clip, periodic.
 orientation : float or texture ∂ [0]
-    Degrees that the patch's x axis is turned by from the first tangent; or a texture (raw, in a
-    float format) or mesh attribute of three channels, the first two of which are (cos, sin) of that
-    angle. Tangents follow UV coordinates: on a mesh without them they are arbitrary, and turn from
+    Degrees that the patch's x axis is turned by from the first tangent, up to 36000; or a texture
+    (raw, in a float format such as EXR) or mesh attribute of three channels, the first two of
+    which are (cos, sin) of that angle. Tangents follow UV coordinates: on a mesh without them they are arbitrary, and turn from
     triangle to triangle. A BSDF cannot see that; `info MESH` and `render` warn.
 height_scale : float ∂ [1]
     Multiplies the heights, up to 1.5 × max(1, value given).
@@ -89,7 +90,9 @@ shadowing : string [none]
 The light beneath
 -----------------
 (nested) : BSDF ∂
-    What lies beneath a dielectric and receives the light that is not reflected, e.g. pigment.
+    What lies beneath a dielectric and receives the light that is not reflected, e.g. pigment:
+    any BSDF that only reflects, mirrors included. Its components follow the diffraction's, which
+    is number 0.
 layering : string [transmission]
     How the nested BSDF shares the light. `transmission`: it gets and returns T(ωi) T(ωo), with
     T = 1 − R of the flat interface. `thesis`: (1 − w) f_diffraction + (1 − F + w) f_nested, F at
@@ -110,6 +113,9 @@ a table of the patch, times what the material makes of them:
 
 N is the mean power of a Jones matrix for unpolarised light; by Kirchhoff (Beckmann and Spizzichino
 1963) it is R (1 + ωi·ωo)² / (2 cosθi cosθo)².
+
+Denoisers that ask for an albedo get the reflectance at normal incidence, that of what lies beneath
+included.
 
 XML and the same in Python:
 

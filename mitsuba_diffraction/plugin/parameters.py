@@ -27,6 +27,7 @@ from .roles import BSDF, Properties, Texture
 from .shadowing import SHADOWINGS
 from .sources import (
     TableProvider,
+    from_cache,
     heights_of_file,
     heights_of_tensor,
     table_of_file,
@@ -92,7 +93,7 @@ class Parameters:
     nested: BSDF | None
 
 
-def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
+def read_parameters(props: Properties, provider: TableProvider = from_cache) -> Parameters:
     """Check everything, and get the table: loaded, or from what provides those of heights.
 
     Raises

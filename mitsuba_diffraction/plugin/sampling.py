@@ -2,7 +2,7 @@
 
 For one wavelength the density of ωo per solid angle is
 
-    [p₀ (σ²/π) exp(−σ²|q|²) + (1 − p₀) P(cell of q) / cell²] · k² cosθo,   q = k (ωi + ωo)_xy,
+    [p₀ (σ²/π) exp(−σ²|q|²) + (1 − p₀) P(cell of q) / area] · k² cosθo,   q = k (ωi + ωo)_xy,
 
 with p₀ the power of order 0 towards the mirror direction and P as in `tables.proposals`. Dispersion
 is dealt with by drawing for one wavelength and using the mean of all wavelengths' densities. A
@@ -15,6 +15,7 @@ weights would have no bound. Meanwhile frequencies just beyond the horizon belon
 
 from __future__ import annotations
 
+import math
 import weakref
 
 import drjit as dr
@@ -53,7 +54,14 @@ class OrderSampler:
         self._row_sums = upload(mi.Float, found.rows)
         self._column_sums = upload(mi.Float, found.columns)
         self._levels = upload(mi.UInt32, found.levels.view(np.uint32))
-        self._units = upload(mi.Float, found.units * np.float32(1.0 / self._cell**2))
+        self._lobes = found.lobes
+        # What a whole lobe of the window holds of a cell that it is in the middle of
+        self._within = [math.erf(0.5 * table.sigma * cell) for cell in found.cell]
+        largest = [
+            table.sigma / (math.sqrt(math.pi) * within) if lobe else 1.0 / cell
+            for lobe, within, cell in zip(self._lobes, self._within, found.cell, strict=True)
+        ]
+        self._units = upload(mi.Float, found.units * np.float32(largest[0] * largest[1]))
         self._order_0 = upload(mi.Float, found.order_0)
         self._bands_per_kappa = BANDS / (BANDED * table.expansion.kappa_max)
         self._last = len(found.order_0) - 1.0
@@ -80,14 +88,19 @@ class OrderSampler:
         variance = self._sigma**2
         exponent = dr.fma(qx, qx, dr.square(qy)) * (-variance / np.log(2.0))
         glossy = (variance / dr.pi) * dr.exp2(exponent)
-        per_cell = 1.0 / self._cell
-        x = dr.fma(qx, per_cell, -self._origin[0] * per_cell)
-        y = dr.fma(qy, per_cell, -self._origin[1] * per_cell)
+        x, y = (
+            dr.fma(q, 1.0 / cell, -origin / cell)
+            for q, cell, origin in zip((qx, qy), self._cell, self._origin, strict=True)
+        )
         inside = (x >= 0.0) & (y >= 0.0) & (x < self._columns) & (y < self._rows)
         column, row = mi.UInt32(dr.select(inside, x, 0.0)), mi.UInt32(dr.select(inside, y, 0.0))
         word = read(mi.UInt32, self._levels, (band * self._rows + row) * self._words + column // 4)
         level = (word >> (8 * (column & 3))) & 255
         cell = unit * dr.exp2(dr.fma(mi.Float(level), 1.0 / LEVEL, -255.0 / LEVEL))
+        for position, number, n in ((x, column, 0), (y, row, 1)):
+            if self._lobes[n]:
+                distance = (position - mi.Float(number) - 0.5) * self._cell[n]
+                cell *= dr.exp(-variance * dr.square(distance))
         return dr.lerp(dr.select(inside & (level > 0), cell, 0.0), glossy, share)
 
     def draw(
@@ -101,9 +114,15 @@ class OrderSampler:
         row, y = invert(self._row_sums, start, self._rows, self._rows, sample2.y)
         start = (band * self._rows + row) * (self._columns + 1)
         column, x = invert(self._column_sums, start, self._columns, self._columns, sample2.x)
-        position = mi.Vector2f(mi.Float(column) + x, mi.Float(row) + y) * self._cell
-        position += mi.Vector2f(self._origin[0], self._origin[1])
+        position = mi.Vector2f(self._place(column, x, 0), self._place(row, y, 1))
         return dr.select(sample1 < share, mi.Vector2f(glossy), position)
+
+    def _place(self, number: Index, t: Float, axis: int) -> Float:
+        """The frequency along an axis at a share t (0 … 1) of a cell's probability."""
+        if self._lobes[axis]:
+            distance = dr.erfinv(dr.fma(2.0, t, -1.0) * self._within[axis]) * (1.0 / self._sigma)
+            t = dr.fma(distance, 1.0 / self._cell[axis], 0.5)
+        return dr.fma(mi.Float(number) + t, self._cell[axis], self._origin[axis])
 
 
 def order_0_share(power: Float, cos_i: Float) -> Float:

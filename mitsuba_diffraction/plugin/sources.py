@@ -23,6 +23,7 @@ from ..settings import MAX_HEIGHT_SCALE, TableSettings
 from ..tables.build.build import build_with
 from ..tables.exr import is_table
 from ..tables.store.cache import cached_table, loaded_table
+from ..tables.store.store import key_of
 from ..tables.table import DiffractionTable
 from .dictionary import HeightData
 
@@ -171,21 +172,22 @@ def _warn(table: DiffractionTable, name: str | None = None) -> None:
 
 
 def _file_digest(path: Path, options: LoadOptions) -> str:
-    content = hashlib.sha256(repr(options).encode())
-    content.update(existing_file(path).read_bytes())
-    return content.hexdigest()
+    return key_of(options.given(), _sha256(path))
 
 
 def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
     """Changes when the recipe's heights may: its own text, its sources, or the generators."""
-    content = hashlib.sha256(repr((recipe.options, recipe.generator, options)).encode())
-    content.update(repr([sorted(arguments.items()) for arguments in recipe.arguments]).encode())
-    for source in recipe.sources:
-        content.update(existing_file(source).read_bytes())
+    files = [existing_file(source) for source in recipe.sources]
     if recipe.generator is not None:
-        for file in sorted(Path(gratings.__file__).parent.glob("*.py")):
-            content.update(file.read_bytes())
-    return content.hexdigest()
+        files += sorted(Path(gratings.__file__).parent.glob("*.py"))
+    arguments = [dict(one) for one in recipe.arguments]
+    options_of_both = [recipe.options.given(), options.given()]
+    return key_of(options_of_both, recipe.generator, arguments, *map(_sha256, files))
+
+
+def _sha256(path: Path) -> str:
+    with open(existing_file(path), "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _remedy(name: str) -> str:

@@ -79,6 +79,11 @@ class Described:
     coarse: Described | None
 
     @property
+    def parts(self) -> tuple[Described, ...]:
+        """As `DiffractionTable.parts`."""
+        return (self,) if self.coarse is None else (self, self.coarse)
+
+    @property
     def shape(self) -> tuple[int, ...]:
         """Of the coefficients."""
         expansion, grid = self.fields["expansion"], self.fields["grid"]

@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -50,14 +50,12 @@ def save_table(table: DiffractionTable, path: str | os.PathLike[str]) -> None:
     if Path(path).suffix.lower() != ".exr":
         raise DiffractionError(f"cannot write '{path}': a table's file name must end with .exr")
     text = json.dumps({"version": FORMAT_VERSION, **document_of(table)}, default=plain)
-    names = ("orders",) if table.coarse is None else ("orders", "coarse")
-    tables = (table,) if table.coarse is None else (table, table.coarse)
     channels = [
         {
             name: np.ascontiguousarray(one.coefficients[index])
             for name, index in _channels(one.expansion)
         }
-        for one in tables
+        for one in table.parts
     ]
     rows, columns = table.grid.shape
     # Parts of a file must agree on it
@@ -66,7 +64,7 @@ def save_table(table: DiffractionTable, path: str | os.PathLike[str]) -> None:
         "compression": OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
     }
-    headers = [{"name": name, **shared} for name in names]
+    headers = [{"name": name, **shared} for name in ("orders", "coarse")[: len(table.parts)]]
     headers[0] |= {ATTRIBUTE: text, CHECKSUM: _checksum(text, channels)}
     with atomic_path(path) as temporary:
         try:
@@ -100,7 +98,7 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
         )
     try:
         found = described(document)
-        parts = [found] if found.coarse is None else [found, found.coarse]
+        parts = found.parts
         _check_headers(headers, parts, os.path.getsize(path))
         channels = _read(path, lambda file: [file.channels(n) for n in range(len(parts))])
         planes = [_planes(*one) for one in zip(channels, parts, strict=True)]
@@ -149,7 +147,7 @@ def _parsed(text: Any, path: str | os.PathLike[str]) -> dict[str, Any] | None:
     return document if isinstance(document, dict) else None
 
 
-def _check_headers(headers: list[dict[str, Any]], parts: list[Described], size: int) -> None:
+def _check_headers(headers: list[dict[str, Any]], parts: Sequence[Described], size: int) -> None:
     """Refuse a file whose parts are not the images described, before any is read."""
     if len(headers) != len(parts):
         raise ValueError(f"{len(headers)} parts, expected {len(parts)}")

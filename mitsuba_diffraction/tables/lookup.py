@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..optics.geometry import diffraction_coordinates, kirchhoff_factor, wavenumber
 from .table import DiffractionTable
-from .window import base_bin, first_tap
+from .window import taps_at
 
 #: A bin's weight by its distance in bins, element by element.
 Kernel = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -110,8 +110,9 @@ def weighted_sum(
     weights = expansion.weights(kappa)
     scaled = weights / table.scale
     x, y = qx / table.spacing[0], qy / table.spacing[1]
-    column, weight_x = _taps(x, grid.last[0], taps[0], kernels[0])
-    row, weight_y = _taps(y, grid.last[1], taps[1], kernels[1])
+    column, distance_x = taps_at(x, grid.last[0], taps[0])
+    row, distance_y = taps_at(y, grid.last[1], taps[1])
+    weight_x, weight_y = kernels[0](distance_x), kernels[1](distance_y)
     incoherent_amplitudes = expansion.kind == "amplitude" and not grid.coherent
 
     def squared(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -133,14 +134,3 @@ def weighted_sum(
 
 def _gaussian(exponent: float) -> Kernel:
     return lambda distance: np.exp(-exponent * distance**2)
-
-
-def _taps(
-    position: NDArray[np.float64], last: int, taps: int, kernel: Kernel
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Array index of the first tap (n,), and the weights of all (n, taps)."""
-    first = base_bin(position, taps) + first_tap(taps)
-    distance = position[:, None] - (first[:, None] + np.arange(taps))
-    # Frequencies beyond the bins see the zeros at the margin, which is as wide as the taps
-    index = np.clip(first.astype(np.int64) + last, 0, 2 * last + 1 - taps)
-    return index, kernel(distance)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
@@ -112,6 +112,11 @@ class DiffractionTable:
         """Half axes (x, y) of the ellipse in which the table has the orders, rad/µm."""
         return self.settings.q_max or (self.q_limit, self.q_limit)
 
+    @property
+    def parts(self) -> tuple[DiffractionTable, ...]:
+        """The table, and the coarse one that it has, if it has one."""
+        return (self,) if self.coarse is None else (self, self.coarse)
+
     def digest(self) -> str:
         """SHA-256 of all that look-ups depend on; not of names, statistics and measured errors."""
         return self._digest
@@ -119,27 +124,22 @@ class DiffractionTable:
     @cached_property
     def _digest(self) -> str:
         content = hashlib.sha256()
-        for numbers in self._numbers():
-            content.update(json.dumps([numbers.dtype.str, numbers.shape]).encode())
-            content.update(np.ascontiguousarray(numbers).data)
-        settings = asdict(self.settings)
-        expansion = {**asdict(self.expansion), "functions": None}
-        plain = [settings, expansion, asdict(self.grid), self.spacing, self.scale]
-        content.update(json.dumps(plain, sort_keys=True).encode())
-        if self.coarse is not None:
-            content.update(self.coarse.digest().encode())
+        for part in self.parts:
+            expansion = {**asdict(part.expansion), "functions": None}
+            plain = [asdict(part.settings), expansion, asdict(part.grid), part.spacing, part.scale]
+            plain.append(part.roughness.first)
+            arrays = (part.coefficients, part.order_0, part.roughness.nodes)
+            for numbers in (*arrays, part.expansion.functions):
+                if numbers is not None:
+                    plain.append([numbers.dtype.str, numbers.shape])
+                    content.update(np.ascontiguousarray(numbers).data)
+            content.update(json.dumps(plain, sort_keys=True).encode())
         return content.hexdigest()
-
-    def _numbers(self) -> Iterator[NDArray[Any]]:
-        yield self.coefficients
-        yield self.order_0
-        if self.expansion.functions is not None:
-            yield self.expansion.functions
 
     @property
     def nbytes(self) -> int:
         """Size of the coefficients in memory."""
-        return self.coefficients.nbytes + (0 if self.coarse is None else self.coarse.nbytes)
+        return sum(part.coefficients.nbytes for part in self.parts)
 
     def require_whole(self, what: str) -> None:
         """Refuse a table of a restricted domain, for what reads orders on its own.

@@ -30,6 +30,20 @@ def base_bin(x: NDArray[np.floating], taps: int) -> NDArray[np.floating]:
     return np.floor(x) if taps % 2 == 0 else np.floor(x + 0.5)
 
 
+def taps_at(
+    positions: NDArray[np.float64], last: int, taps: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Array index of the first tap (n,), and the distances in bins of all, (n, taps).
+
+    Frequencies beyond the bins see the zeros at the margin, which is as wide as the taps.
+
+    last : outermost bin; array index 0 is bin −last.
+    """
+    first = base_bin(positions, taps) + first_tap(taps)
+    distance = positions[:, None] - (first[:, None] + np.arange(taps))
+    return np.clip(first.astype(np.int64) + last, 0, 2 * last + 1 - taps), distance
+
+
 def missing_power(step: float, taps: int) -> float:
     """Share of ∫exp(−s²Δ²) beyond `taps` bins in all, s = `step` = σ·dq."""
     return float(special.erfc(0.5 * step * taps))

@@ -84,8 +84,11 @@ def test_a_truncated_table_is_one_line(run, table):
 
 
 def test_a_table_of_another_format_version_is_one_line(run, table, monkeypatch):
-    monkeypatch.setattr("mitsuba_diffraction.tables.exr.FORMAT_VERSION", 99)
-    assert "format version 3" in run("info", table).failed_in_one_line()
+    from mitsuba_diffraction.tables import exr
+
+    written = exr.FORMAT_VERSION
+    monkeypatch.setattr(exr, "FORMAT_VERSION", 99)
+    assert f"format version {written}" in run("info", table).failed_in_one_line()
 
 
 def test_an_exr_that_is_no_table_is_heights(run, tmp_path):
@@ -203,6 +206,28 @@ def test_periods_are_described(run, tmp_path):
 
 def test_a_patch_of_nanometres_is_not_advised_a_window_of_nanometres(run, tmp_path):
     np.save(tmp_path / "a.npy", np.random.default_rng(1).normal(0, 1e-5, (50, 50)))
-    ran = run("info", tmp_path / "a.npy", "--pixel-size", "0.0001")
+    ran = run("info", tmp_path / "a.npy", "--pixel-size", "0.006")
     assert "--coherence-width" not in ran.out
     assert "check its pixel size" in ran.out
+
+
+@pytest.mark.parametrize("own", [True, False])
+@pytest.mark.parametrize("kind", ["ply", "obj"])
+def test_normals_are_those_of_the_file(run, tmp_path, kind, own):
+    places = ["0 0 0", "1 0 0", "0 1 0"]
+    normal = [" 0 0 1"] * 3 if own and kind == "ply" else [""] * 3
+    uv = ["0 0", "1 0", "0 1"]
+    if kind == "ply":
+        names = ["x", "y", "z", *(["nx", "ny", "nz"] if own else []), "u", "v"]
+        lines = ["ply", "format ascii 1.0", "element vertex 3"]
+        lines += [f"property float {name}" for name in names]
+        lines += ["element face 1", "property list uchar int vertex_indices", "end_header"]
+        lines += [f"{a}{n} {t}" for a, n, t in zip(places, normal, uv, strict=True)]
+        lines += ["3 0 1 2"]
+    else:
+        lines = [f"v {place}" for place in places] + [f"vt {t}" for t in uv]
+        lines += ["vn 0 0 1", "f 1/1/1 2/2/1 3/3/1"] if own else ["f 1/1 2/2 3/3"]
+    file = tmp_path / f"mesh.{kind}"
+    file.write_text("\n".join(lines) + "\n", encoding="ascii")
+    data = json.loads(run("info", file, "--json").out)
+    assert data["normals"] is own

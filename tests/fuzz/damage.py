@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import functools
+import json
+import math
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -13,10 +16,13 @@ from PIL import Image
 import mitsuba_diffraction as md
 from mitsuba_diffraction.heights.recipes import Recipe
 from mitsuba_diffraction.scene.orientation.files import load_mesh
+from mitsuba_diffraction.tables.document import described
+from mitsuba_diffraction.tables.exr import read_document
 from tests.directions import rough_patch
 from tests.instruments import nanoscope
 
 _MOST = 500  # characters of a message
+_MOST_NUMBERS = 10**6  # of a table
 _RECIPE = 'generator = "sinusoidal"\ncoherence_width = 4\n[arguments]\nperiod = 1.6\ndepth = 0.06\n'
 _PLY = """ply
 format ascii 1.0
@@ -95,6 +101,58 @@ def check_table(rng: np.random.Generator) -> None:
     _check(rng, [name for name in originals() if name.endswith(".exr")], _use_table)
 
 
+def check_document(rng: np.random.Generator) -> None:
+    """The same of tables whose plain data another program wrote, without care."""
+    name = str(rng.choice([name for name in originals() if name.endswith(".exr")]))
+    document = json.loads(documents()[name])
+    _mutate(rng, document)
+    try:
+        found = described(document)
+        shapes = [one.shape for one in (found, found.coarse) if one is not None]
+        # as many numbers as it declares, which `exr` compares with the file's size
+        if sum(int(np.prod(shape)) for shape in shapes) > _MOST_NUMBERS:
+            return
+        table = found.table(rng.normal(0.0, 1e-3, shape).astype(np.float32) for shape in shapes)
+    except (md.DiffractionError, ValueError, MemoryError):  # what `load_table` makes one line of
+        return
+    _look_up(table)
+
+
+@functools.cache
+def documents() -> dict[str, str]:
+    """The plain data of the tables, as JSON."""
+    with tempfile.TemporaryDirectory() as folder:
+        found = {}
+        for name, content in originals().items():
+            if name.endswith(".exr"):
+                path = Path(folder, name)
+                path.write_bytes(content)
+                document = read_document(path) or {}
+                document.pop("version")
+                found[name] = json.dumps(document)
+        return found
+
+
+def _mutate(rng: np.random.Generator, document: Any) -> None:
+    """Replace a value somewhere in nested data, or leave it out."""
+    place = document
+    while True:
+        keys = list(place) if isinstance(place, dict) else list(range(len(place)))
+        key = keys[rng.integers(len(keys))]
+        if not isinstance(place[key], (dict, list)) or not place[key] or rng.random() < 0.15:
+            break
+        place = place[key]
+    if rng.random() < 0.1:
+        del place[key]
+        return
+    old = place[key]
+    numbers = [-1, 0, 1, 2, 3, 1000, 10**12, 0.5, 1e-30, 1e30, 1e300, math.nan, math.inf]
+    words: list[Any] = [None, True, "", "patch", "ensemble", "svd", [], {}, [1, 2], [[1.0]]]
+    if isinstance(old, (int, float)) and not isinstance(old, bool) and rng.random() < 0.7:
+        words = [old * 2, old + 1, -old, old * (1 + 1e-3), *numbers]
+    place[key] = [*words, *numbers][rng.integers(len(words) + len(numbers))]
+
+
 def check_heights(rng: np.random.Generator) -> None:
     """Heights are refused, or finite."""
     names = [n for n in originals() if not n.endswith((".exr", ".toml", ".ply"))]
@@ -120,7 +178,10 @@ def _check(rng: np.random.Generator, names: list[str], use: Callable[[Path], obj
 
 
 def _use_table(path: Path) -> None:
-    table = md.DiffractionTable.load(path)
+    _look_up(md.DiffractionTable.load(path))
+
+
+def _look_up(table: md.DiffractionTable) -> None:
     rng = np.random.default_rng(1)
     wi, wo = rng.normal(size=(2, 16, 3))
     for w in (wi, wo):

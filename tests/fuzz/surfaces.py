@@ -54,6 +54,7 @@ def settings(rng: np.random.Generator, field: md.HeightField) -> dict[str, Any]:
 
 def check(rng: np.random.Generator) -> None:
     """Build a table, save and load it, and look it up."""
+    mi.set_variant("llvm_ad_spectral")  # command lines set others
     try:
         field = surface(rng)
         asked = settings(rng, field)

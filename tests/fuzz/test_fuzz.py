@@ -7,7 +7,7 @@ import pytest
 from tests.fuzz.__main__ import KINDS, run_case
 
 #: How many of each kind take about a second together.
-FEW = {"tables": 60, "heights": 40, "texts": 30, "commands": 15, "surfaces": 2}
+FEW = {"tables": 60, "documents": 100, "heights": 40, "texts": 30, "commands": 15, "surfaces": 2}
 
 #: (kind, seed, case): what `python -m tests.fuzz` has found.
 FOUND = [

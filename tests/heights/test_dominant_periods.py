@@ -30,7 +30,7 @@ def sawtooth(phase):
     return (phase / (2 * np.pi)) % 1.0
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     st.floats(0.5, 3.5), st.floats(-89.0, 90.0), st.sampled_from([np.cos, sawtooth]),
     st.tuples(st.integers(300, 360), st.integers(300, 360)),

@@ -8,8 +8,9 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import HeightField
-from tests.directions import as_single, rough_patch
+from tests.directions import as_single, polar, rough_patch
 from tests.lanes import evaluated
+from tests.plugin.gentle import load
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
 
@@ -72,3 +73,18 @@ def test_conserved_energy_and_samples_are_finite(variant, name):
     )
     wi, wo, lam = extreme_pairs()
     assert np.all(np.isfinite(evaluated(bsdf, wi, wo, lam[:, None])))
+
+
+@pytest.mark.parametrize(
+    "parameters", [{}, {"energy_conserving": True}, {"shadowing": "vcavity"}, {"int_ior": 1.5}]
+)
+@pytest.mark.parametrize("theta", [89.0, 89.99])
+def test_reciprocity_near_the_horizon(some_variant, theta, parameters):
+    bsdf = load(**parameters)
+    rng = np.random.default_rng(0)
+    wi = np.array([polar(t, p) for t, p in rng.uniform((0, 0), (60, 360), (100, 2))], "f4")
+    wo = np.array([polar(theta, p) for p in rng.uniform(0, 360, 100)], "f4")
+    there = evaluated(bsdf, wi, wo, 550.0) / wo[:, 2:]
+    back = evaluated(bsdf, wo, wi, 550.0) / wi[:, 2:]
+    # a dozen operations in single precision
+    assert there == pytest.approx(back, rel=1e-6)

@@ -103,6 +103,35 @@ def test_tensors_may_have_a_channel(some_variant, kind):
     assert bsdf.table.source["shape"] == [30, 32]
 
 
+def test_none_is_as_not_given(some_variant):
+    names = ("material", "pigment", "orientation", "height_scale", "pixel_size", "terms")
+    given = md.bsdf_dict(PATCH, **(SMALL | dict.fromkeys(names)))
+    assert given.keys() == md.bsdf_dict(PATCH, **SMALL).keys()
+    assert str(mi.load_dict(given)) == str(load())
+
+
+def test_a_patch_in_memory_keeps_its_history(some_variant):
+    field = md.HeightField(PATCH.heights, PATCH.pixel_size, history=("levelled",))
+    bsdf = load(field)
+    assert bsdf.heights() is field
+    assert bsdf.table.source["digest"] == field.digest()
+
+
+@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+def test_the_wavelength_of_mono_variants_is_theirs_alone(tmp_path):
+    table = tmp_path / "short.exr"
+    md.DiffractionTable.build(PATCH, coherence_width=2.0, wavelength_range=(249, 251)).save(table)
+    try:
+        for name in ("llvm_ad_spectral", "llvm_ad_rgb", "scalar_spectral"):
+            mi.set_variant(name)
+            loads(table=str(table))()
+        mi.set_variant("llvm_ad_mono")
+        assert refusal(loads(table=str(table))).startswith("wavelength=550 nm is outside")
+        loads(table=str(table), wavelength=250.0)()
+    finally:
+        mi.set_variant("llvm_ad_spectral")
+
+
 # ------------------------------------------------------------------------ warnings
 
 
@@ -195,7 +224,7 @@ REFUSED = [
     ({"material": "Al", "eta": 1.0, "k": 2.0}, "material and eta, k both say what the conductor"),
     ({"eta": 1.0}, "eta alone is no conductor; give both eta and k"),
     ({"k": 1.0}, "k alone is no conductor; give both eta and k"),
-    ({"max_height": 0.3}, "max_height is for images; the heights in data are in µm already"),
+    ({"max_height": 0.3}, "max_height is for files; a HeightField has its own already"),
     ({"pixel_size": 0.0}, "pixel_size: expected one length or a pair (dx, dy) in µm"),
     ({"pixel_size": "0.1, -0.1"}, "pixel_size: expected one length or a pair"),
     ({"pixel_size": float("nan")}, "pixel_size: expected one length or a pair"),

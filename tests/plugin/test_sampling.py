@@ -15,6 +15,7 @@ from scipy import stats
 import mitsuba_diffraction as md
 from tests.directions import polar, rough_patch
 from tests.lanes import interaction, spectra, vectors
+from tests.plugin import gentle
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
 
@@ -157,3 +158,17 @@ def test_eval_pdf_equals_eval_and_pdf_and_sample(variant, request, name):
         # the same expressions, fused differently in another kernel
         assert pdf[kept] == pytest.approx(density[kept], rel=1e-4)
         assert (weights * pdf[:, None])[kept] == pytest.approx(value[kept], rel=1e-3, abs=1e-6)
+
+
+@pytest.mark.parametrize("theta", [0.0, 50.0])
+def test_weights_stay_small_where_lobes_are_far_narrower_than_their_distance(some_variant, theta):
+    bsdf = gentle.load(rough_patch((60, 60), (0.13, 0.13), 0.1), coherence_width=400.0)
+    n = 1 << 15
+    rng = np.random.default_rng(4)
+    si = interaction(np.tile(polar(theta), (n, 1)), [(450.0, 500.0, 550.0, 650.0)])
+    s1, s2 = mi.Float(rng.random(n).astype("f4")), mi.Point2f(*rng.random((2, n)).astype("f4"))
+    weights = spectra(bsdf.sample(mi.BSDFContext(), si, s1, s2)[1])
+    error = weights.std() / np.sqrt(n)
+    assert weights.mean() == pytest.approx(1.0, abs=5 * error + 0.01)  # a gentle mirror
+    assert weights.std() < 1.0
+    assert weights.max() < 60.0  # with cells as wide as eleven lobes 400

@@ -128,7 +128,7 @@ def test_values_are_those_of_the_table(name: str) -> None:
 def test_value_density_and_sample_agree(name: str, kind: str) -> None:
     parameters = {
         "dielectric": {},
-        "conductor": {"material": "Au"},
+        "conductor": {"material": "Au", "shadowing": "vcavity"},
         "nested": {"nested": {"type": "diffuse", "reflectance": 0.5}},
     }[kind]
     bsdf = load(wavelength=600.0, orientation=25.0, **parameters)
@@ -160,8 +160,6 @@ def test_one_wavelength_is_the_spectrum_there() -> None:
     mono, spectral = found
     # gold's index is interpolated in double and in single precision
     assert mono == pytest.approx(spectral[:, :1], rel=1e-4, abs=1e-6 * spectral.max())
-
-
 
 
 def test_a_wavelength_outside_the_table_is_refused(name: str) -> None:
@@ -272,3 +270,40 @@ def test_rgb_samples_integrate_what_the_density_says(theta: float) -> None:
         mine = np.arctan2(of_uniform[:, 1], of_uniform[:, 0]) // (np.pi / 2) + 2 == quarter
         agree((side & valid).astype(float), pdf * mine)
         agree(weight * side[:, None], value * mine[:, None])
+
+
+def lit_from(direction: Array) -> Array:
+    """Mean colour of a plate, seen from above in light from one direction: nothing is random."""
+    above = mi.ScalarTransform4f().look_at([0, 0, 3], [0, 0, 0], [0, 1, 0])
+    scene = {
+        "type": "scene",
+        "integrator": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0},
+        "light": {"type": "directional", "direction": (-direction).tolist()},
+        "plate": {"type": "rectangle", "bsdf": diffracting()},
+        "sensor": {
+            "type": "orthographic",
+            "to_world": above @ mi.ScalarTransform4f().scale([0.5, 0.5, 1.0]),
+            "film": {"type": "hdrfilm", "width": 4, "height": 4, "rfilter": {"type": "box"}},
+        },
+    }
+    return np.array(mi.render(mi.load_dict(scene), spp=4), float)[..., :3].mean(axis=(0, 1))
+
+
+def test_scalar_variants_keep_colours_below_zero() -> None:
+    if not runs("llvm_ad_rgb"):
+        pytest.skip("llvm_ad_rgb: Dr.Jit finds no device for it")
+    mi.set_variant("llvm_ad_rgb")
+    bsdf, rng = load(material="none"), np.random.default_rng(1)
+    directions = uniform_directions(400, rng, 0.3)
+    si = interaction(np.tile([0.0, 0.0, 1.0], (400, 1)), np.zeros(0))
+    values = np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(directions.T))).T
+    most = directions[np.argmin(values.min(axis=1) / values.max(axis=1))]
+    expected = lit_from(most)
+    assert expected.min() < -0.01 * expected.max()
+    mi.set_variant("scalar_rgb")
+    level = mi.log_level()
+    mi.set_log_level(mi.LogLevel.Error)  # it warns of each sample below zero, and takes it
+    try:
+        assert lit_from(most) == pytest.approx(expected, rel=1e-4, abs=1e-5 * expected.max())
+    finally:
+        mi.set_log_level(level)

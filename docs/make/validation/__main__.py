@@ -84,14 +84,12 @@ def _solve(args: argparse.Namespace) -> int:
 
 
 def _patches(args: argparse.Namespace) -> int:
-    from .patch_solutions import about, patch_file, solve_patches
-    from .solutions import save_rows
+    from .patch_solutions import patch_file, solve_patches
 
     path = args.output / patch_file(args.material)
     check_writable(path)
     with Bar(args, unit=" cases") as bar:
-        rows = solve_patches(args.material, bar)
-    save_rows(rows, about(args.material), path)
+        rows = solve_patches(args.material, path, bar)
     print(f"wrote {os.fspath(path)}: {len(rows)} orders")
     return 0
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import jv
 
+from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor, wavenumber
 from mitsuba_diffraction.tables.lookup import window_sum
 from mitsuba_diffraction.tables.table import DiffractionTable
@@ -58,7 +59,9 @@ def deviations(grating: Grating, pixels: int = 512) -> Deviations:
     ----------
     grating : sampled with `pixels` per period.
     """
-    field = grating.heights(pixels)
+    strip = grating.heights(pixels)
+    # a window much wider than the patch is refused: eight rows in place of two
+    field = HeightField(np.tile(strip.heights, (4, 1)), strip.pixel_size)
     sigma = lobe_sigma(grating)
     table = DiffractionTable.build(
         field, coherence_width=4 * sigma, tolerance=TABLE_TOLERANCE, height_scale_max=1.0

@@ -75,12 +75,7 @@ def write_report(folder: Path, *, quick: bool = False, progress: Progress | None
         sections.polarisation(perfect),
         sections.materials(comparisons),
         models.section(models.compare_all(_few(comparisons) if quick else comparisons)),
-        patch_sections.section(
-            [
-                *patch_sections.compared("keratin", KINDS[:1] if quick else KINDS),
-                *patch_sections.compared("aluminium", KINDS[:1] if quick else KINDS),
-            ]
-        ),
+        patch_sections.section(patch_sections.compared("keratin", KINDS[:1] if quick else KINDS)),
         sections.random_surfaces(measured),
     ]
     page = folder / "validation.md"

@@ -15,7 +15,7 @@ from mitsuba_diffraction.optics.geometry import wavenumber
 from .compare import GRAZING
 from .markdown import percent, table
 from .model import efficiencies
-from .patch_solutions import Solved, solved
+from .patch_solutions import RESOLUTIONS, Solved, solved
 from .patches import KINDS, PatchCase, cell, patch_index
 
 _MODELS = ("kirchhoff", "small_slope_alone", "small_slope")
@@ -68,6 +68,7 @@ def section(comparisons: Sequence[PatchComparison]) -> str:
             [label, f"{surface.slope:.2g}", f"{wavelength:g}", *_by_angle(same), _most(same)]
         )
         polarised.append([label, f"{wavelength:g}", *_polarised(same)])
+    (coarse, _), (fine, _) = RESOLUTIONS["keratin"][1]
     header = ["surface", "RMS slope", "nm", *(f"{theta:g}°" for theta in _ANGLES), "change"]
     return f"""## Two dimensions, and any plane of incidence
 
@@ -75,7 +76,9 @@ Small periodic cells: sinusoids in conical mounts, a crossed grating, and cuts o
 measured scale (*Elaphe*), of its look-alike, and of 3.2 µm of a CD, made periodic, smoothed and
 scaled to a given RMS slope. Solved by `grcwa` (coupled waves). Deviation of colours, mean over the
 planes of incidence (along x, along y, between), Kirchhoff / small slope alone / the blend; *change*
-is what more harmonics and layers changed, at most, in the same measure.
+is what more harmonics and layers ({coarse} to {fine}) changed, at most, in the same measure: at
+460 nm the first are hardly more than there are orders. Cut 3 at 60° with 241 harmonics and 24
+layers moved a model's deviation by 0.5 % at most.
 
 {table(header, rows)}
 

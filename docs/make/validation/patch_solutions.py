@@ -6,6 +6,7 @@ import datetime
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from mitsuba_diffraction.progress import Progress, silent
 
 from . import crossed
 from .patches import SURFACES, PatchCase, cell, patch_cases, patch_index
-from .solutions import load_rows
+from .solutions import load_rows, save_rows
 
 #: A row is one order (mx, my) of one case: wavelength in nm, angles in degrees, `surface` the place
 #: in `SURFACES`; `jones` as `crossed.Orders` has it; `change` is by how much the efficiency for
@@ -71,22 +72,23 @@ class Solved:
         return power * self.wo(field)[:, 2] / self.wi[2]
 
 
-def solve_patches(material: str, progress: Progress | None = None) -> NDArray[np.void]:
-    """Rows of all cases of a material; a quarter of an hour.
+def solve_patches(material: str, path: Path, progress: Progress | None = None) -> NDArray[np.void]:
+    """Rows of all cases of a material, written to a file after each; a quarter of an hour.
 
     Raises
     ------
     DiffractionError
-        If the solver or the measured patch is not here.
+        If the solver or the measured patch is not here, or the file cannot be written.
     """
     tell = progress or silent
-    cases = patch_cases(material)
-    rows = []
+    cases, made = patch_cases(material), about(material)
+    rows = np.empty(0, PATCH_ROW)
     for n, case in enumerate(cases):
         tell(n, len(cases), f"solving {case.surface.name}")
-        rows.append(solve_case(case))
+        rows = np.concatenate([rows, solve_case(case)])
+        save_rows(rows, made, path)
     tell(len(cases), len(cases), "done")
-    return np.concatenate(rows)
+    return rows
 
 
 def about(material: str) -> dict[str, Any]:

@@ -81,6 +81,7 @@ SURFACES = {
 }
 
 _OBLIQUE = ((0.0, 0.0), (30.0, 0.0), (30.0, 90.0), (60.0, 0.0), (60.0, 45.0), (60.0, 90.0))
+_MANY = ("Elaphe, cut 1", "Elaphe, cut 3")  # the others are for comparison
 _FEW = ((0.0, 0.0), (60.0, 0.0), (60.0, 45.0))
 
 
@@ -130,7 +131,8 @@ def _cases(material: str) -> Iterator[PatchCase]:
             continue  # light in a metal takes more harmonics than there is memory for
         wavelengths = (460.0, 610.0) if surface.name == "Elaphe, cut 1" else (surface.wavelength,)
         for wavelength in wavelengths:
-            for theta, phi in _OBLIQUE if material == "keratin" or grating else _FEW:
+            many = grating or (material == "keratin" and surface.name in _MANY)
+            for theta, phi in _OBLIQUE if many else _FEW:
                 yield PatchCase(surface, material, wavelength, theta, phi)
 
 

@@ -118,9 +118,9 @@ def _grey_levels(image: Image.Image, shown: str) -> npt.NDArray[np.uint8]:
         else "of 16 bits each, of which 8 would be read"
     )
     raise DiffractionError(
-        f"{shown} has {what}, and heights are one grey channel: {why}; export the heights "
-        "themselves as 8- or 16-bit greyscale or as numbers, or, if it is grey but for a tint, "
-        "convert it, in Python: PIL.Image.open(...).convert('L').save('grey.png')"
+        f"{shown} has {what}, and heights are one grey channel: {why}; export the heights as 8- or "
+        "16-bit greyscale or as numbers, or, if it is grey but for a tint, convert it with Pillow: "
+        "image.convert('L')"
     )
 
 

@@ -7,18 +7,36 @@ sampled at another place in every frame, so their edges become smooth as the lig
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .camera import Camera
-from .context import compile_plain, require_moderngl
+from .context import Target, compile_plain, require_moderngl
 from .emitters import Emitters
+from .lights import Light
+from .scene import RealtimeScene
 from .shadows import SIZE, Casters, ShadowMap
+from .textures import Uniform
 
-if TYPE_CHECKING:
-    from .renderer import Renderer
+
+class Drawing(Protocol):
+    """What of `renderer.Renderer` is used here, which imports this."""
+
+    context: Any
+    scene: RealtimeScene
+    mitsuba_scene: Any
+    buffers: list[Any]
+
+    def target(self, width: int, height: int) -> Target:
+        """A framebuffer of floats."""
+
+    def draw_light(
+        self, frame: Any, method: str, camera: Camera, light: Light, shadow_map: Any,
+        shadows: dict[str, Uniform],
+    ) -> None:  # fmt: skip
+        """Draw one light, with its shadows."""
 
 
 class ProgressiveLight:
@@ -36,7 +54,7 @@ class ProgressiveLight:
     """
 
     def __init__(
-        self, renderer: Renderer, method: str, camera: Camera, *, shadow_size: int = SIZE
+        self, renderer: Drawing, method: str, camera: Camera, *, shadow_size: int = SIZE
     ) -> None:
         self._renderer, self._method, self._camera = renderer, method, camera
         context, scene = renderer.context, renderer.scene

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import tempfile
 from pathlib import Path
 
@@ -66,6 +67,16 @@ def load_mesh(
     normals = array("vertex_normals", 3) if mesh.has_vertex_normals() else None
     uv = array("vertex_texcoords", 2) if mesh.has_vertex_texcoords() else None
     return array("vertex_positions", 3), normals, uv, faces
+
+
+def has_own_normals(path: str | os.PathLike[str]) -> bool:
+    """Whether the file of a mesh itself holds vertex normals; else Mitsuba makes smooth ones."""
+    file = Path(path)
+    content = file.read_bytes()
+    if file.suffix.lower() == ".ply":
+        header = content[: content.find(b"end_header")]
+        return re.search(rb"^property\s+\w+\s+nx\s*$", header, re.MULTILINE) is not None
+    return file.suffix.lower() != ".obj" or re.search(rb"^vn\s", content, re.MULTILINE) is not None
 
 
 def _load(file: Path, kind: str, face_normals: bool) -> mi.Mesh:

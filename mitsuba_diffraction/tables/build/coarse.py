@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +23,12 @@ from ...heights.field import HeightField
 from ...optics.geometry import sigma_of
 from ...progress import Progress
 from ...settings import TableSettings
-from ..expansion import Expansion, principal_functions
+from ..expansion import Expansion
 from ..packing import Grid
 from ..table import DiffractionTable, q_limit_of
 from ..window import taps_for
 from .choose import svd_expansion
+from .coefficients import series_of
 from .describe import roughness_of
 from .half_precision import half_scale
 from .spectrum import Spectrum
@@ -130,38 +130,31 @@ def _coefficients(
 ) -> tuple[NDArray[np.float32], NDArray[np.float64], Expansion]:
     """Series coefficients of the cells' power (intervals, ny, nx, 1, terms), and of order 0.
 
-    functions : how many functions of basis "svd" the Chebyshev series is made into, if it is; the
-        expansion returned then has them.
+    functions : see `series_of`.
     """
-    ny, nx = 2 * grid.last[1] + 1, 2 * grid.last[0] + 1
     outermost = [n * last + n // 2 for n, last in zip(each, grid.last, strict=True)]
     spectra = [Spectrum(patch, (outermost[0], outermost[1])) for patch in patches]
-    terms = functions or expansion.terms
-    coefficients = np.empty((expansion.intervals, ny, nx, 1, terms), np.float32)
-    found = []
-    order_0 = np.empty((expansion.intervals, 1, expansion.terms))
+    ny, nx = grid.shape
     total = expansion.intervals * expansion.terms
-    for interval in range(expansion.intervals):
-        cells = np.zeros((expansion.terms, ny, nx), np.float32)
-        centre = np.zeros(expansion.terms)
-        for n, kappa in enumerate(expansion.nodes(interval)):
-            for spectrum in spectra:
-                amplitude = spectrum.of_phase(kappa, minus_one=True)
-                zero = complex(amplitude[outermost[1], outermost[0]])
-                amplitude[outermost[1], outermost[0]] = 0.0
-                power = amplitude.real**2 + amplitude.imag**2
-                cells[n] += power.reshape(ny, each[1], nx, each[0]).sum(axis=(1, 3))
-                centre[n] += abs(zero) ** 2 + 2.0 * zero.real  # |1 + (a_0 − 1)|² − 1
-            tell(interval * expansion.terms + n + 1, total, "summing what lies outside")
-        fit = expansion.fit(interval)
-        centre = centre / len(spectra) + (1.0 - float(expansion.order_0_offset(interval)))
-        order_0[interval, 0] = centre @ fit
-        mean = cells.reshape(expansion.terms, -1) / np.float32(len(spectra))
-        if functions is not None:
-            none = np.zeros(0, np.int64)  # a cell is much wider than the light close to order 0
-            fit, series = principal_functions(mean, expansion, interval, functions, none)
-            found.append(series)
-        coefficients[interval] = (mean.T @ fit.astype(np.float32)).reshape(ny, nx, 1, -1)
-    if functions is not None:
-        expansion = replace(expansion, basis="svd", terms=functions, functions=np.array(found))
-    return coefficients, order_0, expansion
+
+    def values_at(kappa: float, interval: int, values: NDArray[np.float32]) -> tuple[float]:
+        values[...], order_0 = 0.0, 0.0
+        for spectrum in spectra:
+            amplitude = spectrum.of_phase(kappa, minus_one=True)
+            zero = complex(amplitude[outermost[1], outermost[0]])
+            amplitude[outermost[1], outermost[0]] = 0.0
+            power = amplitude.real**2 + amplitude.imag**2
+            values[..., 0] += power.reshape(ny, each[1], nx, each[0]).sum(axis=(1, 3))
+            order_0 += abs(zero) ** 2 + 2.0 * zero.real  # |1 + (a_0 − 1)|² − 1
+        values /= np.float32(len(spectra))
+        return (order_0 / len(spectra) + (1.0 - float(expansion.order_0_offset(interval))),)
+
+    none = np.zeros(0, np.int64)  # a cell is much wider than the light close to order 0
+    return series_of(
+        values_at,
+        (ny, nx, 1),
+        expansion,
+        functions,
+        none,
+        lambda done: tell(done, total, "summing what lies outside"),
+    )

@@ -15,6 +15,50 @@ from ..packing import Grid
 from .error import NEAR, alternate
 from .spectrum import Spectrum
 
+#: Fills an array with what is expanded, of all bins at one κ of an interval; returns order 0's.
+ValuesAt = Callable[[float, int, NDArray[np.float32]], Sequence[float]]
+
+
+def series_of(
+    values_at: ValuesAt,
+    shape: tuple[int, int, int],
+    expansion: Expansion,
+    functions: int | None,
+    near: NDArray[np.int64],
+    done: Callable[[int], None],
+) -> tuple[NDArray[np.float32], NDArray[np.float64], Expansion]:
+    """Series coefficients (intervals, ny, nx, components, terms) of whatever has values at nodes.
+
+    Parameters
+    ----------
+    values_at : what is expanded, at one κ.
+    shape : (ny, nx, components) of the values.
+    functions : how many functions of basis "svd" the Chebyshev series is made into, if it is; the
+        expansion returned then has them.
+    near : indices of the values close to order 0, see `principal_functions`.
+    done : called with the number of κ that are done.
+    """
+    terms = functions or expansion.terms
+    result = np.empty((expansion.intervals, *shape, terms), np.float32)
+    order_0 = np.empty((expansion.intervals, shape[2], expansion.terms))
+    values = np.empty((expansion.terms, *shape), np.float32)
+    flat = values.reshape(expansion.terms, -1)
+    found = []
+    for interval in range(expansion.intervals):
+        at_nodes = []
+        for n, kappa in enumerate(expansion.nodes(interval)):
+            at_nodes.append(values_at(kappa, interval, values[n]))
+            done(interval * expansion.terms + n + 1)
+        fit = expansion.fit(interval)
+        order_0[interval] = np.transpose(at_nodes) @ fit
+        if functions is not None:
+            fit, series = principal_functions(flat, expansion, interval, functions, near)
+            found.append(series)
+        np.matmul(flat.T, fit.astype(np.float32), out=result[interval].reshape(-1, terms))
+    if functions is not None:
+        expansion = replace(expansion, basis="svd", terms=terms, functions=np.array(found))
+    return result, order_0, expansion
+
 
 def coefficients_of(
     spectra: Sequence[Spectrum],
@@ -25,46 +69,35 @@ def coefficients_of(
 ) -> tuple[NDArray[np.float32], NDArray[np.float64], Expansion]:
     """Series coefficients of every bin, (intervals, ny, nx, components, terms), and of order 0.
 
-    functions : how many functions of basis "svd" the Chebyshev series is made into, if it is; the
-        expansion returned then has them.
+    functions : see `series_of`.
     """
-    ny, nx = 2 * grid.last[1] + 1, 2 * grid.last[0] + 1
-    centre = (grid.last[1], grid.last[0])
-    components = 1 if expansion.kind == "power" else 2
-    terms = functions or expansion.terms
-    result = np.empty((expansion.intervals, ny, nx, components, terms), np.float32)
-    order_0 = np.empty((expansion.intervals, components, expansion.terms))
     if expansion.basis == "taylor":
-        inner = _inner(spectra[0], grid)
-        for n in range(1, expansion.terms + 1):
-            power_of_height = partial(_height_power, expansion.half_range, n)
-            amplitude = spectra[0].of(power_of_height)[inner]
-            if grid.coherent:
-                alternate(amplitude, grid.last)
-            amplitude *= 1j**n
-            result[0, :, :, 0, n - 1], result[0, :, :, 1, n - 1] = amplitude.real, amplitude.imag
-            done(n)
-        order_0[0] = result[0, *centre]
-        result[0, *centre] = 0.0
-        return result, order_0, expansion
-    values = np.empty((expansion.terms, ny, nx, components), np.float32)
-    flat = values.reshape(expansion.terms, -1)
+        return *_taylor(spectra[0], grid, expansion, done), expansion
+    components = 1 if expansion.kind == "power" else 2
+
+    def values_at(kappa: float, interval: int, values: NDArray[np.float32]) -> Sequence[float]:
+        return _values_at(kappa, spectra, grid, expansion, interval, values)
+
     near = _near(grid, components)
-    found = []
-    for interval in range(expansion.intervals):
-        powers = []
-        for n, kappa in enumerate(expansion.nodes(interval)):
-            powers.append(_values_at(kappa, spectra, grid, expansion, interval, values[n]))
-            done(interval * expansion.terms + n + 1)
-        fit = expansion.fit(interval)
-        order_0[interval] = np.transpose(powers) @ fit
-        if functions is not None:
-            fit, series = principal_functions(flat, expansion, interval, functions, near)
-            found.append(series)
-        np.matmul(flat.T, fit.astype(np.float32), out=result[interval].reshape(-1, terms))
-    if functions is not None:
-        expansion = replace(expansion, basis="svd", terms=terms, functions=np.array(found))
-    return result, order_0, expansion
+    return series_of(values_at, (*grid.shape, components), expansion, functions, near, done)
+
+
+def _taylor(
+    spectrum: Spectrum, grid: Grid, expansion: Expansion, done: Callable[[int], None]
+) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    """Coefficients DFT[iⁿ(2h/H)ⁿ] of all bins, and of order 0."""
+    result = np.empty((1, *grid.shape, 2, expansion.terms), np.float32)
+    for n in range(1, expansion.terms + 1):
+        amplitude = spectrum.of(partial(_height_power, expansion.half_range, n))
+        amplitude = amplitude[_inner(spectrum, grid)]
+        if grid.coherent:
+            alternate(amplitude, grid.last)
+        amplitude *= 1j**n
+        result[0, :, :, 0, n - 1], result[0, :, :, 1, n - 1] = amplitude.real, amplitude.imag
+        done(n)
+    order_0 = result[:, *grid.middle].astype(float)
+    result[0, *grid.middle] = 0.0
+    return result, order_0
 
 
 def _near(grid: Grid, components: int) -> NDArray[np.int64]:
@@ -93,15 +126,14 @@ def _values_at(
     that of order 0, whose bin is left empty: a grating may put it out nearly altogether, so that it
     takes double precision.
     """
-    centre = (grid.last[1], grid.last[0])
     specular = float(expansion.order_0_offset(interval))
     values[...] = 0.0
     order_0 = np.zeros(values.shape[-1])
     for spectrum in spectra:
         # The transform is of exp(iκh) − 1, so this is a_0 − 1
         amplitude = spectrum.of_phase(kappa, minus_one=True)[_inner(spectrum, grid)]
-        less = complex(amplitude[centre])
-        amplitude[centre] = 0.0
+        less = complex(amplitude[grid.middle])
+        amplitude[grid.middle] = 0.0
         if expansion.kind == "power":
             values[..., 0] += amplitude.real**2
             values[..., 0] += amplitude.imag**2

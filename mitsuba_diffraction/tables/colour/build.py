@@ -24,7 +24,7 @@ from ...optics.colour import linear_srgb, response
 from ..energy.powers import order_0_power, power_expansion, powers_of
 from ..expansion import Expansion
 from ..table import DiffractionTable
-from ..window import base_bin, first_tap
+from ..window import taps_at
 from .polar import RESOLVED_RADIUS, PolarGrid
 
 #: Wavelengths that the eye sees (nm): what is cut off is 1e-4 of the white.
@@ -232,16 +232,14 @@ class _Source:
         """Array indices and weights of the taps along one axis, both (points, taps)."""
         if self._smooth:
             taps = 4
-        first = base_bin(position, taps) + first_tap(taps)
-        distance = (position - first)[:, None] - np.arange(taps)
+        lowest, distance = taps_at(position, last, taps)
         if self._smooth:
-            weights = _cubic(position - base_bin(position, taps))
+            weights = _cubic(distance[:, 1])
         else:
             weights = np.exp(-self._table.grid.exponents[axis] * distance**2)
-        lowest = np.clip(first + last, 0, 2 * last + 1 - taps).astype(np.int32)
-        outside = np.abs(position) > last + taps
-        weights[outside] = 0.0
-        return lowest[:, None] + np.arange(taps, dtype=np.int32), weights.astype(np.float32)
+        weights[np.abs(position) > last + taps] = 0.0
+        index = np.asarray(lowest[:, None] + np.arange(taps), np.int32)
+        return index, weights.astype(np.float32)
 
     def _coherent(
         self, found: NDArray[np.float32], qx: NDArray[np.float64], qy: NDArray[np.float64]

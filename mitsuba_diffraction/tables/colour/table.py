@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import DiffractionWarning
+from ..build.half_precision import half_scale
 from ..energy.powers import kind_of
 from ..expansion import Expansion
 from ..table import DiffractionTable
@@ -43,7 +44,6 @@ STEP, SHARE = 0.02, 0.75
 _SERIES = 8e-3  # relative error of the series in z, at the worst z
 _COARSE = 1.6  # beyond this distance of azimuths, peaks are a quarter too low
 _RADII = 256  # of order 0
-_PEAK = 2.0**14  # largest stored half float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,7 +91,7 @@ class ColourTable:
             start = grid.start(ring)
             values[:, start + grid.counts[ring]] = values[:, start]
         largest = float(np.abs(values).max())
-        scale = 2.0 ** math.floor(math.log2(_PEAK / largest)) if largest > 0.0 else 1.0
+        scale = half_scale(largest)
         values *= np.float32(scale)
         radius_end = 4.5 * VISIBLE[1] * 1e-3 / (2 * math.pi * table.sigma)
         # Neighbouring z differ by at most a tenth in the phase of the deepest parts

@@ -71,12 +71,12 @@ class AlbedoModel:
         """a(ωi; λ) for one polar angle (rad), azimuths (rad, shape (n,)) and a wavelength (nm)."""
         azimuths = np.atleast_1d(np.asarray(phi, float))
         return (
-            self.glossy(theta, wavelength)
+            self.order_0(theta, wavelength)
             + self.weak(theta, azimuths, wavelength)
             + self.strong(theta, azimuths, wavelength)
         )
 
-    def glossy(self, theta: float, wavelength: float) -> float:
+    def order_0(self, theta: float, wavelength: float) -> float:
         """Order 0: its power times the mean of G over the visible part of its lobe."""
         k = float(wavenumber(wavelength))
         sin_i, cos_i = math.sin(theta), math.cos(theta)
@@ -193,7 +193,7 @@ class AlbedoModel:
         cos_o = np.sqrt(np.maximum(1.0 - squared, 0.0))
         with np.errstate(divide="ignore"):
             mean = 1.0 / (cos_o * (cos_i + cos_o) ** 2 * cos_i)
-        # Within a lobe of the horizon: the mean over the lobe, in cosθo (see `glossy`)
+        # Within a lobe of the horizon: the mean over the lobe, in cosθo (see `order_0`)
         near = self._near_horizon(k)
         averaged = near.lobes @ (1.0 / (near.sines * (cos_i + near.cosines) ** 2 * cos_i))
         inside = radius > near.places[0]

@@ -89,8 +89,10 @@ def albedo_bound(table: DiffractionTable, height_scale: float = 1.0) -> AlbedoBo
         around = np.maximum(weak[row], weak[row + 1])
         around = np.maximum(around, np.roll(around, -1, axis=1))
         angles = np.linspace(edges[0], edges[-1], 5)
-        glossy = [max(model.glossy(angle, wavelength) for angle in angles) for wavelength in coarse]
-        around += np.array(glossy, np.float32)[:, None]
+        mirror = [
+            max(model.order_0(angle, wavelength) for angle in angles) for wavelength in coarse
+        ]
+        around += np.array(mirror, np.float32)[:, None]
         total = _strong(model, edges, inside, fine)
         total += _interpolated(around, _FINE)
         return total.max(axis=0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,16 +89,11 @@ def order_mixture(table: DiffractionTable, height_scale: float, smoothing: float
     powers = np.empty((count, 0), np.float32)
     strongest = np.zeros((len(axes[1].frequency), len(axes[0].frequency)), np.float32)
     kept = []
-    powers_at = _Powers(table, axes)
-    beyond = None if table.coarse is None else _Beyond(table, axes, grid, smoothing)
+    powers_at: _Powers | _PlannedPowers = _Powers(table, axes)
+    if table.coarse is not None:
+        powers_at = _PlannedPowers(table, table.coarse, axes, grid, smoothing)
     for n, kappa in enumerate(kappas):
-        power, central[n] = powers_at(float(kappa))
-        around: NDArray[np.float32] | float = 0.0
-        if beyond is not None:
-            around, order_0 = beyond(float(kappa))
-            power *= beyond.inside
-            if kappa > expansion.kappa_max:
-                power[...], central[n] = 0.0, order_0
+        power, central[n], around = powers_at(float(kappa))
         if all_smooth:  # order 0 then is as wide as any other
             power[len(power) // 2, power.shape[1] // 2] += central[n]
             central[n] = 0.0
@@ -111,8 +107,6 @@ def order_mixture(table: DiffractionTable, height_scale: float, smoothing: float
         for n, kappa in enumerate(kappas):
             held = kept[n]
             power = held if held is not None else powers_at(float(kappa))[0]
-            if beyond is not None:  # the chosen ones are within its domain
-                power = power * np.float32(kappa <= expansion.kappa_max)
             powers[n] = power[rows, columns]
             chosen_splats = splats[1][:, rows].multiply(powers[n]) @ splats[0][:, columns].T
             density[n] -= chosen_splats.toarray()
@@ -164,8 +158,8 @@ class _Powers:
         self._interval = -1
         self._coefficients: NDArray[np.float32] = np.zeros((0, 0), np.float32)
 
-    def __call__(self, kappa: float) -> tuple[NDArray[np.float32], float]:
-        """Powers (ny, nx) of all orders but order 0, and that of order 0."""
+    def __call__(self, kappa: float) -> tuple[NDArray[np.float32], float, Any]:
+        """Powers (ny, nx) of all orders but order 0, that of order 0, and the density besides."""
         table, axes = self._table, self._axes
         expansion = table.expansion
         interval = int(expansion.interval(kappa))
@@ -180,7 +174,11 @@ class _Powers:
             amplitude = parts[..., 0] + 1j * parts[..., 1]
             amplitude[table.grid.last[1], table.grid.last[0]] = complex(*centre)
             field = (axes[0].matrix @ (axes[1].matrix @ amplitude).T).T
-            return np.abs(field).astype(np.float32) ** 2 * (axes[0].weight * axes[1].weight), 0.0
+            return (
+                np.abs(field).astype(np.float32) ** 2 * (axes[0].weight * axes[1].weight),
+                0.0,
+                0.0,
+            )
         if expansion.kind == "power":
             power, order_0 = np.maximum(parts[..., 0], 0.0), max(float(centre[0]), 0.0)
         else:
@@ -189,48 +187,53 @@ class _Powers:
             power = power @ axes[0].matrix.T
         if len(axes[1].frequency) < ny:
             power = axes[1].matrix @ power
-        return power, order_0
+        return power, order_0, 0.0
 
 
-class _Beyond:
-    """What the coarse cells around a table of a restricted domain add to the density."""
+class _PlannedPowers:
+    """Powers of a planned table: its own orders in its domain, coarse cells as density beyond."""
 
     def __init__(
         self,
         table: DiffractionTable,
+        coarse: DiffractionTable,
         axes: list[_Axis],
         grid: NDArray[np.floating],
         smoothing: float,
     ) -> None:
-        assert table.coarse is not None
-        self._coarse, self._kappa_max = table.coarse, table.expansion.kappa_max
-        nothing = np.zeros(self._coarse.coefficients.shape[1:3], np.float32)
-        _, middles = cell_powers(self._coarse, nothing)
+        self._fine, self._coarse = _Powers(table, axes), coarse
+        self._kappa_max = table.expansion.kappa_max
+        nothing = np.zeros(coarse.grid.shape, np.float32)
+        _, middles = cell_powers(coarse, nothing)
         self._splats = [_splat(middle, grid, smoothing) for middle in middles]
         # Which orders the table itself has, and the share of each cell that it has not
         x, y = (axis.frequency for axis in axes)
         along_x, along_y = table.q_max
-        self.inside = (np.hypot(x / along_x, y[:, None] / along_y) <= 1.0).astype(np.float32)
+        self._inside = (np.hypot(x / along_x, y[:, None] / along_y) <= 1.0).astype(np.float32)
         within = (np.arange(_PARTS) + 0.5) / _PARTS - 0.5
         x, y = (
             (middle[:, None] + width * within).ravel()
-            for middle, width in zip(middles, self._coarse.spacing, strict=True)
+            for middle, width in zip(middles, coarse.spacing, strict=True)
         )
         outside = np.hypot(x / along_x, y[:, None] / along_y) > 1.0
         shape = (len(middles[1]), _PARTS, len(middles[0]), _PARTS)
         self._outside = outside.reshape(shape).mean(axis=(1, 3)).astype(np.float32)
 
-    def __call__(self, kappa: float) -> tuple[NDArray[np.float32], float]:
-        """Density (ny, nx), and the power of order 0."""
+    def __call__(self, kappa: float) -> tuple[NDArray[np.float32], float, Any]:
+        """As `_Powers`."""
         coarse = self._coarse
         interval = int(coarse.expansion.interval(kappa))
         scaled = (coarse.expansion.weights(kappa) / coarse.scale).astype(np.float32)
         series = coarse.coefficients[interval, :, :, 0].astype(np.float32) @ scaled
-        power, _ = cell_powers(coarse, series)
+        cells, _ = cell_powers(coarse, series)
+        power, order_0, _ = self._fine(kappa)
+        power *= self._inside
         if kappa <= self._kappa_max:
-            power = power * self._outside
-        density = (self._splats[0] @ (self._splats[1] @ power).T).T
-        return density.astype(np.float32), max(float(coarse.order_0_at(kappa)[0]), 0.0)
+            cells = cells * self._outside
+        else:
+            power[...], order_0 = 0.0, max(float(coarse.order_0_at(kappa)[0]), 0.0)
+        around = (self._splats[0] @ (self._splats[1] @ cells).T).T
+        return power, order_0, around.astype(np.float32)
 
 
 def _splat(

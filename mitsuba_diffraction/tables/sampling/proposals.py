@@ -21,6 +21,8 @@ from ..window import apply_window
 
 #: Width of a cell in units of 1/σ: a lobe is then nearly even across it.
 CELL = 1.5
+#: Orders further apart, in units of 1/σ, are lobes with nothing between them: erfc(2) = 0.5 %.
+APART = 4.0
 #: Most cells in each direction; more memory would buy little.
 MOST_CELLS = 1024
 #: Bands of κ, up to 3/4 of κ_max: κ is at most k(cosθi + 1), and k(cosθi + 1/2) picks the band.
@@ -41,7 +43,8 @@ class Proposals:
     Attributes
     ----------
     origin : (x, y), lower corner of cell (0, 0), rad/µm.
-    cell : width of a cell, rad/µm.
+    cell : width of a cell along x and y, rad/µm.
+    lobes : along which axes a cell is one order's, and holds its lobe instead of an even density.
     levels : (bands, ny, 4·n) of a cell's density, n ≥ nx / 4: LEVEL of them double it; 0 is none.
     units : (bands,) probability of a cell of the highest level, 255; 0 where there is no power
         besides order 0.
@@ -51,7 +54,8 @@ class Proposals:
     """
 
     origin: tuple[float, float]
-    cell: float
+    cell: tuple[float, float]
+    lobes: tuple[bool, bool]
     levels: NDArray[np.uint8]
     units: NDArray[np.float32]
     rows: NDArray[np.float32]
@@ -61,14 +65,11 @@ class Proposals:
 
 def proposals(table: DiffractionTable) -> Proposals:
     """Tabulate the densities of all bands."""
-    edge = [
-        min(radius, n * spacing) + 2.0 / table.sigma
-        for radius, n, spacing in zip(table.q_max, table.grid.last, table.spacing, strict=True)
-    ]
-    cell = max(CELL / table.sigma, 2.0 * max(edge) / MOST_CELLS)
-    counts = [math.ceil(2.0 * e / cell) for e in edge]
-    origin = (-0.5 * cell * counts[0], -0.5 * cell * counts[1])
-    matrices = [_cell_matrix(table, axis, origin[axis], cell, counts[axis]) for axis in (0, 1)]
+    axes = (_axis(table, 0), _axis(table, 1))
+    (cell_x, nx, _), (cell_y, ny, _) = axes
+    cell, counts = (cell_x, cell_y), (nx, ny)
+    origin = (-0.5 * cell_x * nx, -0.5 * cell_y * ny)
+    matrices = [_cell_matrix(table, n, origin[n], cell[n], counts[n]) for n in (0, 1)]
     rows = np.zeros((BANDS, counts[1] + 1), np.float32)
     columns = np.zeros((BANDS, counts[1], counts[0] + 1), np.float32)
     levels = np.zeros((BANDS, counts[1], -(-counts[0] // 4) * 4), np.uint8)
@@ -82,7 +83,18 @@ def proposals(table: DiffractionTable) -> Proposals:
             units[band] = 1.0 / of_row.sum()
             rows[band] = _cumulative(of_row)
             columns[band] = _cumulative(power)
-    return Proposals(origin, cell, levels, units, rows, columns, _order_0(table))
+    lobes = (axes[0][2], axes[1][2])
+    return Proposals(origin, cell, lobes, levels, units, rows, columns, _order_0(table))
+
+
+def _axis(table: DiffractionTable, axis: int) -> tuple[float, int, bool]:
+    """Width of the cells along an axis, how many, and whether each is one order's."""
+    spacing, last = table.spacing[axis], table.grid.last[axis]
+    edge = min(table.q_max[axis], last * spacing) + 2.0 / table.sigma
+    if spacing * table.sigma > APART:
+        return spacing, 2 * math.ceil(edge / spacing) + 1, True
+    cell = max(CELL / table.sigma, 2.0 * edge / MOST_CELLS)
+    return cell, math.ceil(2.0 * edge / cell), False
 
 
 def _levels(power: NDArray[np.float64]) -> NDArray[np.uint8]:

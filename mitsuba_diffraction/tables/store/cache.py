@@ -43,14 +43,13 @@ def cached_table(
 
 
 def _table_record(table: DiffractionTable) -> Record:
-    parts = [table] if table.coarse is None else [table, table.coarse]
     document = json.loads(json.dumps(document_of(table), default=plain))
-    return Record(document, [part.coefficients for part in parts])
+    return Record(document, [part.coefficients for part in table.parts])
 
 
 def _table_of(record: Record) -> DiffractionTable:
     found = described(record.document)
-    shapes = [part.shape for part in (found, found.coarse) if part is not None]
+    shapes = [part.shape for part in found.parts]
     if [array.shape for array in record.arrays] != shapes:
         raise ValueError(f"arrays of other shapes than {shapes}")
     return found.table(record.arrays)

@@ -71,7 +71,7 @@ class Record:
 
 def key_of(*parts: Any) -> str:
     """A key: the SHA-256 of what something is made of, as JSON."""
-    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def kept(

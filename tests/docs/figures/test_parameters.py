@@ -43,7 +43,7 @@ def test_the_defaults_are_those_of_the_code(some_variant, patch):
 
     properties = mi.Properties("diffraction")
     given = md.bsdf_dict(patch, coherence_width=4, tolerance=0.1)
-    for name in ("data", "pixel_size", "coherence_width", "tolerance"):
+    for name in ("data", "coherence_width", "tolerance"):
         properties[name] = given[name]
     read = code.read_parameters(properties)
     assert float(default("height_scale")) == read.height_scale

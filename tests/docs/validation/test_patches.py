@@ -30,16 +30,13 @@ def test_a_cell_has_its_slope_and_no_seam(surface):
     assert np.abs(field.heights[:, 0] - field.heights[:, -1]).max() <= 1.5 * inside
 
 
-@pytest.mark.parametrize("material", ["keratin", "aluminium"])
-def test_the_orders_of_a_kept_solution_leave_above_the_surface_and_carry_no_more_than_comes(
-    material,
-):
-    for solution in solved(material)[0]:
+def test_the_orders_of_a_kept_solution_carry_what_a_dielectric_reflects():
+    for solution in solved("keratin")[0]:
         if solution.case.surface.kind not in HERE:
             continue
         field = cell(solution.case.surface)
         assert np.all(solution.wo(field)[:, 2] > 0)
-        assert 0.03 < solution.efficiency(field).sum() < 1
+        assert 0.03 < solution.efficiency(field).sum() < 0.12  # flat: 0.048 to 0.099
 
 
 def test_cuts_of_scales_meet_the_goals(keratin):

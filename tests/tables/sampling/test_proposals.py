@@ -43,8 +43,8 @@ def test_their_cells_hold_the_power_of_the_orders():
     assert cells.sum() == pytest.approx(1.0, abs=1e-5)  # sums of 1000 single floats
     kappa = BANDED * (band + 0.5) / BANDS * table.expansion.kappa_max
     centres = [
-        o + found.cell * (np.arange(n) + 0.5)
-        for o, n in zip(found.origin, cells.T.shape, strict=True)
+        o + cell * (np.arange(n) + 0.5)
+        for o, cell, n in zip(found.origin, found.cell, cells.T.shape, strict=True)
     ]
     x, y = np.meshgrid(*centres)
     inside = np.hypot(x, y) < table.q_limit
@@ -60,7 +60,7 @@ def test_a_grating_s_cells_lie_along_its_axis():
     field = gratings.sinusoidal(2.0, 0.1, periods=4, rows=64, axis="y")
     found = proposals(DiffractionTable.build(field, coherence_width=4.0))
     cells = np.diff(found.rows[2])[:, None] * np.diff(found.columns[2], axis=1)
-    x = found.origin[0] + found.cell * (np.arange(cells.shape[1]) + 0.5)
+    x = found.origin[0] + found.cell[0] * (np.arange(cells.shape[1]) + 0.5)
     spread = np.sqrt(np.sum(cells * x**2))
     assert spread < 1.5  # lobes of 1/(√2σ) = 0.7 rad/µm, in cells 1.5 wide
 

@@ -222,5 +222,6 @@ def test_a_digest_is_of_what_is_looked_up_alone():
         dataclasses.replace(table, order_0=table.order_0 + 1e-9),
         dataclasses.replace(table, scale=2.0 * table.scale),
         dataclasses.replace(table, coarse=table),
+        dataclasses.replace(table, roughness=dataclasses.replace(table.roughness, first=-3.0)),
     ):
         assert changed.digest() != table.digest()

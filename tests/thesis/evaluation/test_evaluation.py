@@ -30,7 +30,7 @@ ANGLES = np.linspace(-75.0, 30.0, 1051)
 
 @pytest.fixture(scope="module")
 def blazed() -> HeightField:
-    return gratings.blazed(2.5, 0.25, rows=2)
+    return gratings.blazed(2.5, 0.25, rows=8)
 
 
 @pytest.fixture(scope="module")

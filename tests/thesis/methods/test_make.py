@@ -24,7 +24,7 @@ def test_light_from_below_is_none(rough, of_rough):
         ("flss", {"step": 0.0}, "step=0 nm does not fit"),
         ("flss", {"step": 900.0}, "step=900 nm does not fit"),
         ("flss", {"wavelength_range": (700.0, 400.0)}, "wavelength_range=700, 400 nm is none"),
-        ("flss", {"coherence": "some"}, "coherence='some' is unknown"),
+        ("flss", {"coherence": "some"}, "coherence='some' must be one of"),
         ("flss", {"terms": 3}, "terms=3 of basis='taylor' leave"),
         ("nmm", {"period": -1.0}, "period=-1.0 must be"),
         ("nmm", {"nmm_weights": "some"}, "weights='some' is unknown"),
