@@ -63,7 +63,9 @@ def test_vcavity_is_its_formula_and_none_is_the_default():
 
 def test_the_thesis_blend_is_its_formula():
     wi, wo = pairs()
-    diffraction, beneath = values(plugin(), wi, wo), values(mi.load_dict(GREY), wi, wo)
+    # which has the tangent plane beside it, as the thesis of 2014 does
+    diffraction = values(plugin(model="kirchhoff"), wi, wo)
+    beneath = values(mi.load_dict(GREY), wi, wo)
     blend = plugin(beneath=GREY, layering="thesis", diffuse_weight=0.3)
     half = np.sqrt(0.5 * (1.0 + np.sum(wi * wo, axis=1)))
     fresnel = np.array(mi.fresnel(mi.Float(half.astype(np.float32)), 1.5 / 1.000277)[0])
