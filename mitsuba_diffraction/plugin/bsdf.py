@@ -38,7 +38,8 @@ orientation : float or texture ∂ [0]
     Degrees that the patch's x axis is turned by from the first tangent, up to 36000; or a texture
     (raw, in a float format such as EXR) or mesh attribute of three channels, the first two of
     which are (cos, sin) of that angle. Tangents follow UV coordinates: on a mesh without them they
-    are arbitrary, and turn from triangle to triangle. A BSDF cannot see that; `info MESH` and `render` warn.
+    are arbitrary, and turn from triangle to triangle. A BSDF cannot see that; `info MESH` and
+    `render` warn.
 height_scale : float ∂ [1]
     Multiplies the heights, up to 1.5 × max(1, value given).
 
