@@ -343,6 +343,7 @@ class Diffraction(mi.BSDF):
         """
         changing = (self._scale, self.orientation, self.fresnel)
         refused = [line for line in [one.settle() for one in changing] if line]
+        refused += self._coat_refusal()
         if self._energy is not None:
             largest = dr.slice(dr.max(dr.detach(self.height_scale)))
             self._energy.update(largest, dr.grad_enabled(self.height_scale))
@@ -354,6 +355,18 @@ class Diffraction(mi.BSDF):
         )
         if refused:
             raise DiffractionError("; ".join(refused))
+
+    def _coat_refusal(self) -> list[str]:
+        """What to say where heights and coat together are beyond the table."""
+        if self.coat is None:
+            return []
+        optical = float(dr.slice(dr.max(dr.detach(self.height_scale * self.coat.eta))))
+        if optical <= self.table.height_scale_max * (1.0 + 1e-6):
+            return []
+        return [
+            f"height_scale times coat_eta is {optical:g}, beyond the table's "
+            f"{self.table.height_scale_max:g}; load the plugin anew with that coat_ior"
+        ]
 
     def _scale_refusal(self, height_scale: float) -> str:
         return (

@@ -205,9 +205,8 @@ def _wavelength(props: Properties, table: DiffractionTable) -> float:
 def _coat(props: Properties) -> Dielectric | None:
     if "coat_ior" not in props:
         return None
-    coat = Dielectric(
-        _index(props, "coat_ior"), _index(props, "ext_ior", _above(props)), "coat_eta"
-    )
+    medium = _index(props, "ext_ior", _above(props))
+    coat = Dielectric(_index(props, "coat_ior"), medium, "coat_eta", 1.0)
     if dr.slice(coat.eta) < 1.0:
         raise DiffractionError(
             f"coat_ior={props.get('coat_ior')} is below the index of the medium above the coat; "

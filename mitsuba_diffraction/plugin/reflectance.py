@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from functools import partial
 from pathlib import Path
 
 import drjit as dr
@@ -36,12 +37,24 @@ class Perfect:
 
 
 class Dielectric:
-    """Fresnel reflectance of an interface between two dielectrics, unpolarised."""
+    """Fresnel reflectance of an interface between two dielectrics, unpolarised.
 
-    def __init__(self, int_ior: float | str, ext_ior: float | str, name: str = "eta") -> None:
+    Parameters
+    ----------
+    int_ior, ext_ior : indices, or names that Mitsuba knows.
+    name, least : of the ratio as a parameter, and the least that it may become.
+    """
+
+    def __init__(
+        self,
+        int_ior: float | str,
+        ext_ior: float | str,
+        name: str = "eta",
+        least: float = INDICES[0],
+    ) -> None:
         probe = _load("dielectric", int_ior=int_ior, ext_ior=ext_ior)
         eta = float(dr.slice(mi.traverse(probe)["eta"]))
-        self._index = Bounded(name, eta, *INDICES, _eta_refusal)
+        self._index = Bounded(name, eta, least, INDICES[1], partial(_ratio_refusal, name, least))
         self.eta = self._index.value
         self.traverse = self._index.traverse
         self.settle()
@@ -64,9 +77,11 @@ class Dielectric:
         return f"dielectric[eta = {dr.slice(self.eta):.5g}]"
 
 
-def _eta_refusal(eta: float) -> str:
+def _ratio_refusal(name: str, least: float, ratio: float) -> str:
+    lowest = "above 0" if least == INDICES[0] else f"at least {least:g}"
     return (
-        f"eta={eta:g}, the ratio of refractive indices, must be above 0 and at most {INDICES[1]:g}"
+        f"{name}={ratio:g}, the ratio of refractive indices, must be {lowest} and at most "
+        f"{INDICES[1]:g}"
     )
 
 

@@ -157,3 +157,19 @@ def test_a_table_that_does_not_reach_is_one_line(some_variant, tmp_path):
     plugin = {"type": "diffraction", "table": str(file), "material": "Al"}
     mi.load_dict({**plugin, "coat_ior": 1.49, "energy_conserving": False})
     assert "--height-scale-max 1.58" in refusal(lambda: mi.load_dict({**plugin, "coat_ior": 1.58}))
+
+
+@pytest.mark.parametrize(
+    ("changed", "line"),
+    [
+        ({"coat_eta": 0.9}, "coat_eta=0.9"),
+        ({"coat_eta": 2.9}, "beyond the table's 2.37"),
+        ({"height_scale": 1.6}, "height_scale=1.6 is outside what the table serves"),
+    ],
+)
+def test_a_change_beyond_the_table_is_refused(some_variant, changed, line):
+    parameters = mi.traverse(load(eta=0.9, k=6.0, coat_ior=1.58))
+    for name, value in changed.items():
+        parameters[name] = value
+    with pytest.raises(md.DiffractionError, match=line):
+        parameters.update()
