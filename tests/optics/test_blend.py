@@ -51,7 +51,7 @@ def test_a_table_of_nodes_interpolates_to_it():
     q = np.geomspace(0.01, 35.0, 2000)
     assert table.first + (len(table.nodes) - 1) / NODES_PER_OCTAVE >= np.log2(35.0)
     assert table.at(q) == pytest.approx(exact.at(q), abs=5e-4 * table.nodes.max())
-    assert table.at(0.0) == 0.0
+    assert table.at(0.0) < 1e-30
 
 
 def test_the_mean_of_several_is_that_of_their_variances():

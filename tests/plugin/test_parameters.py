@@ -224,7 +224,7 @@ REFUSED = [
     ({"material": "Al", "eta": 1.0, "k": 2.0}, "material and eta, k both say what the conductor"),
     ({"eta": 1.0}, "eta alone is no conductor; give both eta and k"),
     ({"k": 1.0}, "k alone is no conductor; give both eta and k"),
-    ({"max_height": 0.3}, "max_height is for files; a HeightField has its own already"),
+    ({"max_height": 0.3}, "max_height is for files; the heights in data"),
     ({"pixel_size": 0.0}, "pixel_size: expected one length or a pair (dx, dy) in µm"),
     ({"pixel_size": "0.1, -0.1"}, "pixel_size: expected one length or a pair"),
     ({"pixel_size": float("nan")}, "pixel_size: expected one length or a pair"),

@@ -140,18 +140,22 @@ def _by_angle(same: Sequence[PatchComparison]) -> list[str]:
     cells = []
     for theta in _ANGLES:
         chosen = [c.by_model for c in same if c.case.theta == theta]
-        means = [np.mean([c[model] for c in chosen]) if chosen else np.nan for model in _MODELS]
-        cells.append(" / ".join(percent(float(mean)) for mean in means))
+        means = [_mean([c[model] for c in chosen]) for model in _MODELS]
+        cells.append(" / ".join(percent(mean) for mean in means))
     return cells
 
 
 def _polarised(same: Sequence[PatchComparison]) -> list[str]:
     oblique = [c.polarised for c in same if c.case.theta == 60.0]
     return [
-        percent(float(np.mean([c[model][n] for c in oblique])))
+        percent(_mean([c[model][n] for c in oblique]))
         for n in range(2)
         for model in ("kirchhoff", "small_slope")
     ]
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values)) if values else np.nan
 
 
 def _most(same: Sequence[PatchComparison]) -> str:

@@ -14,7 +14,7 @@ from ...errors import DiffractionError
 from .domain import Domain
 
 #: Raised whenever an older file would mean something else.
-VERSION = 1
+VERSION = 2
 _KIND = "mitsuba-diffraction plan"
 
 

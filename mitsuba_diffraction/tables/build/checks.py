@@ -70,7 +70,8 @@ def check_window(extent: tuple[float, float], settings: TableSettings) -> None:
         If no table of such a patch could be rendered with.
     """
     width = settings.coherence_width
-    if width > MOST_PATCHES * min(extent):
+    # The longer side: a grating is a few pixels high, and constant along them
+    if width > MOST_PATCHES * max(extent):
         raise build_error(
             f"coherence_width={width:g} µm is more than {MOST_PATCHES} times as wide as the patch "
             f"of {extent[0]:.4g} × {extent[1]:.4g} µm; check both units, or give a larger patch "

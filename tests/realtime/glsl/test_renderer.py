@@ -54,7 +54,8 @@ def several_surfaces(table_file: Path, directory: Path) -> dict[str, Any]:
     turned = np.broadcast_to(turned, (4, 16, 3)).astype(np.float32)
     chequers = np.full((4, 4, 3), 0.1, np.float32)
     chequers[::2, ::2] = [0.5, 0.2, 0.1]
-    skin = {"type": "diffraction", "table": str(table_file)}
+    # what the shaders draw
+    skin = {"type": "diffraction", "table": str(table_file), "model": "kirchhoff"}
     transform = mi.ScalarTransform4f
     return {
         "type": "scene",
@@ -176,7 +177,8 @@ def test_another_height_scale_has_its_own_bound(
 def test_all_that_is_not_shown_is_named_in_one_warning(
     gl: Any, some_variant: str, table_file: Path
 ) -> None:
-    skin = {"type": "diffraction", "table": str(table_file)}
+    # what the shaders draw
+    skin = {"type": "diffraction", "table": str(table_file), "model": "kirchhoff"}
     scene = mi.load_dict(
         {
             "type": "scene",
@@ -262,7 +264,8 @@ def test_a_scene_without_diffraction_is_refused(gl: Any, some_variant: str) -> N
 def test_cameras_without_perspective_are_refused(
     gl: Any, some_variant: str, table_file: Path
 ) -> None:
-    skin = {"type": "diffraction", "table": str(table_file)}
+    # what the shaders draw
+    skin = {"type": "diffraction", "table": str(table_file), "model": "kirchhoff"}
     scene = mi.load_dict(
         {
             "type": "scene",

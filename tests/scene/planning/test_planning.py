@@ -242,7 +242,7 @@ def test_a_plan_comes_back_from_its_file(looked, tmp_path):
         ("no JSON", "it is no JSON"),
         ("[1]", "JSON but no plan"),
         ('{"kind": "mitsuba-diffraction plan", "version": 99}', "a plan of version 99"),
-        ('{"kind": "mitsuba-diffraction plan", "version": 1}', "a damaged plan"),
+        ('{"kind": "mitsuba-diffraction plan", "version": 2}', "a damaged plan"),
     ],
 )
 def test_files_that_are_no_plan_are_refused_in_one_line(tmp_path, text, says):
