@@ -88,7 +88,8 @@ def _check(texture: Texture) -> None:
             'add <boolean name="raw" value="true"/> to the texture ("raw": True in Python)'
         )
     levels, lengths = data[..., :2] * 65535.0, np.hypot(data[..., 0], data[..., 1])
-    from_integers = np.all(np.abs(levels - np.rint(levels)) < 0.02) and levels.min() >= 0.0
+    within = levels.min() >= 0.0 and levels.max() <= 65535.5
+    from_integers = within and np.all(np.abs(levels - np.rint(levels)) < 0.02)
     if from_integers and np.any((lengths > 0.0) & (np.abs(lengths - 1.0) > 0.02)):
         raise DiffractionError(
             "orientation: the bitmap comes from a picture of 8 or 16 bits, which cannot hold "
