@@ -41,6 +41,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="of a table: plot its raw directional albedo against angle and azimuth",
     )  # fmt: skip
     parser.add_argument(
+        "--energy", action="store_true",
+        help="of a table: what it reflects and what energy conservation takes, made of three "
+        "materials",
+    )  # fmt: skip
+    parser.add_argument(
         "--picture", metavar="OUT", type=path_ending_in(".png", ".pdf", ".svg"),
         help="of heights or a recipe: draw them, their distribution and spectrum, and the light "
         "that they scatter",
@@ -52,6 +57,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Print the description, and return the exit code."""
     data = {"file": str(args.file), **_describe(args.file, args)}
+    if args.energy:
+        if data["kind"] != "table":
+            args.parser.error(f"argument --energy: '{args.file}' is a {data['kind']}, not a table")
+        data |= _energy(args.file)
     if args.albedo is not None:
         if data["kind"] != "table":
             args.parser.error(f"argument --albedo: '{args.file}' is a {data['kind']}, not a table")
@@ -103,6 +112,14 @@ def _table(file: Path) -> dict[str, Any]:
     from ..tables import DiffractionTable
 
     return {"kind": "table", **DiffractionTable.load(file).summary()}
+
+
+def _energy(file: Path) -> dict[str, Any]:
+    from ..analysis.energy import energy_summary, energy_warnings
+    from ..tables import DiffractionTable
+
+    found = energy_summary(DiffractionTable.load(file))
+    return {"energy": found, "warnings": energy_warnings(found)}
 
 
 def _plot_albedo(file: Path, output: Path) -> None:

@@ -78,12 +78,14 @@ model : string [small_slope]
     matrices. `kirchhoff`: the tangent plane, also the default of material `none`, which has no
     index, and of layering `thesis`.
 energy_conserving : boolean [true]
-    Divides by max(1, a(ωi), a(ωo)), where a bounds the directional albedo for R = 1 from above at
-    all wavelengths: reciprocal, never brighter than white. `false` is raw Kirchhoff, which gains
-    energy at grazing angles (1.3 at 80°, more beyond), for checks. The bound takes a second or
-    more the first time, and is kept in the cache. It follows height_scale, interpolated between
-    bounds at a few scales: an optimisation waits where it enters such an interval for the first
-    time. For its derivative, enable that of height_scale before parameters.update().
+    Where the model reflects more than it gets, multiplies it by s(ωi) s(ωo), a scale of directions
+    found for this table, model, material and each wavelength, so that no more is reflected than
+    comes in and nothing is taken from directions that gain nothing: reciprocal. Kirchhoff's model
+    fades within 10° of the horizon as well. Dielectrics gain nothing and are as they are. `false`
+    is the model as it is, for checks. The scale takes a second or more the first time, and is kept
+    in the cache. It follows height_scale, interpolated between a few: an optimisation waits where
+    it enters such an interval for the first time. For its derivative, enable that of height_scale
+    before parameters.update().
 shadowing : string [none]
     `vcavity`: the surface shadows itself like long V-shaped grooves (Torrance and Sparrow 1967);
     `none`.
@@ -96,9 +98,10 @@ The light beneath
     is number 0.
 layering : string [transmission]
     How the nested BSDF shares the light. `transmission`: it gets and returns T(ωi) T(ωo), with
-    T = 1 − R of the flat interface. `thesis`: (1 − w) f_diffraction + (1 − F + w) f_nested, F at
-    the half vector, as in the thesis of 2014 that the method comes from; for comparisons with
-    its pictures only, since it gains energy.
+    T = 1 − a, a the diffracting surface's own albedo (under a coat, the flat interface's
+    reflectance). `thesis`: (1 − w) f_diffraction + (1 − F + w) f_nested, F at the half vector, as
+    in the thesis of 2014 that the method comes from; for comparisons with its pictures only, since
+    it gains energy.
 diffuse_weight : float [0]
     That w.
 
@@ -147,15 +150,18 @@ import operator
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from .boundary import Kirchhoff
 from .bounded import Bounded
 from .coat import CoatedPair
-from .energy import EnergyBound
+from .energy import EnergyModel
 from .frozen import arrays_within, marks
+from .layers import Transmission
 from .llvm import require_loaded_llvm
-from .pair import Pair, from_patch
+from .pair import Pair, from_patch, in_patch
 from .parameters import read_parameters
 from .power import power_model
 from .roles import (
@@ -207,8 +213,13 @@ class Diffraction(mi.BSDF):
         self.layering = parameters.layering
         self.vcavity = parameters.vcavity
         self.power = power_model(self.table, parameters.wavelength)
+        # Under a coat nothing is known of the albedo
         self._energy = (
-            EnergyBound(self.table) if parameters.energy_conserving and not self.coat else None
+            EnergyModel(
+                self.table, self.boundary, parameters.wavelength, parameters.energy_conserving
+            )
+            if self.coat is None
+            else None
         )
         self._area_factor = 4.0 * dr.pi * self.table.sigma**2  # 4π²σ⁴ over the window's area πσ²
         front = mi.BSDFFlags.FrontSide
@@ -232,7 +243,7 @@ class Diffraction(mi.BSDF):
             power = self.power.power(pair, self.height_scale, si)
             value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
         if nested is not None:
-            beneath = mi.Spectrum(self.layering.beneath(si, wo, active))
+            beneath = mi.Spectrum(self._beneath(si, wo, active))
             value += beneath * self.nested.eval(nested, si, wo, active)
         return dr.select(active, value, 0.0)
 
@@ -263,7 +274,7 @@ class Diffraction(mi.BSDF):
             value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
             density = _with_cosine(density, wo)
         if nested is not None:
-            beneath = mi.Spectrum(self.layering.beneath(si, wo, active))
+            beneath = mi.Spectrum(self._beneath(si, wo, active))
             its_value, its_density = self.nested.eval_pdf(nested, si, wo, active)
             value += beneath * its_value
             density = dr.lerp(its_density, density, self._glossy_share(above, si, active))
@@ -303,7 +314,7 @@ class Diffraction(mi.BSDF):
         value, density = self.eval_pdf(ctx, si, result.wo, active & ~delta)
         value = value / dr.select(density > 0.0, density, 1.0)
         if nested is not None:
-            beneath = mi.Spectrum(self.layering.beneath(si, result.wo, delta))
+            beneath = mi.Spectrum(self._beneath(si, result.wo, delta))
             value = dr.select(delta, beneath * weight / dr.select(delta, 1.0 - share, 1.0), value)
             density = dr.select(delta, result.pdf * (1.0 - share), density)
         active &= (density > 0.0) & (mi.Frame3f.cos_theta(result.wo) > 0.0)
@@ -319,7 +330,7 @@ class Diffraction(mi.BSDF):
         if self.nested is not None:
             level = mi.SurfaceInteraction3f(si)
             level.wi = mi.Vector3f(0.0, 0.0, 1.0)
-            beneath = self.layering.beneath(level, level.wi, active)
+            beneath = self._beneath(level, level.wi, active)
             own = self.nested.eval_diffuse_reflectance(level, active)
             reflectance = self.layering.above * reflectance + mi.Spectrum(beneath) * own
         return dr.select(active, dr.clip(reflectance, 0.0, 1.0), 0.0)
@@ -346,12 +357,18 @@ class Diffraction(mi.BSDF):
         refused += self._coat_refusal()
         if self._energy is not None:
             largest = dr.slice(dr.max(dr.detach(self.height_scale)))
-            self._energy.update(largest, dr.grad_enabled(self.height_scale))
+            beneath = self.nested is not None and isinstance(self.layering, Transmission)
+            self._energy.update(largest, dr.grad_enabled(self.height_scale), beneath)
         held = arrays_within(
             self.power, self._energy, self.orientation, self.fresnel, self.boundary, self.mirror
         )
         self._for_freezing = held + marks(
-            self.table, self.vcavity, str(self.layering), str(self.boundary), self.coat is None
+            self.table,
+            self.vcavity,
+            str(self.layering),
+            str(self.boundary),
+            self.coat is None,
+            self._takes,
         )
         if refused:
             raise DiffractionError("; ".join(refused))
@@ -376,8 +393,22 @@ class Diffraction(mi.BSDF):
 
     @property
     def energy_conserving(self) -> bool:
-        """Whether it divides by a bound of its albedo."""
-        return self._energy is not None
+        """Whether it takes what it would reflect too much."""
+        return self._energy is not None and self._energy.conserving
+
+    def energy_scale(self, height_scale: float) -> tuple[NDArray[np.float32], bool] | None:
+        """What conserves energy, for who knows no wavelengths: s, and whether it fades as well.
+
+        s : (polar + 1, azimuthal) on `tables.energy.conservation.FINE`; None where nothing is.
+        """
+        if self._energy is None or not self._energy.conserving:
+            return None
+        scale = self._energy.brightness(height_scale)
+        return None if scale is None else (scale, self._energy.fades)
+
+    @property
+    def _takes(self) -> bool:
+        return self._energy is not None and self._energy.takes
 
     def to_string(self) -> str:
         """All parameters, for people."""
@@ -390,7 +421,7 @@ class Diffraction(mi.BSDF):
             f"  surface = {self.fresnel},\n"
             f"  model = {self.boundary},\n"
             f"  height_scale = {dr.slice(self.height_scale):g},\n"
-            f"  energy_conserving = {'false' if self._energy is None else 'true'},\n"
+            f"  energy_conserving = {'true' if self.energy_conserving else 'false'},\n"
             f"  orientation = {self.orientation},\n"
             f"  shadowing = {'vcavity' if self.vcavity else 'none'},\n"
             f"  layering = {self.layering},\n"
@@ -412,19 +443,32 @@ class Diffraction(mi.BSDF):
         outside = self._area_factor * dr.rcp(dr.square(w) * pair.cos_i)
         if self.coat is not None:
             outside *= pair.outer.cos_o * dr.rcp(pair.cos_o)
-        if self._energy is not None:
-            outside /= self._energy.divisor(pair, self.height_scale)
         if self.vcavity:
             outside *= vcavity(pair.cos_i, pair.cos_o, pair.one_plus_dot)
         wavenumbers, scale = self.power.wavenumbers(si), self.height_scale
         factor = self.boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)
-        value = mi.Spectrum(outside * power) * factor
+        power = outside * power
+        if self._energy is not None and self._energy.takes:
+            power *= self._energy.factor(pair, wavenumbers, scale)
+        value = mi.Spectrum(power) * factor
         if self.mirror is not None:
             pair = pair.outer
             outside = self._area_factor * dr.rcp(dr.square(pair.w) * pair.cos_i)
             factor = self.mirror.factor(pair, scale, wavenumbers, si, active, ctx.mode)
             value += mi.Spectrum(outside * self.power.flat(pair, si)) * factor
         return dr.select(active, value, 0.0)
+
+    def _beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
+        """Factor of the nested BSDF."""
+        ratios = mi.UnpolarizedSpectrum(1.0), mi.UnpolarizedSpectrum(1.0)
+        if self._energy is not None and isinstance(self.layering, Transmission):
+            rotation = self.orientation.rotation(si, active)
+            k, scale = self.power.wavenumbers(si), self.height_scale
+            ratios = tuple(
+                self._energy.reflected(in_patch(d, rotation), mi.Frame3f.cos_theta(d), k, scale)
+                for d in (si.wi, wo)
+            )
+        return self.layering.beneath(si, wo, active, ratios)
 
     def _power_and_density(self, pair: Pair, si: Interaction) -> tuple[Colour, Float]:
         """Of a pair, and of drawing it."""

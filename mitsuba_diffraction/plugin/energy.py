@@ -1,91 +1,298 @@
-"""Energy conservation (Dr.Jit): the raw Kirchhoff BRDF over max(1, a(ωi), a(ωo)).
+"""Energy conservation, and the light that goes beneath (Dr.Jit): `tables.energy` in a kernel.
 
-a bounds the directional albedo from above (`tables.bound`), so that the quotient's albedo is at
-most 1, and the divisor is symmetric in its directions, so that it stays reciprocal.
+What is reflected is multiplied by s(ωi) s(ωo), reciprocal, where the model would reflect more than
+it gets; T = 1 − a(ω) of a dielectric's own albedo goes on to what lies beneath.
 """
 
 from __future__ import annotations
 
 import math
+import warnings
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tables.energy.bound import AZIMUTHAL, LAST_ANGLE, POLAR, SHARE
-from ..tables.store.bounds import BoundsAround, bounds_around
+from ..errors import DiffractionWarning
+from ..optics import fresnel
+from ..optics.colour import RGB_WAVELENGTHS, linear_srgb, response
+from ..optics.geometry import wavenumber
+from ..tables.energy.conservation import Conservation, DirectionalTable
+from ..tables.energy.gain import GRAZING
+from ..tables.energy.grid import SHARE
+from ..tables.store.energy import Energy
 from ..tables.table import DiffractionTable
+from .boundary import Boundary, Kirchhoff
 from .memory import index_between, read_record, upload
 from .pair import Pair
-from .roles import Buffer, Float, Index, Vector2f
+from .reflectance import Perfect, Reflectance
+from .roles import Buffer, Colour, Float, Index, Vector2f
+
+Array = NDArray[np.float32]
+
+#: Indices are rounded to this, real and imaginary part, for s and the ratio of albedos.
+INDEX_STEP = 0.05
+#: What is taken beyond this share of a real material is warned of.
+MUCH = 0.05
 
 
-class EnergyBound:
-    """The divisor, for one table and the height scale last given."""
+class EnergyModel:
+    """Of one BSDF, at the height scale and the material last given.
 
-    def __init__(self, table: DiffractionTable) -> None:
-        self._table = table
-        self._height_scale = math.nan
-        self._around: BoundsAround | None = None
-        self._ends: tuple[Buffer, Buffer] = (None, None)
-        self._values: Buffer = None
-        self._low, self._slope = mi.Float(0.0), mi.Float(0.0)
+    Parameters
+    ----------
+    table, boundary : of the BSDF.
+    wavelength : nm, for mono variants.
+    conserving : whether anything is to be taken.
+    """
 
-    def update(self, height_scale: float, differentiable: bool = False) -> None:
-        """Look up, or compute, the bound for another height scale."""
-        if height_scale == self._height_scale and not differentiable:
+    def __init__(
+        self, table: DiffractionTable, boundary: Boundary, wavelength: float, conserving: bool
+    ) -> None:
+        low, high = table.wavelength_range
+        if mi.is_monochromatic:
+            low = high = wavelength
+        kirchhoff = isinstance(boundary, Kirchhoff)
+        self.conserving, self._material = conserving, boundary.material
+        self._energy = Energy(
+            table, "kirchhoff" if kirchhoff else "small_slope", self._indices, (low, high)
+        )
+        self._fades, self._warned = kirchhoff, False
+        self._scale = _Lookup()
+        self._reflected = _Lookup()
+
+    def update(self, height_scale: float, differentiable: bool, beneath: bool) -> None:
+        """Look up, or compute, what belongs to another height scale or material.
+
+        beneath : whether light goes on to something.
+        """
+        if not (self.conserving or beneath):
             return
-        around = bounds_around(self._table, height_scale, interval=differentiable)
-        low, high = (_cells(np.maximum(bound.values, np.float32(1.0))) for bound in around.bounds)
-        if self._around is None or around.scales != self._around.scales:
-            self._around = around
-            self._ends = upload(mi.Float, low), upload(mi.Float, high)
-            width = around.scales[1] - around.scales[0]
-            self._low = mi.Float(around.scales[0])
-            self._slope = mi.Float(1.0 / width if width > 0.0 else 0.0)
-            dr.make_opaque(self._low, self._slope)
-        share = np.float32(around.share(height_scale))
-        self._values = upload(mi.Float, low * (1 - share) + high * share)
-        self._height_scale = height_scale
+        nodes = self._energy.nodes(height_scale, interval=differentiable)
+        found = [self._energy.at(node) for node in nodes]
+        if self.conserving:
+            scales = [_scale_of(one) for one in found]
+            taken = any(one.scale is not None for one in found)
+            self._warn(found)
+            self._scale.update(scales if taken else None, nodes, height_scale)
+        if beneath:
+            ratios = [self._ratio(one.albedo) for one in found]
+            self._reflected.update(ratios, nodes, height_scale)
 
-    def divisor(self, pair: Pair, height_scale: Float) -> Float:
-        """max(1, a(ωi), a(ωo)).
+    def _warn(self, found: list[Conservation]) -> None:
+        """Say once that much is taken of a real material."""
+        if self._warned or isinstance(self._material, Perfect) or found[0].scale is None:
+            return
+        albedo = found[0].albedo
+        largest = float(albedo.values[:, albedo.grid.theta <= math.acos(GRAZING)].max())
+        if largest > 1.0 + MUCH:
+            self._warned = True
+            warnings.warn(
+                f"the surface would reflect up to {100 * largest:.0f} % of the light within 80° of "
+                "the normal: what is above 100 % is taken (energy_conserving=false keeps it); its "
+                "orders are least certain there",
+                DiffractionWarning,
+                stacklevel=2,
+            )
+
+    def brightness(self, height_scale: float) -> Array | None:
+        """s for who knows no wavelengths, (polar + 1, azimuthal): their mean as the eye has it."""
+        nodes = self._energy.nodes(height_scale)
+        found = [self._energy.at(node) for node in nodes]
+        if all(one.scale is None for one in found):
+            return None
+        low, high = _alike([_scale_of(one) for one in found])
+        width = nodes[1] - nodes[0]
+        share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
+        weights = response(low.wavelengths)[:, 1] * low.wavelengths
+        values = low.values * (1 - share) + high.values * share
+        return np.average(values, axis=0, weights=weights).astype(np.float32)
+
+    @property
+    def fades(self) -> bool:
+        """Whether the factor has `tables.energy.gain.fade`."""
+        return self._fades
+
+    @property
+    def takes(self) -> bool:
+        """Whether the BSDF is multiplied by anything."""
+        return self._scale.present
+
+    def factor(self, pair: Pair, wavenumbers: list[Float], height_scale: Float) -> Colour:
+        """s(ωi) s(ωo), and for Kirchhoff's model `tables.energy.gain.fade`, per channel.
 
         height_scale : the one given to `update`; needed where derivatives with respect to it are.
         """
+        both = zip(
+            self._scale.at(pair.incident, pair.cos_i, wavenumbers, height_scale),
+            self._scale.at(pair.outgoing, pair.cos_o, wavenumbers, height_scale),
+            strict=True,
+        )
+        found = mi.UnpolarizedSpectrum([one * other for one, other in both])
+        if self._fades:
+            one, other = dr.minimum(pair.cos_i, GRAZING), dr.minimum(pair.cos_o, GRAZING)
+            found *= dr.square(dr.minimum(one, other) * dr.rcp(dr.maximum(one, other)))
+        return found
+
+    def reflected(
+        self, tangential: Vector2f, cosine: Float, wavenumbers: list[Float], height_scale: Float
+    ) -> Colour:
+        """a(ω) over the flat interface's reflectance, per channel; `update` was told `beneath`."""
+        return mi.UnpolarizedSpectrum(
+            self._reflected.at(tangential, cosine, wavenumbers, height_scale)
+        )
+
+    def _indices(self, wavelengths: NDArray[np.float64]) -> NDArray[np.complex128] | None:
+        """The material's n + ik, to `INDEX_STEP`: an optimisation of it waits rarely, and sees s
+        and the ratio of albedos as constants.
+        """
+        found = indices_of(self._material, wavelengths)
+        return None if found is None else np.round(found / INDEX_STEP) * INDEX_STEP
+
+    def _ratio(self, albedo: DirectionalTable) -> DirectionalTable:
+        found = self._indices(albedo.wavelengths)
+        assert found is not None  # without an index no light goes beneath
+        flat = fresnel.reflectance(np.cos(albedo.grid.theta), found[:, None])
+        # of an index of 1 there is neither
+        ratio = np.where(flat > 1e-9, 1.0 / np.maximum(flat, 1e-9), 0.0)[:, :, None]
+        return DirectionalTable(albedo.wavelengths, (albedo.values * ratio).astype(np.float32))
+
+
+class _Lookup:
+    """A function of direction and channel in the variant's memory, bilinear in (θ, φ)."""
+
+    def __init__(self) -> None:
+        self.present = False
+        self._values: Buffer = None
+        self._ends: tuple[Buffer, Buffer] = (None, None)
+        self._low, self._slope = mi.Float(0.0), mi.Float(0.0)
+        self._first, self._pages_per_log = mi.Float(0.0), mi.Float(0.0)
+        self._pages = self._polar = self._azimuthal = 1
+
+    def update(
+        self,
+        tables: list[DirectionalTable] | None,
+        nodes: tuple[float, float],
+        height_scale: float,
+    ) -> None:
+        """Take the tables at two height scales, or none."""
+        self.present = tables is not None
+        if tables is None:
+            return
+        low, high = (_pages(table) for table in _alike(tables))
+        self._pages, self._polar, self._azimuthal = low.shape[:3]
+        width = nodes[1] - nodes[0]
+        share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
+        self._values = upload(mi.Float, low * (1 - share) + high * share)
+        self._ends = upload(mi.Float, low), upload(mi.Float, high)
+        wavelengths = tables[0].wavelengths
+        self._low = mi.Float(nodes[0])
+        self._slope = mi.Float(1.0 / width if width > 0.0 else 0.0)
+        self._first = mi.Float(math.log2(float(wavenumber(wavelengths[0]))))
+        octaves = math.log2(wavelengths[-1] / wavelengths[0])
+        self._pages_per_log = mi.Float((len(wavelengths) - 1) / octaves if octaves > 0.0 else 0.0)
+        dr.make_opaque(self._low, self._slope, self._first, self._pages_per_log)
+
+    def at(
+        self, tangential: Vector2f, cosine: Float, wavenumbers: list[Float], height_scale: Float
+    ) -> list[Float]:
+        """For each channel; tangential in the patch's frame."""
         share = None
         if dr.grad_enabled(height_scale):
             share = (height_scale - self._low) * self._slope
-        return dr.maximum(
-            self._bound(pair.incident, pair.cos_i, share),
-            self._bound(pair.outgoing, pair.cos_o, share),
-        )
+        remaining = 1.0 - dr.safe_acos(cosine) * (2.0 / dr.pi)
+        row = (1.0 - dr.safe_sqrt(remaining)) * (self._polar / SHARE)
+        column = dr.atan2(tangential.y, tangential.x) * (self._azimuthal / (2.0 * dr.pi))
+        column = dr.select(column < 0.0, column + self._azimuthal, column)
+        i = mi.UInt32(index_between(row, 0.0, self._polar - 1.0))
+        j = mi.UInt32(index_between(column, 0.0, self._azimuthal - 1.0))
+        s, t = dr.clip(row - i, 0.0, 1.0), dr.clip(column - j, 0.0, 1.0)
+        cell = i * self._azimuthal + j
+
+        def page(n: Index) -> Float:
+            corners = self._corners(n * (self._polar * self._azimuthal) + cell, share)
+            return dr.lerp(dr.lerp(*corners[:2], t), dr.lerp(*corners[2:], t), s)
+
+        if mi.is_rgb or self._pages == 1:
+            last = self._pages - 1
+            return [page(mi.UInt32(min(n, last))) for n in range(len(wavenumbers))]
+        found = []
+        for k in wavenumbers:
+            place = (self._first - dr.log2(k)) * self._pages_per_log
+            n = mi.UInt32(index_between(place, 0.0, self._pages - 2.0))
+            found.append(dr.lerp(page(n), page(n + 1), dr.clip(place - n, 0.0, 1.0)))
+        return found
 
     def _corners(self, cell: Index, share: Float | None) -> list[Float]:
-        """The bound at a cell's corners; interpolated here only where its derivative is wanted."""
+        """Values at a cell's corners; interpolated here only where a derivative is wanted."""
         if share is None:
             return read_record(self._values, cell, 4)
         low, high = (read_record(end, cell, 4) for end in self._ends)
         return [dr.lerp(*ends, share) for ends in zip(low, high, strict=True)]
 
-    def _bound(self, tangential: Vector2f, cosine: Float, share: Float | None) -> Float:
-        """max(1, a): bilinear in (θ, φ), like `AlbedoBound`."""
-        remaining = 1.0 - dr.safe_acos(cosine) * (2.0 / dr.pi)
-        row = (1.0 - dr.safe_sqrt(remaining)) * (POLAR / SHARE)
-        column = dr.atan2(tangential.y, tangential.x) * (AZIMUTHAL / (2.0 * dr.pi))
-        column = dr.select(column < 0.0, column + AZIMUTHAL, column)
-        i = mi.UInt32(index_between(row, 0.0, POLAR - 1.0))
-        j = mi.UInt32(index_between(column, 0.0, AZIMUTHAL - 1.0))
-        s, t = dr.clip(row - i, 0.0, 1.0), dr.clip(column - j, 0.0, 1.0)
-        corners = self._corners(i * AZIMUTHAL + j, share)
-        bound = dr.lerp(dr.lerp(*corners[:2], t), dr.lerp(*corners[2:], t), s)
-        # Towards the horizon the albedo grows with 1/cos²θ
-        beyond = dr.maximum(math.cos(LAST_ANGLE) * dr.rcp(dr.maximum(cosine, 1e-6)), 1.0)
-        return bound * dr.square(beyond)
+
+def indices_of(
+    material: Reflectance, wavelengths: NDArray[np.float64]
+) -> NDArray[np.complex128] | None:
+    """n + ik of a material at wavelengths (n,), nm, in the variant's colours; None for R = 1."""
+    if isinstance(material, Perfect):
+        return None
+    found = []
+    for wavelength in wavelengths if mi.is_spectral else wavelengths[:1]:
+        si = dr.zeros(mi.SurfaceInteraction3f)
+        if mi.is_spectral:
+            si.wavelengths = mi.UnpolarizedSpectrum(float(wavelength))
+        channels = [_complex(n) for n in material.indices(si, True)]
+        found.append(channels[0] if not mi.is_rgb else channels)
+    if not mi.is_rgb:
+        return np.broadcast_to(np.array(found), wavelengths.shape)
+    colours = np.broadcast_to(np.array(found[0]), len(RGB_WAVELENGTHS))
+    return np.interp(wavelengths, RGB_WAVELENGTHS[::-1], colours[::-1])
 
 
-def _cells(values: NDArray[np.float32]) -> NDArray[np.float32]:
-    """All four corners of each cell together: (rows, columns) → (rows − 1, columns − 1, 4)."""
-    corners = (values[:-1, :-1], values[:-1, 1:], values[1:, :-1], values[1:, 1:])
+def _complex(number: Float) -> complex:
+    if dr.is_complex_v(number):
+        return complex(_plain(number.real), _plain(number.imag))
+    return complex(_plain(number))
+
+
+def _plain(number: Float) -> float:
+    return float(dr.slice(dr.detach(number)))
+
+
+def _scale_of(found: Conservation) -> DirectionalTable:
+    if found.scale is not None:
+        return found.scale
+    return DirectionalTable(found.albedo.wavelengths, np.ones_like(found.albedo.values))
+
+
+def _alike(tables: list[DirectionalTable]) -> list[DirectionalTable]:
+    """All on the directions and wavelengths of the finest."""
+    finest = max(tables, key=lambda table: table.values.size)
+    theta, phi = finest.grid.theta[:, None], finest.grid.phi
+    return [
+        table
+        if table.values.shape == finest.values.shape
+        else DirectionalTable(
+            finest.wavelengths,
+            np.stack([table.at(theta, phi, wavelength) for wavelength in finest.wavelengths]),
+        )
+        for table in tables
+    ]
+
+
+def _pages(table: DirectionalTable) -> Array:
+    """All four corners of each cell together: (channels or wavelengths, rows, columns, 4)."""
+    values = table.values
+    if mi.is_rgb and len(values) > 1:
+        values = np.tensordot(_sensitivities(table.wavelengths), values, 1).astype(np.float32)
+    right = np.roll(values, -1, axis=2)
+    corners = (values[:, :-1], right[:, :-1], values[:, 1:], right[:, 1:])
     return np.stack(corners, axis=-1)
+
+
+def _sensitivities(wavelengths: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How much each wavelength counts in red, green and blue, (3, n)."""
+    weights = np.maximum(linear_srgb(response(wavelengths)).T, 0.0) * wavelengths
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))

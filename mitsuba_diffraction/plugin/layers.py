@@ -16,18 +16,26 @@ LAYERINGS = ("transmission", "thesis")
 
 @dataclass(frozen=True)
 class Transmission:
-    """f = f_diffraction + T(ωi) T(ωo) f_nested, T = 1 − R(cosθ) of the flat interface.
+    """f = f_diffraction + T(ωi) T(ωo) f_nested, T = 1 − a of the diffracting surface.
 
-    A white pair reflects no more than it gets: what f_diffraction sends back is about R(cosθi).
+    a(ω) is the albedo of f_diffraction, so that what is not reflected goes on, and a white pair
+    reflects at most what it gets. It is taken as the flat interface's reflectance times their
+    ratio, which is smooth; under a coat as the flat reflectance alone.
     """
 
     fresnel: Reflectance | UnderCoat
     above = 1.0
 
-    def beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
-        """Factor of the nested BSDF."""
-        inwards = 1.0 - self.fresnel.reflectance(mi.Frame3f.cos_theta(si.wi), si, active)
-        outwards = 1.0 - self.fresnel.reflectance(mi.Frame3f.cos_theta(wo), si, active)
+    def beneath(
+        self, si: Interaction, wo: Vector3f, active: Mask, ratios: tuple[Colour, Colour]
+    ) -> Colour:
+        """Factor of the nested BSDF; ratios : of ωi and ωo."""
+        inwards, outwards = (
+            dr.maximum(1.0 - ratio * self.fresnel.reflectance(cosine, si, active), 0.0)
+            for ratio, cosine in zip(
+                ratios, (mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)), strict=True
+            )
+        )
         return inwards * outwards
 
     def __str__(self) -> str:
@@ -51,7 +59,9 @@ class Blend:
         """Factor of the diffraction."""
         return 1.0 - self.weight
 
-    def beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
+    def beneath(
+        self, si: Interaction, wo: Vector3f, active: Mask, ratios: tuple[Colour, Colour]
+    ) -> Colour:
         """Factor of the nested BSDF."""
         cos_half = 0.5 * dr.norm(si.wi + wo)
         return 1.0 - self.fresnel.reflectance(cos_half, si, active) + self.weight

@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.optics import fresnel
+from mitsuba_diffraction.tables.energy.conservation import DirectionalTable
+from mitsuba_diffraction.tables.store.energy import Energy
 from tests.directions import polar
 from tests.lanes import evaluated, interaction, spectra, vectors
 from tests.plugin.gentle import load, pairs
@@ -18,15 +21,26 @@ def test_what_is_not_reflected_reaches_the_nested_bsdf(variant):
     wi, wo, lam = pairs()
     context, si = mi.BSDFContext(), interaction(wi, lam[:, None])
     eta = 1.5 / 1.000277
+    table = bare.table
+    model = Energy(
+        table, "small_slope", lambda w: np.full(len(w), 1.5 + 0j), table.wavelength_range
+    )
+    albedo = model.at(1.0).albedo
+    flat = fresnel.reflectance(np.cos(albedo.grid.theta), 1.5)[:, None]
+    ratio = DirectionalTable(albedo.wavelengths, (albedo.values / flat).astype(np.float32))
 
-    def transmittance(cos_theta):
-        return 1 - np.array(mi.fresnel(mi.Float(cos_theta.astype(np.float32)), eta)[0])
+    def transmittance(directions):
+        theta, phi = np.arccos(directions[:, 2]), np.arctan2(directions[:, 1], directions[:, 0])
+        relative = [ratio.at(*one) for one in zip(theta, phi, lam, strict=True)]
+        return 1 - np.array(relative) * fresnel.reflectance(directions[:, 2], eta)
 
-    t = transmittance(wi[:, 2]) * transmittance(wo[:, 2])
+    t = transmittance(wi) * transmittance(wo)
     beneath = spectra(mi.load_dict(pigment).eval(context, si, vectors(wo)))
     expected = evaluated(bare, wi, wo, lam[:, None]) + t[:, None] * beneath
-    # three sums and products in single precision
-    assert evaluated(coated, wi, wo, lam[:, None]) == pytest.approx(expected, rel=1e-5)
+    # an angle in single precision, on a grid of directions
+    assert evaluated(coated, wi, wo, lam[:, None]) == pytest.approx(expected, rel=1e-4)
+    # and it is not the flat interface's
+    assert np.abs(ratio.values - 1.0).max() > 0.02
 
 
 def test_over_a_white_base_no_light_is_gained_where_a_mirror_would_gain_none(variant):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md  # before Mitsuba: it chooses Dr.Jit's LLVM
+from mitsuba_diffraction.optics.geometry import wavenumber
 from tests.directions import polar
 
 import mitsuba as mi  # isort: skip
@@ -45,6 +46,7 @@ def rough() -> md.HeightField:
     return md.HeightField(0.06 * heights / heights.std(), 0.125)
 
 
+DIELECTRIC = {"material": None, "int_ior": 1.5}
 SURFACES = {
     "sinusoid": (sinusoid, {}),
     "sawtooth": (sawtooth, {}),
@@ -54,7 +56,9 @@ SURFACES = {
 
 def bsdf(name: str, **parameters):
     field, own = SURFACES[name]
-    return mi.load_dict(md.bsdf_dict(field(), **own, **{"material": "none", **parameters}))
+    given = {"material": "none", **own, **parameters}
+    given = {key: value for key, value in given.items() if value is not None}
+    return mi.load_dict(md.bsdf_dict(field(), **given))
 
 
 def white_pair(name: str, **parameters):
@@ -176,9 +180,38 @@ def test_only_the_values_change_not_the_samples():
     one, other = (b.sample(context, si, *numbers)[0] for b in (conserving, raw))
     assert np.array_equal(np.array(one.wo), np.array(other.wo))
     assert np.array_equal(np.array(one.pdf), np.array(other.pdf))
-    assert np.all(
-        np.array(conserving.eval(context, si, one.wo)) <= np.array(raw.eval(context, si, one.wo))
-    )
+    values = (np.array(b.eval(context, si, one.wo)) for b in (conserving, raw))
+    assert next(values).mean() < next(values).mean()
+
+
+def test_a_dielectric_is_as_it_is():
+    conserving, raw = (bsdf("sawtooth", **DIELECTRIC, energy_conserving=e) for e in (True, False))
+    assert conserving.energy_conserving
+    si = dr.zeros(mi.SurfaceInteraction3f, 1000)
+    si.wi = mi.Vector3f(polar(70.0, 10.0))
+    si.wavelengths = mi.Spectrum(400.0, 500.0, 600.0, 700.0)
+    rng = mi.PCG32(1000)
+    wo = mi.warp.square_to_cosine_hemisphere(mi.Point2f(rng.next_float32(), rng.next_float32()))
+    one, other = (np.array(b.eval(mi.BSDFContext(), si, wo)) for b in (conserving, raw))
+    assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_a_white_base_gets_what_the_model_does_not_reflect(name):
+    """White Lambertian beneath: a + T ∫T cosθ/π dω, with T = 1 − a of the furnace itself."""
+    alone, pair = bsdf(name, **DIELECTRIC), white_pair(name)
+    directions = np.array([polar(theta, 37.0) for theta in (0.0, 50.0, 75.0)])
+    reflected, error = furnace_in(alone, directions, 0)
+    total, other_error = furnace_in(pair, directions, 0)
+    rng = np.random.default_rng(1)
+    cosine, azimuth = np.sqrt(rng.uniform(0.0, 1.0, 400)), rng.uniform(0.0, 2 * np.pi, 400)
+    sine = np.sqrt(1.0 - cosine**2)
+    hemisphere = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], axis=1)
+    mean = 1.0 - furnace_in(alone, hemisphere, 0)[0].mean()
+    expected = reflected + (1.0 - reflected) * mean
+    # four standard errors, and 5e-3 for the 400 directions, four wavelengths each, of the mean
+    assert np.all(np.abs(total - expected) < 4.0 * (error + other_error) + 5e-3)
+    assert total.max() < 1.0
 
 
 def test_the_bound_follows_height_scale():
@@ -190,25 +223,22 @@ def test_the_bound_follows_height_scale():
 
 
 def test_kernels_twin_agrees_with_numpy():
-    from mitsuba_diffraction.plugin.energy import EnergyBound
-    from mitsuba_diffraction.tables.store.bounds import cached_bound
-
-    table = bsdf("sinusoid").table
-    bound = EnergyBound(table)
-    bound.update(1.0)
+    surface = bsdf("sinusoid")
+    model = surface._energy
+    found = model._energy.at(1.0).scale
     rng = np.random.default_rng(0)
-    z, azimuth = rng.uniform(0.002, 1.0, 2000), rng.uniform(-np.pi, np.pi, 2000)
+    z, azimuth = rng.uniform(0.02, 1.0, 500), rng.uniform(-np.pi, np.pi, 500)
     sine = np.sqrt(1.0 - z**2)
-    directions = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), z], axis=1)
-    x, y, cosine = (mi.Float(c.astype(np.float32)) for c in directions.T)
-    ours = bound.divisor(
-        mi.Vector2f(x, y), cosine, mi.Vector2f(0.0, 0.0), mi.Float(1.0), mi.Float(1.0)
+    x, y, cosine = (
+        mi.Float(c.astype(np.float32)) for c in (sine * np.cos(azimuth), sine * np.sin(azimuth), z)
     )
-    theirs = cached_bound(table, 1.0)
-    at_normal = theirs([[0.0, 0.0, 1.0]])[0]
-    expected = np.maximum(np.maximum(theirs(directions), at_normal), 1.0)
-    # single precision in acos, amplified where the bound is steep
-    assert np.array(ours) == pytest.approx(expected, rel=2e-3)
+    for wavelength in (360.0, 512.0, 830.0):
+        k = mi.Float(float(wavenumber(wavelength)))
+        ours = model._scale.at(mi.Vector2f(x, y), cosine, [k], mi.Float(1.0))[0]
+        # single precision in acos, amplified where the scale is steep
+        assert np.array(ours) == pytest.approx(
+            found.at(np.arccos(z), azimuth, wavelength), rel=2e-3
+        )
 
 
 def test_only_booleans_are_accepted():

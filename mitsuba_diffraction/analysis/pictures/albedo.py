@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.projections.polar import PolarAxes
 from numpy.typing import NDArray
 
-from ...tables.energy.albedo import AlbedoModel
+from ...tables.energy.conservation import FINE
+from ...tables.energy.transport import Orders
 from ...tables.table import DiffractionTable
 
 #: Polar angles of the curves end here: towards 90° the raw albedo has no limit.
@@ -26,13 +27,16 @@ def albedo_figure(table: DiffractionTable) -> Figure:
     (shaded) and their mean. Right: the largest over the wavelengths, against both angles; the
     colour scale is centred at 1, where energy is conserved, and ends at the largest value at 80°.
     """
-    model = AlbedoModel(table)
+    orders, weights = Orders(table), np.ones((FINE.polar + 1, FINE.azimuthal), np.float32)
     theta = LAST * (1.0 - np.linspace(1.0, 0.0, 64) ** 1.5)  # denser towards grazing angles
     phi = np.arange(0.0, 360.1, 5.0)
     wavelengths = np.geomspace(*table.wavelength_range, WAVELENGTHS)
     azimuths = np.radians(np.concatenate([AZIMUTHS, phi]))
     albedo = np.array(
-        [[model.albedo(angle, azimuths, w) for angle in np.radians(theta)] for w in wavelengths]
+        [
+            orders.transport(np.radians(theta), azimuths, w, "kirchhoff", None, FINE)(weights)
+            for w in wavelengths.tolist()
+        ]
     )
     figure = Figure(figsize=(12, 5.2), layout="constrained")
     name = table.source.get("name", "table")

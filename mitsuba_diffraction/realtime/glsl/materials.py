@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from ...optics.geometry import wavenumber
 from ...plugin.traversal import children
-from ...tables.store.bounds import cached_bound
 from ...tables.table import DiffractionTable
-from .packing import pack_bounds, pack_conductor, pack_roughness
+from .packing import pack_conductor, pack_energy, pack_roughness
 from .textures import Packed, Texture, Uniform, as_half
 
 Array = NDArray[np.float64]
@@ -91,16 +90,21 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
     return Material(_diffuse(bsdf, omissions, name, light), two_sided)
 
 
-def pack_albedo_bounds(material: Material, factors: Sequence[float] = (1.0,)) -> Packed:
-    """The bounds that conserve its energy, at its height scale times these factors."""
-    if material.bsdf is None or not material.bsdf.energy_conserving:
-        return pack_bounds(None)
+def pack_conservation(material: Material, factors: Sequence[float] = (1.0,)) -> Packed:
+    """What conserves its energy, at its height scale times these factors."""
+    if material.bsdf is None:
+        return pack_energy([], False)
     own = height_scale(material)
-    return pack_bounds([cached_bound(material.table, own * factor) for factor in factors])
+    found = [material.bsdf.energy_scale(own * factor) for factor in factors]
+    given = [one for one in found if one is not None]
+    if not given:
+        return pack_energy([], False)
+    ones = np.ones_like(given[0][0])
+    return pack_energy([ones if one is None else one[0] for one in found], given[0][1])
 
 
 def pack_surface(material: Material) -> Packed:
-    """A material, all but its tables and the bound of its albedo."""
+    """A material, all but its tables and what conserves its energy."""
     uniforms: dict[str, Uniform] = {
         "two_sided": material.two_sided,
         "colour_uv": tuple(material.pigment.to_uv.T.ravel().tolist()),

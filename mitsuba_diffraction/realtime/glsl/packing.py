@@ -15,7 +15,8 @@ from ...optics.fresnel import reflectance
 from ...optics.geometry import wavenumber
 from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
-from ...tables.energy.bound import AZIMUTHAL, LAST_ANGLE, POLAR, SHARE, AlbedoBound
+from ...tables.energy.gain import GRAZING
+from ...tables.energy.grid import SHARE
 from ...tables.energy.powers import order_0_power, power_series
 from ...tables.packing import Record, cells_of, functions_at
 from ...tables.table import DiffractionTable
@@ -114,26 +115,29 @@ def area_factor(sigma: float) -> float:
     return 4.0 * math.pi * sigma**2
 
 
-def pack_bounds(bounds: Sequence[AlbedoBound] | None) -> Packed:
-    """Bounds of the albedo for one or several height scales, for `energy_conserving`.
+def pack_energy(scales: Sequence[NDArray[np.float32]], fades: bool) -> Packed:
+    """What conserves energy, at one or several height scales; nothing if there are none.
 
-    bounds : None where the BSDF does not conserve energy.
+    scales : s on a grid of directions, (polar + 1, azimuthal) each (`Diffraction.energy_scale`).
+    fades : whether Kirchhoff's model fades towards the horizon as well.
     """
-    if bounds is None:
+    if not scales:
         return Packed()
+    values = np.stack(list(scales))
     definitions = {
         "ENERGY_CONSERVING": "",
-        "BOUND_PAGES": str(len(bounds)),
-        "BOUND_POLAR": str(POLAR),
-        "BOUND_AZIMUTHAL": str(AZIMUTHAL),
-        "BOUND_SHARE": repr(float(SHARE)),
-        "BOUND_LAST_COSINE": repr(math.cos(LAST_ANGLE)),
+        "ENERGY_PAGES": str(len(values)),
+        "ENERGY_POLAR": str(values.shape[1] - 1),
+        "ENERGY_AZIMUTHAL": str(values.shape[2]),
+        "ENERGY_SHARE": repr(float(SHARE)),
+        # below every cosine there is no more to clamp
+        "ENERGY_GRAZING": repr(GRAZING if fades else 1e-6),
     }
-    values = np.maximum(np.stack([b.values for b in bounds]), np.float32(1.0))
-    corners = [values[:, :-1, :-1], values[:, :-1, 1:], values[:, 1:, :-1], values[:, 1:, 1:]]
+    right = np.roll(values, -1, axis=2)
+    corners = [values[:, :-1], right[:, :-1], values[:, 1:], right[:, 1:]]
     return Packed(
-        (listed("bounds", np.stack(corners, axis=-1).reshape(-1, 4)),),
-        {"bound_page": 0.0},
+        (listed("energy", np.stack(corners, axis=-1).reshape(-1, 4)),),
+        {"energy_page": 0.0},
         definitions,
     )
 

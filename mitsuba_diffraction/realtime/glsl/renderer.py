@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionWarning
-from ...tables.store.bounds import cached_bound
+from ...tables.energy.conservation import FINE
 from .camera import Camera
 from .context import (
     Bindings,
@@ -22,8 +22,8 @@ from .context import (
     set_uniforms,
 )
 from .lights import Light, light_definitions
-from .materials import height_scale, pack_albedo_bounds, pack_surface
-from .packing import pack_bounds, pack_responses
+from .materials import height_scale, pack_conservation, pack_surface
+from .packing import pack_energy, pack_responses
 from .prepared import Prepared, window
 from .progressive import ProgressiveLight
 from .scene import RealtimeScene, load, read_scene
@@ -70,7 +70,7 @@ class Renderer:
         check_version(self.context)
         self.buffers = [self.context.buffer(s.vertices.tobytes()) for s in self.scene.surfaces]
         self.bindings = [
-            Bindings(self.context, pack_surface(s.material) | pack_albedo_bounds(s.material))
+            Bindings(self.context, pack_surface(s.material) | pack_conservation(s.material))
             for s in self.scene.surfaces
         ]
         self._methods: dict[str, Prepared] = {}
@@ -145,7 +145,7 @@ class Renderer:
         method : one of `source.METHODS`.
         camera : the scene's by default.
         exposure : factor on the light, for display as sRGB; None leaves it linear.
-        scale : height scale of all patches, instead of their own; see `bound_for`.
+        scale : height scale of all patches, instead of their own; see `energy_for`.
         coherence_width : µm, instead of their own; not for `lut` and `pq`, whose tables hold it.
         """
         self._draw(
@@ -253,12 +253,14 @@ class Renderer:
                     set_uniforms(program, window(part.tables, coherence_width))
             part.array.render(moderngl.TRIANGLES)
 
-    def bound_for(self, scale: float) -> None:
-        """Take the albedo's bound for another height scale: a second or so, where it is new."""
+    def energy_for(self, scale: float) -> None:
+        """Take what conserves energy at another height scale: a second or so, where it is new."""
         for surface, own in zip(self.scene.surfaces, self.bindings, strict=True):
-            if "bounds" in own.textures:
-                packed = pack_bounds([cached_bound(surface.material.table, scale)])
-                own.textures["bounds"].write(packed.textures[0].data.tobytes())
+            if "energy" in own.textures:
+                found = surface.material.bsdf.energy_scale(scale)
+                values = np.ones((FINE.polar + 1, FINE.azimuthal), np.float32)
+                packed = pack_energy([values if found is None else found[0]], False)
+                own.textures["energy"].write(packed.textures[0].data.tobytes())
 
     def release(self) -> None:
         """Free what lies in the graphics card's memory."""

@@ -139,7 +139,7 @@ class Viewer(PanelWindow):
         _, self.stops = imgui.slider_float("exposure, stops", self.stops, -8.0, 8.0)
         _, self.scale = imgui.slider_float("height scale", self.scale, 0.05, self.largest_scale)
         if imgui.is_item_deactivated_after_edit():
-            self._ready.bound_for(self.scale)
+            self._ready.energy_for(self.scale)
         if not self._baked:
             widest = 4.0 * self.own_width
             _, self.width = imgui.slider_float("coherence, µm", self.width, self.own_width, widest)

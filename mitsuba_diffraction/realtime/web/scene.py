@@ -15,7 +15,7 @@ from ...optics.colour import encode_srgb
 from ...progress import Progress
 from ...tables.table import DiffractionTable
 from ..glsl.lights import light_definitions
-from ..glsl.materials import height_scale, pack_albedo_bounds, pack_surface
+from ..glsl.materials import height_scale, pack_conservation, pack_surface
 from ..glsl.packing import pack_responses
 from ..glsl.scene import RealtimeScene, box_of
 from ..glsl.source import fragment_source, vertex_source
@@ -27,7 +27,7 @@ from .tables import as_columns, fitting_tables
 #: Largest page, bytes.
 MAX_BYTES = 25_000_000
 
-#: Albedo bounds are at height scales 2^n of the scene's own.
+#: What conserves energy is at height scales 2^n of the scene's own.
 OCTAVES = (-2.0, -1.5, -1.0, -0.5, 0.0, 0.5)
 
 _HEADER = 200_000  # bytes for shaders, script and style, generously
@@ -76,7 +76,7 @@ def web_scene(
         progress(number, len(scene.surfaces), f"packing {surface.name}")
         material = surface.material
         # at all height scales that the slider offers
-        common = pack_surface(material) | pack_albedo_bounds(material, [2.0**n for n in OCTAVES])
+        common = pack_surface(material) | pack_conservation(material, [2.0**n for n in OCTAVES])
         entry: dict[str, Any] = {
             "name": surface.name,
             "mesh": sections_of(packed_mesh(surface.vertices), sections.add),
@@ -107,7 +107,7 @@ def web_scene(
         },
         "methods": shown,
         "octaves": [OCTAVES[0], OCTAVES[-1]],
-        "bound_pages": len(OCTAVES),
+        "energy_pages": len(OCTAVES),
         "omissions": list(dict.fromkeys(scene.omissions)),
         "lights": [
             {"name": light.name, "place": light.place.tolist(), "colour": light.colour.tolist()}

@@ -1,8 +1,10 @@
-"""How much light a table's surface reflects, and the bound that conserves energy.
+"""How much light a table's surface reflects, and what conserves energy.
 
 Contents
 --------
-albedo   the directional albedo of the raw model
-bound    an upper bound of it on a grid of directions
-powers   powers of the orders as series in κ
+gain           what becomes of one order's light, by model and material
+transport      the albedo of one wavelength, as a linear map of weights of directions
+conservation   the scale by which no more is reflected than comes in
+grid           the grid of directions
+powers         powers of the orders as series in κ
 """

@@ -60,6 +60,15 @@ class OrderMixture:
         share = (position - lower).astype(np.float32)
         return (self.powers[lower].T * (1.0 - share)) + self.powers[lower + 1].T * share
 
+    def strong_at(self, kappa: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Powers of the strong orders, each at its own κ, shape of κ (..., n)."""
+        position = np.clip(kappa / self.kappa_step, 0.0, len(self.powers) - 1.001)
+        lower = position.astype(int)
+        share = (position - lower).astype(np.float32)
+        order = np.arange(self.powers.shape[1])
+        low, high = self.powers[lower, order], self.powers[lower + 1, order]
+        return np.asarray(low * (1.0 - share) + high * share)
+
 
 def order_mixture(table: DiffractionTable, height_scale: float, smoothing: float) -> OrderMixture:
     """Sort a table's orders.

@@ -4,5 +4,5 @@ Contents
 --------
 store    the files: key, checksum, locks, how large they may grow
 cache    tables and colours
-bounds   bounds of the albedo
+energy   what conserves energy
 """

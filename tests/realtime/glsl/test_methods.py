@@ -20,9 +20,9 @@ from mitsuba_diffraction.optics.fresnel import reflectance
 from mitsuba_diffraction.realtime.glsl.context import compile_program, compiler_words
 from mitsuba_diffraction.realtime.glsl.packing import (
     WAVENUMBERS,
-    pack_bounds,
     pack_colours,
     pack_conductor,
+    pack_energy,
     pack_powers,
     pack_responses,
 )
@@ -43,7 +43,7 @@ from mitsuba_diffraction.realtime.glsl.textures import (
 from mitsuba_diffraction.realtime.glsl.thesis import pack_method, thesis_method
 from mitsuba_diffraction.tables.colour.colour_difference import colour_difference
 from mitsuba_diffraction.tables.colour.table import ColourTable
-from mitsuba_diffraction.tables.energy.bound import AZIMUTHAL, POLAR, AlbedoBound
+from mitsuba_diffraction.tables.energy.conservation import FINE
 from mitsuba_diffraction.tables.store import cache
 from mitsuba_diffraction.thesis.methods import make
 from tests.realtime.glsl.conftest import probed
@@ -214,10 +214,10 @@ def test_one_body_compiles_on_the_desktop_and_in_a_browser(
 ) -> None:
     definitions = {"TEXELS": "2", "TAPS_X": "3", "TAPS_Y": "3", "DIFFRACTING": ""}
     if all_parts:
-        bounds = AlbedoBound(np.ones((POLAR + 1, AZIMUTHAL + 1), np.float32))
+        scale = np.ones((FINE.polar + 1, FINE.azimuthal), np.float32)
         parts = ("COLOUR_MAPPED", "AXIS_MAPPED", "PIGMENTED", "VCAVITY", "THESIS", "COHERENT")
         definitions |= dict.fromkeys(parts, "") | {"SURFACE_KIND": "2"}
-        definitions |= pack_bounds([bounds, bounds]).definitions
+        definitions |= pack_energy([scale, scale], True).definitions
     compile_program(gl, method, definitions).release()
     if "GL_ARB_ES3_compatibility" not in gl.extensions:
         pytest.skip(f"{gl.info['GL_RENDERER']} compiles no GLSL ES")

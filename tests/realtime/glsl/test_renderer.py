@@ -17,7 +17,7 @@ from mitsuba_diffraction.realtime.comparison.measures import regions
 from mitsuba_diffraction.realtime.comparison.truth import box_sensor, seen, with_lights
 from mitsuba_diffraction.realtime.glsl.context import check_version, headless_context
 from mitsuba_diffraction.realtime.glsl.renderer import Renderer
-from mitsuba_diffraction.tables.energy.bound import AZIMUTHAL, POLAR, AlbedoBound
+from mitsuba_diffraction.tables.energy.conservation import FINE
 
 mi = pytest.importorskip("mitsuba")
 
@@ -142,30 +142,29 @@ def test_pictures_agree_with_path_traced_ones(renderer: Any) -> None:
             assert bias == pytest.approx(1.0, abs=0.06)
 
 
-def test_another_height_scale_has_its_own_bound(
+def test_another_height_scale_has_its_own_energy(
     gl: Any, some_variant: str, table_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    plate = mi.load_dict({"type": "diffraction", "table": str(table_file)})
+    # the real ones take seconds; light is multiplied by them twice, for both directions
+    shape = (FINE.polar + 1, FINE.azimuthal)
+    scales = {1.0: 1.0, 1.1: 1.0, 1.4: 0.5}
+    monkeypatch.setattr(
+        type(plate),
+        "energy_scale",
+        lambda self, scale: (np.full(shape, scales[scale], np.float32), False),
+    )
     scene = {
         "type": "scene",
         "sensor": sensor(24, 16),
-        "plate": {"type": "rectangle", "bsdf": {"type": "diffraction", "table": str(table_file)}},
+        "plate": {"type": "rectangle", "bsdf": plate},
         "sun": {"type": "directional", "direction": [0.0, -1.0, -0.8]},
     }
     made = Renderer(mi.load_dict(scene), context=gl)
-    # the real ones take seconds; light is divided by them
-    shape = (POLAR + 1, AZIMUTHAL + 1)
-    bounds = {
-        1.1: AlbedoBound(np.ones(shape, np.float32)),
-        1.4: AlbedoBound(np.full(shape, 4.0, np.float32)),
-    }
-    monkeypatch.setattr(
-        "mitsuba_diffraction.realtime.glsl.renderer.cached_bound",
-        lambda table, scale: bounds[scale],
-    )
     frame = made.target(24, 16)
     pictures = []
-    for scale in bounds:
-        made.bound_for(scale)
+    for scale in (1.1, 1.4):
+        made.energy_for(scale)
         made.draw(frame.frame, "lut")
         pictures.append(np.frombuffer(frame.frame.read(components=3, dtype="f4"), np.float32))
     assert pictures[0].max() > 0.0

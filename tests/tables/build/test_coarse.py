@@ -9,8 +9,9 @@ from scipy.special import jv
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.tables.colour.table import ColourTable
-from mitsuba_diffraction.tables.energy.albedo import AlbedoModel
+from mitsuba_diffraction.tables.energy.conservation import FINE
 from mitsuba_diffraction.tables.energy.powers import power_series
+from mitsuba_diffraction.tables.energy.transport import Orders
 from tests.directions import rough_patch
 
 #: 19.2 µm wide: a coarse cell holds five by five orders. Nyquist's frequency is 10.5 rad/µm.
@@ -101,10 +102,16 @@ def test_order_0_keeps_its_lobe_beyond_kappa_max():
 def test_the_bound_of_the_albedo_counts_what_lies_outside(whole):
     table = DiffractionTable.build(PATCH, coherence_width=WIDTH, q_max=Q_MAX)
     azimuths = np.linspace(0.0, 2 * np.pi, 5)
-    for theta in (0.0, 0.6, 1.2):
-        exact, found = (AlbedoModel(t).albedo(theta, azimuths, 450.0) for t in (whole, table))
-        # what lies outside is some percent of all, and right on average
-        assert found == pytest.approx(exact, rel=5e-3)
+    theta, weights = (
+        np.array([0.0, 0.6, 1.2]),
+        np.ones((FINE.polar + 1, FINE.azimuthal), np.float32),
+    )
+    exact, found = (
+        Orders(t).transport(theta, azimuths, 450.0, "kirchhoff", None, FINE)(weights)
+        for t in (whole, table)
+    )
+    # what lies outside is some percent of all, and right on average
+    assert found == pytest.approx(exact, rel=5e-3)
 
 
 def test_what_sums_orders_on_its_own_refuses(restricted):

@@ -120,37 +120,42 @@ float groove_shadow(float cos_i, float cos_o, float one_plus_dot)
 
 #ifdef ENERGY_CONSERVING
 
-uniform sampler2D bounds;   // of the albedo at the corners of BOUND_POLAR × BOUND_AZIMUTHAL cells
-uniform float bound_page;   // between pages, which are for different height scales
+uniform sampler2D energy;    // s at the corners of ENERGY_POLAR × ENERGY_AZIMUTHAL cells
+uniform float energy_page;   // between pages, which are for different height scales
 
-float bound_on_page(int page, vec2 cell)
+float energy_on_page(int page, vec2 cell)
 {
-    vec2 lower = clamp(floor(cell), vec2(0.0), vec2(BOUND_POLAR - 1, BOUND_AZIMUTHAL - 1));
+    vec2 lower = clamp(floor(cell), vec2(0.0), vec2(ENERGY_POLAR - 1, ENERGY_AZIMUTHAL - 1));
     vec2 t = clamp(cell - lower, 0.0, 1.0);
-    vec4 corner = entry(bounds, (page * BOUND_POLAR + int(lower.x)) * BOUND_AZIMUTHAL + int(lower.y));
+    vec4 corner = entry(energy, (page * ENERGY_POLAR + int(lower.x)) * ENERGY_AZIMUTHAL + int(lower.y));
     vec2 along = mix(corner.xz, corner.yw, t.y);
     return mix(along.x, along.y, t.x);
 }
 
-// max(1, a) of a direction, given its tangential part in the patch's frame.
-float albedo_bound(vec2 tangential, float cosine)
+// s of a direction, given its tangential part in the patch's frame.
+float energy_scale(vec2 tangential, float cosine)
 {
     // 1 − 2θ/π by a minimax polynomial over √(1 − cosθ), 3e-6
     float c = clamp(cosine, 0.0, 1.0);
     float remaining = 1.0 - sqrt(1.0 - c) * (0.99999695 + c * (-0.13641527 + c * (0.05451908
                       + c * (-0.02394849 + c * 0.006196195))));
-    vec2 cell = vec2((1.0 - sqrt(max(remaining, 0.0))) * (float(BOUND_POLAR) / BOUND_SHARE),
-                     turn_of(tangential) * float(BOUND_AZIMUTHAL));
-#if BOUND_PAGES > 1
-    int page = int(clamp(floor(bound_page), 0.0, float(BOUND_PAGES - 2)));
-    float bound = mix(bound_on_page(page, cell), bound_on_page(page + 1, cell),
-                      clamp(bound_page - float(page), 0.0, 1.0));
+    vec2 cell = vec2((1.0 - sqrt(max(remaining, 0.0))) * (float(ENERGY_POLAR) / ENERGY_SHARE),
+                     turn_of(tangential) * float(ENERGY_AZIMUTHAL));
+#if ENERGY_PAGES > 1
+    int page = int(clamp(floor(energy_page), 0.0, float(ENERGY_PAGES - 2)));
+    return mix(energy_on_page(page, cell), energy_on_page(page + 1, cell),
+               clamp(energy_page - float(page), 0.0, 1.0));
 #else
-    float bound = bound_on_page(0, cell);
+    return energy_on_page(0, cell);
 #endif
-    // towards the horizon the albedo grows with 1/cos²θ
-    float beyond = max(BOUND_LAST_COSINE / max(cosine, 1e-6), 1.0);
-    return bound * beyond * beyond;
+}
+
+// (min/max)² of two cosines, clamped: see tables/energy/gain.py.
+float energy_fade(float cos_i, float cos_o)
+{
+    float one = min(cos_i, ENERGY_GRAZING), other = min(cos_o, ENERGY_GRAZING);
+    float ratio = min(one, other) / max(one, other);
+    return ratio * ratio;
 }
 
 #endif

@@ -64,8 +64,8 @@ vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
 #endif
     begin_pair(wi, wo, through);
 #ifdef ENERGY_CONSERVING
-    outside /= max(albedo_bound(in_patch(wi, rotation), wi.z),
-                   albedo_bound(in_patch(wo, rotation), wo.z));
+    outside *= energy_scale(in_patch(wi, rotation), wi.z)
+             * energy_scale(in_patch(wo, rotation), wo.z) * energy_fade(wi.z, wo.z);
 #endif
 #ifdef VCAVITY
     outside *= groove_shadow(wi.z, wo.z, one_plus_dot);

@@ -195,7 +195,7 @@ class Drawing {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     const octaves = Math.log2(view.heights);
     const [first, last] = this.header.octaves;
-    const page = ((octaves - first) / (last - first)) * (this.header.bound_pages - 1);
+    const page = ((octaves - first) / (last - first)) * (this.header.energy_pages - 1);
     for (const surface of this.surfaces) {
       const program = this.programs[surface.programs[view.method]];
       program.use();
@@ -205,7 +205,7 @@ class Drawing {
       program.set({
         ...view.uniforms,
         height_scale: (surface.height_scale ?? 1) * view.heights,
-        bound_page: page,
+        energy_page: page,
       });
       surface.mesh.draw();
     }

@@ -1,0 +1,94 @@
+"""What a table's surface reflects of three materials, and what energy conservation takes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..tables.energy.conservation import Index, albedos
+from ..tables.store.energy import Energy
+from ..tables.table import DiffractionTable
+
+#: Polar angles (degrees) and wavelengths (nm) looked at, at `AZIMUTHS` azimuths each.
+ANGLES, WAVELENGTHS, AZIMUTHS = (0.0, 30.0, 45.0, 60.0, 70.0, 75.0, 80.0), (450.0, 550.0, 650.0), 24
+#: Angles that are told of one by one.
+SHOWN = (0.0, 45.0, 60.0, 75.0)
+#: What is taken beyond this share is warned of.
+MUCH = 0.05
+
+
+def energy_summary(table: DiffractionTable) -> dict[str, Any]:
+    """For each material what is reflected, before and after, and how much of it is taken.
+
+    The albedos are sums over the orders at 24 azimuths of seven angles up to 80° at 450, 550 and
+    650 nm, not at the directions for which the scale was made.
+    """
+    return {
+        name: _of_material(table, model, index) for name, (model, index) in _materials().items()
+    }
+
+
+def _materials() -> dict[str, tuple[str, Index]]:
+    return {
+        "dielectric 1.5": ("small_slope", lambda wavelengths: np.full(len(wavelengths), 1.5 + 0j)),
+        "aluminium": ("small_slope", _aluminium),
+        "none (R = 1)": ("kirchhoff", lambda wavelengths: None),
+    }
+
+
+def _aluminium(wavelengths: NDArray[np.float64]) -> NDArray[np.complex128]:
+    parts = []
+    for name in ("eta", "k"):
+        nodes, values = np.loadtxt(
+            Path(str(mi.file_resolver().resolve(f"data/ior/Al.{name}.spd")))
+        ).T
+        parts.append(np.interp(wavelengths, nodes, values))
+    return np.asarray(parts[0] + 1j * parts[1])
+
+
+def _of_material(table: DiffractionTable, model: str, index: Index) -> dict[str, Any]:
+    found = Energy(table, model, index, table.wavelength_range).at(1.0)
+    # off the grid, and off the axes of symmetry
+    theta = np.asarray(np.radians(ANGLES), np.float64)
+    phi: NDArray[np.float64] = (np.arange(AZIMUTHS, dtype=float) + 0.3) * (2.0 * np.pi / AZIMUTHS)
+    pairs = [
+        albedos(table, 1.0, model, index, found, theta, phi, wavelength)
+        for wavelength in WAVELENGTHS
+    ]
+    raw, kept = (np.stack(part).astype(float) for part in zip(*pairs, strict=True))
+    taken = 1.0 - kept / raw
+    gains = raw > 1.0
+    result: dict[str, Any] = {
+        "model": model,
+        "albedo": _range(raw),
+        "albedo, conserved": _range(kept),
+        "taken, largest": round(float(taken.max()), 4),
+        "taken at": {
+            f"{angle:g}°": round(float(taken[:, ANGLES.index(angle)].max()), 4) for angle in SHOWN
+        },
+        "conserved over raw where that is at most 1": _range((kept / raw)[~gains]),
+        "within 1 % there": round(float((np.abs(taken[~gains]) <= 0.0101).mean()), 3),
+    }
+    if gains.any():
+        result["conserved where raw is above 1"] = _range(kept[gains])
+        inside = (kept[gains] >= 0.97) & (kept[gains] <= 1.001)
+        result["between 0.97 and 1.001 there"] = round(float(inside.mean()), 3)
+    return result
+
+
+def _range(values: NDArray[np.floating]) -> list[float]:
+    return [round(float(values.min()), 3), round(float(values.max()), 3)]
+
+
+def energy_warnings(summary: dict[str, Any]) -> list[str]:
+    """Which materials lose much."""
+    return [
+        f"made of {name}, the model gains energy: up to {100 * found['taken, largest']:.0f} % is "
+        "taken (up to 80° from the normal; energy_conserving=false keeps it)"
+        for name, found in summary.items()
+        if found["taken, largest"] > MUCH
+    ]

@@ -1,0 +1,117 @@
+"""What conserves energy, kept by what it is made of: a second's work, a file of a megabyte."""
+
+from __future__ import annotations
+
+import math
+import weakref
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..energy import conservation as made
+from ..energy import gain, transport
+from ..energy.conservation import Conservation, DirectionalTable, Index, conservation
+from ..energy.grid import LAST_ANGLE
+from ..sampling.order_mixture import MOST_STRONG, STRONG
+from ..table import DiffractionTable
+from .store import Record, kept, key_of
+
+#: Raised whenever the computation changes.
+VERSION = 4
+
+#: Height scales are n/steps: this phase (rad) changes at most in between. The power of an order
+#: bends by a fiftieth then, and by less at grazing angles, where there is most to take.
+_PHASE = 0.8
+_FEWEST_STEPS = 4
+#: As good as no heights at all.
+_FLAT = 1e-3
+#: Wavelengths at which a material is told from another.
+_PROBES = 24
+
+_SETTINGS = (
+    VERSION, str(made.FINE), str(made.COARSE), made.FINE_WAVELENGTHS, made.COARSE_WAVELENGTHS,
+    made.TARGET, made.SWEEPS, made.LARGEST, made.PARTS, made.FEW_ORDERS, made.GENTLE,
+    made.PEAKS, gain.POLAR_NODES, gain.AZIMUTH_NODES, gain.GRAZING,
+    transport.RINGS, transport.STEPS, transport.SMOOTHING,
+    transport.LEAST_WEAK, STRONG, MOST_STRONG, LAST_ANGLE,
+)  # fmt: skip
+
+_known: weakref.WeakKeyDictionary[DiffractionTable, dict[str, Conservation]] = (
+    weakref.WeakKeyDictionary()
+)
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Of a table, a model and a material; what it holds at height scales is made when asked for.
+
+    Attributes
+    ----------
+    table, model, index, wavelength_range : as in `tables.energy.conservation`.
+    """
+
+    table: DiffractionTable
+    model: str
+    index: Index
+    wavelength_range: tuple[float, float]
+
+    def nodes(self, height_scale: float, *, interval: bool = False) -> tuple[float, float]:
+        """The two height scales around one, for which something is made; equal at a node.
+
+        They lie evenly, 1 among them, so close that an order's power bends little in between. An
+        optimisation of the heights thus sees a continuous scale with derivatives, and waits only
+        where it enters an interval that nobody has been in before.
+
+        interval : two nodes even if the scale is at one, for derivatives.
+        """
+        phase = 2.0 * self.table.q_limit * self.table.expansion.half_range
+        steps = max(_FEWEST_STEPS, math.ceil(phase / _PHASE))
+        # Beyond the table's own limit nothing can be looked up, so the last interval is shorter
+        most = max(self.table.height_scale_max, _FLAT)
+
+        def node(n: int) -> float:
+            return min(max(n / steps, _FLAT), most)
+
+        position = height_scale * steps  # of a scale in single precision
+        lower = min(math.floor(position + 1e-4), math.ceil(most * steps - 1e-4) - 1)
+        at_node = abs(position - lower) < 1e-4
+        return node(lower), node(lower if at_node and not interval else lower + 1)
+
+    def at(self, height_scale: float) -> Conservation:
+        """From memory, from disk, or computed."""
+        probes = np.geomspace(*self.wavelength_range, _PROBES)
+        found = self.index(probes)
+        indices = None if found is None else _rounded(found)
+        material = [self.model, indices, list(self.wavelength_range)]
+        return kept(
+            "energy",
+            key_of(_SETTINGS, self.table.digest(), height_scale, material),
+            _known.setdefault(self.table, {}),
+            lambda: conservation(
+                self.table, height_scale, self.model, self.index, self.wavelength_range
+            ),
+            _record,
+            _conservation,
+        )
+
+
+def _rounded(index: NDArray[np.complex128]) -> list[str]:
+    """Single precision's noise makes no other material."""
+    return [f"{n.real:.5g} {n.imag:.5g}" for n in index]
+
+
+def _record(found: Conservation) -> Record:
+    tables = [found.albedo] if found.scale is None else [found.albedo, found.scale]
+    return Record(
+        [table.wavelengths.tolist() for table in tables], [table.values for table in tables]
+    )
+
+
+def _conservation(record: Record) -> Conservation:
+    tables = []
+    for wavelengths, values in zip(record.document, record.arrays, strict=True):
+        if values.ndim != 3 or len(values) != len(wavelengths) or not np.isfinite(values).all():
+            raise ValueError(f"values of shape {values.shape}")
+        tables.append(DirectionalTable(np.array(wavelengths, float), values))
+    return Conservation(tables[0], tables[1] if len(tables) > 1 else None)

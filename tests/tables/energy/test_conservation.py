@@ -1,0 +1,168 @@
+"""Albedos of model and material, and the scale by which no more is reflected than comes in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import reference
+from mitsuba_diffraction.optics import fresnel
+from mitsuba_diffraction.tables.energy import conservation as energy
+from mitsuba_diffraction.tables.energy.gain import Gain, fade, read
+from mitsuba_diffraction.tables.energy.grid import LAST_ANGLE, DirectionGrid
+from mitsuba_diffraction.tables.energy.transport import Orders
+from tests.directions import polar
+
+pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+
+ALUMINIUM = 0.96 + 6.69j  # at 550 nm (Rakić 1995)
+MATERIALS = {
+    "dielectric": ("small_slope", 1.5 + 0j),
+    "aluminium": ("small_slope", ALUMINIUM),
+    "perfect": ("kirchhoff", None),
+}
+GRID = DirectionGrid(12, 16)
+
+
+def index_of(value):
+    return lambda wavelengths: None if value is None else np.full(len(wavelengths), value)
+
+
+def grating(depth: float = 0.2) -> md.HeightField:
+    x = np.arange(32) * (1.6 / 32)
+    return md.HeightField(np.tile(0.5 * depth * np.cos(2 * np.pi * x / 1.6), (8, 1)), 0.05)
+
+
+def rough() -> md.HeightField:
+    rng = np.random.default_rng(4)
+    frequency = np.hypot(*np.meshgrid(np.fft.fftfreq(96, 0.125), np.fft.fftfreq(96, 0.125)))
+    spectrum = np.fft.fft2(rng.standard_normal((96, 96))) * np.exp(-((frequency / 0.9) ** 2))
+    heights = np.fft.ifft2(spectrum).real
+    return md.HeightField(0.08 * heights / heights.std(), 0.125)
+
+
+@pytest.fixture(scope="module")
+def tables():
+    return {
+        "grating": md.DiffractionTable.build(grating()),
+        "rough": md.DiffractionTable.build(rough(), coherence_width=12.0),
+    }
+
+
+def raw_albedo(table, theta, phi, wavelength, material):
+    model, index = MATERIALS[material]
+    transport = Orders(table).transport(
+        np.radians([theta]), np.radians([phi]), wavelength, model, index, GRID
+    )
+    return float(transport(np.ones((GRID.polar + 1, GRID.azimuthal), np.float32))[0, 0])
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize(
+    ("theta", "phi", "wavelength"), [(0, 0, 500), (40, 20, 430), (65, 60, 650)]
+)
+def test_a_gratings_albedo_is_the_sum_of_its_efficiencies(tables, material, theta, phi, wavelength):
+    """Order by order, from the reference's peaks."""
+    _, index = MATERIALS[material]
+    wi, sigma = polar(theta, phi), 65.0 / 4.0
+    parameters = {} if index is None else {"eta": index.real, "k": index.imag}
+    total, lam = 0.0, wavelength * 1e-3
+    for m in range(-8, 9):
+        x, y = m * lam / 1.6 - wi[0], -wi[1]
+        if x * x + y * y < 0.995:
+            wo = np.array([x, y, np.sqrt(1.0 - x * x - y * y)])
+            peak = reference.brdf(
+                grating(), wi, wo, wavelength, model=MATERIALS[material][0], **parameters
+            )[0]
+            # the lobe is exp(−σ²k²|Δ|²) in direction cosines, and cosθ dω is their area
+            total += peak * np.pi * (lam / (2 * np.pi * sigma)) ** 2
+    # lobes have a width, over which G changes
+    assert raw_albedo(tables["grating"], theta, phi, wavelength, material) == pytest.approx(
+        total, rel=0.01
+    )
+
+
+def test_a_flat_surface_reflects_what_fresnel_says():
+    table = md.DiffractionTable.build(md.HeightField(np.zeros((8, 8)), 8.0))
+    for material, (_, index) in MATERIALS.items():
+        for theta in (0.0, 45.0, 75.0):
+            exact = fresnel.reflectance(np.cos(np.radians(theta)), index or np.inf)
+            # the lobe's width at 75°, and bilinear tables
+            assert raw_albedo(table, theta, 0.0, 550, material) == pytest.approx(exact, rel=4e-3)
+
+
+@pytest.mark.parametrize("surface", ["grating", "rough"])
+def test_a_dielectric_gains_nothing_and_nothing_is_taken(tables, surface):
+    found = energy.conservation(tables[surface], 1.0, "small_slope", index_of(1.5), (400.0, 700.0))
+    assert found.scale is None
+    assert found.albedo.values.max() < 1.0
+
+
+def test_a_gentle_metal_gains_nothing_and_nothing_is_taken():
+    x = np.arange(32) * (2.5 / 32)
+    gentle = md.HeightField(np.tile(0.02 * np.cos(2 * np.pi * x / 2.5), (8, 1)), 2.5 / 32)
+    table = md.DiffractionTable.build(gentle)
+    found = energy.conservation(table, 1.0, "small_slope", index_of(ALUMINIUM), (550.0, 550.0))
+    assert found.scale is None
+
+
+def test_a_rough_surface_keeps_what_it_may(tables):
+    arguments = (tables["rough"], 1.0, "kirchhoff", index_of(None))
+    found = energy.conservation(*arguments, (550.0, 550.0))
+    assert found.scale is not None
+    theta, phi = np.radians([3.0, 31.0, 52.0, 68.0, 77.0]), np.radians([5.0, 72.0, 201.0, 333.0])
+    raw, kept = energy.albedos(*arguments, found, theta, phi, 550.0)
+    assert raw.max() > 1.01  # or the test would say little
+    assert kept.max() <= 1.001
+    # an aim of 0.99, and what lies between the grid's directions
+    assert np.all(kept >= np.minimum(raw, 1.0) * 0.97)
+    assert np.all(kept <= raw * 1.01)
+
+
+def test_a_gratings_spikes_are_taken(tables):
+    arguments = (tables["grating"], 1.0, "kirchhoff", index_of(None))
+    found = energy.conservation(*arguments, (500.0, 600.0))
+    rng = np.random.default_rng(0)
+    for wavelength in rng.uniform(500.0, 600.0, 4):
+        theta, phi = np.radians(rng.uniform(0, 85, 15)), np.radians(rng.uniform(0, 360, 15))
+        raw, kept = energy.albedos(*arguments, found, theta, phi, wavelength)
+        assert raw.max() > 1.2
+        assert np.percentile(kept, 99) <= 1.001
+        assert kept.max() <= 1.03  # tips of spikes between the directions that were looked at
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+def test_the_tabulated_gain_is_the_gain(tables, material):
+    model, index = MATERIALS[material]
+    gain = Gain(tables["rough"], model, index, 2 * np.pi / 0.55, 1.0)
+    theta = np.radians([0.0, 33.0, 71.0])
+    rng = np.random.default_rng(0)
+    cos_o, turn = rng.uniform(0.05, 1.0, 300), rng.uniform(-np.pi, np.pi, 300)
+    sin_o = np.sqrt(1.0 - cos_o**2)
+    for angle, table in zip(theta, gain.tables(theta), strict=True):
+        exact = gain.ratio(np.cos(angle), sin_o * np.cos(turn), sin_o * np.sin(turn), cos_o)
+        # what an albedo sees of it: 3° and 15 nodes of azimuth where it is steep, at 71°
+        assert np.abs(read(table, cos_o, turn) - exact).mean() < 4e-3 * exact.mean()
+
+
+def test_fading_is_symmetric_and_leaves_mirrors_and_steep_light():
+    rng = np.random.default_rng(0)
+    one, other = rng.uniform(0.001, 1.0, (2, 200))
+    assert np.array_equal(fade(one, other), fade(other, one))
+    assert np.all(fade(one, one) == 1.0)
+    assert np.all(fade(0.2 + one, 0.2 + other) == 1.0)
+    assert fade(0.5, 0.001) < 1e-4
+
+
+def test_the_grid_interpolates_what_is_linear_and_goes_round():
+    grid = DirectionGrid(10, 12)
+    assert grid.theta[0] == 0.0
+    assert grid.theta[-1] == pytest.approx(LAST_ANGLE)
+    rows = np.arange(11.0, dtype=np.float32)[:, None] + np.zeros((1, 12), np.float32)
+    theta = np.radians([0.0, 10.0, 47.0, 89.9])
+    found = grid.interpolation(theta, np.radians([-30.0, 0.0, 359.0, 725.0]))(rows)
+    assert found == pytest.approx(grid.row(theta), abs=1e-5)
+    round_ = np.cos(grid.phi).astype(np.float32) + np.zeros((11, 1), np.float32)
+    middle = grid.interpolation(0.5, np.radians([345.0, -15.0]))(round_)
+    assert middle == pytest.approx(0.5 * (1.0 + np.cos(np.radians(30.0))), abs=1e-6)
