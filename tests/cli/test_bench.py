@@ -78,6 +78,8 @@ def test_everything_is_measured_and_written(measured):
     assert goals == {
         "at most 4× roughconductor",
         "within 1.5× of bare gathers",
+        "at most 1.15× kirchhoff",
+        "at most 1.25× kirchhoff",
         "at most 3× roughconductor",
         "at least 30× the defaults",
     }

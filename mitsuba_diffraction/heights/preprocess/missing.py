@@ -93,6 +93,8 @@ def _harmonic(start: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
     at, neighbour = (np.concatenate(ends) for ends in zip(*links, strict=True))
     adjacency = sparse.coo_array((np.ones(at.size), (at, neighbour)), shape=(count, count))
     laplacian = (sparse.diags_array(degree) - adjacency).tocsr()
+    if not np.any(laplacian @ start[missing] - measured):
+        return start  # solved, which conjugate gradients divide by
     # Heights come as float32 at best, 1e-7 of their size; solving far below that gains nothing.
     solution, failed = linalg.cg(
         laplacian, measured, x0=start[missing], rtol=1e-9, maxiter=10 * (ny + nx)

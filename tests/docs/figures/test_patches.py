@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from PIL import Image
 
-from mitsuba_diffraction.analysis.pictures import patches
+from docs.make.figures import patches
+from mitsuba_diffraction.analysis.pictures.patches import colour_field, patches_figure
 from mitsuba_diffraction.heights.gratings import cd, elaphe_like
 
 
 def test_a_row_of_panels_with_units_for_each_patch():
     fields = [elaphe_like(20.0, 128), cd(20.0, 128)]
-    figure = patches.patches_figure(fields)
+    figure = patches_figure(fields)
     panels = [axes for axes in figure.axes if axes.get_xlabel()]
     assert len(panels) == 10
     for axes in panels:
@@ -20,7 +21,7 @@ def test_a_row_of_panels_with_units_for_each_patch():
 
 def test_colours_lie_where_the_grating_throws_them():
     """A CD's first orders, 650 nm/1.6 µm and so on, along v."""
-    colours = patches.colour_field(cd(32.0, 320, irregularity=0), 201)
+    colours = colour_field(cd(32.0, 320, irregularity=0), 201)
     for channel, wavelength in enumerate((0.65, 0.55, 0.45)):
         for order in (-2, -1, 1, 2):
             v = round(100 + 100 * order * wavelength / 1.6)  # a pixel is 0.01, an order 0.02 wide

@@ -74,3 +74,10 @@ def test_what_cannot_be_filled_is_refused(share, method, word):
     heights.ravel()[: int(share * 100)] = np.nan
     with pytest.raises(DiffractionError, match=word):
         fill_missing(heights, method, "patch")
+
+
+def test_a_start_that_is_the_solution_is_left_as_it_is():
+    heights = np.ones((2, 4))
+    heights[1, 2:] = np.nan
+    filled, _ = fill_missing(heights, "harmonic", "two gaps")
+    assert np.array_equal(filled, np.ones((2, 4)))
