@@ -78,7 +78,7 @@ scaled to a given RMS slope. Solved by `grcwa` (coupled waves). Deviation of col
 planes of incidence (along x, along y, between), Kirchhoff / small slope alone / the blend; *change*
 is what more harmonics and layers ({coarse} to {fine}) changed, at most, in the same measure: at
 460 nm the first are hardly more than there are orders. Cut 3 at 60° with 241 harmonics and 24
-layers moved a model's deviation by 0.5 % at most.
+layers moved the default's deviation by 0.5 % and Kirchhoff's by 0.8 %.
 
 {table(header, rows)}
 
