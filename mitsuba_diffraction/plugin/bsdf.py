@@ -82,10 +82,10 @@ energy_conserving : boolean [true]
     found for this table, model, material and each wavelength, so that no more is reflected than
     comes in: reciprocal. Kirchhoff's model fades within 10° of the horizon as well. Dielectrics
     gain nothing and are as they are; metal gratings lose some of the light of directions that gain
-    nothing, too (docs/energy.md has figures). `false` is the model as it is, for checks. The scale takes a second or more the first time, and is kept
-    in the cache. It follows height_scale, interpolated between a few: an optimisation waits where
-    it enters such an interval for the first time. For its derivative, enable that of height_scale
-    before parameters.update().
+    nothing, too (docs/energy.md has figures). `false` is the model as it is, for checks. The scale
+    takes a second or more the first time, and is kept in the cache. It follows height_scale,
+    interpolated between a few: an optimisation waits where it enters such an interval for the first
+    time. For its derivative, enable that of height_scale before parameters.update().
 shadowing : string [none]
     `vcavity`: the surface shadows itself like long V-shaped grooves (Torrance and Sparrow 1967);
     `none`.
