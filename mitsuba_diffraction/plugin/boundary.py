@@ -10,7 +10,6 @@ and in polarised variants the Mueller matrix of J' takes the place of N'.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import drjit as dr
@@ -30,8 +29,6 @@ MODELS = ("small_slope", "kirchhoff")
 #: Entries ss, sp, ps, pp of a Jones matrix: first the outgoing, then the incident polarisation.
 Jones = tuple[Number, Number, Number, Number]
 
-#: Of 2, that makes s.
-_EXPONENT = -1.0 / (3.0 * math.log(2.0))
 # Squared sines below which a direction is the normal itself, or two are one
 _NORMAL = 1e-20
 
@@ -96,13 +93,16 @@ class SmallSlope:
             matrices *= len(wavenumbers)
         shares = self._shares(pair, height_scale, wavenumbers)
         blended = [
-            tuple(dr.fma(b - k, s, k) for k, b in zip(*both, strict=True))
-            for both, s in zip(matrices, shares, strict=True)
+            tuple(dr.fma(k - b, share, b) for k, b in zip(*both, strict=True))
+            for both, share in zip(matrices, shares, strict=True)
         ]
         return light.of_jones(blended)
 
     def _shares(self, pair: Pair, height_scale: Float, wavenumbers: list[Float]) -> list[Float]:
-        """s = exp(−(κσ_q)⁴/3) for each channel."""
+        """Kirchhoff's share for each channel, 1 − s with s = exp(−(κσ_q)⁴/3).
+
+        Not s: near the horizon K is so large beside B that the last digit of 1 − s counts.
+        """
         # An order of no frequency to speak of has the first node's roughness, as q → 0
         squared = dr.maximum(dr.squared_norm(pair.uv), 1e-20)
         start = dr.fma(dr.log2(squared), 0.5 * NODES_PER_OCTAVE, -self._first * NODES_PER_OCTAVE)
@@ -113,7 +113,7 @@ class SmallSlope:
             lower = index_between(dr.floor(place), 0.0, self._last)
             low, high = read_record(self._nodes, mi.UInt32(lower), 2)
             variance = dr.lerp(low, high, dr.clip(place - lower, 0.0, 1.0))
-            shares.append(dr.exp2(dr.square(squared_w * dr.square(k) * variance) * _EXPONENT))
+            shares.append(_one_minus_exp(dr.square(squared_w * dr.square(k) * variance) / 3.0))
         return shares
 
     def __str__(self) -> str:
@@ -121,6 +121,12 @@ class SmallSlope:
 
 
 Boundary = Kirchhoff | SmallSlope
+
+
+def _one_minus_exp(x: Float) -> Float:
+    """1 − exp(−x), x ≥ 0, to single precision: near 0 by its series, with an error of x⁵/120."""
+    series = x * dr.fma(x, dr.fma(x, dr.fma(x, -1.0 / 24.0, 1.0 / 6.0), -0.5), 1.0)
+    return dr.select(x < 0.05, series, 1.0 - dr.exp(-x))
 
 
 class _Path:

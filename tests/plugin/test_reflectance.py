@@ -15,8 +15,9 @@ WIDTH = 2.4
 
 
 def load(field=FLAT, **parameters):
-    """A mirror with these parameters."""
-    return mi.load_dict(md.bsdf_dict(field, coherence_width=WIDTH, model="kirchhoff", **parameters))
+    """A mirror with these parameters: the model as it is, which has R as a factor."""
+    raw = {"model": "kirchhoff", "energy_conserving": False}
+    return mi.load_dict(md.bsdf_dict(field, coherence_width=WIDTH, **(raw | parameters)))
 
 
 def ratios(wi, wo, wavelengths, **parameters):

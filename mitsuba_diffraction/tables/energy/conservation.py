@@ -22,7 +22,6 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -125,7 +124,7 @@ def conservation(
             return Conservation(albedo, None)
     if maps.fades:
         transports = maps.at(wavelengths, grid.theta, grid.phi, grid, faded=True)
-    aims = np.minimum(values, np.float32(TARGET))
+    aims = np.clip(values, np.float32(0.0), np.float32(TARGET))  # quadrature may fall below 0
     scale = np.stack([_scaled(*one) for one in zip(transports, aims, strict=True)])
     return Conservation(albedo, maps.lowered(DirectionalTable(wavelengths, scale)))
 
@@ -156,9 +155,13 @@ def albedos(
     return raw, found.scale.at(theta[:, None], phi, wavelength) * transport(s)
 
 
-@lru_cache(maxsize=4)
 def _orders(table: DiffractionTable, height_scale: float) -> Orders:
-    return Orders(table, height_scale)
+    """Those last asked for, kept in the table itself: they go with it."""
+    last: dict[float, Orders] = table.__dict__.setdefault("_orders", {})
+    if height_scale not in last:
+        last.clear()
+        last[height_scale] = Orders(table, height_scale)
+    return last[height_scale]
 
 
 def _scaled(transport: Transport, aim: Array) -> Array:
