@@ -247,9 +247,9 @@ def test_arguments_broadcast():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"coherence": "none"}, "coherence='none' is unknown; choose one of ensemble, patch"),
-        ({"coherence_width": 0.0}, "coherence_width=0.0 must be a positive number of µm"),
-        ({"coherence_width": -1.0}, "coherence_width=-1.0 must be a positive"),
+        ({"coherence": "none"}, "coherence='none' must be one of ensemble, patch"),
+        ({"coherence_width": 0.0}, "coherence_width=0 must be a positive number of µm"),
+        ({"coherence_width": -1.0}, "coherence_width=-1 must be a positive"),
         ({"coherence_width": np.nan}, "coherence_width=nan must be a positive"),
         ({"coherence_width": np.inf}, "coherence_width=inf must be a positive"),
         ({"wavelength": 0.0}, "wavelength must be positive, in nm"),

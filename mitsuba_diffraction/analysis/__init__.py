@@ -6,4 +6,5 @@ maps       BRDF maps: the hemisphere of view directions
 tradeoff   accuracy against speed and memory
 bench      speed and noise
 pictures   patches and albedo as pictures
+energy     how much a table reflects before and after energy is conserved
 """
