@@ -127,7 +127,7 @@ def _other_number(rng: np.random.Generator, data: bytearray) -> None:
 
 def check_table(rng: np.random.Generator) -> None:
     """A table is refused, or every value that it gives is finite and not negative."""
-    _check(rng, [name for name in originals() if name.endswith(".exr")], _use_table)
+    _check(rng, [name for name in originals() if name.endswith(".exr")], use_table)
 
 
 def check_document(rng: np.random.Generator) -> None:
@@ -147,7 +147,7 @@ def check_document(rng: np.random.Generator) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "table.exr")
         table.save(path)
-        _use_table(path)
+        use_table(path)
 
 
 @functools.cache
@@ -236,7 +236,7 @@ def _use_plan(path: Path) -> None:
         TableSettings(coherence_width=2.0, **limits)
 
 
-def _use_table(path: Path) -> None:
+def use_table(path: Path) -> None:
     table = md.DiffractionTable.load(path)
     _look_up(table)
     mi.set_variant("scalar_spectral")  # where reading outside of an array is an error
