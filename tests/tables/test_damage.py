@@ -170,9 +170,7 @@ def test_a_bit_that_is_flipped_anywhere_is_noticed(file, tmp_path, used):
         lambda d: d["source"].update(warnings="one"),
     ],
 )
-def test_what_would_read_outside_or_fill_memory_is_refused_at_once(
-    file, tmp_path, used, change
-):
+def test_what_would_read_outside_or_fill_memory_is_refused_at_once(file, tmp_path, used, change):
     contents = Contents(file)
     change(contents.document)
     contents.write(tmp_path / "changed.exr")
