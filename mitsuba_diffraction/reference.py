@@ -227,7 +227,7 @@ def _jones(
     u, v, w = diffraction_coordinates(incident, outgoing)
     wave = wavenumber(wavelength)
     roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
-    s = blend.weight(wave * w, roughness.at(wave * np.hypot(u, v)))
+    s = blend.weight(wave * w, roughness.at(wave * np.hypot(u, v)), index)
     return blend.jones(incident, outgoing, index, s)
 
 

@@ -92,15 +92,17 @@ class SmallSlope:
         if len(matrices) == 1:  # one index at all wavelengths
             matrices *= len(wavenumbers)
             indices *= len(wavenumbers)
-        shares = self._shares(pair, height_scale, wavenumbers)
+        shares = self._shares(pair, height_scale, wavenumbers, indices)
         blended = [
             tuple(dr.fma(k - b, share, b) for k, b in zip(*both, strict=True))
             for both, share in zip(matrices, shares, strict=True)
         ]
         return light.of_jones(blended, indices)
 
-    def _shares(self, pair: Pair, height_scale: Float, wavenumbers: list[Float]) -> list[Float]:
-        """Kirchhoff's share for each channel, 1 − s with s = exp(−(κσ_q)⁴/3).
+    def _shares(
+        self, pair: Pair, height_scale: Float, wavenumbers: list[Float], indices: list[Number]
+    ) -> list[Float]:
+        """Kirchhoff's share for each channel, 1 − s with s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3).
 
         Not s: near the horizon K is so large beside B that the last digit of 1 − s counts.
         """
@@ -108,13 +110,17 @@ class SmallSlope:
         squared = dr.maximum(dr.squared_norm(pair.uv), 1e-20)
         start = dr.fma(dr.log2(squared), 0.5 * NODES_PER_OCTAVE, -self._first * NODES_PER_OCTAVE)
         squared_w = dr.square(pair.w * height_scale)
+        halves = [0.5 * _square((n - 1.0) / (n + 1.0)) for n in indices]
+        if len(halves) == 1:
+            halves *= len(wavenumbers)
         shares = []
-        for k in wavenumbers:
+        for k, half in zip(wavenumbers, halves, strict=True):
             place = dr.fma(dr.log2(k), NODES_PER_OCTAVE, start)
             lower = index_between(dr.floor(place), 0.0, self._last)
             low, high = read_record(self._nodes, mi.UInt32(lower), 2)
             variance = dr.lerp(low, high, dr.clip(place - lower, 0.0, 1.0))
-            shares.append(_one_minus_exp(dr.square(squared_w * dr.square(k) * variance) / 3.0))
+            squared = squared_w * dr.square(k) * variance
+            shares.append(_one_minus_exp(squared * dr.fma(squared, 1.0 / 3.0, half)))
         return shares
 
     def __str__(self) -> str:

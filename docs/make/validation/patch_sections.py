@@ -120,7 +120,7 @@ def _matrices(solution: Solved, wo: NDArray[np.float64]) -> dict[str, NDArray[np
     index, k = patch_index(case.material, case.wavelength), float(wavenumber(case.wavelength))
     total = solution.wi + wo
     roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
-    s = blend.weight(k * total[:, 2], roughness.at(k * np.hypot(total[:, 0], total[:, 1])))
+    s = blend.weight(k * total[:, 2], roughness.at(k * np.hypot(total[:, 0], total[:, 1])), index)
     return {
         "kirchhoff": boundary.kirchhoff(solution.wi, wo, index),
         "small_slope": blend.jones(solution.wi, wo, index, s),

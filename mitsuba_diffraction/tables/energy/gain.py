@@ -64,7 +64,7 @@ class Gain:
         wi = np.stack([sin_i, np.zeros_like(sin_i), cos_i], axis=-1)
         wo = np.stack([x, y, cos_o], axis=-1)
         variance = self.table.roughness.at(self.wavenumber * np.hypot(x + sin_i, y))
-        s = blend.weight(self.wavenumber * w * self.height_scale, variance)
+        s = blend.weight(self.wavenumber * w * self.height_scale, variance, self.index)
         power = boundary.unpolarised(blend.jones(wi, wo, self.index, s))
         return np.asarray((2.0 * cos_i * cos_o / one_plus_dot) ** 2 * power)
 

@@ -18,7 +18,7 @@ from ..table import DiffractionTable
 from .store import Record, kept, key_of
 
 #: Raised whenever the computation changes.
-VERSION = 4
+VERSION = 5
 
 #: Height scales are n/steps: this phase (rad) changes at most in between. The power of an order
 #: bends by a fiftieth then, and by less at grazing angles, where there is most to take.

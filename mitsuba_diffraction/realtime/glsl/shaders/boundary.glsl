@@ -152,20 +152,21 @@ uniform sampler2D roughness;      // σ_q² at a node in log2 q and at the next
 uniform float first_octave;       // of the first node
 uniform float last_node;
 
-// s = exp(−(κσ_q)⁴/3)
-float gentle_share(float k, float r, float z)
+// s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3)
+float gentle_share(NUMBER index, float k, float r, float z)
 {
     float place = (log2(max(k * r, 1e-10)) - first_octave) * NODES_PER_OCTAVE;
     place = clamp(place, 0.0, last_node);
     float lower = min(floor(place), last_node - 1.0);
     vec2 ends = entry(roughness, int(lower)).xy;
     float squared = k * k * z * z * mix(ends.x, ends.y, place - lower);
-    return exp(squared * squared * (-1.0 / 3.0));
+    NUMBER mirror = times(plus(index, -1.0), inverse_of(plus(index, 1.0)));
+    return exp(-squared * (0.5 * dot(mirror, mirror) + squared / 3.0));
 }
 
 #else
 
-float gentle_share(float k, float r, float z) { return 0.0; }
+float gentle_share(NUMBER index, float k, float r, float z) { return 0.0; }
 
 #endif
 
@@ -179,7 +180,7 @@ float boundary_at_all(float cos_half) { return 1.0; }
 
 float boundary_at(float cos_half, float k, float r, float z)
 {
-    return mean_power(pair_tangent, pair_gentle, gentle_share(k, r, z));
+    return mean_power(pair_tangent, pair_gentle, gentle_share(eta, k, r, z));
 }
 
 vec3 boundary(float cos_half, float r, float z)
@@ -206,7 +207,8 @@ float boundary_at(float cos_half, float k, float r, float z)
 {
     float last = float(textureSize(reflectances, 0).y - 2);
     float y = clamp((k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x), 0.0, 1.0) * last;
-    return of_index(texelFetch(reflectances, ivec2(0, int(y + 0.5)), 0).yz, gentle_share(k, r, z));
+    vec2 index = texelFetch(reflectances, ivec2(0, int(y + 0.5)), 0).yz;
+    return of_index(index, gentle_share(index, k, r, z));
 }
 
 // A channel's reflectance is that of daylight, what is beside it that at the channel's mean.
@@ -221,7 +223,7 @@ vec3 boundary(float cos_half, float r, float z)
         float own = 0.0;
         for (int m = 0; m < 4; ++m) own += dot(tangent[m], tangent[m]);
         own *= 0.5 / (pair_one_plus_dot * pair_one_plus_dot);
-        found[n] = mean_power(tangent, gentle, gentle_share(k, r, z)) / max(own, 1e-20);
+        found[n] = mean_power(tangent, gentle, gentle_share(index, k, r, z)) / max(own, 1e-20);
     }
     return found * reflectance(cos_half);
 }
