@@ -56,6 +56,9 @@ tolerance : float [0.001]
     Relative error of ⟨|P|²⟩, met or refused.
 terms : integer [from tolerance]
     Length of the series.
+windows : float or string [none]
+    Width, in µm, of the overlapping windows that a scan much wider than coherence_width is cut
+    into, each levelled, whose powers are averaged (Welch 1967); `auto` is twice coherence_width.
 
 The material
 ------------
