@@ -110,12 +110,16 @@ class EnergyModel:
         scales = _scales_of(found)
         if scales is None:
             return None
-        low, high = (one if one.grating is None else one.on(FINE) for one in scales)
-        width = nodes[1] - nodes[0]
-        share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
-        weights = response(low.wavelengths)[:, 1] * low.wavelengths
-        values = low.values * (1 - share) + high.values * share
-        return np.average(values, axis=0, weights=weights).astype(np.float32)
+        scales = [one if one.grating is None else one.on(FINE) for one in scales]
+        scale = _between(scales, nodes, height_scale)
+        weights = response(scale.wavelengths)[:, 1] * scale.wavelengths
+        return np.average(scale.values, axis=0, weights=weights).astype(np.float32)
+
+    def ratio(self, height_scale: float) -> DirectionalTable:
+        """What `reflected` looks up, for who draws without Dr.Jit."""
+        nodes = self._energy.nodes(height_scale)
+        ratios = [self._ratio(self._energy.at(node).albedo) for node in nodes]
+        return _between(ratios, nodes, height_scale)
 
     @property
     def fades(self) -> bool:
@@ -307,6 +311,16 @@ def _scales_of(found: list[Conservation]) -> list[DirectionalTable] | None:
         return None
     ones = replace(made, values=np.ones_like(made.values))
     return [ones if one.scale is None else one.scale for one in found]
+
+
+def _between(
+    tables: list[DirectionalTable], nodes: tuple[float, float], height_scale: float
+) -> DirectionalTable:
+    """Interpolated between two height scales."""
+    low, high = _alike(tables)
+    width = nodes[1] - nodes[0]
+    share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
+    return DirectionalTable(low.wavelengths, low.values * (1 - share) + high.values * share)
 
 
 def _alike(tables: list[DirectionalTable]) -> list[DirectionalTable]:

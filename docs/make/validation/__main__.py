@@ -40,9 +40,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     solve.set_defaults(run=_solve)
     patches = commands.add_parser("patches", help="make those in two dimensions anew")
     patches.add_argument("material", choices=("keratin", "aluminium"))
+    patches.add_argument("--solver", choices=("coupled_wave", "rayleigh"), default="rayleigh")
     patches.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
     patches.set_defaults(run=_patches)
-    for command in (report, solve, patches):
+    coated = commands.add_parser("coated", help="make those under a coat anew")
+    coated.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
+    coated.set_defaults(run=_coated)
+    for command in (report, solve, patches, coated):
         command.add_argument(
             "--progress", action=argparse.BooleanOptionalAction, default=None,
             help="show progress bars; by default on a terminal",
@@ -86,11 +90,23 @@ def _solve(args: argparse.Namespace) -> int:
 def _patches(args: argparse.Namespace) -> int:
     from .patch_solutions import patch_file, solve_patches
 
-    path = args.output / patch_file(args.material)
+    path = args.output / patch_file(args.material, args.solver)
     check_writable(path)
     with Bar(args, unit=" cases") as bar:
-        rows = solve_patches(args.material, path, bar)
+        rows = solve_patches(args.material, args.solver, path, bar)
     print(f"wrote {os.fspath(path)}: {len(rows)} orders")
+    return 0
+
+
+def _coated(args: argparse.Namespace) -> int:
+    from .coated import SERIES, coated_file, solve_coated
+
+    for series in SERIES:
+        check_writable(args.output / coated_file(series))
+    with Bar(args, unit=" gratings") as bar:
+        found = solve_coated(args.output, bar)
+    for series, rows in found.items():
+        print(f"wrote {os.fspath(args.output / coated_file(series))}: {len(rows)} orders")
     return 0
 
 

@@ -73,9 +73,14 @@ class Comparison:
 
 
 def compare(
-    material: str, solutions: Solutions | None = None, model: str = "kirchhoff"
+    material: str,
+    solutions: Solutions | None = None,
+    model: str = "kirchhoff",
+    coat: float | None = None,
 ) -> Comparison:
     """Evaluate a model (`model.MODELS`) for what has converged, by default of what is shipped.
+
+    coat : index of a coat over the gratings.
 
     Raises
     ------
@@ -92,7 +97,7 @@ def compare(
         profile, period, depth, theta, wavelength = (_decimal(value) for value in key)
         grating = Grating(PROFILES[int(profile)], period, depth)
         orders, _ = order_sines(period, wavelength, theta)
-        efficiencies = order_efficiencies(grating, material, theta, wavelength, model)
+        efficiencies = order_efficiencies(grating, material, theta, wavelength, model, coat)
         found[members] = efficiencies[np.searchsorted(orders, rows["order"][members])]
     return Comparison(material, trusted, found)
 

@@ -32,7 +32,12 @@ MODELS = (*reference.MODELS, "small_slope_alone")
 
 
 def order_efficiencies(
-    grating: Grating, material: str, theta: float, wavelength: float, model: str = "kirchhoff"
+    grating: Grating,
+    material: str,
+    theta: float,
+    wavelength: float,
+    model: str = "kirchhoff",
+    coat: float | None = None,
 ) -> NDArray[np.float64]:
     """η_m of every propagating order, ordered as `cases.order_sines`, for unpolarised light.
 
@@ -43,12 +48,13 @@ def order_efficiencies(
     theta : angle of incidence, degrees.
     wavelength : nm.
     model : of `MODELS`.
+    coat : index of a coat over the grating, for models of `reference.MODELS`.
     """
     _, sines = order_sines(grating.period, wavelength, theta)
     wi, wo = in_plane(np.sin(np.radians(theta))), in_plane(sines)
     index = None if material == "perfect" else index_of(material, wavelength)
     return efficiencies(
-        grating.heights(), index, wi, wo, wavelength, model, sigma=lobe_sigma(grating)
+        grating.heights(), index, wi, wo, wavelength, model, sigma=lobe_sigma(grating), coat=coat
     )
 
 
@@ -61,6 +67,7 @@ def efficiencies(
     model: str,
     *,
     sigma: float,
+    coat: float | None = None,
 ) -> NDArray[np.float64]:
     """η of the orders of a periodic surface that leave along `wo`, for unpolarised light.
 
@@ -77,8 +84,9 @@ def efficiencies(
         return per_brdf * reference.brdf(field, wi, wo, wavelength, coherence_width=width)
     known = model if model in reference.MODELS else "kirchhoff"
     brdf = per_brdf * reference.brdf(
-        field, wi, wo, wavelength, coherence_width=width, model=known, eta=index.real, k=index.imag
-    )
+        field, wi, wo, wavelength,
+        coherence_width=width, model=known, eta=index.real, k=index.imag, coat=coat,
+    )  # fmt: skip
     if model == known:
         return brdf
     # what Kirchhoff's matrix weighs, replaced

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.optics import blend, boundary
 from mitsuba_diffraction.optics.geometry import wavenumber
 
@@ -16,7 +15,7 @@ from .compare import GRAZING
 from .markdown import percent, table
 from .model import efficiencies
 from .patch_solutions import RESOLUTIONS, Solved, solved
-from .patches import KINDS, PatchCase, cell, patch_index
+from .patches import KINDS, MEASURED, PatchCase, cell, patch_index
 
 _MODELS = ("kirchhoff", "small_slope_alone", "small_slope")
 _ANGLES = (0.0, 30.0, 60.0)
@@ -39,16 +38,11 @@ class PatchComparison:
 def compared(material: str, kinds: Sequence[str] = KINDS) -> list[PatchComparison]:
     """The cases that are kept of surfaces of these kinds, without those of the measured patch where
     that is not here."""
-    found = []
-    for solution in solved(material)[0]:
-        if solution.case.surface.kind not in kinds:
-            continue
-        try:
-            found.append(_compare(solution))
-        except DiffractionError:
-            if solution.case.surface.kind != "elaphe":
-                raise
-    return found
+    return [
+        _compare(solution)
+        for solution in solved(material)[0]
+        if solution.case.surface.kind in kinds and _is_here(solution.case)
+    ]
 
 
 def section(comparisons: Sequence[PatchComparison]) -> str:
@@ -85,6 +79,46 @@ layers moved the default's deviation by 0.5 % and Kirchhoff's by 0.8 %.
 The same for s- and p-polarised light at 60°, mean over the planes of incidence:
 
 {table(["surface", "nm", "s: Kirchhoff", "s: blend", "p: Kirchhoff", "p: blend"], polarised)}"""
+
+
+@dataclass(frozen=True)
+class PatchAgreement:
+    """Both solvers on one case: their deviation of colours, and what either still changed."""
+
+    case: PatchCase
+    deviation: float
+    first_change: float
+    second_change: float
+
+
+def agreements() -> list[PatchAgreement]:
+    """Rayleigh's expansion beside coupled waves, on keratin."""
+    second = {solution.case: solution for solution in solved("keratin", "coupled_wave")[0]}
+    found = []
+    for first in solved("keratin")[0]:
+        if first.case not in second or not _is_here(first.case):
+            continue
+        field, other = cell(first.case.surface), second[first.case]
+        powers, others = (
+            dict(zip(_numbers(one), one.efficiency(field), strict=True)) for one in (first, other)
+        )
+        coloured = [number for number in powers if number != (0, 0)]
+        truth = sum(powers[number] for number in coloured)
+        deviation = sum(abs(powers[number] - others[number]) for number in coloured) / truth
+        changes = (
+            float(one.rows["change"][[number != (0, 0) for number in _numbers(one)]].sum() / truth)
+            for one in (first, other)
+        )
+        found.append(PatchAgreement(first.case, float(deviation), *changes))
+    return found
+
+
+def _numbers(solution: Solved) -> list[tuple[int, int]]:
+    return [(int(mx), int(my)) for mx, my in solution.rows[["mx", "my"]]]
+
+
+def _is_here(case: PatchCase) -> bool:
+    return case.surface.kind != "elaphe" or MEASURED.is_file()
 
 
 def _compare(solution: Solved) -> PatchComparison:
