@@ -16,6 +16,7 @@ from .interrupts import INTERRUPTED
 from .options import scene_parameters
 from .output import check_writable
 from .progress import Bar
+from .report import save_report
 
 
 def run_frames(args: argparse.Namespace) -> int:
@@ -40,19 +41,22 @@ def run_frames(args: argparse.Namespace) -> int:
             bar(0, 0, "loading")
             for _ in render_frames(args.scene, to_do, variant, with_exr=args.exr, progress=bar):
                 done += 1
+    report = {"scene": args.scene, "frames": len(frames), "new": done,
+              "files": [frame.png for frame in frames if frame.png.exists()], "film": None,
+              "interrupted": done < len(to_do), "seconds": time.perf_counter() - start}  # fmt: skip
     if done < len(to_do):
+        save_report(args, report)
         there = len(frames) - len(to_do) + done
         say(
             f"interrupted; {there} of {len(frames)} frames are done, run the command again to "
             "continue"
         )
         return INTERRUPTED
-    print(
-        f"{folder}: {len(frames)} frames, {done} of them new, {time.perf_counter() - start:.1f} s"
-    )
+    print(f"{folder}: {len(frames)} frames, {done} of them new, {report['seconds']:.1f} s")
     if film is not None:
         write_film([frame.png for frame in frames], film, args.fps)
         print(f"{film}: {len(frames) / args.fps:.3g} s at {args.fps:g} frames a second")
+    save_report(args, report | {"film": film})
     return 0
 
 

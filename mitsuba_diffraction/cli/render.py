@@ -11,11 +11,12 @@ from ..errors import DiffractionError
 from .arguments import change, number_between, whole_number
 from .console import mitsuba_warnings, say, say_warning
 from .interrupts import INTERRUPTED
-from .options import add_exposure, add_samples, add_scene, scene_parameters
+from .options import add_exposure, add_json, add_samples, add_scene, scene_parameters
 from .output import check_writable
 from .plan import add_plan_options, plan_or_json
 from .planned import MAKE, check_plan_options, load_by_plan, say_outside
 from .progress import Bar
+from .report import save_report
 
 if TYPE_CHECKING:
     from ..scene.passes import Result
@@ -52,6 +53,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "that `plan -o` wrote",
     )  # fmt: skip
     add_plan_options(parser)
+    add_json(parser, "what was rendered")
     film = parser.add_argument_group("animation")
     film.add_argument(
         "--frames", metavar="N", type=whole_number(1), help="render N pictures, frame_0000.png on"
@@ -146,10 +148,14 @@ def _run_one(args: argparse.Namespace) -> int:
         written = _written(result, args, None if only_png else output, png, variant)
     width, height = result.bitmap.size()
     samples = "1 sample" if result.spp == 1 else f"{result.spp} samples"
+    seconds = time.perf_counter() - start
     print(
         f"{' and '.join(map(str, written))}: {width} x {height} pixels, {samples} per pixel, "
-        f"{time.perf_counter() - start:.1f} s, {variant}"
+        f"{seconds:.1f} s, {variant}"
     )
+    save_report(args, {"scene": args.scene, "files": written, "pixels": (width, height),
+                       "spp": result.spp, "asked_spp": spp, "seed": args.seed, "variant": variant,
+                       "interrupted": result.interrupted, "seconds": seconds})  # fmt: skip
     if result.interrupted:
         say(f"interrupted; the picture has {result.spp} of {spp} samples per pixel")
         return INTERRUPTED

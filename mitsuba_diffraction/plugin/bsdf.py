@@ -56,6 +56,9 @@ tolerance : float [0.001]
     Relative error of ⟨|P|²⟩, met or refused.
 terms : integer [from tolerance]
     Length of the series.
+windows : float or string [none]
+    Width, in µm, of the overlapping windows that a scan much wider than coherence_width is cut
+    into, each levelled, whose powers are averaged (Welch 1967); `auto` is twice coherence_width.
 
 The material
 ------------
@@ -155,6 +158,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
+from ..tables.energy.conservation import DirectionalTable
 from .boundary import Kirchhoff
 from .bounded import Bounded
 from .coat import CoatedPair
@@ -406,6 +410,11 @@ class Diffraction(mi.BSDF):
             return None
         scale = self._energy.brightness(height_scale)
         return None if scale is None else (scale, self._energy.fades)
+
+    def reflected_ratio(self, height_scale: float) -> DirectionalTable | None:
+        """Its albedo over the flat interface's reflectance, where T = 1 − a goes on beneath."""
+        beneath = self.nested is not None and isinstance(self.layering, Transmission)
+        return self._energy.ratio(height_scale) if beneath and self._energy is not None else None
 
     @property
     def _takes(self) -> bool:

@@ -102,12 +102,15 @@ class EnergyModel:
         found = [self._energy.at(node) for node in nodes]
         if all(one.scale is None for one in found):
             return None
-        low, high = _alike([_scale_of(one) for one in found])
-        width = nodes[1] - nodes[0]
-        share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
-        weights = response(low.wavelengths)[:, 1] * low.wavelengths
-        values = low.values * (1 - share) + high.values * share
-        return np.average(values, axis=0, weights=weights).astype(np.float32)
+        scale = _between([_scale_of(one) for one in found], nodes, height_scale)
+        weights = response(scale.wavelengths)[:, 1] * scale.wavelengths
+        return np.average(scale.values, axis=0, weights=weights).astype(np.float32)
+
+    def ratio(self, height_scale: float) -> DirectionalTable:
+        """What `reflected` looks up, for who draws without Dr.Jit."""
+        nodes = self._energy.nodes(height_scale)
+        ratios = [self._ratio(self._energy.at(node).albedo) for node in nodes]
+        return _between(ratios, nodes, height_scale)
 
     @property
     def fades(self) -> bool:
@@ -265,6 +268,16 @@ def _scale_of(found: Conservation) -> DirectionalTable:
     if found.scale is not None:
         return found.scale
     return DirectionalTable(found.albedo.wavelengths, np.ones_like(found.albedo.values))
+
+
+def _between(
+    tables: list[DirectionalTable], nodes: tuple[float, float], height_scale: float
+) -> DirectionalTable:
+    """Interpolated between two height scales."""
+    low, high = _alike(tables)
+    width = nodes[1] - nodes[0]
+    share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
+    return DirectionalTable(low.wavelengths, low.values * (1 - share) + high.values * share)
 
 
 def _alike(tables: list[DirectionalTable]) -> list[DirectionalTable]:
