@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
@@ -16,6 +16,8 @@ from .interrupts import INTERRUPTED
 from .options import scene_parameters
 from .output import check_writable
 from .progress import Bar
+from .report import save_report
+from .workers import client_of, film_of, on_workers, say_report
 
 
 def run_frames(args: argparse.Namespace) -> int:
@@ -34,7 +36,9 @@ def run_frames(args: argparse.Namespace) -> int:
 
     start = time.perf_counter()
     done = 0
-    if to_do:
+    if to_do and on_workers(args):
+        done = _on_workers(args, to_do, folder)
+    elif to_do:
         variant = set_variant(args.mode)
         with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
             bar(0, 0, "loading")
@@ -54,6 +58,27 @@ def run_frames(args: argparse.Namespace) -> int:
         write_film([frame.png for frame in frames], film, args.fps)
         print(f"{film}: {len(frames) / args.fps:.3g} s at {args.fps:g} frames a second")
     return 0
+
+
+def _on_workers(args: argparse.Namespace, to_do: Sequence[Frame], folder: Path) -> int:
+    """Render frames on workers; how many came before Ctrl-C."""
+    from ..cluster.film import Wanted
+    from ..scene.frames import write_frame
+    from ..scene.load import set_variant
+    from ..scene.passes import Stop
+
+    variant, done = set_variant(args.mode), 0
+    wanted = [Wanted(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]
+    with mitsuba_warnings(), client_of(args) as client:
+        film = film_of(args, client, wanted, variant, folder / "passes")
+        with Bar(args, unit=" tasks", delay=0) as bar, Stop() as stop:
+            for frame, result in zip(to_do, film.render(stop, bar), strict=False):
+                write_frame(frame, result.bitmap, args.scene, variant, args.exr)
+                film.forget(done)
+                done += 1
+        say_report(film)
+        save_report(args, {"variant": variant, **film.report.summary()})
+    return done
 
 
 def _say_why(reasons: Mapping[Path, tuple[str, str] | None]) -> None:
