@@ -206,6 +206,7 @@ def _check_agreement(
         "basis": table.expansion.basis,
         "tolerance": table.tolerance,
         "terms": table.expansion.terms,
+        "windows": table.settings.windows,
     }
     for name, value in asked.items():
         if value != own[name] and not (name == "basis" and value == "auto"):
