@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from .gain import LEAST_COSINE, Gain, over_lobe
 from .grating import NODES, Grating, fractions
 from .grid import LAST_ANGLE
-from .transport import Orders, lobes
+from .transport import Orders, lobe_means, lobes
 
 Real = NDArray[np.float64]
 Array = NDArray[np.float32]
@@ -67,11 +67,10 @@ class Chains:
             0.5 * g * (last - 2 * o + first - second),
         )
         y_squared = np.maximum(1.0 - (0.5 * g * width) ** 2, 0.0)
-        places, visible, cosines, poles = lobes(self.orders.table.sigma, self.gain.wavenumber)
         radius = np.sqrt(x_o**2 + y_squared)
-        share = np.interp(radius, places, visible, right=0.0)
-        cos_o, pole = np.interp(radius, places, cosines), np.interp(radius, places, poles)
-        least = math.cos(LAST_ANGLE) if steepest else cosines[-1]
+        lobe = self.orders.table.sigma, self.gain.wavenumber
+        share, cos_o, pole = lobe_means(*lobe, radius)
+        least = math.cos(LAST_ANGLE) if steepest else float(lobes(*lobe)[2][-1])
         cos_i = np.sqrt(np.maximum(1.0 - x**2 - y_squared, least**2))
         w = cos_i + np.sqrt(np.maximum(1.0 - radius**2, 0.0))
         power = self._powers(np.rint(last - k - o).astype(int), self.grating.spacing / g * w)
