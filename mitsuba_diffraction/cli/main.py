@@ -26,6 +26,7 @@ from . import (
     plan,
     precompute,
     render,
+    survey,
     sweep,
     tangents,
     tradeoff,
@@ -37,8 +38,8 @@ from .options import STDOUT
 from .output import check_writable
 
 COMMANDS = (
-    precompute, info, tangents, plan, render, brdf_map, evaluate, sweep, tradeoff, compare, view,
-    export_viewer, bench,
+    precompute, info, tangents, plan, render, brdf_map, evaluate, survey, sweep, tradeoff, compare,
+    view, export_viewer, bench,
 )  # fmt: skip
 
 FAILED = 1
