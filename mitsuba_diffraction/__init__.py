@@ -22,6 +22,13 @@ in every variant that is set later.
 
 from __future__ import annotations
 
+import sys
+
+if sys.argv[:1] == ["-m"] and __name__ in sys.orig_argv:  # `python -m`: __main__ comes last
+    from _mitsuba_diffraction import leave_quietly
+
+    leave_quietly()
+
 import importlib
 from importlib.metadata import version
 from types import ModuleType

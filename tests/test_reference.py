@@ -290,11 +290,12 @@ def test_in_the_mirror_direction_it_is_fresnel_s_share_of_the_perfect_reflector(
     assert found == pytest.approx(share * perfect, rel=1e-10)
 
 
+@pytest.mark.parametrize("coat", [None, 1.58])
 @pytest.mark.parametrize("model", reference.MODELS)
-def test_the_first_entry_of_the_mueller_matrix_is_the_brdf(model):
+def test_the_first_entry_of_the_mueller_matrix_is_the_brdf(model, coat):
     wi, wo = polar(50, 30), polar(35, 100)
-    matrix = reference.mueller(SMALL, wi, wo, 520.0, model=model, **ALUMINIUM)
-    found = reference.brdf(SMALL, wi, wo, 520.0, model=model, **ALUMINIUM)
+    matrix = reference.mueller(SMALL, wi, wo, 520.0, model=model, coat=coat, **ALUMINIUM)
+    found = reference.brdf(SMALL, wi, wo, 520.0, model=model, coat=coat, **ALUMINIUM)
     assert matrix.shape == (1, 4, 4)
     assert matrix[:, 0, 0] == pytest.approx(found, rel=1e-12)
 

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from ..scene.animation import values_of_frames
 from ..scene.frames import FILMS, MISSING, Frame, digest_of
@@ -35,33 +36,39 @@ def run_frames(args: argparse.Namespace) -> int:
     from ..scene.load import set_variant
 
     start = time.perf_counter()
-    done = 0
+    done, workers = 0, None
     if to_do and on_workers(args):
-        done = _on_workers(args, to_do, folder)
+        done, workers = _on_workers(args, to_do, folder)
     elif to_do:
         variant = set_variant(args.mode)
         with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
             bar(0, 0, "loading")
             for _ in render_frames(args.scene, to_do, variant, with_exr=args.exr, progress=bar):
                 done += 1
+    report = {"scene": args.scene, "frames": len(frames), "new": done,
+              "files": [frame.png for frame in frames if frame.png.exists()], "film": None,
+              "interrupted": done < len(to_do), "seconds": time.perf_counter() - start,
+              "workers": workers}  # fmt: skip
     if done < len(to_do):
+        save_report(args, report)
         there = len(frames) - len(to_do) + done
         say(
             f"interrupted; {there} of {len(frames)} frames are done, run the command again to "
             "continue"
         )
         return INTERRUPTED
-    print(
-        f"{folder}: {len(frames)} frames, {done} of them new, {time.perf_counter() - start:.1f} s"
-    )
+    print(f"{folder}: {len(frames)} frames, {done} of them new, {report['seconds']:.1f} s")
     if film is not None:
         write_film([frame.png for frame in frames], film, args.fps)
         print(f"{film}: {len(frames) / args.fps:.3g} s at {args.fps:g} frames a second")
+    save_report(args, report | {"film": film})
     return 0
 
 
-def _on_workers(args: argparse.Namespace, to_do: Sequence[Frame], folder: Path) -> int:
-    """Render frames on workers; how many came before Ctrl-C."""
+def _on_workers(
+    args: argparse.Namespace, to_do: Sequence[Frame], folder: Path
+) -> tuple[int, dict[str, Any]]:
+    """Render frames on workers; how many came before Ctrl-C, and what the workers did."""
     from ..cluster.film import Wanted
     from ..scene.frames import write_frame
     from ..scene.load import set_variant
@@ -76,9 +83,7 @@ def _on_workers(args: argparse.Namespace, to_do: Sequence[Frame], folder: Path) 
                 write_frame(frame, result.bitmap, args.scene, variant, args.exr)
                 film.forget(done)
                 done += 1
-        say_report(film)
-        save_report(args, {"variant": variant, **film.report.summary()})
-    return done
+        return done, say_report(film)
 
 
 def _say_why(reasons: Mapping[Path, tuple[str, str] | None]) -> None:

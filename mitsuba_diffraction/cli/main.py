@@ -16,6 +16,7 @@ from importlib.metadata import version
 from typing import NoReturn
 
 from ..errors import DiffractionError, shortened
+from ..streams import own_program
 from . import (
     bench,
     brdf_map,
@@ -58,7 +59,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         args = build_parser().parse_args(argv)
     except SystemExit as stop:  # argparse: --help, --version and usage errors
         return _code_of(stop)
-    with warnings_in_one_line(), ended_at_once():
+    with own_program(), warnings_in_one_line(), ended_at_once():
         return _run(args)
 
 

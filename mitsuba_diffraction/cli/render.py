@@ -54,6 +54,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "that `plan -o` wrote",
     )  # fmt: skip
     add_plan_options(parser)
+    add_json(parser, "what was rendered")
     film = parser.add_argument_group("animation")
     film.add_argument(
         "--frames", metavar="N", type=whole_number(1), help="render N pictures, frame_0000.png on"
@@ -75,7 +76,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )  # fmt: skip
     add_workers(parser)
     add_threads(parser)
-    add_json(parser, "what it cost")
     parser.set_defaults(run=run, parser=parser)
 
 
@@ -134,9 +134,10 @@ def _on_workers(args: argparse.Namespace) -> int:
             for result in film.render(stop, bar):
                 written = _written(result, args, None if only_png else output, png, variant)
                 film.forget(0)
-                _say_written(result, written, time.perf_counter() - start, variant)
-                say_report(film)
-                save_report(args, {"variant": variant, **film.report.summary()})
+                seconds = time.perf_counter() - start
+                _say_written(result, written, seconds, variant)
+                report = _report(args, result, written, seconds, variant)
+                save_report(args, report | {"workers": say_report(film)})
                 return 0
     say(f"interrupted; finished passes are kept in '{keep}': run the command again to go on")
     return INTERRUPTED
@@ -183,11 +184,22 @@ def _run_one(args: argparse.Namespace) -> int:
         written = _written(result, args, None if only_png else output, png, variant)
     seconds = time.perf_counter() - start
     _say_written(result, written, seconds, variant)
-    save_report(args, {"variant": variant, "seconds": seconds, "samples per pixel": result.spp})
+    save_report(args, _report(args, result, written, seconds, variant))
     if result.interrupted:
         say(f"interrupted; the picture has {result.spp} of {spp} samples per pixel")
         return INTERRUPTED
     return 0
+
+
+def _report(
+    args: argparse.Namespace, result: Result, written: list[Path], seconds: float, variant: str
+) -> dict[str, Any]:
+    """For --json."""
+    return {
+        "scene": args.scene, "files": written, "pixels": result.bitmap.size(), "spp": result.spp,
+        "seed": args.seed, "variant": variant, "interrupted": result.interrupted,
+        "seconds": seconds,
+    }  # fmt: skip
 
 
 def _written(

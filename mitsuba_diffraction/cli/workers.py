@@ -85,8 +85,8 @@ def film_of(
     return film
 
 
-def say_report(film: Film) -> None:
-    """What the workers did, in a line."""
+def say_report(film: Film) -> dict[str, Any]:
+    """Print what the workers did in a line; the same as plain data."""
     report = film.report.summary()
     kept = f", {report['kept']} kept from before" if report["kept"] else ""
     again = f", {report['retries']} given out again" if report["retries"] else ""
@@ -96,3 +96,4 @@ def say_report(film: Film) -> None:
         f"{report['overhead_per_task_s']:.2g} s a task beside it, {report['bytes'] / 1e6:.3g} MB, "
         f"{report['peak'] / 1e9:.2g} GB of memory at most"
     )
+    return report

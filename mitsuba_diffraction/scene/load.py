@@ -74,7 +74,7 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
             raise DiffractionError(f"-D {name}: Mitsuba reserves this name; rename the parameter")
     try:
         scene = mi.load_file(str(file), **parameters)
-    except RuntimeError as error:
+    except (RuntimeError, UnicodeDecodeError) as error:
         raise error_of("cannot load the scene", error) from error
     if not isinstance(scene, mi.Scene):
         raise DiffractionError(f"'{file}' is not a scene; its outermost element must be <scene>")
