@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import itertools
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -54,7 +53,10 @@ def kinds(notebook: Any) -> list[list[tuple[str, ...]]]:
         for cell in notebook.cells
         if cell.cell_type == "code"
     ]
-    return [[kind for kind, _ in itertools.groupby(cell)] for cell in cells]
+    return [
+        [kind for last, kind in zip([None, *cell], cell) if kind != last or kind[0] != "stream"]
+        for cell in cells
+    ]
 
 
 def hindrance(notebook: Any) -> str | None:
