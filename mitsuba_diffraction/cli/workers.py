@@ -52,6 +52,13 @@ def on_workers(args: argparse.Namespace) -> bool:
     return found
 
 
+def worker_threads(args: argparse.Namespace) -> int:
+    """Dr.Jit threads of a worker; 0 for as many as it has cores."""
+    if args.threads or not args.workers:
+        return args.threads or 0
+    return max(1, len(os.sched_getaffinity(0)) // int(args.workers))
+
+
 @contextlib.contextmanager
 def client_of(args: argparse.Namespace) -> Iterator[Any]:
     """The workers that were asked for; says where to watch them."""
@@ -70,12 +77,9 @@ def film_of(
     """What renders frames of the command's scene on workers."""
     from ..cluster.film import Film
 
-    threads = args.threads or 0
-    if args.workers and not threads:
-        threads = max(1, len(os.sched_getaffinity(0)) // int(args.workers))
     film = Film(
         client, args.scene, frames, variant, keep=keep, warn=say_warning, sensor=args.sensor,
-        preview=args.preview, threads=threads,
+        preview=args.preview, threads=worker_threads(args),
     )  # fmt: skip
     say(f"a task is estimated to need {film.needed / 1e9:.2g} GB of memory")
     return film

@@ -40,6 +40,14 @@ def small_tasks(monkeypatch):
     monkeypatch.setattr(passes, "GROUP", 1)
 
 
+@pytest.fixture(autouse=True)
+def own_threads():
+    """What a test does to Dr.Jit's threads is undone: with one, Mitsuba's EXR writer waits."""
+    before = dr.thread_count()
+    yield
+    dr.set_thread_count(before)
+
+
 @pytest.fixture
 def scene(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
