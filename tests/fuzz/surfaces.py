@@ -99,8 +99,8 @@ def _check_look_ups(
 
 
 def _compare(value: Any, exact: Any, near: Any, most: float, what: str) -> None:
-    assert np.isfinite(value).all(), what
-    assert (value >= 0.0).all(), what
+    if not (np.isfinite(value).all() and (value >= 0.0).all()):
+        raise ArithmeticError(f"{what}: not finite, or negative")
     for part in (near, ~near):
         total = exact[part].sum()
         if total > 1e-12 * exact.sum():
