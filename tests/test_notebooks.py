@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import itertools
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -44,12 +45,16 @@ def streams(notebook: Any, name: str) -> str:
 
 
 def kinds(notebook: Any) -> list[list[tuple[str, ...]]]:
-    """What each of its cells shows: which streams, pictures and values, not what is in them."""
-    return [
+    """What each of its cells shows: which streams, pictures and values, not what is in them.
+
+    A stream counts once however many pieces it comes in: a slow machine's come in more.
+    """
+    cells = [
         [(o.output_type, o.get("name", ""), *sorted(o.get("data", ()))) for o in cell.outputs]
         for cell in notebook.cells
         if cell.cell_type == "code"
     ]
+    return [[kind for kind, _ in itertools.groupby(cell)] for cell in cells]
 
 
 def hindrance(notebook: Any) -> str | None:
