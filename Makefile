@@ -33,7 +33,7 @@ demo: setup  ## tabulate a snake scale, render three scenes with it, the snake i
 
 # one thread for linear algebra in each of the two processes
 test: setup .venv/browser  ## run the tests
-	@OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest -n 2
+	@OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest -n 2 --dist worksteal
 
 # for as long as you like: make fuzz SECONDS=600; the same cases again: make fuzz SEED=1
 fuzz: setup  ## try random surfaces, damaged files and command lines for a minute

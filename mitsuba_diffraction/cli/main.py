@@ -27,6 +27,7 @@ from . import (
     plan,
     precompute,
     render,
+    survey,
     sweep,
     tangents,
     tradeoff,
@@ -38,8 +39,8 @@ from .options import STDOUT
 from .output import check_writable
 
 COMMANDS = (
-    precompute, info, tangents, plan, render, brdf_map, evaluate, sweep, tradeoff, compare, view,
-    export_viewer, bench,
+    precompute, info, tangents, plan, render, brdf_map, evaluate, survey, sweep, tradeoff, compare,
+    view, export_viewer, bench,
 )  # fmt: skip
 
 FAILED = 1

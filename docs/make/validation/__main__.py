@@ -2,7 +2,9 @@
 
 python -m docs.make.validation report -o docs
 python -m docs.make.validation solve perfect      # minutes to an hour; extra `validation`
-python -m docs.make.validation patches keratin    # in two dimensions; extra `validation`
+python -m docs.make.validation groups             # deviations by material, profile and slope
+python -m docs.make.validation patches keratin    # in two dimensions; a minute
+python -m docs.make.validation coated             # under a coat; half an hour; extra `validation`
 """
 
 from __future__ import annotations
@@ -32,6 +34,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     report.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=Path("docs"))
     report.add_argument("--quick", action="store_true", help="a small version, for tests")
     report.set_defaults(run=_report)
+    groups = commands.add_parser("groups", help="print deviations by material, profile and slope")
+    groups.set_defaults(run=_groups, progress=False)
     solve = commands.add_parser("solve", help="compute the rigorous solutions again")
     solve.add_argument("material", choices=MATERIALS)
     solve.add_argument("--solver", choices=("integral", "coupled_wave"), default="integral")
@@ -68,6 +72,16 @@ def _report(args: argparse.Namespace) -> int:
     check_writable(args.output / "validation.md", make_folder=True)
     with Bar(args) as bar:
         print(f"wrote {write_report(args.output, quick=args.quick, progress=bar)}")
+    return 0
+
+
+def _groups(args: argparse.Namespace) -> int:
+    from . import models, patch_sections
+    from .compare import compare
+
+    sides = models.compare_all({name: compare(name) for name in models.MATERIALS})
+    cuts = [c for material in models.MATERIALS for c in patch_sections.compared(material)]
+    print(models.section(sides), patch_sections.section(cuts), sep="\n\n")
     return 0
 
 

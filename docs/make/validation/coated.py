@@ -14,7 +14,9 @@ In the plane across the grooves s and p light stay apart, and this is exact for 
 from __future__ import annotations
 
 import datetime
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -25,8 +27,9 @@ from mitsuba_diffraction.progress import Progress, silent
 
 from . import integral, rayleigh
 from .cases import ALUMINIUM, COAT, FEW_WAVELENGTHS, PROFILES, Grating, Scan, index_of, order_sines
-from .model import in_plane
-from .solutions import ROW, save_rows
+from .compare import compare
+from .model import efficiencies, in_plane, jones_of, lobe_sigma, shares
+from .solutions import ROW, Solutions, load, save_rows
 
 Real = NDArray[np.float64]
 
@@ -130,6 +133,68 @@ def inner_orders(period: float, wavelength: float, theta: float) -> NDArray[np.i
     return np.arange(np.ceil((sine - COAT) / step), np.floor((sine + COAT) / step) + 1).astype(int)
 
 
+def deviations(
+    gratings: Sequence[Grating] = GRATINGS,
+) -> list[tuple[str, str, dict[str, float]]]:
+    """Grating, incidence, and the default model's deviations of colours from what is kept.
+
+    From `single`, with light that is diffracted once in the coat, and from `bounced`; `left out` is
+    the share of the colours that `single` has not.
+    """
+    kept = {series: shipped_coated(series) for series in SERIES}
+    found = []
+    for grating in gratings:
+        for theta in ANGLES:
+            single, bounced = (
+                compare("aluminium", _of(part, grating, theta), "small_slope", COAT)
+                for part in kept.values()
+            )
+            once = np.concatenate([_once(grating, theta, w) for w in FEW_WAVELENGTHS])
+            coloured = bounced.counted & (bounced.solutions.rows["order"] != 0)
+            share = 1 - single.rigorous[coloured].sum() / bounced.rigorous[coloured].sum()
+            values = {
+                "single": replace(single, model=once).deviation(colours=True),
+                "bounced": bounced.deviation(colours=True),
+                "left out": float(share),
+            }
+            found.append((str(grating), f"{theta:g}°", values))
+    return found
+
+
+def shipped_coated(series: str) -> Solutions:
+    """What is kept of one of `SERIES`."""
+    with resources.as_file(resources.files(__package__) / "data" / coated_file(series)) as path:
+        return load(path)
+
+
+def _of(part: Solutions, grating: Grating, theta: float) -> Solutions:
+    return part.where(
+        profile=grating.profile, period=grating.period, depth=grating.depth, theta=theta
+    )
+
+
+def _once(grating: Grating, theta: float, wavelength: float) -> Real:
+    """The default model's efficiencies of light that is diffracted once, without the face's own."""
+    _, sines = order_sines(grating.period, wavelength, theta)
+    sine, field = np.sin(np.radians(theta)), grating.heights()
+    light = in_plane(sine / COAT), in_plane(sines / COAT), wavelength / COAT
+    index = index_of(MATERIAL, wavelength / COAT)
+    inside = efficiencies(field, index, *light, "small_slope", sigma=lobe_sigma(grating))
+    both = inside[:, None] * shares(jones_of(field, index, *light, "small_slope"))
+    through = np.stack(
+        [
+            (1 - np.abs(there) ** 2) * (1 - np.abs(back) ** 2)
+            for there, back in zip(
+                amplitudes(in_plane(sine)[2], COAT),
+                amplitudes(in_plane(sines)[:, 2], COAT),
+                strict=True,
+            )
+        ],
+        axis=1,
+    )
+    return np.asarray((both * through).mean(axis=1))
+
+
 def _matrices(
     grating: Grating, theta: float, wavelength: float, inside: NDArray[np.int64], *, fine: bool
 ) -> Real:
@@ -138,10 +203,10 @@ def _matrices(
     for column, order in enumerate(inside):
         # going down in order m is light from −sin of it
         sine = (np.sin(np.radians(theta)) - order * wavelength / 1000 / grating.period) / COAT
-        for relative, shares in _reflected(grating, float(sine), wavelength / COAT, fine=fine):
+        for relative, powers in _reflected(grating, float(sine), wavelength / COAT, fine=fine):
             row = np.flatnonzero(inside == order + relative)
             if len(row):
-                found[:, row[0], column] = shares
+                found[:, row[0], column] = powers
     return found
 
 
@@ -161,8 +226,8 @@ def _reflected(
     scan = Scan(grating, MATERIAL, float(np.degrees(np.arcsin(sine))), (wavelength,))
     solution = integral.solve(scan, integral.resolutions(scan)[fine])
     orders, _ = order_sines(grating.period, wavelength, scan.theta)
-    shares = np.stack([solution.orders[light][0] for light in ("te", "tm")], axis=1)
-    yield from zip(orders.tolist(), shares, strict=True)
+    powers = np.stack([solution.orders[light][0] for light in ("te", "tm")], axis=1)
+    yield from zip(orders.tolist(), powers, strict=True)
 
 
 def _about(series: str) -> dict[str, object]:

@@ -141,7 +141,8 @@ def test_what_is_kept_of_aluminium_has_converged_and_reflects_what_aluminium_doe
         if solution.case.surface.kind in HERE:
             power = solution.efficiency(cell(solution.case.surface))
             assert 0.88 < power.sum() < 0.93  # flat: 0.90 to 0.92
-            assert solution.rows["change"].sum() < 0.001
+            coloured = (solution.rows["mx"] != 0) | (solution.rows["my"] != 0)
+            assert solution.rows["change"][coloured].sum() < 0.02 * power[coloured].sum()
 
 
 def test_the_solver_agrees_with_what_is_kept():
