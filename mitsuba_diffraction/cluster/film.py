@@ -37,7 +37,9 @@ class Report:
     Attributes
     ----------
     tasks, kept : that were done now, and that had been kept.
-    retries : tasks that were given out again, since a worker, the scheduler or files were lost.
+    retries : tasks that were given out again, since the scheduler or a worker's files were lost;
+        those of a worker that died are given to others by the scheduler.
+    lost : workers that were there and are not any more.
     seconds, busy : of the client's clock, and of all workers' work.
     bytes : of sums that came from workers.
     peak : bytes of memory that a worker has taken at most.
@@ -47,6 +49,7 @@ class Report:
     tasks: int = 0
     kept: int = 0
     retries: int = 0
+    lost: int = 0
     seconds: float = 0.0
     busy: float = 0.0
     bytes: int = 0
@@ -202,6 +205,7 @@ class _InOrder:
         self._lost_since: float | None = None
         self._contents: dict[str, Any] = {}
         self._counted = (-math.inf, 1)
+        self._seen: set[str] = set()
 
     def of(self, task: Task) -> Sums | None:
         """The sums of a task; None once asked to stop."""
@@ -313,4 +317,6 @@ class _InOrder:
             with contextlib.suppress(OSError, CancelledError):  # the scheduler is gone
                 info = self._film._client.scheduler_info(n_workers=-1)
                 self._counted = now, len(info["workers"])
+                self._seen |= set(info["workers"])
+                self._film.report.lost = len(self._seen - set(info["workers"]))
         return int(self._counted[1])
