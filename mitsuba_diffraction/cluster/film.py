@@ -24,6 +24,8 @@ from .workers import check_workers, memory_warnings, require_dask
 
 #: Tasks that are with the scheduler for every worker: one is worked at, others wait.
 AHEAD = 3
+#: Sums that wait for their turn in memory, too; others are read from the disk again.
+HELD = 16
 #: Bytes that Dr.Jit takes for a sample of a pass, and for the rest of a process: estimates.
 BYTES_A_SAMPLE, BYTES_A_PROCESS = 400, 5e8
 _POLL, _COUNTED = 0.02, 2.0  # seconds
@@ -200,7 +202,7 @@ class _InOrder:
         self._waiting = [task for tasks in film._frames for task in tasks][::-1]
         self._total = len(self._waiting)
         self._with: dict[Any, Task] = {}
-        self._ready: dict[str, bool] = {}  # keys of sums that are on disk, and whether they are new
+        self._ready: dict[str, Sums | None] = {}  # by key; None for those that are only on disk
         self._done = 0
         self._lost_since: float | None = None
         self._contents: dict[str, Any] = {}
@@ -212,9 +214,9 @@ class _InOrder:
         kept = self._film._kept
         while True:
             if task.key in self._ready or task in kept:
-                found = kept.read(task)
+                new = task.key in self._ready
+                found = self._ready.pop(task.key, None) or kept.read(task)
                 if found is not None:
-                    new = self._ready.pop(task.key, False)
                     self._film.report.add(found, new)
                     return found
                 if task not in self._with.values() and task not in self._waiting:
@@ -261,7 +263,8 @@ class _InOrder:
             found = self._result(future, task)
             if isinstance(found, Sums):
                 self._film._kept.write(task, found)
-                self._ready[task.key] = True
+                held = sum(sums is not None for sums in self._ready.values())
+                self._ready[task.key] = found if held < HELD else None
                 self._done += 1
                 self._lost_since = None
             elif isinstance(found, Failed):
