@@ -101,7 +101,7 @@ def _film_seconds(
     report = folder / "report.json"
     command = [
         sys.executable, "-m", "mitsuba_diffraction", "render", str(scene), "--frames", str(frames),
-        "-m", "llvm_ad_rgb", "-D", "resx=240", "-D", "resy=200", "-s", "16", "--no-progress",
+        "-m", "llvm_ad_rgb", "-D", "resx=240", "-D", "resy=200", "-s", "32", "--no-progress",
         "--animate", "lamp_azimuth=0:90", "-o", str(folder / "film"), "--json", str(report), *more,
     ]  # fmt: skip
     start = time.perf_counter()
