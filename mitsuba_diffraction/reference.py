@@ -27,7 +27,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import DiffractionError
+from .errors import DiffractionError, quoted
 from .heights.field import HeightField
 from .optics import blend, boundary
 from .optics.coat import refracted, transmitted
@@ -80,7 +80,7 @@ def brdf(
         For an unknown coherence or model, a width that is not positive and finite, an index that
         is missing or none, or arrays whose shapes do not fit.
     """
-    width = checked("coherence_width", coherence_width)
+    width = _width(coherence_width)
     checked("coherence", coherence)
     light = _broadcast(wi, wo, wavelength)
     index = _index(model, eta, k, light[2].shape)
@@ -112,7 +112,7 @@ def mueller(
     They take Stokes vectors of light along −ωi to those of light along ωo, both about the axes of
     `optics.boundary.polarisation_axes`. Entry (0, 0) is `brdf`.
     """
-    width = checked("coherence_width", coherence_width)
+    width = _width(coherence_width)
     checked("coherence", coherence)
     light = _broadcast(wi, wo, wavelength)
     index = _index(model, eta, k, light[2].shape)
@@ -243,6 +243,15 @@ def _order_factor(
     w = np.where(above, cos_i + cos_o, 1.0)
     lam = wavelength * 1e-3
     return np.where(above, 4 * cos_i * cos_o / (lam**2 * np.pi * sigma**2 * w**2), 0.0)
+
+
+def _width(value: float) -> float:
+    """A coherence width: unlike a table, an integral may have any."""
+    number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+    if not (number and 0.0 < value < np.inf):
+        shown = f"{value:g}" if number else quoted(value)
+        raise DiffractionError(f"coherence_width={shown} must be a positive number of µm")
+    return float(value)
 
 
 def _index(

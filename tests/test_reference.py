@@ -244,6 +244,16 @@ def test_arguments_broadcast():
     assert reference.brdf(SMALL, polar(0), polar(3), [400.0, 500.0]).shape == (2,)
 
 
+def test_a_window_may_be_wider_than_any_table_s():
+    widths = (500.0, 5000.0)
+    narrow, wide = (
+        reference.brdf(SMALL, polar(0), polar(0), 550.0, coherence_width=width)[0]
+        for width in widths
+    )
+    # of order 0 alone: its lobe holds the same light in a solid angle of 1/width²
+    assert wide == pytest.approx(narrow * (widths[1] / widths[0]) ** 2, rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

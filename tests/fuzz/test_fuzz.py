@@ -18,6 +18,10 @@ FOUND = [
     # PLY files that are no UTF-8, or whose lists have infinitely many corners
     ("texts", 1, 732),
     ("texts", 1, 746),
+    # a plan with infinite numbers; a scene that is no UTF-8; heights without a name, but warnings
+    ("texts", 5, 42),
+    ("scenes", 5, 174),
+    ("documents", 5, 218),
 ]
 
 

@@ -58,8 +58,8 @@ def slopes_figure(kirchhoff: dict[str, Comparison], default: dict[str, Compariso
         panel.grid(alpha=0.2)
         panel.legend(title="model, incidence", loc="lower right", fontsize=8)
     figure.suptitle(
-        f"Sinusoids beside the integral method (dotted: where warnings begin; below "
-        f"{percent(_SMALLEST)} drawn there)"
+        "Sinusoids beside the integral method. Dotted: where warnings begin; "
+        f"deviations below {percent(_SMALLEST)} are drawn at it"
     )
     return figure
 
@@ -121,14 +121,14 @@ def scatter_figure(comparisons: list[Comparison]) -> Figure:
         low, high = 1e-6, 1.5
         panel.plot([low, high], [low, high], color="black", lw=0.8)
         panel.set(
-            xlim=(low, high), ylim=(low, high), title=comparison.material,
+            xlim=(low, high), ylim=(low, high), title=_MODEL_OF[comparison.material],
             xlabel="rigorous efficiency", ylabel="model",
         )  # fmt: skip
         panel.set_aspect("equal")
         panel.grid(alpha=0.2)
         panel.legend(fontsize=8, markerscale=2, loc="upper left")
     figure.suptitle(
-        f"Every order, unpolarised, default model; strong colours: depth/period up to "
+        f"Every order, unpolarised; strong colours: depth/period up to "
         f"{_GENTLE_RATIO:g}, incidence up to 30°"
     )
     return figure
@@ -187,6 +187,13 @@ def _offsets(axes: Axes, statistics: Statistics) -> None:
     )  # fmt: skip
     axes.grid(alpha=0.2)
 
+
+#: A perfect conductor has no index, and Kirchhoff's model.
+_MODEL_OF = {
+    "perfect": "perfect conductor, Kirchhoff",
+    "keratin": "keratin, default model",
+    "aluminium": "aluminium, default model",
+}
 
 _GENTLE_RATIO = 0.05  # depth/period; of a sinusoid, an RMS slope of 0.11
 

@@ -194,9 +194,9 @@ def edges(kirchhoff: dict[str, Comparison], default: dict[str, Comparison]) -> s
     parts = [
         """## Edges
 
-Vertical walls reflect light too, and the model knows nothing of it, on metals least of all.
-Deviation of colours, Kirchhoff / default. Blazed gratings ascend towards +x: at positive angles the
-light falls on their steps, at negative ones along the facets."""
+Vertical walls reflect light too, of which the model knows nothing; metals suffer most. Deviation of
+colours, Kirchhoff / default. Blazed gratings ascend towards +x: at positive angles the light falls
+on their steps, at negative ones along the facets."""
     ]
     for profile in ("lamellar", "blazed"):
         angles = angles_of(default["keratin"].where(profile=profile))
@@ -250,18 +250,19 @@ def coated(found: Sequence[tuple[str, str, dict[str, float]]]) -> str:
 
 Aluminium under polycarbonate (`coat_ior` {COAT:g}). The rigorous solutions are those of the
 interface inside the coat, as matrices between all orders there, which the coat's faces then
-transmit and send back, in powers (docs/make/validation/coated.py): *one passage* is light that is
-diffracted once, *with bounces* the whole series, also of the light that is reflected totally.
+transmit and send back, in powers (docs/make/validation/coated.py; sinusoids by Rayleigh's
+expansion, the others by `gratinglab`): *one passage* is light that is diffracted once, *with
+bounces* the whole series, also of the light that is reflected totally.
 Deviation of colours of the default model: from the first without its own bounces (G = 1), from the
 second as it is. *Share of the bounces* is what of the rigorous colours has come back from the face
 at least once: what a model without bounces would miss.
 
 {table(header, rows)}
 
-Refraction and transmission are right to within a few tenths of a per cent on gentle sinusoids. Of
-the bounces, the model has those between two mirrors; what is left is light that the structure
-spreads beyond the critical angle, which comes back altogether and leaves from there: the steeper
-and the more oblique, the more."""
+Refraction and transmission are right to within a few tenths of a per cent on gentle sinusoids,
+walls deviate as without a coat. Of the bounces, the model has those between two mirrors; what is
+left is light that is diffracted twice, much of it spread beyond the critical angle, all of which
+comes back and leaves from there: the steeper and the more oblique, the more."""
 
 
 def random_surfaces(measured: Statistics) -> str:

@@ -10,7 +10,7 @@ is solved exactly at every node, with no interpolation. It has a solution if bot
 are to reflect the same in all, Σ_k min(a_k, 1) = Σ_l min(a_l, 1), as M's symmetry wants. On a
 symmetric profile the halves mirror each other. On a blazed one they do not: what one half may
 reflect and the other cannot send is lost to any reciprocal model, and is taken from all of that
-half alike.
+half alike (`Chains.most_kept`).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from .gain import LEAST_COSINE, Gain, over_lobe
 from .grating import NODES, Grating, fractions
 from .grid import LAST_ANGLE
-from .transport import Orders, lobes
+from .transport import Orders, lobe_means, lobes
 
 Real = NDArray[np.float64]
 Array = NDArray[np.float32]
@@ -67,11 +67,10 @@ class Chains:
             0.5 * g * (last - 2 * o + first - second),
         )
         y_squared = np.maximum(1.0 - (0.5 * g * width) ** 2, 0.0)
-        places, visible, cosines, poles = lobes(self.orders.table.sigma, self.gain.wavenumber)
         radius = np.sqrt(x_o**2 + y_squared)
-        share = np.interp(radius, places, visible, right=0.0)
-        cos_o, pole = np.interp(radius, places, cosines), np.interp(radius, places, poles)
-        least = math.cos(LAST_ANGLE) if steepest else cosines[-1]
+        lobe = self.orders.table.sigma, self.gain.wavenumber
+        share, cos_o, pole = lobe_means(*lobe, radius)
+        least = math.cos(LAST_ANGLE) if steepest else float(lobes(*lobe)[2][-1])
         cos_i = np.sqrt(np.maximum(1.0 - x**2 - y_squared, least**2))
         w = cos_i + np.sqrt(np.maximum(1.0 - radius**2, 0.0))
         power = self._powers(np.rint(last - k - o).astype(int), self.grating.spacing / g * w)
@@ -112,11 +111,23 @@ class Chains:
             shares = self.shares(first, second, last)
             aim = np.minimum(shares.sum(axis=-1), target)
             total = aim.sum(axis=-1)
-            aim *= np.minimum(1.0, total.T / total)[..., None]
+            aim *= _balance(total, total.T)[..., None]
             s = scaled(shares, aim, largest)
             self._lower_horizon(s, last, target)
             put(values, s, last)
         return values
+
+    def most_kept(self, first: Real, second: Real, last: int) -> Real:
+        """Of min(a, 1), what a reciprocal BRDF of the same orders can keep everywhere in a chain.
+
+        Its f cosθo dω from k to l is that from l to k, so what it reflects of both halves is one
+        sum: of the half that may reflect more some direction loses at least this share.
+        """
+        totals = [
+            np.minimum(self.shares(*ends, last).sum(axis=-1), 1.0).sum(axis=-1)
+            for ends in ((first, second), (second, first))
+        ]
+        return _balance(*totals)
 
     def _lower_horizon(self, s: Real, last: int, target: float) -> None:
         """Nodes at the horizon are met by light that comes yet closer to it."""
@@ -153,6 +164,11 @@ class Chains:
         """Where between nodes albedos are looked at: amid, and where Kirchhoff's has its spikes."""
         amid = np.arange(NODES) + 0.5
         return np.append(amid, SPIKES if self.gain.model == "kirchhoff" else [])
+
+
+def _balance(total: Real, other: Real) -> Real:
+    """What may be kept of a half's sum, where the other half's may be less."""
+    return np.asarray(np.minimum(1.0, other / np.maximum(total, 1e-12)))
 
 
 def _bilinear(values: Real, row: NDArray[np.int_], column: NDArray[np.int_], share: Real) -> Real:

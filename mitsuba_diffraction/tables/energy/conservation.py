@@ -52,7 +52,7 @@ LARGEST = 1.5
 #: Parts of a cell, polar and azimuthal, looked at where few orders are strong.
 PARTS, FEW_ORDERS = 3, 24
 #: How often s is lowered by the root of what is too much, before by all of it.
-GENTLE = 2
+GENTLE = 4
 #: And by how much more than what is too much where it was looked at: peaks lie in between.
 PEAKS = 1.3
 #: A grating's albedo is brought below this where its cells were looked at, in so many turns.
@@ -179,6 +179,36 @@ def albedos(
     transport = maps.at(at, theta, phi, found.scale.grid_at(wavelength), maps.fades)[0]
     s = found.scale.at(theta[:, None], phi, wavelength)
     return raw, s * transport(found.scale.page(wavelength))
+
+
+def most_kept(
+    table: DiffractionTable,
+    height_scale: float,
+    model: str,
+    index: Index,
+    theta: Real,
+    phi: Real,
+    wavelength: float,
+) -> Real | None:
+    """What reciprocity leaves of a grating at best, (t, p); arguments as in `albedos`.
+
+    Of min(a, 1), the share that can be kept of every direction which light goes to and fro between
+    with this one. None for a surface that is no grating: all its directions hang together.
+    """
+    orders = _orders(table, height_scale)
+    if orders.grating is None:
+        return None
+    gain = _Maps(orders, model, index).gains(np.array([wavelength]))[0]
+    x, c = orders.grating.along(theta[:, None], phi)
+    per_x = gain.wavenumber / orders.grating.spacing
+    first, second = per_x * (c - x), per_x * (c + x)
+    last = (np.floor(first) + np.floor(second)).astype(int)
+    found = np.empty(last.shape)
+    for n in np.unique(last):
+        at = last == n
+        parts = (first[at] % 1.0, second[at] % 1.0)
+        found[at] = Chains(orders, orders.grating, gain).most_kept(*parts, int(n))
+    return found
 
 
 def _orders(table: DiffractionTable, height_scale: float) -> Orders:

@@ -244,12 +244,10 @@ class _Row:
         x = mixture.frequency[:, 0] / k - self.sin * np.cos(self.phi)[:, None]
         y = mixture.frequency[:, 1] / k - self.sin * np.sin(self.phi)[:, None]
         radius, azimuth = np.hypot(x, y), np.arctan2(y, x)
-        places, visible, cosine, pole = lobes(self.sigma, k)
-        share = np.interp(radius, places, visible, right=0.0)
-        cos_o = np.interp(radius, places, cosine)
+        share, cos_o, pole = lobe_means(self.sigma, k, radius)
         w = np.where(share > 0.0, self.cos + np.sqrt(np.maximum(1.0 - radius**2, 0.0)), 1.0)
         power = mixture.strong_at(k * w)
-        pole, turn = np.interp(radius, places, pole), azimuth - self.phi[:, None]
+        turn = azimuth - self.phi[:, None]
         gain = self._gain(cos_o, turn)
         near = cos_o * pole > 1.001
         end = np.full(np.count_nonzero(near), LEAST_COSINE)
@@ -263,6 +261,19 @@ class _Row:
         kirchhoff = (one_plus_dot / (self.cos + cos_o)) ** 2 / (self.cos * cos_o)
         gain = read(self._table, cos_o, turn) * kirchhoff
         return gain * fade(self.cos, cos_o) if self._faded else gain
+
+
+def lobe_means(sigma: float, k: float, radius: Real) -> tuple[Real, Real, Real]:
+    """The visible share of lobes, and its means of cosθo and of 1/cosθo.
+
+    radius : of their centres from the normal, in direction cosines.
+    """
+    places, *means = lobes(sigma, k)
+    place = np.interp(radius, places, np.arange(float(len(places))))
+    low = np.minimum(place.astype(np.int32), len(places) - 2)
+    share = place - low
+    visible, cosine, pole = (one[low] * (1.0 - share) + one[low + 1] * share for one in means)
+    return np.where(radius < places[-1], visible, 0.0), cosine, pole
 
 
 @lru_cache(maxsize=64)
