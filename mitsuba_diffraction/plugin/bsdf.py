@@ -255,8 +255,7 @@ class Diffraction(mi.BSDF):
         density = mi.Float(0.0)
         if above:
             pair = self._pair(si, wo, active)
-            density = self.power.density(pair.outer, self._drawing_scale, si)
-            density = _with_cosine(density, wo)
+            density = self._density(pair, si)
         if nested is not None:
             beneath = self.nested.pdf(nested, si, wo, active)
             density = dr.lerp(beneath, density, self._glossy_share(above, si, active))
@@ -271,9 +270,9 @@ class Diffraction(mi.BSDF):
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         if above:
             pair = self._pair(si, wo, active)
-            power, density = self._power_and_density(pair, si)
+            density = self._density(pair, si)  # before its neighbours fill the caches
+            power = self.power.power(pair, self.height_scale, si)
             value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
-            density = _with_cosine(density, wo)
         if nested is not None:
             beneath = mi.Spectrum(self._beneath(si, wo, active))
             its_value, its_density = self.nested.eval_pdf(nested, si, wo, active)
@@ -476,12 +475,11 @@ class Diffraction(mi.BSDF):
             )
         return self.layering.beneath(si, wo, active, ratios)
 
-    def _power_and_density(self, pair: Pair, si: Interaction) -> tuple[Colour, Float]:
-        """Of a pair, and of drawing it."""
-        if self.coat is None:
-            return self.power.power_and_density(pair, self.height_scale, si)
-        power = self.power.power(pair, self.height_scale, si)
-        return power, self.power.density(pair.outer, self._drawing_scale, si)
+    def _density(self, pair: Pair, si: Interaction) -> Float:
+        """Of drawing a pair: by the orders, and a little by the cosine."""
+        orders = self.power.density(pair.outer, self._drawing_scale, si)
+        cosine = mi.warp.square_to_cosine_hemisphere_pdf(pair.outer.wo)
+        return dr.lerp(orders, cosine, COSINE)
 
     @property
     def _drawing_scale(self) -> Float:
@@ -529,11 +527,6 @@ class Diffraction(mi.BSDF):
         mean = dr.mean(mi.unpolarized_spectrum(reflectance))
         # What lies beneath is taken to return half of what it gets
         return dr.clip(mean / (0.5 + 0.5 * mean), 0.1, 0.9)
-
-
-def _with_cosine(density: Float, wo: Vector3f) -> Float:
-    """That of the orders, and a little cosine."""
-    return dr.lerp(density, mi.warp.square_to_cosine_hemisphere_pdf(wo), COSINE)
 
 
 mi.register_bsdf("diffraction", Diffraction)
