@@ -369,6 +369,7 @@ class Diffraction(mi.BSDF):
             str(self.boundary),
             self.coat is None,
             self._takes,
+            getattr(self.boundary.material, "reflects_all", False),  # other kernels
         )
         if refused:
             raise DiffractionError("; ".join(refused))
