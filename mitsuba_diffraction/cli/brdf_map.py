@@ -15,6 +15,7 @@ from .options import (
     add_direction,
     add_exposure,
     add_heights,
+    add_json,
     add_method,
     add_mode,
     add_resolution,
@@ -29,6 +30,7 @@ from .options import (
 from .output import check_outputs
 from .patch import load_patch
 from .progress import Bar
+from .report import save_report
 
 _KEPT = "that of the table or recipe, else "
 _TABLE = {
@@ -73,6 +75,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )  # fmt: skip
     add_relative(group)
     add_heights(parser)
+    add_json(parser, "what was mapped")
     parser.set_defaults(run=run, parser=parser)
 
 
@@ -185,11 +188,15 @@ def run(args: argparse.Namespace) -> int:
     shown = ""
     if not bands.is_single:
         shown = f", exposure {result.exposure() if exposure is None else exposure:+g} stops"
+    seconds = time.perf_counter() - start
     print(
         f"{' and '.join(map(str, written))}: {args.resolution} x {args.resolution} pixels, "
-        f"{result.samples} samples per pixel, {bands}{shown}, {time.perf_counter() - start:.1f} s, "
-        f"{how}"
+        f"{result.samples} samples per pixel, {bands}{shown}, {seconds:.1f} s, {how}"
     )
+    save_report(args, {"source": args.source, "files": written, "theta": args.theta,
+                       "phi": args.phi, "pixels": args.resolution, "samples": result.samples,
+                       "bands": str(bands), "surface": surface, "how": how,
+                       "seconds": seconds})  # fmt: skip
     return 0
 
 

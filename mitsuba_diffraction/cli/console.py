@@ -16,6 +16,11 @@ PROGRAM = "mitsuba-diffraction"
 _STAMP = re.compile(r"^[\d-]+ [\d:]+ [A-Z]+\s+(?:\[[^]]*\]\s+)?(?:(?:<module>|\w+\(\)): )?")
 # Mitsuba catches SIGINT while it renders, says so, and then lets Python have it.
 _INTERRUPTED = "Received interrupt signal"
+# Scalar variants say so of each, with its numbers.
+_SAMPLE = re.compile(r"Invalid sample value: \[.*\]")
+_SAMPLES = (
+    "some samples are below zero, as colours outside of sRGB are, or no numbers; they are kept"
+)
 
 
 def say(text: str) -> None:
@@ -80,7 +85,7 @@ def mitsuba_warnings() -> Iterator[None]:
         def append(self, level: object, text: str) -> None:
             line = _without_stamp(text)
             if not line.startswith(_INTERRUPTED):  # whoever pressed Ctrl-C knows
-                say(line)
+                say(_SAMPLE.sub(_SAMPLES, line))
 
         def log_progress(self, *_: object) -> None:
             pass  # scalar variants draw bars of their own

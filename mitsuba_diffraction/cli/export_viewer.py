@@ -8,9 +8,10 @@ import time
 from ..realtime.web.tables import WEB_METHODS
 from .arguments import path_ending_in
 from .console import mitsuba_warnings, say_warning
-from .options import add_scene, scene_parameters
+from .options import add_json, add_scene, scene_parameters
 from .output import check_writable
 from .progress import Bar
+from .report import save_report
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -32,6 +33,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--method", choices=(*WEB_METHODS, "all"), default="all",
         help="that the page offers; all leaves out what does not fit; default: all",
     )  # fmt: skip
+    add_json(parser, "what the page shows")
     parser.set_defaults(run=run, parser=parser)
 
 
@@ -62,6 +64,11 @@ def run(args: argparse.Namespace) -> int:
         f"{method} ΔE2000 {mean:.2f} (99 % below {most:.2f})"
         for method, (mean, most) in page.loss.items()
     )
-    size = args.output.stat().st_size / 1e6
-    print(f"{args.output}: {size:.1f} MB, {time.perf_counter() - start:.1f} s; rounding: {losses}")
+    size, seconds = args.output.stat().st_size, time.perf_counter() - start
+    print(f"{args.output}: {size / 1e6:.1f} MB, {seconds:.1f} s; rounding: {losses}")
+    save_report(args, {"scene": args.scene, "files": [args.output], "bytes": size,
+                       "delta_e": {m: {"mean": mean, "99 %": most}
+                                   for m, (mean, most) in page.loss.items()},
+                       "left_out": page.left_out, "omissions": page.omissions,
+                       "seconds": seconds})  # fmt: skip
     return 0

@@ -51,6 +51,7 @@ _HEIGHTS: dict[str, tuple[str, str]] = {
 
 _TABLE = (
     "coherence_width", "coherence", "basis", "tolerance", "terms", "taps", "height_scale_max",
+    "windows",
 )  # fmt: skip
 
 
@@ -107,7 +108,10 @@ def add_table(group: Group, names: Sequence[str] = _TABLE, **defaults: str) -> N
         item = described_setting(name)
         kind: dict[str, Any] = {"choices": item.choices}
         if item.choices is None:
-            kind = {"metavar": item.metavar, "type": whole_number(1) if item.whole else float}
+            kind = {
+                "metavar": item.metavar,
+                "type": whole_number(1) if item.type is int else item.type,
+            }
         if isinstance(item.metavar, tuple):
             kind["nargs"] = len(item.metavar)
         default = defaults.get(name, item.default_text)

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 from .arguments import number_between, path_ending_in
 from .console import mitsuba_warnings, say_warning
+from .options import add_json
 from .output import check_writable
 from .progress import Bar
+from .report import save_report
 
 if TYPE_CHECKING:
     from ..scene.orientation.report import TangentReport
@@ -50,6 +52,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="distance within which the field may leave an axis or the body's direction to stay "
         "smooth, as a share of the mesh's size; default: 0.03",
     )  # fmt: skip
+    add_json(parser, "what the field is like")
     parser.set_defaults(run=run, parser=parser)
 
 
@@ -91,6 +94,9 @@ def run(args: argparse.Namespace) -> int:
             f"the field turns by over {BREAK:g} degrees within triangles on {report.turning:.0%} "
             "of the surface: use a finer mesh, or another --along"
         )
+    places = [{"at": at, "turns": n} for at, n in zip(field.singular, field.indices, strict=True)]
+    save_report(args, {"mesh": args.mesh, "files": [args.output], "along": args.along,
+                       "singular": places, "tangents": report})  # fmt: skip
     return 0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -35,7 +36,10 @@ def test_a_page_is_written_and_its_loss_is_named(
     scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], some_variant: str
 ) -> None:
     out = tmp_path / "plate.html"
-    assert main(["export-viewer", str(scene), str(out), "--method", "lut"]) == 0
+    report = tmp_path / "page.json"
+    command = ["export-viewer", str(scene), str(out), "--method", "lut", "--json", str(report)]
+    assert main(command) == 0
+    assert json.loads(report.read_text(encoding="utf-8"))["bytes"] == out.stat().st_size
     text = out.read_text(encoding="utf-8")
     assert text.startswith("<!DOCTYPE html>")
     assert "http://" not in text

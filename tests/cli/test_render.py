@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+from pathlib import Path
 
 import numpy as np
 import OpenEXR
@@ -22,8 +24,10 @@ def test_an_exr_and_a_png_are_written_and_named(run, scene):
 
 
 def test_a_png_alone_can_be_asked_for(run, scene):
-    assert run("render", scene, *QUICK, "-o", "a.png").code == 0
-    assert sorted(os.listdir()) == ["a.png", "room.xml"]
+    assert run("render", scene, *QUICK, "-o", "a.png", "--json", "a.json").code == 0
+    report = json.loads(Path("a.json").read_text(encoding="utf-8"))
+    assert (report["files"], report["pixels"], report["spp"]) == (["a.png"], [24, 16], 4)
+    assert sorted(os.listdir()) == ["a.json", "a.png", "room.xml"]
 
 
 def test_the_png_is_srgb_and_exposure_is_in_stops(run, scene):

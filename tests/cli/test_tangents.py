@@ -81,8 +81,12 @@ def test_a_mesh_without_texture_coordinates_gets_a_field(run, bare):
 
 
 def test_singular_points_are_named(run, ball):
-    ran = run("tangents", ball, "-o", ball.with_name("field.ply"), "--along", "z")
+    out, report = ball.with_name("field.ply"), ball.with_name("field.json")
+    ran = run("tangents", ball, "-o", out, "--along", "z", "--json", report)
     assert ran.code == 0
+    data = json.loads(report.read_text(encoding="utf-8"))
+    assert sum(place["turns"] for place in data["singular"]) == 2
+    assert data["tangents"]["has_orientation"]
     line = ran.out.splitlines()[1]
     assert line.startswith("2 singular points, with the turns around each: (")
     assert line.endswith("together +2")

@@ -48,10 +48,10 @@ vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
     float one_plus_dot = 0.5 * dot(sum, sum);
     float ratio = one_plus_dot / sum.z;
     float outside = area_factor * ratio * ratio / wi.z;
-    vec4 through = vec4(1.0);
+    vec2 there = vec2(1.0), back = vec2(1.0);
 #ifdef COATED
-    vec2 there = sqrt(transmittances(wi.z)), back = sqrt(transmittances(wo.z));
-    through = vec4(back.x * there, back.y * there);
+    there = transmittances(wi.z);
+    back = transmittances(wo.z);
     float face = outside * face_reflectance(sqrt(min(0.5 * one_plus_dot, 1.0)));
     float leaving = wo.z;
     wi = refracted(wi);
@@ -62,7 +62,7 @@ vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
     outside = area_factor * ratio * ratio / wi.z * leaving / wo.z;
     sum.z *= coat;  // κ grows by the index
 #endif
-    begin_pair(wi, wo, through);
+    begin_pair(wi, wo, there, back);
 #ifdef ENERGY_CONSERVING
     outside *= energy_scale(in_patch(wi, rotation), wi.z)
              * energy_scale(in_patch(wo, rotation), wo.z) * energy_fade(wi.z, wo.z);
