@@ -160,13 +160,12 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from ..tables.energy.conservation import DirectionalTable
 from .boundary import Kirchhoff
-from .bounded import Bounded
+from .changing import Bounded, arrays_within, marks
 from .coat import CoatedPair
 from .energy import EnergyModel
-from .frozen import arrays_within, marks
 from .layers import Transmission
 from .llvm import require_loaded_llvm
-from .pair import Pair, from_patch, in_patch
+from .pair import Pair, from_patch, in_patch, vcavity
 from .parameters import read_parameters
 from .power import power_model
 from .roles import (
@@ -184,7 +183,6 @@ from .roles import (
     Vector3f,
 )
 from .sampling import COSINE, fold
-from .shadowing import vcavity
 from .sources import TableProvider, from_cache
 
 #: Flatter would be lost in single precision.

@@ -11,9 +11,8 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
-from .bounded import Bounded
+from .changing import Bounded, children
 from .roles import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Texture
-from .traversal import children
 
 #: Ratios of refractive indices that are taken when one changes.
 INDICES = (1e-3, 1e3)
