@@ -9,12 +9,14 @@ render                 a scene to a picture
 frames                 `render --frames`: pictures of a scene that changes
 plan, planned          what a plan says, and `render --plan`
 brdf_map               the hemisphere of view directions, by the BSDF or by a method
+survey                 many scans: a row, a table and a map each
 evaluate, sweep        the methods of the thesis
 view, compare          a scene in real time, and beside the path tracer
 export_viewer          a scene as a page for a browser
 tangents               a patch laid smoothly over any mesh
 tradeoff, bench        accuracy, speed and memory
 patch                  the one patch of a command that needs heights
+workers                options of commands that may run on many processes
 options                options that several commands share, each declared once
 arguments              types of arguments
 output                 output files, checked before the work
