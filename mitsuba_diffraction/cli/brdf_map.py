@@ -11,8 +11,10 @@ from typing import Any
 from ..errors import DiffractionError, DiffractionWarning
 from ..optics.colour import ILLUMINANTS
 from .arguments import number_between, path_ending_in
+from .console import Bar
 from .options import (
     add_direction,
+    add_done,
     add_exposure,
     add_heights,
     add_method,
@@ -23,12 +25,11 @@ from .options import (
     given_for_heights,
     in_library,
     load_options,
+    load_patch,
     table_options,
     wavelengths,
 )
-from .output import check_outputs
-from .patch import load_patch
-from .progress import Bar
+from .report import check_outputs, save_done
 
 _KEPT = "that of the table or recipe, else "
 _TABLE = {
@@ -72,6 +73,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "evaluate by this method in NumPy instead of the renderer's BSDF; R is 1, the light D65",
     )  # fmt: skip
     add_relative(group)
+    add_done(parser)
     add_heights(parser)
     parser.set_defaults(run=run, parser=parser)
 
@@ -185,11 +187,12 @@ def run(args: argparse.Namespace) -> int:
     shown = ""
     if not bands.is_single:
         shown = f", exposure {result.exposure() if exposure is None else exposure:+g} stops"
+    seconds = time.perf_counter() - start
     print(
         f"{' and '.join(map(str, written))}: {args.resolution} x {args.resolution} pixels, "
-        f"{result.samples} samples per pixel, {bands}{shown}, {time.perf_counter() - start:.1f} s, "
-        f"{how}"
+        f"{result.samples} samples per pixel, {bands}{shown}, {seconds:.1f} s, {how}"
     )
+    save_done(args, written, seconds, samples=result.samples, surface=surface, exposure=exposure)
     return 0
 
 

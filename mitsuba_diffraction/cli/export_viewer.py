@@ -7,10 +7,9 @@ import time
 
 from ..realtime.web.tables import WEB_METHODS
 from .arguments import path_ending_in
-from .console import mitsuba_warnings, say_warning
-from .options import add_scene, scene_parameters
-from .output import check_writable
-from .progress import Bar
+from .console import Bar, mitsuba_warnings, say_warning
+from .options import add_done, add_scene, scene_parameters
+from .report import check_writable, save_done
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -32,6 +31,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--method", choices=(*WEB_METHODS, "all"), default="all",
         help="that the page offers; all leaves out what does not fit; default: all",
     )  # fmt: skip
+    add_done(parser)
     parser.set_defaults(run=run, parser=parser)
 
 
@@ -62,6 +62,7 @@ def run(args: argparse.Namespace) -> int:
         f"{method} ΔE2000 {mean:.2f} (99 % below {most:.2f})"
         for method, (mean, most) in page.loss.items()
     )
-    size = args.output.stat().st_size / 1e6
-    print(f"{args.output}: {size:.1f} MB, {time.perf_counter() - start:.1f} s; rounding: {losses}")
+    size, seconds = args.output.stat().st_size / 1e6, time.perf_counter() - start
+    print(f"{args.output}: {size:.1f} MB, {seconds:.1f} s; rounding: {losses}")
+    save_done(args, [args.output], seconds, size_mb=size, delta_e_mean_and_99=page.loss)
     return 0

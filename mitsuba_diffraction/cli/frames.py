@@ -9,13 +9,12 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
-from ..scene.animation import values_of_frames
 from ..scene.frames import FILMS, MISSING, Frame, digest_of
-from .console import mitsuba_warnings, say
+from ..scene.parameters import values_of_frames
+from .console import Bar, mitsuba_warnings, say
 from .interrupts import INTERRUPTED
 from .options import scene_parameters
-from .output import check_writable
-from .progress import Bar
+from .report import check_writable, save_done
 
 
 def run_frames(args: argparse.Namespace) -> int:
@@ -50,9 +49,12 @@ def run_frames(args: argparse.Namespace) -> int:
     print(
         f"{folder}: {len(frames)} frames, {done} of them new, {time.perf_counter() - start:.1f} s"
     )
+    written = [frame.png for frame in frames]
     if film is not None:
-        write_film([frame.png for frame in frames], film, args.fps)
+        write_film(written, film, args.fps)
         print(f"{film}: {len(frames) / args.fps:.3g} s at {args.fps:g} frames a second")
+        written = [film, *written]
+    save_done(args, written, time.perf_counter() - start, rendered=done)
     return 0
 
 

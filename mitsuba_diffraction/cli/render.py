@@ -9,13 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
 from .arguments import change, number_between, whole_number
-from .console import mitsuba_warnings, say, say_warning
+from .console import Bar, mitsuba_warnings, say, say_warning
 from .interrupts import INTERRUPTED
-from .options import add_exposure, add_samples, add_scene, scene_parameters
-from .output import check_writable
-from .plan import add_plan_options, plan_or_json
-from .planned import MAKE, check_plan_options, load_by_plan, say_outside
-from .progress import Bar
+from .options import add_done, add_exposure, add_samples, add_scene, scene_parameters
+from .plan import (
+    MAKE,
+    add_plan_options,
+    check_plan_options,
+    load_by_plan,
+    plan_or_json,
+    say_outside,
+)
+from .report import check_writable, save_done
 
 if TYPE_CHECKING:
     from ..scene.passes import Result
@@ -71,6 +76,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--fps", metavar="N", type=number_between(1, 100),
         help="frames a second of the film; default: 24",
     )  # fmt: skip
+    add_done(parser)
     parser.set_defaults(run=run, parser=parser)
 
 
@@ -146,10 +152,13 @@ def _run_one(args: argparse.Namespace) -> int:
         written = _written(result, args, None if only_png else output, png, variant)
     width, height = result.bitmap.size()
     samples = "1 sample" if result.spp == 1 else f"{result.spp} samples"
+    seconds = time.perf_counter() - start
     print(
         f"{' and '.join(map(str, written))}: {width} x {height} pixels, {samples} per pixel, "
-        f"{time.perf_counter() - start:.1f} s, {variant}"
+        f"{seconds:.1f} s, {variant}"
     )
+    spent = {"variant": variant, "size": [width, height], "samples": result.spp}
+    save_done(args, written, seconds, **spent, interrupted=result.interrupted)
     if result.interrupted:
         say(f"interrupted; the picture has {result.spp} of {spp} samples per pixel")
         return INTERRUPTED

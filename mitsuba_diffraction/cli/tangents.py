@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .arguments import number_between, path_ending_in
-from .console import mitsuba_warnings, say_warning
-from .output import check_writable
-from .progress import Bar
+from .console import Bar, mitsuba_warnings, say_warning
+from .options import add_done
+from .report import check_writable, save_done
 
 if TYPE_CHECKING:
     from ..scene.orientation.report import TangentReport
@@ -50,6 +51,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="distance within which the field may leave an axis or the body's direction to stay "
         "smooth, as a share of the mesh's size; default: 0.03",
     )  # fmt: skip
+    add_done(parser)
     parser.set_defaults(run=run, parser=parser)
 
 
@@ -59,10 +61,10 @@ def run(args: argparse.Namespace) -> int:
     from ..scene.orientation.breaks import BREAK
     from ..scene.orientation.directions import direction_field, turned
     from ..scene.orientation.files import load_mesh, write_ply
-    from ..scene.orientation.oriented import oriented_mesh
     from ..scene.orientation.tangents import check_tangents
-    from ..scene.orientation.trimesh import vertex_normals
+    from ..scene.orientation.trimesh import oriented_mesh, vertex_normals
 
+    start = time.perf_counter()
     with Bar(args) as bar, mitsuba_warnings():
         bar(0, 0, "reading")
         positions, normals, uv, faces = load_mesh(args.mesh)
@@ -91,6 +93,12 @@ def run(args: argparse.Namespace) -> int:
             f"the field turns by over {BREAK:g} degrees within triangles on {report.turning:.0%} "
             "of the surface: use a finer mesh, or another --along"
         )
+    singular = [
+        {"place": place, "turns": int(turns)}
+        for place, turns in zip(field.singular.tolist(), field.indices, strict=True)
+    ]
+    seconds = time.perf_counter() - start
+    save_done(args, [args.output], seconds, singular=singular, mesh=report.summary())
     return 0
 
 

@@ -27,8 +27,7 @@ from ..settings import RECIPE_SETTINGS, checked
 from . import gratings
 from .field import HeightField
 from .formats.raw import existing_file, first_line
-from .options import LoadOptions
-from .read import is_recipe, read_heights, treat
+from .read import LoadOptions, is_recipe, read_heights, treat
 
 LOAD_KEYS = tuple(option.name for option in fields(LoadOptions))
 _OWN_KEYS = ("source", "generator", "arguments", "seeds", "output")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+from pathlib import Path
 
 import numpy as np
 import OpenEXR
@@ -19,6 +21,18 @@ def test_an_exr_and_a_png_are_written_and_named(run, scene):
     assert pixels("room.exr").shape == (16, 24, 3)
     assert pixels("room.exr").dtype == np.float32
     assert OpenEXR.File("room.exr").header()["spp"] == 4
+
+
+def test_json_says_what_was_done(run, scene):
+    ran = run("render", scene, *QUICK, "-o", "a.png", "--seed", "3", "--json", "done.json")
+    assert ran.code == 0
+    done = json.loads(Path("done.json").read_text(encoding="utf-8"))
+    assert done["command"] == "render"
+    assert done["files"] == ["a.png"]
+    assert done["settings"]["seed"] == 3
+    assert done["size"] == [24, 16]
+    assert 0 < done["seconds"] < 600
+    assert done["warnings"] == []
 
 
 def test_a_png_alone_can_be_asked_for(run, scene):
@@ -113,9 +127,11 @@ def test_further_channels_are_kept_in_the_exr(run, scene):
 def test_pixels_that_are_not_numbers_are_counted(run, scene):
     scene.write_text(SCENE.replace('<rgb name="radiance" value="0.5"/>',
                                    '<spectrum name="radiance" value="nan"/>'))  # fmt: skip
-    ran = run("render", scene, *QUICK, "-o", "a.exr", "-s", "1")
+    ran = run("render", scene, *QUICK, "-o", "a.exr", "-s", "1", "--json", "done.json")
     assert ran.code == 0
     assert "pixels are not finite" in ran.err
+    warnings = json.loads(Path("done.json").read_text(encoding="utf-8"))["warnings"]
+    assert [line.split("warning: ", 1)[1] for line in ran.err.splitlines()] == warnings
 
 
 def test_a_sensor_is_chosen_by_its_number(run, scene):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
@@ -68,10 +69,14 @@ def test_the_choices_are_those_of_the_field():
 
 
 def test_a_mesh_without_texture_coordinates_gets_a_field(run, bare):
-    ran = run("tangents", bare, "-o", "field.ply")
+    ran = run("tangents", bare, "-o", "field.ply", "--json", "done.json")
     assert ran.code == 0, ran.err
     assert "field.ply: 960 triangles, patch along smooth, had no texture coordinates" in ran.out
     assert "the field is smooth everywhere" in ran.out  # a knot's tube is a torus
+    done = json.loads(Path("done.json").read_text(encoding="utf-8"))
+    assert done["files"] == ["field.ply"]
+    assert done["singular"] == done["warnings"] == []
+    assert done["mesh"]["usable"]
     assert '"usable": true' in run("info", "field.ply", "--json").out
     mesh = mi.load_dict({"type": "ply", "filename": "field.ply"})
     turn = np.array(mi.traverse(mesh)["vertex_orientation"]).reshape(-1, 3)

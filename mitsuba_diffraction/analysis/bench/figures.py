@@ -1,10 +1,62 @@
-"""Figures with goals: sections of rows, printed as text, kept as plain data."""
+"""How much is measured, and figures with goals: rows as text and plain data; two runs compared."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
+
+from ...errors import DiffractionError
+
+#: µm: the patch of 1332² pixels is as wide as the default coherence window.
+PIXEL = 65.0 / 1332
+#: The numbers that directions and wavelengths are drawn with.
+SEED = 20140113
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Sizes and repetitions.
+
+    Attributes
+    ----------
+    pixels : a side of the patch that `eval` is measured on.
+    more_pixels : sides of further patches whose tables are built, with the same size of pixels.
+    other_tables : build `patch` and Taylor tables too.
+    lanes : calls at once.
+    slow_lanes : likewise, for the thesis' configuration.
+    rounds : timed calls of each contender.
+    resolution, spp : of the rendered pictures.
+    reference_spp : of pictures that are to have converged.
+    map_resolution : directions of view along each axis, to compare colours at.
+    """
+
+    pixels: int = 1332
+    more_pixels: tuple[int, ...] = (4096, 8192)
+    other_tables: bool = True
+    lanes: int = 1 << 20
+    slow_lanes: int = 1 << 17
+    rounds: int = 15
+    resolution: int = 256
+    spp: int = 16
+    reference_spp: int = 2048
+    map_resolution: int = 256
+
+
+FULL = Plan()
+QUICK = Plan(
+    more_pixels=(),
+    other_tables=False,
+    lanes=1 << 18,
+    slow_lanes=1 << 15,
+    rounds=5,
+    resolution=128,
+    spp=4,
+    reference_spp=256,
+    map_resolution=96,
+)
 
 
 @dataclass(frozen=True)
@@ -89,3 +141,46 @@ def _number(value: float | None) -> str:
     if abs(value) >= 1000:
         return f"{value:.0f}"
     return f"{value:.3g}" if abs(value) < 1 else f"{value:#.3g}".rstrip(".")
+
+
+def read_run(path: Path) -> dict[str, Any]:
+    """What `bench --json` wrote.
+
+    Raises
+    ------
+    DiffractionError
+        If the file is missing or something else.
+    """
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        if isinstance(found["sections"], list) and isinstance(found["machine"], dict):
+            return dict(found)
+    except OSError as error:
+        raise DiffractionError(f"cannot read '{path}': {error.strerror}") from error
+    except (ValueError, KeyError, TypeError):
+        pass
+    raise DiffractionError(f"'{path}' is not what bench --json writes; give such a file")
+
+
+def compared(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+    """Lines for people: every number that both runs have, and by what it changed.
+
+    Times of two runs are not alike even where nothing changed; ratios are, to some per cent.
+    """
+    before = dict(_numbers(old))
+    machines = [f"{run['machine'].get('processor')}" for run in (old, new)]
+    if machines[0] != machines[1]:
+        yield f"other machines: {machines[0]} then, {machines[1]} now"
+    for key, value in _numbers(new):
+        was = before.get(key)
+        if was and value is not None:
+            section, row, column = key
+            yield f"  {value / was:6.2f}×  {section}: {row}: {column}: {was:.4g} → {value:.4g}"
+
+
+def _numbers(run: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str, str], float | None]]:
+    for section in run["sections"]:
+        name = section["title"].split(":")[0]
+        for row in section["rows"]:
+            for column, value in row["values"].items():
+                yield (name, row["name"], column), value

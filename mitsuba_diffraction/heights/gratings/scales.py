@@ -15,10 +15,10 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from ..field import HeightField
+from ..lengths import Counts, Lengths, count_pair, length_pair, number_between, seed_of
 from .dirt import beads, debris, flakes, scratches
 from .fingers import Layout, Row, lay_out
 from .noise import FloatArray, grain, on_pixels, rounded, smooth_field
-from .parameters import Counts, Lengths, count_pair, length_pair, number_between, seed_of
 from .sheets import Blade, overlay, ramp
 
 # Creases and bends are drawn on a grid of this many µm, whatever the pixels.

@@ -69,7 +69,7 @@ def time_compiled(
     """
     import mitsuba as mi
 
-    from ...analysis.bench.saved import saved_bsdf, thesis_bsdf
+    from ...analysis.bench.contenders import saved_bsdf, thesis_bsdf
 
     common: dict[str, Any] = {
         "coherence_width": coherence_width, "tolerance": tolerance, "wavelength_range": _RANGE,
