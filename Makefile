@@ -31,9 +31,9 @@ demo: setup  ## tabulate a snake scale, render three scenes with it, the snake i
 	@$(RENDER) scenes/snake.xml -s 32 -D sun_azimuth=60 -o out/snake_other_light.exr
 	@echo "Compare out/snake.png and out/snake_other_light.png: the colours move with the sun."
 
-# one thread for linear algebra in each of the two processes
+# one thread for linear algebra in each of two processes; the first that is done takes over tests
 test: setup .venv/browser  ## run the tests
-	@OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest -n 2
+	@OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest -n 2 --dist worksteal
 
 # for as long as you like: make fuzz SECONDS=600; the same cases again: make fuzz SEED=1
 fuzz: setup  ## try random surfaces, damaged files and command lines for a minute

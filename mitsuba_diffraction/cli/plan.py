@@ -145,20 +145,12 @@ MAKE = Path()
 
 @dataclass(frozen=True)
 class Planned:
-    """A scene with the tables of a plan that fits it.
+    """A scene with the tables of a plan that fits it."""
 
-    Attributes
-    ----------
-    scene : in the variant that is set.
-    plan : its tables.
-    tables : by their keys.
-    shares : by key, of the light of a table's surfaces that is looked up outside.
-    """
-
-    scene: Any
-    plan: Plan
-    tables: dict[str, Any]
-    shares: dict[str, float]
+    scene: Any  # in the variant that is set
+    plan: Plan  # its tables
+    tables: dict[str, Any]  # by their keys
+    shares: dict[str, float]  # by key, of the light of a table's surfaces that is looked up outside
 
 
 def load_by_plan(

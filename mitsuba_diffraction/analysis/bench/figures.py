@@ -18,31 +18,20 @@ SEED = 20140113
 
 @dataclass(frozen=True)
 class Plan:
-    """Sizes and repetitions.
+    """Sizes and repetitions."""
 
-    Attributes
-    ----------
-    pixels : a side of the patch that `eval` is measured on.
-    more_pixels : sides of further patches whose tables are built, with the same size of pixels.
-    other_tables : build `patch` and Taylor tables too.
-    lanes : calls at once.
-    slow_lanes : likewise, for the thesis' configuration.
-    rounds : timed calls of each contender.
-    resolution, spp : of the rendered pictures.
-    reference_spp : of pictures that are to have converged.
-    map_resolution : directions of view along each axis, to compare colours at.
-    """
-
-    pixels: int = 1332
+    pixels: int = 1332  # a side of the patch that `eval` is measured on
+    # sides of further patches whose tables are built, with the same size of pixels
     more_pixels: tuple[int, ...] = (4096, 8192)
-    other_tables: bool = True
-    lanes: int = 1 << 20
-    slow_lanes: int = 1 << 17
-    rounds: int = 15
+    other_tables: bool = True  # build `patch` and Taylor tables too
+    lanes: int = 1 << 20  # calls at once
+    slow_lanes: int = 1 << 17  # likewise, for the thesis' configuration
+    rounds: int = 15  # timed calls of each contender
+    # resolution, spp: of the rendered pictures
     resolution: int = 256
     spp: int = 16
-    reference_spp: int = 2048
-    map_resolution: int = 256
+    reference_spp: int = 2048  # of pictures that are to have converged
+    map_resolution: int = 256  # directions of view along each axis, to compare colours at
 
 
 FULL = Plan()
@@ -72,36 +61,22 @@ class Goal:
 
 @dataclass(frozen=True)
 class Row:
-    """One thing measured.
+    """One thing measured."""
 
-    Attributes
-    ----------
-    name : what it is.
-    values : by column; None where a column does not apply.
-    goals : of this row.
-    raw : all single measurements and whatever else belongs to them, as plain data.
-    """
-
-    name: str
-    values: dict[str, float | None]
-    goals: Sequence[Goal] = ()
+    name: str  # what it is
+    values: dict[str, float | None]  # by column; None where a column does not apply
+    goals: Sequence[Goal] = ()  # of this row
+    # all single measurements and whatever else belongs to them, as plain data
     raw: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Section:
-    """A table of rows.
+    """A table of rows."""
 
-    Attributes
-    ----------
-    title : what was measured, and how.
-    columns : heading of each column, with its unit.
-    rows : what was measured.
-    """
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Row]
+    title: str  # what was measured, and how
+    columns: Sequence[str]  # heading of each column, with its unit
+    rows: Sequence[Row]  # what was measured
 
     @property
     def goals(self) -> list[Goal]:

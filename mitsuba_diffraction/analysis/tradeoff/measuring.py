@@ -26,21 +26,15 @@ from .sample import Sample
 
 @dataclass(frozen=True)
 class Setting:
-    """One table.
+    """One table."""
 
-    Attributes
-    ----------
-    group : the parameter that is varied.
-    name : what is said of this value.
-    arguments : of `DiffractionTable.build`, besides the patch and the coherence width.
-    stored : numbers the coefficients are stored as afterwards: "half", "single", or as built.
-    crop : largest spatial frequency as a share of what light can probe, or None.
-    """
-
-    group: str
-    name: str
+    group: str  # the parameter that is varied
+    name: str  # what is said of this value
+    # of `DiffractionTable.build`, besides the patch and the coherence width
     arguments: dict[str, Any] = field(default_factory=dict)
+    # numbers the coefficients are stored as afterwards: "half", "single", or as built
     stored: str | None = None
+    # largest spatial frequency as a share of what light can probe, or None
     crop: float | None = None
 
     @property
@@ -89,34 +83,26 @@ FINEST = 1e-5
 
 @dataclass(frozen=True)
 class Measured:
-    """One setting and what it does.
+    """One setting and what it does."""
 
-    Attributes
-    ----------
-    setting : what was asked for.
-    refused : why there is no such table; everything else then is as by default.
-    error : Σ|table − exact| / Σ exact, the larger of near order 0 and elsewhere, double precision.
-    error_single : the same by the plugin, in single precision.
-    delta_e, delta_e_99 : ΔE2000 of random directions in daylight from the finest table, mean and
-        99th percentile.
-    nanoseconds : of `eval` with four wavelengths.
-    relative : the same over that of `roughconductor` (Al), median of the rounds.
-    taps, terms, intervals : bins read, numbers of each, intervals of κ.
-    megabytes, seconds : the table's size, and the time it took to build.
-    """
-
-    setting: Setting
-    refused: str = ""
+    setting: Setting  # what was asked for
+    refused: str = ""  # why there is no such table; everything else then is as by default
+    # Σ|table − exact| / Σ exact, the larger of near order 0 and elsewhere, double precision
     error: float = float("nan")
-    error_single: float = float("nan")
+    error_single: float = float("nan")  # the same by the plugin, in single precision
+    # delta_e, delta_e_99: ΔE2000 of random directions in daylight from the finest table, mean and
+    # 99th percentile
     delta_e: float = float("nan")
     delta_e_99: float = float("nan")
-    nanoseconds: float = float("nan")
+    nanoseconds: float = float("nan")  # of `eval` with four wavelengths
+    # the same over that of `roughconductor` (Al), median of the rounds
     relative: float = float("nan")
+    # taps, terms, intervals: bins read, numbers of each, intervals of κ
     taps: int = 0
     terms: int = 0
     intervals: int = 0
     precision: str = ""
+    # megabytes, seconds: the table's size, and the time it took to build
     megabytes: float = float("nan")
     seconds: float = float("nan")
 

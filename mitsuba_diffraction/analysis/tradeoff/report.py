@@ -20,18 +20,11 @@ _ALIKE = 1.1  # times differ by as much from one run to the next
 
 @dataclass(frozen=True)
 class Budget:
-    """What a user can afford; None: as much as it takes.
+    """What a user can afford; None: as much as it takes."""
 
-    Attributes
-    ----------
-    tolerance : largest error.
-    megabytes : of the table.
-    relative : time of `eval` over that of `roughconductor`.
-    """
-
-    tolerance: float | None = None
-    megabytes: float | None = None
-    relative: float | None = None
+    tolerance: float | None = None  # largest error
+    megabytes: float | None = None  # of the table
+    relative: float | None = None  # time of `eval` over that of `roughconductor`
 
     def allows(self, one: Measured) -> bool:
         """Whether a setting stays within it."""

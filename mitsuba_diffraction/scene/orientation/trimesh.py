@@ -14,21 +14,15 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TriangleMesh:
-    """Vertices with normals and texture coordinates, and the triangles between them.
+    """Vertices with normals and texture coordinates, and the triangles between them."""
 
-    Attributes
-    ----------
-    positions, normals : (n, 3) floats; normals are unit vectors.
-    uv : (n, 2) floats; dp/du is the first tangent, which a measured patch follows.
-    faces : (m, 3) integers, counter-clockwise seen from outside.
-    orientation : (n, 2) floats or None
-        Cosine and sine of the angle by which the patch is turned away from dp/du.
-    """
-
+    # positions, normals: (n, 3) floats; normals are unit vectors
     positions: Floats
     normals: Floats
-    uv: Floats
-    faces: NDArray[np.int64]
+    uv: Floats  # (n, 2) floats; dp/du is the first tangent, which a measured patch follows
+    faces: NDArray[np.int64]  # (m, 3) integers, counter-clockwise seen from outside
+    # (n, 2) floats or None Cosine and sine of the angle by which the patch is turned away from
+    # dp/du
     orientation: Floats | None = None
 
     def __post_init__(self) -> None:

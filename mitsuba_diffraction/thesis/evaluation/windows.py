@@ -28,16 +28,10 @@ _SEED = 20140113
 
 @dataclass(frozen=True, eq=False)
 class WindowFits:
-    """Fits of single windows.
+    """Fits of single windows."""
 
-    Attributes
-    ----------
-    places : (n, 2), centres of the windows, µm.
-    fits : as many; `None` where too few maxima were found.
-    """
-
-    places: Array
-    fits: tuple[Fit | None, ...]
+    places: Array  # (n, 2), centres of the windows, µm
+    fits: tuple[Fit | None, ...]  # as many; `None` where too few maxima were found
 
     @property
     def periods(self) -> Array:
