@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks validation realtime lint clean help
+.PHONY: setup demo test fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks validation energy realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -31,7 +31,7 @@ demo: setup  ## tabulate a snake scale, render three scenes with it, the snake i
 	@$(RENDER) scenes/snake.xml -s 32 -D sun_azimuth=60 -o out/snake_other_light.exr
 	@echo "Compare out/snake.png and out/snake_other_light.png: the colours move with the sun."
 
-# one thread for linear algebra in each of two processes; the first that is done takes over tests
+# one thread for linear algebra in each of the two processes
 test: setup .venv/browser  ## run the tests
 	@OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest -n 2 --dist worksteal
 
@@ -83,6 +83,14 @@ notebooks: setup  ## run the notebooks, and keep what they show in their files
 
 validation: setup  ## compare the model with rigorous solutions: docs/validation.md
 	@$(PYTHON3) -m docs.make.validation report -o docs
+
+SURFACES := sinusoidal blazed cd cd_pits dvd_pits elaphe_like xenopeltis_like
+energy: setup  ## measure what energy conservation takes: docs/energy.md
+	@mkdir -p out/energy
+	@for name in $(SURFACES); do \
+	    $(RUN) precompute precompute/$$name.toml -o out/energy/$$name.exr && \
+	    $(RUN) info --energy --json out/energy/$$name.json out/energy/$$name.exr || exit 1; done
+	@$(PYTHON3) -m docs.make.figures.energy $(SURFACES:%=out/energy/%.json)
 
 COMPARE := $(RUN) compare
 realtime: setup  ## compare the shaders with the path tracer: docs/realtime.md

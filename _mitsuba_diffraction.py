@@ -17,14 +17,19 @@ def _leave(number: int, frame: FrameType | None) -> None:
     os._exit(128 + number)
 
 
+def leave_quietly() -> None:
+    """From now on Ctrl-C is one line, until `main` has imported what answers it."""
+    # unless it is ignored, as in the background of a shell
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _leave)
+
+
 def main() -> int:
     """Run the command, and return its exit code."""
-    handled = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    if handled:  # and not ignored, as in the background of a shell
-        signal.signal(signal.SIGINT, _leave)
+    leave_quietly()
     from mitsuba_diffraction.cli import main as command
 
-    if handled:
+    if signal.getsignal(signal.SIGINT) is _leave:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     return command()
 

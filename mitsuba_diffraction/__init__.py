@@ -10,6 +10,7 @@ evaluation         a beam on a patch: maxima against the grating equation
 tradeoff           accuracy against speed and memory, setting by setting
 glsl               the realtime renderer
 comparison         how far its pictures are from path-traced ones
+cluster            rendering on many processes and machines
 web                pages that show a scene in a browser or a notebook
 reference          the BRDF straight from its integral, in double precision
 bsdf_dict          a dictionary for `mi.load_dict` from arrays
@@ -20,6 +21,13 @@ in every variant that is set later.
 """
 
 from __future__ import annotations
+
+import sys
+
+if sys.argv[:1] == ["-m"] and __name__ in sys.orig_argv:  # `python -m`: __main__ comes last
+    from _mitsuba_diffraction import leave_quietly
+
+    leave_quietly()
 
 import importlib
 from importlib.metadata import version
@@ -39,6 +47,7 @@ from .realtime import glsl, web  # noqa: E402
 from .tables import DiffractionTable  # noqa: E402
 
 if TYPE_CHECKING:
+    from . import cluster
     from .analysis import maps, tradeoff
     from .realtime import comparison
     from .thesis import evaluation
@@ -50,6 +59,7 @@ __all__ = [
     "DiffractionWarning",
     "HeightField",
     "bsdf_dict",
+    "cluster",
     "comparison",
     "evaluation",
     "glsl",
@@ -62,6 +72,7 @@ __all__ = [
 
 # Imported when first asked for: renders need neither, nor Matplotlib, which they load.
 _ON_DEMAND = {
+    "cluster": "cluster",
     "comparison": "realtime.comparison",
     "evaluation": "thesis.evaluation",
     "maps": "analysis.maps",

@@ -22,12 +22,14 @@ What the material makes of the light is a factor outside the integral, `optics.b
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .errors import DiffractionError
+from .errors import DiffractionError, quoted
 from .heights.field import HeightField
-from .optics import blend, boundary, fresnel
+from .optics import blend, boundary
 from .optics.coat import refracted, transmitted
 from .optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
 from .settings import COHERENCES as COHERENCES
@@ -78,20 +80,18 @@ def brdf(
         For an unknown coherence or model, a width that is not positive and finite, an index that
         is missing or none, or arrays whose shapes do not fit.
     """
-    coherence_width = checked("coherence_width", coherence_width)
+    width = _width(coherence_width)
     checked("coherence", coherence)
-    incident, outgoing, lam = _broadcast(wi, wo, wavelength)
-    index = _index(model, eta, k, lam.shape)
-    sigma = sigma_of(coherence_width)
-    power = window_power(field, incident, outgoing, lam, sigma, coherence)
-    if index is None and coat is not None:
-        raise DiffractionError(f"coat={coat} needs an index beneath it: give eta (and k)")
-    if index is None:
-        return kirchhoff_factor(incident, outgoing, lam, sigma) * power
+    light = _broadcast(wi, wo, wavelength)
+    index = _index(model, eta, k, light[2].shape)
+    if index is not None:
+        return _measured(
+            boundary.unpolarised, field, light, model, index, coat, sigma_of(width), coherence
+        )
     if coat is not None:
-        return _coated(field, incident, outgoing, lam, model, index, coat, sigma, coherence)
-    jones = _jones(field, incident, outgoing, lam, model, index)
-    return _order_factor(incident, outgoing, lam, sigma) * boundary.unpolarised(jones) * power
+        raise DiffractionError(f"coat={coat} needs an index beneath it: give eta (and k)")
+    power = window_power(field, *light, sigma_of(width), coherence)
+    return kirchhoff_factor(*light, sigma_of(width)) * power
 
 
 def mueller(
@@ -105,23 +105,20 @@ def mueller(
     coherence_width: float = 65.0,
     coherence: str = "ensemble",
     model: str = "small_slope",
+    coat: float | None = None,
 ) -> NDArray[np.float64]:
     """Mueller matrices of the BRDF, in 1/sr, shape (n, 4, 4); arguments and errors as `brdf`.
 
     They take Stokes vectors of light along −ωi to those of light along ωo, both about the axes of
     `optics.boundary.polarisation_axes`. Entry (0, 0) is `brdf`.
     """
-    coherence_width = checked("coherence_width", coherence_width)
+    width = _width(coherence_width)
     checked("coherence", coherence)
-    incident, outgoing, lam = _broadcast(wi, wo, wavelength)
-    index = _index(model, eta, k, lam.shape)
+    light = _broadcast(wi, wo, wavelength)
+    index = _index(model, eta, k, light[2].shape)
     if index is None:
         raise DiffractionError("polarisation needs an index: give eta (and k of a conductor)")
-    sigma = sigma_of(coherence_width)
-    power = window_power(field, incident, outgoing, lam, sigma, coherence)
-    factor = _order_factor(incident, outgoing, lam, sigma) * power
-    jones = _jones(field, incident, outgoing, lam, model, index)
-    return np.asarray(factor[..., None, None] * boundary.mueller(jones))
+    return _measured(boundary.mueller, field, light, model, index, coat, sigma_of(width), coherence)
 
 
 def window_power(
@@ -169,31 +166,50 @@ def screen_power(
     return float(4 * np.pi**2 * sigma**4 * total)
 
 
-def _coated(
+def _measured(
+    measure: Callable[[NDArray[np.complex128]], NDArray[np.float64]],
     field: HeightField,
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
-    wavelength: NDArray[np.float64],
+    light: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     model: str,
     index: NDArray[np.complex128],
-    coat: float,
+    coat: float | None,
     sigma: float,
     coherence: str,
 ) -> NDArray[np.float64]:
-    """The BRDF under a coat of this index, and of the coat's face (`optics.coat`)."""
+    """The BRDF as a measure of its Jones matrices; under a coat, that of its face too.
+
+    light : wi, wo, wavelength.
+    """
+
+    def weighed(factor: NDArray[np.float64], jones: NDArray[np.complex128]) -> NDArray[np.float64]:
+        found = measure(jones)
+        return factor.reshape(factor.shape + (1,) * (found.ndim - 1)) * found
+
+    wi, wo, wavelength = light
+    if coat is None:
+        power = window_power(field, *light, sigma, coherence)
+        return weighed(_order_factor(*light, sigma) * power, _jones(field, *light, model, index))
     if not (np.isfinite(coat) and coat >= 1.0):
         raise DiffractionError(f"coat={coat} must be an index of at least 1")
     below, above = refracted(wi, coat), refracted(wo, coat)
     below, above = (np.where(w[:, 2:] > 0, r, -r) for w, r in ((wi, below), (wo, above)))
-    within = wavelength / coat
-    power = window_power(field, below, above, within, sigma, coherence)
-    jones = _jones(field, below, above, within, model, index / coat)
-    through = boundary.unpolarised(transmitted(jones, wi, wo, coat))
-    structure = _order_factor(below, above, within, sigma) * through * power / coat**2
+    inside = below, above, wavelength / coat
+    power = window_power(field, *inside, sigma, coherence) / coat**2
+    lit = _lit(wi, wo)
+    jones = transmitted(_jones(field, *inside, model, index / coat), *lit, coat, index / coat)
+    structure = weighed(_order_factor(*inside, sigma) * power, jones)
     flat = np.exp(-((sigma * wavenumber(wavelength)) ** 2) * np.sum((wi + wo)[:, :2] ** 2, axis=1))
-    face = kirchhoff_factor(wi, wo, wavelength, sigma) * 4 * np.pi**2 * sigma**4 * flat
-    half = np.sqrt(np.clip(0.5 + 0.5 * np.sum(wi * wo, axis=1), 0.0, 1.0))
-    return np.asarray(structure + face * fresnel.reflectance(half, coat))
+    face = _order_factor(*light, sigma) * 4 * np.pi**2 * sigma**4 * flat
+    return structure + weighed(face, boundary.kirchhoff(*lit, coat))
+
+
+def _lit(
+    wi: NDArray[np.float64], wo: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Both directions; the normal, where either is below the surface and there is no light."""
+    above = ((wi[:, 2] > 0) & (wo[:, 2] > 0))[:, None]
+    normal = np.array([0.0, 0.0, 1.0])
+    return np.where(above, wi, normal), np.where(above, wo, normal)
 
 
 def _jones(
@@ -205,15 +221,13 @@ def _jones(
     index: NDArray[np.complex128],
 ) -> NDArray[np.complex128]:
     """Jones matrices (n, 2, 2) of a model; those of a mirror's normal where there is no light."""
-    above = ((wi[:, 2] > 0) & (wo[:, 2] > 0))[:, None]
-    normal = np.array([0.0, 0.0, 1.0])
-    incident, outgoing = np.where(above, wi, normal), np.where(above, wo, normal)
+    incident, outgoing = _lit(wi, wo)
     if model == "kirchhoff":
         return boundary.kirchhoff(incident, outgoing, index)
     u, v, w = diffraction_coordinates(incident, outgoing)
     wave = wavenumber(wavelength)
     roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
-    s = blend.weight(wave * w, roughness.at(wave * np.hypot(u, v)))
+    s = blend.weight(wave * w, roughness.at(wave * np.hypot(u, v)), index)
     return blend.jones(incident, outgoing, index, s)
 
 
@@ -229,6 +243,15 @@ def _order_factor(
     w = np.where(above, cos_i + cos_o, 1.0)
     lam = wavelength * 1e-3
     return np.where(above, 4 * cos_i * cos_o / (lam**2 * np.pi * sigma**2 * w**2), 0.0)
+
+
+def _width(value: float) -> float:
+    """A coherence width: unlike a table, an integral may have any."""
+    number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+    if not (number and 0.0 < value < np.inf):
+        shown = f"{value:g}" if number else quoted(value)
+        raise DiffractionError(f"coherence_width={shown} must be a positive number of µm")
+    return float(value)
 
 
 def _index(

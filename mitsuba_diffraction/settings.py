@@ -100,6 +100,12 @@ def _half_axes(value: Any) -> tuple[float, float] | None:
     return positive(x), positive(y)
 
 
+def _windows(value: Any) -> str | float | None:
+    if value is None or value == "none":
+        return None
+    return "auto" if value == "auto" else _between(0.0, math.inf)(value)
+
+
 def _choices(*names: str) -> dict[str, Any]:
     return {"check": _among(*names), "must": f"one of {', '.join(names)}", "choices": names}
 
@@ -123,6 +129,8 @@ class TableSettings:
     q_max : largest spatial frequency k·|(u, v)| that is tabulated, rad/µm, as half axes of an
         ellipse along x and y; None for all that light can probe.
     kappa_max : largest k·w·height_scale that is, rad/µm; None likewise.
+    windows : width in µm of the overlapping windows that a wide scan is cut into, whose powers are
+        averaged (`tables.build.windows`); "auto" for twice the coherence width; None for the whole.
 
     Raises
     ------
@@ -164,6 +172,11 @@ class TableSettings:
         None, _half_axes, "largest spatial frequency", "a positive number, or two, in rad/µm"
     )
     kappa_max: float | None = _setting(None, _positive, "largest κ", "a positive number, in rad/µm")
+    windows: str | float | None = _setting(
+        None, _windows, "µm, average over overlapping windows of a scan much wider than "
+        "coherence_width; auto is twice that", "auto, none, or a positive number of µm",
+        metavar="auto|W", text="the scan as a whole", type=str,
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         for name in _BY_NAME:
@@ -183,7 +196,7 @@ class TableSettings:
 _BY_NAME: dict[str, Field[Any]] = {item.name: item for item in fields(TableSettings)}
 
 #: Those that scenes and recipes may set.
-SCENE_SETTINGS = ("coherence_width", "coherence", "basis", "tolerance", "terms")
+SCENE_SETTINGS = ("coherence_width", "coherence", "basis", "tolerance", "terms", "windows")
 RECIPE_SETTINGS = (*SCENE_SETTINGS, "wavelength_range")
 
 
@@ -212,14 +225,14 @@ class Setting:
     help, default_text : what it is, and what it is by default.
     choices : the words that it can be, or None.
     metavar : names for its value, or for each of several.
-    whole : whether it is a whole number.
+    type : of its value: int, float or str.
     """
 
     help: str
     default_text: str
     choices: tuple[str, ...] | None
     metavar: str | tuple[str, ...] | None
-    whole: bool
+    type: type
 
 
 def described_setting(name: str) -> Setting:
@@ -229,8 +242,8 @@ def described_setting(name: str) -> Setting:
     text = " ".join(value if isinstance(value, str) else f"{value:g}" for value in values if value)
     return Setting(
         help=described["help"],
-        default_text=text or "as many as the tolerance takes",
+        default_text=text or described.get("text", "as many as the tolerance takes"),
         choices=described.get("choices"),
         metavar=described.get("metavar"),
-        whole=default is None,
+        type=described.get("type", int if default is None else float),
     )

@@ -44,11 +44,22 @@ def streams(notebook: Any, name: str) -> str:
 
 
 def kinds(notebook: Any) -> list[list[tuple[str, ...]]]:
-    """What each of its cells shows: which streams, pictures and values, not what is in them."""
-    return [
+    """What each of its cells shows: which streams, pictures and values, not what is in them.
+
+    A stream counts once however many pieces it comes in: a slow machine's come in more.
+    """
+    cells = [
         [(o.output_type, o.get("name", ""), *sorted(o.get("data", ()))) for o in cell.outputs]
         for cell in notebook.cells
         if cell.cell_type == "code"
+    ]
+    return [
+        [
+            kind
+            for last, kind in zip([None, *cell], cell, strict=False)
+            if kind != last or kind[0] != "stream"
+        ]
+        for cell in cells
     ]
 
 

@@ -244,6 +244,16 @@ def test_arguments_broadcast():
     assert reference.brdf(SMALL, polar(0), polar(3), [400.0, 500.0]).shape == (2,)
 
 
+def test_a_window_may_be_wider_than_any_table_s():
+    widths = (500.0, 5000.0)
+    narrow, wide = (
+        reference.brdf(SMALL, polar(0), polar(0), 550.0, coherence_width=width)[0]
+        for width in widths
+    )
+    # of order 0 alone: its lobe holds the same light in a solid angle of 1/width²
+    assert wide == pytest.approx(narrow * (widths[1] / widths[0]) ** 2, rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -290,11 +300,12 @@ def test_in_the_mirror_direction_it_is_fresnel_s_share_of_the_perfect_reflector(
     assert found == pytest.approx(share * perfect, rel=1e-10)
 
 
+@pytest.mark.parametrize("coat", [None, 1.58])
 @pytest.mark.parametrize("model", reference.MODELS)
-def test_the_first_entry_of_the_mueller_matrix_is_the_brdf(model):
+def test_the_first_entry_of_the_mueller_matrix_is_the_brdf(model, coat):
     wi, wo = polar(50, 30), polar(35, 100)
-    matrix = reference.mueller(SMALL, wi, wo, 520.0, model=model, **ALUMINIUM)
-    found = reference.brdf(SMALL, wi, wo, 520.0, model=model, **ALUMINIUM)
+    matrix = reference.mueller(SMALL, wi, wo, 520.0, model=model, coat=coat, **ALUMINIUM)
+    found = reference.brdf(SMALL, wi, wo, 520.0, model=model, coat=coat, **ALUMINIUM)
     assert matrix.shape == (1, 4, 4)
     assert matrix[:, 0, 0] == pytest.approx(found, rel=1e-12)
 

@@ -3,6 +3,7 @@
 Contents
 --------
 maps       BRDF maps: the hemisphere of view directions
+survey     many scans: a row, a table and a map each
 tradeoff   accuracy against speed and memory
 bench      speed and noise
 pictures   patches and albedo as pictures

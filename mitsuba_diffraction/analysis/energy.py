@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tables.energy.conservation import Index, albedos
+from ..tables.energy.conservation import Index, albedos, most_kept
 from ..tables.store.energy import Energy
 from ..tables.table import DiffractionTable
 
@@ -25,7 +25,8 @@ def energy_summary(table: DiffractionTable) -> dict[str, Any]:
     """For each material what is reflected, before and after, and how much of it is taken.
 
     The albedos are sums over the orders at 24 azimuths of seven angles up to 80° at 450, 550 and
-    650 nm, not at the directions for which the scale was made.
+    650 nm, not at the directions for which the scale was made. Of gratings there is a bound beside
+    it: what any reciprocal BRDF of the same orders must take of some direction.
     """
     return {
         name: _of_material(table, model, index) for name, (model, index) in _materials().items()
@@ -77,6 +78,11 @@ def _of_material(table: DiffractionTable, model: str, index: Index) -> dict[str,
         result["conserved where raw is above 1"] = _range(kept[gains])
         inside = (kept[gains] >= 0.97) & (kept[gains] <= 1.001)
         result["between 0.97 and 1.001 there"] = round(float(inside.mean()), 3)
+    if found.scale is not None and found.scale.grating is not None:
+        parts = [most_kept(table, 1.0, model, index, theta, phi, one) for one in WAVELENGTHS]
+        most = np.stack([part for part in parts if part is not None])
+        result["reciprocity lets be kept"] = round(float(most.min()), 3)
+        result["kept over that"] = _range(kept / np.minimum(raw, 1.0) / most)
     return result
 
 

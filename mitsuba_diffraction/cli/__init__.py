@@ -14,6 +14,8 @@ view, compare          a scene in real time, and beside the path tracer
 export_viewer          a scene as a page for a browser
 tangents               a patch laid smoothly over any mesh
 tradeoff, bench        accuracy, speed and memory
+survey                 many scans of one kind, measured alike
+workers                `render --workers`, and what it says
 options                options that several commands share, declared once, and their values
 arguments              types of arguments
 console                lines and bars on stderr, what Mitsuba says among them

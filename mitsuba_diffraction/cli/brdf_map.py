@@ -14,9 +14,9 @@ from .arguments import number_between, path_ending_in
 from .console import Bar
 from .options import (
     add_direction,
-    add_done,
     add_exposure,
     add_heights,
+    add_json,
     add_method,
     add_mode,
     add_resolution,
@@ -29,7 +29,7 @@ from .options import (
     table_options,
     wavelengths,
 )
-from .report import check_outputs, save_done
+from .report import check_outputs, save_report
 
 _KEPT = "that of the table or recipe, else "
 _TABLE = {
@@ -73,8 +73,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "evaluate by this method in NumPy instead of the renderer's BSDF; R is 1, the light D65",
     )  # fmt: skip
     add_relative(group)
-    add_done(parser)
     add_heights(parser)
+    add_json(parser, "what was mapped")
     parser.set_defaults(run=run, parser=parser)
 
 
@@ -192,7 +192,10 @@ def run(args: argparse.Namespace) -> int:
         f"{' and '.join(map(str, written))}: {args.resolution} x {args.resolution} pixels, "
         f"{result.samples} samples per pixel, {bands}{shown}, {seconds:.1f} s, {how}"
     )
-    save_done(args, written, seconds, samples=result.samples, surface=surface, exposure=exposure)
+    save_report(args, {"source": args.source, "files": written, "theta": args.theta,
+                       "phi": args.phi, "pixels": args.resolution, "samples": result.samples,
+                       "bands": str(bands), "surface": surface, "how": how,
+                       "seconds": seconds})  # fmt: skip
     return 0
 
 

@@ -18,11 +18,13 @@ PROGRAM = "mitsuba-diffraction"
 
 # date, time, level, then the class, or the line of Python and its function
 _STAMP = re.compile(r"^[\d-]+ [\d:]+ [A-Z]+\s+(?:\[[^]]*\]\s+)?(?:(?:<module>|\w+\(\)): )?")
-#: Warnings that the command of this process has printed, for its --json.
-WARNED: list[str] = []
-
 # Mitsuba catches SIGINT while it renders, says so, and then lets Python have it.
 _INTERRUPTED = "Received interrupt signal"
+# Scalar variants say so of each, with its numbers.
+_SAMPLE = re.compile(r"Invalid sample value: \[.*\]")
+_SAMPLES = (
+    "some samples are below zero, as colours outside of sRGB are, or no numbers; they are kept"
+)
 
 
 def say(text: str) -> None:
@@ -43,14 +45,12 @@ def say_error(text: str) -> None:
 
 def say_warning(text: str) -> None:
     """Print a warning."""
-    WARNED.append(one_line(text))
     say(f"warning: {text}")
 
 
 @contextlib.contextmanager
 def warnings_in_one_line() -> Iterator[None]:
     """Inside, every Python warning is printed as one line, a text that comes again only once."""
-    WARNED.clear()
     say = saying_once()
 
     def show(message: Warning | str, category: type[Warning], *_: object) -> None:
@@ -89,7 +89,7 @@ def mitsuba_warnings() -> Iterator[None]:
         def append(self, level: object, text: str) -> None:
             line = _without_stamp(text)
             if not line.startswith(_INTERRUPTED):  # whoever pressed Ctrl-C knows
-                say(line)
+                say(_SAMPLE.sub(_SAMPLES, line))
 
         def log_progress(self, *_: object) -> None:
             pass  # scalar variants draw bars of their own

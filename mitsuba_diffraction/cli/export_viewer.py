@@ -8,8 +8,8 @@ import time
 from ..realtime.web.tables import WEB_METHODS
 from .arguments import path_ending_in
 from .console import Bar, mitsuba_warnings, say_warning
-from .options import add_done, add_scene, scene_parameters
-from .report import check_writable, save_done
+from .options import add_json, add_scene, scene_parameters
+from .report import check_writable, save_report
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -31,7 +31,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--method", choices=(*WEB_METHODS, "all"), default="all",
         help="that the page offers; all leaves out what does not fit; default: all",
     )  # fmt: skip
-    add_done(parser)
+    add_json(parser, "what the page shows")
     parser.set_defaults(run=run, parser=parser)
 
 
@@ -62,7 +62,11 @@ def run(args: argparse.Namespace) -> int:
         f"{method} ΔE2000 {mean:.2f} (99 % below {most:.2f})"
         for method, (mean, most) in page.loss.items()
     )
-    size, seconds = args.output.stat().st_size / 1e6, time.perf_counter() - start
-    print(f"{args.output}: {size:.1f} MB, {seconds:.1f} s; rounding: {losses}")
-    save_done(args, [args.output], seconds, size_mb=size, delta_e_mean_and_99=page.loss)
+    size, seconds = args.output.stat().st_size, time.perf_counter() - start
+    print(f"{args.output}: {size / 1e6:.1f} MB, {seconds:.1f} s; rounding: {losses}")
+    save_report(args, {"scene": args.scene, "files": [args.output], "bytes": size,
+                       "delta_e": {m: {"mean": mean, "99 %": most}
+                                   for m, (mean, most) in page.loss.items()},
+                       "left_out": page.left_out, "omissions": page.omissions,
+                       "seconds": seconds})  # fmt: skip
     return 0

@@ -5,16 +5,18 @@ from __future__ import annotations
 import argparse
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from ..scene.frames import FILMS, MISSING, Frame, digest_of
 from ..scene.parameters import values_of_frames
 from .console import Bar, mitsuba_warnings, say
 from .interrupts import INTERRUPTED
 from .options import scene_parameters
-from .report import check_writable, save_done
+from .report import check_writable, save_report
+from .workers import client_of, film_of, on_workers, say_report
 
 
 def run_frames(args: argparse.Namespace) -> int:
@@ -32,30 +34,54 @@ def run_frames(args: argparse.Namespace) -> int:
     from ..scene.load import set_variant
 
     start = time.perf_counter()
-    done = 0
-    if to_do:
+    done, workers = 0, None
+    if to_do and on_workers(args):
+        done, workers = _on_workers(args, to_do, folder)
+    elif to_do:
         variant = set_variant(args.mode)
         with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
             bar(0, 0, "loading")
             for _ in render_frames(args.scene, to_do, variant, with_exr=args.exr, progress=bar):
                 done += 1
+    report = {"scene": args.scene, "frames": len(frames), "new": done,
+              "files": [frame.png for frame in frames if frame.png.exists()], "film": None,
+              "interrupted": done < len(to_do), "seconds": time.perf_counter() - start,
+              "workers": workers}  # fmt: skip
     if done < len(to_do):
+        save_report(args, report)
         there = len(frames) - len(to_do) + done
         say(
             f"interrupted; {there} of {len(frames)} frames are done, run the command again to "
             "continue"
         )
         return INTERRUPTED
-    print(
-        f"{folder}: {len(frames)} frames, {done} of them new, {time.perf_counter() - start:.1f} s"
-    )
-    written = [frame.png for frame in frames]
+    print(f"{folder}: {len(frames)} frames, {done} of them new, {report['seconds']:.1f} s")
     if film is not None:
-        write_film(written, film, args.fps)
+        write_film([frame.png for frame in frames], film, args.fps)
         print(f"{film}: {len(frames) / args.fps:.3g} s at {args.fps:g} frames a second")
-        written = [film, *written]
-    save_done(args, written, time.perf_counter() - start, rendered=done)
+    save_report(args, report | {"film": film})
     return 0
+
+
+def _on_workers(
+    args: argparse.Namespace, to_do: Sequence[Frame], folder: Path
+) -> tuple[int, dict[str, Any]]:
+    """Render frames on workers; how many came before Ctrl-C, and what the workers did."""
+    from ..cluster.film import Wanted
+    from ..scene.frames import write_frame
+    from ..scene.load import set_variant
+    from ..scene.passes import Stop
+
+    variant, done = set_variant(args.mode), 0
+    wanted = [Wanted(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]
+    with mitsuba_warnings(), client_of(args) as client:
+        film = film_of(args, client, wanted, variant, folder / "passes")
+        with Bar(args, unit=" tasks", delay=0) as bar, Stop() as stop:
+            for frame, result in zip(to_do, film.render(stop, bar), strict=False):
+                write_frame(frame, result.bitmap, args.scene, variant, args.exr)
+                film.forget(done)
+                done += 1
+        return done, say_report(film)
 
 
 def _say_why(reasons: Mapping[Path, tuple[str, str] | None]) -> None:

@@ -16,6 +16,7 @@ from importlib.metadata import version
 from typing import NoReturn
 
 from ..errors import DiffractionError, shortened
+from ..streams import own_program
 from . import (
     bench,
     brdf_map,
@@ -26,6 +27,7 @@ from . import (
     plan,
     precompute,
     render,
+    survey,
     sweep,
     tangents,
     tradeoff,
@@ -37,8 +39,8 @@ from .options import STDOUT
 from .report import check_writable
 
 COMMANDS = (
-    precompute, info, tangents, plan, render, brdf_map, evaluate, sweep, tradeoff, compare, view,
-    export_viewer, bench,
+    precompute, info, tangents, plan, render, brdf_map, evaluate, survey, sweep, tradeoff, compare,
+    view, export_viewer, bench,
 )  # fmt: skip
 
 FAILED = 1
@@ -57,7 +59,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         args = build_parser().parse_args(argv)
     except SystemExit as stop:  # argparse: --help, --version and usage errors
         return _code_of(stop)
-    with warnings_in_one_line(), ended_at_once():
+    with own_program(), warnings_in_one_line(), ended_at_once():
         return _run(args)
 
 

@@ -54,6 +54,7 @@ _HEIGHTS: dict[str, tuple[str, str]] = {
 
 _TABLE = (
     "coherence_width", "coherence", "basis", "tolerance", "terms", "taps", "height_scale_max",
+    "windows",
 )  # fmt: skip
 
 
@@ -110,7 +111,10 @@ def add_table(group: Group, names: Sequence[str] = _TABLE, **defaults: str) -> N
         item = described_setting(name)
         kind: dict[str, Any] = {"choices": item.choices}
         if item.choices is None:
-            kind = {"metavar": item.metavar, "type": whole_number(1) if item.whole else float}
+            kind = {
+                "metavar": item.metavar,
+                "type": whole_number(1) if item.type is int else item.type,
+            }
         if isinstance(item.metavar, tuple):
             kind["nargs"] = len(item.metavar)
         default = defaults.get(name, item.default_text)
@@ -247,11 +251,6 @@ def add_json(parser: argparse.ArgumentParser, what: str = "the figures", **more:
     parser.add_argument(
         "--json", metavar="FILE", type=path_ending_in(".json"), help=f"write {what} as JSON", **more
     )
-
-
-def add_done(parser: argparse.ArgumentParser) -> None:
-    """The same for commands that write pictures, meshes or pages: `report.save_done`."""
-    add_json(parser, "what was done (files, settings, seconds, warnings)")
 
 
 class Renamed(argparse.Action):

@@ -104,7 +104,8 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
             fields = [load_heights(source, options) for source in sources]
     # Before the table is waited for: whoever treats the heights will not want this one
     shortest = settings.wavelength_range[0] / 1000
-    cut_out = (field for field in fields if field.cut_out)
+    # windows are levelled, and fade at their edges
+    cut_out = (field for field in fields if field.cut_out and settings.windows is None)
     said = [line for field in cut_out for line in edge_lines(field, shortest)]
     for line in said:
         warnings.warn(line, DiffractionWarning, stacklevel=1)
@@ -136,6 +137,18 @@ def _report(
         yield "patch", patch
         for line in field.history:
             yield "", line
+    if "windows" in table.source:
+        windows = table.source["windows"]
+        width, height = windows["extent"]
+        error = windows["standard_error"]
+        yield (
+            "",
+            (
+                f"mean of {windows['number']} windows of {width:.4g} x {height:.4g} µm; its "
+                f"standard error is {error['glossy']:.2g} of the light near order 0, and "
+                f"{error['colours']:.2g} of that of all other orders"
+            ),
+        )
     if "variation" in table.source:
         yield "", f"orders vary by {table.source['variation']:.2g} of their mean between patches"
     intervals, ny, nx, _, terms = table.coefficients.shape

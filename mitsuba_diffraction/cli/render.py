@@ -11,7 +11,7 @@ from ..errors import DiffractionError
 from .arguments import change, number_between, whole_number
 from .console import Bar, mitsuba_warnings, say, say_warning
 from .interrupts import INTERRUPTED
-from .options import add_done, add_exposure, add_samples, add_scene, scene_parameters
+from .options import add_exposure, add_json, add_samples, add_scene, scene_parameters
 from .plan import (
     MAKE,
     add_plan_options,
@@ -20,7 +20,8 @@ from .plan import (
     plan_or_json,
     say_outside,
 )
-from .report import check_writable, save_done
+from .report import check_writable, save_report
+from .workers import add_threads, add_workers, client_of, film_of, on_workers, say_report
 
 if TYPE_CHECKING:
     from ..scene.passes import Result
@@ -57,6 +58,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "that `plan -o` wrote",
     )  # fmt: skip
     add_plan_options(parser)
+    add_json(parser, "what was rendered")
     film = parser.add_argument_group("animation")
     film.add_argument(
         "--frames", metavar="N", type=whole_number(1), help="render N pictures, frame_0000.png on"
@@ -76,13 +78,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--fps", metavar="N", type=number_between(1, 100),
         help="frames a second of the film; default: 24",
     )  # fmt: skip
-    add_done(parser)
+    add_workers(parser)
+    add_threads(parser)
     parser.set_defaults(run=run, parser=parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Render, and return the exit code."""
     check_plan_options(args)
+    if on_workers(args) and args.plan is not None:
+        args.parser.error("argument --plan: is for one process; leave the workers out")
     moving = bool(args.animate or args.turn)
     if args.frames is not None:
         if not moving:
@@ -97,11 +102,11 @@ def run(args: argparse.Namespace) -> int:
         return run_frames(args)
     if moving or args.exr or args.fps:
         args.parser.error("--animate, --turn, --exr and --fps belong to --frames: say how many")
-    return _run_one(args)
+    return _on_workers(args) if on_workers(args) else _run_one(args)
 
 
-def _run_one(args: argparse.Namespace) -> int:
-    parameters = scene_parameters(args)
+def _outputs(args: argparse.Namespace) -> tuple[Path, Path, bool]:
+    """What `-o` names, the PNG, and whether that is all."""
     output = args.output or Path(args.scene.with_suffix(".exr").name)
     if output.suffix.lower() not in (".exr", ".png"):
         args.parser.error(
@@ -111,6 +116,40 @@ def _run_one(args: argparse.Namespace) -> int:
     png = output if only_png else output.with_suffix(".png")
     for path in dict.fromkeys((output, png)):
         check_writable(path)
+    return output, png, only_png
+
+
+def _on_workers(args: argparse.Namespace) -> int:
+    parameters = scene_parameters(args)
+    output, png, only_png = _outputs(args)
+
+    from ..cluster.film import Wanted
+    from ..scene.load import set_variant
+    from ..scene.passes import Stop
+
+    start = time.perf_counter()
+    variant = set_variant(args.mode)
+    keep = output.with_name(f"{output.name}.passes")
+    with mitsuba_warnings(), client_of(args) as client:
+        film = film_of(args, client, [Wanted(parameters, args.spp, args.seed)], variant, keep)
+        if only_png:
+            _check_colours(film.scene, film.sensor, args, output)
+        with Bar(args, unit=" tasks", delay=0) as bar, Stop() as stop:
+            for result in film.render(stop, bar):
+                written = _written(result, args, None if only_png else output, png, variant)
+                film.forget(0)
+                seconds = time.perf_counter() - start
+                _say_written(result, written, seconds, variant)
+                report = _report(args, result, written, seconds, variant)
+                save_report(args, report | {"workers": say_report(film)})
+                return 0
+    say(f"interrupted; finished passes are kept in '{keep}': run the command again to go on")
+    return INTERRUPTED
+
+
+def _run_one(args: argparse.Namespace) -> int:
+    parameters = scene_parameters(args)
+    output, png, only_png = _outputs(args)
 
     from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink
     from ..scene.passes import Stop, render_passes
@@ -134,11 +173,8 @@ def _run_one(args: argparse.Namespace) -> int:
             if args.preview:
                 shrink(sensor)
             spp = spp or preview_samples(sensor, args.preview)
-            if only_png and not _shows_colours(scene, sensor):
-                raise DiffractionError(
-                    f"the film of '{args.scene}' holds no colours that a PNG could show; "
-                    f"name an EXR: -o {output.with_suffix('.exr')}"
-                )
+            if only_png:
+                _check_colours(scene, sensor, args, output)
             with Stop() as stop:
                 result = render_passes(
                     scene, sensor, spp=spp, seed=args.seed, variant=variant, stop=stop,
@@ -150,19 +186,24 @@ def _run_one(args: argparse.Namespace) -> int:
             width, height = result.bitmap.size()
             say_outside(planned, width * height * result.spp)
         written = _written(result, args, None if only_png else output, png, variant)
-    width, height = result.bitmap.size()
-    samples = "1 sample" if result.spp == 1 else f"{result.spp} samples"
     seconds = time.perf_counter() - start
-    print(
-        f"{' and '.join(map(str, written))}: {width} x {height} pixels, {samples} per pixel, "
-        f"{seconds:.1f} s, {variant}"
-    )
-    spent = {"variant": variant, "size": [width, height], "samples": result.spp}
-    save_done(args, written, seconds, **spent, interrupted=result.interrupted)
+    _say_written(result, written, seconds, variant)
+    save_report(args, _report(args, result, written, seconds, variant))
     if result.interrupted:
         say(f"interrupted; the picture has {result.spp} of {spp} samples per pixel")
         return INTERRUPTED
     return 0
+
+
+def _report(
+    args: argparse.Namespace, result: Result, written: list[Path], seconds: float, variant: str
+) -> dict[str, Any]:
+    """For --json."""
+    return {
+        "scene": args.scene, "files": written, "pixels": result.bitmap.size(), "spp": result.spp,
+        "seed": args.seed, "variant": variant, "interrupted": result.interrupted,
+        "seconds": seconds,
+    }  # fmt: skip
 
 
 def _written(
@@ -188,10 +229,24 @@ def _written(
     return written
 
 
-def _shows_colours(scene: object, sensor: object) -> bool:
-    """Whether the film will hold something for a PNG, asked before the work is done."""
+def _say_written(result: Result, written: list[Path], seconds: float, variant: str) -> None:
+    width, height = result.bitmap.size()
+    samples = "1 sample" if result.spp == 1 else f"{result.spp} samples"
+    print(
+        f"{' and '.join(map(str, written))}: {width} x {height} pixels, {samples} per pixel, "
+        f"{seconds:.1f} s, {variant}"
+    )
+
+
+def _check_colours(scene: Any, sensor: Any, args: argparse.Namespace, output: Path) -> None:
+    """Refuse a film that will hold nothing for a PNG, before the work is done."""
+    from ..scene.passes import integrator_of
     from ..scene.pictures import colours_of
 
-    film = sensor.film()  # type: ignore[attr-defined]
-    film.prepare(scene.integrator().aov_names())  # type: ignore[attr-defined]
-    return colours_of(film.bitmap()) is not None
+    film = sensor.film()
+    film.prepare(integrator_of(scene).aov_names())
+    if colours_of(film.bitmap()) is None:
+        raise DiffractionError(
+            f"the film of '{args.scene}' holds no colours that a PNG could show; "
+            f"name an EXR: -o {output.with_suffix('.exr')}"
+        )

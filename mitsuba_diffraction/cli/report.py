@@ -14,14 +14,11 @@ from typing import Any
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError
-from .console import WARNED
 
 # Keys of height-field summaries, which are in µm throughout, and suffixes of keys that say so.
 _UNITS = {"pixel_size": "µm", "extent": "µm", "range": "µm", "rms_height": "µm"}
 _SUFFIXES = {"_um": "µm", "_nm": "nm", "_mb": "MB", "_s": "s", "_deg": "°"}
 _INDENT = "  "
-# What a command line holds beside settings.
-_NO_SETTINGS = ("run", "parser", "command", "json", "debug", "progress")
 
 
 def lines_of(data: Mapping[str, Any], depth: int = 0) -> Iterator[str]:
@@ -76,13 +73,6 @@ def save_report(args: argparse.Namespace, data: Mapping[str, Any]) -> None:
     """Write the file of --json, if one is asked for."""
     if args.json is not None:
         save_json(args.json, data)
-
-
-def save_done(args: argparse.Namespace, files: Iterable[Path], seconds: float, **more: Any) -> None:
-    """Write to --json what a command did: files, settings, seconds and warnings, and `more`."""
-    settings = {key: value for key, value in vars(args).items() if key not in _NO_SETTINGS}
-    done = {"command": args.command, "files": list(files), "settings": settings}
-    save_report(args, {**done, "seconds": seconds, "warnings": WARNED, **more})
 
 
 def _label(key: str) -> tuple[str, str]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .arguments import number_between, path_ending_in
 from .console import Bar, mitsuba_warnings, say_warning
-from .options import add_done
-from .report import check_writable, save_done
+from .options import add_json
+from .report import check_writable, save_report
 
 if TYPE_CHECKING:
     from ..scene.orientation.report import TangentReport
@@ -51,7 +50,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="distance within which the field may leave an axis or the body's direction to stay "
         "smooth, as a share of the mesh's size; default: 0.03",
     )  # fmt: skip
-    add_done(parser)
+    add_json(parser, "what the field is like")
     parser.set_defaults(run=run, parser=parser)
 
 
@@ -64,7 +63,6 @@ def run(args: argparse.Namespace) -> int:
     from ..scene.orientation.tangents import check_tangents
     from ..scene.orientation.trimesh import oriented_mesh, vertex_normals
 
-    start = time.perf_counter()
     with Bar(args) as bar, mitsuba_warnings():
         bar(0, 0, "reading")
         positions, normals, uv, faces = load_mesh(args.mesh)
@@ -93,12 +91,9 @@ def run(args: argparse.Namespace) -> int:
             f"the field turns by over {BREAK:g} degrees within triangles on {report.turning:.0%} "
             "of the surface: use a finer mesh, or another --along"
         )
-    singular = [
-        {"place": place, "turns": int(turns)}
-        for place, turns in zip(field.singular.tolist(), field.indices, strict=True)
-    ]
-    seconds = time.perf_counter() - start
-    save_done(args, [args.output], seconds, singular=singular, mesh=report.summary())
+    places = [{"at": at, "turns": n} for at, n in zip(field.singular, field.indices, strict=True)]
+    save_report(args, {"mesh": args.mesh, "files": [args.output], "along": args.along,
+                       "singular": places, "tangents": report})  # fmt: skip
     return 0
 
 

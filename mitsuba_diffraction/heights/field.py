@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
@@ -17,8 +17,10 @@ from .lengths import LONGEST_HEIGHT, PixelSize, pixel_size_of
 
 FloatArray = npt.NDArray[np.float64]
 
-# 11585² pixels, 1 GiB of heights: beyond it no table could be built in the memory of a workstation.
-MAX_PIXELS = 2**27
+# 16384² pixels, 2 GiB of heights: beyond it no table could be built in the memory of a workstation.
+MAX_PIXELS = 2**28
+# Beyond so many pixels statistics are added up by so many rows.
+_LARGE, _ROWS = 2**25, 256
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
@@ -104,7 +106,11 @@ class HeightField:
     @cached_property
     def rms_height(self) -> float:
         """Root-mean-square deviation from the mean height, µm."""
-        return float(self.heights.std())
+        if self.heights.size <= _LARGE:
+            return float(self.heights.std())
+        mean = float(self.heights.mean())
+        total = sum(float(np.square(rows - mean).sum()) for rows in self._blocks())
+        return math.sqrt(total / self.heights.size)
 
     @cached_property
     def rms_slope(self) -> float:
@@ -113,10 +119,22 @@ class HeightField:
         The seams between tiles are left out: their steps are not part of the surface.
         """
         dx, dy = self.pixel_size
+        if self.heights.size > _LARGE:
+            (ny, nx), along_x, along_y = self.shape, 0.0, 0.0
+            for rows in self._blocks(1):
+                along_x += float(np.square(np.diff(rows[:_ROWS], axis=1)).sum())
+                along_y += float(np.square(np.diff(rows, axis=0)).sum())
+            along_x, along_y = along_x / (ny * (nx - 1)), along_y / ((ny - 1) * nx)
+            return math.sqrt(along_x / dx**2 + along_y / dy**2)
         return math.sqrt(
             _mean_square(np.diff(self.heights, axis=1)) / dx**2
             + _mean_square(np.diff(self.heights, axis=0)) / dy**2
         )
+
+    def _blocks(self, more: int = 0) -> Iterator[FloatArray]:
+        """Some rows at a time, and `more` of the next, so that no copy is as large as the field."""
+        for start in range(0, self.shape[0], _ROWS):
+            yield self.heights[start : start + _ROWS + more]
 
     def changed(
         self, heights: npt.ArrayLike, line: str, *, cut_out: bool | None = None

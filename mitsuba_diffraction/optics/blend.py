@@ -5,15 +5,20 @@ Kirchhoff's K where it is rough and gentle, so that facets reflect. What counts 
 at the scales that make the order q: waves much longer than 2π/q tilt and shift what makes the
 order, and do not make it; roughness much finer dims it. So
 
-    s = exp(−(κσ_q)⁴/3),   σ_q² = Σ_q' |h_q'|² (1 − exp(−(4q'/q)⁴)) exp(−(q'/2q)⁴),
+    s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3),
+    σ_q² = Σ_q' |h_q'|² (1 − exp(−(4q'/q)⁴)) exp(−(q'/2q)⁴),
 
 where σ_q² is the height variance of the components q' from about a fifth to twice the order's
-frequency; at κσ_q = 1.2 both have half a share. The first correction to B, of order (κσ)², is not
-in s. The local curvature approximation has it (Elfouhaily, Guignard, Awadallah and Thompson 2003,
-Waves in Random Media 13, 321), as s = 1 − (κσ)²/2 for a sinusoid's first order, but K is so far
-from B in oblique light that a small share of it does more harm than good. Band and power are chosen
-against rigorous solutions, see docs/validation.md. s is symmetric in ωi and ωo, and smooth in both
-and in the wavelength.
+frequency and R₀ = |(n−1)/(n+1)|² what a flat surface reflects along its normal. At κσ_q = 1.2 of a
+dielectric, 0.95 of a metal, both have half a share.
+
+The first correction to B is of order (κσ)². The local curvature approximation has it (Elfouhaily,
+Guignard, Awadallah and Thompson 2003, Waves in Random Media 13, 321): s = 1 − (κσ)²/2 for a
+sinusoid's first order. On a metal, whose K and B differ by the facet's tilt alone, that is right:
+it halves the errors of either polarisation on gentle aluminium at normal incidence. On a dielectric
+they differ by Brewster's angle too, there K is so far from B in oblique light that a small share of
+it does more harm than good. Hence R₀. Band and fourth power are chosen against rigorous solutions,
+see docs/validation.md. s is symmetric in ωi and ωo, and smooth in both and in the wavelength.
 """
 
 from __future__ import annotations
@@ -24,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import boundary
+from . import boundary, fresnel
 from .boundary import Complex, Real
 
 #: Components are told apart to this part of an octave; lines of a grating stay where they are.
@@ -111,10 +116,17 @@ class RoughnessTable:
         return np.asarray(np.interp(place, np.arange(len(self.nodes)), self.nodes), np.float64)
 
 
-def weight(kappa: ArrayLike, variance: ArrayLike) -> Real:
-    """s = exp(−(κσ_q)⁴/3); κ in rad/µm, σ_q² in µm² (`ScaleRoughness.at`)."""
+def weight(kappa: ArrayLike, variance: ArrayLike, index: ArrayLike) -> Real:
+    """s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3) of any shapes that broadcast.
+
+    Parameters
+    ----------
+    kappa : rad/µm.
+    variance : σ_q², µm² (`ScaleRoughness.at`).
+    index : n + ik of the material over that of the medium above it.
+    """
     roughness = np.square(np.asarray(kappa, np.float64)) * np.asarray(variance, np.float64)
-    return np.exp(-np.square(roughness) / 3)
+    return np.exp(-roughness * (0.5 * fresnel.reflectance(1.0, index) + roughness / 3))
 
 
 def jones(wi: ArrayLike, wo: ArrayLike, index: ArrayLike, s: ArrayLike) -> Complex:

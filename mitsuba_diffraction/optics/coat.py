@@ -5,10 +5,19 @@ k·u stay what they are; the normal part of ωi + ωo in optical units, n w', gr
 does κ. Each way the face transmits the shares T_s and T_p of the powers of both polarisations
 (Born and Wolf, section 1.5.2), and cosθ dω grows by n² on the way out, so that
 
-    f = 1/n² · 4 cosθi' cosθo' · N' / (λ'² A w'²) · ⟨|P|²⟩,   J' = √T(ωo) J(ωi', ωo') √T(ωi),
+    f = 1/n² · 4 cosθi' cosθo' · N' / (λ'² A w'²) · ⟨|P|²⟩,   J'_ab = √(T_a(ωo) T_b(ωi) G_ab) J_ab,
 
-and the face itself is a mirror. Light that the structure sends back to the face, and the face to
-the structure, is left out: for a clear coat under air that loses, and never gains.
+and the face itself is a mirror. G is light that the face sends back to the structure. Between two
+mirrors of reflectances R and ρ the powers add up to 1/(1 − Rρ) (Born and Wolf, section 7.6, without
+interference); with ρ_a(ωo), ρ_b(ωi) of the flat structure and the mean √(R_a ρ_a R_b ρ_b) of both
+directions,
+
+    G_ab = 1 / max(1 − √(R_a ρ_a R_b ρ_b), max(ρ_a, ρ_b) (1 − min(R_a, R_b))).
+
+For a flat structure that is the exact sum. It is reciprocal; and by the second term T G ρ is at
+most 1 in either direction, so that a coat never reflects more than it gets while the structure
+reflects no more than a flat one. Light that the structure sends beyond the critical angle is lost,
+though all of it comes back and some leaves in the end: docs/validation.md says how much.
 """
 
 from __future__ import annotations
@@ -27,17 +36,29 @@ def refracted(direction: ArrayLike, n: float) -> Real:
     return np.stack([x, y, np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))], axis=-1)
 
 
-def transmitted(jones: ArrayLike, wi: ArrayLike, wo: ArrayLike, n: float) -> Complex:
-    """Jones matrices (..., 2, 2) of the structure in the coat, between the faces' two passages.
+def transmitted(
+    jones: ArrayLike, wi: ArrayLike, wo: ArrayLike, n: float, index: ArrayLike
+) -> Complex:
+    """Jones matrices (..., 2, 2) of the structure in the coat, as seen from outside the coat.
 
     wi, wo : directions outside the coat, (..., 3).
+    index : (...) of the structure over that of the coat.
     """
-    before, after = (np.asarray(w, np.float64)[..., 2] for w in (wi, wo))
+    (back0, sent0), (back, sent) = (_mirrors(np.asarray(w, np.float64), n, index) for w in (wi, wo))
+    passed = (1.0 - back)[..., :, None] * (1.0 - back0)[..., None, :]
+    both = np.sqrt((back * sent)[..., :, None] * (back0 * sent0)[..., None, :])
+    most = np.maximum(sent[..., :, None], sent0[..., None, :])
+    least = most * (1.0 - np.minimum(back[..., :, None], back0[..., None, :]))
     matrix = np.asarray(jones, np.complex128)
-    return np.asarray(_roots(after, n)[..., :, None] * matrix * _roots(before, n)[..., None, :])
+    return np.asarray(np.sqrt(passed / np.maximum(1.0 - both, least)) * matrix)
 
 
-def _roots(cosine: Real, n: float) -> Real:
-    """√T_s and √T_p of light at this angle outside, (..., 2); the same both ways."""
-    r_s, r_p = amplitudes(cosine, n)
-    return np.sqrt(1.0 - np.abs(np.stack([r_s, r_p], axis=-1)) ** 2)
+def _mirrors(outside: Real, n: float, index: ArrayLike) -> tuple[Real, Real]:
+    """R_s and R_p of the face, the same from both sides, and of the flat structure, (..., 2)."""
+    within = refracted(outside, n)[..., 2]
+    face, structure = amplitudes(outside[..., 2], n), amplitudes(within, index)
+    return _powers(*face), _powers(*structure)
+
+
+def _powers(r_s: Complex, r_p: Complex) -> Real:
+    return np.asarray(np.abs(np.stack([r_s, r_p], axis=-1)) ** 2)

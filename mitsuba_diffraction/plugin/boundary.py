@@ -17,7 +17,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..optics.blend import NODES_PER_OCTAVE, RoughnessTable
-from .coat import CoatedPair, transmittances
+from .coat import CoatedPair, bounced, transmittances
 from .memory import index_between, read_record, upload
 from .pair import Pair
 from .reflectance import Conductor, Dielectric, Perfect, Reflectance
@@ -56,8 +56,8 @@ class Kirchhoff:
         coated = isinstance(pair, CoatedPair)
         if (mi.is_polarized or coated) and not isinstance(self.material, Perfect):
             light = _Path(pair, mode)
-            found = [light.kirchhoff(index) for index in self.material.indices(si, active)]
-            return light.of_jones(found)
+            indices = self.material.indices(si, active)
+            return light.of_jones([light.kirchhoff(index) for index in indices], indices)
         reflectance = self.material.reflectance(pair.cos_half, si, active)
         return mi.depolarizer(reflectance * dr.square(pair.one_plus_dot))
 
@@ -91,15 +91,18 @@ class SmallSlope:
         matrices = [(light.kirchhoff(index), light.small_slope(index)) for index in indices]
         if len(matrices) == 1:  # one index at all wavelengths
             matrices *= len(wavenumbers)
-        shares = self._shares(pair, height_scale, wavenumbers)
+            indices *= len(wavenumbers)
+        shares = self._shares(pair, height_scale, wavenumbers, indices)
         blended = [
             tuple(dr.fma(k - b, share, b) for k, b in zip(*both, strict=True))
             for both, share in zip(matrices, shares, strict=True)
         ]
-        return light.of_jones(blended)
+        return light.of_jones(blended, indices)
 
-    def _shares(self, pair: Pair, height_scale: Float, wavenumbers: list[Float]) -> list[Float]:
-        """Kirchhoff's share for each channel, 1 − s with s = exp(−(κσ_q)⁴/3).
+    def _shares(
+        self, pair: Pair, height_scale: Float, wavenumbers: list[Float], indices: list[Number]
+    ) -> list[Float]:
+        """Kirchhoff's share for each channel, 1 − s with s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3).
 
         Not s: near the horizon K is so large beside B that the last digit of 1 − s counts.
         """
@@ -107,13 +110,17 @@ class SmallSlope:
         squared = dr.maximum(dr.squared_norm(pair.uv), 1e-20)
         start = dr.fma(dr.log2(squared), 0.5 * NODES_PER_OCTAVE, -self._first * NODES_PER_OCTAVE)
         squared_w = dr.square(pair.w * height_scale)
+        halves = [0.5 * _square((n - 1.0) / (n + 1.0)) for n in indices]
+        if len(halves) == 1:
+            halves *= len(wavenumbers)
         shares = []
-        for k in wavenumbers:
+        for k, half in zip(wavenumbers, halves, strict=True):
             place = dr.fma(dr.log2(k), NODES_PER_OCTAVE, start)
             lower = index_between(dr.floor(place), 0.0, self._last)
             low, high = read_record(self._nodes, mi.UInt32(lower), 2)
             variance = dr.lerp(low, high, dr.clip(place - lower, 0.0, 1.0))
-            shares.append(_one_minus_exp(dr.square(squared_w * dr.square(k) * variance) / 3.0))
+            squared = squared_w * dr.square(k) * variance
+            shares.append(_one_minus_exp(squared * dr.fma(squared, 1.0 / 3.0, half)))
         return shares
 
     def __str__(self) -> str:
@@ -220,24 +227,42 @@ class _Path:
             contrast * bent * bent0 * self._dot - into * p0 * epsilon * self._sines,
         )
 
-    def of_jones(self, matrices: list[Jones]) -> Spectrum:
-        """What Jones matrices make of light, for each channel; one may stand for all.
+    def of_jones(self, matrices: list[Jones], indices: list[Number]) -> Spectrum:
+        """What Jones matrices and indices make of light, for each channel; one may stand for all.
 
         ½ Σ|J|², or in polarised variants the Mueller matrix between Mitsuba's bases; through the
         faces of a coat, where there is one.
         """
         if self._coat:
-            matrices = [self._transmitted(jones) for jones in matrices]
+            matrices = [self._transmitted(*both) for both in zip(matrices, indices, strict=True)]
         if mi.is_polarized:
             return self._mueller(matrices)
         powers = [0.5 * sum(map(_square, jones)) for jones in matrices]
         return mi.UnpolarizedSpectrum(powers if len(powers) > 1 else powers[0])
 
-    def _transmitted(self, jones: Jones) -> Jones:
-        """√T J √T of the coat's face, light coming and going."""
-        (s0, p0), (s, p) = ([dr.sqrt(t) for t in ts] for ts in self._coat)
-        ss, sp, ps, pp = jones
-        return ss * (s * s0), sp * (s * p0), ps * (p * s0), pp * (p * p0)
+    def _transmitted(self, jones: Jones, index: Number) -> Jones:
+        """√(T T G) J of the coat's face, light coming and going (`optics.coat`)."""
+        structure = (
+            self._mirrored(self._q0, self._square0, index),
+            self._mirrored(self._q, self._square, index),
+        )
+        factors = []
+        for out in range(2):
+            for into in range(2):
+                through = self._coat[0][into], self._coat[1][out]
+                again = bounced(
+                    (1.0 - through[0], 1.0 - through[1]), (structure[0][into], structure[1][out])
+                )
+                factors.append(dr.sqrt(through[0] * through[1] * again))
+        return tuple(entry * factor for entry, factor in zip(jones, factors, strict=True))
+
+    def _mirrored(self, cosine: Float, square: Float, index: Number) -> tuple[Float, Float]:
+        """|r_s|² and |r_p|² of the flat structure."""
+        epsilon = index * index
+        inside = _root(epsilon - square)
+        r_s = (cosine - inside) * dr.rcp(cosine + inside)
+        r_p = (epsilon * cosine - inside) * dr.rcp(epsilon * cosine + inside)
+        return _square(r_s), _square(r_p)
 
     def _mueller(self, matrices: list[Jones]) -> Spectrum:
         incident, outgoing = self._frames

@@ -56,6 +56,9 @@ tolerance : float [0.001]
     Relative error of ⟨|P|²⟩, met or refused.
 terms : integer [from tolerance]
     Length of the series.
+windows : float or string [none]
+    Width, in µm, of the overlapping windows that a scan much wider than coherence_width is cut
+    into, each levelled, whose powers are averaged (Welch 1967); `auto` is twice coherence_width.
 
 The material
 ------------
@@ -69,8 +72,9 @@ int_ior, ext_ior : float or string [1.5, 1.000277]
 coat_ior : float or string [none]
     A flat clear layer over the structure, too thick to interfere: 1.58 is the polycarbonate of a
     CD. Light is refracted into it and out again, and its own face is a mirror of the same
-    coherence width. Light that bounces between face and structure is left out, so coats lose it
-    and never gain; energy_conserving has nothing to do. Over that of the medium above it is the
+    coherence width. Light that the face sends back is summed as between two mirrors; what leaves
+    the structure beyond the critical angle is lost (docs/validation.md has figures), so coats never
+    gain, and energy_conserving has nothing to do. Over that of the medium above it is the
     differentiable parameter `coat_eta`.
 model : string [small_slope]
     `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
@@ -98,10 +102,10 @@ The light beneath
     is number 0.
 layering : string [transmission]
     How the nested BSDF shares the light. `transmission`: it gets and returns T(ωi) T(ωo), with
-    T = 1 − a, a the diffracting surface's own albedo (under a coat, the flat interface's
-    reflectance). `thesis`: (1 − w) f_diffraction + (1 − F + w) f_nested, F at the half vector, as
-    in the thesis of 2014 that the method comes from; for comparisons with its pictures only, since
-    it gains energy.
+    T = 1 − a, a the diffracting surface's own albedo (under a coat, the reflectance of both flat
+    faces, bounces included). `thesis`: (1 − w) f_diffraction + (1 − F + w) f_nested, F at the half
+    vector, as in the thesis of 2014 that the method comes from; for comparisons with its pictures
+    only, since it gains energy.
 diffuse_weight : float [0]
     That w.
 
@@ -154,6 +158,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
+from ..tables.energy.conservation import DirectionalTable
 from .boundary import Kirchhoff
 from .bounded import Bounded
 from .coat import CoatedPair
@@ -405,6 +410,11 @@ class Diffraction(mi.BSDF):
             return None
         scale = self._energy.brightness(height_scale)
         return None if scale is None else (scale, self._energy.fades)
+
+    def reflected_ratio(self, height_scale: float) -> DirectionalTable | None:
+        """Its albedo over the flat interface's reflectance, where T = 1 − a goes on beneath."""
+        beneath = self.nested is not None and isinstance(self.layering, Transmission)
+        return self._energy.ratio(height_scale) if beneath and self._energy is not None else None
 
     @property
     def _takes(self) -> bool:

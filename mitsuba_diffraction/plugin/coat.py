@@ -43,11 +43,14 @@ class UnderCoat:
         self.material, self.coat = material, coat
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
-        """1 − T T of coat and material, for the cosine of the angle outside."""
+        """1 − T T / (1 − R R) of coat and material, for the cosine of the angle outside."""
         n = self.coat.eta
         inside = dr.sqrt(dr.maximum(dr.fma(cos_theta, cos_theta, n * n - 1.0), 1e-12)) / n
-        through = 1.0 - self.coat.reflectance(cos_theta, si, active)
-        return 1.0 - through * (1.0 - self.material.reflectance(inside, si, active))
+        face = self.coat.reflectance(cos_theta, si, active)
+        beneath = self.material.reflectance(inside, si, active)
+        through = (1.0 - face) * (1.0 - beneath)
+        # Mirrors that reflect everything let nothing through
+        return 1.0 - through * dr.rcp(dr.maximum(1.0 - face * beneath, 1e-6))
 
     def traverse(self, callback: Callback) -> None:
         """Expose the material's index, and the coat's over that of the medium above it."""
@@ -69,6 +72,14 @@ def transmittances(cosine: Float, n: Float) -> tuple[Float, Float]:
     outside = 4.0 * cosine * inside
     below = dr.fma(n * n, cosine, inside)
     return outside * dr.rcp(dr.square(cosine + inside)), n * n * outside * dr.rcp(dr.square(below))
+
+
+def bounced(face: tuple[Float, Float], structure: tuple[Float, Float]) -> Float:
+    """G of the light that comes and goes, from R of the face and ρ of the structure for both."""
+    # At Brewster's angle R is 0 to rounding
+    ends = [dr.safe_sqrt(r * rho) for r, rho in zip(face, structure, strict=True)]
+    left = dr.fma(-ends[0], ends[1], 1.0)
+    return dr.rcp(dr.maximum(left, dr.maximum(*structure) * (1.0 - dr.minimum(*face))))
 
 
 def _refracted(direction: Vector3f, n: Float) -> Vector3f:

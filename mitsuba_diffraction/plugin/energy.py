@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from dataclasses import replace
 
 import drjit as dr
 import mitsuba as mi
@@ -18,9 +19,10 @@ from ..errors import DiffractionWarning
 from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from ..optics.geometry import wavenumber
-from ..tables.energy.conservation import Conservation, DirectionalTable
+from ..tables.energy.conservation import FINE, Conservation, DirectionalTable
 from ..tables.energy.gain import GRAZING
-from ..tables.energy.grid import SHARE
+from ..tables.energy.grating import ENDS, LAST_NODE, NODES, Grating
+from ..tables.energy.grid import SHARE, DirectionGrid
 from ..tables.store.energy import Energy
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, Kirchhoff
@@ -35,6 +37,10 @@ Array = NDArray[np.float32]
 INDEX_STEP = 0.05
 #: What is taken beyond this share of a real material is warned of.
 MUCH = 0.05
+
+
+#: Directions of a grating's s in RGB, whose channels are means over wavelengths.
+_COLOURS = DirectionGrid(80, 120)
 
 
 class EnergyModel:
@@ -58,7 +64,8 @@ class EnergyModel:
         self._energy = Energy(
             table, "kirchhoff" if kirchhoff else "small_slope", self._indices, (low, high)
         )
-        self._fades, self._warned = kirchhoff, False
+        self._kirchhoff = self._fades = kirchhoff
+        self._warned = False
         self._scale = _Lookup()
         self._reflected = _Lookup()
 
@@ -72,12 +79,12 @@ class EnergyModel:
         nodes = self._energy.nodes(height_scale, interval=differentiable)
         found = [self._energy.at(node) for node in nodes]
         if self.conserving:
-            scales = [_scale_of(one) for one in found]
-            taken = any(one.scale is not None for one in found)
+            scales = _scales_of(found)
             self._warn(found)
-            self._scale.update(scales if taken else None, nodes, height_scale)
+            self._fades = self._kirchhoff and (scales is None or scales[0].grating is None)
+            self._scale.update(scales, nodes, height_scale)
         if beneath:
-            ratios = [self._ratio(one.albedo) for one in found]
+            ratios = [self._ratio(one) for one in _alike([one.albedo for one in found])]
             self._reflected.update(ratios, nodes, height_scale)
 
     def _warn(self, found: list[Conservation]) -> None:
@@ -100,14 +107,19 @@ class EnergyModel:
         """s for who knows no wavelengths, (polar + 1, azimuthal): their mean as the eye has it."""
         nodes = self._energy.nodes(height_scale)
         found = [self._energy.at(node) for node in nodes]
-        if all(one.scale is None for one in found):
+        scales = _scales_of(found)
+        if scales is None:
             return None
-        low, high = _alike([_scale_of(one) for one in found])
-        width = nodes[1] - nodes[0]
-        share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
-        weights = response(low.wavelengths)[:, 1] * low.wavelengths
-        values = low.values * (1 - share) + high.values * share
-        return np.average(values, axis=0, weights=weights).astype(np.float32)
+        scales = [one if one.grating is None else one.on(FINE) for one in scales]
+        scale = _between(scales, nodes, height_scale)
+        weights = response(scale.wavelengths)[:, 1] * scale.wavelengths
+        return np.average(scale.values, axis=0, weights=weights).astype(np.float32)
+
+    def ratio(self, height_scale: float) -> DirectionalTable:
+        """What `reflected` looks up, for who draws without Dr.Jit."""
+        nodes = self._energy.nodes(height_scale)
+        ratios = [self._ratio(self._energy.at(node).albedo) for node in nodes]
+        return _between(ratios, nodes, height_scale)
 
     @property
     def fades(self) -> bool:
@@ -169,6 +181,7 @@ class _Lookup:
         self._low, self._slope = mi.Float(0.0), mi.Float(0.0)
         self._first, self._pages_per_log = mi.Float(0.0), mi.Float(0.0)
         self._pages = self._polar = self._azimuthal = 1
+        self._grating: Grating | None = None
 
     def update(
         self,
@@ -180,7 +193,8 @@ class _Lookup:
         self.present = tables is not None
         if tables is None:
             return
-        low, high = (_pages(table) for table in _alike(tables))
+        self._grating = None if mi.is_rgb else tables[0].grating
+        low, high = (_pages(table) for table in tables)
         self._pages, self._polar, self._azimuthal = low.shape[:3]
         width = nodes[1] - nodes[0]
         share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
@@ -201,28 +215,40 @@ class _Lookup:
         share = None
         if dr.grad_enabled(height_scale):
             share = (height_scale - self._low) * self._slope
-        remaining = 1.0 - dr.safe_acos(cosine) * (2.0 / dr.pi)
-        row = (1.0 - dr.safe_sqrt(remaining)) * (self._polar / SHARE)
-        column = dr.atan2(tangential.y, tangential.x) * (self._azimuthal / (2.0 * dr.pi))
-        column = dr.select(column < 0.0, column + self._azimuthal, column)
-        i = mi.UInt32(index_between(row, 0.0, self._polar - 1.0))
-        j = mi.UInt32(index_between(column, 0.0, self._azimuthal - 1.0))
-        s, t = dr.clip(row - i, 0.0, 1.0), dr.clip(column - j, 0.0, 1.0)
-        cell = i * self._azimuthal + j
+        if self._grating is None:
+            at = self._cell(*self._place(tangential, cosine))
+            cells = [at] * len(wavenumbers)
+        else:
+            cells = [self._cell(*_chain(self._grating, tangential, k)) for k in wavenumbers]
 
-        def page(n: Index) -> Float:
+        def page(n: Index, at: tuple[Index, Float, Float]) -> Float:
+            cell, s, t = at
             corners = self._corners(n * (self._polar * self._azimuthal) + cell, share)
             return dr.lerp(dr.lerp(*corners[:2], t), dr.lerp(*corners[2:], t), s)
 
         if mi.is_rgb or self._pages == 1:
             last = self._pages - 1
-            return [page(mi.UInt32(min(n, last))) for n in range(len(wavenumbers))]
+            return [page(mi.UInt32(min(n, last)), at) for n, at in enumerate(cells)]
         found = []
-        for k in wavenumbers:
+        for k, at in zip(wavenumbers, cells, strict=True):
             place = (self._first - dr.log2(k)) * self._pages_per_log
             n = mi.UInt32(index_between(place, 0.0, self._pages - 2.0))
-            found.append(dr.lerp(page(n), page(n + 1), dr.clip(place - n, 0.0, 1.0)))
+            found.append(dr.lerp(page(n, at), page(n + 1, at), dr.clip(place - n, 0.0, 1.0)))
         return found
+
+    def _place(self, tangential: Vector2f, cosine: Float) -> tuple[Float, Float]:
+        """Row and column of a `DirectionGrid`."""
+        remaining = 1.0 - dr.safe_acos(cosine) * (2.0 / dr.pi)
+        row = (1.0 - dr.safe_sqrt(remaining)) * (self._polar / SHARE)
+        column = dr.atan2(tangential.y, tangential.x) * (self._azimuthal / (2.0 * dr.pi))
+        return row, dr.select(column < 0.0, column + self._azimuthal, column)
+
+    def _cell(self, row: Float, column: Float) -> tuple[Index, Float, Float]:
+        """A cell, and where in it."""
+        i = mi.UInt32(index_between(row, 0.0, self._polar - 1.0))
+        j = mi.UInt32(index_between(column, 0.0, self._azimuthal - 1.0))
+        s, t = dr.clip(row - i, 0.0, 1.0), dr.clip(column - j, 0.0, 1.0)
+        return i * self._azimuthal + j, s, t
 
     def _corners(self, cell: Index, share: Float | None) -> list[Float]:
         """Values at a cell's corners; interpolated here only where a derivative is wanted."""
@@ -230,6 +256,23 @@ class _Lookup:
             return read_record(self._values, cell, 4)
         low, high = (read_record(end, cell, 4) for end in self._ends)
         return [dr.lerp(*ends, share) for ends in zip(low, high, strict=True)]
+
+
+def _chain(grating: Grating, tangential: Vector2f, wavenumber: Float) -> tuple[Float, Float]:
+    """Row and column of a `tables.energy.grating.GratingGrid`."""
+    cosine, sine = grating.axis
+    x = cosine * tangential.x + sine * tangential.y
+    y = cosine * tangential.y - sine * tangential.x
+    width, per_x = dr.safe_sqrt(dr.fma(-y, y, 1.0)), wavenumber / grating.spacing
+    rows = []
+    for one in (width - x, width + x):
+        xi = dr.maximum(one * per_x, 0.0)
+        whole = dr.floor(xi)
+        rest = xi - whole
+        within = dr.sqrt(rest / LAST_NODE) * (NODES - ENDS)
+        beyond = (rest - LAST_NODE) * (ENDS / (1.0 - LAST_NODE)) + (NODES - ENDS)
+        rows.append(dr.fma(whole, NODES, dr.select(rest < LAST_NODE, within, beyond)))
+    return rows[0], rows[1]
 
 
 def indices_of(
@@ -261,14 +304,27 @@ def _plain(number: Float) -> float:
     return float(dr.slice(dr.detach(number)))
 
 
-def _scale_of(found: Conservation) -> DirectionalTable:
-    if found.scale is not None:
-        return found.scale
-    return DirectionalTable(found.albedo.wavelengths, np.ones_like(found.albedo.values))
+def _scales_of(found: list[Conservation]) -> list[DirectionalTable] | None:
+    """s of each, 1 where there is none; nothing if there is none at all."""
+    made = next((one.scale for one in found if one.scale is not None), None)
+    if made is None:
+        return None
+    ones = replace(made, values=np.ones_like(made.values))
+    return [ones if one.scale is None else one.scale for one in found]
+
+
+def _between(
+    tables: list[DirectionalTable], nodes: tuple[float, float], height_scale: float
+) -> DirectionalTable:
+    """Interpolated between two height scales."""
+    low, high = _alike(tables)
+    width = nodes[1] - nodes[0]
+    share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
+    return DirectionalTable(low.wavelengths, low.values * (1 - share) + high.values * share)
 
 
 def _alike(tables: list[DirectionalTable]) -> list[DirectionalTable]:
-    """All on the directions and wavelengths of the finest."""
+    """Albedos, all on the directions and wavelengths of the finest."""
     finest = max(tables, key=lambda table: table.values.size)
     theta, phi = finest.grid.theta[:, None], finest.grid.phi
     return [
@@ -284,7 +340,12 @@ def _alike(tables: list[DirectionalTable]) -> list[DirectionalTable]:
 
 def _pages(table: DirectionalTable) -> Array:
     """All four corners of each cell together: (channels or wavelengths, rows, columns, 4)."""
-    values = table.values
+    if table.grating is not None and not mi.is_rgb:
+        values = np.pad(table.values, [(0, 0), (0, 0), (0, 1)], mode="edge")
+        right, values = values[:, :, 1:], table.values
+        corners = (values[:, :-1], right[:, :-1], values[:, 1:], right[:, 1:])
+        return np.stack(corners, axis=-1)
+    values = table.values if table.grating is None else table.on(_COLOURS).values
     if mi.is_rgb and len(values) > 1:
         values = np.tensordot(_sensitivities(table.wavelengths), values, 1).astype(np.float32)
     right = np.roll(values, -1, axis=2)

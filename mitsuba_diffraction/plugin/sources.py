@@ -164,7 +164,7 @@ def _built(
 def _warn(table: DiffractionTable, name: str | None = None) -> None:
     """Say what a table remembers; of heights called `name`, whoever had it built."""
     for line in table.source.get("warnings", ()):
-        own = f"{table.source['name']}: "
+        own = f"{table.source.get('name', '')}: "
         if name is not None and line.startswith(own):
             line = f"{name}: {line.removeprefix(own)}"
         warnings.warn(line, DiffractionWarning, stacklevel=2)
@@ -205,6 +205,7 @@ def _check_agreement(
         "basis": table.expansion.basis,
         "tolerance": table.tolerance,
         "terms": table.expansion.terms,
+        "windows": table.settings.windows,
     }
     for name, value in asked.items():
         if value != own[name] and not (name == "basis" and value == "auto"):

@@ -105,13 +105,20 @@ def render_frames(
             )  # fmt: skip
             if result.interrupted and result.spp < spp:
                 return
-            _write(frame, result.bitmap, scene, variant, with_exr)
+            write_frame(frame, result.bitmap, scene, variant, with_exr)
             yield frame
             if stop.asked:
                 return
 
 
-def _write(frame: Frame, bitmap: Any, scene: Path, variant: str, with_exr: bool) -> None:
+def write_frame(frame: Frame, bitmap: Any, scene: Path, variant: str, with_exr: bool) -> None:
+    """Write a frame's files.
+
+    Raises
+    ------
+    DiffractionError
+        If its film holds no colours.
+    """
     colours = colours_of(bitmap)
     if colours is None:
         raise DiffractionError(

@@ -41,7 +41,7 @@ def plain_text(error: BaseException) -> str:
     The places in Mitsuba's own sources, the tracebacks of Python plugins and repeated
     "while loading" are left out.
     """
-    text = _TRACEBACK.sub("", _SOURCE_LINE.sub("", str(error)))
+    text = _TRACEBACK.sub("", _SOURCE_LINE.sub("", _words(error)))
     places = [(m["file"], m["line"]) for m in _LOADING.finditer(text)]
     text = _LOADING.sub("", text)
     # "no plugin of this kind" is the cause, not a consequence of failing to make one
@@ -68,12 +68,19 @@ def error_of(what: str, error: BaseException) -> BaseException:
     Mitsuba makes a RuntimeError of whatever a Python plugin raises: Ctrl-C, an exit and lack of
     memory are themselves again, anything else is a DiffractionError that begins with `what`.
     """
-    found = _NO_ERROR.search(str(error))
+    found = _NO_ERROR.search(_words(error))
     if found is None:
         return DiffractionError(f"{what}: {plain_text(error)}")
     if found[1] == "SystemExit":
         return SystemExit(int(found[2] or 1))
     return KeyboardInterrupt() if found[1] == "KeyboardInterrupt" else MemoryError()
+
+
+def _words(error: BaseException) -> str:
+    """Its text; a text that is no UTF-8, as it quotes a damaged scene, reaches us as bytes."""
+    if isinstance(error, UnicodeDecodeError):
+        return error.object.decode("utf-8", "replace")
+    return str(error)
 
 
 def _no_ply(found: re.Match[str]) -> str:

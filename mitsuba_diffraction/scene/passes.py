@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any, Self
@@ -14,6 +15,9 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from ..progress import Progress
 from .mitsuba_text import error_of
+
+#: Passes that a task of a cluster renders, at most; their sum is what is added to the picture.
+GROUP = 8
 
 # Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
 # wavefronts exhaust the memory. Fixed, so that a seed gives the same picture on every machine.
@@ -69,6 +73,90 @@ def samples_per_pass(spp: int, pixels: int, variant: str) -> int:
     return most
 
 
+@dataclass(frozen=True)
+class Pass:
+    """One pass: the seed of its random numbers, and its samples per pixel."""
+
+    seed: int
+    spp: int
+
+
+def passes_of(sensor: Any, spp: int, seed: int, variant: str) -> list[Pass]:
+    """The passes that take `spp` samples per pixel, or the few more that a sampler rounds up to.
+
+    Parameters
+    ----------
+    sensor : its film and sampler.
+    spp, seed, variant : as in `render_passes`.
+    """
+    sampler, seeds = sensor.sampler(), np.random.SeedSequence(seed)
+    size = samples_per_pass(spp, int(np.prod(sensor.film().crop_size())), variant)
+    result, done = [], 0
+    while done < spp:
+        sampler.set_sample_count(min(size, spp - done))
+        (sequence,) = seeds.spawn(1)
+        result.append(Pass(int(sequence.generate_state(1)[0]), int(sampler.sample_count())))
+        done += result[-1].spp
+    return result
+
+
+def groups_of(passes: Sequence[Pass]) -> list[Sequence[Pass]]:
+    """Passes that are added up on their own first: the same in one process and in many."""
+    return [passes[n : n + GROUP] for n in range(0, len(passes), GROUP)]
+
+
+def render_pass(scene: Any, sensor: Any, one: Pass) -> NDArray[np.float64]:
+    """The film's raw storage after one pass: filter-weighted sums beside the sums of the weights.
+
+    Raises
+    ------
+    DiffractionError
+        If Mitsuba refuses or fails to render.
+    """
+    integrator, film = integrator_of(scene), sensor.film()
+    try:
+        integrator.render(scene, sensor, seed=one.seed, spp=one.spp, develop=False)
+        raw = np.array(film.develop(raw=True), dtype=np.float64)
+    except RuntimeError as error:
+        raise error_of("cannot render", error) from error
+    return raw * one.spp if _splats(integrator) else raw
+
+
+def developed(scene: Any, sensor: Any, total: NDArray[np.float64], spp: int) -> Any:
+    """The picture, a `mi.Bitmap`, of the sum of passes with `spp` samples per pixel in all."""
+    import mitsuba as mi
+
+    integrator, film = integrator_of(scene), sensor.film()
+    if _splats(integrator):
+        total = total / spp
+    film.prepare(integrator.aov_names())
+    storage: Any = mi.TensorXf(np.asarray(total, dtype=np.float32))
+    offset: Any = mi.ScalarPoint2i(film.crop_offset())
+    film.put_block(mi.ImageBlock(storage, offset))
+    return film.bitmap()
+
+
+def integrator_of(scene: Any) -> Any:
+    """The scene's integrator.
+
+    Raises
+    ------
+    DiffractionError
+        If there is none.
+    """
+    integrator = scene.integrator()
+    if integrator is None:
+        raise DiffractionError("the scene has no integrator; add <integrator type='path'/>")
+    return integrator
+
+
+def _splats(integrator: Any) -> bool:
+    """Light tracing splats finished estimates without weights: an average needs them."""
+    import mitsuba as mi
+
+    return isinstance(integrator, mi.AdjointIntegrator)
+
+
 def render_passes(
     scene: Any,
     sensor: Any,
@@ -99,44 +187,25 @@ def render_passes(
     DiffractionError
         If Mitsuba refuses or fails to render.
     """
-    import mitsuba as mi
-
-    integrator, film, sampler = scene.integrator(), sensor.film(), sensor.sampler()
-    if integrator is None:
-        raise DiffractionError("the scene has no integrator; add <integrator type='path'/>")
-    # Light tracing splats finished estimates without weights: an average needs them.
-    splats = isinstance(integrator, mi.AdjointIntegrator)
-    pixels = int(np.prod(film.crop_size()))
-    size = samples_per_pass(spp, pixels, variant)
-    seeds = np.random.SeedSequence(seed)
+    integrator_of(scene)
+    progress(0, spp, "compiling")
     total: NDArray[np.float64] | float = 0.0
     done = 0
-    progress(0, spp, "compiling")
-    try:
-        while done < spp and not stop.asked:
-            (sequence,) = seeds.spawn(1)
-            integrator.render(
-                scene,
-                sensor,
-                seed=int(sequence.generate_state(1)[0]),
-                spp=min(size, spp - done),
-                develop=False,
-            )
+    for group in groups_of(passes_of(sensor, spp, seed, variant)):
+        part: NDArray[np.float64] | float = 0.0
+        for one in group:
+            if stop.asked:
+                break
+            raw = render_pass(scene, sensor, one)
             if stop.asked and variant.startswith("scalar"):
                 break  # Mitsuba left this pass unfinished; a JIT variant never does
-            taken = int(sampler.sample_count())
-            raw = np.array(film.develop(raw=True), dtype=np.float64)
-            total = total + raw * (taken if splats else 1)
-            done += taken
+            part = part + raw
+            done += one.spp
             progress(min(done, spp), spp, "rendering")
-        if done == 0:  # asked to stop before there was anything
-            return Result(None, 0, stop.asked)
-        if splats:
-            total = total / done
-        film.prepare(integrator.aov_names())
-        storage: Any = mi.TensorXf(np.asarray(total, dtype=np.float32))
-        offset: Any = mi.ScalarPoint2i(film.crop_offset())
-        film.put_block(mi.ImageBlock(storage, offset))
-        return Result(film.bitmap(), done, stop.asked)
+        total = total + part
+    if done == 0:  # asked to stop before there was anything
+        return Result(None, 0, stop.asked)
+    try:
+        return Result(developed(scene, sensor, np.asarray(total), done), done, stop.asked)
     except RuntimeError as error:
         raise error_of("cannot render", error) from error

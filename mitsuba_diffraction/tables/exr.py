@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
+from ..streams import without_chatter
 from .document import Described, described, document_of, plain
 from .expansion import Expansion
 from .table import FORMAT_VERSION, DiffractionTable
@@ -219,7 +220,8 @@ def _read(
         why = "it is a folder" if Path(path).is_dir() else "there is no such file"
         raise DiffractionError(f"cannot read '{path}': {why}")
     try:
-        return what(OpenEXR.File(str(path), separate_channels=True, header_only=header_only))
+        with without_chatter():
+            return what(OpenEXR.File(str(path), separate_channels=True, header_only=header_only))
     except (RuntimeError, ValueError, OSError, LookupError, TypeError, MemoryError) as error:
         raise DiffractionError(
             f"cannot read '{path}' as EXR: it is empty, cut short or no EXR file; "

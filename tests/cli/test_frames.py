@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
+from pathlib import Path
 
 import numpy as np
 import OpenEXR
@@ -75,7 +77,9 @@ def test_frames_that_are_there_are_kept(render):
     folder = "room_frames"
     before = {name: os.stat(f"{folder}/{name}").st_mtime_ns for name in os.listdir(folder)}
     os.remove(f"{folder}/frame_0001.png")
-    ran = render("--frames", "3", *LIGHT)
+    ran = render("--frames", "3", *LIGHT, "--json", "a.json")
+    report = json.loads(Path("a.json").read_text(encoding="utf-8"))
+    assert (report["frames"], report["new"], len(report["files"])) == (3, 1, 3)
     assert ran.code == 0
     assert ran.err == "mitsuba-diffraction: 2 of 3 frames are up to date\n"
     assert "3 frames, 1 of them new" in ran.out

@@ -74,13 +74,13 @@ def test_files_that_are_nothing_are_one_line(run, tmp_path, content):
     assert str(file) in run("info", file).failed_in_one_line()
 
 
-def test_a_truncated_table_is_one_line(run, table):
-    table.write_bytes(table.read_bytes()[:-1000])
-    ran = run("info", table)
-    assert ran.code == 1
-    *others, line = ran.err.splitlines()
-    assert line.startswith(f"mitsuba-diffraction: error: cannot read '{table}' as EXR")
-    assert all("EXR_ERR" in other for other in others)  # OpenEXR's own words
+def test_a_damaged_table_is_one_line(run, table, capfd):
+    content = table.read_bytes()
+    for damaged in (content[:-1000], content[:-100] + bytes(100), content[:-1000] + bytes(1000)):
+        table.write_bytes(damaged)
+        assert f"'{table}'" in run("info", table).failed_in_one_line()
+        # OpenEXR prints past Python, some of it to stdout
+        assert capfd.readouterr() == ("", "")
 
 
 def test_a_table_of_another_format_version_is_one_line(run, table, monkeypatch):

@@ -10,6 +10,7 @@ import warnings
 import pytest
 
 from mitsuba_diffraction import __version__
+from mitsuba_diffraction.cli.console import mitsuba_warnings
 from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 
@@ -137,6 +138,22 @@ def test_a_warning_is_one_line_and_said_once(run, command):
         "mitsuba-diffraction: warning: steep slopes",
         "mitsuba-diffraction: warning: coarse pixels",
     ]
+
+
+def test_samples_below_zero_are_said_once_whatever_they_are(run, command):
+    import mitsuba as mi
+
+    def action():
+        mi.set_variant("scalar_rgb")
+        with mitsuba_warnings():
+            for value in (-0.1, -0.2, -0.3):
+                mi.Log(mi.LogLevel.Warn, f"Invalid sample value: [{value}, 0, 0, 1]")
+        return {}
+
+    ran = run(*command(action))
+    assert ran.code == 0
+    (line,) = ran.err.splitlines()
+    assert line.startswith("mitsuba-diffraction: warning: some samples are below zero")
 
 
 def test_a_closed_pipe_is_no_traceback(heights):

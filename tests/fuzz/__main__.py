@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.fuzz import command_lines, damage, surfaces
+from tests.fuzz import cached, command_lines, damage, surfaces
 
 KINDS: dict[str, Callable[[np.random.Generator], None]] = {
     "tables": damage.check_table,
@@ -26,13 +26,15 @@ KINDS: dict[str, Callable[[np.random.Generator], None]] = {
     "texts": damage.check_text,
     "commands": command_lines.check,
     "surfaces": surfaces.check,
+    "cache": cached.check,
+    "scenes": damage.check_scene,
 }
 #: A kind's place decides its random numbers: new ones go to the end.
-_STREAMS = ("commands", "heights", "surfaces", "tables", "texts", "documents")
+_STREAMS = ("commands", "heights", "surfaces", "tables", "texts", "documents", "cache", "scenes")
 #: Share of the time that each kind gets.
 _SHARES = {
-    "tables": 0.1, "documents": 0.1, "heights": 0.15, "texts": 0.05, "commands": 0.3,
-    "surfaces": 0.3,
+    "tables": 0.1, "documents": 0.1, "heights": 0.1, "texts": 0.05, "cache": 0.1, "scenes": 0.05,
+    "commands": 0.25, "surfaces": 0.25,
 }  # fmt: skip
 #: Seconds of the processor, and by the clock of a busy machine, that a case may take.
 _BUSY, _HANG = 10, 60

@@ -10,12 +10,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from PIL import Image
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.heights.recipes import Recipe
+from mitsuba_diffraction.scene.load import load_scene
 from mitsuba_diffraction.scene.orientation.files import load_mesh
+from mitsuba_diffraction.scene.planning.plan import Plan
+from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.document import described
 from mitsuba_diffraction.tables.exr import read_document
 from tests.directions import rough_patch
@@ -23,6 +28,7 @@ from tests.instruments import nanoscope
 
 _MOST = 500  # characters of a message
 _MOST_NUMBERS = 10**6  # of a table
+_HEIGHTS = (".png", ".tiff", ".bmp", ".npy", ".txt", ".csv", ".spm")
 _RECIPE = 'generator = "sinusoidal"\ncoherence_width = 4\n[arguments]\nperiod = 1.6\ndepth = 0.06\n'
 _PLY = """ply
 format ascii 1.0
@@ -37,6 +43,25 @@ end_header
 1 0 0
 0 1 0
 3 0 1 2
+"""
+_OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1\n"
+_GWYDDION = "# Channel: Height\n# Width: 2.4 µm\n# Height: 2 µm\n# Value units: nm\n"
+_PLAN = {
+    "kind": "mitsuba-diffraction plan", "version": 2, "scene": "a.xml", "tolerance": 1e-3,
+    "paths": 1000, "tables": {"5" * 64: {
+        "surfaces": ["skin"], "name": "a.npy", "digest": "6" * 64, "memory": [1000, 100],
+        "domain": {"crop": [20.0, 10.0], "kappa_max": 30.0, "tolerance": 1e-3, "outside": 1e-4},
+    }},
+}  # fmt: skip
+_SCENE = """<scene version="3.0.0"><default name="width" value="4"/>
+<integrator type="path"><integer name="max_depth" value="3"/></integrator>
+<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="$width"/>
+<integer name="height" value="4"/></film></sensor>
+<shape type="sphere" id="ball"><transform name="to_world"><scale value="0.5"/></transform>
+<bsdf type="diffraction" id="skin"><string name="table" value="TABLE"/>
+<string name="material" value="Al"/><boolean name="energy_conserving" value="false"/>
+<float name="orientation" value="30"/><float name="height_scale" value="1.2"/></bsdf></shape>
+<emitter type="point"><point name="position" value="0,0,-4"/></emitter></scene>
 """
 
 
@@ -61,6 +86,10 @@ def originals() -> dict[str, bytes]:
         (at / "scan.spm").write_bytes(nanoscope(np.int16(1000 * field.heights), scan_size="2 2 ~m"))
         (at / "recipe.toml").write_text(_RECIPE)
         (at / "mesh.ply").write_text(_PLY)
+        (at / "mesh.obj").write_text(_OBJ)
+        (at / "plan.json").write_text(json.dumps(_PLAN))
+        np.savetxt(at / "gwyddion.txt", field.heights, header=_GWYDDION, comments="")
+        np.savetxt(at / "heights.csv", field.heights, delimiter=",")
         return {path.name: path.read_bytes() for path in sorted(at.iterdir())}
 
 
@@ -98,7 +127,7 @@ def _other_number(rng: np.random.Generator, data: bytearray) -> None:
 
 def check_table(rng: np.random.Generator) -> None:
     """A table is refused, or every value that it gives is finite and not negative."""
-    _check(rng, [name for name in originals() if name.endswith(".exr")], _use_table)
+    _check(rng, [name for name in originals() if name.endswith(".exr")], use_table)
 
 
 def check_document(rng: np.random.Generator) -> None:
@@ -115,7 +144,10 @@ def check_document(rng: np.random.Generator) -> None:
         table = found.table(rng.normal(0.0, 1e-3, shape).astype(np.float32) for shape in shapes)
     except (md.DiffractionError, ValueError, MemoryError):  # what `load_table` makes one line of
         return
-    _look_up(table)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "table.exr")
+        table.save(path)
+        use_table(path)
 
 
 @functools.cache
@@ -155,14 +187,32 @@ def _mutate(rng: np.random.Generator, document: Any) -> None:
 
 def check_heights(rng: np.random.Generator) -> None:
     """Heights are refused, or finite."""
-    names = [n for n in originals() if not n.endswith((".exr", ".toml", ".ply"))]
+    names = [n for n in originals() if Path(n).suffix in _HEIGHTS]
     _check(rng, names, _use_heights)
 
 
 def check_text(rng: np.random.Generator) -> None:
-    """Recipes and meshes."""
+    """Recipes, meshes and plans."""
     _check(rng, ["recipe.toml"], lambda path: Recipe.load(path))
-    _check(rng, ["mesh.ply"], lambda path: load_mesh(path))
+    _check(rng, ["mesh.ply", "mesh.obj"], lambda path: load_mesh(path))
+    _check(rng, ["plan.json"], _use_plan)
+
+
+def check_scene(rng: np.random.Generator) -> None:
+    """A scene is refused in one line, or its surface can be looked up."""
+    with tempfile.TemporaryDirectory() as folder:
+        table, scene = Path(folder, "table.exr"), Path(folder, "scene.xml")
+        table.write_bytes(originals()["ensemble.exr"])
+        scene.write_bytes(damaged(rng, _SCENE.replace("TABLE", str(table)).encode()))
+        mi.set_variant("scalar_spectral")
+        try:
+            loaded = load_scene(scene, {})
+        except md.DiffractionError as error:
+            _check_line(error)
+            return
+        for shape in loaded.shapes():
+            if shape.bsdf() is not None and "Diffraction[" in str(shape.bsdf()):
+                _look_up_in_plugin(shape.bsdf())
 
 
 def _check(rng: np.random.Generator, names: list[str], use: Callable[[Path], object]) -> None:
@@ -173,12 +223,46 @@ def _check(rng: np.random.Generator, names: list[str], use: Callable[[Path], obj
         try:
             use(path)
         except md.DiffractionError as error:
-            assert len(str(error)) <= _MOST, "too long a message"
-            assert "\n" not in str(error), "more than one line"
+            _check_line(error)
 
 
-def _use_table(path: Path) -> None:
-    _look_up(md.DiffractionTable.load(path))
+def _check_line(error: md.DiffractionError) -> None:
+    assert len(str(error)) <= _MOST, "too long a message"
+    assert "\n" not in str(error), "more than one line"
+
+
+def _use_plan(path: Path) -> None:
+    for limits in Plan.load(path).limits().values():
+        TableSettings(coherence_width=2.0, **limits)
+
+
+def use_table(path: Path) -> None:
+    table = md.DiffractionTable.load(path)
+    _look_up(table)
+    mi.set_variant("scalar_spectral")  # where reading outside of an array is an error
+    scene = {"type": "diffraction", "table": str(path), "energy_conserving": False}
+    try:
+        bsdf = mi.load_dict({**scene, "material": "none"})
+    except RuntimeError as error:
+        assert "DiffractionError: " in str(error), str(error)[-200:]
+        return
+    _look_up_in_plugin(bsdf)
+
+
+def _look_up_in_plugin(bsdf: Any) -> None:
+    """Values, densities and samples are finite and not negative."""
+    rng = np.random.default_rng(2)
+    context, si = mi.BSDFContext(), dr.zeros(mi.SurfaceInteraction3f)
+    for _ in range(4):
+        wi, wo = (np.append(p, np.sqrt(1.0 - p @ p)) for p in rng.uniform(-0.7, 0.7, (2, 2)))
+        si.wi, si.wavelengths = mi.Vector3f(wi), mi.Spectrum(rng.uniform(360.0, 830.0, 4))
+        si.sh_frame = mi.Frame3f(mi.Normal3f(0, 0, 1))
+        value, density = bsdf.eval_pdf(context, si, mi.Vector3f(wo))
+        drawn, weight = bsdf.sample(context, si, rng.random(), mi.Point2f(rng.random(2)))
+        numbers = np.array([*value, density, drawn.pdf, *weight])
+        assert np.isfinite(numbers).all(), "not finite in the plugin"
+        assert (numbers >= 0.0).all(), "negative in the plugin"
+        assert numbers[:4].max() < 1e9, "too bright in the plugin"
 
 
 def _look_up(table: md.DiffractionTable) -> None:

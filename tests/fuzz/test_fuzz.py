@@ -8,6 +8,7 @@ from tests.fuzz.__main__ import KINDS, run_case
 
 #: How many of each kind take about a second together.
 FEW = {"tables": 60, "documents": 100, "heights": 40, "texts": 30, "commands": 15, "surfaces": 2}
+FEW |= {"cache": 20, "scenes": 20}
 
 #: (kind, seed, case): what `python -m tests.fuzz` has found.
 FOUND = [
@@ -17,6 +18,10 @@ FOUND = [
     # PLY files that are no UTF-8, or whose lists have infinitely many corners
     ("texts", 1, 732),
     ("texts", 1, 746),
+    # a plan with infinite numbers; a scene that is no UTF-8; heights without a name, but warnings
+    ("texts", 5, 42),
+    ("scenes", 5, 174),
+    ("documents", 5, 218),
 ]
 
 

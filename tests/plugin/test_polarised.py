@@ -81,11 +81,16 @@ def rotation(start: Array, to: Array, direction: Array) -> Array:
 
 
 @pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
-@pytest.mark.parametrize("material", [{"int_ior": 1.56, "ext_ior": 1.0}, CONDUCTOR])
+@pytest.mark.parametrize(
+    "material",
+    [{"int_ior": 1.56, "ext_ior": 1.0}, CONDUCTOR, CONDUCTOR | {"coat_ior": 1.58}],
+)
 def test_matrices_are_the_reference_s(polarised, model, material):
     wi, wo = pairs()
     found = matrices(load(model=model, **material), wi, wo)
     index = {"eta": 1.56, "k": 0.0} if "int_ior" in material else CONDUCTOR
+    if "coat_ior" in material:
+        index = index | {"coat": material["coat_ior"]}
     # light arrives along ωo where radiance is followed
     s_in, s_out = md.optics.boundary.polarisation_axes(wo, wi)
     before, after = rotation(bases(-wo), s_in, -wo), rotation(s_out, bases(wi), wi)

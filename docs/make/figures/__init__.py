@@ -8,6 +8,7 @@ evaluation, sweeps      pages about the methods: the grating equation, one param
 methods                 the table of docs/methods.md
 speed, tradeoff         tables of what `bench` and `tradeoff` measured
 realtime, plan          tables of what `compare` and `plan` measured
+energy                  the table of what `info --energy` found
 parameters              the reference of the plugin's parameters, from its own docstring
 notebooks               notebooks, run anew
 albedo                  the plot of `info --albedo`

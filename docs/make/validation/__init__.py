@@ -6,20 +6,27 @@ needs the extra `validation`.
 
 Contents
 --------
-cases          which gratings, lights and materials
-integral       a rigorous solver: boundary integrals
-coupled_wave   another: coupled waves in layers
-solve          solutions of all cases, by both
-solutions      files of solutions
-second         the two solvers beside each other
-model          what the package says of the same gratings
-compare        how far apart they are
-limits         up to which slopes that is little
-closed_forms   ideal gratings
-roughness      random surfaces of known mean diffraction
-statistics     checks with them, and windows at random places
-page           the page as a whole
-sections       its sections
-plots          its pictures
-markdown       its tables and numbers
+cases            which gratings, lights and materials
+integral         a rigorous solver: boundary integrals
+coupled_wave     another: coupled waves in layers
+solve            solutions of all cases, by both
+solutions        files of solutions
+second           the two solvers beside each other
+patches          surfaces in two dimensions, in any plane of incidence
+rayleigh         a rigorous solver for them: Rayleigh's expansion
+crossed          another: coupled waves in layers
+patch_solutions  solutions of all of them
+coated           solutions of gratings under a coat
+model            what the package says of the same surfaces
+compare          how far apart they are
+limits           up to which slopes that is little
+closed_forms     ideal gratings
+roughness        random surfaces of known mean diffraction
+statistics       checks with them, and windows at random places
+page             the page as a whole
+models           its section on Kirchhoff, small slope and their blend
+patch_sections   its section on two dimensions
+sections         its other sections
+plots            its pictures
+markdown         its tables and numbers
 """

@@ -2,7 +2,9 @@
 
 python -m docs.make.validation report -o docs
 python -m docs.make.validation solve perfect      # minutes to an hour; extra `validation`
-python -m docs.make.validation patches keratin    # in two dimensions; extra `validation`
+python -m docs.make.validation groups             # deviations by material, profile and slope
+python -m docs.make.validation patches keratin    # in two dimensions; a minute
+python -m docs.make.validation coated             # under a coat; half an hour; extra `validation`
 """
 
 from __future__ import annotations
@@ -32,6 +34,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     report.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=Path("docs"))
     report.add_argument("--quick", action="store_true", help="a small version, for tests")
     report.set_defaults(run=_report)
+    groups = commands.add_parser("groups", help="print deviations by material, profile and slope")
+    groups.set_defaults(run=_groups, progress=False)
     solve = commands.add_parser("solve", help="compute the rigorous solutions again")
     solve.add_argument("material", choices=MATERIALS)
     solve.add_argument("--solver", choices=("integral", "coupled_wave"), default="integral")
@@ -40,9 +44,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     solve.set_defaults(run=_solve)
     patches = commands.add_parser("patches", help="make those in two dimensions anew")
     patches.add_argument("material", choices=("keratin", "aluminium"))
+    patches.add_argument("--solver", choices=("coupled_wave", "rayleigh"), default="rayleigh")
     patches.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
     patches.set_defaults(run=_patches)
-    for command in (report, solve, patches):
+    coated = commands.add_parser("coated", help="make those under a coat anew")
+    coated.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
+    coated.set_defaults(run=_coated)
+    for command in (report, solve, patches, coated):
         command.add_argument(
             "--progress", action=argparse.BooleanOptionalAction, default=None,
             help="show progress bars; by default on a terminal",
@@ -67,6 +75,16 @@ def _report(args: argparse.Namespace) -> int:
     return 0
 
 
+def _groups(args: argparse.Namespace) -> int:
+    from . import models, patch_sections
+    from .compare import compare
+
+    sides = models.compare_all({name: compare(name) for name in models.MATERIALS})
+    cuts = [c for material in models.MATERIALS for c in patch_sections.compared(material)]
+    print(models.section(sides), patch_sections.section(cuts), sep="\n\n")
+    return 0
+
+
 def _solve(args: argparse.Namespace) -> int:
     from .solutions import file_name, save
     from .solve import solve_material
@@ -86,11 +104,23 @@ def _solve(args: argparse.Namespace) -> int:
 def _patches(args: argparse.Namespace) -> int:
     from .patch_solutions import patch_file, solve_patches
 
-    path = args.output / patch_file(args.material)
+    path = args.output / patch_file(args.material, args.solver)
     check_writable(path)
     with Bar(args, unit=" cases") as bar:
-        rows = solve_patches(args.material, path, bar)
+        rows = solve_patches(args.material, args.solver, path, bar)
     print(f"wrote {os.fspath(path)}: {len(rows)} orders")
+    return 0
+
+
+def _coated(args: argparse.Namespace) -> int:
+    from .coated import SERIES, coated_file, solve_coated
+
+    for series in SERIES:
+        check_writable(args.output / coated_file(series))
+    with Bar(args, unit=" gratings") as bar:
+        found = solve_coated(args.output, bar)
+    for series, rows in found.items():
+        print(f"wrote {os.fspath(args.output / coated_file(series))}: {len(rows)} orders")
     return 0
 
 

@@ -39,6 +39,9 @@ ALUMINIUM = {460.0: 0.646 + 5.590j, 610.0: 1.248 + 7.368j}
 #: Keratin's index, the middle of what is reported for hair and scales (1.54–1.58).
 KERATIN = 1.56
 
+#: Polycarbonate's index, the coat of a CD.
+COAT = 1.58
+
 #: Samples a period: 5e-6 from the closed forms of lamellar and blazed gratings.
 PIXELS = 512
 
@@ -102,7 +105,12 @@ def scans(material: str) -> list[Scan]:
 
 
 def index_of(material: str, wavelength: float) -> complex:
-    """Index n + ik of a material at a wavelength (nm) of its scans."""
+    """Index n + ik of a material at a wavelength (nm) of its scans.
+
+    Under polycarbonate both are those inside: the index is over the coat's.
+    """
+    if material == "aluminium under polycarbonate":
+        return ALUMINIUM[round(wavelength * COAT, 6)] / COAT
     return KERATIN + 0j if material == "keratin" else ALUMINIUM[wavelength]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cases import PROFILES, Grating, order_sines
-from .model import order_efficiencies
+from .model import order_efficiencies, order_shares
 from .solutions import KEY, Solutions, shipped
 
 #: Orders that leave closer to the surface than this are not counted: the model has no limit there.
@@ -20,11 +20,15 @@ GRAZING = 75.0  # degrees
 
 @dataclass(frozen=True)
 class Comparison:
-    """Solutions of one material (what has converged) and the model's efficiency of each row."""
+    """Solutions of one material (what has converged) and the model's efficiency of each row.
+
+    `by_light` are the model's for TE and TM light, (n, 2), whose mean is `model`.
+    """
 
     material: str
     solutions: Solutions
     model: NDArray[np.float64]
+    by_light: NDArray[np.float64]
 
     @cached_property
     def rigorous(self) -> NDArray[np.float64]:
@@ -46,21 +50,25 @@ class Comparison:
     def select(self, keep: NDArray[np.bool_]) -> Comparison:
         """Some of the rows."""
         part = Solutions(self.solutions.rows[keep], self.solutions.about)
-        return Comparison(self.material, part, self.model[keep])
+        return Comparison(self.material, part, self.model[keep], self.by_light[keep])
 
     def where(self, **values: Any) -> Comparison:
         """The rows with these values, such as profile="lamellar" or theta=30.0."""
         return self.select(self.solutions.having(**values))
 
-    def deviation(self, *, colours: bool = False) -> float:
+    def deviation(self, *, colours: bool = False, light: str | None = None) -> float:
         """Σ|η − η_rigorous| / Σ η_rigorous over the counted rows; NaN if there are none.
 
         The measure of the project's other accuracy figures. With `colours` order 0 is left out,
-        which would hide the others where it is much the strongest.
+        which would hide the others where it is much the strongest. `light` is "te", "tm" or both.
         """
         keep = self.counted & (self.solutions.rows["order"] != 0) if colours else self.counted
-        total = float(self.rigorous[keep].sum())
-        return float(np.abs(self.model - self.rigorous)[keep].sum()) / total if total else np.nan
+        model, exact = self.model, self.rigorous
+        if light is not None:
+            model = self.by_light[:, ("te", "tm").index(light)]
+            exact = self.solutions.rows[light].astype(float)
+        total = float(exact[keep].sum())
+        return float(np.abs(model - exact)[keep].sum()) / total if total else np.nan
 
     def largest_relative(self, orders: int = 2) -> float:
         """Largest |η/η_rigorous − 1| among the counted rows with |m| up to `orders`."""
@@ -73,9 +81,14 @@ class Comparison:
 
 
 def compare(
-    material: str, solutions: Solutions | None = None, model: str = "kirchhoff"
+    material: str,
+    solutions: Solutions | None = None,
+    model: str = "kirchhoff",
+    coat: float | None = None,
 ) -> Comparison:
     """Evaluate a model (`model.MODELS`) for what has converged, by default of what is shipped.
+
+    coat : index of a coat over the gratings; `by_light` is NaN then.
 
     Raises
     ------
@@ -84,7 +97,7 @@ def compare(
     """
     trusted = (solutions or shipped(material)).trusted()
     rows = trusted.rows
-    found = np.full(len(rows), np.nan)
+    found, lights = np.full(len(rows), np.nan), np.full((len(rows), 2), np.nan)
     unique, inverse = np.unique(rows[KEY], return_inverse=True)
     starts = np.argsort(inverse.ravel(), kind="stable")
     ends = np.cumsum(np.bincount(inverse.ravel()))
@@ -92,9 +105,13 @@ def compare(
         profile, period, depth, theta, wavelength = (_decimal(value) for value in key)
         grating = Grating(PROFILES[int(profile)], period, depth)
         orders, _ = order_sines(period, wavelength, theta)
-        efficiencies = order_efficiencies(grating, material, theta, wavelength, model)
-        found[members] = efficiencies[np.searchsorted(orders, rows["order"][members])]
-    return Comparison(material, trusted, found)
+        efficiencies = order_efficiencies(grating, material, theta, wavelength, model, coat)
+        place = np.searchsorted(orders, rows["order"][members])
+        found[members] = efficiencies[place]
+        if coat is None:
+            share = order_shares(grating, material, theta, wavelength, model)
+            lights[members] = (efficiencies[:, None] * share)[place]
+    return Comparison(material, trusted, found, lights)
 
 
 def gratings_of(comparison: Comparison, profile: str) -> list[Grating]:

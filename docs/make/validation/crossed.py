@@ -22,7 +22,7 @@ from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.optics import boundary
 
 #: Orders closer to the horizon than this cosine are not returned.
-_HORIZON = 0.01
+HORIZON = 0.01
 # modes whose |Im q| is below this share of |Re q| travel: the rest is rounding
 _TRAVELLING = 1e-6
 
@@ -87,7 +87,7 @@ def solve(
     width, height = field.extent
     # grcwa's z points along the light: its frame is ours turned about x by half a turn
     along = -wi * _TURNED
-    chosen = _harmonics(along, lam, (width, height), is_crossed(field), harmonics)
+    chosen = lowest_orders(along, lam, (width, height), is_crossed(field), harmonics)
     grcwa.rcwa.SolveLayerEigensystem = _eigenmodes
     grcwa.rcwa.Lattice_getG = lambda *_, **__: (chosen, len(chosen))
     polar, azimuth = np.arccos(along[2]), np.arctan2(along[1], along[0])
@@ -105,7 +105,7 @@ def is_crossed(field: HeightField) -> bool:
 _TURNED = np.array([1.0, -1.0, -1.0])
 
 
-def _harmonics(
+def lowest_orders(
     along: NDArray[np.float64],
     lam: float,
     extent: tuple[float, float],
@@ -145,7 +145,7 @@ def _amplitudes(
     omega, count = cell.omega.real, cell.nG
     kx, ky = np.real(cell.kx), np.real(cell.ky)
     up = np.sqrt(np.maximum(omega**2 - kx**2 - ky**2, 0)) / omega
-    kept = up > _HORIZON
+    kept = up > HORIZON
     wo = np.stack([kx / omega, -ky / omega, up], axis=1)[kept]
     s_in, s_out = boundary.polarisation_axes(wi, wo)
     p_out = np.cross(wo, s_out)

@@ -123,12 +123,12 @@ def _material(scan: Scan) -> Iterator[str | None]:
 
     wavelengths = np.array(sorted(scan.wavelengths))
     index = np.array([index_of(scan.material, w) for w in wavelengths])
-    # a table needs two points
+    # a table's ends are rounded
     table = materials.OpticalConstants(
         scan.material,
-        np.concatenate([[wavelengths[0] - 1], wavelengths]),
-        np.concatenate([[1 - index[0].real], 1 - index.real]),
-        np.concatenate([[index[0].imag], index.imag]),
+        np.concatenate([[wavelengths[0] - 1], wavelengths, [wavelengths[-1] + 1]]),
+        1 - np.pad(index.real, 1, mode="edge"),
+        np.pad(index.imag, 1, mode="edge"),
     )
     before = os.environ.get(materials.LIBRARY_ENV)
     with tempfile.TemporaryDirectory() as folder:

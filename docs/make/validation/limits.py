@@ -1,13 +1,15 @@
 """Up to which slope the model may be trusted: where the package's warnings come from.
 
-The rule: sinusoids of a perfect conductor are put in the order of their RMS slope; a limit is the
-slope of the last one before the first whose deviation (`Comparison.deviation`, over all counted
-orders, or over the colours alone) exceeds an error at any angle of incidence up to 45°. A sinusoid
-has no edges, and a perfect conductor reflects all light at every angle: nothing but the slope is
-left to decide. (A dielectric's reflectance errs at oblique angles on any slope.)
+The rule: sinusoids of keratin and of aluminium are put in the order of their RMS slope; a limit is
+the largest slope below the first whose colours deviate (`Comparison.deviation`, the default model)
+by more than an error at any angle of incidence that was solved, up to 60°. A sinusoid has no edges,
+so nothing but the slope, the period and the material are left to decide, and the worst of these
+does.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from .cases import Grating
 from .compare import Comparison, angles_of, gratings_of, table_of
@@ -16,7 +18,7 @@ from .compare import Comparison, angles_of, gratings_of, table_of
 GENTLE_ERROR = 0.05
 STEEP_ERROR = 0.2
 #: Largest angle of incidence of the rule, degrees.
-STEEPEST_LIGHT = 45.0
+STEEPEST_LIGHT = 60.0
 
 
 def rms_slope(grating: Grating) -> float:
@@ -24,25 +26,25 @@ def rms_slope(grating: Grating) -> float:
     return grating.heights().rms_slope
 
 
-def worst_deviations(comparison: Comparison) -> list[tuple[Grating, float, float]]:
-    """Each sinusoid with its RMS slope and largest deviation under the rule, gentlest first."""
-    of_sinusoids = angles_of(comparison.where(profile="sinusoidal"))
-    angles = [theta for theta in of_sinusoids if abs(theta) <= STEEPEST_LIGHT]
-    sinusoids = gratings_of(comparison, "sinusoidal")
-    measures = (Comparison.deviation, lambda part: part.deviation(colours=True))
-    tables = [table_of(comparison, sinusoids, angles, measure) for measure in measures]
-    found = [
-        (grating, rms_slope(grating), float(max(table[n].max() for table in tables)))
-        for n, grating in enumerate(sinusoids)
-    ]
+def worst_deviations(comparisons: Sequence[Comparison]) -> list[tuple[Grating, float, float]]:
+    """Each material's sinusoids with slope and largest deviation of colours, gentlest first."""
+    found = []
+    for comparison in comparisons:
+        sinusoids = gratings_of(comparison, "sinusoidal")
+        angles = [theta for theta in angles_of(comparison) if 0 <= theta <= STEEPEST_LIGHT]
+        table = table_of(
+            comparison, sinusoids, angles, lambda part: part.deviation(colours=True)
+        ).max(axis=1)
+        found += [
+            (grating, rms_slope(grating), float(worst))
+            for grating, worst in zip(sinusoids, table, strict=True)
+        ]
     return sorted(found, key=lambda item: item[1])
 
 
-def slope_limit(comparison: Comparison, error: float) -> float:
+def slope_limit(comparisons: Sequence[Comparison], error: float) -> float:
     """Largest RMS slope up to which no sinusoid deviates by more than `error`; 0 if all do."""
-    limit = 0.0
-    for _, slope, deviation in worst_deviations(comparison):
-        if deviation > error:
-            break
-        limit = slope
-    return limit
+    worst = worst_deviations(comparisons)
+    # slopes of one depth/period are equal to rounding
+    first = min((slope for _, slope, found in worst if found > error), default=float("inf"))
+    return max((slope for _, slope, _ in worst if slope < first - 1e-6), default=0.0)

@@ -2,15 +2,15 @@
 
 Through a window much wider than the period every order is a narrow lobe of the BRDF,
 
-    f = R (1 + ωi·ωo)² / (λ² A w² cosθi cosθo) · 4π²σ⁴ |a_m|² exp(−σ²|q − q_m|²),   A = πσ²,
+    f = 4 cosθi cosθo N / (λ² A w²) · 4π²σ⁴ |a_m|² exp(−σ²|q − q_m|²),   A = πσ²,
 
 and carries the power ∫ f cosθo dωo of a beam of unit power. With dωo = dα dβ/(k² cosθo) and
 ∬ exp(−σ²|q − q_m|²) dα dβ = π/σ², all else constant across the lobe,
 
-    η_m = f(ωi, ω_m) · π/(σ²k²) = R(cosθ_half) (1 + ωi·ω_m)² / (w² cosθi cosθ_m) · |a_m(k w)|².
+    η_m = f(ωi, ω_m) · π/(σ²k²) = 4 cosθi cosθ_m N / w² · |a_m(k w)|².
 
-For a mirror this is R; for m = 0 of any grating R·|a_0|². The small-slope model puts
-4 cosθi cosθm N/w² for R (1 + ωi·ω_m)²/(w² cosθi cosθ_m), see `mitsuba_diffraction.optics.boundary`.
+For a mirror this is R; for m = 0 of any grating R·|a_0|². Kirchhoff's model has
+R (1 + ωi·ω_m)²/(w² cosθi cosθ_m) for the factor, see `mitsuba_diffraction.optics.boundary`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_diffraction import HeightField, reference
-from mitsuba_diffraction.optics import boundary
+from mitsuba_diffraction.optics import blend, boundary
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 
 from .cases import PIXELS, Grating, index_of, order_sines
@@ -32,7 +32,12 @@ MODELS = (*reference.MODELS, "small_slope_alone")
 
 
 def order_efficiencies(
-    grating: Grating, material: str, theta: float, wavelength: float, model: str = "kirchhoff"
+    grating: Grating,
+    material: str,
+    theta: float,
+    wavelength: float,
+    model: str = "kirchhoff",
+    coat: float | None = None,
 ) -> NDArray[np.float64]:
     """η_m of every propagating order, ordered as `cases.order_sines`, for unpolarised light.
 
@@ -43,12 +48,13 @@ def order_efficiencies(
     theta : angle of incidence, degrees.
     wavelength : nm.
     model : of `MODELS`.
+    coat : index of a coat over the grating, for models of `reference.MODELS`.
     """
     _, sines = order_sines(grating.period, wavelength, theta)
     wi, wo = in_plane(np.sin(np.radians(theta))), in_plane(sines)
     index = None if material == "perfect" else index_of(material, wavelength)
     return efficiencies(
-        grating.heights(), index, wi, wo, wavelength, model, sigma=lobe_sigma(grating)
+        grating.heights(), index, wi, wo, wavelength, model, sigma=lobe_sigma(grating), coat=coat
     )
 
 
@@ -61,6 +67,7 @@ def efficiencies(
     model: str,
     *,
     sigma: float,
+    coat: float | None = None,
 ) -> NDArray[np.float64]:
     """η of the orders of a periodic surface that leave along `wo`, for unpolarised light.
 
@@ -77,13 +84,54 @@ def efficiencies(
         return per_brdf * reference.brdf(field, wi, wo, wavelength, coherence_width=width)
     known = model if model in reference.MODELS else "kirchhoff"
     brdf = per_brdf * reference.brdf(
-        field, wi, wo, wavelength, coherence_width=width, model=known, eta=index.real, k=index.imag
-    )
+        field, wi, wo, wavelength,
+        coherence_width=width, model=known, eta=index.real, k=index.imag, coat=coat,
+    )  # fmt: skip
     if model == known:
         return brdf
     # what Kirchhoff's matrix weighs, replaced
-    alone = boundary.unpolarised(boundary.small_slope(wi, wo, index))
-    return brdf * alone / boundary.unpolarised(boundary.kirchhoff(wi, wo, index))
+    alone, tangent = (
+        boundary.unpolarised(jones_of(field, index, wi, wo, wavelength, name))
+        for name in (model, known)
+    )
+    return brdf * alone / tangent
+
+
+def jones_of(
+    field: HeightField,
+    index: complex,
+    wi: NDArray[np.float64],
+    wo: NDArray[np.float64],
+    wavelength: float,
+    model: str,
+) -> NDArray[np.complex128]:
+    """Jones matrices (n, 2, 2) of one of `MODELS`; arguments as `efficiencies`."""
+    if model == "kirchhoff":
+        return boundary.kirchhoff(wi, wo, index)
+    if model == "small_slope_alone":
+        return boundary.small_slope(wi, wo, index)
+    k, total = float(wavenumber(wavelength)), wi + wo
+    roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
+    variance = roughness.at(k * np.hypot(total[:, 0], total[:, 1]))
+    return blend.jones(wi, wo, index, blend.weight(k * total[:, 2], variance, index))
+
+
+def shares(jones: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """Power of incident s and p light after Jones matrices, over the mean of both, (n, 2)."""
+    power = np.sum(np.abs(jones) ** 2, axis=1)
+    return np.asarray(power / power.mean(axis=1, keepdims=True), np.float64)
+
+
+def order_shares(
+    grating: Grating, material: str, theta: float, wavelength: float, model: str
+) -> NDArray[np.float64]:
+    """`shares` of TE and TM light for every order; arguments as `order_efficiencies`."""
+    _, sines = order_sines(grating.period, wavelength, theta)
+    if material == "perfect":
+        return np.ones((len(sines), 2))
+    index, field = index_of(material, wavelength), grating.heights()
+    wi, wo = in_plane(np.sin(np.radians(theta))), in_plane(sines)
+    return shares(jones_of(field, index, wi, wo, wavelength, model))
 
 
 def lobe_sigma(grating: Grating) -> float:

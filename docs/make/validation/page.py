@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.progress import Progress, silent
 
-from . import models, patch_sections, plots, sections, statistics
+from . import coated, models, patch_sections, plots, sections, statistics
 from .cases import FEW_WAVELENGTHS, MATERIALS, PROBE_GRATING, Grating
 from .compare import Comparison, compare
 from .patches import KINDS
@@ -48,6 +48,11 @@ def write_report(folder: Path, *, quick: bool = False, progress: Progress | None
     tell(3, _STEPS, "random surfaces")
     measured = statistics.measure(*((15, 80) if quick else (200, 2000)))
     perfect = comparisons["perfect"]
+    sides = models.compare_all(_few(comparisons) if quick else comparisons)
+    kirchhoff, default = (
+        {material: sides[material, model] for material in models.MATERIALS}
+        for model in ("kirchhoff", "small_slope")
+    )
 
     tell(4, _STEPS, "drawing")
     examples = [
@@ -56,26 +61,29 @@ def write_report(folder: Path, *, quick: bool = False, progress: Progress | None
         Grating("sinusoidal", 1.1, 0.2),
     ]
     figures = {
-        "slopes": plots.slopes_figure(perfect),
+        "slopes": plots.slopes_figure(kirchhoff, default),
         "orders": plots.orders_figure(perfect, examples, 30.0),
-        "materials": plots.scatter_figure(list(comparisons.values())),
+        "materials": plots.scatter_figure([perfect, *default.values()]),
         "statistics": plots.statistics_figure(measured),
     }
     for name, figure in figures.items():
         _write_figure(figure, images / f"validation_{name}.png")
 
     tell(5, _STEPS, "writing")
+    kinds = KINDS[:1] if quick else KINDS
     text = [
         sections.introduction(),
-        sections.closed_forms(_IDEAL[1:2] if quick else _IDEAL),
-        sections.solutions(comparisons),
+        models.section(sides),
+        patch_sections.section(
+            [c for material in models.MATERIALS for c in patch_sections.compared(material, kinds)]
+        ),
+        sections.slopes(kirchhoff, default),
+        sections.edges(kirchhoff, default),
+        sections.coated(coated.deviations(coated.GRATINGS[:1] if quick else coated.GRATINGS)),
         sections.probe(perfect),
-        sections.slopes(perfect),
-        sections.edges(perfect),
         sections.polarisation(perfect),
-        sections.materials(comparisons),
-        models.section(models.compare_all(_few(comparisons) if quick else comparisons)),
-        patch_sections.section(patch_sections.compared("keratin", KINDS[:1] if quick else KINDS)),
+        sections.solutions(comparisons, patch_sections.second_solver()),
+        sections.closed_forms(_IDEAL[1:2] if quick else _IDEAL),
         sections.random_surfaces(measured),
     ]
     page = folder / "validation.md"

@@ -20,22 +20,26 @@ from .statistics import Statistics
 _SMALLEST = 1e-4  # deviations below it are drawn on it
 
 
-def slopes_figure(comparison: Comparison) -> Figure:
-    """Deviation of sinusoids against RMS slope, at every angle: of all orders, and of colours."""
-    figure, axes = _figure(11.5, 4.6, 2)
-    sinusoids = gratings_of(comparison, "sinusoidal")
-    slopes = np.array([rms_slope(grating) for grating in sinusoids])
-    angles = angles_of(comparison.where(profile="sinusoidal"))
-    colours = _shades(len(angles))
-    for panel, title, only_colours in (
-        (axes[0], "all orders", False),
-        (axes[1], "without order 0 (the colours)", True),
-    ):
-        measure = functools.partial(Comparison.deviation, colours=only_colours)
-        table = table_of(comparison, sinusoids, angles, measure)
-        for column, theta in enumerate(angles):
-            values = np.maximum(table[:, column], _SMALLEST)
-            panel.loglog(slopes, values, "o", ms=5, color=colours[column], label=f"{theta:g}°")
+def slopes_figure(kirchhoff: dict[str, Comparison], default: dict[str, Comparison]) -> Figure:
+    """Deviation of the colours of sinusoids against RMS slope, at every angle, by material."""
+    figure, axes = _figure(11.5, 4.8, len(default))
+    for panel, (material, blend) in zip(axes, default.items(), strict=True):
+        sinusoids = gratings_of(blend, "sinusoidal")
+        slopes = np.array([rms_slope(grating) for grating in sinusoids])
+        angles = angles_of(blend.where(profile="sinusoidal"))
+        for part, marker, fill, name in (
+            (kirchhoff[material], "s", "none", "Kirchhoff"),
+            (blend, "o", None, "default"),
+        ):
+            measure = functools.partial(Comparison.deviation, colours=True)
+            table = np.maximum(table_of(part, sinusoids, angles, measure), _SMALLEST)
+            for column, (theta, colour) in enumerate(
+                zip(angles, _shades(len(angles)), strict=True)
+            ):
+                panel.loglog(
+                    slopes, table[:, column], marker, ms=5, color=colour, mfc=fill,
+                    label=f"{name}, {theta:g}°",
+                )  # fmt: skip
         for slope, error in ((GENTLE_SLOPE, GENTLE_ERROR), (STEEP_SLOPE, STEEP_ERROR)):
             panel.axvline(slope, color="black", lw=0.8, ls=":")
             panel.axhline(error, color="black", lw=0.8, ls="--")
@@ -44,16 +48,19 @@ def slopes_figure(comparison: Comparison) -> Figure:
                 fontsize=8,
             )  # fmt: skip
         panel.set(
-            xlabel="RMS slope", title=title, ylim=(0.7 * _SMALLEST, 2),
-            ylabel="Σ |model − rigorous| / Σ rigorous",
+            xlabel="RMS slope", title=material, xlim=(0.02, 1), ylim=(0.7 * _SMALLEST, 2),
+            ylabel="deviation of colours, Σ |model − rigorous| / Σ rigorous",
         )  # fmt: skip
         panel.set_xticks(
             [0.02, 0.05, 0.1, 0.2, 0.5, 1], labels=["0.02", "0.05", "0.1", "0.2", "0.5", "1"]
         )
         panel.set_xticks([], minor=True)
         panel.grid(alpha=0.2)
-    axes[0].legend(title="incidence", loc="lower right", fontsize=8)
-    figure.suptitle("Sinusoids of a perfect conductor: the model beside the integral method")
+        panel.legend(title="model, incidence", loc="lower right", fontsize=8)
+    figure.suptitle(
+        "Sinusoids beside the integral method. Dotted: where warnings begin; "
+        f"deviations below {percent(_SMALLEST)} are drawn at it"
+    )
     return figure
 
 
@@ -114,15 +121,15 @@ def scatter_figure(comparisons: list[Comparison]) -> Figure:
         low, high = 1e-6, 1.5
         panel.plot([low, high], [low, high], color="black", lw=0.8)
         panel.set(
-            xlim=(low, high), ylim=(low, high), title=comparison.material,
+            xlim=(low, high), ylim=(low, high), title=_MODEL_OF[comparison.material],
             xlabel="rigorous efficiency", ylabel="model",
         )  # fmt: skip
         panel.set_aspect("equal")
         panel.grid(alpha=0.2)
         panel.legend(fontsize=8, markerscale=2, loc="upper left")
     figure.suptitle(
-        f"Every order, unpolarised; strong colours: depth/period up to {_GENTLE_RATIO:g}, "
-        "incidence up to 30°"
+        f"Every order, unpolarised; strong colours: depth/period up to "
+        f"{_GENTLE_RATIO:g}, incidence up to 30°"
     )
     return figure
 
@@ -180,6 +187,13 @@ def _offsets(axes: Axes, statistics: Statistics) -> None:
     )  # fmt: skip
     axes.grid(alpha=0.2)
 
+
+#: A perfect conductor has no index, and Kirchhoff's model.
+_MODEL_OF = {
+    "perfect": "perfect conductor, Kirchhoff",
+    "keratin": "keratin, default model",
+    "aluminium": "aluminium, default model",
+}
 
 _GENTLE_RATIO = 0.05  # depth/period; of a sinusoid, an RMS slope of 0.11
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
 
-from .cases import MATERIALS, PERIODS, PROBE_GRATING, PROFILES, Grating
+from .cases import COAT, MATERIALS, PERIODS, PROBE_GRATING, PROFILES, Grating
 from .closed_forms import ANGLES, deviations
 from .compare import GRAZING, Comparison, angles_of, gratings_of, table_of
 from .limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT, rms_slope, slope_limit
@@ -26,21 +26,26 @@ def introduction() -> str:
     return f"""# How far the model holds
 
 Written by `make validation`, which computes every number and picture below from the package itself.
-What it is compared with was made by others: closed forms from optics, and rigorous solutions of
-Maxwell's equations by `gratinglab` (boundary integrals) and `pySCATMECH` (coupled waves), which
-come with the package as data. `python -m docs.make.validation solve` makes those anew.
+What it is compared with are closed forms from optics, and rigorous solutions of Maxwell's equations
+by `gratinglab` (boundary integrals), `pySCATMECH` and `grcwa` (coupled waves) and by Rayleigh's
+expansion, kept as data in docs/make/validation/data with what made them. `python -m
+docs.make.validation solve`, `patches` and `coated` make those anew. `python -m docs.make.validation
+groups` prints the first three tables alone.
 
 A grating's order m carries the power of its lobe of the BRDF. Through a window much wider than the
 period, ∫ f cosθo dωo over that lobe is
 
-    η_m = R(cosθ_half) · (1 + ωi·ω_m)² / (w² cosθi cosθ_m) · |a_m(k w)|²,   w = cosθi + cosθ_m,
+    η_m = 4 cosθi cosθ_m N / w² · |a_m(k w)|²,   w = cosθi + cosθ_m,
 
-since dωo = dα dβ/(k² cosθo) and ∬ exp(−σ²|q − q_m|²) dα dβ = π/σ². Below, η_m is the value of
-`md.reference.brdf` at the centre of the lobe, times π/(σk)² and Fresnel's reflectance: the raw
-model, with `energy_conserving` false.
+since dωo = dα dβ/(k² cosθo) and ∬ exp(−σ²|q − q_m|²) dα dβ = π/σ²; N is the mean power of the Jones
+matrix ([theory.md](theory.md#the-material)), R (1 + ωi·ω_m)²/(2 cosθi cosθ_m)² by Kirchhoff. Below,
+η_m is the value of `md.reference.brdf` at the centre of the lobe, times π/(σk)²: the raw model,
+with `energy_conserving` false.
 
 *Deviation* is Σ|η − η_rigorous| / Σ η_rigorous over the wavelengths and the orders that leave
-within {GRAZING:g}° of the normal, for unpolarised light; *of colours* leaves out order 0."""
+within {GRAZING:g}° of the normal, for unpolarised light unless a polarisation is named; *of
+colours* leaves out order 0. The *default* is `model="small_slope"`. A perfect conductor has no
+index, and is Kirchhoff's alone."""
 
 
 def closed_forms(chosen: Sequence[tuple[float, float]]) -> str:
@@ -61,8 +66,11 @@ a period. What is left of lamellar and blazed gratings is their sampling.
 {table(["profile", "orders", "`reference.brdf`", "table"], rows)}"""
 
 
-def solutions(comparisons: dict[str, Comparison]) -> str:
-    """How good the rigorous solutions are."""
+def solutions(comparisons: dict[str, Comparison], patches: str) -> str:
+    """How good the rigorous solutions are.
+
+    patches : the same of those in two dimensions.
+    """
     rows = []
     for material in MATERIALS:
         every = shipped(material)
@@ -107,7 +115,14 @@ Coupled waves on a staircase do not converge for TM light on metal: there only T
 both polarisations on lamellar gratings, which need no staircase. Absolute differences of
 efficiencies, and by how much the second method itself changed when its orders and layers doubled:
 
-{table(["case", "orders", "strongest", "difference: median", "largest", "own change"], pairs)}"""
+{table(["case", "orders", "strongest", "difference: median", "largest", "own change"], pairs)}
+
+{patches}
+
+![Every order: default model against rigorous efficiency](images/validation_materials.png)"""
+
+
+_OBLIQUE = (0.0, 30.0, 60.0)
 
 
 def probe(perfect: Comparison) -> str:
@@ -130,54 +145,80 @@ def probe(perfect: Comparison) -> str:
         "of colours",
         "light gained",
     ]
-    return f"""## A gentle grating
+    return f"""## A gentle grating of a perfect conductor
 
-A sinusoid of period {grating.period:g} µm and depth {grating.depth:g} µm, RMS slope
-{rms_slope(grating):.3f}; perfect conductor, unpolarised. At normal incidence none of the orders −2
-to 2 is off by more than {percent(to_550)} of its own power up to 550 nm, and {percent(from_450)}
-from 450 to {wavelength.max():g} nm. The error grows with the angle:
+A perfect conductor takes Kirchhoff's model. A sinusoid of period {grating.period:g} µm and depth
+{grating.depth:g} µm, RMS slope {rms_slope(grating):.3f}, unpolarised. At normal incidence none of
+the orders −2 to 2 is off by more than {percent(to_550)} of its own power up to 550 nm, and
+{percent(from_450)} from 450 to {wavelength.max():g} nm. The error grows with the angle:
 
 {table(header, rows)}
 
 ![Efficiencies of three gratings against wavelength](images/validation_orders.png)"""
 
 
-def slopes(perfect: Comparison) -> str:
+def slopes(kirchhoff: dict[str, Comparison], default: dict[str, Comparison]) -> str:
     """Deviation against slope, and the warnings."""
-    angles = angles_of(perfect.where(profile="sinusoidal"))
-    sinusoids = gratings_of(perfect, "sinusoidal")
-    values = table_of(perfect, sinusoids, angles, _of_colours)
-    gentle, steep = (slope_limit(perfect, error) for error in (GENTLE_ERROR, STEEP_ERROR))
+    rows = []
+    for material in default:
+        for grating in sorted(gratings_of(default[material], "sinusoidal"), key=rms_slope):
+            rows.append(
+                [
+                    f"{material}, {grating.period:g}/{grating.depth:g} µm",
+                    f"{rms_slope(grating):.3f}",
+                    *_side_by_side(kirchhoff[material], default[material], grating, _OBLIQUE),
+                ]
+            )
+    parts = list(default.values())
+    gentle, steep = (slope_limit(parts, error) for error in (GENTLE_ERROR, STEEP_ERROR))
+    header = ["sinusoid", "RMS slope", *(f"{theta:g}°" for theta in _OBLIQUE)]
     return f"""## Slope decides
 
 The deviation of sinusoids grows with the RMS slope; at one slope it is larger where the period is
-narrow. Deviation of colours:
+narrow, and in oblique light. Deviation of colours, Kirchhoff / default:
 
-{_grating_table(sinusoids, angles, values, slopes=True)}
+{table(header, rows)}
 
 ![Deviation against RMS slope](images/validation_slopes.png)
 
-The package warns by this rule: a limit is the slope of the last sinusoid before the first that
-deviates by more than {percent(GENTLE_ERROR)}, or {percent(STEEP_ERROR)}, at any incidence up to
-{STEEPEST_LIGHT:g}°, in all orders or in the colours alone. Here the limits are {gentle:.3f} and
-{steep:.3f}; the warnings begin at {GENTLE_SLOPE:g} and {STEEP_SLOPE:g}. Beyond {STEEPEST_LIGHT:g}°
-expect more at any slope, and more of a dielectric (see Materials)."""
+The package warns by this rule: a limit is the largest slope below that of the first sinusoid, of
+either material, whose colours deviate by more than {percent(GENTLE_ERROR)}, or
+{percent(STEEP_ERROR)}, by the default model at any incidence up to {STEEPEST_LIGHT:g}°. Here the
+limits are {gentle:.3f} and {steep:.3f}; the warnings begin at {GENTLE_SLOPE:g} and
+{STEEP_SLOPE:g}. Cuts of scales behave alike (above). Beyond {STEEPEST_LIGHT:g}° expect more at any
+slope. An RMS slope knows no edges: blazed gratings, whose steps are a pixel wide, deviate more."""
 
 
-def edges(perfect: Comparison) -> str:
+def edges(kirchhoff: dict[str, Comparison], default: dict[str, Comparison]) -> str:
     """Lamellar and blazed gratings."""
-    parts = []
-    for profile in ("lamellar", "blazed"):
-        angles = angles_of(perfect.where(profile=profile))
-        gratings = gratings_of(perfect, profile)
-        values = table_of(perfect, gratings, angles, _of_colours)
-        parts.append(f"{sentence_case(profile)}:\n\n{_grating_table(gratings, angles, values)}")
-    text = """## Edges
+    parts = [
+        """## Edges
 
-Vertical walls reflect light too, and the model knows nothing of it. Deviation of colours, perfect
-conductor. Blazed gratings ascend towards +x: at positive angles the light falls on their steps, at
-negative ones along the facets."""
-    return "\n\n".join([text, *parts])
+Vertical walls reflect light too, of which the model knows nothing; metals suffer most. Deviation of
+colours, Kirchhoff / default. Blazed gratings ascend towards +x: at positive angles the light falls
+on their steps, at negative ones along the facets."""
+    ]
+    for profile in ("lamellar", "blazed"):
+        angles = angles_of(default["keratin"].where(profile=profile))
+        rows = [
+            [
+                f"{material}, {grating.period:g}/{grating.depth:g} µm",
+                *_side_by_side(kirchhoff[material], part, grating, angles),
+            ]
+            for material, part in default.items()
+            for grating in gratings_of(part, profile)
+        ]
+        header = ["period/depth", *(f"{theta:g}°" for theta in angles)]
+        parts.append(f"{sentence_case(profile)}:\n\n{table(header, rows)}")
+    return "\n\n".join(parts)
+
+
+def _side_by_side(
+    first: Comparison, second: Comparison, grating: Grating, angles: Sequence[float]
+) -> list[str]:
+    """Deviations of colours by both, a cell for each angle."""
+    both = (table_of(part, [grating], angles, _of_colours)[0] for part in (first, second))
+    return [" / ".join(map(percent, pair)) for pair in zip(*both, strict=True)]
 
 
 def polarisation(perfect: Comparison) -> str:
@@ -190,41 +231,38 @@ def polarisation(perfect: Comparison) -> str:
         for light in ("te", "tm"):
             values = table_of(sinusoids, [grating], angles, _of_light(light))[0]
             rows.append([str(grating), light.upper(), *map(percent, values)])
-    return f"""## Polarisation
+    return f"""## Polarisation of a perfect conductor
 
-The model knows none, and stands for the mean. Held against one polarisation at a time (TE: the
-electric field along the grooves) it is further off. Deviation of all orders, perfect conductor:
+Without an index the model knows no polarisation, and stands for the mean. Held against one at a
+time (TE: the electric field along the grooves) it is further off. Deviation of all orders:
 
 {table(["grating", "light", *(f"{theta:g}°" for theta in angles)], rows)}"""
 
 
-def materials(comparisons: dict[str, Comparison]) -> str:
-    """Metal and dielectric beside the perfect conductor."""
-    angles = (0.0, 30.0, 60.0)
-    rows = []
-    for profile in PROFILES:
-        for period, depth in ((2.5, 0.1), (1.1, 0.1), (2.5, 0.4), (1.1, 0.4)):
-            grating = Grating(profile, period, depth)
-            for material in MATERIALS:
-                values = table_of(comparisons[material], [grating], angles, _of_colours)[0]
-                rows.append([str(grating), material, *map(percent, values)])
-    keratin = comparisons["keratin"].where(profile="sinusoidal")
-    gentle = [g for g in gratings_of(keratin, "sinusoidal") if rms_slope(g) <= 1.05 * GENTLE_SLOPE]
-    least, most = (
-        percent(float(at_60(table_of(keratin, gentle, [60.0], _of_colours))))
-        for at_60 in (np.min, np.max)
-    )
-    return f"""## Materials
+def coated(found: Sequence[tuple[str, str, dict[str, float]]]) -> str:
+    """The coat: from `coated.deviations`."""
+    rows = [
+        [grating, theta, *(percent(values[name]) for name in ("single", "left out", "bounced"))]
+        for grating, theta, values in found
+    ]
+    header = ["grating", "incidence", "one passage", "share of the bounces", "with bounces"]
+    return f"""## Under a coat
 
-Fresnel's reflectance at the half vector, once, stands for the boundary conditions. On aluminium
-that does about as well as on a perfect conductor. A dielectric reflects the two polarisations so
-differently at oblique angles that it does not, however gentle the slope: the colours of sinusoids
-with slopes up to {GENTLE_SLOPE:g} are off by {least} to {most} on keratin at 60°. Deviation of
-colours; aluminium and keratin at 460 and 610 nm.
+Aluminium under polycarbonate (`coat_ior` {COAT:g}). The rigorous solutions are those of the
+interface inside the coat, as matrices between all orders there, which the coat's faces then
+transmit and send back, in powers (docs/make/validation/coated.py; sinusoids by Rayleigh's
+expansion, the others by `gratinglab`): *one passage* is light that is diffracted once, *with
+bounces* the whole series, also of the light that is reflected totally.
+Deviation of colours of the default model: from the first without its own bounces (G = 1), from the
+second as it is. *Share of the bounces* is what of the rigorous colours has come back from the face
+at least once: what a model without bounces would miss.
 
-{table(["grating", "material", *(f"{theta:g}°" for theta in angles)], rows)}
+{table(header, rows)}
 
-![Every order: model against rigorous efficiency](images/validation_materials.png)"""
+Refraction and transmission are right to within a few tenths of a per cent on gentle sinusoids,
+walls deviate as without a coat. Of the bounces, the model has those between two mirrors; what is
+left is light that is diffracted twice, much of it spread beyond the critical angle, all of which
+comes back and leaves from there: the steeper and the more oblique, the more."""
 
 
 def random_surfaces(measured: Statistics) -> str:
@@ -264,30 +302,7 @@ def _of_colours(part: Comparison) -> float:
 
 
 def _of_light(name: str) -> Measure:
-    def deviation(part: Comparison) -> float:
-        exact = part.solutions.rows[name].astype(float)[part.counted]
-        return float(np.abs(part.model[part.counted] - exact).sum() / exact.sum())
-
-    return deviation
-
-
-def _grating_table(
-    gratings: Sequence[Grating],
-    angles: Sequence[float],
-    values: NDArray[np.float64],
-    *,
-    slopes: bool = False,
-) -> str:
-    header = ["period, depth", *(["RMS slope"] if slopes else []), *(f"{t:g}°" for t in angles)]
-    rows = [
-        [
-            f"{grating.period:g}, {grating.depth:g} µm",
-            *([f"{rms_slope(grating):.3f}"] if slopes else []),
-            *map(percent, row),
-        ]
-        for grating, row in zip(gratings, values, strict=True)
-    ]
-    return table(header, rows)
+    return lambda part: part.deviation(light=name)
 
 
 def _distances(z: NDArray[np.float64]) -> list[object]:

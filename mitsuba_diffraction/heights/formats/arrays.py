@@ -11,6 +11,8 @@ from ...errors import DiffractionError
 from ..field import check_pixel_count
 from .raw import RawHeights, first_line
 
+_BLOCK = 1 << 22  # values
+
 
 def read_npy(path: Path) -> RawHeights:
     """Read heights in µm from an NPY file of shape (ny, nx), taken as it is: row 0 is y = 0.
@@ -37,9 +39,7 @@ def read_npy(path: Path) -> RawHeights:
                 f"{shown} has shape {values.shape}; expected two dimensions (ny, nx)"
             )
         check_pixel_count(values.shape[0], values.shape[1], shown)
-        # signalling NaNs, as damage makes them; what is no number is looked for later
-        with np.errstate(invalid="ignore"):
-            return RawHeights(np.array(values, np.float64))
+        return RawHeights(_copied(path, values))
     except DiffractionError:
         raise
     except (
@@ -49,3 +49,16 @@ def read_npy(path: Path) -> RawHeights:
         raise DiffractionError(
             f"{shown} is not a readable NPY file: {first_line(error)}"
         ) from error
+
+
+def _copied(path: Path, values: np.ndarray) -> np.ndarray:
+    """The values, read-only; mapped anew for some rows at a time, which lets go of those before."""
+    result = np.empty(values.shape, np.float64)
+    rows = max(1, _BLOCK // values.shape[1])
+    # signalling NaNs, as damage makes them; what is no number is looked for later
+    with np.errstate(invalid="ignore"):
+        for start in range(0, len(result), rows):
+            mapped = np.load(path, mmap_mode="r", allow_pickle=False)
+            result[start : start + rows] = mapped[start : start + rows]
+    result.setflags(write=False)
+    return result

@@ -14,6 +14,7 @@ import OpenEXR
 from PIL import Image, UnidentifiedImageError
 
 from ...errors import DiffractionError
+from ...streams import without_chatter
 from ..field import check_pixel_count
 from .raw import RawHeights, first_line
 
@@ -145,7 +146,7 @@ def read_exr(path: Path, channel: str | None = None) -> RawHeights:
         check_pixel_count(height, width, shown)
         check_pixel_count(height * len(names), width, f"{shown}, {len(names)} channels")
         chosen = _choose_channel(names, channel, shown)
-        with OpenEXR.File(str(path), separate_channels=True) as file:
+        with without_chatter(), OpenEXR.File(str(path), separate_channels=True) as file:
             pixels = file.channels()[chosen].pixels
     except DiffractionError:
         raise
@@ -159,7 +160,8 @@ def read_exr(path: Path, channel: str | None = None) -> RawHeights:
 
 def _only_header(path: Path, shown: str) -> dict[str, Any]:
     """Header of the only part."""
-    file = OpenEXR.File(str(path), header_only=True)
+    with without_chatter():
+        file = OpenEXR.File(str(path), header_only=True)
     if len(file.parts) > 1:
         raise DiffractionError(
             f"{shown} has {len(file.parts)} parts; save the one with the heights alone"

@@ -14,7 +14,7 @@ from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from ...optics.geometry import wavenumber
 from ...plugin.traversal import children
 from ...tables.table import DiffractionTable
-from .packing import pack_conductor, pack_energy, pack_roughness
+from .packing import pack_beneath, pack_conductor, pack_energy, pack_roughness
 from .textures import Packed, Texture, Uniform, as_half
 
 Array = NDArray[np.float64]
@@ -91,16 +91,24 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
 
 
 def pack_conservation(material: Material, factors: Sequence[float] = (1.0,)) -> Packed:
-    """What conserves its energy, at its height scale times these factors."""
+    """What conserves its energy, and goes beneath, at its height scale times these factors."""
     if material.bsdf is None:
-        return pack_energy([], False)
-    own = height_scale(material)
-    found = [material.bsdf.energy_scale(own * factor) for factor in factors]
+        return Packed()
+    scales = [height_scale(material) * factor for factor in factors]
+    return conservation_at(material.bsdf, scales)
+
+
+def conservation_at(bsdf: Any, scales: Sequence[float]) -> Packed:
+    """The same, of a diffraction BSDF at height scales."""
+    ratios = [bsdf.reflected_ratio(scale) for scale in scales]
+    beneath = pack_beneath([ratio for ratio in ratios if ratio is not None])
+    found = [bsdf.energy_scale(scale) for scale in scales]
     given = [one for one in found if one is not None]
     if not given:
-        return pack_energy([], False)
+        return beneath
     ones = np.ones_like(given[0][0])
-    return pack_energy([ones if one is None else one[0] for one in found], given[0][1])
+    values = [ones if one is None else one[0] for one in found]
+    return beneath | pack_energy(values, given[0][1])
 
 
 def pack_surface(material: Material) -> Packed:

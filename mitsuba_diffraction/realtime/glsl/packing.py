@@ -15,6 +15,7 @@ from ...optics.fresnel import reflectance
 from ...optics.geometry import wavenumber
 from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
+from ...tables.energy.conservation import FINE, DirectionalTable
 from ...tables.energy.gain import GRAZING
 from ...tables.energy.grid import SHARE
 from ...tables.energy.powers import order_0_power, power_series
@@ -126,10 +127,6 @@ def pack_energy(scales: Sequence[NDArray[np.float32]], fades: bool) -> Packed:
     values = np.stack(list(scales))
     definitions = {
         "ENERGY_CONSERVING": "",
-        "ENERGY_PAGES": str(len(values)),
-        "ENERGY_POLAR": str(values.shape[1] - 1),
-        "ENERGY_AZIMUTHAL": str(values.shape[2]),
-        "ENERGY_SHARE": repr(float(SHARE)),
         # below every cosine there is no more to clamp
         "ENERGY_GRAZING": repr(GRAZING if fades else 1e-6),
     }
@@ -138,8 +135,44 @@ def pack_energy(scales: Sequence[NDArray[np.float32]], fades: bool) -> Packed:
     return Packed(
         (listed("energy", np.stack(corners, axis=-1).reshape(-1, 4)),),
         {"energy_page": 0.0},
-        definitions,
+        definitions | _grid(len(values)),
     )
+
+
+def pack_beneath(ratios: Sequence[DirectionalTable]) -> Packed:
+    """What light is left for what lies beneath, at one or several height scales.
+
+    ratios : albedo over the flat interface's reflectance (`Diffraction.reflected_ratio`).
+    """
+    if not ratios:
+        return Packed()
+    values = np.zeros((len(ratios), FINE.polar + 1, FINE.azimuthal, 4), np.float16)
+    for page, ratio in zip(values, ratios, strict=True):
+        page[..., :3] = _daylight_mean(ratio)
+    texture = Texture("beneath", values.reshape(-1, *values.shape[2:]), smooth=True)
+    return Packed((texture,), {"energy_page": 0.0}, {"BENEATH": "", **_grid(len(ratios))})
+
+
+def _daylight_mean(table: DirectionalTable) -> NDArray[np.float64]:
+    """In linear sRGB under daylight, on `FINE`: exact of what is straight between wavelengths."""
+    lam = np.arange(360.0, 830.5, 1.0)
+    place = np.interp(
+        np.log(lam), np.log(table.wavelengths), np.arange(len(table.wavelengths), dtype=float)
+    )
+    shares = np.maximum(1.0 - np.abs(place - np.arange(len(table.wavelengths))[:, None]), 0.0)
+    weights = linear_srgb(response(lam))
+    weights /= weights.sum(axis=0)
+    pages = [table.at(FINE.theta[:, None], FINE.phi, at) for at in table.wavelengths]
+    return np.tensordot(np.stack(pages, axis=-1), shares @ weights, 1)
+
+
+def _grid(pages: int) -> dict[str, str]:
+    return {
+        "GRID_PAGES": str(pages),
+        "GRID_POLAR": str(FINE.polar),
+        "GRID_AZIMUTHAL": str(FINE.azimuthal),
+        "GRID_SHARE": repr(float(SHARE)),
+    }
 
 
 def pack_responses(lights: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Packed:

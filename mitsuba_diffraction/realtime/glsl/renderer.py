@@ -22,7 +22,7 @@ from .context import (
     set_uniforms,
 )
 from .lights import Light, light_definitions
-from .materials import height_scale, pack_conservation, pack_surface
+from .materials import conservation_at, height_scale, pack_conservation, pack_surface
 from .packing import pack_energy, pack_responses
 from .prepared import Prepared, window
 from .progressive import ProgressiveLight
@@ -256,11 +256,13 @@ class Renderer:
     def energy_for(self, scale: float) -> None:
         """Take what conserves energy at another height scale: a second or so, where it is new."""
         for surface, own in zip(self.scene.surfaces, self.bindings, strict=True):
-            if "energy" in own.textures:
-                found = surface.material.bsdf.energy_scale(scale)
-                values = np.ones((FINE.polar + 1, FINE.azimuthal), np.float32)
-                packed = pack_energy([values if found is None else found[0]], False)
-                own.textures["energy"].write(packed.textures[0].data.tobytes())
+            if {"energy", "beneath"}.isdisjoint(own.textures):
+                continue
+            ones = pack_energy([np.ones((FINE.polar + 1, FINE.azimuthal), np.float32)], False)
+            packed = ones | conservation_at(surface.material.bsdf, [scale])
+            for texture in packed.textures:
+                if texture.name in own.textures:
+                    own.textures[texture.name].write(texture.data.tobytes())
 
     def release(self) -> None:
         """Free what lies in the graphics card's memory."""

@@ -48,15 +48,13 @@ def load_mesh(
     if not file.is_file():
         raise DiffractionError(f"mesh '{file}': there is no such file")
     _need_variant()
-    # without normals first: making them, Mitsuba follows indices that point nowhere
-    mesh = _load(file, kind, face_normals=True)
-    faces = np.array(mi.traverse(mesh)["faces"], dtype=np.int64).reshape(-1, 3)
+    vertices, faces = _vertices_and_faces(file, kind)
     if not len(faces):
         raise DiffractionError(f"mesh '{file}': it has no triangles")
-    if faces.max() >= mesh.vertex_count():
+    if faces.max() >= vertices:
         raise DiffractionError(
             f"mesh '{file}': a triangle names vertex {faces.max()}, but there are only "
-            f"{mesh.vertex_count()}; export the mesh again"
+            f"{vertices}; export the mesh again"
         )
     mesh = _load(file, kind, face_normals=False)
     values = mi.traverse(mesh)
@@ -67,6 +65,18 @@ def load_mesh(
     normals = array("vertex_normals", 3) if mesh.has_vertex_normals() else None
     uv = array("vertex_texcoords", 2) if mesh.has_vertex_texcoords() else None
     return array("vertex_positions", 3), normals, uv, faces
+
+
+def _vertices_and_faces(file: Path, kind: str) -> tuple[int, Ints]:
+    """How many vertices, and the faces (m, 3), of a mesh that is not kept.
+
+    Whoever keeps an error keeps what its traceback has seen, and Dr.Jit compiles kernels for all
+    meshes alive: one without faces would break every later rendering of the process.
+    """
+    # without normals: making them, Mitsuba follows indices that point nowhere
+    mesh = _load(file, kind, face_normals=True)
+    faces = np.array(mi.traverse(mesh)["faces"], dtype=np.int64).reshape(-1, 3)
+    return mesh.vertex_count(), faces
 
 
 def has_own_normals(path: str | os.PathLike[str]) -> bool:

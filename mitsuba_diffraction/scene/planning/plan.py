@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ...atomic import atomic_path
-from ...errors import DiffractionError
+from ...errors import DiffractionError, quoted
 from .domain import Domain
 
 #: Raised whenever an older file would mean something else.
@@ -68,14 +69,14 @@ class Plan:
             document = json.loads(Path(path).read_text(encoding="utf-8"))
         except OSError as error:
             raise DiffractionError(f"cannot read '{path}': {error.strerror}") from error
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise DiffractionError(f"'{path}' is no plan: it is no JSON; {_REMEDY}") from error
         if not isinstance(document, dict) or document.get("kind") != _KIND:
             raise DiffractionError(f"'{path}' is JSON but no plan; {_REMEDY}")
         if document.get("version") != VERSION:
             raise DiffractionError(
-                f"'{path}' is a plan of version {document.get('version')}, this program reads "
-                f"version {VERSION}; {_REMEDY}"
+                f"'{path}' is a plan of version {quoted(document.get('version'))}, this program "
+                f"reads version {VERSION}; {_REMEDY}"
             )
         try:
             return cls(
@@ -84,7 +85,7 @@ class Plan:
                 paths=int(document["paths"]),
                 tables={str(k): _table(v) for k, v in document["tables"].items()},
             )
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (LookupError, TypeError, ValueError, OverflowError, AttributeError) as error:
             raise DiffractionError(f"'{path}' is a damaged plan ({error!r}); {_REMEDY}") from error
 
 
@@ -96,7 +97,8 @@ def _table(document: dict[str, Any]) -> PlannedTable:
     if domain is not None:
         x, y = (float(value) for value in domain.pop("crop"))
         domain = Domain(crop=(x, y), **{name: float(value) for name, value in domain.items()})
-        if not min(x, y, domain.kappa_max, domain.tolerance) > 0.0:
+        numbers = (x, y, domain.kappa_max, domain.tolerance)
+        if not all(0.0 < number < math.inf for number in numbers):
             raise ValueError(f"domain {domain}")
     whole, planned = document["memory"]
     return PlannedTable(

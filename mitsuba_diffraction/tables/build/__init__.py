@@ -6,6 +6,7 @@ build           tries until the tolerance is met: `build_table`
 attempt         one try, and its error
 choose          how many terms and intervals a tolerance takes
 checks          what cannot be built
+windows         a wide scan cut into overlapping ones, averaged
 spectrum        DFT of exp(iκh) at some κ, cropped to the orders that light can reach
 coefficients    of the series, from transforms of the heights
 half_precision  these as half floats

@@ -19,7 +19,7 @@ from .checks import check_size
 from .coefficients import coefficients_of
 from .error import FLOOR, ErrorMeter, Parts, worst
 from .half_precision import half_precision
-from .spectrum import Spectrum
+from .windows import spectra_of
 
 #: Below it single precision transforms would spend a share of the tolerance themselves.
 DOUBLE_BELOW = 2e-4
@@ -56,7 +56,7 @@ class Attempt:
         double = expansion.basis == "taylor" or tolerance < DOUBLE_BELOW
         margin = math.ceil(FULL_REACH * math.sqrt(2.0) / min(grid.steps)) + 2
         outer = (grid.last[0] + margin, grid.last[1] + margin)
-        self._spectra = [Spectrum(patch, outer, double) for patch in patches]
+        self._spectra = spectra_of(patches, outer, double)
         self._checks = [expansion.extrema(interval) for interval in range(expansion.intervals)]
         self._transforms = expansion.intervals * expansion.series_terms
         self._total = self._transforms + sum(map(len, self._checks))

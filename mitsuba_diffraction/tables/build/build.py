@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -39,6 +40,7 @@ from .choose import (
 )
 from .coarse import coarse_table
 from .describe import describe, roughness_of
+from .windows import shape_of, windows_of
 
 T = TypeVar("T")
 
@@ -59,7 +61,7 @@ class _Wanted:
     patches: Sequence[HeightField]
     settings: TableSettings
 
-    @property
+    @cached_property
     def deepest(self) -> HeightField:
         return max(self.patches, key=lambda patch: patch.range)
 
@@ -119,6 +121,7 @@ def build_table(
     taps: int | None = None,
     q_max: float | tuple[float, float] | None = None,
     kappa_max: float | None = None,
+    windows: str | float | None = None,
     crop: float | tuple[float, float] | None = None,
     progress: Progress | None = None,
 ) -> DiffractionTable:
@@ -129,8 +132,8 @@ def build_table(
     heights : the patch, which tiles the plane; or several of one size, whose powers are
         averaged (`ensemble` only).
     coherence_width, coherence, basis, tolerance, terms, wavelength_range, height_scale_max, taps,
-    q_max, kappa_max : see `settings.TableSettings`. Beyond `q_max` or `kappa_max` a table of
-        coarse cells answers, which is right on average (`tables.build.coarse`).
+    q_max, kappa_max, windows : see `settings.TableSettings`. Beyond `q_max` or `kappa_max` a table
+        of coarse cells answers, which is right on average (`tables.build.coarse`).
     crop : the former name of `q_max`, in rad/µm; heights have a treatment of that name, in µm.
     progress : called as progress(done, total, text) while it works.
 
@@ -144,7 +147,7 @@ def build_table(
         q_max = _former_name(crop, q_max)
     settings = TableSettings(
         coherence_width, coherence, basis, tolerance, terms, taps, wavelength_range,
-        height_scale_max, checked("q_max", q_max), kappa_max,
+        height_scale_max, checked("q_max", q_max), kappa_max, windows,
     )  # fmt: skip
     return build_with(heights, settings, progress)
 
@@ -155,14 +158,16 @@ def build_with(
     progress: Progress | None = None,
 ) -> DiffractionTable:
     """`build_table` with its arguments in one record."""
-    patches = [heights] if isinstance(heights, HeightField) else list(heights)
-    check_patches(patches, settings)
-    check_units(patches)
+    scans = [heights] if isinstance(heights, HeightField) else list(heights)
+    patches = windows_of(scans, settings)
+    if patches is scans:
+        check_patches(scans, settings)
+    check_units(scans)
     try:
         check_window(patches[0].extent, settings)
         return _built(_Wanted(patches, settings), progress or silent)
     except DiffractionError as error:
-        questions = [question for patch in patches if (question := units_warning(patch))]
+        questions = [question for patch in scans if (question := units_warning(patch))]
         if not questions:
             raise
         raise DiffractionError(f"{error}; or {questions[0]}") from error
@@ -276,10 +281,10 @@ def _grid(wanted: _Wanted, taps: tuple[int, int]) -> Grid:
     if max(taps) > MAX_TAPS:
         raise too_wide(wanted.patches[0].extent, wanted.settings, taps)
     radius = (q_max[0] / spacing[0], q_max[1] / spacing[1])
-    ny, nx = np.max([patch.shape for patch in wanted.patches], axis=0)
+    ny, nx = shape_of(wanted.patches)
     # A margin as wide as the taps: see tables.lookup
-    last_x = min(math.ceil(radius[0]), int(nx) // 2) + taps[0]
-    last_y = min(math.ceil(radius[1]), int(ny) // 2) + taps[1]
+    last_x = min(math.ceil(radius[0]), nx // 2) + taps[0]
+    last_y = min(math.ceil(radius[1]), ny // 2) + taps[1]
     return Grid((last_x, last_y), wanted.steps, radius, taps, wanted.settings.coherent)
 
 

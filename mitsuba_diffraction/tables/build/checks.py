@@ -90,9 +90,9 @@ def too_wide(
     width = settings.coherence_width
     return build_error(
         f"the patch is {max(extent):.4g} µm wide, so much more than the coherence window that a "
-        f"look-up would read {taps[0]}×{taps[1]} orders; crop the heights, for instance to "
-        f"{width:g} µm (crop={width:g} of a scene, --crop {width:g}), or raise coherence_width or "
-        "tolerance"
+        f"look-up would read {taps[0]}×{taps[1]} orders; average over windows of it (windows=auto, "
+        f"--windows auto), or crop the heights, for instance to {width:g} µm (crop={width:g} of a "
+        f"scene, --crop {width:g})"
     )
 
 

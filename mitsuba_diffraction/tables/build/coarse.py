@@ -31,7 +31,7 @@ from .choose import svd_expansion
 from .coefficients import series_of
 from .describe import roughness_of
 from .half_precision import half_scale
-from .spectrum import Spectrum
+from .windows import shape_of, spectra_of
 
 #: Width of a cell in units of 1/σ, and fewest cells from the middle to the edge.
 CELL, FEWEST = 16.0, 24
@@ -66,7 +66,7 @@ def coarse_table(
     steps = tuple(s if n == 1 else min(s, STEP) for s, n in zip(own, each, strict=True))
     taps = taps_for((steps[0], steps[1]), TOLERANCE, False)
     radius = (q_limit / spacing[0], q_limit / spacing[1])
-    ny, nx = np.max([patch.shape for patch in patches], axis=0)
+    ny, nx = shape_of(patches)
     last = tuple(  # beyond Nyquist's frequency there are no orders
         min(math.ceil(r), int(pixels) // (2 * n) + 1) + tap
         for r, pixels, n, tap in zip(radius, (nx, ny), each, taps, strict=True)
@@ -133,7 +133,7 @@ def _coefficients(
     functions : see `series_of`.
     """
     outermost = [n * last + n // 2 for n, last in zip(each, grid.last, strict=True)]
-    spectra = [Spectrum(patch, (outermost[0], outermost[1])) for patch in patches]
+    spectra = spectra_of(patches, (outermost[0], outermost[1]))
     ny, nx = grid.shape
     total = expansion.intervals * expansion.terms
 

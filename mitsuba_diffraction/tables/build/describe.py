@@ -13,6 +13,7 @@ from ...optics.blend import RoughnessTable, ScaleRoughness
 from ...optics.geometry import wavenumber
 from ...settings import TableSettings
 from .spectrum import Spectrum
+from .windows import Windows
 
 _SLOW = 150  # orders read in a look-up; 16 are usual
 _GREEN = 550.0  # nm, where the variation between patches is stated
@@ -23,11 +24,18 @@ def describe(
 ) -> dict[str, Any]:
     """Statistics, digest and warnings of the patches, as plain data.
 
-    With several patches, `variation` is the mean over orders of the standard deviation of |a_j|²
+    Of windows, it is that of their scans, with the standard error of the mean over them. With
+    several patches, `variation` is the mean over orders of the standard deviation of |a_j|²
     between patches, over its mean, at 550 nm and normal incidence and reflection.
     """
-    first, coherence_width = patches[0], settings.coherence_width
-    warnings = [line for patch in patches for line in patch.validity(settings.wavelength_range)]
+    windows = patches if isinstance(patches, Windows) else None
+    scans = windows.scans if windows else patches
+    first, coherence_width = scans[0], settings.coherence_width
+    if windows:  # which are levelled and fade: the scans' own tilt and edges are nowhere
+        scans = [
+            HeightField(s.heights, s.pixel_size, name=s.name, history=s.history) for s in scans
+        ]
+    warnings = [line for scan in scans for line in scan.validity(settings.wavelength_range)]
     small = window_warning(first, coherence_width)
     if small:
         warnings.append(small)
@@ -35,19 +43,30 @@ def describe(
         warnings.append(
             f"{first.name}: the patch of {first.extent[0]:.4g} × {first.extent[1]:.4g} µm is so "
             f"much larger than the coherence width of {coherence_width:g} µm that every look-up "
-            f"reads {taps[0]}×{taps[1]} orders: rendering will be slow; crop "
-            f"the heights, for instance to {coherence_width:g} µm (crop={coherence_width:g} of a "
+            f"reads {taps[0]}×{taps[1]} orders: rendering will be slow; average over "
+            "windows (windows=auto, --windows auto), or crop the heights, "
+            f"for instance to {coherence_width:g} µm (crop={coherence_width:g} of a "
             f"scene, --crop {coherence_width:g})"
         )
     source = first.summary() | {"digest": first.digest(), "warnings": warnings}
-    if len(patches) > 1:
-        source["patches"] = [p.summary() | {"digest": p.digest()} for p in patches]
-        source["variation"] = _variation(patches)
+    if len(scans) > 1:
+        source["patches"] = [p.summary() | {"digest": p.digest()} for p in scans]
+    if windows:
+        source["windows"] = {
+            "number": len(windows),
+            "along x, y": windows.counts,
+            "extent": list(windows[0].extent),
+            "standard_error": windows.standard_error(coherence_width),
+        }
+    elif len(scans) > 1:
+        source["variation"] = _variation(scans)
     return source
 
 
 def roughness_of(patches: Sequence[HeightField], q_max: float) -> RoughnessTable:
     """Height variance by spatial frequency up to q_max (rad/µm), the mean of all patches'."""
+    if isinstance(patches, Windows):
+        return ScaleRoughness.mean(patches.roughness()).table(q_max)
     each = [ScaleRoughness.of(patch.heights, patch.pixel_size) for patch in patches]
     return ScaleRoughness.mean(each).table(q_max)
 

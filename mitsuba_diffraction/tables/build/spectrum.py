@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 from ...heights.field import HeightField
 
+#: What fades at the edges, along y and x.
+Tapers = tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]
+
 _SMALL = 1 << 16  # pixels
 _ROWS = 64  # rows (or columns) a task: large enough for the FFT, small enough to stay in cache
 
@@ -27,9 +30,17 @@ class Spectrum:
     field : the heights; they are centred here (half range ±H/2), which only turns phases.
     last : (jx, jy), the outermost bins wanted.
     double : compute in double precision instead of single.
+    tapers : along y and x, of mean square 1, what f without its mean fades with: bin 0 is then the
+        mean, and all others are of the rest. None along an axis, or altogether, for no fading.
     """
 
-    def __init__(self, field: HeightField, last: tuple[int, int], double: bool = False) -> None:
+    def __init__(
+        self,
+        field: HeightField,
+        last: tuple[int, int],
+        double: bool = False,
+        tapers: Tapers = (None, None),
+    ) -> None:
         self.real_type: Any = np.float64 if double else np.float32
         self.complex_type: Any = np.complex128 if double else np.complex64
         lowest, highest = float(field.heights.min()), float(field.heights.max())
@@ -38,6 +49,7 @@ class Spectrum:
         self.last = last
         self._columns = _Crop(self.heights.shape[1], last[0])
         self._rows = _Crop(self.heights.shape[0], last[1])
+        self._tapers = None if tapers[0] is None and tapers[1] is None else self._filled(tapers)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -66,12 +78,17 @@ class Spectrum:
         """DFT of function(h), which is applied to blocks of rows of the centred heights (µm)."""
         ny = self.heights.shape[0]
         half = np.empty((ny, len(self._columns.bins)), self.complex_type)
+        sums = np.zeros(-(-ny // _ROWS), np.complex128)
         result = np.zeros(self.shape, self.complex_type)
 
         def along_x(start: int) -> None:
             block = function(self.heights[start : start + _ROWS]).astype(
                 self.complex_type, copy=False
             )
+            if self._tapers is not None:
+                sums[start // _ROWS] = block.sum(dtype=np.complex128)
+                block *= self._tapers[0][start : start + _ROWS, None]
+                block *= self._tapers[1]
             lines = scipy.fft.ifft(block, axis=1, overwrite_x=True)
             half[start : start + _ROWS] = lines[:, self._columns.source]
 
@@ -87,10 +104,33 @@ class Spectrum:
             for work, starts in zip((along_x, along_y), blocks, strict=True):
                 for start in starts:
                     work(start)
-            return result
+            return self._mean_apart(result, sums)
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             for work, starts in zip((along_x, along_y), blocks, strict=True):
                 list(pool.map(work, starts))
+        return self._mean_apart(result, sums)
+
+    def _filled(self, tapers: Tapers) -> tuple[NDArray[Any], NDArray[Any]]:
+        y, x = (
+            np.ones(n) if taper is None else taper
+            for n, taper in zip(self.heights.shape, tapers, strict=True)
+        )
+        return y.astype(self.real_type), x.astype(self.real_type)
+
+    def _mean_apart(
+        self, result: NDArray[np.complexfloating], sums: NDArray[np.complex128]
+    ) -> NDArray[np.complexfloating]:
+        """From the transform of w·f, that of w·(f − mean), with the mean in bin 0."""
+        if self._tapers is None:
+            return result
+        mean = sums.sum() / self.heights.size
+        y, x = (
+            scipy.fft.ifft(taper.astype(np.float64))[crop.source]
+            for taper, crop in zip(self._tapers, (self._rows, self._columns), strict=True)
+        )
+        rows, columns = self._rows.target, self._columns.target
+        result[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] -= np.outer(mean * y, x)
+        result[self.last[1], self.last[0]] = mean
         return result
 
 

@@ -12,8 +12,8 @@ with M of `transport`. What is left to do:
 
 - Between the grid's directions and wavelengths an order may appear or vanish (a Rayleigh anomaly).
   So the albedo is looked at between them too, and s lowered around where it is above 1.
-- No scaling exists where a direction's partners all gain and it does not: the light between two
-  groups of directions, as a blazed grating has them, is one sum for both. There s ends up between.
+- Gratings have few orders and so the most of both, and they are solved otherwise: by chains of
+  directions, at nodes that lie where orders appear (`chains`, `grating`).
 """
 
 from __future__ import annotations
@@ -21,12 +21,16 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..table import DiffractionTable
+from .chains import Chains
+from .gain import Gain
+from .grating import Grating, GratingGrid
 from .grid import DirectionGrid
 from .transport import Orders, Transport
 
@@ -48,9 +52,11 @@ LARGEST = 1.5
 #: Parts of a cell, polar and azimuthal, looked at where few orders are strong.
 PARTS, FEW_ORDERS = 3, 24
 #: How often s is lowered by the root of what is too much, before by all of it.
-GENTLE = 2
+GENTLE = 4
 #: And by how much more than what is too much where it was looked at: peaks lie in between.
 PEAKS = 1.3
+#: A grating's albedo is brought below this where its cells were looked at, in so many turns.
+CEILING, TURNS = 0.995, 3
 
 
 @dataclass(frozen=True)
@@ -60,27 +66,45 @@ class DirectionalTable:
     Attributes
     ----------
     wavelengths : (n,) nm, evenly in their logarithm.
-    values : (n, polar + 1, azimuthal) on the `grid`.
+    values : (n, polar + 1, azimuthal) on a `DirectionGrid`, or (n, rows, rows) on a `GratingGrid`.
+    grating : of the latter.
     """
 
     wavelengths: Real
     values: Array
+    grating: Grating | None = None
 
     @property
     def grid(self) -> DirectionGrid:
-        """Where the values are."""
+        """Where the values are, if they are no grating's."""
+        assert self.grating is None
         return DirectionGrid(self.values.shape[1] - 1, self.values.shape[2])
+
+    def grid_at(self, wavelength: float) -> DirectionGrid | GratingGrid:
+        """Where they are at a wavelength (nm)."""
+        if self.grating is None:
+            return self.grid
+        return GratingGrid(self.grating, self.values.shape[1], wavelength)
 
     def at(self, theta: ArrayLike, phi: ArrayLike, wavelength: float) -> Array:
         """Trilinear, at angles (rad) of any one shape and a wavelength (nm)."""
+        return self.grid_at(wavelength).interpolation(theta, phi)(self.page(wavelength))
+
+    def on(self, grid: DirectionGrid) -> DirectionalTable:
+        """The same on a grid of directions."""
+        theta, phi = grid.theta[:, None], grid.phi
+        values = np.stack([self.at(theta, phi, float(one)) for one in self.wavelengths])
+        return DirectionalTable(self.wavelengths, values)
+
+    def page(self, wavelength: float) -> Array:
+        """Values at one wavelength (nm)."""
         place = np.interp(
             np.log(wavelength), np.log(self.wavelengths), np.arange(len(self.wavelengths))
         )
         low = int(min(place, len(self.wavelengths) - 2)) if len(self.wavelengths) > 1 else 0
         high = min(low + 1, len(self.wavelengths) - 1)
         share = np.float32(place - low)
-        values = self.values[low] * (1 - share) + self.values[high] * share
-        return self.grid.interpolation(theta, phi)(values)
+        return np.asarray(self.values[low] * (1 - share) + self.values[high] * share, np.float32)
 
 
 @dataclass(frozen=True)
@@ -90,7 +114,8 @@ class Conservation:
     Attributes
     ----------
     albedo : of the model as it is.
-    scale : s, or None where the albedo is at most 1; Kirchhoff's is faded then (`gain.fade`).
+    scale : s, or None where the albedo is at most 1; what Kirchhoff's is scaled from is faded
+        (`gain.fade`), unless it is a grating's.
     """
 
     albedo: DirectionalTable
@@ -122,6 +147,8 @@ def conservation(
         albedo = DirectionalTable(wavelengths, values)
         if values.max() <= TARGET:
             return Conservation(albedo, None)
+    if maps.orders.grating is not None:
+        return Conservation(albedo, maps.of_chains(maps.orders.grating, wavelengths))
     if maps.fades:
         transports = maps.at(wavelengths, grid.theta, grid.phi, grid, faded=True)
     aims = np.clip(values, np.float32(0.0), np.float32(TARGET))  # quadrature may fall below 0
@@ -145,14 +172,43 @@ def albedos(
     `conservation`, which gave `found`.
     """
     maps, at = _Maps(_orders(table, height_scale), model, index), np.array([wavelength])
-    grid = FINE if found.scale is None else found.scale.grid
-    ones = np.ones((grid.polar + 1, grid.azimuthal), np.float32)
-    raw = maps.at(at, theta, phi, grid)[0](ones)
+    ones = np.ones((FINE.polar + 1, FINE.azimuthal), np.float32)
+    raw = maps.at(at, theta, phi, FINE)[0](ones)
     if found.scale is None:
         return raw, raw
-    transport = maps.at(at, theta, phi, grid, maps.fades)[0]
-    s = found.scale.at(grid.theta[:, None], grid.phi, wavelength)
-    return raw, found.scale.at(theta[:, None], phi, wavelength) * transport(s)
+    transport = maps.at(at, theta, phi, found.scale.grid_at(wavelength), maps.fades)[0]
+    s = found.scale.at(theta[:, None], phi, wavelength)
+    return raw, s * transport(found.scale.page(wavelength))
+
+
+def most_kept(
+    table: DiffractionTable,
+    height_scale: float,
+    model: str,
+    index: Index,
+    theta: Real,
+    phi: Real,
+    wavelength: float,
+) -> Real | None:
+    """What reciprocity leaves of a grating at best, (t, p); arguments as in `albedos`.
+
+    Of min(a, 1), the share that can be kept of every direction which light goes to and fro between
+    with this one. None for a surface that is no grating: all its directions hang together.
+    """
+    orders = _orders(table, height_scale)
+    if orders.grating is None:
+        return None
+    gain = _Maps(orders, model, index).gains(np.array([wavelength]))[0]
+    x, c = orders.grating.along(theta[:, None], phi)
+    per_x = gain.wavenumber / orders.grating.spacing
+    first, second = per_x * (c - x), per_x * (c + x)
+    last = (np.floor(first) + np.floor(second)).astype(int)
+    found = np.empty(last.shape)
+    for n in np.unique(last):
+        at = last == n
+        parts = (first[at] % 1.0, second[at] % 1.0)
+        found[at] = Chains(orders, orders.grating, gain).most_kept(*parts, int(n))
+    return found
 
 
 def _orders(table: DiffractionTable, height_scale: float) -> Orders:
@@ -184,25 +240,57 @@ class _Maps:
     orders: Orders
     model: str
     index: Index
+    known: dict[float, Gain] = field(default_factory=dict)
 
     @property
     def fades(self) -> bool:
-        return self.model == "kirchhoff"
+        return fades(self.orders.grating, self.model)
 
     def at(
-        self, wavelengths: Real, theta: Real, phi: Real, grid: DirectionGrid, faded: bool = False
+        self,
+        wavelengths: Real,
+        theta: Real,
+        phi: Real,
+        grid: DirectionGrid | GratingGrid,
+        faded: bool = False,
     ) -> list[Transport]:
         """At several wavelengths (nm), for directions, from weights on a grid."""
+
+        def one(gain: Gain) -> Transport:
+            return self.orders.of_gain(theta, phi, gain, grid, faded)
+
+        return _parallel(one, self.gains(wavelengths))
+
+    def gains(self, wavelengths: Real) -> list[Gain]:
+        """G at several wavelengths (nm), each made once."""
         found = self.index(wavelengths)
-        indices = [None] * len(wavelengths) if found is None else [complex(n) for n in found]
+        for n, wavelength in enumerate(wavelengths.tolist()):
+            index = None if found is None else complex(found[n])
+            if wavelength not in self.known:
+                self.known[wavelength] = self.orders.gain(wavelength, self.model, index)
+        return [self.known[wavelength] for wavelength in wavelengths.tolist()]
 
-        def one(wavelength: float, index: complex | None) -> Transport:
-            return self.orders.transport(
-                theta, phi, float(wavelength), self.model, index, grid, faded
+    def of_chains(self, grating: Grating, wavelengths: Real) -> DirectionalTable:
+        """A grating's s."""
+        units = grating.units(float(wavelengths[0]))
+        middle = np.sqrt(wavelengths[1:] * wavelengths[:-1])
+        pages, between = (
+            [Chains(self.orders, grating, gain) for gain in self.gains(at)]
+            for at in (wavelengths, middle if len(middle) else wavelengths)
+        )
+        s = np.stack(_parallel(lambda one: one.scale(units, TARGET, LARGEST), pages))
+        sums = _parallel(lambda one: one.sums(units), between)
+        for turn in range(TURNS + 1):
+            means = 0.5 * (s + np.append(s[1:], s[-1:], axis=0))
+            much = np.stack(
+                [
+                    one.excess(m, mean, CEILING)
+                    for one, m, mean in zip(between, sums, means, strict=False)
+                ]
             )
-
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            return list(pool.map(one, wavelengths, indices))
+            much = _of_both_pages(much, len(s))
+            s /= much if turn == TURNS else np.sqrt(much)
+        return DirectionalTable(wavelengths, s, grating)
 
     def lowered(self, scale: DirectionalTable) -> DirectionalTable:
         """s lowered around where between its nodes the albedo is above 1."""
@@ -215,16 +303,31 @@ class _Maps:
         transports = self.at(middle, theta, phi, grid, self.fades)
         here = grid.interpolation(theta[:, None], phi)
         for turn in range(GENTLE + 1):
-            excess = np.empty((len(middle), *s.shape[1:]), np.float32)
+            much = np.empty((len(middle), *s.shape[1:]), np.float32)
             for n, transport in enumerate(transports):
                 mean = 0.5 * (s[n] + s[min(n + 1, len(s) - 1)])
                 found = (here(mean) * transport(mean)).reshape(grid.polar, parts, -1, parts)
-                excess[n] = _largest_around(np.maximum(found.max(axis=(1, 3)), 1.0))
-            if len(s) > 1:
-                both = np.maximum(excess[1:], excess[:-1])
-                excess = np.concatenate([excess[:1], both, excess[-1:]])
-            s /= 1.0 + PEAKS * (excess - 1.0) if turn == GENTLE else np.sqrt(excess)
+                much[n] = _largest_around(np.maximum(found.max(axis=(1, 3)), 1.0))
+            much = _of_both_pages(much, len(s))
+            s /= 1.0 + PEAKS * (much - 1.0) if turn == GENTLE else np.sqrt(much)
         return DirectionalTable(scale.wavelengths, s)
+
+
+def _of_both_pages(much: Array, pages: int) -> Array:
+    """From between the wavelengths to them, each the larger of what is to its sides."""
+    if pages == 1:
+        return much
+    return np.concatenate([much[:1], np.maximum(much[1:], much[:-1]), much[-1:]])
+
+
+def _parallel(one: Callable[[Any], Any], arguments: list[Any]) -> list[Any]:
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(one, arguments))
+
+
+def fades(grating: Grating | None, model: str) -> bool:
+    """Whether what is scaled has `gain.fade`: Kirchhoff's, but for gratings."""
+    return model == "kirchhoff" and grating is None
 
 
 def _between(grid: DirectionGrid, parts: int) -> tuple[Real, Real]:

@@ -11,10 +11,12 @@ N the mean power of the boundary's Jones matrix (`optics.boundary`): for Kirchho
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import map_coordinates
 
 from ...optics import blend, boundary, fresnel
 from ..table import DiffractionTable
@@ -26,7 +28,7 @@ POLAR_NODES, AZIMUTH_NODES = 31, 15
 #: Polar angles θo and cosines of the azimuth between which its table is then bilinear.
 POLAR_FINE, AZIMUTH_FINE = 61, 65
 # The horizon itself would divide by zero in the facets' frame
-_LEAST_COSINE = 1e-3
+LEAST_COSINE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -64,27 +66,53 @@ class Gain:
         wi = np.stack([sin_i, np.zeros_like(sin_i), cos_i], axis=-1)
         wo = np.stack([x, y, cos_o], axis=-1)
         variance = self.table.roughness.at(self.wavenumber * np.hypot(x + sin_i, y))
-        s = blend.weight(self.wavenumber * w * self.height_scale, variance)
+        s = blend.weight(self.wavenumber * w * self.height_scale, variance, self.index)
         power = boundary.unpolarised(blend.jones(wi, wo, self.index, s))
         return np.asarray((2.0 * cos_i * cos_o / one_plus_dot) ** 2 * power)
 
     def tables(self, theta: Real) -> Real:
         """`ratio` at θi = theta (t,), rad, for `read`: (t, POLAR_FINE, AZIMUTH_FINE)."""
-        nodes = np.linspace(0.0, 0.5 * np.pi, POLAR_NODES)
-        cosines = np.maximum(np.cos(nodes), _LEAST_COSINE)
+        return np.tensordot(_spline(theta), self._nodes, 1)
+
+    def between(self, cos_i: Real, cos_o: Real, turn: Real) -> Real:
+        """`ratio`, linear between a table's nodes, at (cosθi, cosθo, φo − φi); all broadcast."""
+        fine = (POLAR_FINE - 1) / (0.5 * np.pi)
+        places = [np.arccos(np.minimum(cosine, 1.0)) * fine for cosine in (cos_i, cos_o)]
+        column = (np.cos(turn) + 1.0) * (0.5 * (AZIMUTH_FINE - 1))
+        at = np.stack(np.broadcast_arrays(*places, column))
+        return np.asarray(map_coordinates(self._fine, at, order=1, mode="nearest"))
+
+    @cached_property
+    def _fine(self) -> Real:
+        return self.tables(np.linspace(0.0, 0.5 * np.pi, POLAR_FINE))
+
+    @cached_property
+    def _nodes(self) -> Real:
+        """The same at θi of the nodes."""
+        cosines = np.maximum(np.cos(_POLAR), LEAST_COSINE)
         turns = np.polynomial.chebyshev.chebpts2(AZIMUTH_NODES)  # cos(φo − φi)
-        sines = np.sqrt(1.0 - cosines**2)[:, None]
-        values = self.ratio(
-            cosines[:, None, None], sines * turns, sines * np.sqrt(1.0 - turns**2), cosines[:, None]
+        i, o = np.tril_indices(POLAR_NODES)
+        sines = np.sqrt(1.0 - cosines[o] ** 2)[:, None]
+        half = self.ratio(
+            cosines[i, None], sines * turns, sines * np.sqrt(1.0 - turns**2), cosines[o, None]
         )
+        values = np.empty((POLAR_NODES, POLAR_NODES, AZIMUTH_NODES))
+        values[i, o] = values[o, i] = half  # reciprocity
         # nearly a polynomial in cos(φo − φi), and smooth in the polar angles
         across = np.polynomial.chebyshev.chebvander(turns, AZIMUTH_NODES - 1)
         fine = np.polynomial.chebyshev.chebvander(
             np.linspace(-1.0, 1.0, AZIMUTH_FINE), AZIMUTH_NODES - 1
         )
         values = values @ (fine @ np.linalg.inv(across)).T
-        values = CubicSpline(nodes, values, axis=1)(np.linspace(0.0, 0.5 * np.pi, POLAR_FINE))
-        return np.asarray(CubicSpline(nodes, values, axis=0)(theta))
+        return np.einsum("on,inf->iof", _spline(np.linspace(0.0, 0.5 * np.pi, POLAR_FINE)), values)
+
+
+_POLAR = np.linspace(0.0, 0.5 * np.pi, POLAR_NODES)
+
+
+def _spline(theta: Real) -> Real:
+    """Matrix (t, POLAR_NODES) from values at the polar nodes to a cubic spline's at theta (rad)."""
+    return np.asarray(CubicSpline(_POLAR, np.eye(POLAR_NODES))(theta))
 
 
 def read(table: Real, cos_o: Real, turn: Real) -> Real:
@@ -100,6 +128,16 @@ def read(table: Real, cos_o: Real, turn: Real) -> Real:
     return np.asarray(
         low * (1.0 - s) + (flat.take(index) * (1.0 - t) + flat.take(index + 1) * t) * s
     )
+
+
+def over_lobe(gain: Real, at_horizon: Real, cos_o: Real, pole: Real) -> Real:
+    """G's mean over a lobe, from G at the lobe's mean cosθo and G cosθo at the horizon.
+
+    With G cosθo linear in cosθo over a lobe, whose mean of 1/cosθo is `pole`: Kirchhoff's G has a
+    pole at the horizon, the small-slope one has little of it. All broadcast.
+    """
+    share = np.clip(at_horizon / np.maximum(gain * cos_o, 1e-30), 0.0, 1.0)
+    return np.asarray(gain * (1.0 + share * (cos_o * pole - 1.0)))
 
 
 #: cosθ of `fade`: light that leaves or comes within 10° of the horizon.

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,8 @@ from numpy.typing import NDArray
 from ...optics.geometry import wavenumber
 from ..sampling.order_mixture import OrderMixture, order_mixture
 from ..table import DiffractionTable
-from .gain import Gain, fade, read
+from .gain import LEAST_COSINE, Gain, fade, over_lobe, read
+from .grating import Grating, GratingGrid, grating_of, orders_of
 from .grid import DirectionGrid, Interpolation
 
 Real = NDArray[np.float64]
@@ -48,9 +50,14 @@ class Orders:
 
     def __init__(self, table: DiffractionTable, height_scale: float = 1.0) -> None:
         self.table, self.height_scale = table, height_scale
-        longest = float(wavenumber(table.wavelength_range[0]))
-        spacing = longest * 0.5 * math.pi / RINGS
-        self.mixture: OrderMixture = order_mixture(table, height_scale, SMOOTHING * spacing)
+        self.grating: Grating | None = None
+        if (found := grating_of(table)) is not None:
+            self.grating, bins = found
+            self.mixture: OrderMixture = orders_of(table, bins, height_scale)
+        else:
+            longest = float(wavenumber(table.wavelength_range[0]))
+            spacing = longest * 0.5 * math.pi / RINGS
+            self.mixture = order_mixture(table, height_scale, SMOOTHING * spacing)
         total = self.mixture.density.sum(axis=(1, 2)).max() * self.mixture.pitch**2
         self.has_weak = bool(total > LEAST_WEAK)
         self.nodes, self.weights = _directions()
@@ -62,15 +69,30 @@ class Orders:
         wavelength: float,
         model: str,
         index: complex | None,
-        grid: DirectionGrid,
+        grid: DirectionGrid | GratingGrid,
         faded: bool = False,
     ) -> Transport:
         """The map at polar angles (t,) and azimuths (p,), rad, from weights on a grid.
 
         wavelength : nm; model, index : as in `Gain`; faded : whether by `gain.fade`.
         """
+        gain = self.gain(wavelength, model, index)
+        return self.of_gain(theta, phi, gain, grid, faded)
+
+    def gain(self, wavelength: float, model: str, index: complex | None) -> Gain:
+        """G of a model and material at a wavelength (nm)."""
         k = float(wavenumber(wavelength))
-        gain = Gain(self.table, model, index, k, self.height_scale)
+        return Gain(self.table, model, index, k, self.height_scale)
+
+    def of_gain(
+        self,
+        theta: Real,
+        phi: Real,
+        gain: Gain,
+        grid: DirectionGrid | GratingGrid,
+        faded: bool = False,
+    ) -> Transport:
+        """As `transport`."""
         rows = self._rows(gain, theta, phi, faded)
         return Transport(
             glossy=np.array([row.glossy() for row in rows])[:, None],
@@ -86,8 +108,16 @@ class Orders:
             for angle, table in zip(theta, tables, strict=True)
         ]
 
-    def _weak(self, theta: Real, phi: Real, gain: Gain, grid: DirectionGrid, faded: bool) -> Weak:
+    def _weak(
+        self,
+        theta: Real,
+        phi: Real,
+        gain: Gain,
+        grid: DirectionGrid | GratingGrid,
+        faded: bool,
+    ) -> Weak:
         """The weak orders' part: smooth, so that a grid of half as many angles will do."""
+        assert isinstance(grid, DirectionGrid)  # a grating has none
         half = DirectionGrid(grid.polar // 2, grid.azimuthal // 2)
         x, y, cos_o = self.nodes
         turned = half.phi[:, None] + np.arctan2(y, x)
@@ -144,7 +174,7 @@ class Transport:
         return np.asarray(result, np.float32)
 
 
-def _strong_of(rows: list[_Row], grid: DirectionGrid) -> Strong:
+def _strong_of(rows: list[_Row], grid: DirectionGrid | GratingGrid) -> Strong:
     found = [row.strong() for row in rows]
     shares, theta, phi = (np.stack(part) for part in zip(*found, strict=True))
     return Strong(shares.astype(np.float32), grid.interpolation(theta, phi))
@@ -214,13 +244,15 @@ class _Row:
         x = mixture.frequency[:, 0] / k - self.sin * np.cos(self.phi)[:, None]
         y = mixture.frequency[:, 1] / k - self.sin * np.sin(self.phi)[:, None]
         radius, azimuth = np.hypot(x, y), np.arctan2(y, x)
-        places, visible, cosine, pole = _lobes(self.sigma, k)
-        share = np.interp(radius, places, visible, right=0.0)
-        cos_o = np.interp(radius, places, cosine)
+        share, cos_o, pole = lobe_means(self.sigma, k, radius)
         w = np.where(share > 0.0, self.cos + np.sqrt(np.maximum(1.0 - radius**2, 0.0)), 1.0)
         power = mixture.strong_at(k * w)
-        pole = np.interp(radius, places, pole)  # instead of 1/cosθo in G
-        gain = self._gain(cos_o, azimuth - self.phi[:, None]) * cos_o * pole
+        turn = azimuth - self.phi[:, None]
+        gain = self._gain(cos_o, turn)
+        near = cos_o * pole > 1.001
+        end = np.full(np.count_nonzero(near), LEAST_COSINE)
+        at_horizon = self._gain(end, turn[near]) * LEAST_COSINE
+        gain[near] = over_lobe(gain[near], at_horizon, cos_o[near], pole[near])
         return power * gain * share, np.arccos(cos_o), azimuth
 
     def _gain(self, cos_o: Real, turn: Real) -> Real:
@@ -231,7 +263,21 @@ class _Row:
         return gain * fade(self.cos, cos_o) if self._faded else gain
 
 
-def _lobes(sigma: float, k: float) -> tuple[Real, Real, Real, Real]:
+def lobe_means(sigma: float, k: float, radius: Real) -> tuple[Real, Real, Real]:
+    """The visible share of lobes, and its means of cosθo and of 1/cosθo.
+
+    radius : of their centres from the normal, in direction cosines.
+    """
+    places, *means = lobes(sigma, k)
+    place = np.interp(radius, places, np.arange(float(len(places))))
+    low = np.minimum(place.astype(np.int32), len(places) - 2)
+    share = place - low
+    visible, cosine, pole = (one[low] * (1.0 - share) + one[low + 1] * share for one in means)
+    return np.where(radius < places[-1], visible, 0.0), cosine, pole
+
+
+@lru_cache(maxsize=64)
+def lobes(sigma: float, k: float) -> tuple[Real, Real, Real, Real]:
     """Means over a lobe's visible part, against its centre's distance from the normal.
 
     Returns the distances (direction cosines), the visible share, and of that the mean of cosθo and

@@ -9,16 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..energy import chains, gain, grating, transport
 from ..energy import conservation as made
-from ..energy import gain, transport
 from ..energy.conservation import Conservation, DirectionalTable, Index, conservation
+from ..energy.grating import Grating
 from ..energy.grid import LAST_ANGLE
 from ..sampling.order_mixture import MOST_STRONG, STRONG
 from ..table import DiffractionTable
 from .store import Record, kept, key_of
 
 #: Raised whenever the computation changes.
-VERSION = 4
+VERSION = 5
 
 #: Height scales are n/steps: this phase (rad) changes at most in between. The power of an order
 #: bends by a fiftieth then, and by less at grazing angles, where there is most to take.
@@ -32,7 +33,9 @@ _PROBES = 24
 _SETTINGS = (
     VERSION, str(made.FINE), str(made.COARSE), made.FINE_WAVELENGTHS, made.COARSE_WAVELENGTHS,
     made.TARGET, made.SWEEPS, made.LARGEST, made.PARTS, made.FEW_ORDERS, made.GENTLE,
-    made.PEAKS, gain.POLAR_NODES, gain.AZIMUTH_NODES, gain.GRAZING,
+    made.PEAKS, made.CEILING, made.TURNS, chains.SWEEPS,
+    grating.NODES, grating.LAST_NODE, grating.ENDS, grating.MOST_UNITS,
+    gain.POLAR_NODES, gain.AZIMUTH_NODES, gain.GRAZING,
     transport.RINGS, transport.STEPS, transport.SMOOTHING,
     transport.LEAST_WEAK, STRONG, MOST_STRONG, LAST_ANGLE,
 )  # fmt: skip
@@ -103,15 +106,18 @@ def _rounded(index: NDArray[np.complex128]) -> list[str]:
 
 def _record(found: Conservation) -> Record:
     tables = [found.albedo] if found.scale is None else [found.albedo, found.scale]
-    return Record(
-        [table.wavelengths.tolist() for table in tables], [table.values for table in tables]
-    )
+    document = [
+        [table.wavelengths.tolist(), table.grating and [table.grating.axis, table.grating.spacing]]
+        for table in tables
+    ]
+    return Record(document, [table.values for table in tables])
 
 
 def _conservation(record: Record) -> Conservation:
     tables = []
-    for wavelengths, values in zip(record.document, record.arrays, strict=True):
+    for (wavelengths, line), values in zip(record.document, record.arrays, strict=True):
         if values.ndim != 3 or len(values) != len(wavelengths) or not np.isfinite(values).all():
             raise ValueError(f"values of shape {values.shape}")
-        tables.append(DirectionalTable(np.array(wavelengths, float), values))
+        grating = Grating((line[0][0], line[0][1]), line[1]) if line else None
+        tables.append(DirectionalTable(np.array(wavelengths, float), values, grating))
     return Conservation(tables[0], tables[1] if len(tables) > 1 else None)

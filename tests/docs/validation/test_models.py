@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from docs.make.validation.cases import PROFILES
+from docs.make.validation.cases import PROFILES, Grating, index_of, order_sines
 from docs.make.validation.compare import Comparison, angles_of, compare, gratings_of, table_of
-from docs.make.validation.models import banded, of_colours
+from docs.make.validation.model import in_plane, lobe_sigma
+from docs.make.validation.models import ANGLES, banded, of_colours
 from docs.make.validation.solutions import shipped
+from mitsuba_diffraction import reference
+from mitsuba_diffraction.optics.geometry import wavenumber
 
 #: Largest deviation of colours on keratin at 60°, by profile and depth/period.
 GOALS = {
@@ -42,10 +45,41 @@ def test_nowhere_on_keratin_is_it_worse_than_kirchhoff_by_more_than_a_tenth(kera
         assert not worse.any(), [(str(chosen[i]), angles[j]) for i, j in np.argwhere(worse)]
 
 
-def test_on_gentle_aluminium_it_is_no_worse():
-    solutions = shipped("aluminium").where(profile="sinusoidal", theta=60.0)
+def test_on_aluminium_it_is_no_worse_in_any_band():
     old, new = (
-        next(banded(compare("aluminium", solutions, model), [60.0]))[2][0]
-        for model in ("kirchhoff", "small_slope")
+        list(banded(compare("aluminium", model=model))) for model in ("kirchhoff", "small_slope")
     )
-    assert new < 0.5 * old
+    for (name, band, before), (_, _, after) in zip(old, new, strict=True):
+        for theta, was, now in zip(ANGLES, before, after, strict=True):
+            # Kirchhoff's errors of the two polarisations cancel: blazed 1.1/0.1 µm at 30° has 47 %
+            # of the mean, 54 and 68 % of either; and where both are as good as exact
+            assert now <= max(1.013 * was, was + 5e-5), (name, band, theta)
+    assert new[0][2][2] < 0.3 * old[0][2][2]  # gentle sinusoids at 60°
+
+
+def test_on_aluminium_either_polarisation_is_far_better():
+    chosen = {"profile": "sinusoidal", "period": 2.5, "theta": 60.0, "wavelength": 610.0}
+    for depth in (0.05, 0.1, 0.2):
+        rows = shipped("aluminium").trusted().where(depth=depth, **chosen).rows
+        old, new = (polarised_errors(depth, rows, model) for model in ("kirchhoff", "small_slope"))
+        assert np.all(new < 0.4 * old), depth
+
+
+def polarised_errors(depth: float, rows, model: str) -> np.ndarray:
+    """Deviation of colours at 60° and 610 nm, of TE and TM light (2,)."""
+    grating, index = Grating("sinusoidal", 2.5, depth), index_of("aluminium", 610.0)
+    _, sines = order_sines(2.5, 610.0, 60.0)
+    wi, wo = in_plane(np.sin(np.radians(60.0))), in_plane(sines)
+    lobe = np.pi / (lobe_sigma(grating) * wavenumber(610.0)) ** 2
+    matrices = lobe * reference.mueller(
+        grating.heights(), wi, wo, 610.0, coherence_width=4 * lobe_sigma(grating),
+        model=model, eta=index.real, k=index.imag,
+    )  # fmt: skip
+    counted = (rows["order"] != 0) & (np.abs(sines) < np.sin(np.radians(75.0)))
+    found = [matrices[:, 0, 0] + sign * matrices[:, 0, 1] for sign in (1, -1)]
+    return np.array(
+        [
+            np.abs(mine - rows[name])[counted].sum() / rows[name][counted].sum()
+            for mine, name in zip(found, ("te", "tm"), strict=True)
+        ]
+    )

@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from docs.make.validation import models
 from docs.make.validation.__main__ import main
 from docs.make.validation.markdown import joined, percent, table
 
@@ -16,8 +17,10 @@ def test_the_report_is_whole(tmp_path, capsys):
     assert str(page) in capsys.readouterr().out
     text = page.read_text(encoding="utf-8")
     for heading in (
-        "Closed forms", "The rigorous solutions", "A gentle grating", "Slope decides", "Edges",
-        "Polarisation", "Materials", "Random surfaces",
+        "Kirchhoff, small slope, and the blend", "Two dimensions, and any plane of incidence",
+        "Slope decides", "Edges", "Under a coat", "A gentle grating of a perfect conductor",
+        "Polarisation of a perfect conductor", "The rigorous solutions", "Closed forms",
+        "Random surfaces",
     ):  # fmt: skip
         assert f"\n## {heading}\n" in text
     assert "nan" not in text
@@ -28,6 +31,14 @@ def test_the_report_is_whole(tmp_path, capsys):
     rows = [line for line in text.splitlines() if line.startswith("|")]
     assert len(rows) > 100
     assert sorted(path.name for path in page.parent.iterdir()) == ["images", "validation.md"]
+
+
+def test_groups_prints_what_the_page_compares_the_models_by(capsys, monkeypatch):
+    monkeypatch.setattr(models, "MATERIALS", ("aluminium",))
+    assert main(["groups"]) == 0
+    printed = capsys.readouterr().out
+    assert "| aluminium, sinusoidal | 0 to 0.03 | " in printed
+    assert "| aluminium, crossed grating | 0.1 | 550 | " in printed
 
 
 def test_a_folder_that_cannot_be_written_is_an_error_in_one_line(tmp_path, capsys):

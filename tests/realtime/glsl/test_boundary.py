@@ -56,7 +56,7 @@ def factor(
     total = wi + wo
     k = wavenumber(lam)
     q = np.hypot(total[:, 0], total[:, 1])[:, None] * k
-    s = blend.weight(total[:, 2:] * k, table.roughness.at(q))
+    s = blend.weight(total[:, 2:] * k, table.roughness.at(q), index(kind, lam))
     jones = blend.jones(wi[:, None], wo[:, None], index(kind, lam), s)
     scale = 2 * wi[:, 2] * wo[:, 2] / (1 + np.sum(wi * wo, axis=1))
     return boundary.unpolarised(jones) * scale[:, None] ** 2

@@ -20,6 +20,7 @@ from mitsuba_diffraction.optics.fresnel import reflectance
 from mitsuba_diffraction.realtime.glsl.context import compile_program, compiler_words
 from mitsuba_diffraction.realtime.glsl.packing import (
     WAVENUMBERS,
+    pack_beneath,
     pack_colours,
     pack_conductor,
     pack_energy,
@@ -43,7 +44,7 @@ from mitsuba_diffraction.realtime.glsl.textures import (
 from mitsuba_diffraction.realtime.glsl.thesis import pack_method, thesis_method
 from mitsuba_diffraction.tables.colour.colour_difference import colour_difference
 from mitsuba_diffraction.tables.colour.table import ColourTable
-from mitsuba_diffraction.tables.energy.conservation import FINE
+from mitsuba_diffraction.tables.energy.conservation import FINE, DirectionalTable
 from mitsuba_diffraction.tables.store import cache
 from mitsuba_diffraction.thesis.methods import make
 from tests.realtime.glsl.conftest import probed
@@ -218,6 +219,8 @@ def test_one_body_compiles_on_the_desktop_and_in_a_browser(
         parts = ("COLOUR_MAPPED", "AXIS_MAPPED", "PIGMENTED", "VCAVITY", "THESIS", "COHERENT")
         definitions |= dict.fromkeys(parts, "") | {"SURFACE_KIND": "2"}
         definitions |= pack_energy([scale, scale], True).definitions
+        ratio = DirectionalTable(np.array([550.0]), scale[None])
+        definitions |= pack_beneath([ratio, ratio]).definitions
     compile_program(gl, method, definitions).release()
     if "GL_ARB_ES3_compatibility" not in gl.extensions:
         pytest.skip(f"{gl.info['GL_RENDERER']} compiles no GLSL ES")

@@ -12,14 +12,20 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
 from mitsuba_diffraction import DiffractionError, DiffractionWarning
-from mitsuba_diffraction.optics.colour import delta_e
+from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
+from mitsuba_diffraction.optics.fresnel import reflectance
 from mitsuba_diffraction.realtime.comparison.measures import regions
 from mitsuba_diffraction.realtime.comparison.truth import box_sensor, seen, with_lights
 from mitsuba_diffraction.realtime.glsl.context import check_version, headless_context
 from mitsuba_diffraction.realtime.glsl.renderer import Renderer
 from mitsuba_diffraction.tables.energy.conservation import FINE
+from tests.lanes import interaction, spectra, vectors
 
 mi = pytest.importorskip("mitsuba")
+
+#: Towards the eye, in the plate's frame; and where a vertex has its colour.
+VIEW = np.array([0.0, -0.6, 0.8])
+COLOUR = slice(11, 14)
 
 
 def sensor(width: int = 72, height: int = 48) -> dict[str, Any]:
@@ -171,6 +177,63 @@ def test_another_height_scale_has_its_own_energy(
     np.testing.assert_allclose(pictures[0], 4.0 * pictures[1], rtol=1e-5)
     for thing in (frame, made):
         thing.release()
+
+
+def test_what_lies_beneath_gets_the_light_that_the_table_leaves(
+    gl: Any, table_file: Path, some_variant: str
+) -> None:
+    white = {"type": "diffuse", "reflectance": 1.0}
+    skin = {"type": "diffraction", "table": str(table_file), "int_ior": 2.5, "orientation": 25.0}
+    plate = mi.load_dict({**skin, "nested": white})
+    wo = np.array([-0.6, 0.64, 0.48])
+    drawn = pigment_of(gl, plate, wo, 1.25)
+    parameters = mi.traverse(plate)
+    parameters["height_scale"] = 1.25
+    parameters.update()
+    np.testing.assert_allclose(drawn, beneath(plate, wo), rtol=4e-4)  # half floats
+    flat = np.prod([1.0 - reflectance(cos, 2.5 / 1.000277) for cos in (wo[2], VIEW[2])])
+    assert np.abs(drawn / (wo[2] / np.pi * flat) - 1.0).min() > 4e-3
+
+
+def pigment_of(gl: Any, plate: Any, wo: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
+    """What a plate's shader adds for a white pigment beneath, over the light's irradiance.
+
+    scale : height scale, set when the plate's own has been packed.
+    """
+    scene = {
+        "type": "scene",
+        "sensor": {
+            "type": "perspective",
+            "fov": 0.1,
+            "to_world": mi.ScalarTransform4f().look_at(list(100.0 * VIEW), [0, 0, 0], [0, 0, 1]),
+            "film": {"type": "hdrfilm", "width": 4, "height": 4},
+        },
+        "plate": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(9), "bsdf": plate},
+        "sun": {"type": "directional", "direction": (-wo).tolist(), "irradiance": 1.0},
+    }
+    made = Renderer(mi.load_dict(scene), context=gl)
+    made.energy_for(scale)
+    (surface,), (buffer,) = made.scene.surfaces, made.buffers
+    vertices, pictures = surface.vertices.copy(), []
+    for pigment in (1.0, 0.0):
+        vertices[:, COLOUR] = pigment
+        buffer.write(vertices.tobytes())
+        pictures.append(made.render("spectral", supersampling=1)[1, 1, :3].astype(float))
+    found = (pictures[0] - pictures[1]) / made.lights[0].colour
+    made.release()
+    return np.asarray(found)
+
+
+def beneath(plate: Any, wo: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same by the plugin, over all wavelengths of daylight."""
+    lam = np.arange(380.0, 740.0, 5.0)
+    si = interaction(np.broadcast_to(VIEW, (len(lam), 3)), lam)
+    everywhere = vectors(np.broadcast_to(wo, (len(lam), 3)))
+    of_nested = mi.BSDFContext()
+    of_nested.component = 1
+    found = spectra(plate.eval(of_nested, si, everywhere))[:, 0]
+    weights = linear_srgb(response(lam))
+    return np.asarray(found @ (weights / weights.sum(axis=0)))
 
 
 def test_all_that_is_not_shown_is_named_in_one_warning(

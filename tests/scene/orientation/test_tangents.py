@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
+import mitsuba as mi
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -125,6 +126,17 @@ def test_bad_files_are_refused_in_one_line(
         load_mesh(path)
     assert str(path) in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_refused_mesh_leaves_later_scenes_alone(tmp_path: Path, some_variant: str) -> None:
+    (tmp_path / "empty.ply").write_bytes(PLY + bytes(12))
+    with pytest.raises(DiffractionError, match="no triangles") as kept:
+        load_mesh(tmp_path / "empty.ply")
+    # kernels are compiled for all shapes alive, which an error kept must not count among
+    scene = mi.load_dict({"type": "scene", "a": {"type": "rectangle"}, "b": {"type": "sphere"}})
+    hit = scene.ray_intersect(mi.Ray3f(mi.Point3f(0, 0, 5), mi.Vector3f(0, 0, -1)))
+    assert float(hit.t[0]) == pytest.approx(4.0)
+    del kept
 
 
 @given(st.binary(max_size=300))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import gc
 import json
 
 import mitsuba as mi
@@ -72,7 +71,6 @@ def sensor(scene):
 def looked():
     """The plate, and what its table is asked."""
     mi.set_variant("llvm_ad_spectral")
-    gc.collect()  # meshes of earlier tests, which kernels would be compiled for, too
     loaded = record_scene(plate, sensor, PATHS)
     yield loaded
     loaded.session.close()

@@ -24,11 +24,13 @@ float face_reflected;
 
 float face_reflectance(float cosine) { return 1.0 - 0.5 * dot(transmittances(cosine), vec2(1.0)); }
 
-// 1 − T T of both faces.
+// 1 − T T / (1 − R R) of both faces.
 vec3 flat_reflectance(float cosine)
 {
     float inside = sqrt(max(cosine * cosine + coat * coat - 1.0, 0.0)) / coat;
-    return 1.0 - (1.0 - face_reflectance(cosine)) * (1.0 - reflectance(inside));
+    float face = face_reflectance(cosine);
+    vec3 beneath = reflectance(inside);
+    return 1.0 - (1.0 - face) * (1.0 - beneath) / max(1.0 - face * beneath, 1e-6);
 }
 
 #else
@@ -39,7 +41,7 @@ vec3 flat_reflectance(float cosine) { return reflectance(cosine); }
 
 #if !defined(SMALL_SLOPE) && !defined(COATED)
 
-void begin_pair(vec3 wi, vec3 wo, vec4 through) {}
+void begin_pair(vec3 wi, vec3 wo, vec2 there, vec2 back) {}
 
 vec3 boundary(float cos_half, float r, float z) { return reflectance(cos_half); }
 float boundary_at_all(float cos_half) { return reflectance_at_all(cos_half); }
@@ -74,9 +76,31 @@ vec2 root(vec2 a)
 vec2 pair_cosines, pair_squares;
 vec4 pair_turns;
 float pair_dot, pair_cross, pair_sines, pair_half, pair_one_plus_dot;
-vec4 pair_through;                // ... and √T of a coat, there and back, for each entry
+vec2 pair_there, pair_back;       // ... T_s and T_p of a coat
+vec4 pair_through;                // ... and what it makes of each entry
 
 const float NORMAL = 1e-20;       // squared sine
+
+// |r_s|² and |r_p|² of the flat structure; inside: the cosine in it times its index.
+vec2 mirrored(NUMBER epsilon, NUMBER inside, float cosine)
+{
+    NUMBER raised = epsilon * cosine;
+    NUMBER r_s = times(plus(inside, -cosine), inverse_of(plus(inside, cosine)));
+    NUMBER r_p = times(raised - inside, inverse_of(raised + inside));
+    return vec2(dot(r_s, r_s), dot(r_p, r_p));
+}
+
+// √(T T G): through the coat's face and back, and what it sends to the structure again.
+vec4 through_coat(vec2 structure0, vec2 structure)
+{
+    vec2 face0 = max(1.0 - pair_there, 0.0), face = max(1.0 - pair_back, 0.0);
+    vec2 sent0 = sqrt(face0 * structure0), sent = sqrt(face * structure);
+    vec4 left = 1.0 - vec4(sent.x * sent0, sent.y * sent0);
+    vec4 least = vec4(max(structure.xx, structure0), max(structure.yy, structure0))
+                 * (1.0 - vec4(min(face.xx, face0), min(face.yy, face0)));
+    vec4 passed = vec4(pair_back.x * pair_there, pair_back.y * pair_there);
+    return sqrt(passed / max(left, least));
+}
 
 void matrices(NUMBER index, out NUMBER tangent[4], out NUMBER gentle[4])
 {
@@ -103,6 +127,12 @@ void matrices(NUMBER index, out NUMBER tangent[4], out NUMBER gentle[4])
     gentle[2] = times(contrast, times(bent1, s0)) * pair_cross;
     gentle[3] = times(contrast, times(bent1, bent0) * pair_dot
                                 - times(epsilon, times(p1, p0)) * pair_sines);
+#ifdef COATED
+    pair_through = through_coat(mirrored(epsilon, in0, pair_cosines.x),
+                                mirrored(epsilon, in1, pair_cosines.y));
+#else
+    pair_through = vec4(1.0);
+#endif
 }
 
 // ½ Σ|(1 − s) K + s B|² over (1 + ωi·ωo)².
@@ -122,20 +152,21 @@ uniform sampler2D roughness;      // σ_q² at a node in log2 q and at the next
 uniform float first_octave;       // of the first node
 uniform float last_node;
 
-// s = exp(−(κσ_q)⁴/3)
-float gentle_share(float k, float r, float z)
+// s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3)
+float gentle_share(NUMBER index, float k, float r, float z)
 {
     float place = (log2(max(k * r, 1e-10)) - first_octave) * NODES_PER_OCTAVE;
     place = clamp(place, 0.0, last_node);
     float lower = min(floor(place), last_node - 1.0);
     vec2 ends = entry(roughness, int(lower)).xy;
     float squared = k * k * z * z * mix(ends.x, ends.y, place - lower);
-    return exp(squared * squared * (-1.0 / 3.0));
+    NUMBER mirror = times(plus(index, -1.0), inverse_of(plus(index, 1.0)));
+    return exp(-squared * (0.5 * dot(mirror, mirror) + squared / 3.0));
 }
 
 #else
 
-float gentle_share(float k, float r, float z) { return 0.0; }
+float gentle_share(NUMBER index, float k, float r, float z) { return 0.0; }
 
 #endif
 
@@ -149,7 +180,7 @@ float boundary_at_all(float cos_half) { return 1.0; }
 
 float boundary_at(float cos_half, float k, float r, float z)
 {
-    return mean_power(pair_tangent, pair_gentle, gentle_share(k, r, z));
+    return mean_power(pair_tangent, pair_gentle, gentle_share(eta, k, r, z));
 }
 
 vec3 boundary(float cos_half, float r, float z)
@@ -176,7 +207,8 @@ float boundary_at(float cos_half, float k, float r, float z)
 {
     float last = float(textureSize(reflectances, 0).y - 2);
     float y = clamp((k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x), 0.0, 1.0) * last;
-    return of_index(texelFetch(reflectances, ivec2(0, int(y + 0.5)), 0).yz, gentle_share(k, r, z));
+    vec2 index = texelFetch(reflectances, ivec2(0, int(y + 0.5)), 0).yz;
+    return of_index(index, gentle_share(index, k, r, z));
 }
 
 // A channel's reflectance is that of daylight, what is beside it that at the channel's mean.
@@ -191,7 +223,7 @@ vec3 boundary(float cos_half, float r, float z)
         float own = 0.0;
         for (int m = 0; m < 4; ++m) own += dot(tangent[m], tangent[m]);
         own *= 0.5 / (pair_one_plus_dot * pair_one_plus_dot);
-        found[n] = mean_power(tangent, gentle, gentle_share(k, r, z)) / max(own, 1e-20);
+        found[n] = mean_power(tangent, gentle, gentle_share(index, k, r, z)) / max(own, 1e-20);
     }
     return found * reflectance(cos_half);
 }
@@ -199,14 +231,16 @@ vec3 boundary(float cos_half, float r, float z)
 #endif
 
 // What all wavelengths share, of directions above the structure.
-void begin_pair(vec3 wi, vec3 wo, vec4 through)
+// there, back: transmittances of a coat.
+void begin_pair(vec3 wi, vec3 wo, vec2 there, vec2 back)
 {
     vec3 sum = wi + wo;
     pair_one_plus_dot = max(0.5 * dot(sum, sum), 1e-12);
     pair_half = sqrt(min(0.5 * pair_one_plus_dot, 1.0));
     pair_cosines = vec2(wi.z, wo.z);
     pair_squares = vec2(dot(wi.xy, wi.xy), dot(wo.xy, wo.xy));
-    pair_through = through;
+    pair_there = there;
+    pair_back = back;
 
     bool slanted = min(pair_squares.x, pair_squares.y) > NORMAL;
     vec2 squares = slanted ? pair_squares : vec2(1.0);

@@ -118,16 +118,59 @@ float groove_shadow(float cos_i, float cos_o, float one_plus_dot)
     return min(1.0, 2.0 * (cos_i + cos_o) * min(cos_i, cos_o) / max(one_plus_dot, 1e-30));
 }
 
+#ifdef GRID_POLAR
+
+uniform float energy_page;   // between pages, which are for different height scales
+
+// Row and column on a grid of directions (tables/energy/grid.py), given the tangential part.
+vec2 on_grid(vec2 tangential, float cosine)
+{
+    // 1 − 2θ/π by a minimax polynomial over √(1 − cosθ), 3e-6
+    float c = clamp(cosine, 0.0, 1.0);
+    float remaining = 1.0 - sqrt(1.0 - c) * (0.99999695 + c * (-0.13641527 + c * (0.05451908
+                      + c * (-0.02394849 + c * 0.006196195))));
+    return vec2((1.0 - sqrt(max(remaining, 0.0))) * (float(GRID_POLAR) / GRID_SHARE),
+                turn_of(tangential) * float(GRID_AZIMUTHAL));
+}
+
+#if GRID_PAGES > 1
+#define ON_PAGES(of, place) mix(of(lower_page(), place), of(lower_page() + 1, place), \
+                                clamp(energy_page - float(lower_page()), 0.0, 1.0))
+int lower_page() { return int(clamp(floor(energy_page), 0.0, float(GRID_PAGES - 2))); }
+#else
+#define ON_PAGES(of, place) of(0, place)
+#endif
+
+#endif
+
+#ifdef BENEATH
+
+uniform sampler2D beneath;   // rows of all pages; columns go all around
+
+vec3 beneath_on_page(int page, vec2 cell)
+{
+    float row = float(page * (GRID_POLAR + 1)) + clamp(cell.x, 0.0, float(GRID_POLAR));
+    return texture(beneath, (vec2(cell.y, row) + 0.5) / vec2(textureSize(beneath, 0))).rgb;
+}
+
+// Albedo over the flat interface's reflectance, of a direction's tangential part in the patch's frame.
+vec3 reflected_ratio(vec2 tangential, float cosine)
+{
+    vec2 cell = on_grid(tangential, cosine);
+    return ON_PAGES(beneath_on_page, cell);
+}
+
+#endif
+
 #ifdef ENERGY_CONSERVING
 
-uniform sampler2D energy;    // s at the corners of ENERGY_POLAR × ENERGY_AZIMUTHAL cells
-uniform float energy_page;   // between pages, which are for different height scales
+uniform sampler2D energy;    // s at the corners of GRID_POLAR × GRID_AZIMUTHAL cells
 
 float energy_on_page(int page, vec2 cell)
 {
-    vec2 lower = clamp(floor(cell), vec2(0.0), vec2(ENERGY_POLAR - 1, ENERGY_AZIMUTHAL - 1));
+    vec2 lower = clamp(floor(cell), vec2(0.0), vec2(GRID_POLAR - 1, GRID_AZIMUTHAL - 1));
     vec2 t = clamp(cell - lower, 0.0, 1.0);
-    vec4 corner = entry(energy, (page * ENERGY_POLAR + int(lower.x)) * ENERGY_AZIMUTHAL + int(lower.y));
+    vec4 corner = entry(energy, (page * GRID_POLAR + int(lower.x)) * GRID_AZIMUTHAL + int(lower.y));
     vec2 along = mix(corner.xz, corner.yw, t.y);
     return mix(along.x, along.y, t.x);
 }
@@ -135,19 +178,8 @@ float energy_on_page(int page, vec2 cell)
 // s of a direction, given its tangential part in the patch's frame.
 float energy_scale(vec2 tangential, float cosine)
 {
-    // 1 − 2θ/π by a minimax polynomial over √(1 − cosθ), 3e-6
-    float c = clamp(cosine, 0.0, 1.0);
-    float remaining = 1.0 - sqrt(1.0 - c) * (0.99999695 + c * (-0.13641527 + c * (0.05451908
-                      + c * (-0.02394849 + c * 0.006196195))));
-    vec2 cell = vec2((1.0 - sqrt(max(remaining, 0.0))) * (float(ENERGY_POLAR) / ENERGY_SHARE),
-                     turn_of(tangential) * float(ENERGY_AZIMUTHAL));
-#if ENERGY_PAGES > 1
-    int page = int(clamp(floor(energy_page), 0.0, float(ENERGY_PAGES - 2)));
-    return mix(energy_on_page(page, cell), energy_on_page(page + 1, cell),
-               clamp(energy_page - float(page), 0.0, 1.0));
-#else
-    return energy_on_page(0, cell);
-#endif
+    vec2 cell = on_grid(tangential, cosine);
+    return ON_PAGES(energy_on_page, cell);
 }
 
 // (min/max)² of two cosines, clamped: see tables/energy/gain.py.

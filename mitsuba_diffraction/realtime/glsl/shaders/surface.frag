@@ -48,10 +48,10 @@ vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
     float one_plus_dot = 0.5 * dot(sum, sum);
     float ratio = one_plus_dot / sum.z;
     float outside = area_factor * ratio * ratio / wi.z;
-    vec4 through = vec4(1.0);
+    vec2 there = vec2(1.0), back = vec2(1.0);
 #ifdef COATED
-    vec2 there = sqrt(transmittances(wi.z)), back = sqrt(transmittances(wo.z));
-    through = vec4(back.x * there, back.y * there);
+    there = transmittances(wi.z);
+    back = transmittances(wo.z);
     float face = outside * face_reflectance(sqrt(min(0.5 * one_plus_dot, 1.0)));
     float leaving = wo.z;
     wi = refracted(wi);
@@ -62,7 +62,7 @@ vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
     outside = area_factor * ratio * ratio / wi.z * leaving / wo.z;
     sum.z *= coat;  // κ grows by the index
 #endif
-    begin_pair(wi, wo, through);
+    begin_pair(wi, wo, there, back);
 #ifdef ENERGY_CONSERVING
     outside *= energy_scale(in_patch(wi, rotation), wi.z)
              * energy_scale(in_patch(wo, rotation), wo.z) * energy_fade(wi.z, wo.z);
@@ -79,15 +79,29 @@ vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
 
 #endif
 
+#ifdef DIFFRACTING
+
+// What the surface reflects of a direction's light, at most all.
+vec3 albedo(vec3 w, vec2 rotation)
+{
+    vec3 found = flat_reflectance(w.z);
+#ifdef BENEATH
+    found *= reflected_ratio(in_patch(w, rotation), w.z);
+#endif
+    return min(found, 1.0);
+}
+
+#endif
+
 // Share of the light that reaches what lies beneath and comes back.
-vec3 transmission(vec3 wi, vec3 wo)
+vec3 transmission(vec3 wi, vec3 wo, vec2 rotation)
 {
 #ifndef DIFFRACTING
     return vec3(1.0);
 #elif defined(THESIS)
     return 1.0 - reflectance(0.5 * length(wi + wo)) + diffuse_weight;
 #else
-    return (1.0 - flat_reflectance(wi.z)) * (1.0 - flat_reflectance(wo.z));
+    return (1.0 - albedo(wi, rotation)) * (1.0 - albedo(wo, rotation));
 #endif
 }
 
@@ -132,7 +146,7 @@ void main()
         wo.z = max(wo.z, LOWEST);
         vec3 added = vec3(0.0);
 #ifdef PIGMENTED
-        added += light_colour[i] * wo.z * (1.0 / PI) * pigment * transmission(wi, wo);
+        added += light_colour[i] * wo.z * (1.0 / PI) * pigment * transmission(wi, wo, rotation);
 #endif
 #ifdef DIFFRACTING
         vec3 diffracting = diffraction(wi, wo, rotation, i);
@@ -148,12 +162,11 @@ void main()
         radiance += lit ? falloff * added : vec3(0.0);
     }
 #ifdef SKY
-    // A diffracting surface returns about what a smooth one does
     vec3 facing = side * n;
     vec3 above = sky[0] + facing.x * sky[1] + facing.y * sky[2] + facing.z * sky[3];
-    vec3 returned = pigment * transmission(wi, vec3(0.0, 0.0, 1.0));
+    vec3 returned = pigment * transmission(wi, vec3(0.0, 0.0, 1.0), rotation);
 #ifdef DIFFRACTING
-    returned += flat_reflectance(wi.z);
+    returned += albedo(wi, rotation);
 #endif
     radiance += seen ? max(above, 0.0) * returned : vec3(0.0);
 #endif

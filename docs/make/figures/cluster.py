@@ -1,0 +1,184 @@
+"""The figures of docs/cluster.md: a film on two workers beside one process, and how far it scales.
+
+python -m docs.make.figures.cluster scenes/plate.xml -o docs/cluster.md
+
+Renders a film of 16 frames twice, with two threads in one process and with one in each of two
+workers; measures what the client and the scheduler do for a task; and simulates clusters of up to
+1,000 workers with these times.
+"""
+
+from __future__ import annotations
+
+import argparse
+import heapq
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mitsuba_diffraction.cluster.files import SceneFiles
+from mitsuba_diffraction.cluster.kept import Kept
+from mitsuba_diffraction.cluster.tasks import Sums, Task
+from mitsuba_diffraction.cluster.workers import require_dask
+
+from . import markers
+from .program import exit_code
+
+FRAMES = 16
+WORKERS = (1, 2, 10, 30, 100, 300, 1000)
+#: What is simulated: a film of 2,000 frames of 1,024 samples, 1,024 × 640 pixels of 4 channels.
+TASKS, PIXELS, CHANNELS = 2000 * 320 // 8, 1024 * 640, 4
+
+
+@dataclass(frozen=True)
+class Costs:
+    """Seconds and bytes of a task.
+
+    Attributes
+    ----------
+    work, spread : of a worker, and its standard deviation.
+    scheduler : of the scheduler, for one task after the other.
+    client : of the client: to receive, write, read and add a sum.
+    transfer : of the client's network, for a sum.
+    """
+
+    work: float
+    spread: float
+    scheduler: float
+    client: float
+    transfer: float
+
+
+def simulate(workers: int, tasks: int, costs: Costs, ahead: int = 3, seed: int = 0) -> float:
+    """Seconds until the last sum is added up.
+
+    Scheduler and client do one thing at a time, a worker one task. The client gives out a task for
+    each that it has taken in, `ahead` for every worker at first, as `cluster.film` does.
+    """
+    rng = np.random.default_rng(seed)
+    scheduler = client = 0.0
+    free = [0.0] * workers
+    heapq.heapify(free)
+    done: list[float] = []
+    given = 0
+
+    def give(now: float) -> None:
+        nonlocal scheduler, given
+        scheduler = max(scheduler, now) + costs.scheduler
+        start = max(heapq.heappop(free), scheduler)
+        end = start + max(0.1 * costs.work, rng.normal(costs.work, costs.spread))
+        heapq.heappush(free, end)
+        heapq.heappush(done, end)
+        given += 1
+
+    while given < min(tasks, ahead * workers):
+        give(0.0)
+    while done:
+        client = max(client, heapq.heappop(done)) + max(costs.client, costs.transfer)
+        if given < tasks:
+            give(client)
+    return client
+
+
+def film_seconds(scene: Path, folder: Path, more: Sequence[str]) -> tuple[float, dict]:
+    """Seconds of the command for 16 frames, and its report."""
+    report = folder / "report.json"
+    command = [
+        sys.executable, "-m", "mitsuba_diffraction", "render", str(scene), "--frames", str(FRAMES),
+        "-m", "llvm_ad_rgb", "-D", "resx=240", "-D", "resy=200", "-s", "32", "--no-progress",
+        "--animate", "lamp_azimuth=0:90", "-o", str(folder / "film"), "--json", str(report), *more,
+    ]  # fmt: skip
+    start = time.perf_counter()
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return time.perf_counter() - start, json.loads(report.read_text("utf-8"))
+
+
+def client_seconds(count: int = 20) -> float:
+    """Of the client for one sum: written, read, added."""
+    task = Task(SceneFiles("scene", (), ()), "", 0, False, "", 0, 0, (), (), 1)
+    rng = np.random.default_rng(0)
+    raw = rng.random((640, PIXELS // 640, CHANNELS)).astype(np.float32).astype(np.float64)
+    total = np.zeros_like(raw)
+    with tempfile.TemporaryDirectory() as folder:
+        kept = Kept(Path(folder) / "passes")
+        start = time.perf_counter()
+        for _ in range(count):
+            kept.write(task, Sums(raw, "", "", 0.0, 0))
+            found = kept.read(task)
+            assert found is not None
+            total += found.raw
+            kept.forget(task)
+        return (time.perf_counter() - start) / count
+
+
+def scheduler_seconds(count: int = 500) -> float:
+    """Of client, scheduler and worker together for a task that does nothing, one after the other
+    in the queue: more than the scheduler's own."""
+    distributed = require_dask()
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=True, dashboard_address=":0"
+        ) as local,
+        distributed.Client(local) as client,
+    ):
+        client.gather(client.map(abs, range(10), pure=False))
+        start = time.perf_counter()
+        client.gather(client.map(abs, range(count), pure=False))
+        return (time.perf_counter() - start) / count
+
+
+def scaling(costs: Costs) -> str:
+    """The table of simulated clusters."""
+    rows = []
+    for workers in WORKERS:
+        seconds = simulate(workers, TASKS, costs)
+        ideal = TASKS * costs.work / workers
+        rows.append((f"{workers:,}", f"{seconds / 3600:.3g} h", f"{ideal / seconds:.0%}"))
+    return markers.table(("workers", f"{TASKS:,} tasks take", "of the ideal"), rows)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measure, simulate, and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("scene", type=Path)
+    parser.add_argument("-o", "--output", type=Path, default=Path("docs/cluster.md"))
+    parser.add_argument("--work", type=float, default=20.0, help="simulated seconds of a task")
+    args = parser.parse_args(argv)
+
+    def work() -> None:
+        with tempfile.TemporaryDirectory() as first, tempfile.TemporaryDirectory() as second:
+            alone, _ = film_seconds(args.scene, Path(first), [])
+            both, found = film_seconds(
+                args.scene, Path(second), ["--workers", "2", "--threads", "1"]
+            )
+        report = found.get("workers", found)
+        seconds = report["seconds"]
+        scheduler, client = scheduler_seconds(), client_seconds()
+        transfer = PIXELS * CHANNELS * 8 / 1.25e8
+        costs = Costs(args.work, 0.15 * args.work, scheduler, client, transfer)
+        film = (
+            f"A film of {FRAMES} frames takes {alone:.0f} s in one process with two threads. Two "
+            f"workers with one thread each take {seconds:.0f} s, {seconds / alone:.2f} times as "
+            f"long, and {both - seconds:.0f} s to start; "
+            f"{report['overhead_per_task_s']:.2g} s a task are not work."
+        )
+        times = (
+            f"Measured: {1e3 * scheduler:.2g} ms a task for the scheduler, {1e3 * client:.3g} ms "
+            f"for the client to write, read and add a sum of {PIXELS * CHANNELS * 8 / 1e6:.3g} "
+            f"MB. Assumed: tasks of {args.work:g} ± {0.15 * args.work:g} s, and 1 Gbit/s to the "
+            f"client, {1e3 * transfer:.3g} ms a sum."
+        )
+        print(film, times, scaling(costs), sep="\n\n")
+        markers.update(args.output, {"film": film, "times": times, "scaling": scaling(costs)})
+
+    return exit_code("cluster", work)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

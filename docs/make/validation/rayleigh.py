@@ -1,0 +1,174 @@
+"""Rigorous solutions of shallow smooth surfaces in two dimensions, by Rayleigh's expansion.
+
+The field above the surface is taken for outgoing plane waves down to the surface itself, which
+holds for sinusoids up to a steepest slope of 0.448 (Petit and Cadilhac 1966, C. R. Acad. Sci. B
+262, 468; Hill and Celli 1978, Physical Review B 17, 2478) and is close for a while beyond. Light in
+the material is eliminated, as in the reduced equations of Brown, Celli, Haller and Marvin 1984
+(Surface Science 136, 381): a metal's short waves are never expanded, which is where coupled waves
+in layers fail.
+
+With (E, H) the field above and (E', H') a plane wave that goes down in the material, of Bloch
+vector −u, reciprocity says ∫ (E×H' − E'×H)·n dS = 0 over a period: light in the material goes down,
+too. Between waves exp(iκ·r) and exp(iκ'·r), κ = (k, ±q), κ' = (−u, −q'), ∇h is integrated by parts,
+
+    ∫ (−∇h, 1) exp(i(κ+κ')·r) dx dy = (κ+κ')/γ · I(γ),   γ = ±q − q',
+    I(γ) = ∫ exp(iγh) exp(i(k−u)·r) dx dy,
+
+and I(γ)/γ is summed as a series of the spectra of hⁿ. Time exp(−iωt), lengths over 2π/λ.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import resample
+
+from mitsuba_diffraction import HeightField
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.optics import boundary
+from mitsuba_diffraction.optics.fresnel import decaying_root
+from mitsuba_diffraction.optics.geometry import wavenumber
+
+from .crossed import HORIZON, Orders, is_crossed, lowest_orders
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+# Terms of the series of exp(iγh) end where they are below this
+_PRECISION = 1e-14
+# |γh| beyond which the series would cancel to fewer than eight digits
+_LARGEST = 18.0
+
+
+def name() -> str:
+    """What solved."""
+    return "Rayleigh's expansion, reduced (docs/make/validation/rayleigh.py)"
+
+
+def solve(
+    field: HeightField,
+    index: complex,
+    wavelength: float,
+    wi: NDArray[np.float64],
+    harmonics: int,
+) -> Orders:
+    """Amplitudes of every reflected order; parameters as `crossed.solve`.
+
+    Raises
+    ------
+    DiffractionError
+        If heights are beyond what the series of exp(iγh) can sum.
+    """
+    k = float(wavenumber(wavelength))
+    width, height = field.extent
+    orders = lowest_orders(-wi, wavelength / 1000, (width, height), is_crossed(field), harmonics)
+    tangential = -wi[:2] + orders * (2 * np.pi / k / np.array([width, height]))
+    above = decaying_root(1.0 - np.sum(tangential**2, axis=1) + 0j)
+    below = decaying_root(complex(index) ** 2 - np.sum(tangential**2, axis=1))
+    out = np.column_stack([tangential, above])
+    down = np.column_stack([-tangential, -below])
+    zeroth = int(np.flatnonzero((orders == 0).all(axis=1))[0])
+    into = out[zeroth : zeroth + 1] * [1, 1, -1]
+    spectra = _Spectra(field, k)
+    tests = _axes(down, index)
+    reflected = _coupling(tests, down, _axes(out, 1.0), out, orders, orders, spectra)
+    incident = _coupling(
+        tests, down, _axes(into, 1.0), into, orders, orders[zeroth : zeroth + 1], spectra
+    )
+    found = _solved(reflected, -incident)
+    return _orders(orders, out, wi, found, k * float(field.heights.mean()))
+
+
+def _solved(matrix: Complex, right: Complex) -> Complex:
+    """The solution, rows scaled first: those of evanescent waves are far smaller."""
+    scale = 1.0 / np.abs(matrix).max(axis=1, keepdims=True)
+    found = np.linalg.solve(matrix * scale, right * scale)
+    return np.asarray(found)
+
+
+def _axes(vector: Complex, index: complex) -> Complex:
+    """Electric fields s and p of plane waves κ (n, 3) in a medium, (2, n, 3): s = ẑ×κ̂, p = κ̂×s."""
+    x, y = vector[:, 0].real, vector[:, 1].real
+    length = np.hypot(x, y)
+    slanted = length > 1e-12
+    safe = np.where(slanted, length, 1.0)
+    s = np.column_stack(
+        [np.where(slanted, -y / safe, 0.0), np.where(slanted, x / safe, 1.0), np.zeros(len(x))]
+    ).astype(complex)
+    return np.stack([s, np.cross(vector / index, s)])
+
+
+def _coupling(
+    tests: Complex,
+    down: Complex,
+    fields: Complex,
+    waves: Complex,
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    spectra: _Spectra,
+) -> Complex:
+    """(κ+κ')·(e×(κ'×e') − e'×(κ×e)) I(γ)/γ of test waves and waves, (2 rows, 2 columns)."""
+    gamma = waves[None, :, 2] + down[:, None, 2]
+    weight = spectra.over_gamma(gamma, columns[None, :, :] - rows[:, None, :])
+    total = waves[None, :, :] + down[:, None, :]
+    blocks = []
+    for e_test in tests:
+        h_test = np.cross(down, e_test)
+        row = []
+        for e in fields:
+            h = np.cross(waves, e)
+            flux = np.cross(e[None], h_test[:, None]) - np.cross(e_test[:, None], h[None])
+            row.append(np.sum(total * flux, axis=2) * weight)
+        blocks.append(row)
+    return np.asarray(np.block(blocks))
+
+
+class _Spectra:
+    """Fourier coefficients of the powers of the heights, in units of 1/k."""
+
+    def __init__(self, field: HeightField, k: float) -> None:
+        heights = (field.heights - field.heights.mean()) * k
+        if is_crossed(field):  # powers of the heights hold higher frequencies than these
+            ny, nx = field.shape
+            heights = resample(resample(heights, 2 * nx, axis=1), 2 * ny, axis=0)
+        self._heights, self._largest = heights, float(np.abs(heights).max())
+
+    def over_gamma(self, gamma: Complex, difference: NDArray[np.int64]) -> Complex:
+        """I(γ)/γ for orders that differ by (mx, my); mean over the period of exp(iγh + iQ·r)."""
+        reach = float(np.abs(gamma).max()) * self._largest
+        if reach > _LARGEST:
+            raise DiffractionError(f"heights of |γh| = {reach:.3g} are beyond {_LARGEST:g}")
+        ny, nx = self._heights.shape
+        place = difference[..., 1] % ny, difference[..., 0] % nx
+        inside = (np.abs(difference[..., 0]) < nx / 2) & (np.abs(difference[..., 1]) < ny / 2)
+        same = (difference == 0).all(axis=2)
+        found = np.where(same, 1.0 / np.where(same, gamma, 1.0), 0.0)
+        power, factor = np.ones_like(self._heights), np.ones_like(gamma)
+        n, bound = 0, 1.0
+        while n <= reach or bound > _PRECISION:
+            n += 1
+            power = power * self._heights
+            # exp(+iQ·r): the inverse transform
+            spectrum = np.fft.ifft2(power)
+            factor = factor * (1j / n) if n == 1 else factor * (1j * gamma / n)
+            found = found + factor * np.where(inside, spectrum[place], 0.0)
+            bound *= reach / n
+        return found
+
+
+def _orders(
+    orders: NDArray[np.int64], out: Complex, wi: Real, found: Complex, mean: float
+) -> Orders:
+    """Of the amplitudes (2n, 2), those that travel, about `boundary.polarisation_axes`.
+
+    mean : of the heights, which the amplitudes' phases are from.
+    """
+    kept = (np.abs(out[:, 2].imag) == 0) & (out[:, 2].real > HORIZON)
+    wo = out[kept].real
+    both = np.moveaxis(found.reshape(2, len(orders), 2), 1, 0)[kept]
+    axes = _axes(out[kept], 1.0)[0].real
+    basis = _axes(-wi[None].astype(complex), 1.0)[0].real[0]
+    s_in, s_out = boundary.polarisation_axes(wi, wo)
+    turned = boundary.turn(s_out, axes, wo) @ both @ boundary.turn(basis, s_in, -wi)
+    phase = np.exp(-1j * mean * (wi[2] + wo[:, 2]))
+    return Orders(orders[kept], wo, phase[:, None, None] * turned)

@@ -1,0 +1,97 @@
+"""`mitsuba-diffraction survey`: many scans, a row of measurements and a map each."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import time
+from pathlib import Path
+
+from .arguments import number_between, whole_number
+from .console import Bar, mitsuba_warnings, say
+from .interrupts import INTERRUPTED
+from .options import add_heights, add_json, add_mode, add_table, load_options, table_options
+from .report import check_writable, save_report
+from .workers import add_threads, add_workers, client_of, on_workers, worker_threads
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the sub-command."""
+    parser = subparsers.add_parser(
+        "survey",
+        help="measure many scans: tables, maps, gratings, colours",
+        description=(
+            "For each scan build its table, map its BRDF and measure its heights, the gratings in "
+            "it, the colours that it shows and how much they change with direction. Writes "
+            "survey.csv, contact sheets, and a table and a map of each scan. A scan that fails is "
+            "a row with its reason; a second run does only what is new."
+        ),
+    )
+    parser.add_argument(
+        "files", metavar="FILE", type=Path, nargs="+", help="scans of any format, or recipes"
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="FOLDER", type=Path, default=Path("survey"),
+        help="default: survey",
+    )  # fmt: skip
+    parser.add_argument(
+        "--treatments", metavar="FILE", type=Path,
+        help='TOML: a table of options for each pattern of names, ["snakes/*.png"]; options on '
+        "the command line override it",
+    )  # fmt: skip
+    parser.add_argument(
+        "--theta", metavar="DEG", type=number_between(0, 89), default=30.0,
+        help="of the light, from the normal, across the strongest grating's grooves; default: 30",
+    )  # fmt: skip
+    parser.add_argument(
+        "--resolution", metavar="N", type=whole_number(8), default=160,
+        help="pixels of a map a side; default: 160",
+    )  # fmt: skip
+    add_mode(parser)
+    add_heights(parser)
+    add_table(parser.add_argument_group("the tables"))
+    add_workers(parser)
+    add_threads(parser)
+    add_json(parser, "the rows")
+    parser.set_defaults(run=run, parser=parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure what is new, and return the exit code."""
+    own_options, settings = load_options(args), table_options(args)
+    check_writable(args.output / "survey.csv", make_folder=True)
+
+    from ..analysis.survey import Treatment, run_survey, treatments_of
+    from ..scene.load import set_variant
+    from ..scene.passes import Stop
+
+    treatments = treatments_of(args.treatments)
+    start = time.perf_counter()
+    variant = set_variant(args.mode or "llvm_ad_rgb")
+    with mitsuba_warnings(), contextlib.ExitStack() as stack:
+        client = stack.enter_context(client_of(args)) if on_workers(args) else None
+        if client is not None:
+            from ..cluster.workers import check_workers
+
+            check_workers(client, variant)
+        with Bar(args, unit=" scans", delay=0) as bar, Stop() as stop:
+            rows = run_survey(
+                args.files, args.output, treatments=treatments,
+                own=Treatment(own_options, settings), variant=variant, theta=args.theta,
+                resolution=args.resolution, threads=worker_threads(args), client=client,
+                stop=stop, progress=bar,
+            )  # fmt: skip
+    for row in rows:
+        if row["reason"]:
+            say(f"{os.path.basename(row['file'])}: {row['reason']}")
+    failed = sum(bool(row["reason"]) for row in rows)
+    save_report(args, {"rows": rows, "seconds": time.perf_counter() - start})
+    print(
+        f"{args.output}: {len(rows) - failed} scans in survey.csv, {failed} failed, "
+        f"{time.perf_counter() - start:.1f} s"
+    )
+    if len(rows) < len(args.files):
+        say(f"interrupted; {len(rows)} of {len(args.files)} scans are done, run it again to go on")
+        return INTERRUPTED
+    return 0

@@ -1,0 +1,99 @@
+"""Options of commands that may run on workers, and pictures that come from them."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib.util
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .arguments import whole_number
+from .console import say, say_warning
+
+if TYPE_CHECKING:
+    from ..cluster.film import Film, Wanted
+
+#: As `cluster.workers.VARIABLE`, which imports more than --help has time for.
+VARIABLE = "DASK_SCHEDULER_ADDRESS"
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """Which workers, if any."""
+    group = parser.add_argument_group("workers (extra `cluster`)")
+    group.add_argument(
+        "--workers", metavar="N", type=whole_number(1), help="start N processes here for it"
+    )
+    group.add_argument(
+        "--scheduler", metavar="ADDRESS",
+        help="use the Dask cluster of this scheduler, or of a scheduler file (.json); default: "
+        f"that of ${VARIABLE}, if it is set",
+    )  # fmt: skip
+
+
+def add_threads(parser: argparse.ArgumentParser) -> None:
+    """Of Dr.Jit, in workers."""
+    parser.add_argument(
+        "--threads", metavar="N", type=whole_number(1),
+        help="Dr.Jit threads of a worker; default: its share of this machine's cores, or with "
+        "--scheduler all that it may use",
+    )  # fmt: skip
+
+
+def on_workers(args: argparse.Namespace) -> bool:
+    """Whether the command is for workers; a usage error where the options contradict."""
+    if args.workers and args.scheduler:
+        args.parser.error("argument --workers: starts workers; --scheduler has its own")
+    found = bool(args.workers or args.scheduler or os.environ.get(VARIABLE))
+    if getattr(args, "threads", None) and not found:
+        args.parser.error("argument --threads: is for --workers or --scheduler")
+    return found
+
+
+def worker_threads(args: argparse.Namespace) -> int:
+    """Dr.Jit threads of a worker; 0 for as many as it has cores."""
+    if args.threads or not args.workers:
+        return args.threads or 0
+    return max(1, len(os.sched_getaffinity(0)) // int(args.workers))
+
+
+@contextlib.contextmanager
+def client_of(args: argparse.Namespace) -> Iterator[Any]:
+    """The workers that were asked for; says where to watch them."""
+    from ..cluster.workers import connect
+
+    has_page = importlib.util.find_spec("bokeh") is not None
+    with connect(args.workers, args.scheduler) as client:
+        if not args.workers or has_page:
+            say(f"workers at {client.dashboard_link}")
+        yield client
+
+
+def film_of(
+    args: argparse.Namespace, client: Any, frames: Sequence[Wanted], variant: str, keep: Path
+) -> Film:
+    """What renders frames of the command's scene on workers."""
+    from ..cluster.film import Film
+
+    film = Film(
+        client, args.scene, frames, variant, keep=keep, warn=say_warning, sensor=args.sensor,
+        preview=args.preview, threads=worker_threads(args),
+    )  # fmt: skip
+    say(f"a task is estimated to need {film.needed / 1e9:.2g} GB of memory")
+    return film
+
+
+def say_report(film: Film) -> dict[str, Any]:
+    """Print what the workers did in a line; the same as plain data."""
+    report = film.report.summary()
+    kept = f", {report['kept']} kept from before" if report["kept"] else ""
+    again = f", {report['retries']} given out again" if report["retries"] else ""
+    print(
+        f"workers: {report['tasks']} tasks{kept}{again}, {report['busy']:.1f} s of work by "
+        f"{len(report['workers'])} workers in {report['seconds']:.1f} s, "
+        f"{report['overhead_per_task_s']:.2g} s a task beside it, {report['bytes'] / 1e6:.3g} MB, "
+        f"{report['peak'] / 1e9:.2g} GB of memory at most"
+    )
+    return report

@@ -1,0 +1,316 @@
+"""Frames from the tasks of many workers: submitted, kept, added up in order, developed."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import DiffractionError, one_line
+from ..progress import Progress
+from ..scene.load import load_scene, preview_samples, sensor_of, shrink
+from ..scene.passes import Result, Stop, developed, groups_of, passes_of
+from .files import SceneFiles
+from .kept import Kept
+from .tasks import Failed, Lacking, Sums, Task, film_of, run_task, versions
+from .workers import check_workers, memory_warnings, require_dask
+
+#: Tasks that are with the scheduler for every worker: one is worked at, others wait.
+AHEAD = 3
+#: Bytes that Dr.Jit takes for a sample of a pass, and for the rest of a process: estimates.
+BYTES_A_SAMPLE, BYTES_A_PROCESS = 400, 5e8
+_POLL, _COUNTED = 0.02, 2.0  # seconds
+_PATIENCE = 60.0  # seconds for a scheduler or the last worker to come back
+
+
+@dataclass
+class Report:
+    """What a run on workers cost.
+
+    Attributes
+    ----------
+    tasks, kept : that were done now, and that had been kept.
+    retries : tasks that were given out again, since a worker, the scheduler or files were lost.
+    seconds, busy : of the client's clock, and of all workers' work.
+    bytes : of sums that came from workers.
+    peak : bytes of memory that a worker has taken at most.
+    workers, where : addresses, and processors with threads, of what has been added up.
+    """
+
+    tasks: int = 0
+    kept: int = 0
+    retries: int = 0
+    seconds: float = 0.0
+    busy: float = 0.0
+    bytes: int = 0
+    peak: int = 0
+    workers: set[str] = field(default_factory=set)
+    where: set[str] = field(default_factory=set)
+
+    def summary(self) -> dict[str, Any]:
+        """As plain data, with what a task cost besides its work."""
+        plain = {k: sorted(v) if isinstance(v, set) else v for k, v in vars(self).items()}
+        count = len(self.workers) or 1
+        idle = self.seconds * count - self.busy
+        return plain | {"overhead_per_task_s": idle / self.tasks if self.tasks else 0.0}
+
+    def add(self, sums: Sums, new: bool) -> None:
+        """Count one sum."""
+        self.where.add(sums.where)
+        if not new:
+            self.kept += 1
+            return
+        self.tasks += 1
+        self.busy += sums.seconds
+        self.bytes += sums.raw.nbytes
+        self.peak = max(self.peak, sums.peak)
+        self.workers.add(sums.worker)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A frame: values of the scene's parameters, samples (None: the scene's), and seed."""
+
+    values: Mapping[str, str]
+    spp: int | None
+    seed: int
+
+
+class Film:
+    """Frames of one scene, from workers.
+
+    Parameters
+    ----------
+    client : `distributed.Client`.
+    scene : XML file.
+    frames : to render, in this order.
+    variant : that is set here; workers set it, too.
+    sensor, preview, threads : as in `cluster.render`.
+    keep : folder of sums that wait for their picture.
+    warn : called with lines that are worth one.
+
+    Raises
+    ------
+    DiffractionError
+        If the scene cannot be loaded, or a worker is of no use.
+    """
+
+    def __init__(
+        self,
+        client: Any,
+        scene: Path,
+        frames: Sequence[Wanted],
+        variant: str,
+        *,
+        keep: Path,
+        warn: Callable[[str], None],
+        sensor: int = 0,
+        preview: bool = False,
+        threads: int = 0,
+    ) -> None:
+        check_workers(client, variant)
+        self.report = Report()
+        self._client, self._kept, self._warn = client, Kept(keep), warn
+        self._scene = load_scene(scene, frames[0].values)
+        self._sensor = sensor_of(self._scene, sensor)
+        own = preview_samples(self._sensor, preview)
+        if preview:
+            shrink(self._sensor)
+        film = film_of(self._scene, self._sensor)
+        self._frames: list[list[Task]] = []
+        for number, frame in enumerate(frames):
+            files, first, mine = SceneFiles.of(scene, frame.values), 0, []
+            for group in groups_of(passes_of(self._sensor, frame.spp or own, frame.seed, variant)):
+                mine.append(
+                    Task(files, variant, sensor, preview, film, number, first, tuple(group),
+                         versions(), threads)
+                )  # fmt: skip
+                first += len(group)
+            self._frames.append(mine)
+        pixels = int(np.prod(self._sensor.film().crop_size()))
+        largest = max(one.spp for mine in self._frames for task in mine for one in task.passes)
+        self.needed = BYTES_A_PROCESS + BYTES_A_SAMPLE * pixels * largest
+        for line in memory_warnings(client, self.needed):
+            warn(line)
+
+    @property
+    def sensor(self) -> Any:
+        """The sensor of frame 0, with its film."""
+        return self._sensor
+
+    @property
+    def scene(self) -> Any:
+        """The scene of frame 0."""
+        return self._scene
+
+    def render(self, stop: Stop, progress: Progress) -> Iterator[Result]:
+        """Frame after frame; ends early once asked to stop.
+
+        Raises
+        ------
+        DiffractionError
+            Naming frame, passes and worker, if a task fails; what is done is kept.
+        """
+        start = time.perf_counter()
+        sums = _InOrder(self, stop, progress)
+        try:
+            for tasks in self._frames:
+                total: Any = 0.0
+                for task in tasks:
+                    found = sums.of(task)
+                    if found is None:
+                        return
+                    total = total + found.raw
+                spp = sum(one.spp for task in tasks for one in task.passes)
+                picture = developed(self._scene, self._sensor, total, spp)
+                self.report.seconds = time.perf_counter() - start
+                yield Result(picture, spp, stop.asked)
+                if stop.asked:
+                    return
+        finally:
+            sums.cancel()
+            self.report.seconds = time.perf_counter() - start
+            if len(self.report.where) > 1:
+                self._warn(
+                    "sums of different processors or numbers of threads were mixed, and may "
+                    f"differ in their last bits: {'; '.join(sorted(self.report.where))}"
+                )
+
+    def forget(self, frame: int) -> None:
+        """Remove what was kept of a frame."""
+        for task in self._frames[frame]:
+            self._kept.forget(task)
+
+
+class _InOrder:
+    """Gives out tasks ahead of what is added up, and takes results in whatever order they come."""
+
+    def __init__(self, film: Film, stop: Stop, progress: Progress) -> None:
+        self._film, self._stop, self._progress = film, stop, progress
+        self._waiting = [task for tasks in film._frames for task in tasks][::-1]
+        self._total = len(self._waiting)
+        self._with: dict[Any, Task] = {}
+        self._ready: dict[str, bool] = {}  # keys of sums that are on disk, and whether they are new
+        self._done = 0
+        self._lost_since: float | None = None
+        self._contents: dict[str, Any] = {}
+        self._counted = (-math.inf, 1)
+
+    def of(self, task: Task) -> Sums | None:
+        """The sums of a task; None once asked to stop."""
+        kept = self._film._kept
+        while True:
+            if task.key in self._ready or task in kept:
+                found = kept.read(task)
+                if found is not None:
+                    new = self._ready.pop(task.key, False)
+                    self._film.report.add(found, new)
+                    return found
+                if task not in self._with.values() and task not in self._waiting:
+                    self._waiting.append(task)  # it was damaged
+            if self._stop.asked:
+                return None
+            self._give_out()
+            self._take()
+            self._tell(task)
+            time.sleep(_POLL)
+
+    def cancel(self) -> None:
+        """Take back what nobody waits for."""
+        for future in self._with:
+            future.cancel()
+        self._with.clear()
+
+    def _give_out(self) -> None:
+        kept = self._film._kept
+        most = AHEAD * max(1, self._workers())
+        while self._waiting and len(self._with) < most:
+            task = self._waiting.pop()
+            if task in kept:
+                self._done += 1
+            else:
+                self._with[self._submitted(task)] = task
+
+    def _submitted(self, task: Task, lacking: Sequence[str] = ()) -> Any:
+        client = self._film._client
+        for digest in lacking:
+            if digest not in self._contents:
+                (path,) = {p for p, d in task.files.files if d == digest} or {""}
+                # a task of its own, which Dask repeats where its result is lost
+                self._contents[digest] = client.submit(
+                    bytes, Path(path).read_bytes(), key=f"file-{digest[:32]}"
+                )
+        contents = {digest: self._contents[digest] for digest in lacking}
+        return client.submit(run_task, task, contents, pure=False, priority=-task.frame, key=None)
+
+    def _take(self) -> None:
+        report = self._film.report
+        for future in [future for future in self._with if future.done()]:
+            task = self._with.pop(future)
+            found = self._result(future, task)
+            if isinstance(found, Sums):
+                self._film._kept.write(task, found)
+                self._ready[task.key] = True
+                self._done += 1
+                self._lost_since = None
+            elif isinstance(found, Failed):
+                raise DiffractionError(f"{task}, worker {found.worker}: {found.text}")
+            else:
+                report.retries += 1
+                self._with[self._submitted(task, found.digests if found else ())] = task
+
+    def _result(self, future: Any, task: Task) -> Sums | Lacking | Failed | None:
+        """What a task gave; None if it was lost with the scheduler."""
+        distributed = require_dask()
+        try:
+            return future.result()
+        except distributed.scheduler.KilledWorker as error:
+            raise DiffractionError(
+                f"{task}, worker {error.last_worker.address}: it died, as did those before that "
+                "had the same passes; a worker may lack memory, see docs/cluster.md. What is done "
+                "is kept"
+            ) from error
+        except (CancelledError, distributed.client.FutureCancelledError, OSError) as error:
+            self._wait_for_scheduler(error)
+            return None
+
+    def _wait_for_scheduler(self, error: BaseException) -> None:
+        """Until it answers again.
+
+        Raises
+        ------
+        DiffractionError
+            If it does not.
+        """
+        now = time.perf_counter()
+        self._lost_since = self._lost_since or now
+        self._contents.clear()
+        while time.perf_counter() - self._lost_since < _PATIENCE and not self._stop.asked:
+            if self._film._client.status == "running":
+                return
+            time.sleep(10 * _POLL)
+        raise DiffractionError(
+            f"the scheduler is gone ({one_line(str(error))[:80]}); what is done is kept: run the "
+            "same command again to go on"
+        ) from error
+
+    def _tell(self, task: Task) -> None:
+        frames = len(self._film._frames)
+        what = f"frame {task.frame + 1} of {frames}, " if frames > 1 else ""
+        self._progress(self._done, self._total, f"{what}{self._workers()} workers")
+
+    def _workers(self) -> int:
+        """How many there are, asked for every other second."""
+        now = time.perf_counter()
+        if now - self._counted[0] > _COUNTED:
+            with contextlib.suppress(OSError, CancelledError):  # the scheduler is gone
+                info = self._film._client.scheduler_info(n_workers=-1)
+                self._counted = now, len(info["workers"])
+        return int(self._counted[1])

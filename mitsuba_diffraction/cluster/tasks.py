@@ -1,0 +1,199 @@
+"""What a worker does: some passes of one frame, and the sum of their films."""
+
+from __future__ import annotations
+
+import os
+import platform
+import resource
+import time
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DiffractionError, one_line
+from ..scene.load import load_scene, sensor_of, set_variant, shrink
+from ..scene.passes import Pass, integrator_of, render_pass
+from ..tables.store.store import key_of
+from .files import SceneFiles
+
+_PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit")
+
+
+@dataclass(frozen=True)
+class Task:
+    """Passes of one frame, in the order that their films are added up.
+
+    Attributes
+    ----------
+    files : the scene.
+    variant, sensor, preview : as in `cluster.render`.
+    film : what the client takes the film to be, see `film_of`.
+    frame, first : numbers of the frame and of the first pass, for people.
+    passes : seeds and samples.
+    versions : of the packages that decide the bits of a picture.
+    threads : of Dr.Jit; 0 for one a core.
+    """
+
+    files: SceneFiles
+    variant: str
+    sensor: int
+    preview: bool
+    film: str
+    frame: int
+    first: int
+    passes: tuple[Pass, ...]
+    versions: tuple[str, ...]
+    threads: int
+
+    @property
+    def key(self) -> str:
+        """Of the sum: of all that decides it, but how many threads of which processor add it up."""
+        passes = [(one.seed, one.spp) for one in self.passes]
+        what = (self.files.digest, self.variant, self.sensor, self.preview, self.film, passes)
+        return key_of("passes", *what, self.versions)
+
+    def __str__(self) -> str:
+        last = self.first + len(self.passes) - 1
+        passes = f"pass {self.first}" if last == self.first else f"passes {self.first} to {last}"
+        return f"frame {self.frame}, {passes}"
+
+
+@dataclass(frozen=True)
+class Sums:
+    """What came of a task.
+
+    Attributes
+    ----------
+    raw : (ny, nx, channels), the sum of the films' raw storage in double precision.
+    where : processor and Dr.Jit threads, which decide the last bits.
+    worker : address.
+    seconds, peak : of work, loading included; bytes of the process at most.
+    """
+
+    raw: NDArray[np.float64]
+    where: str
+    worker: str
+    seconds: float
+    peak: int
+
+
+@dataclass(frozen=True)
+class Lacking:
+    """A worker lacks files; by their digests."""
+
+    digests: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Failed:
+    """An error, as one line, and the worker's address."""
+
+    text: str
+    worker: str
+
+
+def versions() -> tuple[str, ...]:
+    """Of the packages that decide the bits of a picture."""
+    return tuple(version(name) for name in _PACKAGES)
+
+
+def run_task(task: Task, contents: Mapping[str, bytes] | None = None) -> Sums | Lacking | Failed:
+    """Do a task in this process; `contents` are of files that are lacking here, by digest."""
+    try:
+        task.files.keep(contents or {})
+        lacking = task.files.missing()
+        if lacking:
+            return Lacking(tuple(lacking))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the client has loaded the scene, and said them
+            return _sums(task)
+    except DiffractionError as error:
+        return Failed(str(error), _address())
+    except Exception as error:  # a worker must answer, and its traceback is of no use elsewhere
+        return Failed(f"unexpected {type(error).__name__}: {one_line(str(error))}", _address())
+
+
+def _sums(task: Task) -> Sums:
+    import drjit as dr
+
+    start = time.perf_counter()
+    check_versions(task.versions)
+    threads = task.threads or len(os.sched_getaffinity(0))
+    set_variant(task.variant)  # per process and thread: mitsuba3 #1685
+    if task.variant.startswith("llvm") and dr.thread_count() != threads:
+        dr.set_thread_count(threads)
+    scene, sensor = _scene(task.files, task.variant, task.sensor, task.preview)
+    if film_of(scene, sensor) != task.film:
+        raise DiffractionError(
+            "its film is not that of frame 0; parameters that change the film's size or format "
+            "take one process, or a run for each"
+        )
+    total: Any = 0.0
+    for one in task.passes:
+        total = total + render_pass(scene, sensor, one)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    where = f"{processor()}, {threads} threads"
+    return Sums(total, where, _address(), time.perf_counter() - start, peak)
+
+
+@lru_cache(1)
+def _scene(files: SceneFiles, variant: str, sensor: int, preview: bool) -> tuple[Any, Any]:
+    """The scene that this process rendered last, or the next one; what both need stays loaded."""
+    path, values = files.here()
+    scene = load_scene(path, values)
+    found = sensor_of(scene, sensor)
+    if preview:
+        shrink(found)
+    return scene, found
+
+
+def film_of(scene: Any, sensor: Any) -> str:
+    """All that the sum of passes depends on, as text: size, crop, filter, channels."""
+    film = sensor.film()
+    offset, size = film.crop_offset(), film.crop_size()
+    return f"{film} {offset} {size} {integrator_of(scene).aov_names()}"
+
+
+def check_versions(wanted: tuple[str, ...]) -> None:
+    """Refuse to work with other packages than the client's.
+
+    Raises
+    ------
+    DiffractionError
+        Naming both.
+    """
+    found = versions()
+    for name, mine, theirs in zip(_PACKAGES, found, wanted, strict=True):
+        if mine != theirs:
+            raise DiffractionError(
+                f"it has {name} {mine}, and the client {theirs}: pictures of both do not agree to "
+                "the last bit; install the same on both"
+            )
+
+
+@lru_cache(1)
+def processor() -> str:
+    """The kind of this machine's processor."""
+    try:
+        with open("/proc/cpuinfo", encoding="utf-8") as file:
+            names = [
+                line.partition(":")[2].strip() for line in file if line.startswith("model name")
+            ]
+    except OSError:
+        names = []
+    return names[0] if names else platform.machine()
+
+
+def _address() -> str:
+    from distributed import get_worker
+
+    try:
+        return str(get_worker().address)
+    except ValueError:
+        return "this process"

@@ -1,0 +1,251 @@
+"""A scan much wider than the coherence window, as overlapping windows whose powers are averaged.
+
+Welch's method (1967, IEEE Transactions on Audio and Electroacoustics 15, 70) for the screen
+exp(iκh): windows overlap by half, each is levelled, and what is left of its screen once the mean is
+taken out fades at the edges (Hann, of mean square 1), so that the seams of the tiles diffract
+nothing. The mean itself is order 0, and has no seams. Windows are cut out when they are asked for:
+memory does not grow with the scan.
+
+A Hann window L wide widens every lobe. Its power has the variance 1/3 in bins of 2π/L, that of the
+coherence window 1/(2σ²): with L = 8σ, twice the coherence width, lobes are 19 % wider.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, overload
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from ...heights.field import HeightField
+from ...heights.preprocess.levelling import plane_of
+from ...optics.blend import ScaleRoughness
+from ...optics.geometry import sigma_of, wavenumber
+from ...settings import TableSettings
+from ..table import build_error
+from .error import NEAR
+from .spectrum import Spectrum
+
+#: Width of a window, in coherence widths, of `windows="auto"`.
+AUTO = 2.0
+#: An axis with less than so many windows' widths is one window, as wide as the scan and untapered.
+_WIDE = 1.5
+#: Windows that the roughness by spatial frequency is taken from, which is smooth.
+_ROUGHNESS_OF = 16
+_GREEN = 550.0  # nm, where the standard error is stated
+
+Reals = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """Where windows lie along one axis of a scan, in pixels; `taper` is None for a single one."""
+
+    starts: Sequence[int]
+    length: int
+    taper: Reals | None
+
+    @classmethod
+    def of(cls, pixels: int, wanted: float) -> _Axis:
+        if pixels < _WIDE * wanted:
+            return cls([0], pixels, None)
+        length = int(scipy.fft.next_fast_len(round(wanted)))
+        count = 1 + max(1, round((pixels - length) / (0.5 * length)))
+        starts = np.linspace(0, pixels - length, count).round().astype(int).tolist()
+        taper = np.hanning(length + 1)[:-1]
+        return cls(starts, length, taper / np.sqrt(np.mean(taper**2)))
+
+    @property
+    def variance_factor(self) -> float:
+        """Variance of the mean over the windows of one: 1/n if they were independent (Welch)."""
+        count = len(self.starts)
+        if self.taper is None:
+            return 1.0
+        step = (self.starts[-1] - self.starts[0]) / (count - 1)
+        total = 1.0
+        for n in range(1, count):
+            shift = round(n * step)
+            if shift >= self.length:
+                break
+            overlap = float(np.mean(self.taper[shift:] * self.taper[: self.length - shift]))
+            overlap *= (self.length - shift) / self.length
+            total += 2.0 * (1.0 - n / count) * overlap**2
+        return total / count
+
+
+class Windows(Sequence[HeightField]):
+    """The windows of one or several scans, all of one size.
+
+    Parameters
+    ----------
+    scans : with pixels of one size.
+    width : of a window, µm.
+
+    Attributes
+    ----------
+    tapers : along y and x, of mean square 1; None where a window is as wide as its scan.
+    variance_factor : variance of the mean over all windows, of one window's.
+    """
+
+    def __init__(self, scans: Sequence[HeightField], width: float) -> None:
+        self.scans = list(scans)
+        axes = [
+            [_Axis.of(n, width / d) for n, d in zip(s.shape, self._pixels, strict=True)]
+            for s in scans
+        ]
+        self._check(axes)
+        self._places = [
+            (scan, top, left)
+            for scan, (along_y, along_x) in zip(self.scans, axes, strict=True)
+            for top in along_y.starts
+            for left in along_x.starts
+        ]
+        self.shape = axes[0][0].length, axes[0][1].length
+        self.tapers = axes[0][0].taper, axes[0][1].taper
+        self.counts = [(len(x.starts), len(y.starts)) for y, x in axes]
+        weights = [nx * ny / len(self) for nx, ny in self.counts]
+        self.variance_factor = sum(
+            w**2 * y.variance_factor * x.variance_factor
+            for w, (y, x) in zip(weights, axes, strict=True)
+        )
+
+    def _check(self, axes: Sequence[Sequence[_Axis]]) -> None:
+        first = self.scans[0]
+        for scan, own in zip(self.scans[1:], axes[1:], strict=True):
+            alike = np.allclose(scan.pixel_size, first.pixel_size, rtol=1e-6, atol=0.0)
+            if not alike or [a.length for a in own] != [a.length for a in axes[0]]:
+                raise build_error(
+                    f"'{scan.name}' and '{first.name}' have no windows of one size: their pixels "
+                    "differ, or one is narrower than a window; build a table of each"
+                )
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    @overload
+    def __getitem__(self, n: int) -> HeightField: ...
+    @overload
+    def __getitem__(self, n: slice) -> Sequence[HeightField]: ...
+    def __getitem__(self, n: int | slice) -> HeightField | Sequence[HeightField]:
+        if isinstance(n, slice):
+            return [self[m] for m in range(*n.indices(len(self)))]
+        scan, top, left = self._places[n]
+        ny, nx = self.shape
+        heights = scan.heights[top : top + ny, left : left + nx].copy()
+        raw = HeightField(heights, scan.pixel_size)
+        slopes, (dx, dy) = plane_of(raw), scan.pixel_size
+        # A tilt turns the mirror direction; an axis of one window is periodic, and its own
+        if self.tapers[1] is not None:
+            heights -= slopes[0] * dx * np.arange(nx)
+        if self.tapers[0] is not None:
+            heights -= (slopes[1] * dy * np.arange(ny))[:, None]
+        heights.setflags(write=False)
+        return HeightField(heights, scan.pixel_size, name=f"{scan.name}, window {n + 1}")
+
+    def spectrum(self, n: int, last: tuple[int, int], double: bool = False) -> Spectrum:
+        """Transforms of one window."""
+        return Spectrum(self[n], last, double, self.tapers)
+
+    def standard_error(self, coherence_width: float) -> dict[str, float]:
+        """That of the mean over windows, relative, as the windows scatter.
+
+        Of what look-ups find at 550 nm, normal incidence and reflection: Σ error / Σ mean over
+        directions, near order 0 and in all others, as a table's own error is summed.
+        """
+        sigma, kappa = sigma_of(coherence_width), 2.0 * float(wavenumber(_GREEN))
+        bins = [2.0 * math.pi / (n * d) for n, d in zip(self.shape, self._pixels, strict=True)]
+        last = [min(int(kappa / q), n // 2) for q, n in zip(bins, self.shape, strict=True)]
+        lobe = [1.0 / (math.sqrt(2.0) * sigma * q) for q in bins]
+        mean, squares = np.zeros(1), np.zeros(1)
+        for n in range(len(self)):
+            power = np.abs(self.spectrum(n, (last[1], last[0])).of_phase(kappa)) ** 2
+            power = gaussian_filter(power.astype(np.float64), lobe, mode="constant")
+            change = power - mean
+            mean = mean + change / (n + 1)
+            squares = squares + change * (power - mean)
+        error = np.sqrt(squares / (len(self) - 1) * self.variance_factor)
+        y, x = (q * np.arange(-n, n + 1) for q, n in zip(bins, last, strict=True))
+        near = np.hypot(x, y[:, None]) <= NEAR / sigma
+        return {
+            name: float(error[part].sum() / mean[part].sum()) if part.any() else 0.0
+            for name, part in (("glossy", near), ("colours", ~near))
+        }
+
+    def roughness(self) -> list[ScaleRoughness]:
+        """Of some of the windows, their heights tapered as the screens are."""
+        some = np.unique(np.linspace(0, len(self) - 1, _ROUGHNESS_OF).round().astype(int))
+        taper = np.outer(*(np.ones(1) if t is None else t for t in self.tapers))
+        return [
+            ScaleRoughness.of((one.heights - one.heights.mean()) * taper, one.pixel_size)
+            for one in (self[int(n)] for n in some)
+        ]
+
+    @property
+    def _pixels(self) -> tuple[float, float]:
+        """µm along y and x."""
+        dx, dy = self.scans[0].pixel_size
+        return dy, dx
+
+
+class _Spectra(Sequence[Spectrum]):
+    """Those of windows, made when they are asked for."""
+
+    def __init__(self, windows: Windows, last: tuple[int, int], double: bool) -> None:
+        self._windows, self._of = windows, (last, double)
+
+    def __len__(self) -> int:
+        return len(self._windows)
+
+    def __getitem__(self, n: Any) -> Any:
+        return self._windows.spectrum(n, *self._of)
+
+
+def windows_of(scans: Sequence[HeightField], settings: TableSettings) -> Sequence[HeightField]:
+    """The windows of scans as `settings.windows` has them; the scans where none is wide enough.
+
+    Raises
+    ------
+    DiffractionError
+        If their powers cannot be averaged, or windows would be narrower than the coherence width.
+    """
+    if settings.windows is None or not scans:
+        return scans
+    if settings.coherent or settings.basis == "taylor":
+        raise build_error(
+            "windows have their powers averaged, which coherence='patch' and basis='taylor' "
+            "cannot; use coherence='ensemble' and basis='svd', or leave windows out"
+        )
+    width = settings.windows
+    if isinstance(width, str):
+        width = AUTO * settings.coherence_width
+    elif width < settings.coherence_width:
+        raise build_error(
+            f"windows={width:g} µm are narrower than coherence_width={settings.coherence_width:g}; "
+            f"take windows='auto', {AUTO * settings.coherence_width:g} µm"
+        )
+    if min(width / d for d in scans[0].pixel_size) < 4:
+        return scans  # pixels so coarse that something else is wrong
+    found = Windows(scans, width)
+    return scans if len(found) == len(scans) else found
+
+
+def shape_of(patches: Sequence[HeightField]) -> tuple[int, int]:
+    """The largest (ny, nx) of all patches."""
+    if isinstance(patches, Windows):
+        return patches.shape
+    ny, nx = np.max([patch.shape for patch in patches], axis=0)
+    return int(ny), int(nx)
+
+
+def spectra_of(
+    patches: Sequence[HeightField], last: tuple[int, int], double: bool = False
+) -> Sequence[Spectrum]:
+    """Transforms of every patch."""
+    if isinstance(patches, Windows):
+        return _Spectra(patches, last, double)
+    return [Spectrum(patch, last, double) for patch in patches]

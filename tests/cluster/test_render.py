@@ -1,0 +1,245 @@
+"""Rendering on workers, real processes: bit for bit one process, whatever happens to them."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import drjit as dr
+import numpy as np
+import pytest
+
+distributed = pytest.importorskip("distributed")
+
+from mitsuba_diffraction import DiffractionError, cluster  # noqa: E402
+from mitsuba_diffraction.cluster import film as film_module  # noqa: E402
+from mitsuba_diffraction.cluster import workers as workers_module  # noqa: E402
+from mitsuba_diffraction.cluster.film import Film, Wanted  # noqa: E402
+from mitsuba_diffraction.cluster.kept import Kept  # noqa: E402
+from mitsuba_diffraction.cluster.tasks import Lacking, run_task  # noqa: E402
+from mitsuba_diffraction.scene import passes  # noqa: E402
+from mitsuba_diffraction.scene.load import load_scene, set_variant  # noqa: E402
+from tests.cli.conftest import run  # noqa: E402, F401
+from tests.cli.room import SCENE, pixels  # noqa: E402
+
+VARIANT = "llvm_ad_rgb"
+SPP = 24
+
+
+@pytest.fixture(scope="module")
+def client():
+    with cluster.connect(2) as found:
+        yield found
+
+
+@pytest.fixture(autouse=True)
+def small_tasks(monkeypatch):
+    """Two samples a pass and one pass a task: 12 tasks."""
+    monkeypatch.setattr(passes, "_SAMPLES", {"llvm": 2 * 24 * 16})
+    monkeypatch.setattr(passes, "GROUP", 1)
+
+
+@pytest.fixture(autouse=True)
+def own_threads():
+    """What a test does to Dr.Jit's threads is undone: with one, Mitsuba's EXR writer waits."""
+    before = dr.thread_count()
+    yield
+    dr.set_thread_count(before)
+
+
+@pytest.fixture
+def scene(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "room.xml").write_text(SCENE)
+    return tmp_path / "room.xml"
+
+
+@pytest.fixture
+def expected(scene):
+    """The picture of one process with one thread."""
+    set_variant(VARIANT)
+    before = dr.thread_count()
+    dr.set_thread_count(1)
+    loaded = load_scene(scene, {})
+    result = passes.render_passes(
+        loaded, loaded.sensors()[0], spp=SPP, seed=3, variant=VARIANT, stop=passes.Stop(),
+        progress=lambda *_: None,
+    )  # fmt: skip
+    dr.set_thread_count(before)
+    return np.array(result.bitmap)
+
+
+def rendered(client, scene, **more):
+    arguments = {"spp": SPP, "seed": 3, "variant": VARIANT, "threads": 1, **more}
+    return cluster.render(scene, client=client, **arguments)
+
+
+def film(client, scene, frames, keep, **more):
+    set_variant(VARIANT)
+    return Film(client, scene, frames, VARIANT, keep=keep, warn=pytest.fail, threads=1, **more)
+
+
+def test_workers_give_the_picture_of_one_process(client, scene, expected):
+    result = rendered(client, scene)
+    assert result.spp == SPP
+    np.testing.assert_array_equal(np.array(result.bitmap), expected)
+
+
+def test_a_killed_worker_and_late_ones_change_nothing(client, scene, expected):
+    happened = []
+
+    def disturb(done, total, text):
+        if done >= 2 and not happened:
+            happened.append(text)
+            victim = next(iter(client.cluster.workers.values()))
+            os.kill(victim.pid, signal.SIGKILL)
+            client.cluster.scale(4)
+
+    result = rendered(client, scene, progress=disturb)
+    assert happened
+    np.testing.assert_array_equal(np.array(result.bitmap), expected)
+    client.wait_for_workers(4, timeout=60)
+    np.testing.assert_array_equal(np.array(rendered(client, scene).bitmap), expected)
+    client.cluster.scale(2)
+
+
+def test_a_client_that_was_stopped_goes_on(client, scene, expected, tmp_path):
+    keep = tmp_path / "passes"
+
+    def interrupt(done, total, text):
+        if done >= 4:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(DiffractionError, match="interrupted"):
+        rendered(client, scene, keep=keep, progress=interrupt)
+    there = len(list(keep.iterdir()))
+    assert 4 <= there < 12
+    again = film(client, scene, [Wanted({}, SPP, 3)], keep)
+    (result,) = again.render(passes.Stop(), lambda *_: None)
+    assert again.report.kept == there
+    assert again.report.tasks == 12 - there
+    np.testing.assert_array_equal(np.array(result.bitmap), expected)
+    again.forget(0)
+    assert not keep.exists()
+
+
+def test_files_that_a_worker_lacks_come_by_content(client, scene, expected, monkeypatch):
+    def without_files(task, contents=None):
+        return run_task(task) if contents else Lacking((task.files.files[0][1],))
+
+    monkeypatch.setattr(film_module, "run_task", without_files)
+    np.testing.assert_array_equal(np.array(rendered(client, scene).bitmap), expected)
+
+
+def test_a_copy_of_a_scene_is_the_scene(scene, expected, monkeypatch, tmp_path):
+    (tmp_path / "part.xml").write_text('<scene version="3.0.0"/>')
+    scene.write_text(SCENE.replace("</scene>", '<include filename="part.xml"/></scene>'))
+    task = _Recorder.first_task(scene)
+    contents = {digest: Path(path).read_bytes() for path, digest in task.files.files}
+    assert len(contents) == 2
+    scene.rename(tmp_path / "elsewhere.xml")
+    (tmp_path / "part.xml").unlink()
+    assert run_task(task) == Lacking(tuple(sorted(contents)))
+    found = run_task(task, contents)
+    assert found.raw.shape[:2] == expected.shape[:2]
+
+
+class _Recorder:
+    """A client that keeps what is submitted."""
+
+    status = "running"
+
+    def __init__(self):
+        self.tasks = []
+
+    def wait_for_workers(self, *_, **__):
+        pass
+
+    def run(self, *_, **__):
+        return {"one": None}
+
+    def scheduler_info(self, **_):
+        return {"workers": {"one": {"nthreads": 1}}}
+
+    @classmethod
+    def first_task(cls, scene):
+        return film(cls(), scene, [Wanted({}, SPP, 3)], scene.parent)._frames[0][0]
+
+
+def test_an_error_names_frame_pass_and_worker(client, scene, tmp_path):
+    frames = [Wanted({}, 2, 0), Wanted({"format": "nonsense"}, 2, 1)]
+    job = film(client, scene, frames, tmp_path / "passes")
+    with pytest.raises(DiffractionError, match=r"^frame 1, pass 0, worker tcp://\S+: cannot load"):
+        list(job.render(passes.Stop(), lambda *_: None))
+
+
+def test_other_versions_are_refused_by_name(client, scene, monkeypatch):
+    versions = workers_module.versions()
+    monkeypatch.setattr(workers_module, "versions", lambda: (*versions[:2], "0.1"))
+    with pytest.raises(DiffractionError, match=r"worker tcp://\S+ is of no use: .*drjit .* 0\.1"):
+        rendered(client, scene)
+
+
+def test_workers_with_several_dask_threads_are_refused(scene):
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=2, processes=False, dashboard_address=":0"
+        ) as local,
+        distributed.Client(local) as mine,
+        pytest.raises(DiffractionError, match="has 2 Dask threads"),
+    ):
+        rendered(mine, scene)
+
+
+def test_no_scheduler_is_one_line():
+    with (
+        pytest.raises(DiffractionError, match=r"no scheduler answers at 'tcp://127\.0\.0\.1:1'"),
+        cluster.connect(scheduler="tcp://127.0.0.1:1", patience=1),
+    ):
+        pass
+
+
+def test_damaged_sums_are_rendered_again(scene, tmp_path):
+    task = _Recorder.first_task(scene)
+    kept, sums = Kept(tmp_path / "passes"), run_task(task)
+    kept.write(task, sums)
+    assert np.array_equal(kept.read(task).raw, sums.raw)
+    (file,) = (tmp_path / "passes").iterdir()
+    file.write_bytes(file.read_bytes()[:-100])
+    assert kept.read(task) is None
+    assert task not in kept
+
+
+def test_the_command_renders_on_a_cluster(client, scene, expected, run, tmp_path):  # noqa: F811
+    address = client.scheduler.address
+    ran = run(
+        "render", scene, "-m", VARIANT, "-s", SPP, "--seed", 3, "--scheduler", address,
+        "--threads", 1, "-o", "a.exr", "--json", "a.json",
+    )  # fmt: skip
+    assert ran.code == 0, ran
+    assert "12 tasks" in ran.out
+    np.testing.assert_allclose(pixels("a.exr"), expected, atol=1e-3)
+    assert '"tasks": 12' in (tmp_path / "a.json").read_text()
+
+
+def test_the_command_renders_frames_on_a_cluster(client, scene, run, monkeypatch):  # noqa: F811
+    monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", client.scheduler.address)
+    z = '<default name="z" value="4"/><default name="spp"'
+    scene.write_text(SCENE.replace("0,0,4", "0,0,$z").replace('<default name="spp"', z))
+    command = ["render", scene, "-m", VARIANT, "-s", 2, "--frames", 3, "--animate", "z=4:6"]
+    ran = run(*command)
+    assert ran.code == 0, ran
+    assert "3 frames, 3 of them new" in ran.out
+    assert sorted(p.name for p in Path("room_frames").iterdir()) == [
+        f"frame_000{n}.png" for n in range(3)
+    ]
+    monkeypatch.delenv("DASK_SCHEDULER_ADDRESS")
+    assert "0 of them new" in run(*command).out
+
+
+def test_asked_to_stop_it_gives_nothing(client, scene, tmp_path):
+    stop = passes.Stop()
+    job = film(client, scene, [Wanted({}, SPP, 3)], tmp_path / "passes")
+    stop.asked = True
+    assert list(job.render(stop, lambda *_: None)) == []
