@@ -200,9 +200,9 @@ def _report(
 ) -> dict[str, Any]:
     """For --json."""
     return {
-        "scene": args.scene, "files": written, "pixels": result.bitmap.size(), "spp": result.spp,
-        "seed": args.seed, "variant": variant, "interrupted": result.interrupted,
-        "seconds": seconds,
+        "scene": args.scene, "files": written, "pixels": list(result.bitmap.size()),
+        "spp": result.spp, "seed": args.seed, "variant": variant,
+        "interrupted": result.interrupted, "seconds": seconds,
     }  # fmt: skip
 
 
