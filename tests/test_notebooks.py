@@ -54,11 +54,7 @@ def kinds(notebook: Any) -> list[list[tuple[str, ...]]]:
         if cell.cell_type == "code"
     ]
     return [
-        [
-            kind
-            for last, kind in zip([None, *cell], cell, strict=False)
-            if kind != last or kind[0] != "stream"
-        ]
+        [kind for n, kind in enumerate(cell) if kind[0] != "stream" or kind not in cell[n - 1 : n]]
         for cell in cells
     ]
 

@@ -9,13 +9,13 @@ render                 a scene to a picture
 frames                 `render --frames`: pictures of a scene that changes
 plan                   what a plan says, and `render --plan`
 brdf_map               the hemisphere of view directions, by the BSDF or by a method
+survey                 many scans: a row, a table and a map each
 evaluate, sweep        the methods of the thesis
 view, compare          a scene in real time, and beside the path tracer
 export_viewer          a scene as a page for a browser
 tangents               a patch laid smoothly over any mesh
 tradeoff, bench        accuracy, speed and memory
-survey                 many scans of one kind, measured alike
-workers                `render --workers`, and what it says
+workers                options of commands that may run on many processes
 options                options that several commands share, declared once, and their values
 arguments              types of arguments
 console                lines and bars on stderr, what Mitsuba says among them

@@ -24,6 +24,8 @@ from .workers import check_workers, memory_warnings, require_dask
 
 #: Tasks that are with the scheduler for every worker: one is worked at, others wait.
 AHEAD = 3
+#: Sums that wait for their turn in memory, too; others are read from the disk again.
+HELD = 16
 #: Bytes that Dr.Jit takes for a sample of a pass, and for the rest of a process: estimates.
 BYTES_A_SAMPLE, BYTES_A_PROCESS = 400, 5e8
 _POLL, _COUNTED = 0.02, 2.0  # seconds
@@ -37,7 +39,9 @@ class Report:
     Attributes
     ----------
     tasks, kept : that were done now, and that had been kept.
-    retries : tasks that were given out again, since a worker, the scheduler or files were lost.
+    retries : tasks that were given out again, since the scheduler or a worker's files were lost;
+        those of a worker that died are given to others by the scheduler.
+    lost : workers that were there and are not any more.
     seconds, busy : of the client's clock, and of all workers' work.
     bytes : of sums that came from workers.
     peak : bytes of memory that a worker has taken at most.
@@ -47,6 +51,7 @@ class Report:
     tasks: int = 0
     kept: int = 0
     retries: int = 0
+    lost: int = 0
     seconds: float = 0.0
     busy: float = 0.0
     bytes: int = 0
@@ -197,20 +202,21 @@ class _InOrder:
         self._waiting = [task for tasks in film._frames for task in tasks][::-1]
         self._total = len(self._waiting)
         self._with: dict[Any, Task] = {}
-        self._ready: dict[str, bool] = {}  # keys of sums that are on disk, and whether they are new
+        self._ready: dict[str, Sums | None] = {}  # by key; None for those that are only on disk
         self._done = 0
         self._lost_since: float | None = None
         self._contents: dict[str, Any] = {}
         self._counted = (-math.inf, 1)
+        self._seen: set[str] = set()
 
     def of(self, task: Task) -> Sums | None:
         """The sums of a task; None once asked to stop."""
         kept = self._film._kept
         while True:
             if task.key in self._ready or task in kept:
-                found = kept.read(task)
+                new = task.key in self._ready
+                found = self._ready.pop(task.key, None) or kept.read(task)
                 if found is not None:
-                    new = self._ready.pop(task.key, False)
                     self._film.report.add(found, new)
                     return found
                 if task not in self._with.values() and task not in self._waiting:
@@ -257,7 +263,8 @@ class _InOrder:
             found = self._result(future, task)
             if isinstance(found, Sums):
                 self._film._kept.write(task, found)
-                self._ready[task.key] = True
+                held = sum(sums is not None for sums in self._ready.values())
+                self._ready[task.key] = found if held < HELD else None
                 self._done += 1
                 self._lost_since = None
             elif isinstance(found, Failed):
@@ -313,4 +320,6 @@ class _InOrder:
             with contextlib.suppress(OSError, CancelledError):  # the scheduler is gone
                 info = self._film._client.scheduler_info(n_workers=-1)
                 self._counted = now, len(info["workers"])
+                self._seen |= set(info["workers"])
+                self._film.report.lost = len(self._seen - set(info["workers"]))
         return int(self._counted[1])

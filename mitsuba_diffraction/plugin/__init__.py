@@ -7,12 +7,12 @@ registration    it is registered in every variant
 dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives
 parameters      read from Mitsuba's Properties, checked
-bounded         a parameter that changes, and what it refuses
+changing        a parameter that changes and what it refuses; what `dr.freeze` must know of a BSDF
 sources         from what a scene names to a table, built once
 attributes      whether a mesh has what its BSDF reads
 names           what messages call an element of a scene
 roles           what arguments are, one name a role
-pair            a pair of directions in the patch's frame
+pair            a pair of directions in the patch's frame, and how V-shaped grooves shadow it
 power           the diffracted power at single wavelengths; asks the next two
 lookup          a table inside a kernel: `DeviceTable`
 sampling        directions drawn where the orders are
@@ -26,8 +26,5 @@ boundary        what the material makes of the light, with its polarisation
 coat            a clear coat over the structure
 layers          how much light reaches what lies beneath
 orientation     how the patch is turned in the tangent plane
-shadowing       V-shaped grooves
 memory          arrays in the variant's memory, and reading them
-traversal       what Mitsuba's objects show of themselves
-frozen          what `dr.freeze` must know of a BSDF
 """

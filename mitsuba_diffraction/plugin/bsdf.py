@@ -84,12 +84,13 @@ model : string [small_slope]
 energy_conserving : boolean [true]
     Where the model reflects more than it gets, multiplies it by s(ωi) s(ωo), a scale of directions
     found for this table, model, material and each wavelength, so that no more is reflected than
-    comes in: reciprocal. Kirchhoff's model fades within 10° of the horizon as well. Dielectrics
-    gain nothing and are as they are; metal gratings lose some of the light of directions that gain
-    nothing, too (docs/energy.md has figures). `false` is the model as it is, for checks. The scale
-    takes a second or more the first time, and is kept in the cache. It follows height_scale,
-    interpolated between a few: an optimisation waits where it enters such an interval for the first
-    time. For its derivative, enable that of height_scale before parameters.update().
+    comes in: reciprocal. Kirchhoff's model fades within 9° of the horizon as well, but for
+    gratings. Dielectrics gain nothing and are as they are; blazed metal gratings lose some of the
+    light of directions that gain nothing, too (docs/energy.md has figures). `false` is the model as
+    it is, for checks. The scale takes a second or more the first time, and is kept in the cache. It
+    follows height_scale, interpolated between a few: an optimisation waits where it enters such an
+    interval for the first time. For its derivative, enable that of height_scale before
+    parameters.update().
 shadowing : string [none]
     `vcavity`: the surface shadows itself like long V-shaped grooves (Torrance and Sparrow 1967);
     `none`.
@@ -160,13 +161,12 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from ..tables.energy.conservation import DirectionalTable
 from .boundary import Kirchhoff
-from .bounded import Bounded
+from .changing import Bounded, arrays_within, marks
 from .coat import CoatedPair
 from .energy import EnergyModel
-from .frozen import arrays_within, marks
 from .layers import Transmission
 from .llvm import require_loaded_llvm
-from .pair import Pair, from_patch, in_patch
+from .pair import Pair, from_patch, in_patch, vcavity
 from .parameters import read_parameters
 from .power import power_model
 from .roles import (
@@ -184,7 +184,6 @@ from .roles import (
     Vector3f,
 )
 from .sampling import COSINE, fold
-from .shadowing import vcavity
 from .sources import TableProvider, from_cache
 
 #: Flatter would be lost in single precision.
@@ -259,8 +258,7 @@ class Diffraction(mi.BSDF):
         density = mi.Float(0.0)
         if above:
             pair = self._pair(si, wo, active)
-            density = self.power.density(pair.outer, self._drawing_scale, si)
-            density = _with_cosine(density, wo)
+            density = self._density(pair, si)
         if nested is not None:
             beneath = self.nested.pdf(nested, si, wo, active)
             density = dr.lerp(beneath, density, self._glossy_share(above, si, active))
@@ -275,9 +273,9 @@ class Diffraction(mi.BSDF):
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         if above:
             pair = self._pair(si, wo, active)
-            power, density = self._power_and_density(pair, si)
+            density = self._density(pair, si)  # before its neighbours fill the caches
+            power = self.power.power(pair, self.height_scale, si)
             value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
-            density = _with_cosine(density, wo)
         if nested is not None:
             beneath = mi.Spectrum(self._beneath(si, wo, active))
             its_value, its_density = self.nested.eval_pdf(nested, si, wo, active)
@@ -374,6 +372,7 @@ class Diffraction(mi.BSDF):
             str(self.boundary),
             self.coat is None,
             self._takes,
+            getattr(self.boundary.material, "reflects_all", False),  # other kernels
         )
         if refused:
             raise DiffractionError("; ".join(refused))
@@ -480,12 +479,11 @@ class Diffraction(mi.BSDF):
             )
         return self.layering.beneath(si, wo, active, ratios)
 
-    def _power_and_density(self, pair: Pair, si: Interaction) -> tuple[Colour, Float]:
-        """Of a pair, and of drawing it."""
-        if self.coat is None:
-            return self.power.power_and_density(pair, self.height_scale, si)
-        power = self.power.power(pair, self.height_scale, si)
-        return power, self.power.density(pair.outer, self._drawing_scale, si)
+    def _density(self, pair: Pair, si: Interaction) -> Float:
+        """Of drawing a pair: by the orders, and a little by the cosine."""
+        orders = self.power.density(pair.outer, self._drawing_scale, si)
+        cosine = mi.warp.square_to_cosine_hemisphere_pdf(pair.outer.wo)
+        return dr.lerp(orders, cosine, COSINE)
 
     @property
     def _drawing_scale(self) -> Float:
@@ -533,11 +531,6 @@ class Diffraction(mi.BSDF):
         mean = dr.mean(mi.unpolarized_spectrum(reflectance))
         # What lies beneath is taken to return half of what it gets
         return dr.clip(mean / (0.5 + 0.5 * mean), 0.1, 0.9)
-
-
-def _with_cosine(density: Float, wo: Vector3f) -> Float:
-    """That of the orders, and a little cosine."""
-    return dr.lerp(density, mi.warp.square_to_cosine_hemisphere_pdf(wo), COSINE)
 
 
 mi.register_bsdf("diffraction", Diffraction)

@@ -92,7 +92,7 @@ class EnergyModel:
         if self._warned or isinstance(self._material, Perfect) or found[0].scale is None:
             return
         albedo = found[0].albedo
-        largest = float(albedo.values[:, albedo.grid.theta <= math.acos(GRAZING)].max())
+        largest = float(albedo.values[:, albedo.grid.theta <= math.radians(80.0)].max())
         if largest > 1.0 + MUCH:
             self._warned = True
             warnings.warn(

@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from .roles import Buffer, Float, Index, Kind, Packet
+from .roles import Buffer, Float, Index, Kind, Mask, Packet
 
 #: Largest number of floats that one packet load fetches.
 PACKET = 16
@@ -27,11 +27,18 @@ def upload(kind: Kind, values: NDArray[np.generic]) -> Buffer:
     return array
 
 
-def read(kind: Kind, source: Buffer, index: Index) -> Float | Index:
-    """One number of what `upload` made."""
+def read(kind: Kind, source: Buffer, index: Index, active: Mask = True) -> Float | Index:
+    """One number of what `upload` made; 0 where it is not asked for."""
     if not dr.is_jit_v(mi.Float):
-        return kind(source[index])
-    return dr.gather(kind, source, index)
+        return kind(source[index] if active else 0)
+    return dr.gather(kind, source, index, active)
+
+
+def float_of_bits(bits: Index) -> Float:
+    """The number of single precision that has these bits."""
+    if not dr.is_jit_v(mi.Float):
+        return float(np.uint32(bits).view(np.float32))
+    return dr.reinterpret_array(mi.Float, bits)
 
 
 def read_packets(source: Buffer, index: Index, floats: int) -> list[Packet]:

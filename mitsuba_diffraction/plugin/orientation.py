@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
-from .bounded import Bounded
+from .changing import Bounded
 from .roles import Callback, Interaction, Mask, Rotation, Texture
 
 #: Degrees; much larger ones leave no digits of the angle in single precision.

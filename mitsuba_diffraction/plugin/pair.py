@@ -1,4 +1,4 @@
-"""What the model asks of a pair of directions, in the patch's frame (Dr.Jit)."""
+"""What the model asks of a pair of directions, in the patch's frame; grooves (Dr.Jit)."""
 
 from __future__ import annotations
 
@@ -6,9 +6,14 @@ from functools import cached_property
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from .roles import Float, Interaction, Mask, Rotation, Vector2f, Vector3f
 from .sampling import unfolded
+
+SHADOWINGS = ("none", "vcavity")
+
+_SMALLEST = float(np.finfo(np.float32).tiny)
 
 
 class Pair:
@@ -73,3 +78,15 @@ def from_patch(q: Vector2f, rotation: Rotation) -> Vector2f:
     """The inverse of `in_patch`."""
     cos, sin = rotation
     return mi.Vector2f(dr.fma(cos, q.x, -sin * q.y), dr.fma(cos, q.y, sin * q.x))
+
+
+def vcavity(cos_i: Float, cos_o: Float, one_plus_dot: Float) -> Float:
+    """min(1, 2(n·h)(n·ωi)/(ωo·h), 2(n·h)(n·ωo)/(ωo·h)): long V-shaped grooves, edges level.
+
+    Torrance and Sparrow 1967 (the form is Blinn's, 1977; Stam 1999, appendix, uses it for
+    diffraction). With ωi + ωo = |ωi + ωo| h and |ωi + ωo|² = 2(1 + ωi·ωo) =: 2·one_plus_dot,
+    (n·h)/(ωo·h) = (cosθi + cosθo)/(1 + ωi·ωo). Symmetric in the two directions.
+    """
+    least = dr.minimum(cos_i, cos_o)
+    edge = dr.maximum(one_plus_dot, _SMALLEST)
+    return dr.minimum(1.0, 2.0 * (cos_i + cos_o) * least / edge)

@@ -22,9 +22,9 @@ from .boundary import MODELS, Boundary, Kirchhoff, SmallSlope
 from .coat import UnderCoat
 from .layers import LAYERINGS, Blend, Layering, Transmission
 from .orientation import Constant, Orientation, Textured
+from .pair import SHADOWINGS
 from .reflectance import Conductor, Dielectric, Perfect, Reflectance
 from .roles import BSDF, Properties, Texture
-from .shadowing import SHADOWINGS
 from .sources import (
     TableProvider,
     from_cache,

@@ -17,7 +17,7 @@ from .pair import Pair
 from .restricted import device_table
 from .rgb_power import rgb_power
 from .roles import Colour, Float, Interaction, Vector2f
-from .sampling import order_sampler
+from .sampling import folded_cosine, order_sampler
 
 
 class PowerModel(Protocol):
@@ -28,11 +28,6 @@ class PowerModel(Protocol):
 
     def density(self, pair: Pair, height_scale: Float, si: Interaction) -> Float:
         """Density per solid angle of drawing ωo: by `draw`, then `sampling.fold`."""
-
-    def power_and_density(
-        self, pair: Pair, height_scale: Float, si: Interaction
-    ) -> tuple[Colour, Float]:
-        """Both at once."""
 
     def wavenumbers(self, si: Interaction) -> list[Float]:
         """2π/λ of each channel, rad/µm."""
@@ -70,33 +65,26 @@ class SpectralPower:
         """See `PowerModel.power`."""
         scaled_w = pair.w * height_scale
 
-        def of_wavelength(k: Float) -> tuple[Float, Float]:
-            return self._power(k, pair, scaled_w), mi.Float(0.0)
+        def of_wavelength(k: Float) -> Float:
+            found = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w)
+            return found * dr.square(k * (0.5 / dr.pi))
 
         differentiable = dr.grad_enabled(pair.uv, scaled_w)
-        return mi.UnpolarizedSpectrum(self._each(of_wavelength, si, differentiable)[0])
+        return mi.UnpolarizedSpectrum(self._each(of_wavelength, si, differentiable))
 
     def density(self, pair: Pair, height_scale: Float, si: Interaction) -> Float:
         """See `PowerModel.density`; the mean of all wavelengths'."""
+        folded, cos_folded = pair.folded, folded_cosine(pair.cos_o)  # the same at all
 
-        def of_wavelength(k: Float) -> tuple[Float, Float]:
-            return mi.Float(0.0), self._density(k, pair, height_scale)
+        def of_wavelength(k: Float) -> Float:
+            strategy = self._sampler.strategy(k, pair.cos_i, dr.detach(height_scale))
+            direct = self._sampler.density(k * pair.uv, *strategy)
+            beyond = self._sampler.density(k * folded, *strategy, cos_folded > 0.0)
+            return dr.fma(direct, pair.cos_o, cos_folded * beyond) * dr.square(k)
 
         differentiable = dr.grad_enabled(pair.uv, pair.cos_i, pair.cos_o)
-        return self._each(of_wavelength, si, differentiable)[1]
-
-    def power_and_density(
-        self, pair: Pair, height_scale: Float, si: Interaction
-    ) -> tuple[Colour, Float]:
-        """See `PowerModel.power_and_density`."""
-        scaled_w = pair.w * height_scale
-
-        def of_wavelength(k: Float) -> tuple[Float, Float]:
-            return self._power(k, pair, scaled_w), self._density(k, pair, height_scale)
-
-        differentiable = dr.grad_enabled(pair.uv, scaled_w, pair.cos_i, pair.cos_o)
-        powers, density = self._each(of_wavelength, si, differentiable)
-        return mi.UnpolarizedSpectrum(powers), density
+        found = self._each(of_wavelength, si, differentiable)
+        return sum(found[1:], found[0]) * (1.0 / len(found))
 
     def draw(
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
@@ -124,51 +112,31 @@ class SpectralPower:
             [dr.exp(apart * square) * (square * (0.5 / dr.pi) ** 2) for square in squares]
         )
 
-    def _power(self, k: Float, pair: Pair, scaled_w: Float) -> Float:
-        power = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w)
-        return power * dr.square(k * (0.5 / dr.pi))
-
-    def _density(self, k: Float, pair: Pair, height_scale: Float) -> Float:
-        strategy = self._sampler.strategy(k, pair.cos_i, dr.detach(height_scale))
-        direct = self._sampler.density(k * pair.uv.x, k * pair.uv.y, *strategy)
-        beyond = self._sampler.density(k * pair.folded.x, k * pair.folded.y, *strategy)
-        return dr.fma(direct, pair.cos_o, 0.5 * beyond) * dr.square(k)
-
     def _wavelengths(self, si: Interaction) -> list[Float]:
         if not mi.is_spectral:
             return [self._fixed]
         return [si.wavelengths[n] for n in range(len(si.wavelengths))]
 
     def _each(
-        self,
-        function: Callable[[Float], tuple[Float, Float]],
-        si: Interaction,
-        differentiable: bool,
-    ) -> tuple[list[Float], Float]:
-        """What function(k) gives first for each wavelength, and the mean of what it gives second.
+        self, function: Callable[[Float], Float], si: Interaction, differentiable: bool
+    ) -> list[Float]:
+        """function(k) for each wavelength.
 
         In a loop, which makes a smaller and faster kernel. Derivatives do not flow through loops
         without further ado, so then it is unrolled; so it is where there is no kernel.
         """
         wavenumbers = self.wavenumbers(si)
         count = len(wavenumbers)
-        first, second = [mi.Float(0.0)] * count, mi.Float(0.0)
         if differentiable or count == 1 or not dr.is_jit_v(mi.Float):
-            for n, k in enumerate(wavenumbers):
-                first[n], more = function(k)
-                second = second + more
-            return first, second * (1.0 / count)
+            return [function(k) for k in wavenumbers]
 
         def body(
-            n: Float, inputs: list[Float], first: list[Float], second: Float
-        ) -> tuple[Float, list[Float], list[Float], Float]:
-            value, more = function(inputs[0])
-            return n + 1, [*inputs[1:], inputs[0]], [*first[1:], value], second + more
+            n: Float, inputs: list[Float], found: list[Float]
+        ) -> tuple[Float, list[Float], list[Float]]:
+            return n + 1, [*inputs[1:], inputs[0]], [*found[1:], function(inputs[0])]
 
-        first = [mi.Float(0.0) for _ in first]
-        state = (mi.UInt32(0), wavenumbers, first, second)
-        _, _, first, second = dr.while_loop(state, lambda n, *_: n < count, body)
-        return first, second * (1.0 / count)
+        state = (mi.UInt32(0), wavenumbers, [mi.Float(0.0) for _ in wavenumbers])
+        return list(dr.while_loop(state, lambda n, *_: n < count, body)[2])
 
 
 def power_model(table: DiffractionTable, wavelength: float) -> PowerModel:

@@ -11,9 +11,8 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
-from .bounded import Bounded
+from .changing import Bounded, children
 from .roles import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Texture
-from .traversal import children
 
 #: Ratios of refractive indices that are taken when one changes.
 INDICES = (1e-3, 1e3)
@@ -43,6 +42,11 @@ class Dielectric:
     ----------
     int_ior, ext_ior : indices, or names that Mitsuba knows.
     name, least : of the ratio as a parameter, and the least that it may become.
+
+    Attributes
+    ----------
+    eta : the ratio.
+    reflects_all : whether there is total reflection: the medium above is the denser one.
     """
 
     def __init__(
@@ -65,12 +69,12 @@ class Dielectric:
 
     def indices(self, si: Interaction, active: Mask) -> list[Number]:
         """The relative index, one for all channels; complex where there is total reflection."""
-        return [mi.Complex2f(self.eta, 0.0) if self._reflects_all else self.eta]
+        return [mi.Complex2f(self.eta, 0.0) if self.reflects_all else self.eta]
 
     def settle(self) -> str | None:
         """See `Bounded.settle`."""
         refused = self._index.settle()
-        self._reflects_all = bool(dr.slice(dr.detach(self.eta)) < 1.0)
+        self.reflects_all = bool(dr.slice(dr.detach(self.eta)) < 1.0)
         return refused
 
     def __str__(self) -> str:

@@ -10,7 +10,7 @@ little of the cosine density bounds the weights where the tables promise no ligh
 
 Near the horizon that density vanishes with cosθo while the raw BRDF times cosθo does not, so that
 weights would have no bound. Meanwhile frequencies just beyond the horizon belong to no direction.
-`fold` turns these into directions near the horizon, with the Jacobian ½ instead of cosθo.
+`fold` turns these into directions near the horizon, with `folded_cosine` instead of cosθo.
 """
 
 from __future__ import annotations
@@ -22,13 +22,15 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..tables.sampling.proposals import BANDED, BANDS, LEVEL, proposals
+from ..tables.sampling.proposals import BANDED, SHIFT, proposals
 from ..tables.table import DiffractionTable
-from .memory import index_between, read, upload
-from .roles import Buffer, Float, Index, Vector2f, Vector3f
+from .memory import float_of_bits, index_between, read, upload
+from .roles import Buffer, Float, Index, Mask, Vector2f, Vector3f
 
 #: Share of the samples drawn from the cosine density.
 COSINE = 0.03
+#: Cosine up to which directions are near the horizon: few, as they need a second look-up.
+HORIZON = 0.4
 #: Bounds of order 0's share: neither part may starve the other.
 LEAST_SHARE = 0.02
 
@@ -63,7 +65,8 @@ class OrderSampler:
         ]
         self._units = upload(mi.Float, found.units * np.float32(largest[0] * largest[1]))
         self._order_0 = upload(mi.Float, found.order_0)
-        self._bands_per_kappa = BANDS / (BANDED * table.expansion.kappa_max)
+        self._last_band = len(found.units) - 1.0
+        self._bands_per_kappa = len(found.units) / (BANDED * table.expansion.kappa_max)
         self._last = len(found.order_0) - 1.0
         self._steps_per_kappa = self._last / table.expansion.kappa_max
 
@@ -76,32 +79,33 @@ class OrderSampler:
         """Share of the samples that order 0 gets; the band of the other orders, and its unit."""
         kappa = k * height_scale
         position = kappa * (cos_i + 0.5) * self._bands_per_kappa
-        band = mi.UInt32(index_between(position, 0.0, BANDS - 1.0))
+        band = mi.UInt32(index_between(position, 0.0, self._last_band))
         nearest = dr.fma(2.0 * kappa * cos_i, self._steps_per_kappa, 0.5)
         power = read(mi.Float, self._order_0, mi.UInt32(index_between(nearest, 0.0, self._last)))
         share = order_0_share(power, cos_i)
         unit = read(mi.Float, self._units, band)
         return dr.select(unit > 0.0, share, 1.0), band, unit
 
-    def density(self, qx: Float, qy: Float, share: Float, band: Index, unit: Float) -> Float:
-        """Density of drawing the frequency (qx, qy), per (rad/µm)²."""
+    def density(
+        self, q: Vector2f, share: Float, band: Index, unit: Float, active: Mask = True
+    ) -> Float:
+        """Density of drawing the frequency q, per (rad/µm)²; 0 where it is not active."""
         variance = self._sigma**2
-        exponent = dr.fma(qx, qx, dr.square(qy)) * (-variance / np.log(2.0))
-        glossy = (variance / dr.pi) * dr.exp2(exponent)
+        glossy = dr.exp2(dr.squared_norm(q) * (-variance / np.log(2.0))) * (variance / dr.pi)
         x, y = (
-            dr.fma(q, 1.0 / cell, -origin / cell)
-            for q, cell, origin in zip((qx, qy), self._cell, self._origin, strict=True)
+            dr.fma(part, 1.0 / cell, -origin / cell)
+            for part, cell, origin in zip(q, self._cell, self._origin, strict=True)
         )
-        inside = (x >= 0.0) & (y >= 0.0) & (x < self._columns) & (y < self._rows)
+        inside = (x >= 0.0) & (y >= 0.0) & (x < self._columns) & (y < self._rows) & active
         column, row = mi.UInt32(dr.select(inside, x, 0.0)), mi.UInt32(dr.select(inside, y, 0.0))
-        word = read(mi.UInt32, self._levels, (band * self._rows + row) * self._words + column // 4)
-        level = (word >> (8 * (column & 3))) & 255
-        cell = unit * dr.exp2(dr.fma(mi.Float(level), 1.0 / LEVEL, -255.0 / LEVEL))
+        index = (band * self._rows + row) * self._words + column // 4
+        level = (read(mi.UInt32, self._levels, index, inside) >> (8 * (column & 3))) & 255
+        cell = unit * float_of_bits(level << SHIFT)
         for position, number, n in ((x, column, 0), (y, row, 1)):
             if self._lobes[n]:
                 distance = (position - mi.Float(number) - 0.5) * self._cell[n]
                 cell *= dr.exp(-variance * dr.square(distance))
-        return dr.lerp(dr.select(inside & (level > 0), cell, 0.0), glossy, share)
+        return dr.select(active, dr.lerp(cell, glossy, share), 0.0)
 
     def draw(
         self, k: Float, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f
@@ -141,11 +145,14 @@ def fold(tangential: Vector2f) -> Vector3f:
     """A unit vector from its tangential part; one from beyond the horizon is laid near it.
 
     Beyond the horizon, ρ² = |tangential|² > 1, the direction has the same azimuth and
-    cosθ = ρ² − 1, so that dω = dcosθ dφ = 2 ρ dρ dφ. From ρ² = 2 on there is none: z is −1.
+    cosθ = h (1 − √(2 − ρ²)), h = `HORIZON`, so that their density fades to 0 at h. From ρ² = 2 on
+    there is none: z is −1.
     """
     squared = dr.squared_norm(tangential)
     beyond = squared > 1.0
-    cos = dr.select(beyond, squared - 1.0, dr.safe_sqrt(1.0 - squared))
+    cos = dr.select(
+        beyond, HORIZON * (1.0 - dr.safe_sqrt(2.0 - squared)), dr.safe_sqrt(1.0 - squared)
+    )
     scale = dr.select(beyond, dr.safe_sqrt(1.0 - dr.square(cos)) * dr.rsqrt(squared), 1.0)
     return mi.Vector3f(
         tangential.x * scale, tangential.y * scale, dr.select(squared < 2.0, cos, -1.0)
@@ -153,10 +160,20 @@ def fold(tangential: Vector2f) -> Vector3f:
 
 
 def unfolded(direction: Vector3f) -> Vector2f:
-    """The tangential part beyond the horizon that `fold` makes this direction of."""
+    """The tangential part beyond the horizon that `fold` makes this direction of, if near it."""
     sin_squared = dr.maximum(1.0 - dr.square(direction.z), _SMALLEST)
-    scale = dr.sqrt((1.0 + direction.z) * dr.rcp(sin_squared))
+    scale = dr.safe_sqrt((2.0 - dr.square(_before(direction.z))) * dr.rcp(sin_squared))
     return mi.Vector2f(direction.x * scale, direction.y * scale)
+
+
+def folded_cosine(cosine: Float) -> Float:
+    """dω = ρ dρ dφ over this, of a direction that `fold` made: √(2 − ρ²) / h."""
+    return _before(cosine) * (1.0 / HORIZON)
+
+
+def _before(cosine: Float) -> Float:
+    """√(2 − ρ²) of what `fold` makes a direction of, 0 where it makes none."""
+    return dr.maximum(dr.fma(cosine, -1.0 / HORIZON, 1.0), 0.0)
 
 
 def invert(

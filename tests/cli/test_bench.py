@@ -56,6 +56,7 @@ def test_everything_is_measured_and_written(measured):
         "build",
         "eval",
         "sample",
+        "eval_pdf",
         "pdf",
         "snake",
         "noise",

@@ -280,3 +280,16 @@ def test_an_instrument_file_needs_no_option(run, shared_afm, here):
     assert ran.code == 0
     assert "channel 'ZSensor'" in ran.out
     assert os.path.exists("nanoscope-10um.exr")
+
+
+def test_a_wide_scan_s_table_says_how_sure_its_mean_is(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    x = 0.1 * np.arange(200)
+    np.save("wide.npy", 0.03 * np.sin(2 * np.pi * x / 1.6) + 0 * x[:, None])
+    ran = run(
+        "precompute", "wide.npy", "--pixel-size", 0.1, "--coherence-width", 5, "--windows", "auto",
+        "--tolerance", 0.05, "--wavelength-range", 500, 600,
+    )  # fmt: skip
+    assert ran.code == 0, ran
+    assert "mean of 9 windows of 10 x 10 µm; its standard error is" in ran.out
+    assert '"number": 9' in run("info", "wide.exr", "--json").out

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mitsuba_diffraction.streams import own_program
 from tests.fuzz import cached, command_lines, damage, surfaces
 
 KINDS: dict[str, Callable[[np.random.Generator], None]] = {
@@ -114,7 +115,7 @@ def _work(args: argparse.Namespace, kinds: list[str], seed: int) -> int:
     start = time.monotonic()
     spent = dict.fromkeys(kinds, 0.0)
     number = dict.fromkeys(kinds, args.worker)
-    with args.log.open("w", encoding="utf-8", buffering=1) as log:
+    with own_program(), args.log.open("w", encoding="utf-8", buffering=1) as log:
         while time.monotonic() - start < args.seconds:
             kind = min(kinds, key=lambda k: spent[k] / _SHARES[k])
             entry = {"kind": kind, "number": number[kind]}

@@ -8,7 +8,7 @@ from tests.fuzz.__main__ import KINDS, run_case
 
 #: How many of each kind take about a second together.
 FEW = {"tables": 60, "documents": 100, "heights": 40, "texts": 30, "commands": 15, "surfaces": 2}
-FEW |= {"cache": 20, "scenes": 20}
+FEW |= {"cache": 10, "scenes": 20}
 
 #: (kind, seed, case): what `python -m tests.fuzz` has found.
 FOUND = [

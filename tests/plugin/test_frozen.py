@@ -90,3 +90,19 @@ def test_frozen_eval_and_sample_follow_their_parameters(variant):
             for a, b in zip(found, expected, strict=True):
                 a, b = np.array(a, float), np.array(b, float)
                 assert a == pytest.approx(b, rel=1e-4, abs=1e-5 * np.abs(b).max())
+
+
+def test_frozen_eval_follows_an_index_into_total_reflection(variant):
+    context = mi.BSDFContext()
+    evaluate = dr.freeze(lambda bsdf, si, wo: bsdf.eval(context, si, wo))
+    bsdf = mi.load_dict(md.bsdf_dict(PATCH, coherence_width=4.0, energy_conserving=False))
+    parameters = mi.traverse(bsdf)
+    wi, wo = pairs()
+    si, wo = interaction(wi, WAVELENGTHS), vectors(wo)
+    dr.eval(si, wo)
+    for eta in (1.5, 1.3, 0.7, 0.8):
+        parameters["eta"] = eta
+        parameters.update()
+        expected = np.array(bsdf.eval(context, si, wo))
+        found = np.array(evaluate(bsdf, si, wo))
+        assert found == pytest.approx(expected, rel=1e-4, abs=1e-5 * float(np.abs(expected).max()))

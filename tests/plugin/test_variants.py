@@ -13,29 +13,11 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from tests.directions import Array, as_single, rough_patch, uniform_directions
+from tests.plugin.conftest import runs
 
 WIDTH = 8.0  # µm
 HEIGHTS = rough_patch((90, 100), (0.085, 0.09), 0.2, 0.9)
 N = 24
-
-
-def runs(name: str) -> bool:
-    """Whether the machine runs a variant."""
-    if name.startswith("cuda"):
-        return bool(dr.has_backend(dr.JitBackend.CUDA))
-    return name.startswith("scalar") or bool(dr.has_backend(dr.JitBackend.LLVM))
-
-
-ALL = [name for name in mi.variants() if name.startswith(("scalar", "llvm", "cuda"))]
-
-
-@pytest.fixture(params=ALL)
-def name(request: pytest.FixtureRequest) -> str:
-    """A variant, set."""
-    if not runs(request.param):
-        pytest.skip(f"{request.param}: Dr.Jit finds no device for it")
-    mi.set_variant(request.param)
-    return str(request.param)
 
 
 def load(**parameters: Any) -> Any:
@@ -63,9 +45,16 @@ def interaction(wi: Array, wavelengths: Array) -> Any:
     return si
 
 
-def evaluate(bsdf: Any, wi: Array, wo: Array, samples: Array, wavelengths: Array) -> list[Array]:
+def evaluate(
+    bsdf: Any,
+    wi: Array,
+    wo: Array,
+    samples: Array,
+    wavelengths: Array,
+    component: int | None = None,
+) -> list[Array]:
     """Value (n, channels), pdf, value again, pdf again; then sampled wo, pdf, weight."""
-    context = mi.BSDFContext()
+    context = mi.BSDFContext(mi.TransportMode.Radiance, int(mi.BSDFFlags.All), component)
 
     def once(si: Any, wo: Any, one: Any, two: Any) -> list[Array]:
         together = bsdf.eval_pdf(context, si, wo)
@@ -115,7 +104,7 @@ def wavelengths() -> Array:
     return as_single(np.random.default_rng(4).uniform(400.0, 700.0, (N, 4)))
 
 
-def test_values_are_those_of_the_table(name: str) -> None:
+def test_values_are_those_of_the_table(every_variant: str) -> None:
     wi, wo, samples = pairs()
     lam = wavelengths()
     value = evaluate(load(material="none", wavelength=600.0), wi, wo, samples, lam)[0]
@@ -125,27 +114,55 @@ def test_values_are_those_of_the_table(name: str) -> None:
 
 
 @pytest.mark.parametrize("kind", ["dielectric", "conductor", "nested"])
-def test_value_density_and_sample_agree(name: str, kind: str) -> None:
+def test_value_density_and_sample_agree(every_variant: str, kind: str) -> None:
     parameters = {
         "dielectric": {},
         "conductor": {"material": "Au", "shadowing": "vcavity"},
         "nested": {"nested": {"type": "diffuse", "reflectance": 0.5}},
     }[kind]
-    bsdf = load(wavelength=600.0, orientation=25.0, **parameters)
+    check_agreement(load(wavelength=600.0, orientation=25.0, **parameters))
+
+
+def check_agreement(bsdf: Any, component: int | None = None) -> Array:
+    """`eval`, `pdf`, `eval_pdf` and `sample` of a context's component; returns the values."""
     wi, wo, samples = pairs()
     lam = wavelengths()
-    value, pdf, again, pdf_again, drawn, drawn_pdf, weight = evaluate(bsdf, wi, wo, samples, lam)
+    value, pdf, again, pdf_again, drawn, drawn_pdf, weight = evaluate(
+        bsdf, wi, wo, samples, lam, component
+    )
     assert again == pytest.approx(value, rel=1e-5)
     assert pdf_again == pytest.approx(pdf, rel=1e-5)
     assert np.all(pdf > 0.0)
     valid = drawn_pdf > 0.0
     assert valid.sum() > N // 2
     wi, drawn, samples, lam = wi[valid], drawn[valid], samples[valid], lam[valid]
-    value, pdf, *_ = evaluate(bsdf, wi, drawn, samples, lam)
+    there, pdf, *_ = evaluate(bsdf, wi, drawn, samples, lam, component)
     assert drawn_pdf[valid] == pytest.approx(pdf, rel=1e-3)
     assert weight[valid] * pdf[:, None] == pytest.approx(
-        value, rel=2e-3, abs=1e-5 * np.abs(value).max()
+        there, rel=2e-3, abs=1e-5 * np.abs(there).max()
     )
+    return value
+
+
+def test_components_add_up_and_are_drawn_as_they_are_evaluated(every_variant: str) -> None:
+    grey = {"type": "diffuse", "reflectance": 0.5}
+    bsdf = load(wavelength=600.0, nested=grey)
+    both, above, beneath = (check_agreement(bsdf, component) for component in (None, 0, 1))
+    assert above + beneath == pytest.approx(both, rel=1e-5)
+    assert above == pytest.approx(check_agreement(load(wavelength=600.0)), rel=1e-5)
+
+
+def test_a_picture_of_directions_turns_as_degrees_do(every_variant: str) -> None:
+    angle = np.deg2rad(25.0)
+    picture = np.broadcast_to([np.cos(angle), np.sin(angle), 0.0], (2, 2, 3)).astype(np.float32)
+    texture = {"type": "bitmap", "raw": True, "data": mi.TensorXf(picture)}
+    wi, wo, samples = pairs()
+    turned, expected = (
+        evaluate(load(wavelength=600.0, orientation=by), wi, wo, samples, wavelengths())[0]
+        for by in (texture, 25.0)
+    )
+    # the angle's sine in single precision, times kσ = 20
+    assert turned == pytest.approx(expected, rel=1e-4, abs=1e-5 * expected.max())
 
 
 def test_one_wavelength_is_the_spectrum_there() -> None:
@@ -162,7 +179,7 @@ def test_one_wavelength_is_the_spectrum_there() -> None:
     assert mono == pytest.approx(spectral[:, :1], rel=1e-4, abs=1e-6 * spectral.max())
 
 
-def test_a_wavelength_outside_the_table_is_refused(name: str) -> None:
+def test_a_wavelength_outside_the_table_is_refused(every_variant: str) -> None:
     with pytest.raises(RuntimeError, match="wavelength=900 nm is outside the table's 360 to 830"):
         load(wavelength=900.0)
 
@@ -226,11 +243,11 @@ WHITE = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 1.0}}
 
 
 def test_a_small_scene_has_the_colours_of_the_spectral_one(
-    request: pytest.FixtureRequest, name: str
+    request: pytest.FixtureRequest, every_variant: str
 ) -> None:
-    scalar, mono = name.startswith("scalar"), "mono" in name
+    scalar, mono = every_variant.startswith("scalar"), "mono" in every_variant
     truth = request.getfixturevalue("line_picture" if mono else "spectral_picture")
-    mi.set_variant(name)
+    mi.set_variant(every_variant)
     found = picture(32 if scalar else 1024)
     if mono:
         found = found[..., 0] / picture(16, WHITE)[..., 0]

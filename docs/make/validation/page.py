@@ -79,7 +79,7 @@ def write_report(folder: Path, *, quick: bool = False, progress: Progress | None
         ),
         sections.slopes(kirchhoff, default),
         sections.edges(kirchhoff, default),
-        sections.coated(coated.deviations(coated.GRATINGS[:1] if quick else coated.GRATINGS)),
+        coated.section(coated.GRATINGS[:1] if quick else coated.GRATINGS),
         sections.probe(perfect),
         sections.polarisation(perfect),
         sections.solutions(comparisons, patch_sections.second_solver()),

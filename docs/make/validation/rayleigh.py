@@ -59,24 +59,86 @@ def solve(
     DiffractionError
         If heights are beyond what the series of exp(iγh) can sum.
     """
-    k = float(wavenumber(wavelength))
-    width, height = field.extent
-    orders = lowest_orders(-wi, wavelength / 1000, (width, height), is_crossed(field), harmonics)
-    tangential = -wi[:2] + orders * (2 * np.pi / k / np.array([width, height]))
-    above = decaying_root(1.0 - np.sum(tangential**2, axis=1) + 0j)
-    below = decaying_root(complex(index) ** 2 - np.sum(tangential**2, axis=1))
-    out = np.column_stack([tangential, above])
-    down = np.column_stack([-tangential, -below])
-    zeroth = int(np.flatnonzero((orders == 0).all(axis=1))[0])
-    into = out[zeroth : zeroth + 1] * [1, 1, -1]
-    spectra = _Spectra(field, k)
+    waves = _Waves(field, index, wavelength, wi, harmonics)
+    into = waves.incident
+    down = waves.below * [-1, -1, -1]
     tests = _axes(down, index)
-    reflected = _coupling(tests, down, _axes(out, 1.0), out, orders, orders, spectra)
-    incident = _coupling(
-        tests, down, _axes(into, 1.0), into, orders, orders[zeroth : zeroth + 1], spectra
-    )
+    reflected = waves.coupling(tests, down, _axes(waves.above, 1.0), waves.above)
+    incident = waves.coupling(tests, down, _axes(into, 1.0), into)
     found = _solved(reflected, -incident)
-    return _orders(orders, out, wi, found, k * float(field.heights.mean()))
+    return _orders(waves, wi, found, waves.k * float(field.heights.mean()))
+
+
+def transmitted(
+    field: HeightField,
+    index: complex,
+    wavelength: float,
+    wi: NDArray[np.float64],
+    harmonics: int,
+) -> float:
+    """Share of unpolarised light that a dielectric lets through, all orders; as `solve`.
+
+    From equations of its own: with test waves that go up in the air, whose product with all that is
+    reflected carries nothing. That both add up to 1 is thus no matter of course.
+    """
+    waves = _Waves(field, index, wavelength, wi, harmonics)
+    up, down = waves.above * [-1, -1, 1], waves.below * [1, 1, -1]
+    tests = _axes(up, 1.0)
+    matrix = waves.coupling(tests, up, _axes(down, index), down)
+    # the light meets its own test wave alone: γ is 0, and the flux that of a level plane
+    right = np.zeros((2 * len(up), 2), complex)
+    zeroth, into = waves.zeroth, waves.incident[0]
+    for row, test in enumerate(tests[:, zeroth]):
+        for column, e in enumerate(_axes(waves.incident, 1.0)[:, 0]):
+            flux = np.cross(e, np.cross(up[zeroth], test)) - np.cross(test, np.cross(into, e))
+            right[row * len(up) + zeroth, column] = flux[2]
+    power = np.abs(_solved(matrix, right)) ** 2
+    return float(0.5 * np.sum(np.tile(waves.below[:, 2].real, 2)[:, None] * power) / wi[2])
+
+
+class _Waves:
+    """The plane waves of a period, κ in units of 2π/λ, in vacuum (above) and the material (below).
+
+    Both go up; `incident` (1, 3) goes down.
+    """
+
+    def __init__(
+        self, field: HeightField, index: complex, wavelength: float, wi: Real, harmonics: int
+    ) -> None:
+        self.k = float(wavenumber(wavelength))
+        extent = field.extent
+        crossed = is_crossed(field)
+        self.orders = lowest_orders(-wi, wavelength / 1000, extent, crossed, harmonics)
+        tangential = -wi[:2] + self.orders * (2 * np.pi / self.k / np.array(extent))
+        square = np.sum(tangential**2, axis=1)
+        above, below = (decaying_root(n**2 - square) for n in (1.0 + 0j, complex(index)))
+        self.above = np.column_stack([tangential, above])
+        self.below = np.column_stack([tangential, below])
+        self.zeroth = int(np.flatnonzero((self.orders == 0).all(axis=1))[0])
+        self.incident = self.above[self.zeroth : self.zeroth + 1] * [1, 1, -1]
+        self._spectra = _Spectra(field, self.k)
+
+    def coupling(self, tests: Complex, to: Complex, fields: Complex, waves: Complex) -> Complex:
+        """(κ+κ')·(e×(κ'×e') − e'×(κ×e)) I(γ)/γ of test waves and waves, (2 rows, 2 columns).
+
+        tests, fields : (2, n, 3) s and p fields of test waves `to` (n, 3), and of all waves or the
+        incident one.
+        """
+        columns = self.orders if len(waves) > 1 else self.orders[self.zeroth : self.zeroth + 1]
+        total = waves[None, :, :] + to[:, None, :]
+        weight = self._spectra.over_gamma(
+            total[..., 2], columns[None, :, :] - self.orders[:, None, :]
+        )
+        blocks = []
+        for e_test in tests:
+            h_test = np.cross(to, e_test)
+            row = []
+            for e in fields:
+                h = np.cross(waves, e)
+                flux = np.cross(e[None], h_test[:, None]) - np.cross(e_test[:, None], h[None])
+                row.append(np.sum(total * flux, axis=2) * weight)
+            blocks.append(row)
+        return np.asarray(np.block(blocks))
 
 
 def _solved(matrix: Complex, right: Complex) -> Complex:
@@ -96,31 +158,6 @@ def _axes(vector: Complex, index: complex) -> Complex:
         [np.where(slanted, -y / safe, 0.0), np.where(slanted, x / safe, 1.0), np.zeros(len(x))]
     ).astype(complex)
     return np.stack([s, np.cross(vector / index, s)])
-
-
-def _coupling(
-    tests: Complex,
-    down: Complex,
-    fields: Complex,
-    waves: Complex,
-    rows: NDArray[np.int64],
-    columns: NDArray[np.int64],
-    spectra: _Spectra,
-) -> Complex:
-    """(κ+κ')·(e×(κ'×e') − e'×(κ×e)) I(γ)/γ of test waves and waves, (2 rows, 2 columns)."""
-    gamma = waves[None, :, 2] + down[:, None, 2]
-    weight = spectra.over_gamma(gamma, columns[None, :, :] - rows[:, None, :])
-    total = waves[None, :, :] + down[:, None, :]
-    blocks = []
-    for e_test in tests:
-        h_test = np.cross(down, e_test)
-        row = []
-        for e in fields:
-            h = np.cross(waves, e)
-            flux = np.cross(e[None], h_test[:, None]) - np.cross(e_test[:, None], h[None])
-            row.append(np.sum(total * flux, axis=2) * weight)
-        blocks.append(row)
-    return np.asarray(np.block(blocks))
 
 
 class _Spectra:
@@ -156,19 +193,18 @@ class _Spectra:
         return found
 
 
-def _orders(
-    orders: NDArray[np.int64], out: Complex, wi: Real, found: Complex, mean: float
-) -> Orders:
+def _orders(waves: _Waves, wi: Real, found: Complex, mean: float) -> Orders:
     """Of the amplitudes (2n, 2), those that travel, about `boundary.polarisation_axes`.
 
     mean : of the heights, which the amplitudes' phases are from.
     """
+    out = waves.above
     kept = (np.abs(out[:, 2].imag) == 0) & (out[:, 2].real > HORIZON)
     wo = out[kept].real
-    both = np.moveaxis(found.reshape(2, len(orders), 2), 1, 0)[kept]
+    both = np.moveaxis(found.reshape(2, len(out), 2), 1, 0)[kept]
     axes = _axes(out[kept], 1.0)[0].real
-    basis = _axes(-wi[None].astype(complex), 1.0)[0].real[0]
+    basis = _axes(waves.incident, 1.0)[0].real[0]
     s_in, s_out = boundary.polarisation_axes(wi, wo)
     turned = boundary.turn(s_out, axes, wo) @ both @ boundary.turn(basis, s_in, -wi)
     phase = np.exp(-1j * mean * (wi[2] + wo[:, 2]))
-    return Orders(orders[kept], wo, phase[:, None, None] * turned)
+    return Orders(waves.orders[kept], wo, phase[:, None, None] * turned)

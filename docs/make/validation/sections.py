@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
 
-from .cases import COAT, MATERIALS, PERIODS, PROBE_GRATING, PROFILES, Grating
+from .cases import MATERIALS, PERIODS, PROBE_GRATING, PROFILES, Grating
 from .closed_forms import ANGLES, deviations
 from .compare import GRAZING, Comparison, angles_of, gratings_of, table_of
 from .limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT, rms_slope, slope_limit
@@ -237,32 +237,6 @@ Without an index the model knows no polarisation, and stands for the mean. Held 
 time (TE: the electric field along the grooves) it is further off. Deviation of all orders:
 
 {table(["grating", "light", *(f"{theta:g}°" for theta in angles)], rows)}"""
-
-
-def coated(found: Sequence[tuple[str, str, dict[str, float]]]) -> str:
-    """The coat: from `coated.deviations`."""
-    rows = [
-        [grating, theta, *(percent(values[name]) for name in ("single", "left out", "bounced"))]
-        for grating, theta, values in found
-    ]
-    header = ["grating", "incidence", "one passage", "share of the bounces", "with bounces"]
-    return f"""## Under a coat
-
-Aluminium under polycarbonate (`coat_ior` {COAT:g}). The rigorous solutions are those of the
-interface inside the coat, as matrices between all orders there, which the coat's faces then
-transmit and send back, in powers (docs/make/validation/coated.py; sinusoids by Rayleigh's
-expansion, the others by `gratinglab`): *one passage* is light that is diffracted once, *with
-bounces* the whole series, also of the light that is reflected totally.
-Deviation of colours of the default model: from the first without its own bounces (G = 1), from the
-second as it is. *Share of the bounces* is what of the rigorous colours has come back from the face
-at least once: what a model without bounces would miss.
-
-{table(header, rows)}
-
-Refraction and transmission are right to within a few tenths of a per cent on gentle sinusoids,
-walls deviate as without a coat. Of the bounces, the model has those between two mirrors; what is
-left is light that is diffracted twice, much of it spread beyond the critical angle, all of which
-comes back and leaves from there: the steeper and the more oblique, the more."""
 
 
 def random_surfaces(measured: Statistics) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -31,6 +32,7 @@ from .figures import Goal, Plan, Row, Section
 
 FLOOR = "bare gathers of the defaults"
 _TIMES = "ns/call"
+_EVAL = "× eval"
 _BASELINES = {"× roughconductor": ALUMINIUM, "× defaults": DEFAULT, "× gathers": FLOOR}
 
 
@@ -67,24 +69,33 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
 
 
 def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Section]:
-    """Nanoseconds for `sample` and for `pdf`, of the contenders that differ in them."""
+    """Nanoseconds for `sample`, `eval_pdf` and `pdf`, beside those of `eval` in the same rounds."""
     queries = _queries(plan, False)
-    context = mi.BSDFContext()
-    factories = bsdf_factories(tables)
-    chosen = {name: factories[name]() for name in (ALUMINIUM, DEFAULT, DEFAULT_AL)}
-    lanes = dict.fromkeys(chosen, plan.lanes)
+    context, factories = mi.BSDFContext(), bsdf_factories(tables)
+    drawing = (context, queries.si, queries.sample1, queries.sample2)
+    calls: dict[str, Callable[[], Any]] = {}
+    names = (ALUMINIUM, DEFAULT, DEFAULT_AL)
+    for name in names:
+        bsdf = factories[name]()
+        calls[f"sample {name}"] = partial(bsdf.sample, *drawing)
+        for what in ("eval", "eval_pdf", "pdf"):
+            calls[f"{what} {name}"] = partial(getattr(bsdf, what), context, queries.si, queries.wo)
+    lanes = dict.fromkeys(calls, plan.lanes)
+    times = _nanoseconds(plan, calls, lanes, "eval, sample and pdf", progress)
     sections = []
-    for what in ("sample", "pdf"):
-        calls: dict[str, Callable[[], Any]] = {}
-        for name, bsdf in chosen.items():
-            if what == "sample":
-                calls[name] = partial(
-                    bsdf.sample, context, queries.si, queries.sample1, queries.sample2
-                )
-            else:
-                calls[name] = partial(bsdf.pdf, context, queries.si, queries.wo)
-        times = _nanoseconds(plan, calls, lanes, what, progress)
-        sections.append(_section(f"{what}: {_conditions(plan, tables)}", times, lanes, {}))
+    for what, most in (("sample", 1.5), ("eval_pdf", 1.15), ("pdf", None)):
+        own = {name: times[f"{what} {name}"] for name in names}
+        evals = {name: ratio(own[name], times[f"eval {name}"]) for name in names}
+        goals = {
+            name: [Goal(f"at most {most:g}× eval", evals[name] <= most)]
+            for name in (DEFAULT, DEFAULT_AL)
+            if most is not None
+        }
+        title = f"{what}: {_conditions(plan, tables)}"
+        found = _section(title, own, dict.fromkeys(own, plan.lanes), goals)
+        for row in found.rows:
+            row.values[_EVAL] = evals[row.name]
+        sections.append(replace(found, columns=(*found.columns, _EVAL)))
     return sections
 
 

@@ -100,5 +100,7 @@ def _without_plane(field: HeightField) -> tuple[npt.NDArray[np.float64], float, 
     slope_x, slope_y = plane_of(field)
     x = (np.arange(nx) - (nx - 1) / 2) * dx
     y = (np.arange(ny) - (ny - 1) / 2) * dy
-    heights = field.heights - slope_x * x - (slope_y * y)[:, None]
+    heights = field.heights - slope_x * x
+    heights -= (slope_y * y)[:, None]
+    heights.setflags(write=False)  # so that a HeightField need not copy it
     return heights, slope_x * field.extent[0], slope_y * field.extent[1]

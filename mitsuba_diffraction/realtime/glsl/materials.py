@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from ...optics.geometry import wavenumber
-from ...plugin.traversal import children
+from ...plugin.changing import children
 from ...tables.table import DiffractionTable
 from .packing import pack_beneath, pack_conductor, pack_energy, pack_roughness
 from .textures import Packed, Texture, Uniform, as_half

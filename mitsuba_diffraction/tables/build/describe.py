@@ -16,6 +16,8 @@ from .spectrum import Spectrum
 from .windows import Windows
 
 _SLOW = 150  # orders read in a look-up; 16 are usual
+#: Points of a patch beyond which its roughness is that of windows with so many a side.
+_LARGE, _PART = 2**25, 2048
 _GREEN = 550.0  # nm, where the variation between patches is stated
 
 
@@ -67,7 +69,13 @@ def roughness_of(patches: Sequence[HeightField], q_max: float) -> RoughnessTable
     """Height variance by spatial frequency up to q_max (rad/µm), the mean of all patches'."""
     if isinstance(patches, Windows):
         return ScaleRoughness.mean(patches.roughness()).table(q_max)
-    each = [ScaleRoughness.of(patch.heights, patch.pixel_size) for patch in patches]
+    each = []
+    for patch in patches:
+        if patch.heights.size <= _LARGE:
+            each.append(ScaleRoughness.of(patch.heights, patch.pixel_size))
+        else:  # whose transform would take ten times its memory
+            width = _PART * min(patch.pixel_size)
+            each.append(ScaleRoughness.mean(Windows([patch], width).roughness()))
     return ScaleRoughness.mean(each).table(q_max)
 
 

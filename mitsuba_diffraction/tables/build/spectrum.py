@@ -45,7 +45,10 @@ class Spectrum:
         self.complex_type: Any = np.complex128 if double else np.complex64
         lowest, highest = float(field.heights.min()), float(field.heights.max())
         self.half_range = 0.5 * (highest - lowest)
-        self.heights = (field.heights - 0.5 * (highest + lowest)).astype(self.real_type)
+        # in double precision, but without a copy in it
+        self.heights = np.empty(field.shape, self.real_type)
+        middle = 0.5 * (highest + lowest)
+        np.subtract(field.heights, middle, out=self.heights, dtype=np.float64, casting="same_kind")
         self.last = last
         self._columns = _Crop(self.heights.shape[1], last[0])
         self._rows = _Crop(self.heights.shape[0], last[1])

@@ -307,7 +307,7 @@ class _Maps:
             for n, transport in enumerate(transports):
                 mean = 0.5 * (s[n] + s[min(n + 1, len(s) - 1)])
                 found = (here(mean) * transport(mean)).reshape(grid.polar, parts, -1, parts)
-                much[n] = _largest_around(np.maximum(found.max(axis=(1, 3)), 1.0))
+                much[n] = _largest_around(np.maximum(found.max(axis=(1, 3)) / CEILING, 1.0))
             much = _of_both_pages(much, len(s))
             s /= 1.0 + PEAKS * (much - 1.0) if turn == GENTLE else np.sqrt(much)
         return DirectionalTable(scale.wavelengths, s)

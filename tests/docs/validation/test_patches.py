@@ -130,6 +130,17 @@ def test_it_is_reciprocal_between_any_planes():
         assert back.jones[same].T * signs * ratio == pytest.approx(there.jones[n], abs=1e-5)
 
 
+@pytest.mark.parametrize(("name", "allowed"), [("crossed grating", 1e-6), ("CD's pits, low", 1e-3)])
+def test_what_is_reflected_and_what_goes_through_add_up(name, allowed):
+    field = cell(SURFACES[name])
+    wi = np.array([0.5, 0.2, np.sqrt(1 - 0.29)])
+    found = rayleigh.solve(field, 1.56, 550.0, wi, 317)
+    back = np.sum(boundary.unpolarised(found.jones) * found.wo[:, 2]) / wi[2]
+    through = rayleigh.transmitted(field, 1.56, 550.0, wi, 317)
+    assert 0.9 < through < 0.97
+    assert back + through == pytest.approx(1.0, abs=allowed)
+
+
 def test_two_solvers_agree_on_keratin_within_what_layers_and_harmonics_still_change():
     for agreement in agreements():
         assert agreement.deviation < agreement.second_change, agreement.case

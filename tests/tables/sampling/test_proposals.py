@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionTable, HeightField
 from mitsuba_diffraction.heights import gratings
-from mitsuba_diffraction.tables.sampling.proposals import BANDED, BANDS, LEVEL, proposals
+from mitsuba_diffraction.tables.sampling.proposals import BANDED, BANDS, density_of, proposals
 from tests.directions import rough_patch
 
 PATCH = rough_patch((50, 41), (0.08, 0.09), 0.2)
@@ -30,7 +30,7 @@ def test_levels_are_the_densities_of_the_sums():
     found = proposals(DiffractionTable.build(PATCH, coherence_width=3.7))
     cells = np.diff(found.rows, axis=1)[..., None] * np.diff(found.columns, axis=2)
     levels = found.levels[..., : cells.shape[2]]
-    expected = np.where(levels, found.units[:, None, None] * 2.0 ** ((levels - 255.0) / LEVEL), 0.0)
+    expected = found.units[:, None, None] * density_of(levels)
     # differences of sums near 1 in single precision
     assert cells == pytest.approx(expected, rel=1e-3, abs=2e-7)
 

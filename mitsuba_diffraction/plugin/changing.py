@@ -1,4 +1,4 @@
-"""What `dr.freeze` must know of a BSDF: the arrays that its kernels read, and their constants.
+"""What changes between renderings: bounded parameters, and what `dr.freeze` must know of a BSDF.
 
 A frozen function refuses arrays that it was not told of. Of a plugin written in Python, Dr.Jit sees
 the attributes: arrays, lists of them and Mitsuba's own objects, but not what plain Python objects
@@ -9,15 +9,71 @@ which are part of the recorded kernels: given another patch, it would go on with
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
 from ..tables.table import DiffractionTable
+from .roles import Callback, Float
 
 _OURS = __name__.rpartition(".")[0]
+
+
+class Bounded:
+    """A differentiable number between bounds.
+
+    Parameters
+    ----------
+    name : for `mi.traverse`.
+    value : the first.
+    low, high : the least and the largest that are taken.
+    refusal : what to say of another one.
+
+    Attributes
+    ----------
+    high : as given.
+    value : mi.Float, the same object ever after: Mitsuba assigns to it.
+    """
+
+    def __init__(
+        self, name: str, value: float, low: float, high: float, refusal: Callable[[float], str]
+    ) -> None:
+        self.value: Float = mi.Float(value)
+        self.high = high
+        self._name, self._low, self._refusal = name, low, refusal
+        self._last: Float = mi.Float(value)
+
+    def settle(self) -> str | None:
+        """Take the value given, as a variable, so that kernels stay; or say why it is refused."""
+        given = np.array(dr.detach(self.value), float).ravel()
+        wrong = given[~((given >= self._low) & (given <= self.high))]
+        if len(wrong):
+            if dr.is_jit_v(self.value):
+                mi.set_property(self.value, self._last)
+            return self._refusal(float(wrong[0]))
+        dr.make_opaque(self.value)
+        self._last = mi.Float(dr.detach(self.value))
+        return None
+
+    def traverse(self, callback: Callback) -> None:
+        """Expose it."""
+        callback.put(self._name, self.value, mi.ParamFlags.Differentiable)
+
+
+def children(thing: Any) -> dict[str, Any]:
+    """The objects that one of Mitsuba's shows to `traverse`, by name."""
+    found: dict[str, Any] = {}
+
+    class Collector(mi.TraversalCallback):
+        def put(self, name: str, value: Any, *rest: Any) -> None:
+            if isinstance(value, mi.Object):
+                found[name] = value
+
+    thing.traverse(Collector())
+    return found
 
 
 def arrays_within(*holders: Any) -> list[Any]:

@@ -1,0 +1,25 @@
+"""Every variant of Mitsuba that this machine runs."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import pytest
+
+ALL = [name for name in mi.variants() if name.startswith(("scalar", "llvm", "cuda"))]
+
+
+def runs(name: str) -> bool:
+    """Whether the machine runs a variant."""
+    if name.startswith("cuda"):
+        return bool(dr.has_backend(dr.JitBackend.CUDA))
+    return name.startswith("scalar") or bool(dr.has_backend(dr.JitBackend.LLVM))
+
+
+@pytest.fixture(params=ALL)
+def every_variant(request: pytest.FixtureRequest) -> str:
+    """A variant, set."""
+    if not runs(request.param):
+        pytest.skip(f"{request.param}: Dr.Jit finds no device for it")
+    mi.set_variant(request.param)
+    return str(request.param)
