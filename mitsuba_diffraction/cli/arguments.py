@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..errors import DiffractionError, quoted
-from ..scene.animation import Change, change_of
+from ..scene.parameters import Change, change_of
 
 
 def path_ending_in(*suffixes: str) -> Callable[[str], Path]:

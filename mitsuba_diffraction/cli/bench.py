@@ -10,9 +10,8 @@ from pathlib import Path
 
 from ..errors import DiffractionError
 from .arguments import path_ending_in
-from .console import say_warning
+from .console import Bar, say_warning
 from .options import add_json, add_own_patch, check_own_patch, own_patch
-from .progress import Bar
 from .report import save_report
 
 PARTS = ("build", "eval", "sample", "snake", "noise", "efficiency", "colours")
@@ -47,7 +46,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 def run(args: argparse.Namespace) -> int:
     """Measure and print, and return the exit code; a missed goal is no failure."""
     check_own_patch(args)
-    from ..analysis.bench.history import compared, read_run
+    from ..analysis.bench.figures import compared, read_run
 
     earlier = read_run(args.against) if args.against is not None else None
     parts = (args.only,) if args.only else PARTS
@@ -55,11 +54,11 @@ def run(args: argparse.Namespace) -> int:
         _check_scenes(args.scenes)
     from tqdm import tqdm
 
-    from ..analysis.bench import plan
+    from ..analysis.bench import figures
     from ..analysis.bench.machine import describe_machine
     from ..analysis.bench.run import sections
 
-    chosen = plan.QUICK if args.quick else plan.FULL
+    chosen = figures.QUICK if args.quick else figures.FULL
     machine = describe_machine()
     print("; ".join(f"{name} {value}" for name, value in machine.items()), flush=True)
     if machine["load"] > 0.5 * machine["cores"]:

@@ -11,6 +11,7 @@ from typing import Any
 from ..errors import DiffractionError, DiffractionWarning
 from ..optics.colour import ILLUMINANTS
 from .arguments import number_between, path_ending_in
+from .console import Bar
 from .options import (
     add_direction,
     add_exposure,
@@ -24,13 +25,11 @@ from .options import (
     given_for_heights,
     in_library,
     load_options,
+    load_patch,
     table_options,
     wavelengths,
 )
-from .output import check_outputs
-from .patch import load_patch
-from .progress import Bar
-from .report import save_report
+from .report import check_outputs, save_report
 
 _KEPT = "that of the table or recipe, else "
 _TABLE = {

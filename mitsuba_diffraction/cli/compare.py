@@ -9,11 +9,9 @@ from pathlib import Path
 from ..errors import DiffractionError
 from ..realtime.glsl.source import METHODS
 from .arguments import whole_number
-from .console import mitsuba_warnings
+from .console import Bar, mitsuba_warnings
 from .options import add_json, add_samples, add_scene, scene_parameters
-from .output import check_writable
-from .progress import Bar
-from .report import plain, save_json, save_report
+from .report import check_writable, plain, save_json, save_report
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 from ..errors import DiffractionError, DiffractionWarning
 from ..settings import TableSettings
 from .arguments import path_ending_in, whole_number
-from .console import say_warning
+from .console import Bar, say_warning
 from .options import (
+    TABLE_NAMES,
     add_direction,
     add_heights,
     add_json,
@@ -22,12 +23,11 @@ from .options import (
     add_table,
     add_wavelengths,
     in_library,
+    load_patch,
+    table_warnings,
     wavelengths,
 )
-from .output import check_outputs
-from .patch import TABLE_NAMES, load_patch, table_warnings
-from .progress import Bar
-from .report import save_report
+from .report import check_outputs, save_report
 
 if TYPE_CHECKING:
     from ..heights.spectra import Periodicity
@@ -98,8 +98,7 @@ def run(args: argparse.Namespace) -> int:
     from ..heights.spectra import dominant_periods
     from ..thesis.evaluation import Beam, measure
     from ..thesis.evaluation.beam import check_axes
-    from ..thesis.evaluation.files import save_csv, save_npz
-    from ..thesis.evaluation.plot import figure
+    from ..thesis.evaluation.plot import figure, save_csv, save_npz
     from ..thesis.methods import make
     from ..thesis.methods.method import trapezoid_rule
     from ..thesis.methods.period import check_period

@@ -7,11 +7,9 @@ import time
 
 from ..realtime.web.tables import WEB_METHODS
 from .arguments import path_ending_in
-from .console import mitsuba_warnings, say_warning
+from .console import Bar, mitsuba_warnings, say_warning
 from .options import add_json, add_scene, scene_parameters
-from .output import check_writable
-from .progress import Bar
-from .report import save_report
+from .report import check_writable, save_report
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

@@ -10,14 +10,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from ..scene.animation import values_of_frames
 from ..scene.frames import FILMS, MISSING, Frame, digest_of
-from .console import mitsuba_warnings, say
+from ..scene.parameters import values_of_frames
+from .console import Bar, mitsuba_warnings, say
 from .interrupts import INTERRUPTED
 from .options import scene_parameters
-from .output import check_writable
-from .progress import Bar
-from .report import save_report
+from .report import check_writable, save_report
 from .workers import client_of, film_of, on_workers, say_report
 
 

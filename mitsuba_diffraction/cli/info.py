@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Any
 from ..errors import DiffractionError
 from ..settings import TableSettings
 from .arguments import path_ending_in
-from .console import mitsuba_warnings
-from .options import STDOUT, add_heights, add_json, given_for_heights, load_options
-from .patch import table_warnings
-from .progress import Bar
+from .console import Bar, mitsuba_warnings
+from .options import STDOUT, add_heights, add_json, given_for_heights, load_options, table_warnings
 from .report import lines_of, plain, save_report
 
 if TYPE_CHECKING:

@@ -36,7 +36,7 @@ from . import (
 from .console import PROGRAM, say_error, warnings_in_one_line
 from .interrupts import INTERRUPTED, ended_at_once, say_interrupted
 from .options import STDOUT
-from .output import check_writable
+from .report import check_writable
 
 COMMANDS = (
     precompute, info, tangents, plan, render, brdf_map, evaluate, survey, sweep, tradeoff, compare,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionWarning
 from .arguments import path_ending_in
+from .console import Bar
 from .options import (
     add_heights,
     add_json,
@@ -20,9 +21,7 @@ from .options import (
     load_options,
     table_options,
 )
-from .output import check_outputs
-from .progress import Bar
-from .report import save_report
+from .report import check_outputs, save_report
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField

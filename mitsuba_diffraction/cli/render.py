@@ -9,14 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
 from .arguments import change, number_between, whole_number
-from .console import mitsuba_warnings, say, say_warning
+from .console import Bar, mitsuba_warnings, say, say_warning
 from .interrupts import INTERRUPTED
 from .options import add_exposure, add_json, add_samples, add_scene, scene_parameters
-from .output import check_writable
-from .plan import add_plan_options, plan_or_json
-from .planned import MAKE, check_plan_options, load_by_plan, say_outside
-from .progress import Bar
-from .report import save_report
+from .plan import (
+    MAKE,
+    add_plan_options,
+    check_plan_options,
+    load_by_plan,
+    plan_or_json,
+    say_outside,
+)
+from .report import check_writable, save_report
 from .workers import add_threads, add_workers, client_of, film_of, on_workers, say_report
 
 if TYPE_CHECKING:
@@ -196,9 +200,9 @@ def _report(
 ) -> dict[str, Any]:
     """For --json."""
     return {
-        "scene": args.scene, "files": written, "pixels": result.bitmap.size(), "spp": result.spp,
-        "seed": args.seed, "variant": variant, "interrupted": result.interrupted,
-        "seconds": seconds,
+        "scene": args.scene, "files": written, "pixels": list(result.bitmap.size()),
+        "spp": result.spp, "seed": args.seed, "variant": variant,
+        "interrupted": result.interrupted, "seconds": seconds,
     }  # fmt: skip
 
 

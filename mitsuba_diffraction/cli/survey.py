@@ -9,12 +9,10 @@ import time
 from pathlib import Path
 
 from .arguments import number_between, whole_number
-from .console import mitsuba_warnings, say
+from .console import Bar, mitsuba_warnings, say
 from .interrupts import INTERRUPTED
 from .options import add_heights, add_json, add_mode, add_table, load_options, table_options
-from .output import check_writable
-from .progress import Bar
-from .report import save_report
+from .report import check_writable, save_report
 from .workers import add_threads, add_workers, client_of, on_workers, worker_threads
 
 

@@ -13,8 +13,10 @@ from typing import Any
 from ..errors import DiffractionError, DiffractionWarning
 from .arguments import path_ending_in
 from .brdf_map import add_relative, gain_of
+from .console import Bar
 from .options import (
     METHODS,
+    TABLE_NAMES,
     add_direction,
     add_exposure,
     add_heights,
@@ -24,13 +26,11 @@ from .options import (
     add_table,
     add_wavelengths,
     in_library,
+    load_patch,
     method,
     wavelengths,
 )
-from .output import check_outputs
-from .patch import TABLE_NAMES, load_patch
-from .progress import Bar
-from .report import save_report
+from .report import check_outputs, save_report
 
 # Written out so that --help need not load what makes maps; a test holds them against the library.
 KINDS = ("wavelength-step", "coherence-width", "terms", "light-angle", "method")
@@ -88,7 +88,7 @@ def _add_options(group: argparse._ArgumentGroup) -> None:
 def run(args: argparse.Namespace) -> int:
     """Evaluate all maps, compare, draw, and return the exit code."""
     from ..analysis.maps import Light
-    from ..analysis.maps.sheet import contact_sheet
+    from ..analysis.maps.picture import contact_sheet
     from ..atomic import atomic_path
     from ..thesis.sweeps import sweep
 

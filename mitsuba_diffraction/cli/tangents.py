@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .arguments import number_between, path_ending_in
-from .console import mitsuba_warnings, say_warning
+from .console import Bar, mitsuba_warnings, say_warning
 from .options import add_json
-from .output import check_writable
-from .progress import Bar
-from .report import save_report
+from .report import check_writable, save_report
 
 if TYPE_CHECKING:
     from ..scene.orientation.report import TangentReport
@@ -62,9 +60,8 @@ def run(args: argparse.Namespace) -> int:
     from ..scene.orientation.breaks import BREAK
     from ..scene.orientation.directions import direction_field, turned
     from ..scene.orientation.files import load_mesh, write_ply
-    from ..scene.orientation.oriented import oriented_mesh
     from ..scene.orientation.tangents import check_tangents
-    from ..scene.orientation.trimesh import vertex_normals
+    from ..scene.orientation.trimesh import oriented_mesh, vertex_normals
 
     with Bar(args) as bar, mitsuba_warnings():
         bar(0, 0, "reading")

@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from .arguments import number_between
+from .console import Bar
 from .options import Renamed, add_json, add_own_patch, add_table, check_own_patch, own_patch
-from .output import check_writable
-from .progress import Bar
-from .report import save_json, save_report
+from .report import check_writable, save_json, save_report
 
 #: Pixels of the default patch, pairs of directions, calls at once, timed rounds, depths.
 _FULL, _QUICK = (1332, 240, 1 << 19, 7, 14), (400, 160, 1 << 17, 5, 9)
@@ -62,8 +61,8 @@ def run(args: argparse.Namespace) -> int:
     """Measure, write and recommend, and return the exit code."""
     check_own_patch(args)
     check_writable(args.output / "tradeoff.json", make_folder=True)
+    from ..analysis.bench.figures import PIXEL
     from ..analysis.bench.machine import describe_machine
-    from ..analysis.bench.plan import PIXEL
     from ..analysis.tradeoff import (
         Budget,
         measure,

@@ -11,7 +11,7 @@ from ..realtime.glsl.source import METHODS
 from .arguments import whole_number
 from .console import mitsuba_warnings
 from .options import add_exposure, add_scene, scene_parameters
-from .output import check_writable
+from .report import check_writable
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:

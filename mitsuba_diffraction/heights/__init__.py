@@ -4,15 +4,14 @@ Contents
 --------
 HeightField  heights in µm on a grid that tiles the plane (in `field`)
 load         from any file to a `HeightField`
-read         which reader, which units, which treatment
+read         `LoadOptions`; which reader, which units, which treatment
 formats      the readers, one for each kind of file
-options      how a file is to be read and treated
 recipes      TOML files that say where heights come from and what is made of them
 preprocess   treatments of heights: crop, fill, level, clip, make periodic
 gratings     height fields that are made, not measured
 validity     where a patch leaves the model or its own resolution
 spectra      the spectrum of heights, and the powers of their orders
-lengths      pixel sizes, heights and crops as users give them
+lengths      lengths, counts and other numbers as users give them
 """
 
 from __future__ import annotations

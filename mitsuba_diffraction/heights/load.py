@@ -7,8 +7,7 @@ import os
 from .field import HeightField
 from .formats.raw import existing_file
 from .lengths import Crop, Height, PixelSize
-from .options import LoadOptions
-from .read import kind_of, read_heights, treat
+from .read import LoadOptions, kind_of, read_heights, treat
 from .recipes import Recipe
 
 

@@ -27,8 +27,7 @@ from ..settings import RECIPE_SETTINGS, checked
 from . import gratings
 from .field import HeightField
 from .formats.raw import existing_file, first_line
-from .options import LoadOptions
-from .read import is_recipe, read_heights, treat
+from .read import LoadOptions, is_recipe, read_heights, treat
 
 LOAD_KEYS = tuple(option.name for option in fields(LoadOptions))
 _OWN_KEYS = ("source", "generator", "arguments", "seeds", "output")
@@ -42,32 +41,15 @@ _LARGEST_RECIPE = 1_000_000
 
 @dataclass(frozen=True)
 class Recipe:
-    """One recipe, checked.
+    """One recipe, checked."""
 
-    Attributes
-    ----------
-    path
-        The recipe's own file.
-    sources
-        Files of heights; empty if a generator makes them.
-    generator
-        Name of a function of `mitsuba_diffraction.heights.gratings`, or `None`.
-    arguments
-        Its keyword arguments, one mapping per patch.
-    options
-        How sources are read and all patches treated.
-    table
-        The fields of `TableSettings` that the recipe sets, checked.
-    output
-        Where the table goes; by default the recipe's name with .exr in the current folder.
-    """
-
-    path: Path
-    sources: tuple[Path, ...]
-    generator: str | None
-    arguments: tuple[Mapping[str, Any], ...]
-    options: LoadOptions
-    table: Mapping[str, Any]
+    path: Path  # The recipe's own file
+    sources: tuple[Path, ...]  # Files of heights; empty if a generator makes them
+    generator: str | None  # Name of a function of `mitsuba_diffraction.heights.gratings`, or `None`
+    arguments: tuple[Mapping[str, Any], ...]  # Its keyword arguments, one mapping per patch
+    options: LoadOptions  # How sources are read and all patches treated
+    table: Mapping[str, Any]  # The fields of `TableSettings` that the recipe sets, checked
+    # Where the table goes; by default the recipe's name with .exr in the current folder
     output: Path
 
     @classmethod

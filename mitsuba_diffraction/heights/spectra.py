@@ -64,18 +64,11 @@ def height_spectrum(field: HeightField) -> FloatArray:
 
 @dataclass(frozen=True)
 class Periodicity:
-    """A grating that a patch holds.
+    """A grating that a patch holds."""
 
-    Attributes
-    ----------
-    period : µm, from one groove to the next, across them.
-    direction : degrees from x towards y across the grooves, −89.5 to 90.5.
-    share : of the variance of the heights, 0 to 1, without harmonics.
-    """
-
-    period: float
-    direction: float
-    share: float
+    period: float  # µm, from one groove to the next, across them
+    direction: float  # degrees from x towards y across the grooves, −89.5 to 90.5
+    share: float  # of the variance of the heights, 0 to 1, without harmonics
 
     def __str__(self) -> str:
         return f"{self.period:.4g} µm along {self.direction:.0f}°, {self.share:.0%} of the variance"

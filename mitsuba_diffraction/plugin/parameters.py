@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import DiffractionError
 from ..heights.field import HeightField
 from ..heights.lengths import is_auto
-from ..heights.options import LoadOptions
+from ..heights.read import LoadOptions
 from ..settings import SCENE_SETTINGS, checked
 from ..tables.table import DiffractionTable
 from .boundary import MODELS, Boundary, Kirchhoff, SmallSlope

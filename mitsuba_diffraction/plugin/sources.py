@@ -16,8 +16,7 @@ from ..heights import gratings
 from ..heights.field import HeightField
 from ..heights.formats.raw import existing_file
 from ..heights.load import load_heights
-from ..heights.options import LoadOptions
-from ..heights.read import is_recipe, treat
+from ..heights.read import LoadOptions, is_recipe, treat
 from ..heights.recipes import Recipe
 from ..settings import MAX_HEIGHT_SCALE, TableSettings
 from ..tables.build.build import build_with

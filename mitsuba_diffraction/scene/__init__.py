@@ -3,10 +3,9 @@
 Contents
 --------
 load          a variant set and a scene loaded
-parameters    names that -D may set
+parameters    names that -D may set, and values that change from frame to frame
 passes        rendering in passes of samples
 pictures      EXR and PNG of it
-animation     parameters that change from frame to frame
 frames        frames of an animation, and a film of them
 mitsuba_text  what Mitsuba says, as lines of our own
 planning      the tables that suffice for a scene

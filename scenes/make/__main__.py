@@ -20,8 +20,7 @@ from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.scene.orientation.directions import direction_field
 from mitsuba_diffraction.scene.orientation.files import write_ply
-from mitsuba_diffraction.scene.orientation.oriented import oriented_mesh
-from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh
+from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, oriented_mesh
 
 from . import pigment
 from .anatomy import Anatomy

@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.analysis.bench import colours, plan
-from mitsuba_diffraction.analysis.bench.figures import Goal, Row, Section
-from mitsuba_diffraction.analysis.bench.plan import Plan
-from mitsuba_diffraction.analysis.bench.timing import ratio, rounds_of
+from mitsuba_diffraction.analysis.bench import colours, figures
+from mitsuba_diffraction.analysis.bench.contenders import ratio, rounds_of
+from mitsuba_diffraction.analysis.bench.figures import Goal, Plan, Row, Section
 from mitsuba_diffraction.cli import main
 from tests.directions import rough_patch
 
@@ -36,7 +35,7 @@ SCENES = Path(__file__).parents[2] / "scenes"
 @pytest.fixture(scope="module", autouse=True)
 def tiny():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plan, "QUICK", TINY)
+        patch.setattr(figures, "QUICK", TINY)
         patch.setattr(colours, "MATERIALS", {"none": colours.MATERIALS["none"]})
         yield
 

@@ -13,8 +13,8 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction.cli.arguments import change
-from mitsuba_diffraction.scene.animation import values_of_frames
 from mitsuba_diffraction.scene.frames import Frame
+from mitsuba_diffraction.scene.parameters import values_of_frames
 
 # A uniform sky alone: every pixel is as bright as `light` says.
 SCENE = """<scene version="3.5.0">
@@ -135,7 +135,7 @@ def test_ctrl_c_keeps_finished_frames_and_the_next_run_goes_on(render, monkeypat
             asked.append(text)
             os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr("mitsuba_diffraction.cli.progress.Bar.__call__", interrupt)
+    monkeypatch.setattr("mitsuba_diffraction.cli.console.Bar.__call__", interrupt)
     ran = render("--frames", "4", *LIGHT, "-s", "3", "-o", "out.webp")
     assert ran.code == 130
     assert "interrupted; 2 of 4 frames are done, run the command again to continue" in ran.err

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable
-from mitsuba_diffraction.cli.progress import Bar
+from mitsuba_diffraction.cli.console import Bar
 
 # A table of 6 µm heights with these takes a tenth of a second.
 QUICK = ["--pixel-size", "0.08", "--coherence-width", "6"]
@@ -248,7 +248,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(child, heights, tmp_path):
     ("interrupted", "before"),
     [
         (
-            "import mitsuba_diffraction.cli.progress as p\n"
+            "import mitsuba_diffraction.cli.console as p\n"
             "p.Bar.__call__ = lambda *_: os.kill(os.getpid(), signal.SIGINT)",
             False,
         ),

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction import DiffractionWarning, HeightField
-from mitsuba_diffraction.heights.options import LoadOptions
+from mitsuba_diffraction.heights.read import LoadOptions
 from tests.heights.formats.refusals import refusal
 
 HEIGHTS = np.random.default_rng(3).normal(size=(6, 5))

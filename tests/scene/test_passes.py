@@ -74,7 +74,7 @@ def test_ctrl_c_keeps_the_picture_so_far(run, scene, monkeypatch):
         if done == 2:
             os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr("mitsuba_diffraction.cli.progress.Bar.__call__", interrupt)
+    monkeypatch.setattr("mitsuba_diffraction.cli.console.Bar.__call__", interrupt)
     ran = run("render", scene, *QUICK, "-s", "50", "-o", "a.exr")
     assert ran.code == 130
     assert ran.err.splitlines() == [
@@ -86,7 +86,7 @@ def test_ctrl_c_keeps_the_picture_so_far(run, scene, monkeypatch):
 
 def test_ctrl_c_before_the_first_pass_writes_nothing(run, scene, monkeypatch):
     monkeypatch.setattr(
-        "mitsuba_diffraction.cli.progress.Bar.__call__",
+        "mitsuba_diffraction.cli.console.Bar.__call__",
         lambda *_: os.kill(os.getpid(), signal.SIGINT),
     )
     assert run("render", scene, *QUICK, "-o", "a.exr").code == 130
@@ -98,7 +98,7 @@ def test_ctrl_c_while_compiling_writes_nothing(run, scene, monkeypatch):
         if text == "compiling":
             os.kill(os.getpid(), signal.SIGINT)
 
-    monkeypatch.setattr("mitsuba_diffraction.cli.progress.Bar.__call__", interrupt)
+    monkeypatch.setattr("mitsuba_diffraction.cli.console.Bar.__call__", interrupt)
     ran = run("render", scene, *QUICK, "-o", "a.exr")
     assert ran.code == 130
     assert "nothing half-written" in ran.err

@@ -13,8 +13,7 @@ from typing import Any
 
 from ...errors import DiffractionError
 from ...progress import Progress
-from .figures import Goal, Row, Section
-from .plan import PIXEL, Plan
+from .figures import PIXEL, Goal, Plan, Row, Section
 
 _COLUMNS = ("s", "s of all cores", "GB at most", "GB above the import", "error/tolerance")
 #: Side of the patch: seconds and GB that its table may take at the default tolerance.

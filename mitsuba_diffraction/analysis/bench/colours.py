@@ -16,11 +16,9 @@ from ...optics.colour import delta_e, linear_srgb, response
 from ...progress import Progress
 from ...tables.colour.table import ColourTable
 from ..maps.light import Light
-from .contenders import Queries, Tables
-from .figures import Goal, Row, Section
-from .plan import Plan
+from .contenders import Queries, Tables, kernel_seconds, rounds_of
+from .figures import Goal, Plan, Row, Section
 from .scenes import pigment, rays, snake
-from .timing import kernel_seconds, rounds_of
 
 #: What reflects, and whether the goals are for it.
 MATERIALS: dict[str, tuple[dict[str, Any], bool]] = {

@@ -1,24 +1,132 @@
-"""What `eval` is compared with: other BSDFs, other settings, and the bare gathers."""
+"""What `eval` is compared with: other BSDFs and settings, the thesis' look-up, bare gathers.
+
+No warning tells how far the model holds for the patch: here it is there to be looked up.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+import statistics
+import struct
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
+from ...errors import DiffractionWarning
 from ...heights import gratings
 from ...heights.field import HeightField
 from ...plugin.lookup import DeviceTable
+from ...plugin.memory import upload
 from ...plugin.restricted import device_table
 from ...progress import Progress
 from ...tables.table import DiffractionTable
-from .measured_file import write_measured
-from .plan import PIXEL, SEED, Plan
-from .saved import saved_bsdf, thesis_bsdf
+from .figures import PIXEL, SEED, Plan
+
+#: Calls before the first that counts: the first compiles, the second finds the processor awake.
+WARM_UP = 2
+
+
+def kernel_seconds(call: Callable[[], Any]) -> float:
+    """Time that the kernels of one call take, without what Python needs to put them together."""
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        dr.eval(call())
+        dr.sync_thread()
+        return sum(entry["execution_time"] for entry in dr.kernel_history()) * 1e-3
+
+
+def rounds_of(
+    calls: Mapping[str, Callable[[], float]], rounds: int, done: Callable[[int, int], None]
+) -> dict[str, list[float]]:
+    """Seconds of every call in every round; each round goes through all of them in turn.
+
+    So background load affects all candidates alike, and ratios within a round can be trusted.
+    """
+    seconds: dict[str, list[float]] = {name: [] for name in calls}
+    for n in range(WARM_UP + rounds):
+        for name, call in calls.items():
+            took = call()
+            if n >= WARM_UP:
+                seconds[name].append(took)
+        done(n + 1, WARM_UP + rounds)
+    return seconds
+
+
+def ratio(a: Sequence[float], b: Sequence[float]) -> float:
+    """Median over the rounds of a/b."""
+    return statistics.median(x / y for x, y in zip(a, b, strict=True))
+
+
+def saved_bsdf(table: str | os.PathLike[str], **parameters: Any) -> Any:
+    """The plugin with a table.
+
+    Parameters
+    ----------
+    table : the file.
+    parameters : any other parameter of the plugin.
+
+    Raises
+    ------
+    DiffractionError
+        If the file is no table.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DiffractionWarning)
+        return mi.load_dict({"type": "diffraction", "table": str(table), **parameters})
+
+
+def thesis_bsdf(table: str | os.PathLike[str], **parameters: Any) -> Any:
+    """The same, looked up by `TermImages`; the table is a coherent Taylor series."""
+    bsdf = saved_bsdf(table, **parameters)
+    bsdf.power.device = TermImages(bsdf.table)
+    return bsdf
+
+
+class TermImages(DeviceTable):
+    """A coherent Taylor table as the thesis keeps it, an image of complex numbers a term.
+
+    For every wavelength and every term, the 3 × 3 texels around the asked frequency are fetched
+    from that term's image, weighted by the Gaussian window, and added up. `plugin.lookup` can hold
+    the same series, but keeps all terms of one bin together. Only `window_sum` differs.
+    """
+
+    def __init__(self, table: DiffractionTable) -> None:
+        super().__init__(table)
+        images = np.moveaxis(table.coefficients[0], -1, 0)  # (terms, ny, nx, re and im)
+        self._images = upload(mi.Float, np.ascontiguousarray(images))
+
+    def window_sum(self, qx: Any, qy: Any, kappa: Any) -> Any:
+        """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`)."""
+        grid, expansion = self.grid, self.expansion
+        x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
+        first, weight_x, weight_y = self._place(x, y, mi.UInt32(0))
+        weights = [
+            (grid.index(0, row, column), weight_x(column) * weight_y(row))
+            for row in range(grid.taps[1])
+            for column in range(grid.taps[0])
+        ]
+        lobe = dr.exp(-grid.exponents[0] * dr.square(x) - grid.exponents[1] * dr.square(y))
+        order_0 = mi.Complex2f(*(lobe * c for c in self.series.at(kappa)[2]))
+        scaled = kappa * expansion.half_range
+
+        def of_term(n: Any, image: Any, weight: Any, total: Any) -> tuple[Any, ...]:
+            weight *= scaled / mi.Float(n)  # xⁿ/n!
+            windowed = mi.Complex2f(0.0)
+            for offset, gaussian in weights:
+                windowed += gaussian * dr.gather(mi.Complex2f, self._images, image + offset)
+            return n + 1, image + grid.index(1, 0, 0), weight, total + weight * windowed
+
+        state = (mi.UInt32(1), first, mi.Float(1.0), order_0)
+        total = dr.while_loop(state, lambda n, *_: n <= expansion.terms, of_term)[3]
+        return dr.squared_norm(total)
+
 
 ALUMINIUM = "roughconductor, Al"
 DEFAULT = "diffraction, the defaults"
@@ -163,3 +271,40 @@ def bare_gathers(table: DiffractionTable, queries: Queries) -> Callable[[], Any]
         return dr.while_loop(state, lambda n, *_: n < len(firsts), body)[2]
 
     return call
+
+
+# what an anisotropic surface takes, in the sampling of Dupuy and Jakob 2018
+AZIMUTHS, ANGLES, WAVELENGTHS, SIDE = 8, 8, 195, 32
+_TYPES = {"uint8": 1, "float32": 10}  # of the file
+
+
+def write_measured(path: Path) -> None:
+    """A surface that reflects alike everywhere: values do not matter for the time that it takes."""
+
+    def ones(*shape: int) -> NDArray[np.float32]:
+        return np.ones(shape, np.float32)
+
+    arrays: dict[str, NDArray[Any]] = {
+        "description": np.frombuffer(b"even", np.uint8),
+        "theta_i": np.linspace(0.0, 1.5, ANGLES, dtype=np.float32),
+        "phi_i": np.linspace(-np.pi, np.pi, AZIMUTHS, dtype=np.float32),
+        "ndf": ones(128, 128),
+        "sigma": ones(128, 128),
+        "vndf": ones(AZIMUTHS, ANGLES, 128, 128),
+        "luminance": ones(AZIMUTHS, ANGLES, SIDE, SIDE),
+        "spectra": ones(AZIMUTHS, ANGLES, WAVELENGTHS, SIDE, SIDE),
+        "wavelengths": np.linspace(360.0, 1000.0, WAVELENGTHS, dtype=np.float32),
+        "jacobian": np.zeros(1, np.uint8),
+    }
+    size = 18 + sum(len(n) + 13 + 8 * array.ndim for n, array in arrays.items())
+    header = [b"tensor_file\0", struct.pack("<BBI", 1, 0, len(arrays))]
+    offset = -(-size // 8) * 8
+    contents = []
+    for name, array in arrays.items():
+        header.append(struct.pack("<H", len(name)) + name.encode())
+        header.append(struct.pack("<HBQ", array.ndim, _TYPES[array.dtype.name], offset))
+        header.append(struct.pack(f"<{array.ndim}Q", *array.shape))
+        data = array.tobytes()
+        contents.append(data.ljust(-(-len(data) // 8) * 8, b"\0"))
+        offset += len(contents[-1])
+    path.write_bytes(b"".join(header).ljust(-(-size // 8) * 8, b"\0") + b"".join(contents))

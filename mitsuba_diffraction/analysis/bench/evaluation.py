@@ -24,10 +24,11 @@ from .contenders import (
     bare_gathers,
     bsdf_factories,
     is_slow,
+    kernel_seconds,
+    ratio,
+    rounds_of,
 )
-from .figures import Goal, Row, Section
-from .plan import Plan
-from .timing import kernel_seconds, ratio, rounds_of
+from .figures import Goal, Plan, Row, Section
 
 FLOOR = "bare gathers of the defaults"
 _TIMES = "ns/call"

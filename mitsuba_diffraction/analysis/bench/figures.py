@@ -1,10 +1,51 @@
-"""Figures with goals: sections of rows, printed as text, kept as plain data."""
+"""How much is measured, and figures with goals: rows as text and plain data; two runs compared."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
+
+from ...errors import DiffractionError
+
+#: µm: the patch of 1332² pixels is as wide as the default coherence window.
+PIXEL = 65.0 / 1332
+#: The numbers that directions and wavelengths are drawn with.
+SEED = 20140113
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Sizes and repetitions."""
+
+    pixels: int = 1332  # a side of the patch that `eval` is measured on
+    # sides of further patches whose tables are built, with the same size of pixels
+    more_pixels: tuple[int, ...] = (4096, 8192)
+    other_tables: bool = True  # build `patch` and Taylor tables too
+    lanes: int = 1 << 20  # calls at once
+    slow_lanes: int = 1 << 17  # likewise, for the thesis' configuration
+    rounds: int = 15  # timed calls of each contender
+    # resolution, spp: of the rendered pictures
+    resolution: int = 256
+    spp: int = 16
+    reference_spp: int = 2048  # of pictures that are to have converged
+    map_resolution: int = 256  # directions of view along each axis, to compare colours at
+
+
+FULL = Plan()
+QUICK = Plan(
+    more_pixels=(),
+    other_tables=False,
+    lanes=1 << 18,
+    slow_lanes=1 << 15,
+    rounds=5,
+    resolution=128,
+    spp=4,
+    reference_spp=256,
+    map_resolution=96,
+)
 
 
 @dataclass(frozen=True)
@@ -20,36 +61,22 @@ class Goal:
 
 @dataclass(frozen=True)
 class Row:
-    """One thing measured.
+    """One thing measured."""
 
-    Attributes
-    ----------
-    name : what it is.
-    values : by column; None where a column does not apply.
-    goals : of this row.
-    raw : all single measurements and whatever else belongs to them, as plain data.
-    """
-
-    name: str
-    values: dict[str, float | None]
-    goals: Sequence[Goal] = ()
+    name: str  # what it is
+    values: dict[str, float | None]  # by column; None where a column does not apply
+    goals: Sequence[Goal] = ()  # of this row
+    # all single measurements and whatever else belongs to them, as plain data
     raw: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Section:
-    """A table of rows.
+    """A table of rows."""
 
-    Attributes
-    ----------
-    title : what was measured, and how.
-    columns : heading of each column, with its unit.
-    rows : what was measured.
-    """
-
-    title: str
-    columns: Sequence[str]
-    rows: Sequence[Row]
+    title: str  # what was measured, and how
+    columns: Sequence[str]  # heading of each column, with its unit
+    rows: Sequence[Row]  # what was measured
 
     @property
     def goals(self) -> list[Goal]:
@@ -89,3 +116,46 @@ def _number(value: float | None) -> str:
     if abs(value) >= 1000:
         return f"{value:.0f}"
     return f"{value:.3g}" if abs(value) < 1 else f"{value:#.3g}".rstrip(".")
+
+
+def read_run(path: Path) -> dict[str, Any]:
+    """What `bench --json` wrote.
+
+    Raises
+    ------
+    DiffractionError
+        If the file is missing or something else.
+    """
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        if isinstance(found["sections"], list) and isinstance(found["machine"], dict):
+            return dict(found)
+    except OSError as error:
+        raise DiffractionError(f"cannot read '{path}': {error.strerror}") from error
+    except (ValueError, KeyError, TypeError):
+        pass
+    raise DiffractionError(f"'{path}' is not what bench --json writes; give such a file")
+
+
+def compared(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
+    """Lines for people: every number that both runs have, and by what it changed.
+
+    Times of two runs are not alike even where nothing changed; ratios are, to some per cent.
+    """
+    before = dict(_numbers(old))
+    machines = [f"{run['machine'].get('processor')}" for run in (old, new)]
+    if machines[0] != machines[1]:
+        yield f"other machines: {machines[0]} then, {machines[1]} now"
+    for key, value in _numbers(new):
+        was = before.get(key)
+        if was and value is not None:
+            section, row, column = key
+            yield f"  {value / was:6.2f}×  {section}: {row}: {column}: {was:.4g} → {value:.4g}"
+
+
+def _numbers(run: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str, str], float | None]]:
+    for section in run["sections"]:
+        name = section["title"].split(":")[0]
+        for row in section["rows"]:
+            for column, value in row["values"].items():
+                yield (name, row["name"], column), value

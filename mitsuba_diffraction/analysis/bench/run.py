@@ -7,8 +7,7 @@ from pathlib import Path
 
 from ...heights.field import HeightField
 from ...progress import Progress
-from .figures import Section
-from .plan import Plan
+from .figures import Plan, Section
 
 
 def sections(
@@ -42,8 +41,7 @@ def sections(
     from .colours import measure_colours
     from .contenders import build_tables
     from .evaluation import measure_eval, measure_sampling
-    from .rendering import measure_snake
-    from .variance import measure_efficiency, measure_noise
+    from .variance import measure_efficiency, measure_noise, measure_snake
 
     tables = build_tables(plan, folder, progress, patch)
     for backend in ("llvm", "cuda"):

@@ -14,10 +14,9 @@ save_exr   a map as linear numbers
 
 from __future__ import annotations
 
-from .bands import Bands
 from .evaluate import brdf_map, check_map
 from .files import save_exr, save_png
-from .light import Light
+from .light import Bands, Light
 from .picture import draw
 from .result import BrdfMap
 

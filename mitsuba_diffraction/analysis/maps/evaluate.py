@@ -16,8 +16,7 @@ from ...plugin.llvm import require_loaded_llvm
 from ...progress import Progress
 from ...tables.build.error import NEAR
 from . import hemisphere
-from .bands import Bands
-from .light import Light
+from .light import Bands, Light
 from .result import BrdfMap
 
 # Pixels at a time: enough for a GPU, and their sums stay within some tens of megabytes.

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.colour import encode_srgb, linear_srgb
-from .bands import Bands
-from .light import Light
+from .light import Bands, Light
 
 Image = NDArray[np.float32]
 

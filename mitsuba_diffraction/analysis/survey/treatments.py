@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import DiffractionError, one_line
-from ...heights.options import LoadOptions
+from ...heights.read import LoadOptions
 from ...heights.recipes import LOAD_KEYS
 from ...settings import RECIPE_SETTINGS, checked
 

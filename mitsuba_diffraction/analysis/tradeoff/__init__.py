@@ -15,10 +15,9 @@ Budget, recommended   the cheapest setting within a budget
 from __future__ import annotations
 
 from .depth import measure_depths
-from .measuring import Measured, measure
-from .recommend import Budget, recommended
+from .measuring import Measured, Setting, measure, settings
+from .report import Budget, recommended
 from .sample import lit_pairs
-from .setting import Setting, settings
 from .wavelengths import measure_wavelengths
 
 __all__ = [

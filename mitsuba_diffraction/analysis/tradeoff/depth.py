@@ -22,19 +22,13 @@ _SIDE, _PIXEL = 48, 0.1
 
 @dataclass(frozen=True)
 class Depths:
-    """Errors over depth.
+    """Errors over depth."""
 
-    Attributes
-    ----------
-    depth : (n,) µm, peak to valley.
-    errors : name of a series → (n,) Σ|power − exact| / Σ exact of all orders but order 0; NaN where
-        it is refused.
-    intervals : (n,) of the default series.
-    """
-
-    depth: NDArray[np.float64]
+    depth: NDArray[np.float64]  # (n,) µm, peak to valley
+    # name of a series → (n,) Σ|power − exact| / Σ exact of all orders but order 0; NaN where it is
+    # refused
     errors: dict[str, NDArray[np.float64]]
-    intervals: NDArray[np.int64]
+    intervals: NDArray[np.int64]  # (n,) of the default series
 
 
 def measure_depths(count: int, progress: Progress = silent) -> Depths:

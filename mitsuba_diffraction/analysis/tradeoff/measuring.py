@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,11 +20,62 @@ from ...progress import Progress, silent
 from ...tables.build.half_precision import half_scale
 from ...tables.colour.colour_difference import power_colour_difference
 from ...tables.table import DiffractionTable, q_limit_of
-from ..bench.contenders import Queries
-from ..bench.saved import saved_bsdf
-from ..bench.timing import kernel_seconds, ratio, rounds_of
+from ..bench.contenders import Queries, kernel_seconds, ratio, rounds_of, saved_bsdf
 from .sample import Sample
-from .setting import Setting
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One table."""
+
+    group: str  # the parameter that is varied
+    name: str  # what is said of this value
+    # of `DiffractionTable.build`, besides the patch and the coherence width
+    arguments: dict[str, Any] = field(default_factory=dict)
+    # numbers the coefficients are stored as afterwards: "half", "single", or as built
+    stored: str | None = None
+    # largest spatial frequency as a share of what light can probe, or None
+    crop: float | None = None
+
+    @property
+    def usable(self) -> bool:
+        """Whether a user can ask for it, tolerance and all."""
+        return self.stored is None and self.arguments.get("tolerance", 1e-3) < _ANY
+
+
+#: A tolerance that everything meets: then the error is what the other parameters leave.
+_ANY = 0.999
+
+
+def settings(quick: bool) -> Iterator[Setting]:
+    """All tables that are tried, the defaults first."""
+    yield Setting("default", "the defaults")
+    tolerances = (1e-2, 1e-4) if quick else (1e-2, 1e-4, 1e-5, 1e-6)
+    for tolerance in tolerances:
+        yield Setting("tolerance", f"tolerance {tolerance:.0e}", {"tolerance": tolerance})
+    for basis in ("chebyshev", "taylor"):
+        for tolerance in (1e-3,) if quick else (1e-2, 1e-3, 1e-4):
+            arguments = {"basis": basis, "tolerance": tolerance}
+            yield Setting("basis", f"{basis}, {tolerance:.0e}", arguments)
+    if quick:
+        counts: tuple[int, ...] = (4, 8)
+    else:
+        counts = (4, 6, 8, 12)
+    for basis in ("svd", "chebyshev"):
+        for terms in counts:
+            arguments = {"basis": basis, "terms": terms}
+            yield Setting(f"terms, {basis}", f"{terms} terms, {basis}", arguments)
+    for taps in (2, 3, 4) if quick else (2, 3, 4, 5):
+        arguments = {"terms": 12, "taps": taps, "tolerance": _ANY}
+        yield Setting("taps", f"{taps} × {taps} taps", arguments)
+    for stored in ("half", "single"):
+        yield Setting("precision", f"tolerance 1e-4 in {stored}", {"tolerance": 1e-4}, stored)
+    for crop in (0.5,) if quick else (0.75, 0.5, 0.35):
+        yield Setting("crop", f"up to {crop:g} of all frequencies", crop=crop)
+    for tolerance in (1e-3,) if quick else (1e-2, 1e-3):
+        arguments = {"coherence": "patch", "tolerance": tolerance}
+        yield Setting("coherence", f"patch, {tolerance:.0e}", arguments)
+
 
 #: What colours are compared with: an error so small that nobody sees it.
 FINEST = 1e-5
@@ -32,34 +83,26 @@ FINEST = 1e-5
 
 @dataclass(frozen=True)
 class Measured:
-    """One setting and what it does.
+    """One setting and what it does."""
 
-    Attributes
-    ----------
-    setting : what was asked for.
-    refused : why there is no such table; everything else then is as by default.
-    error : Σ|table − exact| / Σ exact, the larger of near order 0 and elsewhere, double precision.
-    error_single : the same by the plugin, in single precision.
-    delta_e, delta_e_99 : ΔE2000 of random directions in daylight from the finest table, mean and
-        99th percentile.
-    nanoseconds : of `eval` with four wavelengths.
-    relative : the same over that of `roughconductor` (Al), median of the rounds.
-    taps, terms, intervals : bins read, numbers of each, intervals of κ.
-    megabytes, seconds : the table's size, and the time it took to build.
-    """
-
-    setting: Setting
-    refused: str = ""
+    setting: Setting  # what was asked for
+    refused: str = ""  # why there is no such table; everything else then is as by default
+    # Σ|table − exact| / Σ exact, the larger of near order 0 and elsewhere, double precision
     error: float = float("nan")
-    error_single: float = float("nan")
+    error_single: float = float("nan")  # the same by the plugin, in single precision
+    # delta_e, delta_e_99: ΔE2000 of random directions in daylight from the finest table, mean and
+    # 99th percentile
     delta_e: float = float("nan")
     delta_e_99: float = float("nan")
-    nanoseconds: float = float("nan")
+    nanoseconds: float = float("nan")  # of `eval` with four wavelengths
+    # the same over that of `roughconductor` (Al), median of the rounds
     relative: float = float("nan")
+    # taps, terms, intervals: bins read, numbers of each, intervals of κ
     taps: int = 0
     terms: int = 0
     intervals: int = 0
     precision: str = ""
+    # megabytes, seconds: the table's size, and the time it took to build
     megabytes: float = float("nan")
     seconds: float = float("nan")
 

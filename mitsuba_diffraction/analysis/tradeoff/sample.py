@@ -18,21 +18,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Pairs of directions with the exact window sum for each.
+    """Pairs of directions with the exact window sum for each."""
 
-    Attributes
-    ----------
-    wi, wo : (n, 3), exact in single precision.
-    wavelength : (n,) nm, likewise.
-    near : (n,) whether the pair lies within 3/σ of order 0.
-    exact : (n,) ⟨|P|²⟩ / 4π²σ⁴ by `reference`, in double precision.
-    """
-
+    # wi, wo: (n, 3), exact in single precision
     wi: Array
     wo: Array
-    wavelength: Array
-    near: NDArray[np.bool_]
-    exact: Array
+    wavelength: Array  # (n,) nm, likewise
+    near: NDArray[np.bool_]  # (n,) whether the pair lies within 3/σ of order 0
+    exact: Array  # (n,) ⟨|P|²⟩ / 4π²σ⁴ by `reference`, in double precision
 
     @classmethod
     def of(

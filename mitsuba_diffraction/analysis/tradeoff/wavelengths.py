@@ -22,16 +22,10 @@ _DRAWS = 256  # rays for each pair
 
 @dataclass(frozen=True)
 class Spectral:
-    """Errors of sums, and noise of rays.
+    """Errors of sums, and noise of rays."""
 
-    Attributes
-    ----------
-    steps : nm → mean ΔE2000 of a sum with such steps from one of 0.5 nm.
-    counts : wavelengths of a ray → relative standard deviation of its luminance.
-    """
-
-    steps: dict[float, float]
-    counts: dict[int, float]
+    steps: dict[float, float]  # nm → mean ΔE2000 of a sum with such steps from one of 0.5 nm
+    counts: dict[int, float]  # wavelengths of a ray → relative standard deviation of its luminance
 
 
 def measure_wavelengths(

@@ -26,8 +26,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..field import HeightField
+from ..lengths import Counts, Lengths, count_pair, length_pair, number_between, seed_of
 from .noise import FloatArray, grain, rounded
-from .parameters import Counts, Lengths, count_pair, length_pair, number_between, seed_of
 from .sheets import ramp
 
 _SHORTEST_RUN, _LONGEST_RUN = 3, 11  # channel bits

@@ -18,8 +18,7 @@ import numpy.typing as npt
 
 from ...errors import DiffractionError
 from ..field import MAX_PIXELS, HeightField, check_pixel_count
-from ..lengths import pixel_size_of
-from .parameters import count_between, number_between
+from ..lengths import count_between, number_between, pixel_size_of
 
 # Periods are repeated until the patch is about as wide as the default coherence window, µm.
 _USUAL_WIDTH = 65.0

@@ -15,10 +15,10 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from ..field import HeightField
+from ..lengths import Counts, Lengths, count_pair, length_pair, number_between, seed_of
 from .dirt import beads, debris, flakes, scratches
 from .fingers import Layout, Row, lay_out
 from .noise import FloatArray, grain, on_pixels, rounded, smooth_field
-from .parameters import Counts, Lengths, count_pair, length_pair, number_between, seed_of
 from .sheets import Blade, overlay, ramp
 
 # Creases and bends are drawn on a grid of this many µm, whatever the pixels.
@@ -50,94 +50,36 @@ class Species:
 ELAPHE = Species(
     name="elaphe_like",
     layout=Layout(
-        pitch=1.03,
-        row_pitch=3.03,
-        sway=0.17,
-        wave=1.3,
-        wave_reach=(6.0, 8.0),
-        jitter_x=0.02,
-        jitter_y=0.08,
-        rise=0.012,
-        faults=0.003,
+        pitch=1.03, row_pitch=3.03, sway=0.17, wave=1.3, wave_reach=(6.0, 8.0), jitter_x=0.02,
+        jitter_y=0.08, rise=0.012, faults=0.003,
     ),
     blade=Blade(
-        notch=0.94,
-        tip_width=0.152,
-        taper=0.173,
-        tip_round=0.17,
-        tip_drop=0.002,
-        root_drop=0.023,
-        side_drop=0.028,
-        root_side=0.048,
-        floor=0.065,
-        floor_slope=0.014,
-        pocket=0.053,
-        sink=0.71,
-        lag=0.13,
-        dive=0.42,
-        wall=0.85,
+        notch=0.94, tip_width=0.152, taper=0.173, tip_round=0.17, tip_drop=0.002,
+        root_drop=0.023, side_drop=0.028, root_side=0.048, floor=0.065, floor_slope=0.014,
+        pocket=0.053, sink=0.71, lag=0.13, dive=0.42, wall=0.85,
     ),
-    depth=0.375,
-    level=0.527,
-    fray=0.019,
-    streak=0.006,
-    pore=0.018,
-    fuzz=0.0013,
-    bend=0.031,
-    bend_reach=(20.0, 35.0),
-    crease=0.02,
-    beads=0.15,
-    debris=0.03,
-    flakes=0.0006,
+    depth=0.375, level=0.527, fray=0.019, streak=0.006, pore=0.018, fuzz=0.0013, bend=0.031,
+    bend_reach=(20.0, 35.0), crease=0.02, beads=0.15, debris=0.03, flakes=0.0006,
     scratches=0.001,
-)
+)  # fmt: skip
 
 # No measured patch was at hand: finger sizes as published for the project, heights and
 # irregularities those of Elaphe, reduced until the first order is as pure as the animal's colours.
 XENOPELTIS = Species(
     name="xenopeltis_like",
     layout=Layout(
-        pitch=0.6,
-        row_pitch=1.5,
-        sway=0.09,
-        wave=1.0,
-        wave_reach=(12.0, 10.0),
-        jitter_x=0.006,
-        jitter_y=0.03,
-        rise=0.004,
-        faults=0.002,
+        pitch=0.6, row_pitch=1.5, sway=0.09, wave=1.0, wave_reach=(12.0, 10.0), jitter_x=0.006,
+        jitter_y=0.03, rise=0.004, faults=0.002,
     ),
     blade=Blade(
-        notch=0.92,
-        tip_width=0.15,
-        taper=0.16,
-        tip_round=0.2,
-        tip_drop=0.002,
-        root_drop=0.018,
-        side_drop=0.026,
-        root_side=0.048,
-        floor=0.072,
-        floor_slope=0.01,
-        pocket=0.025,
-        sink=0.72,
-        lag=0.12,
-        dive=0.42,
-        wall=1.0,
+        notch=0.92, tip_width=0.15, taper=0.16, tip_round=0.2, tip_drop=0.002, root_drop=0.018,
+        side_drop=0.026, root_side=0.048, floor=0.072, floor_slope=0.01, pocket=0.025,
+        sink=0.72, lag=0.12, dive=0.42, wall=1.0,
     ),
-    depth=0.25,
-    level=0.5,
-    fray=0.01,
-    streak=0.0025,
-    pore=0.006,
-    fuzz=0.0008,
-    bend=0.018,
-    bend_reach=(20.0, 30.0),
-    crease=0.01,
-    beads=0.04,
-    debris=0.01,
-    flakes=0.0002,
+    depth=0.25, level=0.5, fray=0.01, streak=0.0025, pore=0.006, fuzz=0.0008, bend=0.018,
+    bend_reach=(20.0, 30.0), crease=0.01, beads=0.04, debris=0.01, flakes=0.0002,
     scratches=0.0005,
-)
+)  # fmt: skip
 
 
 def elaphe_like(

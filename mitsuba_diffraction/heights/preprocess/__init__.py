@@ -4,9 +4,8 @@ Each takes a `HeightField` and gives a new one, with a line in its `history` tha
 
 Contents
 --------
-cropping    the central region of a patch
 missing     points without data, filled
 levelling   tilt, scan lines and outliers
 periodic    opposite edges made to meet
-edges       how far they are from meeting
+edges       the central region of a patch, and how far its edges are from meeting
 """

@@ -2,7 +2,7 @@
 
 Contents
 --------
-trimesh      `TriangleMesh`: vertices, normals, texture coordinates and triangles as arrays
+trimesh      `TriangleMesh`: arrays; `oriented_mesh`: one whose patch follows a field
 files        `load_mesh`, `write_ply`
 polygons     PLY files of polygons, cut into triangles
 tangents     `check_tangents`: whether a mesh has the tangents that a patch needs
@@ -10,17 +10,15 @@ report       `TangentReport`: what that found
 breaks       along how long lines a field of directions breaks
 surface      frames, transport and Laplacians of a mesh that is welded by position
 directions   `direction_field`: a smooth field of directions on any mesh
-oriented     `oriented_mesh`: a mesh whose patch follows such a field
 """
 
 from __future__ import annotations
 
 from .directions import DirectionField, direction_field
 from .files import load_mesh, load_orientation, write_ply
-from .oriented import oriented_mesh
 from .report import TangentReport
 from .tangents import check_tangents
-from .trimesh import TriangleMesh
+from .trimesh import TriangleMesh, oriented_mesh
 
 __all__ = [
     "DirectionField",

@@ -27,20 +27,12 @@ _EDGES, _SHARE = 4.0, 0.2
 
 @dataclass(frozen=True)
 class Corners:
-    """A field at the corners of triangles, and where neighbours share an edge.
+    """A field at the corners of triangles, and where neighbours share an edge."""
 
-    Attributes
-    ----------
-    places : (n, 3) positions, each once.
-    faces : (m, 3) indices of places.
-    orientation : (m, 3, 2) cosine and sine of the angle from each triangle's tangent.
-    jumps : (e, 2) pairs of places: edges across which the field jumps by over 60 degrees.
-    """
-
-    places: Floats
-    faces: Ints
-    orientation: Floats
-    jumps: Ints
+    places: Floats  # (n, 3) positions, each once
+    faces: Ints  # (m, 3) indices of places
+    orientation: Floats  # (m, 3, 2) cosine and sine of the angle from each triangle's tangent
+    jumps: Ints  # (e, 2) pairs of places: edges across which the field jumps by over 60 degrees
 
     def turning(self) -> Bools:
         """(m, 3) whether the field turns by over 60° on the way from corner n to corner n + 1."""

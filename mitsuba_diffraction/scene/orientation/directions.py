@@ -39,18 +39,12 @@ _SHIFT = 1e-6  # of the eigenvalues' scale: the Laplacian of a flat sheet is sin
 
 @dataclass(frozen=True)
 class DirectionField:
-    """A unit tangent vector for every vertex, and where there is none.
+    """A unit tangent vector for every vertex, and where there is none."""
 
-    Attributes
-    ----------
-    directions : (n, 3) unit vectors at right angles to the normals; zero where there is none.
-    singular : (k, 3) places around which the field turns.
-    indices : (k,) how often, counter-clockwise.
-    """
-
+    # (n, 3) unit vectors at right angles to the normals; zero where there is none
     directions: Floats
-    singular: Floats
-    indices: Ints
+    singular: Floats  # (k, 3) places around which the field turns
+    indices: Ints  # (k,) how often, counter-clockwise
 
 
 def direction_field(

@@ -15,30 +15,21 @@ TURN = 30.0  # degrees between neighbours from which on a seam shows
 
 @dataclass(frozen=True)
 class TangentReport:
-    """What `check_tangents` found; shares are of the surface area, 0 to 1.
+    """What `check_tangents` found; shares are of the surface area, 0 to 1."""
 
-    Attributes
-    ----------
-    triangles : number of triangles with an area.
-    has_uv, has_normals, has_orientation : whether the mesh carries them.
-    degenerate : share whose texture coordinates span no area: no tangent there.
-    mirrored : share where u × v runs the other way round: the patch is seen mirrored.
-    turning : share within which the direction turns by over 60 degrees, or which lies beside an
-        edge across which it turns by more than 30.
-    stretch : median ratio of |dp/du| to |dp/dv| (1: no direction is stretched).
-    broken : length of the lines along which the direction breaks, in the unit of the positions.
-    size : of the mesh, its longest side along an axis.
-    """
-
-    triangles: int
+    triangles: int  # number of triangles with an area
+    # has_uv, has_normals, has_orientation: whether the mesh carries them
     has_uv: bool
     has_normals: bool
-    degenerate: float
-    mirrored: float
+    degenerate: float  # share whose texture coordinates span no area: no tangent there
+    mirrored: float  # share where u × v runs the other way round: the patch is seen mirrored
+    # share within which the direction turns by over 60 degrees, or which lies beside an edge across
+    # which it turns by more than 30
     turning: float
-    stretch: float
+    stretch: float  # median ratio of |dp/du| to |dp/dv| (1: no direction is stretched)
+    # length of the lines along which the direction breaks, in the unit of the positions
     broken: float
-    size: float
+    size: float  # of the mesh, its longest side along an axis
     has_orientation: bool = False
 
     @property

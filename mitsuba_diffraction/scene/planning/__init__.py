@@ -8,6 +8,5 @@ domain       from that to how much of a table it takes
 plan         `Plan`: that for all tables of a scene, as a file
 make         making one, and trying it
 difference   what it changes in the picture
-report       what it found, as plain data
-lookups      what it changes in the time of look-ups, and how many fall outside
+report       what it found, as plain data, with the time of look-ups and how many fall outside
 """

@@ -22,18 +22,13 @@ WIDTH, SPP = 160, 64
 
 @dataclass(frozen=True)
 class Difference:
-    """Between the pictures with whole and with planned tables, of the same random numbers.
+    """Between the pictures with whole and with planned tables, of the same random numbers."""
 
-    Attributes
-    ----------
-    relative : mean |ΔXYZ| over mean XYZ, all pixels.
-    delta_e_mean, delta_e_99 : ΔE2000 of the pixels that are not black, or NaN.
-    size, spp : of the pictures.
-    """
-
-    relative: float
+    relative: float  # mean |ΔXYZ| over mean XYZ, all pixels
+    # delta_e_mean, delta_e_99: ΔE2000 of the pixels that are not black, or NaN
     delta_e_mean: float
     delta_e_99: float
+    # size, spp: of the pictures
     size: tuple[int, int]
     spp: int
 

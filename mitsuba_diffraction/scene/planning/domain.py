@@ -20,22 +20,16 @@ ROOM = 1.02
 
 @dataclass(frozen=True)
 class LookupStatistics:
-    """What one table is asked, over all surfaces that share it.
+    """What one table is asked, over all surfaces that share it."""
 
-    Attributes
-    ----------
-    u, v, w : (n,) ωi + ωo in the patch's frame, w times height_scale.
-    wavelength : (n,) nm.
-    xyz : (n, 3) light of the picture that each look-up adds, the whole picture's being 1.
-    total : light of all paths that meet the surfaces, what lies beneath included.
-    """
-
+    # u, v, w: (n,) ωi + ωo in the patch's frame, w times height_scale
     u: NDArray[np.float64]
     v: NDArray[np.float64]
     w: NDArray[np.float64]
-    wavelength: NDArray[np.float64]
+    wavelength: NDArray[np.float64]  # (n,) nm
+    # (n, 3) light of the picture that each look-up adds, the whole picture's being 1
     xyz: NDArray[np.float64]
-    total: float
+    total: float  # light of all paths that meet the surfaces, what lies beneath included
 
     @property
     def light(self) -> NDArray[np.float64]:
@@ -71,19 +65,13 @@ class LookupStatistics:
 
 @dataclass(frozen=True)
 class Domain:
-    """How much of a table a scene needs.
+    """How much of a table a scene needs."""
 
-    Attributes
-    ----------
-    crop, kappa_max : rad/µm, see `DiffractionTable.build`.
-    tolerance : of the table itself.
-    outside : share of the surfaces' light that is looked up beyond.
-    """
-
+    # crop, kappa_max: rad/µm, see `DiffractionTable.build`
     crop: tuple[float, float]
     kappa_max: float
-    tolerance: float
-    outside: float
+    tolerance: float  # of the table itself
+    outside: float  # share of the surfaces' light that is looked up beyond
 
     def arguments(self) -> dict[str, Any]:
         """For `DiffractionTable.build`."""

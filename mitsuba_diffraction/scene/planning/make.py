@@ -214,19 +214,12 @@ def check_light(loaded: RecordedScene, plan: Plan) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class TestedPlan:
-    """A plan that was tried.
+    """A plan that was tried."""
 
-    Attributes
-    ----------
-    plan : the plan; without any restriction where no picture came near enough.
-    planned : its tables by key, as they were last tried.
-    seconds : that they took to build, with `timing`.
-    difference : between the last pictures, or None where nothing could be made smaller.
-    """
-
-    plan: Plan
-    planned: dict[str, DiffractionTable]
-    seconds: dict[str, float]
+    plan: Plan  # the plan; without any restriction where no picture came near enough
+    planned: dict[str, DiffractionTable]  # its tables by key, as they were last tried
+    seconds: dict[str, float]  # that they took to build, with `timing`
+    # between the last pictures, or None where nothing could be made smaller
     difference: Difference | None
 
     @property

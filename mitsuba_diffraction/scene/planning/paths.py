@@ -39,21 +39,15 @@ LOOKUP = np.dtype(
 
 @dataclass(frozen=True)
 class TracedPaths:
-    """What diffracting surfaces are asked, weighted with the light of the picture.
+    """What diffracting surfaces are asked, weighted with the light of the picture."""
 
-    Attributes
-    ----------
-    lookups : (n,) of type `LOOKUP`.
-    total : (bsdfs,) light of all paths that meet each BSDF, nested BSDFs' included; the light of
-        all paths is 1.
-    paths : how many were traced.
-    lobe_turn : (bsdfs,) median over pixels of how far ωi turns within a pixel, in direction
-        cosines; NaN where the camera does not see the BSDF.
-    """
-
-    lookups: NDArray[np.void]
+    lookups: NDArray[np.void]  # (n,) of type `LOOKUP`
+    # (bsdfs,) light of all paths that meet each BSDF, nested BSDFs' included; the light of all
+    # paths is 1
     total: NDArray[np.float64]
-    paths: int
+    paths: int  # how many were traced
+    # (bsdfs,) median over pixels of how far ωi turns within a pixel, in direction cosines; NaN
+    # where the camera does not see the BSDF
     lobe_turn: NDArray[np.float64]
 
     def of(self, bsdfs: list[int]) -> NDArray[np.void]:

@@ -21,39 +21,23 @@ _KIND = "mitsuba-diffraction plan"
 
 @dataclass(frozen=True)
 class PlannedTable:
-    """One table of the scene.
+    """One table of the scene."""
 
-    Attributes
-    ----------
-    surfaces : ids of the BSDFs that look it up.
-    name : of the heights.
-    digest : of the heights.
-    domain : what of it is needed, or None for all of it.
-    memory : bytes of the whole table and of the planned one.
-    """
-
-    surfaces: list[str]
-    name: str
-    digest: str
-    domain: Domain | None
-    memory: tuple[int, int]
+    surfaces: list[str]  # ids of the BSDFs that look it up
+    name: str  # of the heights
+    digest: str  # of the heights
+    domain: Domain | None  # what of it is needed, or None for all of it
+    memory: tuple[int, int]  # bytes of the whole table and of the planned one
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a scene needs of its tables.
+    """What a scene needs of its tables."""
 
-    Attributes
-    ----------
-    scene : name of the file, for people.
-    tolerance : relative error of the picture that it was made for.
-    paths : that were traced.
-    tables : by the key of the whole table (`tables.store.cache.table_key`): heights and parameters.
-    """
-
-    scene: str
-    tolerance: float
-    paths: int
+    scene: str  # name of the file, for people
+    tolerance: float  # relative error of the picture that it was made for
+    paths: int  # that were traced
+    # by the key of the whole table (`tables.store.cache.table_key`): heights and parameters
     tables: Mapping[str, PlannedTable] = field(default_factory=dict)
 
     def limits(self) -> dict[str, dict[str, Any]]:

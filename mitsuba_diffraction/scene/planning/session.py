@@ -42,23 +42,15 @@ _one_at_a_time = threading.Lock()
 
 @dataclass(frozen=True)
 class Recorded:
-    """What one BSDF was asked in one call; lanes without light are left out.
+    """What one BSDF was asked in one call; lanes without light are left out."""
 
-    Attributes
-    ----------
-    bsdf : index among the session's BSDFs.
-    lane : (n,) what the caller put into `si.time`.
-    u, v : (n,) tangential part of ωi + ωo in the patch's frame.
-    w : (n,) its normal part times height_scale.
-    value : (n, wavelengths) what diffraction alone returned, f·cosθo.
-    """
-
-    bsdf: int
-    lane: NDArray[np.int64]
+    bsdf: int  # index among the session's BSDFs
+    lane: NDArray[np.int64]  # (n,) what the caller put into `si.time`
+    # u, v: (n,) tangential part of ωi + ωo in the patch's frame
     u: NDArray[np.float32]
     v: NDArray[np.float32]
-    w: NDArray[np.float32]
-    value: NDArray[np.float32]
+    w: NDArray[np.float32]  # (n,) its normal part times height_scale
+    value: NDArray[np.float32]  # (n, wavelengths) what diffraction alone returned, f·cosθo
 
 
 @dataclass

@@ -17,9 +17,8 @@ thesis_fit      the procedure behind the thesis' published periods
 from __future__ import annotations
 
 from .beam import Beam, Response, measure
-from .procedure import thesis_fit
 from .ridge import Fit, Ridge, find_period, fit_period, ridge_of
-from .windows import window_fits
+from .windows import thesis_fit, window_fits
 
 #: The name that `thesis_fit` had before.
 documents_fit = thesis_fit

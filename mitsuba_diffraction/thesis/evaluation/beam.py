@@ -48,25 +48,16 @@ class Beam(Light):
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """What leaves the patch, by wavelength and viewing angle.
+    """What leaves the patch, by wavelength and viewing angle."""
 
-    Attributes
-    ----------
-    beam : the light.
-    wavelengths : (L,), nm.
-    angles : (A,), degrees, rising.
-    values : (L, A), angle-resolved scatter f·cosθo in 1/sr: the share of the beam's power that a
-        small detector gets, per solid angle.
-    sigma : µm, of the window; sets how far order 0 reaches.
-    label : which method.
-    """
-
-    beam: Beam
-    wavelengths: Array
-    angles: Array
+    beam: Beam  # the light
+    wavelengths: Array  # (L,), nm
+    angles: Array  # (A,), degrees, rising
+    # (L, A), angle-resolved scatter f·cosθo in 1/sr: the share of the beam's power that a small
+    # detector gets, per solid angle
     values: Array
-    sigma: float
-    label: str
+    sigma: float  # µm, of the window; sets how far order 0 reaches
+    label: str  # which method
 
 
 def measure(

@@ -34,20 +34,12 @@ _LINES = 4000
 
 @dataclass(frozen=True, eq=False)
 class Ridge:
-    """Viewing angle of the maximum at each wavelength.
+    """Viewing angle of the maximum at each wavelength."""
 
-    Attributes
-    ----------
-    response : where it was found.
-    order : whose it is.
-    angles : (L,), degrees; NaN where there is none.
-    heights : (L,), f·cosθo there, 1/sr.
-    """
-
-    response: Response
-    order: int
-    angles: Array
-    heights: Array
+    response: Response  # where it was found
+    order: int  # whose it is
+    angles: Array  # (L,), degrees; NaN where there is none
+    heights: Array  # (L,), f·cosθo there, 1/sr
 
     @property
     def found(self) -> NDArray[np.bool_]:
@@ -62,19 +54,12 @@ class Ridge:
 
 @dataclass(frozen=True)
 class Fit:
-    """The grating equation, fitted to a ridge.
+    """The grating equation, fitted to a ridge."""
 
-    Attributes
-    ----------
-    period : µm.
-    residual : degrees, root mean square of ridge less grating equation.
-    largest : degrees, the largest difference.
-    points, wavelengths : maxima that were found, of how many wavelengths.
-    """
-
-    period: float
-    residual: float
-    largest: float
+    period: float  # µm
+    residual: float  # degrees, root mean square of ridge less grating equation
+    largest: float  # degrees, the largest difference
+    # points, wavelengths: maxima that were found, of how many wavelengths
     points: int
     wavelengths: int
 

@@ -1,4 +1,10 @@
-"""One coherence window at many places of a patch, and the period that each of them shows."""
+"""One coherence window at many places of a patch, and the period that each of them shows.
+
+`thesis_fit` is the procedure behind the thesis' published periods, so that they can be understood.
+It differs from the model in three ways: the phase is exp(ikh) where it should be exp(ikwh), the
+window sits on the patch's first pixel, and what is followed is the brightest speckle of that one
+window. What is plotted is its relative reflectance. For an exact grating none of that matters.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
+from ...optics.geometry import diffraction_coordinates, wavenumber
 from ...progress import Progress
 from ...tables.table import DiffractionTable
-from .beam import Array, Beam, measure
+from ..methods.gain import Gain
+from .beam import Array, Beam, Response, measure
 from .ridge import Fit, fit_period, ridge_of
 
 MOST_WINDOWS = 4096
@@ -20,16 +28,10 @@ _SEED = 20140113
 
 @dataclass(frozen=True, eq=False)
 class WindowFits:
-    """Fits of single windows.
+    """Fits of single windows."""
 
-    Attributes
-    ----------
-    places : (n, 2), centres of the windows, µm.
-    fits : as many; `None` where too few maxima were found.
-    """
-
-    places: Array
-    fits: tuple[Fit | None, ...]
+    places: Array  # (n, 2), centres of the windows, µm
+    fits: tuple[Fit | None, ...]  # as many; `None` where too few maxima were found
 
     @property
     def periods(self) -> Array:
@@ -123,3 +125,35 @@ def _lattice(count: int) -> Array:
     plastic = 1.32471795724474602596
     steps = np.arange(count)[:, None] * np.array([1.0 / plastic, 1.0 / plastic**2])
     return np.asarray((steps + np.random.default_rng(_SEED).random(2)) % 1.0)
+
+
+def thesis_response(
+    table: DiffractionTable, beam: Beam, wavelengths: Array, angles: Array
+) -> Response:
+    """Its response: C·S at κ = k, the window on the corner; in `values`, times cosθo.
+
+    Parameters
+    ----------
+    table : with coherence="patch".
+    """
+    corner = moved_window(table, (0.0, 0.0))
+    gain = Gain()
+
+    def relative(wi: Array, wo: Array, wavelength: Array) -> Array:
+        k = wavenumber(wavelength)
+        u, v, _ = diffraction_coordinates(wi, wo)
+        return gain.factor(wi, wo) * corner.window_sum(k * u, k * v, np.asarray(k))
+
+    label = "thesis' procedure"
+    return measure(relative, beam, wavelengths, angles, sigma=table.sigma, label=label)
+
+
+def thesis_fit(
+    table: DiffractionTable, beam: Beam, wavelengths: Array, angles: Array, order: int = 1
+) -> Fit:
+    """The period that its procedure finds, at viewing angles across the normal from the light.
+
+    That is where it looks; on the light's own side its response grows towards the horizon.
+    """
+    across = angles[angles <= 0.0]
+    return fit_period(ridge_of(thesis_response(table, beam, wavelengths, across), order))

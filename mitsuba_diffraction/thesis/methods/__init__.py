@@ -20,11 +20,10 @@ estimate_periods   the period of a patch, with its confidence
 
 from __future__ import annotations
 
-from .full_spectrum import FullSpectrum
 from .gain import Gain
 from .make import NAMES, make, make_all
 from .maps import method_map
-from .method import Method
+from .method import FullSpectrum, Method
 from .nmm import OrdersOnly
 from .period import Period, estimate_periods
 from .pq import Repeated

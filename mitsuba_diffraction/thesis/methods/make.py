@@ -11,8 +11,7 @@ from ...progress import Progress
 from ...tables.build.checks import TAPS_SHARE
 from ...tables.table import DiffractionTable
 from ...tables.window import taps_for
-from .full_spectrum import FullSpectrum
-from .method import Method, trapezoid_rule
+from .method import FullSpectrum, Method, trapezoid_rule
 from .nmm import OrdersOnly
 from .period import check_period, estimate_periods, required_period
 from .pq import Repeated

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...analysis.maps import hemisphere
-from ...analysis.maps.bands import Bands
-from ...analysis.maps.light import Light
+from ...analysis.maps.light import Bands, Light
 from ...analysis.maps.result import BrdfMap
 from ...optics.geometry import wavenumber
 from ...progress import Progress

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...optics.geometry import diffraction_coordinates, wavenumber
 from ...tables.build.error import NEAR
-from .full_spectrum import FullSpectrum
-from .method import Array, Method
+from .method import Array, FullSpectrum, Method
 
 WEIGHTS = ("step", "lobe")
 

@@ -19,18 +19,12 @@ _SHORTEST, _LONGEST = 1e-2, 1e3  # µm
 
 @dataclass(frozen=True)
 class Period:
-    """An estimate.
+    """An estimate."""
 
-    Attributes
-    ----------
-    axis : "x" or "y".
-    length : µm; NaN where the autocorrelation has no peak at all.
-    confidence : 0 to 1, how far the autocorrelation rises from its valley (or from 0, if that is
-        higher) to its peak at `length`; 1 for an exact grating.
-    """
-
-    axis: str
-    length: float
+    axis: str  # "x" or "y"
+    length: float  # µm; NaN where the autocorrelation has no peak at all
+    # 0 to 1, how far the autocorrelation rises from its valley (or from 0, if that is higher) to
+    # its peak at `length`; 1 for an exact grating
     confidence: float
 
     @property

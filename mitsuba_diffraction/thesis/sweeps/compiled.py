@@ -22,18 +22,11 @@ _RANGE = (360.0, 830.0)
 
 @dataclass(frozen=True)
 class Compiled:
-    """Seconds of one map, the smallest of the rounds.
+    """Seconds of one map, the smallest of the rounds."""
 
-    Attributes
-    ----------
-    spectral : the package's own look-up, at every wavelength.
-    colours : as in RGB variants: one look-up in the table of the whole spectrum's colours.
-    flss : the thesis' loop over wavelengths, terms and taps, an image a term.
-    """
-
-    spectral: float
-    colours: float
-    flss: float
+    spectral: float  # the package's own look-up, at every wavelength
+    colours: float  # as in RGB variants: one look-up in the table of the whole spectrum's colours
+    flss: float  # the thesis' loop over wavelengths, terms and taps, an image a term
 
     @property
     def ratio(self) -> float:
@@ -69,7 +62,7 @@ def time_compiled(
     """
     import mitsuba as mi
 
-    from ...analysis.bench.saved import saved_bsdf, thesis_bsdf
+    from ...analysis.bench.contenders import saved_bsdf, thesis_bsdf
 
     common: dict[str, Any] = {
         "coherence_width": coherence_width, "tolerance": tolerance, "wavelength_range": _RANGE,

@@ -26,18 +26,11 @@ _LIT = 1e-4
 
 @dataclass(frozen=True)
 class _Kind:
-    """A sweep's parameter.
+    """A sweep's parameter."""
 
-    Attributes
-    ----------
-    unit : printed after values.
-    values : by default.
-    reference : the value that others are compared with; `None`: the maps differ by intent.
-    """
-
-    unit: str
-    values: tuple[Any, ...]
-    reference: Any
+    unit: str  # printed after values
+    values: tuple[Any, ...]  # by default
+    reference: Any  # the value that others are compared with; `None`: the maps differ by intent
 
 
 SWEEPS: dict[str, _Kind] = {
@@ -51,27 +44,19 @@ SWEEPS: dict[str, _Kind] = {
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One value.
+    """One value."""
 
-    Attributes
-    ----------
-    value : of the parameter.
-    label : with its unit.
-    map : the colours.
-    seconds : that the map took, without tables.
-    mean, high : ΔE2000 from the reference (`colour.delta_e`) over the pixels that it lights, mean
-        and 95th percentile; NaN where there is no reference.
-    own_mean : the same mean when both have their own exposure: difference of colour, not of light.
-    blueness : ΣZ/ΣX over that of the reference, away from the mirror's lobe; above 1 is bluer.
-    """
-
-    value: Any
-    label: str
-    map: BrdfMap
-    seconds: float
+    value: Any  # of the parameter
+    label: str  # with its unit
+    map: BrdfMap  # the colours
+    seconds: float  # that the map took, without tables
+    # mean, high: ΔE2000 from the reference (`colour.delta_e`) over the pixels that it lights, mean
+    # and 95th percentile; NaN where there is no reference
     mean: float
     high: float
+    # the same mean when both have their own exposure: difference of colour, not of light
     own_mean: float
+    # ΣZ/ΣX over that of the reference, away from the mirror's lobe; above 1 is bluer
     blueness: float
 
 

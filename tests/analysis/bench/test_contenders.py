@@ -16,7 +16,7 @@ from mitsuba_diffraction.analysis.bench.contenders import (
     bsdf_factories,
     build_tables,
 )
-from mitsuba_diffraction.analysis.bench.plan import Plan
+from mitsuba_diffraction.analysis.bench.figures import Plan
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.tables.window import base_bin, first_tap
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.scene.orientation.directions import direction_field
-from mitsuba_diffraction.scene.orientation.oriented import oriented_mesh
 from mitsuba_diffraction.scene.orientation.tangents import check_tangents
-from mitsuba_diffraction.scene.orientation.trimesh import grid_faces
+from mitsuba_diffraction.scene.orientation.trimesh import grid_faces, oriented_mesh
 
 
 def report_of(positions, normals, faces, along, smoothing=0.03):

@@ -13,11 +13,11 @@ from hypothesis.extra.numpy import arrays
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.scene.orientation.directions import GUIDES, direction_field
 from mitsuba_diffraction.scene.orientation.files import load_mesh, write_ply
-from mitsuba_diffraction.scene.orientation.oriented import oriented_mesh
 from mitsuba_diffraction.scene.orientation.tangents import check_tangents
 from mitsuba_diffraction.scene.orientation.trimesh import (
     TriangleMesh,
     grid_faces,
+    oriented_mesh,
     vertex_normals,
 )
 from scenes.make import disc, piece

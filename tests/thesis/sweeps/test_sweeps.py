@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.analysis.maps import Light
-from mitsuba_diffraction.analysis.maps.sheet import contact_sheet
+from mitsuba_diffraction.analysis.maps.picture import contact_sheet
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.thesis import methods
 from mitsuba_diffraction.thesis.methods import Gain
