@@ -62,7 +62,7 @@ class ScaleRoughness:
         length = np.hypot(qx[None, :], qy[:, None]).ravel()[1:]
         weight = power.ravel()[1:]
         bins = np.floor(_BINS_PER_OCTAVE * np.log2(length)).astype(int)
-        _, which = np.unique(bins, return_inverse=True)
+        which = bins - bins.min()  # some are empty
         total = np.bincount(which, weight).astype(np.float64)
         # the mean over the power in a bin; a bin without any may lie anywhere
         moment = np.bincount(which, weight * length).astype(np.float64)
