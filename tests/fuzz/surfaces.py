@@ -14,7 +14,7 @@ from mitsuba_diffraction.optics.geometry import kirchhoff_factor, sigma_of
 from tests.directions import lit_pairs
 from tests.lanes import brdf_values
 
-_PAIRS = 40
+_PAIRS, _MANY = 40, 1500
 #: Errors are measured at some pairs of directions, tolerances hold for sums over thousands; single
 #: precision of directions and wavelengths is worth 1e-5 of the light on top (docs/accuracy.md).
 _SAMPLING, _SINGLE = 2.0, 1e-5
@@ -66,30 +66,41 @@ def check(rng: np.random.Generator) -> None:
         table.save(path)
         loaded = md.DiffractionTable.load(path)
         np.testing.assert_array_equal(loaded.coefficients, table.coefficients)
-        sigma = sigma_of(asked["coherence_width"])
-        try:
-            wi, wo, wavelength, near = lit_pairs(field, sigma, _PAIRS, int(rng.integers(2**31)))
-        except (StopIteration, ValueError):
-            return  # no order but the zeroth has light to look for
-        exact = md.reference.brdf(
-            field, wi, wo, wavelength, coherence_width=asked["coherence_width"],
-            coherence=asked["coherence"],
-        )  # fmt: skip
-        factor = kirchhoff_factor(wi, wo, wavelength, sigma)
-        most = _SAMPLING * asked["tolerance"]
-        _compare(loaded.brdf(wi, wo, wavelength) / factor, exact / factor, near, most, "NumPy")
         scene = {
             "type": "diffraction", "table": str(path), "material": "none",
             "energy_conserving": False,
         }  # fmt: skip
         bsdf = mi.load_dict(scene)
-        value = brdf_values(bsdf, wi, wo, np.asarray(wavelength)[:, None])
+    seed = int(rng.integers(2**31))
+    try:
+        _check_look_ups(field, asked, loaded, bsdf, _PAIRS, seed)
+    except AssertionError:
+        # a few may be darker than those that a tolerance is relative to
+        _check_look_ups(field, asked, loaded, bsdf, _MANY, seed)
+
+
+def _check_look_ups(
+    field: md.HeightField, asked: dict[str, Any], table: md.DiffractionTable, bsdf: Any,
+    count: int, seed: int,
+) -> None:  # fmt: skip
+    """Compare as many pairs of directions with the integral, in NumPy and in the plugin."""
+    sigma = sigma_of(asked["coherence_width"])
+    try:
+        wi, wo, wavelength, near = lit_pairs(field, sigma, count, seed)
+    except (StopIteration, ValueError):
+        return  # no order but the zeroth has light to look for
+    given = {name: asked[name] for name in ("coherence_width", "coherence")}
+    exact = md.reference.brdf(field, wi, wo, wavelength, **given)
+    factor = kirchhoff_factor(wi, wo, wavelength, sigma)
+    most = _SAMPLING * asked["tolerance"]
+    _compare(table.brdf(wi, wo, wavelength) / factor, exact / factor, near, most, "NumPy")
+    value = brdf_values(bsdf, wi, wo, np.asarray(wavelength)[:, None])
     _compare(np.ravel(value) / factor, exact / factor, near, most + _SINGLE, "plugin")
 
 
 def _compare(value: Any, exact: Any, near: Any, most: float, what: str) -> None:
-    assert np.isfinite(value).all(), what
-    assert (value >= 0.0).all(), what
+    if not (np.isfinite(value).all() and (value >= 0.0).all()):
+        raise ArithmeticError(f"{what}: not finite, or negative")
     for part in (near, ~near):
         total = exact[part].sum()
         if total > 1e-12 * exact.sum():

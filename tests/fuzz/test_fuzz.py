@@ -15,6 +15,11 @@ FOUND = [
     # elongated patches, whose look-ups ended in an error of Dr.Jit's loops
     ("surfaces", 1, 21),
     ("surfaces", 2, 12),
+    # two intervals of κ: the last of one was looked up as the first of the next, and refused
+    ("surfaces", 4711, 32),
+    ("surfaces", 4711, 48),
+    # nine directions away from order 0, and next to no light in any of them
+    ("surfaces", 4711, 2),
     # PLY files that are no UTF-8, or whose lists have infinitely many corners
     ("texts", 1, 732),
     ("texts", 1, 746),

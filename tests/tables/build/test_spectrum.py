@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mitsuba_diffraction.tables.build.build.spectrum import Spectrum
 from scipy.special import jv
 
 from mitsuba_diffraction.heights import gratings
+from mitsuba_diffraction.tables.build.spectrum import Spectrum
 from tests.directions import rough_patch
 
 PATCH = rough_patch((70, 81), (0.08, 0.07), 0.3)  # one even and one odd number of pixels
