@@ -19,8 +19,8 @@ FloatArray = npt.NDArray[np.float64]
 
 # 16384² pixels, 2 GiB of heights: beyond it no table could be built in the memory of a workstation.
 MAX_PIXELS = 2**28
-# Beyond so many pixels statistics are added up by so many rows.
-_LARGE, _ROWS = 2**25, 256
+#: Beyond so many pixels statistics are added up by so many rows.
+LARGE, ROWS = 2**25, 256
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
@@ -106,7 +106,7 @@ class HeightField:
     @cached_property
     def rms_height(self) -> float:
         """Root-mean-square deviation from the mean height, µm."""
-        if self.heights.size <= _LARGE:
+        if self.heights.size <= LARGE:
             return float(self.heights.std())
         mean = float(self.heights.mean())
         total = sum(float(np.square(rows - mean).sum()) for rows in self._blocks())
@@ -119,10 +119,10 @@ class HeightField:
         The seams between tiles are left out: their steps are not part of the surface.
         """
         dx, dy = self.pixel_size
-        if self.heights.size > _LARGE:
+        if self.heights.size > LARGE:
             (ny, nx), along_x, along_y = self.shape, 0.0, 0.0
             for rows in self._blocks(1):
-                along_x += float(np.square(np.diff(rows[:_ROWS], axis=1)).sum())
+                along_x += float(np.square(np.diff(rows[:ROWS], axis=1)).sum())
                 along_y += float(np.square(np.diff(rows, axis=0)).sum())
             along_x, along_y = along_x / (ny * (nx - 1)), along_y / ((ny - 1) * nx)
             return math.sqrt(along_x / dx**2 + along_y / dy**2)
@@ -133,8 +133,8 @@ class HeightField:
 
     def _blocks(self, more: int = 0) -> Iterator[FloatArray]:
         """Some rows at a time, and `more` of the next, so that no copy is as large as the field."""
-        for start in range(0, self.shape[0], _ROWS):
-            yield self.heights[start : start + _ROWS + more]
+        for start in range(0, self.shape[0], ROWS):
+            yield self.heights[start : start + ROWS + more]
 
     def changed(
         self, heights: npt.ArrayLike, line: str, *, cut_out: bool | None = None

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...errors import DiffractionError
-from ..field import HeightField
+from ..field import LARGE, ROWS, HeightField
 from .levelling import level_plane, plane_of
 
 FloatArray = npt.NDArray[np.float64]
@@ -133,7 +133,13 @@ def _seams(field: HeightField) -> tuple[_Seam, _Seam]:
 
 def _seam(h: FloatArray, pixel: float) -> _Seam:
     """The seam between the last and the first row."""
-    within = np.mean(np.diff(h, axis=0) ** 2, axis=1)
+    rows = len(h) if h.size <= LARGE else ROWS
+    within = np.concatenate(
+        [
+            np.mean(np.diff(h[start : start + rows + 1], axis=0) ** 2, axis=1)
+            for start in range(0, len(h) - 1, rows)
+        ]
+    )
     across = float(np.mean((h[-1] - h[0]) ** 2))
     lines = h.shape[1] / pixel**2
     return _Seam(

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...heights.field import HeightField
+from ...heights.field import LARGE, HeightField
 from ...heights.validity import window_warning
 from ...optics.blend import RoughnessTable, ScaleRoughness
 from ...optics.geometry import wavenumber
@@ -16,8 +16,8 @@ from .spectrum import Spectrum
 from .windows import Windows
 
 _SLOW = 150  # orders read in a look-up; 16 are usual
-#: Points of a patch beyond which its roughness is that of windows with so many a side.
-_LARGE, _PART = 2**25, 2048
+# A large patch has the roughness of windows with so many points a side.
+_PART = 2048
 _GREEN = 550.0  # nm, where the variation between patches is stated
 
 
@@ -71,7 +71,7 @@ def roughness_of(patches: Sequence[HeightField], q_max: float) -> RoughnessTable
         return ScaleRoughness.mean(patches.roughness()).table(q_max)
     each = []
     for patch in patches:
-        if patch.heights.size <= _LARGE:
+        if patch.heights.size <= LARGE:
             each.append(ScaleRoughness.of(patch.heights, patch.pixel_size))
         else:  # whose transform would take ten times its memory
             width = _PART * min(patch.pixel_size)

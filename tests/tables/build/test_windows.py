@@ -8,6 +8,7 @@ from scipy.ndimage import gaussian_filter
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.heights import field as field_module
+from mitsuba_diffraction.heights.preprocess import edges, levelling
 from mitsuba_diffraction.tables.build import windows as module
 from mitsuba_diffraction.tables.build.windows import Windows
 
@@ -138,8 +139,16 @@ def test_large_fields_have_the_same_statistics_in_parts(monkeypatch, tmp_path):
     heights = rough(300).astype(np.float32)
     np.save(tmp_path / "scan.npy", heights)
     whole = HeightField.load(tmp_path / "scan.npy", pixel_size=PIXEL)
-    monkeypatch.setattr(field_module, "_LARGE", 1)
+    monkeypatch.setattr(field_module, "LARGE", 1)
     parts = HeightField.load(tmp_path / "scan.npy", pixel_size=PIXEL)
     np.testing.assert_array_equal(parts.heights, heights)
     assert parts.rms_slope == pytest.approx(whole.rms_slope, rel=1e-12)
     assert parts.rms_height == pytest.approx(whole.rms_height, rel=1e-12)
+    for one in (edges, levelling):
+        monkeypatch.setattr(one, "LARGE", 1)
+    level = parts.treated(level="plane")
+    assert "RMS change" in level.history[-1]
+    lines = edges.edge_lines(parts, 0.4)
+    monkeypatch.undo()
+    assert level.history == whole.treated(level="plane").history
+    assert lines == edges.edge_lines(whole, 0.4)
