@@ -50,6 +50,7 @@ def connect(
                 dashboard_address=":0", silence_logs=logging.CRITICAL,
             )  # fmt: skip
         with cluster, distributed.Client(cluster) as client:
+            client.register_plugin(_apart(distributed))
             yield client
         return
     address = scheduler or os.environ.get(VARIABLE)
@@ -142,6 +143,20 @@ def _trouble(wanted: tuple[str, ...], variant: str | None) -> str | None:
     except DiffractionError as error:
         return str(error)
     return None
+
+
+def _apart(distributed: Any) -> Any:
+    """A plugin that takes workers out of the terminal's reach, late ones too.
+
+    Mitsuba answers Ctrl-C itself while it renders, and a scalar variant leaves its pass unfinished.
+    """
+
+    class Apart(distributed.WorkerPlugin):
+        def setup(self, worker: Any) -> None:
+            with contextlib.suppress(OSError):  # it leads a session already
+                os.setsid()
+
+    return Apart()
 
 
 @contextlib.contextmanager
