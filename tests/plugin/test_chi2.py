@@ -39,6 +39,7 @@ PIGMENT = {
     "int_ior": 1.5,
     "pigment": {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.4}},
 }
+PRINCIPLED = {"int_ior": 1.5, "pigment": {"type": "principled", "roughness": 0.3}}
 GLOSSY_BELOW = {"int_ior": 1.5, "pigment": {"type": "roughplastic", "alpha": 0.2}}
 DISPERSED = (400.0, 480.0, 560.0, 700.0)
 AZIMUTH = 40.0
@@ -59,13 +60,15 @@ def like_elaphe() -> md.HeightField:
 
 @dataclass(frozen=True)
 class Case:
-    """A surface, light from θ degrees, wavelengths in nm, and where the histogram looks."""
+    """A surface, light from θ degrees, wavelengths in nm, where the histogram looks, and which
+    component the context asks for."""
 
     heights: Any
     theta: float
     wavelengths: tuple[float, ...]
     parameters: dict[str, Any] = field(default_factory=dict)
     order: tuple[float, float] | None = None  # rad/µm; None for the whole disc
+    component: int | None = None  # None for all
 
     def load(self, shared: Any = None) -> Any:
         heights = self.heights
@@ -102,6 +105,11 @@ CASES = {
         ROUGH, 70.0, DISPERSED, SMALL | PIGMENT | {"orientation": -50.0}
     ),
     "over gloss, 50°": Case(ROUGH, 50.0, (700.0,), SMALL | GLOSSY_BELOW),
+    **{
+        f"{name}, component {n}, 35°": Case(ROUGH, 35.0, (550.0,), SMALL | beneath, component=n)
+        for name, beneath in (("over pigment", PIGMENT), ("over principled", PRINCIPLED))
+        for n in (0, 1)
+    },
     "mirror, 65 µm, its lobe": Case(
         md.HeightField(np.zeros((60, 60)), 0.085), 30.0, (550.0,), {}, (0.0, 0.0)
     ),
@@ -159,7 +167,7 @@ class EqualAreas:
 def chi_square(bsdf: Any, case: Case, *, pdf_at: tuple[float, ...] | None = None) -> Any:
     """The test of a case; `pdf_at` asks for the density at other wavelengths than sampled."""
     wi = polar(case.theta, AZIMUTH)
-    context = mi.BSDFContext()
+    context = mi.BSDFContext(mi.TransportMode.Radiance, int(mi.BSDFFlags.All), case.component)
 
     def lanes(wavelengths: tuple[float, ...]) -> Any:
         si = interaction(wi, np.broadcast_to(wavelengths, (1, 4)))
