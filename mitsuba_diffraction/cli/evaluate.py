@@ -67,7 +67,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         group, TABLE_NAMES, coherence="ensemble for spectral, patch for the thesis' own methods"
     )
     group.add_argument(
-        "--windows", metavar="N", type=whole_number(0), default=_WINDOWS,
+        "--windows", dest="positions", metavar="N", type=whole_number(0), default=_WINDOWS,
         help="window positions whose own periods are fitted, for the spread; 0 leaves them out; "
         f"default: {_WINDOWS}",
     )  # fmt: skip
@@ -241,7 +241,7 @@ def _windows(
     angles: Any, fit: Fit | None, bar: Bar,
 ) -> tuple[list[tuple[str, str]], dict[str, Any]]:  # fmt: skip
     """What single windows show, and the thesis' procedure: lines, and entries of the NPZ."""
-    if args.windows == 0 or fit is None:
+    if args.positions == 0 or fit is None:
         return [], {}
     from ..thesis.evaluation import thesis_fit, window_fits
     from ..thesis.methods import make
@@ -254,7 +254,7 @@ def _windows(
     more: dict[str, Any] = {}
     try:
         found = window_fits(
-            table, beam, few, angles, count=args.windows, order=args.order,
+            table, beam, few, angles, count=args.positions, order=args.order,
             period=None if fit is None else fit.period, progress=bar,
         )  # fmt: skip
     except DiffractionError as error:
@@ -263,7 +263,7 @@ def _windows(
         periods = 1e3 * found.periods
         more |= {"window_periods": found.periods, "window_places": found.places}
         lines.append(
-            ("windows", f"{periods.size} of {args.windows} window positions: "
+            ("windows", f"{periods.size} of {args.positions} window positions: "
              f"{1e3 * found.mean:.5g} ± {1e3 * found.spread:.2g} nm, {periods.min():.5g} to "
              f"{periods.max():.5g} nm")
         )  # fmt: skip

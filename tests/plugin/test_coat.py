@@ -13,8 +13,9 @@ from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.fresnel import reflectance
 from tests.directions import Array, as_single, polar
 from tests.lanes import evaluated, interaction, refusal
+from tests.plugin.conftest import ALL, runs
 from tests.plugin.test_model import PATCH, WIDTH, pairs
-from tests.plugin.test_variants import ALL, evaluate, runs
+from tests.plugin.test_variants import evaluate
 
 FLAT = md.HeightField(np.zeros((40, 40)), 0.08)
 COATED = {

@@ -14,7 +14,8 @@ from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from tests.directions import Array, as_single, rough_patch, uniform_directions
 from tests.lanes import evaluated, refusal
-from tests.plugin.test_variants import ALL, evaluate, runs
+from tests.plugin.conftest import ALL, runs
+from tests.plugin.test_variants import evaluate
 
 PATCH = rough_patch((40, 44), (0.09, 0.09), 0.14, 0.8)
 WIDTH = 3.0

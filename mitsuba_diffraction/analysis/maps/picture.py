@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from .result import BrdfMap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
 
 
@@ -158,6 +158,8 @@ def contact_sheet(
     title : of the whole sheet.
     exposure : stops, for all maps alike; by default each has its own, which is then stated.
     """
+    from matplotlib.figure import Figure
+
     columns = min(len(maps), _MOST_COLUMNS)
     rows = math.ceil(len(maps) / columns)
     side = max(1.02 * max(m.resolution for m in maps) / _DPI, _SMALLEST_SIDE)

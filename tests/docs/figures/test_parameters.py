@@ -58,7 +58,7 @@ def test_the_defaults_are_those_of_the_code(some_variant, patch):
 
 
 def test_the_choices_are_those_of_the_code(some_variant):
-    from mitsuba_diffraction.heights import options
+    from mitsuba_diffraction.heights import read as options
     from mitsuba_diffraction.plugin import parameters as code
     from mitsuba_diffraction.tables.expansion import BASES
 
