@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -24,6 +26,13 @@ from tests.plugin.plates import (
 
 # coarse pixels keep the tables small; that is not the point here
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+
+
+@pytest.fixture(autouse=True)
+def alone() -> None:
+    """Without what earlier tests loaded: of a class that a scene lacks, any object that is alive makes
+    Dr.Jit record a call, which is refused since the function was not given the object."""
+    gc.collect()
 
 
 @pytest.mark.parametrize("name", ["llvm_ad_rgb", "llvm_ad_mono", "cuda_ad_rgb"])
