@@ -30,8 +30,8 @@ pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.Diffraction
 
 @pytest.fixture(autouse=True)
 def alone() -> None:
-    """Without what earlier tests loaded: of a class that a scene lacks, any object that is alive makes
-    Dr.Jit record a call, which is refused since the function was not given the object."""
+    """Without what earlier tests loaded: of a class that a scene lacks, any object alive makes Dr.Jit
+    record a call, which it refuses, since the function was not given the object."""
     gc.collect()
 
 
