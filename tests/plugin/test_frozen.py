@@ -30,8 +30,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.Diffraction
 
 @pytest.fixture(autouse=True)
 def alone() -> None:
-    """Without what earlier tests loaded: of a class that a scene lacks, any object alive makes Dr.Jit
-    record a call, which it refuses, since the function was not given the object."""
+    """Without what earlier tests loaded, calls of which a recording would have to be given."""
     gc.collect()
 
 
