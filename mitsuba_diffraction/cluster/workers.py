@@ -83,7 +83,7 @@ def require_dask() -> Any:
         import distributed
     except ImportError as error:
         raise DiffractionError(
-            "workers need Dask, which is not installed: pip install 'mitsuba_diffraction[cluster]'"
+            "workers need Dask, which is not installed: pip install 'mitsuba-diffraction[cluster]'"
         ) from error
     return distributed
 
