@@ -16,7 +16,6 @@ from .tasks import check_versions, versions
 #: Names a running cluster, as Dask has it.
 VARIABLE = "DASK_SCHEDULER_ADDRESS"
 _PATIENCE = 60.0  # seconds for the first worker to come
-_PROBE = 120.0  # seconds for all to answer, which import Mitsuba for it
 
 
 @contextlib.contextmanager
