@@ -27,12 +27,6 @@ VARIANT = "llvm_ad_rgb"
 SPP = 24
 
 
-@pytest.fixture(scope="module")
-def client():
-    with cluster.connect(2) as found:
-        yield found
-
-
 @pytest.fixture(autouse=True)
 def small_tasks(monkeypatch):
     """Two samples a pass and one pass a task: 12 tasks."""
