@@ -80,7 +80,10 @@ def fragment_parts(
         shared.append("taylor.glsl")
     if "SHADOWED" in constants:
         shared.append("shadow.glsl")
-    return parts + [(name, _file(name)) for name in (*shared, f"{method}.glsl", main)]
+    shared += ["layers.glsl", f"{method}.glsl"]
+    if "DIFFRACTING" in constants:
+        shared.append("diffraction.glsl")
+    return parts + [(name, _file(name)) for name in (*shared, main)]
 
 
 def plain_source(name: str) -> str:
