@@ -76,6 +76,15 @@ coat_ior : float or string [none]
     the structure beyond the critical angle is lost (docs/validation.md has figures), so coats never
     gain, and energy_conserving has nothing to do. Over that of the medium above it is the
     differentiable parameter `coat_eta`.
+film_ior : float or string [none]
+    A thin film that follows the heights and interferes: oxide on a metal (1.77 is alumina), wax on
+    a scale. Its lower face is the structure, its upper one the same heights, film_thickness above.
+    Over that of the medium above it is the differentiable parameter `film_eta`. It excludes a coat.
+film_thickness : float ∂ [none]
+    The film's thickness along the vertical, nm; at most the length over which light is coherent,
+    2 n d = 12 µm. RGB variants sum its colours over wavelengths, apart from those of the orders.
+film_k : float ∂ [0]
+    The film's absorption, the k of n + ik over that of the medium above it; not over a nested BSDF.
 model : string [small_slope]
     `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
     where the surface is rough at the scale of an order; polarised variants have its Mueller
@@ -374,6 +383,7 @@ class Diffraction(mi.BSDF):
             self.coat is None,
             self._takes,
             getattr(self.boundary.material, "reflects_all", False),  # other kernels
+            getattr(self.boundary.material, "channels", None),
         )
         if refused:
             raise DiffractionError("; ".join(refused))
