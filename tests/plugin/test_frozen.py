@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from tests.lanes import interaction, vectors
+from tests.lanes import interaction, lanes, vectors
 from tests.plugin.plates import (
     OTHER,
     PATCH,
@@ -86,7 +86,7 @@ def test_frozen_eval_and_sample_follow_their_parameters(variant):
             wi, wo = pairs(seed=n)
             si, wo = interaction(wi, WAVELENGTHS), vectors(wo)
             rng = np.random.default_rng(n)
-            one = mi.Float(rng.random(300).astype(np.float32))
+            one = lanes(rng.random(300))
             two = mi.Point2f(rng.random((2, 300)).astype(np.float32))
             dr.eval(si, wo, one, two)
             expected = [*bsdf.eval_pdf(context, si, wo), *bsdf.sample(context, si, one, two)]
