@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import gc
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -26,12 +24,6 @@ from tests.plugin.plates import (
 
 # coarse pixels keep the tables small; that is not the point here
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
-
-
-@pytest.fixture(autouse=True)
-def alone() -> None:
-    """Without what earlier tests loaded, calls of which a recording would have to be given."""
-    gc.collect()
 
 
 @pytest.mark.parametrize("name", ["llvm_ad_rgb", "llvm_ad_mono", "cuda_ad_rgb"])
