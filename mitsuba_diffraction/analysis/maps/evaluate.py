@@ -15,7 +15,7 @@ from ...optics.geometry import wavenumber
 from ...plugin.llvm import require_loaded_llvm
 from ...plugin.memory import upload
 from ...progress import Progress
-from ...tables.build.error import NEAR
+from ...tables.build.spectrum import NEAR
 from . import hemisphere
 from .light import Bands, Light
 from .result import BrdfMap
