@@ -14,6 +14,7 @@ import mitsuba as mi
 
 from ..tables.table import DiffractionTable
 from .pair import Pair
+from .places import Places
 from .restricted import device_table
 from .rgb_power import rgb_power
 from .roles import Colour, Float, Interaction, Vector2f
@@ -48,15 +49,18 @@ class SpectralPower:
     ----------
     table : the diffraction table.
     wavelength : nm, for mono variants.
+    places : where windows sit; None for the table's own.
 
     Attributes
     ----------
     device : the table in the variant's memory.
     """
 
-    def __init__(self, table: DiffractionTable, wavelength: float) -> None:
-        self.device = device_table(table)
-        self._sampler = order_sampler(table)
+    def __init__(
+        self, table: DiffractionTable, wavelength: float, places: Places | None = None
+    ) -> None:
+        self.device, self._places = device_table(table), places
+        self._sampler = order_sampler(table if places is None else table.averaged)
         self._sigma = table.sigma
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
@@ -64,9 +68,10 @@ class SpectralPower:
     def power(self, pair: Pair, height_scale: Float, si: Interaction) -> Colour:
         """See `PowerModel.power`."""
         scaled_w = pair.w * height_scale
+        windows = () if self._places is None else self._places.at(si, pair.rotation)
 
         def of_wavelength(k: Float) -> Float:
-            found = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w)
+            found = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w, windows)
             return found * dr.square(k * (0.5 / dr.pi))
 
         differentiable = dr.grad_enabled(pair.uv, scaled_w)
@@ -139,6 +144,8 @@ class SpectralPower:
         return list(dr.while_loop(state, lambda n, *_: n < count, body)[2])
 
 
-def power_model(table: DiffractionTable, wavelength: float) -> PowerModel:
-    """That of the current variant."""
-    return rgb_power(table) if mi.is_rgb else SpectralPower(table, wavelength)
+def power_model(
+    table: DiffractionTable, wavelength: float, places: Places | None = None
+) -> PowerModel:
+    """That of the current variant; places, which RGB variants do not know, as `SpectralPower`."""
+    return rgb_power(table) if mi.is_rgb else SpectralPower(table, wavelength, places)
