@@ -31,6 +31,7 @@ from .errors import DiffractionError, quoted
 from .heights.field import HeightField
 from .optics import blend, boundary
 from .optics.coat import refracted, transmitted
+from .optics.fresnel import Filmed
 from .optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
 from .settings import COHERENCES as COHERENCES
 from .settings import SURFACE, checked
@@ -54,6 +55,7 @@ def brdf(
     eta: ArrayLike | None = None,
     k: ArrayLike = 0.0,
     coat: float | None = None,
+    film: tuple[complex, float] | None = None,
 ) -> NDArray[np.float64]:
     """BRDF of a surface with these heights for unpolarised light, in 1/sr, shape (n,).
 
@@ -75,6 +77,8 @@ def brdf(
         without eta R = 1.
     coat : index of a flat clear coat over the surface, relative likewise (`optics.coat`); it needs
         eta, and its own reflection is the lobe of a flat patch.
+    film : index n + ik, relative likewise, and thickness in nm of a film that follows the heights,
+        coherent with the surface (`optics.fresnel.Filmed`); it needs eta, and no coat.
 
     Raises
     ------
@@ -85,7 +89,7 @@ def brdf(
     width = _width(coherence_width)
     light = _broadcast(wi, wo, wavelength)
     window = sigma_of(width), coherence, _places(coherence, place, len(light[2]))
-    index = _index(model, eta, k, light[2].shape)
+    index = _index(model, eta, k, light[2], film)
     if index is not None:
         return _measured(boundary.unpolarised, field, light, model, index, coat, window)
     if coat is not None:
@@ -107,6 +111,7 @@ def mueller(
     place: ArrayLike | None = None,
     model: str = "small_slope",
     coat: float | None = None,
+    film: tuple[complex, float] | None = None,
 ) -> NDArray[np.float64]:
     """Mueller matrices of the BRDF, in 1/sr, shape (n, 4, 4); arguments and errors as `brdf`.
 
@@ -116,7 +121,7 @@ def mueller(
     width = _width(coherence_width)
     light = _broadcast(wi, wo, wavelength)
     window = sigma_of(width), coherence, _places(coherence, place, len(light[2]))
-    index = _index(model, eta, k, light[2].shape)
+    index = _index(model, eta, k, light[2], film)
     if index is None:
         raise DiffractionError("polarisation needs an index: give eta (and k of a conductor)")
     return _measured(boundary.mueller, field, light, model, index, coat, window)
@@ -181,7 +186,7 @@ def _measured(
     field: HeightField,
     light: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     model: str,
-    index: NDArray[np.complex128],
+    index: NDArray[np.complex128] | Filmed,
     coat: float | None,
     window: tuple[float, str, NDArray[np.float64] | None],
 ) -> NDArray[np.float64]:
@@ -199,6 +204,8 @@ def _measured(
     if coat is None:
         power = window_power(field, *light, *window)
         return weighed(_order_factor(*light, sigma) * power, _jones(field, *light, model, index))
+    if isinstance(index, Filmed):
+        raise DiffractionError(f"coat={coat} and a film exclude each other: leave one of them out")
     if not (np.isfinite(coat) and coat >= 1.0):
         raise DiffractionError(f"coat={coat} must be an index of at least 1")
     below, above = refracted(wi, coat), refracted(wo, coat)
@@ -228,7 +235,7 @@ def _jones(
     wo: NDArray[np.float64],
     wavelength: NDArray[np.float64],
     model: str,
-    index: NDArray[np.complex128],
+    index: NDArray[np.complex128] | Filmed,
 ) -> NDArray[np.complex128]:
     """Jones matrices (n, 2, 2) of a model; those of a mirror's normal where there is no light."""
     incident, outgoing = _lit(wi, wo)
@@ -285,18 +292,37 @@ def _places(coherence: str, place: ArrayLike | None, n: int) -> NDArray[np.float
 
 
 def _index(
-    model: str, eta: ArrayLike | None, k: ArrayLike, shape: tuple[int, ...]
-) -> NDArray[np.complex128] | None:
-    """The index eta + ik, (n,), or none, which is R = 1."""
+    model: str,
+    eta: ArrayLike | None,
+    k: ArrayLike,
+    wavelength: NDArray[np.float64],
+    film: tuple[complex, float] | None,
+) -> NDArray[np.complex128] | Filmed | None:
+    """The index eta + ik, (n,), under a film where there is one; or none, which is R = 1."""
     if model not in MODELS:
         raise DiffractionError(f"model='{model}' is unknown; choose one of {', '.join(MODELS)}")
     if eta is None:
+        if film is not None:
+            raise DiffractionError(f"film={film} needs an index beneath it: give eta (and k)")
         if model == "small_slope":
             raise DiffractionError(
                 "model='small_slope' needs an index: give eta (and k of a conductor), or "
                 "model='kirchhoff' for a perfect reflector"
             )
         return None
+    index = _complex(eta, k, wavelength.shape)
+    if film is None:
+        return index
+    layer, thickness = complex(film[0]), float(film[1])
+    if not (0.0 < layer.real < np.inf and 0.0 <= layer.imag < np.inf and 0.0 <= thickness < np.inf):
+        raise DiffractionError(
+            f"film={film} must be a finite index n + ik, n above 0 and k at least 0, and a finite "
+            "thickness of at least 0 nm"
+        )
+    return Filmed(index, layer, wavenumber(wavelength) * thickness * 1e-3)
+
+
+def _complex(eta: ArrayLike, k: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.complex128]:
     real, imaginary = np.asarray(eta, np.float64), np.asarray(k, np.float64)
     if not (np.all(np.isfinite(real)) and np.all(real > 0)):
         raise DiffractionError(f"eta={real} must be positive and finite")
