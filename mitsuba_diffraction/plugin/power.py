@@ -72,7 +72,7 @@ class SpectralPower:
 
     def power(self, pair: Pair, height_scale: Float, si: Interaction) -> Colour:
         """See `PowerModel.power`."""
-        functions = [self._power(pair, height_scale)]
+        functions = [self._power(pair, height_scale, si)]
         return mi.UnpolarizedSpectrum(self._each(functions, si, pair, height_scale)[0])
 
     def density(self, pair: Pair, height_scale: Float, si: Interaction) -> Float:
@@ -84,11 +84,11 @@ class SpectralPower:
         self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
     ) -> tuple[Colour, Float]:
         """See `PowerModel.both`; the density first, before its neighbours fill the caches."""
-        functions = [self._density(pair.outer, drawing_scale), self._power(pair, height_scale)]
+        functions = [self._density(pair.outer, drawing_scale), self._power(pair, height_scale, si)]
         densities, powers = self._each(functions, si, pair, height_scale)
         return mi.UnpolarizedSpectrum(powers), _mean(densities)
 
-    def _power(self, pair: Pair, height_scale: Float) -> Callable[[Float], Float]:
+    def _power(self, pair: Pair, height_scale: Float, si: Interaction) -> Callable[[Float], Float]:
         scaled_w = pair.w * height_scale
         windows = () if self._places is None else self._places.at(si, pair.rotation)
 
