@@ -49,7 +49,19 @@ coherence_width : float or string [65]
     4σ of the Gaussian amplitude window, µm: the width over which light is coherent. `auto`, as
     without it: that of the table or the recipe, else 65.
 coherence : string [ensemble]
-    `ensemble`: what a pixel sees that covers many coherence areas; `patch`: one window's speckle.
+    `ensemble`: what a pixel sees that covers many coherence areas; `patch`: one window's speckle,
+    the same everywhere; `surface`: that of the window centred where the light falls, the grain seen
+    from close up, which averages to `ensemble` from afar. It needs UV coordinates and one of the
+    next two, and a spectral or mono variant. Directions and energy are those of `ensemble`.
+uv_scale : float or string [none]
+    µm a unit of the UV coordinates: one number, or "u, v".
+world_scale : float [none]
+    Or µm a unit of length of the scene, 1000 for mm: positions are then as far apart as UV
+    coordinates are on the surface, which must be alike all over it.
+tiling : string [periodic]
+    How the patch covers the surface: `periodic`, side by side; `random`, shifted at random and
+    blended such that mean and contrast stay, so that it does not show again and again (Heitz and
+    Neyret 2018; for rough surfaces: the lines of a grating would be broken).
 basis : string [auto]
     `svd` (also as `auto`), `chebyshev` or `taylor`: the series in κ.
 tolerance : float [0.001]
@@ -169,6 +181,7 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..tables.energy.conservation import DirectionalTable
+from .attributes import PLACED
 from .boundary import Kirchhoff
 from .changing import Bounded, arrays_within, marks
 from .coat import CoatedPair
@@ -209,7 +222,7 @@ class Diffraction(mi.BSDF):
         super().__init__(props)
         parameters = read_parameters(props, provider)
         self.table = parameters.table
-        self.heights = parameters.heights
+        self.places, self.heights = parameters.places, parameters.heights
         self.fresnel = parameters.reflectance
         self.boundary, self.coat = parameters.boundary, parameters.coat
         self.mirror = Kirchhoff(self.coat) if self.coat is not None else None
@@ -225,12 +238,11 @@ class Diffraction(mi.BSDF):
         self.orientation = parameters.orientation
         self.layering = parameters.layering
         self.vcavity = parameters.vcavity
-        self.power = power_model(self.table, parameters.wavelength)
+        self.power = power_model(self.table, parameters.wavelength, self.places)
+        mean = self.table if self.places is None else self.table.averaged
         # Under a coat nothing is known of the albedo
         self._energy = (
-            EnergyModel(
-                self.table, self.boundary, parameters.wavelength, parameters.energy_conserving
-            )
+            EnergyModel(mean, self.boundary, parameters.wavelength, parameters.energy_conserving)
             if self.coat is None
             else None
         )
@@ -377,6 +389,7 @@ class Diffraction(mi.BSDF):
         )
         self._for_freezing = held + marks(
             self.table,
+            str(self.places),
             self.vcavity,
             str(self.layering),
             str(self.boundary),
@@ -433,10 +446,12 @@ class Diffraction(mi.BSDF):
     def to_string(self) -> str:
         """All parameters, for people."""
         nested = "" if self.nested is None else f"  nested = {self.nested},\n"
+        places = "" if self.places is None else f"  {PLACED}, {self.places},\n"
         return (
             "Diffraction[\n"
             f"  table = {self.table},\n"
             f"  coherence_width = {self.table.coherence_width:g} µm,\n"
+            f"{places}"
             f"  tolerance = {self.table.tolerance:g},\n"
             f"  surface = {self.fresnel},\n"
             f"  model = {self.boundary},\n"
