@@ -32,6 +32,13 @@ float turn_of(vec2 p)
     return p.y < 0.0 ? 1.0 - turn : turn;
 }
 
+// A tangential direction in the axes of a patch that is turned by (cos, sin).
+vec2 in_patch(vec3 direction, vec2 rotation)
+{
+    return vec2(rotation.x * direction.x + rotation.y * direction.y,
+                rotation.x * direction.y - rotation.y * direction.x);
+}
+
 uniform vec3 light_colour[LIGHTS];  // irradiance, or intensity of a point light, linear sRGB
 
 // ---------------------------------------------------------------- reflectance
