@@ -76,6 +76,15 @@ coat_ior : float or string [none]
     the structure beyond the critical angle is lost (docs/validation.md has figures), so coats never
     gain, and energy_conserving has nothing to do. Over that of the medium above it is the
     differentiable parameter `coat_eta`.
+film_ior : float or string [none]
+    A thin film that follows the heights and interferes: oxide on a metal (1.77 is alumina), wax on
+    a scale. Its lower face is the structure, its upper one the same heights, film_thickness above.
+    Over that of the medium above it is the differentiable parameter `film_eta`. It excludes a coat.
+film_thickness : float ∂ [none]
+    The film's thickness along the vertical, nm; at most the length over which light is coherent,
+    2 n d = 12 µm. RGB variants sum its colours over wavelengths, apart from those of the orders.
+film_k : float ∂ [0]
+    The film's absorption, the k of n + ik over that of the medium above it; not over a nested BSDF.
 model : string [small_slope]
     `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
     where the surface is rough at the scale of an order; polarised variants have its Mueller
@@ -183,7 +192,7 @@ from .roles import (
     Vector2f,
     Vector3f,
 )
-from .sampling import COSINE, fold
+from .sampling import EVEN, direction_of
 from .sources import TableProvider, from_cache
 
 #: Flatter would be lost in single precision.
@@ -257,8 +266,8 @@ class Diffraction(mi.BSDF):
         above, nested = self._lobes(ctx)
         density = mi.Float(0.0)
         if above:
-            pair = self._pair(si, wo, active)
-            density = self._density(pair, si)
+            pair = self._pair(si, wo, active).outer
+            density = _with_even_share(self.power.density(pair, self._drawing_scale, si))
         if nested is not None:
             beneath = self.nested.pdf(nested, si, wo, active)
             density = dr.lerp(beneath, density, self._glossy_share(above, si, active))
@@ -273,8 +282,9 @@ class Diffraction(mi.BSDF):
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         if above:
             pair = self._pair(si, wo, active)
-            density = self._density(pair, si)  # before its neighbours fill the caches
-            power = self.power.power(pair, self.height_scale, si)
+            scales = self.height_scale, self._drawing_scale
+            power, orders = self.power.both(pair, *scales, si)
+            density = _with_even_share(orders)
             value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
         if nested is not None:
             beneath = mi.Spectrum(self._beneath(si, wo, active))
@@ -373,6 +383,7 @@ class Diffraction(mi.BSDF):
             self.coat is None,
             self._takes,
             getattr(self.boundary.material, "reflects_all", False),  # other kernels
+            getattr(self.boundary.material, "channels", None),
         )
         if refused:
             raise DiffractionError("; ".join(refused))
@@ -479,12 +490,6 @@ class Diffraction(mi.BSDF):
             )
         return self.layering.beneath(si, wo, active, ratios)
 
-    def _density(self, pair: Pair, si: Interaction) -> Float:
-        """Of drawing a pair: by the orders, and a little by the cosine."""
-        orders = self.power.density(pair.outer, self._drawing_scale, si)
-        cosine = mi.warp.square_to_cosine_hemisphere_pdf(pair.outer.wo)
-        return dr.lerp(orders, cosine, COSINE)
-
     @property
     def _drawing_scale(self) -> Float:
         """What directions are drawn for: under a coat κ is as if heights were larger."""
@@ -515,13 +520,13 @@ class Diffraction(mi.BSDF):
         uv = self.power.draw(
             mi.Frame3f.cos_theta(si.wi),
             dr.detach(self._drawing_scale),
-            dr.maximum((sample1 - COSINE) * (1.0 / (1.0 - COSINE)), 0.0),
+            dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
             sample2,
             si,
         )
         rotation = self.orientation.rotation(si, active)
-        ordered = fold(from_patch(uv, rotation) - mi.Vector2f(si.wi.x, si.wi.y))
-        return dr.select(sample1 < COSINE, mi.warp.square_to_cosine_hemisphere(sample2), ordered)
+        ordered = direction_of(from_patch(uv, rotation) - mi.Vector2f(si.wi.x, si.wi.y))
+        return dr.select(sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), ordered)
 
     def _glossy_share(self, above: bool, si: Interaction, active: Mask) -> Float:
         """Share of the samples for diffraction where something lies beneath: by reflected power."""
@@ -531,6 +536,11 @@ class Diffraction(mi.BSDF):
         mean = dr.mean(mi.unpolarized_spectrum(reflectance))
         # What lies beneath is taken to return half of what it gets
         return dr.clip(mean / (0.5 + 0.5 * mean), 0.1, 0.9)
+
+
+def _with_even_share(density: Float) -> Float:
+    """The density of drawing a direction by the orders, and a little evenly."""
+    return dr.lerp(density, dr.inv_two_pi, EVEN)
 
 
 mi.register_bsdf("diffraction", Diffraction)

@@ -9,7 +9,6 @@ import mitsuba as mi
 import numpy as np
 
 from .roles import Float, Interaction, Mask, Rotation, Vector2f, Vector3f
-from .sampling import unfolded
 
 SHADOWINGS = ("none", "vcavity")
 
@@ -57,12 +56,6 @@ class Pair:
     def outgoing(self) -> Vector2f:
         """Tangential part of ωo, in the patch's frame."""
         return in_patch(self.wo, self._rotation)
-
-    @cached_property
-    def folded(self) -> Vector2f:
-        """Tangential part of the ωi + ωo beyond the horizon which `fold` makes the same ωo of."""
-        tangential = mi.Vector2f(self.wi.x, self.wi.y) + unfolded(self.wo)
-        return in_patch(tangential, self._rotation)
 
 
 def in_patch(direction: Vector2f | Vector3f, rotation: Rotation) -> Vector2f:

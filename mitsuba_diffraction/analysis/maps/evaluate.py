@@ -14,7 +14,7 @@ from ...optics.colour import LONGEST, SHORTEST, check_illuminant, linear_srgb, r
 from ...optics.geometry import wavenumber
 from ...plugin.llvm import require_loaded_llvm
 from ...progress import Progress
-from ...tables.build.error import NEAR
+from ...tables.build.spectrum import NEAR
 from . import hemisphere
 from .light import Bands, Light
 from .result import BrdfMap

@@ -189,15 +189,13 @@ class ProgressiveLight:
         self._stage = stage
         self.emitters = stage.emitters
         context = renderer.context
-        self._lights = self.emitters.lights()
         self._places = stage.casters.seen(camera)
         self._map = ShadowMap(stage.casters, shadow_size)
         width, height = camera.size
         self._frame = renderer.target(width, height)
         self._sums = [renderer.target(width, height) for _ in range(2)]  # of either kind of frame
-        for target in self._sums:
-            target.frame.clear(0.0, 0.0, 0.0, 0.0)
         self._counts = [0, 0]
+        self.clear()
         self._add = compile_plain(context, "whole.vert", "add.frag")
         self._triangle = context.vertex_array(self._add, [])
 
@@ -205,6 +203,13 @@ class ProgressiveLight:
     def frames(self) -> int:
         """How many there are."""
         return sum(self._counts)
+
+    def clear(self) -> None:
+        """Start again."""
+        for target in self._sums:
+            target.frame.clear(0.0, 0.0, 0.0, 0.0)
+        self._counts = [0, 0]
+        self._lights = self.emitters.lights()
 
     def advance(self, frames: int = 1) -> None:
         """Add this many frames."""

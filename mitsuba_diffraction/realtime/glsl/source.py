@@ -35,13 +35,14 @@ _PREAMBLES = {
 
 
 @functools.cache
-def _file(name: str) -> str:
+def shader_file(name: str) -> str:
+    """The text of one of the shaders' files."""
     return resources.files(__package__).joinpath("shaders", name).read_text(encoding="utf-8")
 
 
 def vertex_source(dialect: Dialect = "desktop", name: str = "surface.vert") -> str:
     """The vertex stage, the same for all methods."""
-    return _PREAMBLES[dialect] + _file(name)
+    return _PREAMBLES[dialect] + shader_file(name)
 
 
 def fragment_source(
@@ -84,11 +85,15 @@ def fragment_parts(
         shared.append("taylor.glsl")
     if "SHADOWED" in constants:
         shared.append("shadow.glsl")
+    shared.append("layers.glsl")
     if "GLOSS" in constants:
         shared.append("gloss.glsl")
     if "WEIGHTED" in constants or "LOOKED_UP" in constants:
         shared += ["surroundings.glsl", "lobes.glsl"]
-    return parts + [(name, _file(name)) for name in (*shared, f"{method}.glsl", main)]
+    shared.append(f"{method}.glsl")
+    if "DIFFRACTING" in constants:
+        shared.append("diffraction.glsl")
+    return parts + [(name, shader_file(name)) for name in (*shared, main)]
 
 
 def plain_source(
@@ -100,4 +105,4 @@ def plain_source(
     """
     constants = _CONSTANTS | dict(definitions or {})
     lines = [f"#define {key} {value}\n" for key, value in constants.items()]
-    return _PREAMBLES["desktop"] + "".join((*lines, *map(_file, shared), _file(name)))
+    return _PREAMBLES["desktop"] + "".join((*lines, *map(shader_file, shared), shader_file(name)))

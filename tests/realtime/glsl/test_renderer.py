@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import types
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -256,7 +257,8 @@ def test_all_that_is_not_shown_is_named_in_warnings(
             "room": {"type": "constant", "radiance": 0.25},
         }
     )  # fmt: skip
-    with pytest.warns(DiffractionWarning) as caught:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", DiffractionWarning)
         made = Renderer(scene, context=gl)
         for _ in range(2):
             made.render("lut", supersampling=1)
