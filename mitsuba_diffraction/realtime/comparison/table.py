@@ -40,7 +40,7 @@ def markdown(document: dict[str, Any]) -> str:
             *rows,
             "",
             f"Lights without extent, no shadows: {100 * share:.0f} % of the pixels, those that "
-            f"diffract and are lit in both; {document['driver']}; noise of the path-traced picture: "
+            f"diffract and are lit in both; {document['driver']}; noise of the path tracer: "
             f"ΔE2000 {plain_number(document['noise_delta_e_mean'])}.",
         ]
     )
