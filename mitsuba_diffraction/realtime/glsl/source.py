@@ -87,6 +87,6 @@ def fragment_parts(
     return parts + [(name, shader_file(name)) for name in (*shared, main)]
 
 
-def plain_source(name: str) -> str:
-    """A stage that knows neither surfaces nor tables, for the desktop."""
-    return _PREAMBLES["desktop"] + shader_file(name)
+def plain_source(name: str, dialect: Dialect = "desktop") -> str:
+    """A stage that knows neither surfaces nor tables."""
+    return _PREAMBLES[dialect] + shader_file(name)

@@ -18,8 +18,9 @@ from mitsuba_diffraction.realtime.web.scene import MAX_BYTES
 
 _READ = """async () => {
     viewer.most = 1;  // through the middles of pixels, as the desktop's
+    viewer.shadows = false;
     viewer.touch();
-    await viewer.settled();
+    await viewer.settled(1);
     let text = "";
     for (const byte of new Uint8Array(viewer.drawing.read(viewer.count).buffer))
         text += String.fromCharCode(byte);
