@@ -31,9 +31,10 @@ from .errors import DiffractionError, quoted
 from .heights.field import HeightField
 from .optics import blend, boundary
 from .optics.coat import refracted, transmitted
+from .optics.fresnel import Filmed
 from .optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
 from .settings import COHERENCES as COHERENCES
-from .settings import checked
+from .settings import SURFACE, checked
 
 MODELS = ("kirchhoff", "small_slope")
 
@@ -49,10 +50,12 @@ def brdf(
     *,
     coherence_width: float = 65.0,
     coherence: str = "ensemble",
+    place: ArrayLike | None = None,
     model: str = "kirchhoff",
     eta: ArrayLike | None = None,
     k: ArrayLike = 0.0,
     coat: float | None = None,
+    film: tuple[complex, float] | None = None,
 ) -> NDArray[np.float64]:
     """BRDF of a surface with these heights for unpolarised light, in 1/sr, shape (n,).
 
@@ -66,31 +69,32 @@ def brdf(
         x runs along rows, y along columns, z is the normal. Below the surface the BRDF is 0.
     wavelength : (n,) or scalar, vacuum wavelength in nm.
     coherence_width : 4σ of the amplitude window, µm.
-    coherence : "ensemble", the power averaged over every position of the window, or "patch", the
-        power under one window centred on the patch.
+    coherence : "ensemble", the power averaged over every position of the window; "patch", the
+        power under one window centred on the patch; "surface", under one centred on `place`.
+    place : (n, 2) or (2,), µm along x and y from the patch's first pixel; it tiles the plane.
     model : "kirchhoff", or "small_slope", which needs an index.
     eta, k : (n,) or scalar, the index eta + ik of the material over that of the medium above it;
         without eta R = 1.
     coat : index of a flat clear coat over the surface, relative likewise (`optics.coat`); it needs
         eta, and its own reflection is the lobe of a flat patch.
+    film : index n + ik, relative likewise, and thickness in nm of a film that follows the heights,
+        coherent with the surface (`optics.fresnel.Filmed`); it needs eta, and no coat.
 
     Raises
     ------
     DiffractionError
-        For an unknown coherence or model, a width that is not positive and finite, an index that
-        is missing or none, or arrays whose shapes do not fit.
+        For an unknown coherence or model, a width that is not positive and finite, an index or a
+        place that is missing or none, or arrays whose shapes do not fit.
     """
     width = _width(coherence_width)
-    checked("coherence", coherence)
     light = _broadcast(wi, wo, wavelength)
-    index = _index(model, eta, k, light[2].shape)
+    window = sigma_of(width), coherence, _places(coherence, place, len(light[2]))
+    index = _index(model, eta, k, light[2], film)
     if index is not None:
-        return _measured(
-            boundary.unpolarised, field, light, model, index, coat, sigma_of(width), coherence
-        )
+        return _measured(boundary.unpolarised, field, light, model, index, coat, window)
     if coat is not None:
         raise DiffractionError(f"coat={coat} needs an index beneath it: give eta (and k)")
-    power = window_power(field, *light, sigma_of(width), coherence)
+    power = window_power(field, *light, *window)
     return kirchhoff_factor(*light, sigma_of(width)) * power
 
 
@@ -104,8 +108,10 @@ def mueller(
     k: ArrayLike = 0.0,
     coherence_width: float = 65.0,
     coherence: str = "ensemble",
+    place: ArrayLike | None = None,
     model: str = "small_slope",
     coat: float | None = None,
+    film: tuple[complex, float] | None = None,
 ) -> NDArray[np.float64]:
     """Mueller matrices of the BRDF, in 1/sr, shape (n, 4, 4); arguments and errors as `brdf`.
 
@@ -113,12 +119,12 @@ def mueller(
     `optics.boundary.polarisation_axes`. Entry (0, 0) is `brdf`.
     """
     width = _width(coherence_width)
-    checked("coherence", coherence)
     light = _broadcast(wi, wo, wavelength)
-    index = _index(model, eta, k, light[2].shape)
+    window = sigma_of(width), coherence, _places(coherence, place, len(light[2]))
+    index = _index(model, eta, k, light[2], film)
     if index is None:
         raise DiffractionError("polarisation needs an index: give eta (and k of a conductor)")
-    return _measured(boundary.mueller, field, light, model, index, coat, sigma_of(width), coherence)
+    return _measured(boundary.mueller, field, light, model, index, coat, window)
 
 
 def window_power(
@@ -128,16 +134,21 @@ def window_power(
     wavelength: NDArray[np.float64],
     sigma: float,
     coherence: str,
+    places: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """⟨|P|²⟩ in µm⁴, shape (n,), one explicit integral per direction pair."""
+    """⟨|P|²⟩ in µm⁴, shape (n,), one explicit integral per direction pair.
+
+    places : (n, 2), centres of the windows in µm, instead of the patch's.
+    """
     k = wavenumber(wavelength)
     u, v, w = diffraction_coordinates(wi, wo)
     above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
     power = np.zeros(len(k))
     for n in np.flatnonzero(above):
         phase_screen = np.exp(1j * (k[n] * w[n]) * field.heights)
+        place = None if places is None else (places[n, 0], places[n, 1])
         power[n] = screen_power(
-            phase_screen, field.pixel_size, k[n] * u[n], k[n] * v[n], sigma, coherence
+            phase_screen, field.pixel_size, k[n] * u[n], k[n] * v[n], sigma, coherence, place
         )
     return power
 
@@ -149,8 +160,12 @@ def screen_power(
     beta: float,
     sigma: float,
     coherence: str,
+    place: tuple[float, float] | None = None,
 ) -> float:
-    """⟨|P|²⟩ in µm⁴ of one phase screen (ny, nx) at the spatial frequency (α, β) in rad/µm."""
+    """⟨|P|²⟩ in µm⁴ of one phase screen (ny, nx) at the spatial frequency (α, β) in rad/µm.
+
+    place : centre of the window in µm, instead of the patch's.
+    """
     ny, nx = phase_screen.shape
     qx, waves_x = _plane_waves(nx, pixel_size[0], alpha, sigma)
     qy, waves_y = _plane_waves(ny, pixel_size[1], beta, sigma)
@@ -160,8 +175,8 @@ def screen_power(
     if coherence == "ensemble":
         total = window_y**2 @ np.abs(amplitude) ** 2 @ window_x**2
     else:
-        centre_x = np.exp(-0.5j * qx * nx * pixel_size[0])
-        centre_y = np.exp(-0.5j * qy * ny * pixel_size[1])
+        x, y = place or (0.5 * nx * pixel_size[0], 0.5 * ny * pixel_size[1])
+        centre_x, centre_y = np.exp(-1j * qx * x), np.exp(-1j * qy * y)
         total = np.abs((window_y * centre_y) @ amplitude @ (window_x * centre_x)) ** 2
     return float(4 * np.pi**2 * sigma**4 * total)
 
@@ -171,15 +186,15 @@ def _measured(
     field: HeightField,
     light: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     model: str,
-    index: NDArray[np.complex128],
+    index: NDArray[np.complex128] | Filmed,
     coat: float | None,
-    sigma: float,
-    coherence: str,
+    window: tuple[float, str, NDArray[np.float64] | None],
 ) -> NDArray[np.float64]:
     """The BRDF as a measure of its Jones matrices; under a coat, that of its face too.
 
-    light : wi, wo, wavelength.
+    light : wi, wo, wavelength; window : sigma, coherence, places.
     """
+    sigma = window[0]
 
     def weighed(factor: NDArray[np.float64], jones: NDArray[np.complex128]) -> NDArray[np.float64]:
         found = measure(jones)
@@ -187,14 +202,16 @@ def _measured(
 
     wi, wo, wavelength = light
     if coat is None:
-        power = window_power(field, *light, sigma, coherence)
+        power = window_power(field, *light, *window)
         return weighed(_order_factor(*light, sigma) * power, _jones(field, *light, model, index))
+    if isinstance(index, Filmed):
+        raise DiffractionError(f"coat={coat} and a film exclude each other: leave one of them out")
     if not (np.isfinite(coat) and coat >= 1.0):
         raise DiffractionError(f"coat={coat} must be an index of at least 1")
     below, above = refracted(wi, coat), refracted(wo, coat)
     below, above = (np.where(w[:, 2:] > 0, r, -r) for w, r in ((wi, below), (wo, above)))
     inside = below, above, wavelength / coat
-    power = window_power(field, *inside, sigma, coherence) / coat**2
+    power = window_power(field, *inside, *window) / coat**2
     lit = _lit(wi, wo)
     jones = transmitted(_jones(field, *inside, model, index / coat), *lit, coat, index / coat)
     structure = weighed(_order_factor(*inside, sigma) * power, jones)
@@ -218,7 +235,7 @@ def _jones(
     wo: NDArray[np.float64],
     wavelength: NDArray[np.float64],
     model: str,
-    index: NDArray[np.complex128],
+    index: NDArray[np.complex128] | Filmed,
 ) -> NDArray[np.complex128]:
     """Jones matrices (n, 2, 2) of a model; those of a mirror's normal where there is no light."""
     incident, outgoing = _lit(wi, wo)
@@ -254,19 +271,58 @@ def _width(value: float) -> float:
     return float(value)
 
 
+def _places(coherence: str, place: ArrayLike | None, n: int) -> NDArray[np.float64] | None:
+    """Centres (n, 2) of windows on the surface, µm."""
+    if coherence != SURFACE:
+        checked("coherence", coherence)
+    if (place is None) == (coherence == SURFACE):
+        given = "needs a place: (x, y) on the patch in µm" if place is None else "takes no place"
+        raise DiffractionError(f"coherence='{coherence}' {given}")
+    if place is None:
+        return None
+    try:
+        found = np.broadcast_to(np.asarray(place, np.float64), (n, 2))
+    except ValueError as error:
+        raise DiffractionError(
+            f"place has shape {np.shape(place)}; it must be ({n}, 2) or (2,), in µm"
+        ) from error
+    if not np.all(np.isfinite(found)):
+        raise DiffractionError("place must be finite, in µm")
+    return found
+
+
 def _index(
-    model: str, eta: ArrayLike | None, k: ArrayLike, shape: tuple[int, ...]
-) -> NDArray[np.complex128] | None:
-    """The index eta + ik, (n,), or none, which is R = 1."""
+    model: str,
+    eta: ArrayLike | None,
+    k: ArrayLike,
+    wavelength: NDArray[np.float64],
+    film: tuple[complex, float] | None,
+) -> NDArray[np.complex128] | Filmed | None:
+    """The index eta + ik, (n,), under a film where there is one; or none, which is R = 1."""
     if model not in MODELS:
         raise DiffractionError(f"model='{model}' is unknown; choose one of {', '.join(MODELS)}")
     if eta is None:
+        if film is not None:
+            raise DiffractionError(f"film={film} needs an index beneath it: give eta (and k)")
         if model == "small_slope":
             raise DiffractionError(
                 "model='small_slope' needs an index: give eta (and k of a conductor), or "
                 "model='kirchhoff' for a perfect reflector"
             )
         return None
+    index = _complex(eta, k, wavelength.shape)
+    if film is None:
+        return index
+    layer, thickness = complex(film[0]), float(film[1])
+    if not (0.0 < layer.real < np.inf and 0.0 <= layer.imag < np.inf and 0.0 <= thickness < np.inf):
+        raise DiffractionError(
+            f"film={film} must be a finite index n + ik, n above 0 and k at least 0, and a finite "
+            "thickness of at least 0 nm"
+        )
+    return Filmed(index, layer, wavenumber(wavelength) * thickness * 1e-3)
+
+
+def _complex(eta: ArrayLike, k: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.complex128]:
     real, imaginary = np.asarray(eta, np.float64), np.asarray(k, np.float64)
     if not (np.all(np.isfinite(real)) and np.all(real > 0)):
         raise DiffractionError(f"eta={real} must be positive and finite")

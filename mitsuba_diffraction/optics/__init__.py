@@ -3,7 +3,7 @@
 Contents
 --------
 geometry   directions, wave numbers, the coherence window, the Kirchhoff factor
-fresnel    amplitudes and reflectance of a smooth interface
+fresnel    amplitudes and fields of a smooth interface, or of a thin film
 boundary   Jones and Mueller matrices of a pair of directions: small slope, Kirchhoff
 blend      which of the two an order of a surface follows
 coat       a clear coat over a structure

@@ -31,6 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import boundary, fresnel
 from .boundary import Complex, Real
+from .fresnel import Index
 
 #: Components are told apart to this part of an octave; lines of a grating stay where they are.
 _BINS_PER_OCTAVE = 256
@@ -116,20 +117,20 @@ class RoughnessTable:
         return np.asarray(np.interp(place, np.arange(len(self.nodes)), self.nodes), np.float64)
 
 
-def weight(kappa: ArrayLike, variance: ArrayLike, index: ArrayLike) -> Real:
+def weight(kappa: ArrayLike, variance: ArrayLike, index: Index) -> Real:
     """s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3) of any shapes that broadcast.
 
     Parameters
     ----------
     kappa : rad/µm.
     variance : σ_q², µm² (`ScaleRoughness.at`).
-    index : n + ik of the material over that of the medium above it.
+    index : n + ik of the material over that of the medium above it; a film counts in R₀.
     """
     roughness = np.square(np.asarray(kappa, np.float64)) * np.asarray(variance, np.float64)
     return np.exp(-roughness * (0.5 * fresnel.reflectance(1.0, index) + roughness / 3))
 
 
-def jones(wi: ArrayLike, wo: ArrayLike, index: ArrayLike, s: ArrayLike) -> Complex:
+def jones(wi: ArrayLike, wo: ArrayLike, index: Index, s: ArrayLike) -> Complex:
     """(1−s) K + s B, (..., 2, 2); arguments as `boundary.small_slope`, s as `weight` (...)."""
     share: NDArray[np.float64] = np.asarray(s, np.float64)[..., None, None]
     tangent, gentle = boundary.kirchhoff(wi, wo, index), boundary.small_slope(wi, wo, index)

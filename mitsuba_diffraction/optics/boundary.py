@@ -26,7 +26,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .fresnel import amplitudes, decaying_root
+from .fresnel import Filmed, Index, amplitudes, faces
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -35,7 +35,7 @@ Complex = NDArray[np.complex128]
 _NORMAL = 1e-12
 
 
-def small_slope(wi: ArrayLike, wo: ArrayLike, index: ArrayLike) -> Complex:
+def small_slope(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     """Jones matrices B of the first-order small-slope approximation, (..., 2, 2).
 
     With k0, k the tangential parts of −ωi and ωo, q0, q their cosines, q' = √(ε − k²), all in
@@ -47,32 +47,41 @@ def small_slope(wi: ArrayLike, wo: ArrayLike, index: ArrayLike) -> Complex:
         B_ps =  (ε−1) q'  ẑ·(k̂0×k̂)                 / ((εq+q')(q0+q0'))    s in, p out
         B_sp =  (ε−1) q0' ẑ·(k̂0×k̂)                 / ((q+q')(εq0+q0'))    p in, s out
 
+    These are products of the fields E0 and E that light along ωi and along ωo makes at the flat
+    interface, (ε−1) (E·E0 tangential + D D0/ε normal) over 4 q q0, by the reciprocity theorem
+    (Elson 1977, Applied Optics 16, 2872). Under a film that follows the heights both interfaces
+    are displaced alike, and their products add up; for k = k0 they are r_s and r_p of the film.
+
     Parameters
     ----------
     wi, wo : (..., 3) unit vectors above the surface, pointing away from it.
-    index : (...) n + ik of the material over that of the medium above it, finite, k ≥ 0.
+    index : (...) n + ik of the material over that of the medium above it, finite, k ≥ 0; or that
+        under a film, `fresnel.Filmed`.
     """
     s_in, s_out = polarisation_axes(wi, wo)
-    n = np.asarray(index, np.complex128)
-    epsilon, contrast = n * n, n * n - 1
     incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
     sine0, sine = np.hypot(*_xy(incident)), np.hypot(*_xy(outgoing))
-    q0, q = incident[..., 2], outgoing[..., 2]
-    q0_inside, q_inside = decaying_root(epsilon - sine0**2), decaying_root(epsilon - sine**2)
     # s turned by a quarter of a turn is k̂, so products of the axes are those of k̂
     (x0, y0), (x, y) = _xy(s_in), _xy(s_out)
     dot, cross = x0 * x + y0 * y, x0 * y - y0 * x
-    s0, s1 = q0 + q0_inside, q + q_inside
-    p0, p1 = epsilon * q0 + q0_inside, epsilon * q + q_inside
-    return _matrix(
-        ss=-contrast * dot / (s1 * s0),
-        sp=contrast * q0_inside * cross / (s1 * p0),
-        ps=contrast * q_inside * cross / (p1 * s0),
-        pp=contrast * (q_inside * q0_inside * dot - epsilon * sine * sine0) / (p1 * p0),
-    )
+    found = [
+        _matrix(
+            ss=-there.s * came.s * dot,
+            sp=there.s * came.x * cross,
+            ps=there.x * came.s * cross,
+            pp=there.x * came.x * dot - came.normal * there.p * came.p * sine * sine0,
+        )
+        * came.contrast[..., None, None]
+        for came, there in zip(
+            faces(incident[..., 2], sine0**2, index),
+            faces(outgoing[..., 2], sine**2, index),
+            strict=True,
+        )
+    ]
+    return np.asarray(sum(found[1:], found[0]))
 
 
-def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: ArrayLike) -> Complex:
+def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     """Jones matrices K of the tangent-plane approximation, (..., 2, 2); arguments as above.
 
     Fresnel's coefficients of a facet that mirrors ωi to ωo, between the axes of that facet and
@@ -85,7 +94,10 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: ArrayLike) -> Complex:
     total = incident + outgoing
     # |ωi + ωo|² = 2(1 + ωi·ωo) is the form that survives opposite grazing directions
     one_plus_dot = 0.5 * np.sum(total * total, axis=-1)
-    r_s, r_p = amplitudes(np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0)), index)
+    cos_half = np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0))
+    if isinstance(index, Filmed):
+        index = index.tilted(0.5 * total[..., 2] / cos_half)
+    r_s, r_p = amplitudes(cos_half, index)
     zero = np.zeros_like(r_s)
     facet = _matrix(ss=r_s, sp=zero, ps=zero, pp=r_p)
     turned = turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident)

@@ -18,6 +18,8 @@ import numpy as np
 
 from ..optics.blend import NODES_PER_OCTAVE, RoughnessTable
 from .coat import CoatedPair, bounced, transmittances
+from .film import UnderFilm
+from .fresnel import Face, Filmed, Index, amplitudes, faces, squared
 from .memory import index_between, read_record, upload
 from .pair import Pair
 from .reflectance import Conductor, Dielectric, Perfect, Reflectance
@@ -37,7 +39,7 @@ _NORMAL = 1e-20
 class Kirchhoff:
     """The tangent plane: Fresnel's coefficients at the half vector."""
 
-    material: Reflectance
+    material: Reflectance | UnderFilm
 
     def factor(
         self,
@@ -53,11 +55,12 @@ class Kirchhoff:
         wavenumbers : of the channels, rad/µm.
         mode : whether light comes along ωo (radiance) or along ωi (importance).
         """
-        coated = isinstance(pair, CoatedPair)
-        if (mi.is_polarized or coated) and not isinstance(self.material, Perfect):
+        layered = isinstance(pair, CoatedPair) or isinstance(self.material, UnderFilm)
+        if (mi.is_polarized or layered) and not isinstance(self.material, Perfect):
             light = _Path(pair, mode)
             indices = self.material.indices(si, active)
-            return light.of_jones([light.kirchhoff(index) for index in indices], indices)
+            matrices = [light.kirchhoff(index) for index in indices]
+            return light.of_jones(matrices, indices, self.material)
         reflectance = self.material.reflectance(pair.cos_half, si, active)
         return mi.depolarizer(reflectance * dr.square(pair.one_plus_dot))
 
@@ -68,7 +71,9 @@ class Kirchhoff:
 class SmallSlope:
     """Small slope, blended with Kirchhoff where the surface is rough at the scale of an order."""
 
-    def __init__(self, material: Dielectric | Conductor, roughness: RoughnessTable) -> None:
+    def __init__(
+        self, material: Dielectric | Conductor | UnderFilm, roughness: RoughnessTable
+    ) -> None:
         self.material = material
         self._first = roughness.first
         nodes = roughness.nodes.astype(np.float32)
@@ -88,6 +93,8 @@ class SmallSlope:
         """See `Kirchhoff.factor`."""
         light = _Path(pair, mode)
         indices = self.material.indices(si, active)
+        if isinstance(self.material, UnderFilm):
+            wavenumbers = self.material.wavenumbers(wavenumbers)
         matrices = [(light.kirchhoff(index), light.small_slope(index)) for index in indices]
         if len(matrices) == 1:  # one index at all wavelengths
             matrices *= len(wavenumbers)
@@ -97,10 +104,10 @@ class SmallSlope:
             tuple(dr.fma(k - b, share, b) for k, b in zip(*both, strict=True))
             for both, share in zip(matrices, shares, strict=True)
         ]
-        return light.of_jones(blended, indices)
+        return light.of_jones(blended, indices, self.material)
 
     def _shares(
-        self, pair: Pair, height_scale: Float, wavenumbers: list[Float], indices: list[Number]
+        self, pair: Pair, height_scale: Float, wavenumbers: list[Float], indices: list[Index]
     ) -> list[Float]:
         """Kirchhoff's share for each channel, 1 − s with s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3).
 
@@ -110,7 +117,7 @@ class SmallSlope:
         squared = dr.maximum(dr.squared_norm(pair.uv), 1e-20)
         start = dr.fma(dr.log2(squared), 0.5 * NODES_PER_OCTAVE, -self._first * NODES_PER_OCTAVE)
         squared_w = dr.square(pair.w * height_scale)
-        halves = [0.5 * _square((n - 1.0) / (n + 1.0)) for n in indices]
+        halves = [0.5 * _of_the_normal(n) for n in indices]
         if len(halves) == 1:
             halves *= len(wavenumbers)
         shares = []
@@ -136,6 +143,13 @@ def _one_minus_exp(x: Float) -> Float:
     return dr.select(x < 0.05, series, 1.0 - dr.exp(-x))
 
 
+def _of_the_normal(index: Index) -> Float:
+    """R of normal incidence."""
+    if isinstance(index, Filmed):
+        return squared(amplitudes(mi.Float(1.0), mi.Float(0.0), index)[0])
+    return squared((index - 1.0) / (index + 1.0))
+
+
 class _Path:
     """Light along −ω0, then along ω: what Jones matrices need of it besides the index.
 
@@ -158,7 +172,7 @@ class _Path:
             self._frames = (-ends[0], ends[1])
         cosines = (pair.cos_i, pair.cos_o)
         self._q0, self._q = cosines if forwards else cosines[::-1]
-        self._cos_half, self._one_plus_dot = pair.cos_half, pair.one_plus_dot
+        self._cos_half, self._one_plus_dot, self._w = pair.cos_half, pair.one_plus_dot, pair.w
         self._scale = 2.0 * self._q0 * self._q
         self._square0 = dr.square(first.x) + dr.square(first.y)
         self._square = dr.square(second.x) + dr.square(second.y)
@@ -198,12 +212,12 @@ class _Path:
         self._sc = dr.select(found, -z * turn0 * inverse, self._cross)
         self._ss = dr.select(found, -z * z * inverse, 0.0)
 
-    def kirchhoff(self, index: Number) -> Jones:
+    def kirchhoff(self, index: Index) -> Jones:
         """2 cosθi cosθo K (`optics.boundary.kirchhoff`)."""
-        cosine, epsilon = self._cos_half, index * index
-        inside = _root(epsilon - dr.fma(-cosine, cosine, 1.0))
-        r_s = (cosine - inside) * dr.rcp(cosine + inside) * self._one_plus_dot
-        r_p = (epsilon * cosine - inside) * dr.rcp(epsilon * cosine + inside) * self._one_plus_dot
+        if isinstance(index, Filmed):
+            index = index.tilted(0.5 * self._w * dr.rcp(dr.maximum(self._cos_half, 1e-4)))
+        square = dr.fma(-self._cos_half, self._cos_half, 1.0)
+        r_s, r_p = (r * self._one_plus_dot for r in amplitudes(self._cos_half, square, index))
         return (
             r_s * self._cc - r_p * self._ss,
             r_s * self._cs + r_p * self._sc,
@@ -211,23 +225,25 @@ class _Path:
             r_p * self._cc - r_s * self._ss,
         )
 
-    def small_slope(self, index: Number) -> Jones:
+    def small_slope(self, index: Index) -> Jones:
         """2 cosθi cosθo B (`optics.boundary.small_slope`)."""
-        epsilon = index * index
-        contrast = (epsilon - 1.0) * self._scale
-        inside0, inside = _root(epsilon - self._square0), _root(epsilon - self._square)
-        s0, s = dr.rcp(self._q0 + inside0), dr.rcp(self._q + inside)
-        p0, p = dr.rcp(epsilon * self._q0 + inside0), dr.rcp(epsilon * self._q + inside)
-        out, into = contrast * s, contrast * p
-        bent0, bent = inside0 * p0, inside * p
+        ends = faces(self._q0, self._square0, index), faces(self._q, self._square, index)
+        found = [self._of_face(*both) for both in zip(*ends, strict=True)]
+        return tuple(sum(x[1:], x[0]) for x in zip(*found, strict=True))
+
+    def _of_face(self, came: Face, there: Face) -> Jones:
+        contrast = came.contrast * self._scale
+        out, bent, into = contrast * there.s, contrast * there.x, contrast * there.p
         return (
-            -(out * s0 * self._dot),
-            out * bent0 * self._cross,
-            contrast * bent * s0 * self._cross,
-            contrast * bent * bent0 * self._dot - into * p0 * epsilon * self._sines,
+            -(out * came.s * self._dot),
+            out * came.x * self._cross,
+            bent * came.s * self._cross,
+            bent * came.x * self._dot - into * came.p * came.normal * self._sines,
         )
 
-    def of_jones(self, matrices: list[Jones], indices: list[Number]) -> Spectrum:
+    def of_jones(
+        self, matrices: list[Jones], indices: list[Index], material: Reflectance | UnderFilm
+    ) -> Spectrum:
         """What Jones matrices and indices make of light, for each channel; one may stand for all.
 
         ½ Σ|J|², or in polarised variants the Mueller matrix between Mitsuba's bases; through the
@@ -237,10 +253,12 @@ class _Path:
             matrices = [self._transmitted(*both) for both in zip(matrices, indices, strict=True)]
         if mi.is_polarized:
             return self._mueller(matrices)
-        powers = [0.5 * sum(map(_square, jones)) for jones in matrices]
+        powers = [0.5 * sum(map(squared, jones)) for jones in matrices]
+        if isinstance(material, UnderFilm):
+            powers = material.summed(powers)
         return mi.UnpolarizedSpectrum(powers if len(powers) > 1 else powers[0])
 
-    def _transmitted(self, jones: Jones, index: Number) -> Jones:
+    def _transmitted(self, jones: Jones, index: Index) -> Jones:
         """√(T T G) J of the coat's face, light coming and going (`optics.coat`)."""
         structure = (
             self._mirrored(self._q0, self._square0, index),
@@ -256,13 +274,10 @@ class _Path:
                 factors.append(dr.sqrt(through[0] * through[1] * again))
         return tuple(entry * factor for entry, factor in zip(jones, factors, strict=True))
 
-    def _mirrored(self, cosine: Float, square: Float, index: Number) -> tuple[Float, Float]:
+    def _mirrored(self, cosine: Float, square: Float, index: Index) -> tuple[Float, Float]:
         """|r_s|² and |r_p|² of the flat structure."""
-        epsilon = index * index
-        inside = _root(epsilon - square)
-        r_s = (cosine - inside) * dr.rcp(cosine + inside)
-        r_p = (epsilon * cosine - inside) * dr.rcp(epsilon * cosine + inside)
-        return _square(r_s), _square(r_p)
+        r_s, r_p = amplitudes(cosine, square, index)
+        return squared(r_s), squared(r_p)
 
     def _mueller(self, matrices: list[Jones]) -> Spectrum:
         incident, outgoing = self._frames
@@ -300,7 +315,7 @@ def _turned(jones: Jones, out: tuple[Float, Float], into: tuple[Float, Float]) -
 def _mueller(jones: Jones) -> list[Float]:
     """The sixteen entries, row by row (`optics.boundary.mueller`)."""
     ss, sp, ps, pp = jones
-    a, b, c, d = (0.5 * _square(x) for x in jones)
+    a, b, c, d = (0.5 * squared(x) for x in jones)
     rows, columns = (_product(ss, sp), _product(ps, pp)), (_product(ss, ps), _product(sp, pp))
     same, other = _product(ss, pp), _product(sp, ps)
     real, imag = dr.real, dr.imag
@@ -327,20 +342,3 @@ def _mueller(jones: Jones) -> list[Float]:
 def _product(x: Number, y: Number) -> Number:
     """x y*."""
     return x * dr.conj(y) if dr.is_complex_v(x) else x * y
-
-
-def _square(x: Number) -> Float:
-    """|x|²."""
-    return dr.fma(x.real, x.real, dr.square(x.imag)) if dr.is_complex_v(x) else dr.square(x)
-
-
-def _root(square: Number) -> Number:
-    """The root whose wave decays, or else travels, away from the surface."""
-    if not dr.is_complex_v(square):
-        return dr.safe_sqrt(square)
-    # The larger part from a sum, the other from the product: neither cancels
-    length = dr.sqrt(_square(square))
-    larger = dr.sqrt(0.5 * (length + dr.abs(square.real)))
-    smaller = 0.5 * square.imag / dr.maximum(larger, 1e-20)
-    travels = square.real >= 0.0
-    return mi.Complex2f(dr.select(travels, larger, smaller), dr.select(travels, smaller, larger))

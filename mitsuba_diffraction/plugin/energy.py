@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import replace
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionWarning
 from ..optics import fresnel
@@ -26,15 +27,22 @@ from ..tables.energy.grid import SHARE, DirectionGrid
 from ..tables.store.energy import Energy
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, Kirchhoff
+from .film import UnderFilm, plain
 from .memory import index_between, read_record, upload
 from .pair import Pair
 from .reflectance import Perfect, Reflectance
 from .roles import Buffer, Colour, Float, Index, Vector2f
 
 Array = NDArray[np.float32]
+#: Of wavelengths (n,).
+Indices = NDArray[np.complex128] | fresnel.Filmed
 
 #: Indices are rounded to this, real and imaginary part, for s and the ratio of albedos.
 INDEX_STEP = 0.05
+#: And a film's thickness, nm.
+THICKNESS_STEP = 5.0
+#: Largest ratio of a film's albedo to that of the flat one.
+MOST_RATIO = 2.0
 #: What is taken beyond this share of a real material is warned of.
 MUCH = 0.05
 
@@ -155,12 +163,17 @@ class EnergyModel:
             self._reflected.at(tangential, cosine, wavenumbers, height_scale)
         )
 
-    def _indices(self, wavelengths: NDArray[np.float64]) -> NDArray[np.complex128] | None:
+    def _indices(self, wavelengths: NDArray[np.float64]) -> Indices | None:
         """The material's n + ik, to `INDEX_STEP`: an optimisation of it waits rarely, and sees s
         and the ratio of albedos as constants.
         """
         found = indices_of(self._material, wavelengths)
-        return None if found is None else np.round(found / INDEX_STEP) * INDEX_STEP
+        if found is None:
+            return None
+        if isinstance(found, fresnel.Filmed):
+            index, film, depth = found.parts
+            return fresnel.Filmed(_rounded(index, INDEX_STEP), _rounded(film, INDEX_STEP), depth)
+        return _rounded(found, INDEX_STEP)
 
     def _ratio(self, albedo: DirectionalTable) -> DirectionalTable:
         found = self._indices(albedo.wavelengths)
@@ -168,7 +181,10 @@ class EnergyModel:
         flat = fresnel.reflectance(np.cos(albedo.grid.theta), found[:, None])
         # of an index of 1 there is neither
         ratio = np.where(flat > 1e-9, 1.0 / np.maximum(flat, 1e-9), 0.0)[:, :, None]
-        return DirectionalTable(albedo.wavelengths, (albedo.values * ratio).astype(np.float32))
+        values = albedo.values * ratio
+        if isinstance(found, fresnel.Filmed):  # which may reflect next to nothing
+            values = np.minimum(values, MOST_RATIO)
+        return DirectionalTable(albedo.wavelengths, values.astype(np.float32))
 
 
 class _Lookup:
@@ -276,11 +292,17 @@ def _chain(grating: Grating, tangential: Vector2f, wavenumber: Float) -> tuple[F
 
 
 def indices_of(
-    material: Reflectance, wavelengths: NDArray[np.float64]
-) -> NDArray[np.complex128] | None:
+    material: Reflectance | UnderFilm, wavelengths: NDArray[np.float64]
+) -> Indices | None:
     """n + ik of a material at wavelengths (n,), nm, in the variant's colours; None for R = 1."""
     if isinstance(material, Perfect):
         return None
+    if isinstance(material, UnderFilm):
+        index = indices_of(material.material, wavelengths)
+        assert isinstance(index, np.ndarray)
+        film, thickness = material.numbers()
+        rounded = _rounded(thickness, THICKNESS_STEP)
+        return fresnel.Filmed(index, film, 2.0 * np.pi * rounded / wavelengths)
     found = []
     for wavelength in wavelengths if mi.is_spectral else wavelengths[:1]:
         si = dr.zeros(mi.SurfaceInteraction3f)
@@ -294,14 +316,14 @@ def indices_of(
     return np.interp(wavelengths, RGB_WAVELENGTHS[::-1], colours[::-1])
 
 
+def _rounded(value: ArrayLike, step: float) -> NDArray[Any]:
+    return np.asarray(np.round(np.asarray(value) / step) * step)
+
+
 def _complex(number: Float) -> complex:
     if dr.is_complex_v(number):
-        return complex(_plain(number.real), _plain(number.imag))
-    return complex(_plain(number))
-
-
-def _plain(number: Float) -> float:
-    return float(dr.slice(dr.detach(number)))
+        return complex(plain(number.real), plain(number.imag))
+    return complex(plain(number))
 
 
 def _scales_of(found: list[Conservation]) -> list[DirectionalTable] | None:

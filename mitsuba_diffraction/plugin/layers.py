@@ -8,6 +8,7 @@ import drjit as dr
 import mitsuba as mi
 
 from .coat import UnderCoat
+from .film import UnderFilm
 from .reflectance import Reflectance
 from .roles import Colour, Interaction, Mask, Vector3f
 
@@ -23,7 +24,7 @@ class Transmission:
     ratio, which is smooth; under a coat as the flat reflectance alone.
     """
 
-    fresnel: Reflectance | UnderCoat
+    fresnel: Reflectance | UnderCoat | UnderFilm
     above = 1.0
 
     def beneath(
@@ -51,7 +52,7 @@ class Blend:
     constant for which it gives no value. A white pair gains energy, towards grazing angles most.
     """
 
-    fresnel: Reflectance | UnderCoat
+    fresnel: Reflectance | UnderCoat | UnderFilm
     weight: float
 
     @property

@@ -9,7 +9,6 @@ import mitsuba as mi
 import numpy as np
 
 from .roles import Float, Interaction, Mask, Rotation, Vector2f, Vector3f
-from .sampling import unfolded
 
 SHADOWINGS = ("none", "vcavity")
 
@@ -44,6 +43,11 @@ class Pair:
         return self
 
     @property
+    def rotation(self) -> Rotation:
+        """(cos, sin) of the angle from the first tangent to the patch's x axis."""
+        return self._rotation
+
+    @property
     def cos_half(self) -> Float:
         """Cosine of the angle between either direction and the half vector."""
         return dr.safe_sqrt(0.5 * self.one_plus_dot)
@@ -57,12 +61,6 @@ class Pair:
     def outgoing(self) -> Vector2f:
         """Tangential part of ωo, in the patch's frame."""
         return in_patch(self.wo, self._rotation)
-
-    @cached_property
-    def folded(self) -> Vector2f:
-        """Tangential part of the ωi + ωo beyond the horizon which `fold` makes the same ωo of."""
-        tangential = mi.Vector2f(self.wi.x, self.wi.y) + unfolded(self.wo)
-        return in_patch(tangential, self._rotation)
 
 
 def in_patch(direction: Vector2f | Vector3f, rotation: Rotation) -> Vector2f:

@@ -14,15 +14,17 @@ import numpy as np
 
 from ..errors import DiffractionError
 from ..heights.field import HeightField
-from ..heights.lengths import is_auto
+from ..heights.lengths import is_auto, numbers_of
 from ..heights.read import LoadOptions
-from ..settings import SCENE_SETTINGS, checked
+from ..settings import COHERENCES, SCENE_SETTINGS, SURFACE, checked
 from ..tables.table import DiffractionTable
 from .boundary import MODELS, Boundary, Kirchhoff, SmallSlope
 from .coat import UnderCoat
+from .film import COHERENCE, LEAST_THROUGH, UnderFilm
 from .layers import LAYERINGS, Blend, Layering, Transmission
 from .orientation import Constant, Orientation, Textured
 from .pair import SHADOWINGS
+from .places import TILINGS, Places
 from .reflectance import Conductor, Dielectric, Perfect, Reflectance
 from .roles import BSDF, Properties, Texture
 from .sources import (
@@ -36,18 +38,26 @@ from .sources import (
 
 SOURCES = ("heightfield", "table", "data")
 READING = tuple(field.name for field in fields(LoadOptions))
+#: Of coherence='surface'.
+PLACING = ("uv_scale", "world_scale", "tiling")
+#: µm: beyond, single precision holds places on the surface to no better than 1 µm.
+MOST_UV_SCALE = 1e7
 #: Of mono variants, nm.
 DEFAULT_WAVELENGTH = 550.0
 NAMES = (
     *SOURCES,
     *READING,
     *SCENE_SETTINGS,
+    *PLACING,
     "material",
     "eta",
     "k",
     "int_ior",
     "ext_ior",
     "coat_ior",
+    "film_ior",
+    "film_k",
+    "film_thickness",
     "model",
     "orientation",
     "height_scale",
@@ -66,8 +76,10 @@ class Parameters:
     Attributes
     ----------
     table : the diffraction table.
+    places : where its windows sit, or None for wherever the table has them.
     heights : reads the heights that it was made of.
-    reflectance : the surface's own reflectance, that of the faces of coat and structure together.
+    reflectance : the surface's own reflectance, that of the faces of coat, film and structure
+        together.
     coat : the clear layer over the structure, or None.
     boundary : what the material makes of the light, by model.
     orientation : from the first tangent to the patch's x axis.
@@ -80,8 +92,9 @@ class Parameters:
     """
 
     table: DiffractionTable
+    places: Places | None
     heights: Callable[[], HeightField]
-    reflectance: Reflectance | UnderCoat
+    reflectance: Reflectance | UnderCoat | UnderFilm
     coat: Dielectric | None
     boundary: Boundary
     orientation: Orientation
@@ -117,20 +130,28 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     if not 0.0 < height_scale <= 1e3:
         raise DiffractionError(f"height_scale={height_scale:g} must be above 0 and at most 1000")
     coat = _coat(props)
-    reflectance = _reflectance(props, coat)
-    if nested is not None and isinstance(reflectance, Perfect | Conductor):
+    material = _reflectance(props, coat)
+    if nested is not None and isinstance(material, Perfect | Conductor):
         raise DiffractionError(
             f"a nested BSDF lies beneath a surface that lets no light through (material="
-            f"'{reflectance}'); give int_ior instead, or remove the nested BSDF"
+            f"'{material}'); give int_ior instead, or remove the nested BSDF"
         )
     # κ grows by the coat's index, as if heights did
     optical = 1.0 if coat is None else dr.slice(coat.eta)
     table, heights = _table(props, height_scale * optical, provider)
-    flat: Reflectance | UnderCoat = reflectance
-    if coat is not None and not isinstance(reflectance, Perfect):
-        flat = UnderCoat(reflectance, coat)
+    wavelength = _wavelength(props, table)
+    reflectance = _under_film(props, material, wavelength, table.wavelength_range[0])
+    if nested is not None and isinstance(reflectance, UnderFilm) and reflectance.numbers()[0].imag:
+        raise DiffractionError(
+            "film_k makes a film that absorbs, over a nested BSDF, which would get that light; "
+            "leave film_k out, or remove the nested BSDF"
+        )
+    flat: Reflectance | UnderCoat | UnderFilm = reflectance
+    if coat is not None and not isinstance(material, Perfect):
+        flat = UnderCoat(material, coat)
     return Parameters(
         table=table,
+        places=_places(props, table),
         heights=heights,
         reflectance=flat,
         coat=coat,
@@ -140,7 +161,7 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
         energy_conserving=_flag(props, "energy_conserving", True),
         vcavity=_choice(props, "shadowing", SHADOWINGS) == "vcavity",
         layering=_layering(props, flat, nested is not None),
-        wavelength=_wavelength(props, table),
+        wavelength=wavelength,
         nested=nested,
     )
 
@@ -154,6 +175,8 @@ def _table(
             f"give exactly one of {', '.join(SOURCES)}; got {' and '.join(given) or 'none'}"
         )
     given_settings = {name: props.get(name) for name in SCENE_SETTINGS if name in props}
+    if _on_surface(props):
+        given_settings["coherence"] = "patch"
     if is_auto(given_settings.get("coherence_width", 0.0)):
         del given_settings["coherence_width"]
     asked = {name: checked(name, value) for name, value in given_settings.items()}
@@ -167,6 +190,40 @@ def _table(
     path = _found(value, given[0])
     table = table_of_file(path, given[0] == "table", options, asked, height_scale, provider)
     return table, lambda: heights_of_file(path, given[0] == "table", options)
+
+
+def _on_surface(props: Properties) -> bool:
+    """Whether the window sits where the light falls; the table is then that of one window."""
+    coherence = _choice(props, "coherence", (*COHERENCES, SURFACE))
+    if coherence != SURFACE:
+        return False
+    if mi.is_rgb:
+        raise DiffractionError(
+            f"coherence='{SURFACE}' needs wavelengths, whose speckle differs, and variant "
+            f"{mi.variant()} has none; use a spectral or a mono variant"
+        )
+    return True
+
+
+def _places(props: Properties, table: DiffractionTable) -> Places | None:
+    """From UV coordinates with a scale to places on the patch."""
+    tiling = _choice(props, "tiling", TILINGS)
+    given = [name for name in PLACING[:2] if name in props]
+    if not _on_surface(props):
+        return None  # a scene for all coherences may give the scale in all
+    if len(given) != 1:
+        raise DiffractionError(
+            f"coherence='{SURFACE}' takes one of uv_scale, µm a unit of UV coordinates, and "
+            f"world_scale, µm a unit of length of the scene; got {' and '.join(given) or 'none'}"
+        )
+    name, value = given[0], props.get(given[0])
+    numbers, most = numbers_of(value) or (), 1 if name == "world_scale" else 2
+    if not (1 <= len(numbers) <= most and all(0.0 < n <= MOST_UV_SCALE for n in numbers)):
+        expected = "one number" if most == 1 else "one number or two, 'u, v',"
+        raise DiffractionError(
+            f"{name}={value!r} must be {expected} of µm, above 0 and at most {MOST_UV_SCALE:g}"
+        )
+    return Places((numbers[0], numbers[-1]), name == "world_scale", tiling, table)
 
 
 def _found(name: str, parameter: str) -> Path:
@@ -217,6 +274,53 @@ def _coat(props: Properties) -> Dielectric | None:
     return coat
 
 
+def _under_film(
+    props: Properties, material: Reflectance, wavelength: float, shortest: float
+) -> Reflectance | UnderFilm:
+    """The material, under a film if there is one.
+
+    wavelength : nm, of mono variants; shortest : the least that the table serves.
+    """
+    given = [name for name in ("film_ior", "film_k", "film_thickness") if name in props]
+    if not given:
+        return material
+    if not {"film_ior", "film_thickness"} <= set(given):
+        raise DiffractionError(
+            f"{given[0]} alone is no film; give both film_ior and film_thickness (nm)"
+        )
+    if isinstance(material, Perfect):
+        raise DiffractionError(
+            "film_ior needs a refractive index beneath it, which material='none' has not; give a "
+            "conductor, or int_ior"
+        )
+    for other, present in (
+        ("coat_ior", "coat_ior" in props),
+        ("layering='thesis'", props.get("layering", LAYERINGS[0]) == "thesis"),
+    ):
+        if present:
+            raise DiffractionError(
+                f"film_ior and {other} exclude each other; leave one of them out"
+            )
+    medium = _index(props, "ext_ior", _above(props))
+    film = Dielectric(_index(props, "film_ior"), medium, "film_eta")
+    k, thickness = _number(props, "film_k", 0.0), _number(props, "film_thickness", 0.0)
+    if k < 0.0:
+        raise DiffractionError(f"film_k={k:g} must be at least 0: the film's index is n + ik")
+    path = 2.0 * float(dr.slice(film.eta)) * thickness
+    if not 0.0 <= path <= COHERENCE:
+        raise DiffractionError(
+            f"film_thickness={thickness:g} nm must be at least 0, and 2 n d at most "
+            f"{COHERENCE:g} nm, over which light is coherent (λ²/Δλ of a band of 25 nm at 550 nm); "
+            "a layer so thick is a coat: coat_ior"
+        )
+    if math.exp(-8.0 * math.pi * k * thickness / shortest) < LEAST_THROUGH:
+        raise DiffractionError(
+            f"film_k={k:g} at film_thickness={thickness:g} nm absorbs all light on its way to the "
+            "material beneath; give the film's index as the material, eta and k"
+        )
+    return UnderFilm(material, film, k, thickness, wavelength)
+
+
 def _above(props: Properties) -> float:
     """Index of the medium above: air; conductors have theirs given relative to it."""
     return 1.0 if any(name in props for name in ("material", "eta", "k")) else 1.000277
@@ -253,7 +357,9 @@ def _reflectance(props: Properties, coat: Dielectric | None) -> Reflectance:
     return Dielectric(_index(props, "int_ior", 1.5), medium)
 
 
-def _boundary(props: Properties, material: Reflectance, table: DiffractionTable) -> Boundary:
+def _boundary(
+    props: Properties, material: Reflectance | UnderFilm, table: DiffractionTable
+) -> Boundary:
     """By default small slope where there is an index, unless it is the thesis' layering."""
     scalar = isinstance(material, Perfect) or props.get("layering", LAYERINGS[0]) == "thesis"
     if _choice(props, "model", MODELS[::-1] if scalar else MODELS) == "kirchhoff":
@@ -322,7 +428,9 @@ def _kind(element: BSDF) -> str:
     return str(element.class_name())
 
 
-def _layering(props: Properties, reflectance: Reflectance | UnderCoat, nested: bool) -> Layering:
+def _layering(
+    props: Properties, reflectance: Reflectance | UnderCoat | UnderFilm, nested: bool
+) -> Layering:
     if _choice(props, "layering", LAYERINGS) == "transmission":
         if "diffuse_weight" in props:
             raise DiffractionError("diffuse_weight belongs to layering='thesis'; leave it out")

@@ -17,6 +17,7 @@ rayleigh         a rigorous solver for them: Rayleigh's expansion
 crossed          another: coupled waves in layers
 patch_solutions  solutions of all of them
 coated           solutions of gratings under a coat
+filmed           solutions of gratings under a film
 model            what the package says of the same surfaces
 compare          how far apart they are
 limits           up to which slopes that is little

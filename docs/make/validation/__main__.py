@@ -5,6 +5,7 @@ python -m docs.make.validation solve perfect      # minutes to an hour; extra `v
 python -m docs.make.validation groups             # deviations by material, profile and slope
 python -m docs.make.validation patches keratin    # in two dimensions; a minute
 python -m docs.make.validation coated             # under a coat; half an hour; extra `validation`
+python -m docs.make.validation films              # under a film; seconds
 """
 
 from __future__ import annotations
@@ -50,7 +51,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     coated = commands.add_parser("coated", help="make those under a coat anew")
     coated.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
     coated.set_defaults(run=_coated)
-    for command in (report, solve, patches, coated):
+    films = commands.add_parser("films", help="make those under a film anew")
+    films.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
+    films.set_defaults(run=_films)
+    for command in (report, solve, patches, coated, films):
         command.add_argument(
             "--progress", action=argparse.BooleanOptionalAction, default=None,
             help="show progress bars; by default on a terminal",
@@ -121,6 +125,17 @@ def _coated(args: argparse.Namespace) -> int:
         found = solve_coated(args.output, bar)
     for series, rows in found.items():
         print(f"wrote {os.fspath(args.output / coated_file(series))}: {len(rows)} orders")
+    return 0
+
+
+def _films(args: argparse.Namespace) -> int:
+    from .filmed import STACKS, solve_films
+
+    for stack in STACKS:
+        check_writable(args.output / stack.file)
+    with Bar(args, unit=" films") as bar:
+        for path in solve_films(args.output, bar):
+            print(f"wrote {os.fspath(path)}")
     return 0
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import DiffractionError
 from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from ...optics.geometry import wavenumber
 from ...plugin.changing import children
@@ -83,9 +84,16 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
             omissions.append(f"the back of {name}, another material")
         bsdf = inner[0]
     if _diffracts(bsdf):
+        if bsdf.places is not None:
+            raise DiffractionError(
+                f"coherence='surface' of {name} is for the path tracer, whose windows follow "
+                "places; shaders show 'ensemble' or 'patch'"
+            )
         pigment = Map(np.zeros(3))
         if bsdf.nested is not None:
             pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)
+        if _is_filmed(bsdf.fresnel):
+            omissions.append(f"the thin film of {name}")
         return Material(pigment, two_sided, bsdf, _axis(bsdf.orientation))
     return Material(_diffuse(bsdf, omissions, name, light), two_sided)
 
@@ -144,6 +152,8 @@ def pack_surface(material: Material) -> Packed:
         definitions["COATED"] = ""
         uniforms["coat"] = _number(bsdf.coat.eta)
         uniforms["channel_wavenumbers"] = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
+    elif _is_filmed(surface):
+        surface = surface.material
     if isinstance(bsdf.boundary, SmallSlope):
         packed |= pack_roughness(material.table.roughness)
     return packed | _reflectance(surface)
@@ -189,6 +199,12 @@ def _is_bsdf(thing: Any) -> bool:
     import mitsuba as mi
 
     return isinstance(thing, mi.BSDF)
+
+
+def _is_filmed(surface: Any) -> bool:
+    from ...plugin.film import UnderFilm  # which only a variant has
+
+    return isinstance(surface, UnderFilm)
 
 
 def _diffracts(bsdf: Any) -> bool:

@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...optics.fresnel import Filmed
 from ..table import DiffractionTable
 from .chains import Chains
 from .gain import Gain
@@ -36,8 +37,8 @@ from .transport import Orders, Transport
 
 Real = NDArray[np.float64]
 Array = NDArray[np.float32]
-#: n + ik of the material at wavelengths (n,), nm; None for R = 1.
-Index = Callable[[Real], "NDArray[np.complex128] | None"]
+#: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.
+Index = Callable[[Real], "NDArray[np.complex128] | Filmed | None"]
 
 #: Directions of the scale, and of the albedo by which it is told whether any is needed.
 FINE, COARSE = DirectionGrid(40, 60), DirectionGrid(20, 30)
@@ -265,7 +266,7 @@ class _Maps:
         """G at several wavelengths (nm), each made once."""
         found = self.index(wavelengths)
         for n, wavelength in enumerate(wavelengths.tolist()):
-            index = None if found is None else complex(found[n])
+            index = None if found is None else found[n]
             if wavelength not in self.known:
                 self.known[wavelength] = self.orders.gain(wavelength, self.model, index)
         return [self.known[wavelength] for wavelength in wavelengths.tolist()]

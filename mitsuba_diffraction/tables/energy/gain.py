@@ -39,14 +39,14 @@ class Gain:
     ----------
     table : whose roughness the small-slope model follows.
     model : "kirchhoff" or "small_slope".
-    index : n + ik over that of the medium above; None for R = 1.
+    index : n + ik over that of the medium above, or that under a film; None for R = 1.
     wavenumber : 2π/λ, rad/µm.
     height_scale : factor on the table's heights.
     """
 
     table: DiffractionTable
     model: str
-    index: complex | None
+    index: complex | fresnel.Filmed | None
     wavenumber: float
     height_scale: float
 
@@ -62,7 +62,10 @@ class Gain:
         # |ωi + ωo|² = 2(1 + ωi·ωo)
         one_plus_dot = 0.5 * ((x + sin_i) ** 2 + y**2 + w**2)
         if self.model == "kirchhoff":
-            return fresnel.reflectance(np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0)), self.index)
+            cos_half, index = np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0)), self.index
+            if isinstance(index, fresnel.Filmed):
+                index = index.tilted(0.5 * w / cos_half)
+            return fresnel.reflectance(cos_half, index)
         wi = np.stack([sin_i, np.zeros_like(sin_i), cos_i], axis=-1)
         wo = np.stack([x, y, cos_o], axis=-1)
         variance = self.table.roughness.at(self.wavenumber * np.hypot(x + sin_i, y))

@@ -23,6 +23,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ...optics.fresnel import Filmed
 from ...optics.geometry import wavenumber
 from ..sampling.order_mixture import OrderMixture, order_mixture
 from ..table import DiffractionTable
@@ -68,7 +69,7 @@ class Orders:
         phi: Real,
         wavelength: float,
         model: str,
-        index: complex | None,
+        index: complex | Filmed | None,
         grid: DirectionGrid | GratingGrid,
         faded: bool = False,
     ) -> Transport:
@@ -79,7 +80,7 @@ class Orders:
         gain = self.gain(wavelength, model, index)
         return self.of_gain(theta, phi, gain, grid, faded)
 
-    def gain(self, wavelength: float, model: str, index: complex | None) -> Gain:
+    def gain(self, wavelength: float, model: str, index: complex | Filmed | None) -> Gain:
         """G of a model and material at a wavelength (nm)."""
         k = float(wavenumber(wavelength))
         return Gain(self.table, model, index, k, self.height_scale)

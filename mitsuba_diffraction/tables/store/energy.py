@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...optics.fresnel import Filmed
 from ..energy import chains, gain, grating, transport
 from ..energy import conservation as made
 from ..energy.conservation import Conservation, DirectionalTable, Index, conservation
@@ -99,8 +100,10 @@ class Energy:
         )
 
 
-def _rounded(index: NDArray[np.complex128]) -> list[str]:
+def _rounded(index: NDArray[np.complex128] | Filmed) -> list[str]:
     """Single precision's noise makes no other material."""
+    if isinstance(index, Filmed):
+        index = np.concatenate([np.ravel(part) for part in index.parts])
     return [f"{n.real:.5g} {n.imag:.5g}" for n in index]
 
 

@@ -1,0 +1,78 @@
+"""A film's coefficients and its small-slope matrix: limits, symmetries, and another package's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction.optics import boundary, fresnel
+from mitsuba_diffraction.optics.fresnel import Filmed
+from tests.optics.test_boundary import MATRICES, REVERSED, pairs
+
+MATERIALS = (1.5, 0.8, 0.65 + 5.6j)
+FILMS = (1.45, 0.7, 2.4 + 0.1j)
+DEPTHS = np.random.default_rng(4).uniform(0.1, 6.0, 300)
+
+
+@pytest.mark.parametrize("index", MATERIALS)
+@pytest.mark.parametrize("film", FILMS)
+def test_flat_films_are_those_of_transfer_matrices(index, film):
+    tmm = pytest.importorskip("tmm", reason="the extra `validation` has tmm")
+    for theta, thickness in ((0.0, 80.0), (40.0, 300.0), (80.0, 900.0)):
+        angle, wavelength = np.radians(theta), 550.0
+        depth = 2 * np.pi * thickness / wavelength
+        mine = fresnel.amplitudes(np.cos(angle), Filmed(index, film, depth))
+        for light, r in zip("sp", mine, strict=True):
+            stack = [1.0, film, index], [np.inf, thickness, np.inf]
+            theirs = tmm.coh_tmm(light, *stack, angle, wavelength)
+            assert abs(r) ** 2 == pytest.approx(theirs["R"], abs=1e-12)
+
+
+@pytest.mark.parametrize("index", MATERIALS)
+@pytest.mark.parametrize("film", FILMS)
+@pytest.mark.parametrize("matrix", MATRICES)
+def test_in_the_mirror_direction_it_is_the_flat_film_s(matrix, index, film):
+    wi, _ = pairs()
+    filmed = Filmed(index, film, DEPTHS)
+    r_s, r_p = fresnel.amplitudes(wi[:, 2], filmed)
+    found = matrix(wi, wi * [-1, -1, 1], filmed)
+    expected = np.stack([r_s, 0 * r_s, 0 * r_s, r_p], -1).reshape(-1, 2, 2)
+    assert found == pytest.approx(expected, abs=1e-12)  # rounding
+
+
+@pytest.mark.parametrize("index", MATERIALS)
+@pytest.mark.parametrize("film", FILMS)
+@pytest.mark.parametrize("matrix", MATRICES)
+def test_reciprocity(matrix, index, film):
+    wi, wo = pairs()
+    there, back = (matrix(*pair, Filmed(index, film, DEPTHS)) for pair in ((wi, wo), (wo, wi)))
+    scale = np.abs(there).max()
+    assert back == pytest.approx(REVERSED * np.swapaxes(there, -1, -2), abs=1e-13 * scale)
+
+
+@pytest.mark.parametrize("index", MATERIALS)
+@pytest.mark.parametrize("matrix", MATRICES)
+def test_films_that_are_none_leave_the_surface_bare(matrix, index):
+    wi, wo = pairs()
+    bare = matrix(wi, wo, index)
+    scale = np.abs(bare).max()
+    for none in (Filmed(index, 1.8, 0.0), Filmed(index, index, DEPTHS)):
+        assert matrix(wi, wo, none) == pytest.approx(bare, abs=1e-13 * scale)
+    # of the medium above: the surface lies deeper, by κ times the depth
+    phase = np.exp(1j * (wi[:, 2] + wo[:, 2]) * DEPTHS)[:, None, None]
+    found = matrix(wi, wo, Filmed(index, 1.0, DEPTHS))
+    assert found == pytest.approx(bare * phase, abs=1e-12 * scale)
+
+
+def test_no_film_reflects_more_than_it_gets():
+    cosines = np.linspace(0.01, 1.0, 50)[:, None]
+    for index in MATERIALS:
+        for film in FILMS:
+            assert fresnel.reflectance(cosines, Filmed(index, film, DEPTHS)).max() <= 1.0 + 1e-12
+
+
+def test_elements_are_those_of_all_parts():
+    one = Filmed(np.array([1.5, 1.6]), 1.4, np.array([2.0, 3.0]))[1]
+    wi, wo = (a[:1] for a in pairs())
+    found = boundary.small_slope(wi, wo, one)
+    assert found == pytest.approx(boundary.small_slope(wi, wo, Filmed(1.6, 1.4, 3.0)))

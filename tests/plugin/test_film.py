@@ -1,0 +1,180 @@
+"""A thin film over the heights: values, limits, colours, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import reference
+from mitsuba_diffraction.optics.colour import linear_srgb, response
+from mitsuba_diffraction.optics.fresnel import Filmed, reflectance
+from mitsuba_diffraction.plugin.film import Channels
+from tests.directions import as_single, polar
+from tests.lanes import evaluated, interaction, refusal
+from tests.plugin.conftest import runs
+from tests.plugin.test_coat import FLAT, load
+from tests.plugin.test_model import PATCH, WIDTH, pairs
+from tests.plugin.test_variants import evaluate
+
+OXIDE = {"film_ior": 1.77, "film_thickness": 250.0}
+METAL = {"eta": 0.9, "k": 6.0}
+GLASS = {"int_ior": 1.56, "ext_ior": 1.0}
+FILMED = {
+    "metal": (METAL | OXIDE, {"eta": 0.9, "k": 6.0, "film": (1.77, 250.0)}),
+    "dielectric": (
+        GLASS | {"film_ior": 2.4, "film_k": 0.1, "film_thickness": 150.0},
+        {"eta": 1.56, "film": (2.4 + 0.1j, 150.0)},
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", FILMED)
+@pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
+def test_values_are_the_reference_s(some_variant, kind, model):
+    ours, theirs = FILMED[kind]
+    wi, wo, lam = (a[:120] for a in pairs())
+    found = evaluated(load(model=model, **ours), wi, wo, lam)
+    exact = np.stack(
+        [
+            reference.brdf(PATCH, wi, wo, one, coherence_width=WIDTH, model=model, **theirs)
+            for one in lam.T
+        ],
+        axis=1,
+    ) * wo[:, 2:]  # fmt: skip
+    # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
+    assert found == pytest.approx(exact, rel=1e-3, abs=1e-5 * exact.max())
+
+
+@pytest.mark.parametrize("material", [METAL, GLASS], ids=["metal", "dielectric"])
+@pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
+def test_films_that_are_none_leave_the_surface_bare(some_variant, material, model):
+    wi, wo, lam = pairs(60)
+    bare = evaluated(load(model=model, **material), wi, wo, lam)
+    for film in (
+        {"film_ior": 1.8, "film_thickness": 0.0},
+        {"film_ior": 1.0, "film_thickness": 300.0},
+    ):
+        filmed = evaluated(load(model=model, **material, **film), wi, wo, lam)
+        # of sums that cancel, in single precision
+        assert filmed == pytest.approx(bare, rel=5e-5, abs=2e-6 * bare.max())
+
+
+def test_reciprocity(some_variant):
+    wi, wo, lam = pairs()
+    bsdf = load(**FILMED["dielectric"][0])
+    there = evaluated(bsdf, wi, wo, lam) / wo[:, 2:]
+    back = evaluated(bsdf, wo, wi, lam) / wi[:, 2:]
+    assert there == pytest.approx(back, rel=1e-4, abs=1e-6 * there.max())
+
+
+@pytest.mark.parametrize("name", ["scalar_spectral", "llvm_ad_mono", "llvm_ad_spectral_polarized"])
+def test_variants_agree_with_the_reference(name):
+    if not runs(name):
+        pytest.skip(f"{name}: Dr.Jit finds no device for it")
+    mi.set_variant(name)
+    wi, wo, _ = pairs(16)
+    lam = np.full((len(wi), 4), 600.0)
+    bsdf = load(wavelength=600.0, **FILMED["metal"][0])
+    value, pdf, again, pdf_again, *_ = evaluate(bsdf, wi, wo, np.full((len(wi), 3), 0.5), lam)
+    assert again == pytest.approx(value, rel=1e-5)
+    assert pdf_again == pytest.approx(pdf, rel=1e-5)
+    exact = wo[:, 2] * reference.brdf(
+        PATCH, wi, wo, 600.0, coherence_width=WIDTH, model="small_slope", **FILMED["metal"][1]
+    )
+    assert value[:, 0] == pytest.approx(exact, rel=1e-3, abs=1e-5 * float(exact.max()))
+
+
+def film_colour(thickness: float) -> Any:
+    """Linear sRGB of a flat film of index 1.45 on metal at 30°, summed over all wavelengths."""
+    lam = np.arange(380.0, 781.0)
+    index = Filmed(0.9 + 6.0j, 1.45, 2 * np.pi * thickness / lam)
+    weights = linear_srgb(response(lam)).T
+    return weights @ reflectance(np.cos(np.radians(30.0)), index) / weights.sum(axis=1)
+
+
+@pytest.mark.parametrize("thickness", [0.0, 100.0, 300.0, 1000.0, 4000.0])
+def test_a_few_wavelengths_make_a_film_s_colour(some_variant, thickness):
+    found = Channels.of(2 * 1.45 * thickness)
+    index = Filmed(0.9 + 6.0j, 1.45, 2 * np.pi * thickness / np.array(found.wavelengths))
+    powers = reflectance(np.cos(np.radians(30.0)), index)
+    # what lies beyond the ends is left out, and a spline is through four points a fringe
+    assert np.array(found.weights) @ powers == pytest.approx(film_colour(thickness), abs=5e-3)
+
+
+def test_in_rgb_a_mirror_has_the_film_s_colour():
+    mi.set_variant("scalar_rgb")
+    wi = as_single(polar(30.0))[None]
+    samples, lam = np.full((1, 3), 0.5), np.full((1, 4), 550.0)
+    filmed, mirror = (
+        evaluate(load(FLAT, **p), wi, as_single(wi * [-1, -1, 1]), samples, lam)[0][0]
+        for p in (METAL | {"film_ior": 1.45, "film_thickness": 300.0}, {"material": "none"})
+    )
+    assert filmed / mirror == pytest.approx(film_colour(300.0), abs=5e-3)
+
+
+@pytest.mark.parametrize("theta", [0.0, 60.0])
+def test_it_samples_what_it_says_and_reflects_no_more_than_it_gets(some_variant, theta):
+    count = 1 << 14
+    bsdf = load(**FILMED["metal"][0])
+    si = interaction(np.tile(as_single(polar(theta)), (count, 1)), 550.0)
+    rng = mi.PCG32(count)
+    one, two = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+    sample, weight = bsdf.sample(mi.BSDFContext(), si, one, two)
+    value, pdf = bsdf.eval_pdf(mi.BSDFContext(), si, sample.wo)
+    weights = np.array(weight, float)[0]
+    assert np.array(sample.pdf) == pytest.approx(np.array(pdf), rel=1e-4)
+    assert weights * np.array(pdf) == pytest.approx(np.array(value, float)[0], rel=1e-3, abs=1e-6)
+    assert weights.mean() < 1.0 + 3 * weights.std() / np.sqrt(count)
+
+
+@pytest.mark.parametrize("theta", [0.0, 45.0])
+def test_over_white_it_returns_what_the_film_lets_through(some_variant, theta):
+    count = 1 << 14
+    white = {"type": "diffuse", "reflectance": {"type": "spectrum", "value": 1.0}}
+    film = {"film_ior": 2.2, "film_thickness": 120.0}
+    flat = md.HeightField(np.zeros((300, 300)), 0.08)
+    wide = {"coherence_width": 24.0, "energy_conserving": True}
+    bsdf = load(flat, nested=white, **wide, **GLASS, **film)
+    si = interaction(np.tile(as_single(polar(theta)), (count, 1)), 550.0)
+    rng = mi.PCG32(count)
+    one, two = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+    weights = np.array(bsdf.sample(mi.BSDFContext(), si, one, two)[1], float)[0]
+    cosines = np.sqrt((np.arange(200) + 0.5) / 200)  # equal shares of ∫ cosθ dω
+    filmed = Filmed(1.56, 2.2, 2 * np.pi * 120.0 / 550.0)
+    there, back = (1 - reflectance(c, filmed) for c in (np.cos(np.radians(theta)), cosines))
+    expected = 1 - there + there * back.mean()
+    # a lobe loses a little below the horizon
+    assert weights.mean() == pytest.approx(expected, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "line"),
+    [
+        ({"film_ior": 1.4}, "film_ior alone is no film"),
+        ({"film_k": 0.1}, "film_k alone is no film"),
+        ({"film_ior": 1.4, "film_thickness": -5.0}, "film_thickness=-5 nm must be at least 0"),
+        ({"film_ior": 1.4, "film_thickness": 1e4}, "over which light is coherent"),
+        ({"film_ior": 0.5, "film_thickness": 100.0}, "film_ior=0.5"),
+        ({**OXIDE, "film_k": -0.1}, "film_k=-0.1 must be at least 0"),
+        ({**OXIDE, "film_k": 3.0}, "absorbs all light"),
+        ({**OXIDE, "material": "none"}, "needs a refractive index beneath it"),
+        ({**OXIDE, "coat_ior": 1.5}, "coat_ior exclude each other"),
+        ({**OXIDE, "layering": "thesis", "nested": {"type": "diffuse"}}, "layering='thesis'"),
+        ({**OXIDE, "film_k": 0.1, "nested": {"type": "diffuse"}}, "leave film_k out"),
+    ],
+)
+def test_what_is_no_film_is_one_line(some_variant, parameters, line):
+    assert line in refusal(lambda: load(**parameters))
+
+
+@pytest.mark.parametrize("changed", [{"film_thickness": -1.0}, {"film_thickness": 2e4}])
+def test_a_change_beyond_sense_is_refused(some_variant, changed):
+    parameters = mi.traverse(load(**METAL, **OXIDE))
+    for name, value in changed.items():
+        parameters[name] = value
+    with pytest.raises(md.DiffractionError, match="film_thickness"):
+        parameters.update()
