@@ -68,7 +68,9 @@ def built(scan: Path, pixels: int, more: Sequence[str] = ()) -> Run:
     return Run(DiffractionTable.load(scan.with_suffix(".exr")), seconds, 1024 * used.ru_maxrss)
 
 
-def agreement(windowed: DiffractionTable, whole: DiffractionTable) -> dict[str, tuple[float, float]]:
+def agreement(
+    windowed: DiffractionTable, whole: DiffractionTable
+) -> dict[str, tuple[float, float]]:
     """Σ |windowed − whole| / Σ whole, and the windows' standard error of it, by part.
 
     At normal incidence and reflection, near order 0 and in the directions of visible light.
