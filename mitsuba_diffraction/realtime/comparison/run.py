@@ -161,7 +161,7 @@ class Comparison:
         renderer = self.both.renderer
         light, clock = renderer.progressive(method), clock_of(renderer.driver)
         light.advance(2)  # compiles
-        light.clear()
+        light.restart()
         halves, start = [], clock()
         for half in range(2):
             for done in range(0, self.frames // 2, _STEP):
