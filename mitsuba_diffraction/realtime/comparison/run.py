@@ -24,6 +24,7 @@ from .truth import box_sensor, direct_light
 
 #: Samples along either side of a pixel for the slow methods, whose own errors are far larger.
 _FEWER, _MOST = 2, 64
+_DETAIL = 1024  # samples per pixel at most, under lights without extent, which are quiet
 _STEP = 8  # frames between two looks at the clock
 
 
@@ -104,7 +105,7 @@ class Comparison:
         with Stop() as stop:
             direct = self.both.scene
             halves = [
-                self._traced(direct, direct.sensors()[0], self.spp // 2, seed, stop)
+                self._traced(direct, direct.sensors()[0], min(self.spp, _DETAIL) // 2, seed, stop)
                 for seed in (first, first + 1)
             ]
             every = direct_light(self.scene, renderer.camera)
