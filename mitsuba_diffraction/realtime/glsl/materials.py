@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import DiffractionError
 from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from ...optics.geometry import wavenumber
 from ...plugin.changing import children
@@ -98,6 +99,8 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
             omissions.append(f"the back of {name}, another material")
         bsdf = inner[0]
     if _diffracts(bsdf):
+        if bsdf.only_traced:
+            raise DiffractionError(f"{bsdf.only_traced} of {name} is for the path tracer alone")
         pigment = Map(np.zeros(3))
         if bsdf.nested is not None:
             pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)

@@ -97,12 +97,15 @@ def fragment_parts(
 
 
 def plain_source(
-    name: str, shared: Sequence[str] = (), definitions: Mapping[str, str] | None = None
+    name: str,
+    shared: Sequence[str] = (),
+    definitions: Mapping[str, str] | None = None,
+    dialect: Dialect = "desktop",
 ) -> str:
-    """A stage that knows neither surfaces nor tables, for the desktop.
+    """A stage that knows neither surfaces nor tables.
 
     shared : files that it uses.
     """
     constants = _CONSTANTS | dict(definitions or {})
     lines = [f"#define {key} {value}\n" for key, value in constants.items()]
-    return _PREAMBLES["desktop"] + "".join((*lines, *map(shader_file, shared), shader_file(name)))
+    return _PREAMBLES[dialect] + "".join((*lines, *map(shader_file, shared), shader_file(name)))

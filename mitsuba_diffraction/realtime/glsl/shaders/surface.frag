@@ -182,7 +182,7 @@ void main()
 #endif
         float falloff = light_place[i].w > 0.0 ? 1.0 / square : 1.0;
 #ifdef SHADOWED
-        falloff *= emitted(direction) * reached(v_position, flat_normal);
+        if (i == 0) falloff *= emitted(direction) * reached(v_position, flat_normal);
 #endif
         radiance += lit ? falloff * added : vec3(0.0);
     }
