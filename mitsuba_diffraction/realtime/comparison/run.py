@@ -198,7 +198,9 @@ class Comparison:
         for n, method in enumerate(methods):
             self.progress(n, len(methods), f"drawing with {method}")
             samples = min(self.supersampling, _FEWER if method in THESIS_METHODS else _MOST)
-            drawn = renderer.render(method, supersampling=samples)
+            with warnings.catch_warnings():  # its lights are those of both renderers
+                warnings.simplefilter("ignore", DiffractionWarning)
+                drawn = renderer.render(method, supersampling=samples)
             areas, picture = self.both.regions(drawn), drawn[..., :3]
             compared = areas["both"]
             errors = {
