@@ -26,6 +26,7 @@ reflectance     of the surface itself: dielectric, conductor, mirror
 boundary        what the material makes of the light, with its polarisation
 coat            a clear coat over the structure
 layers          how much light reaches what lies beneath
+height_scale    how heights vary over the surface
 orientation     how the patch is turned in the tangent plane
 memory          arrays in the variant's memory, and reading them
 """

@@ -99,11 +99,8 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
             omissions.append(f"the back of {name}, another material")
         bsdf = inner[0]
     if _diffracts(bsdf):
-        if bsdf.places is not None:
-            raise DiffractionError(
-                f"coherence='surface' of {name} is for the path tracer, whose windows follow "
-                "places; shaders show 'ensemble' or 'patch'"
-            )
+        if bsdf.only_traced:
+            raise DiffractionError(f"{bsdf.only_traced} of {name} is for the path tracer alone")
         pigment = Map(np.zeros(3))
         if bsdf.nested is not None:
             pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)
