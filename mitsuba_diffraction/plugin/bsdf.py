@@ -40,8 +40,11 @@ orientation : float or texture ∂ [0]
     which are (cos, sin) of that angle. Tangents follow UV coordinates: on a mesh without them they
     are arbitrary, and turn from triangle to triangle. A BSDF cannot see that; `info MESH` and
     `render` warn.
-height_scale : float ∂ [1]
-    Multiplies the heights, up to 1.5 × max(1, value given).
+height_scale : float or texture ∂ [1]
+    Multiplies the heights, up to 1.5 × max(1, value given); or, worn and fresh places: a raw bitmap
+    or another texture or mesh attribute of one channel.
+height_scale_max : float [of a bitmap]
+    The largest factor of such a texture, which all but bitmaps need; larger ones are taken for it.
 
 The table
 ---------
@@ -49,7 +52,19 @@ coherence_width : float or string [65]
     4σ of the Gaussian amplitude window, µm: the width over which light is coherent. `auto`, as
     without it: that of the table or the recipe, else 65.
 coherence : string [ensemble]
-    `ensemble`: what a pixel sees that covers many coherence areas; `patch`: one window's speckle.
+    `ensemble`: what a pixel sees that covers many coherence areas; `patch`: one window's speckle,
+    the same everywhere; `surface`: that of the window centred where the light falls, the grain seen
+    from close up, which averages to `ensemble` from afar. It needs UV coordinates and one of the
+    next two, and a spectral or mono variant. Directions and energy are those of `ensemble`.
+uv_scale : float or string [none]
+    µm a unit of the UV coordinates: one number, or "u, v".
+world_scale : float [none]
+    Or µm a unit of length of the scene, 1000 for mm: positions are then as far apart as UV
+    coordinates are on the surface, which must be alike all over it.
+tiling : string [periodic]
+    How the patch covers the surface: `periodic`, side by side; `random`, shifted at random and
+    blended such that mean and contrast stay, so that it does not show again and again (Heitz and
+    Neyret 2018; for rough surfaces: the lines of a grating would be broken).
 basis : string [auto]
     `svd` (also as `auto`), `chebyshev` or `taylor`: the series in κ.
 tolerance : float [0.001]
@@ -169,10 +184,12 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..tables.energy.conservation import DirectionalTable
+from .attributes import PLACED
 from .boundary import Kirchhoff
 from .changing import Bounded, arrays_within, marks
 from .coat import CoatedPair
 from .energy import EnergyModel
+from .height_scale import LEAST_SCALE, Varying
 from .layers import Transmission
 from .llvm import require_loaded_llvm
 from .pair import Pair, from_patch, in_patch, vcavity
@@ -195,8 +212,6 @@ from .roles import (
 from .sampling import EVEN, direction_of
 from .sources import TableProvider, from_cache
 
-#: Flatter would be lost in single precision.
-_LEAST_SCALE = 1e-30
 #: The component of a context that asks for all of them.
 _ALL = 0xFFFFFFFF
 
@@ -209,28 +224,20 @@ class Diffraction(mi.BSDF):
         super().__init__(props)
         parameters = read_parameters(props, provider)
         self.table = parameters.table
-        self.heights = parameters.heights
+        self.places, self.heights = parameters.places, parameters.heights
         self.fresnel = parameters.reflectance
         self.boundary, self.coat = parameters.boundary, parameters.coat
         self.mirror = Kirchhoff(self.coat) if self.coat is not None else None
         self.nested: BSDF = parameters.nested  # or None
-        self._scale = Bounded(
-            "height_scale",
-            parameters.height_scale,
-            _LEAST_SCALE,
-            self.table.height_scale_max / (1.0 if self.coat is None else dr.slice(self.coat.eta)),
-            self._scale_refusal,
-        )
-        self.height_scale = self._scale.value
+        self._set_height_scale(parameters.height_scale)
         self.orientation = parameters.orientation
         self.layering = parameters.layering
         self.vcavity = parameters.vcavity
-        self.power = power_model(self.table, parameters.wavelength)
+        self.power = power_model(self.table, parameters.wavelength, self.places)
+        mean = self.table if self.places is None else self.table.averaged
         # Under a coat nothing is known of the albedo
         self._energy = (
-            EnergyModel(
-                self.table, self.boundary, parameters.wavelength, parameters.energy_conserving
-            )
+            EnergyModel(mean, self.boundary, parameters.wavelength, parameters.energy_conserving)
             if self.coat is None
             else None
         )
@@ -244,6 +251,18 @@ class Diffraction(mi.BSDF):
         self.m_flags = functools.reduce(operator.or_, components)
         self.parameters_changed([])
 
+    def _set_height_scale(self, given: float | Varying) -> None:
+        """A bounded number; or factors that vary, of which `height_scale` is the largest."""
+        if isinstance(given, Varying):
+            self._scale: Varying | Bounded = given
+            self._varying: Varying | None = given
+            self.height_scale: Float = mi.Float(given.high)
+            return
+        optical = 1.0 if self.coat is None else dr.slice(self.coat.eta)
+        most = self.table.height_scale_max / optical
+        bounded = Bounded("height_scale", given, LEAST_SCALE, most, self._scale_refusal)
+        self._scale, self._varying, self.height_scale = bounded, None, bounded.value
+
     # ------------------------------------------------------------------ Mitsuba's interface
 
     def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
@@ -253,7 +272,7 @@ class Diffraction(mi.BSDF):
         value = mi.Spectrum(0.0)
         if above:
             pair = self._pair(si, wo, active)
-            power = self.power.power(pair, self.height_scale, si)
+            power = self.power.power(pair, self.scale_at(si, active), si)
             value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
         if nested is not None:
             beneath = mi.Spectrum(self._beneath(si, wo, active))
@@ -267,7 +286,9 @@ class Diffraction(mi.BSDF):
         density = mi.Float(0.0)
         if above:
             pair = self._pair(si, wo, active).outer
-            density = _with_even_share(self.power.density(pair, self._drawing_scale, si))
+            density = _with_even_share(
+                self.power.density(pair, self._drawing_scale(si, active), si)
+            )
         if nested is not None:
             beneath = self.nested.pdf(nested, si, wo, active)
             density = dr.lerp(beneath, density, self._glossy_share(above, si, active))
@@ -282,7 +303,7 @@ class Diffraction(mi.BSDF):
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         if above:
             pair = self._pair(si, wo, active)
-            scales = self.height_scale, self._drawing_scale
+            scales = self.scale_at(si, active), self._drawing_scale(si, active)
             power, orders = self.power.both(pair, *scales, si)
             density = _with_even_share(orders)
             value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
@@ -371,12 +392,21 @@ class Diffraction(mi.BSDF):
         if self._energy is not None:
             largest = dr.slice(dr.max(dr.detach(self.height_scale)))
             beneath = self.nested is not None and isinstance(self.layering, Transmission)
-            self._energy.update(largest, dr.grad_enabled(self.height_scale), beneath)
+            lowest = self._varying.range()[0] if self._varying else None
+            self._energy.update(largest, dr.grad_enabled(self.height_scale), beneath, lowest)
         held = arrays_within(
-            self.power, self._energy, self.orientation, self.fresnel, self.boundary, self.mirror
+            self.power,
+            self._energy,
+            self.orientation,
+            self.fresnel,
+            self.boundary,
+            self.mirror,
+            self._varying,
         )
         self._for_freezing = held + marks(
             self.table,
+            str(self.places),
+            str(self._varying),
             self.vcavity,
             str(self.layering),
             str(self.boundary),
@@ -407,6 +437,13 @@ class Diffraction(mi.BSDF):
         )
 
     @property
+    def only_traced(self) -> str | None:
+        """What it has that only the path tracer shows."""
+        if self.places is not None:
+            return "coherence='surface'"
+        return "a height_scale that varies" if self._varying else None
+
+    @property
     def energy_conserving(self) -> bool:
         """Whether it takes what it would reflect too much."""
         return self._energy is not None and self._energy.conserving
@@ -433,14 +470,16 @@ class Diffraction(mi.BSDF):
     def to_string(self) -> str:
         """All parameters, for people."""
         nested = "" if self.nested is None else f"  nested = {self.nested},\n"
+        places = "" if self.places is None else f"  {PLACED}, {self.places},\n"
         return (
             "Diffraction[\n"
             f"  table = {self.table},\n"
             f"  coherence_width = {self.table.coherence_width:g} µm,\n"
+            f"{places}"
             f"  tolerance = {self.table.tolerance:g},\n"
             f"  surface = {self.fresnel},\n"
             f"  model = {self.boundary},\n"
-            f"  height_scale = {dr.slice(self.height_scale):g},\n"
+            f"  height_scale = {self._varying or f'{dr.slice(self.height_scale):g}'},\n"
             f"  energy_conserving = {'true' if self.energy_conserving else 'false'},\n"
             f"  orientation = {self.orientation},\n"
             f"  shadowing = {'vcavity' if self.vcavity else 'none'},\n"
@@ -465,7 +504,7 @@ class Diffraction(mi.BSDF):
             outside *= pair.outer.cos_o * dr.rcp(pair.cos_o)
         if self.vcavity:
             outside *= vcavity(pair.cos_i, pair.cos_o, pair.one_plus_dot)
-        wavenumbers, scale = self.power.wavenumbers(si), self.height_scale
+        wavenumbers, scale = self.power.wavenumbers(si), self.scale_at(si, active)
         factor = self.boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)
         power = outside * power
         if self._energy is not None and self._energy.takes:
@@ -483,17 +522,21 @@ class Diffraction(mi.BSDF):
         ratios = mi.UnpolarizedSpectrum(1.0), mi.UnpolarizedSpectrum(1.0)
         if self._energy is not None and isinstance(self.layering, Transmission):
             rotation = self.orientation.rotation(si, active)
-            k, scale = self.power.wavenumbers(si), self.height_scale
+            k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
             ratios = tuple(
                 self._energy.reflected(in_patch(d, rotation), mi.Frame3f.cos_theta(d), k, scale)
                 for d in (si.wi, wo)
             )
         return self.layering.beneath(si, wo, active, ratios)
 
-    @property
-    def _drawing_scale(self) -> Float:
+    def scale_at(self, si: Interaction, active: Mask) -> Float:
+        """The factor on the heights at points of the surface."""
+        return self._varying.at(si, active) if self._varying else self.height_scale
+
+    def _drawing_scale(self, si: Interaction, active: Mask) -> Float:
         """What directions are drawn for: under a coat κ is as if heights were larger."""
-        return self.height_scale if self.coat is None else self.height_scale * self.coat.eta
+        scale = self.scale_at(si, active)
+        return scale if self.coat is None else scale * self.coat.eta
 
     def _pair(self, si: Interaction, wo: Vector3f, active: Mask) -> Pair:
         pair = Pair(si, wo, self.orientation.rotation(si, active), active)
@@ -519,7 +562,7 @@ class Diffraction(mi.BSDF):
         """A direction, possibly below the surface (then it has no density and no value)."""
         uv = self.power.draw(
             mi.Frame3f.cos_theta(si.wi),
-            dr.detach(self._drawing_scale),
+            dr.detach(self._drawing_scale(si, active)),
             dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
             sample2,
             si,

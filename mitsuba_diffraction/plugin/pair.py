@@ -43,6 +43,11 @@ class Pair:
         return self
 
     @property
+    def rotation(self) -> Rotation:
+        """(cos, sin) of the angle from the first tangent to the patch's x axis."""
+        return self._rotation
+
+    @property
     def cos_half(self) -> Float:
         """Cosine of the angle between either direction and the half vector."""
         return dr.safe_sqrt(0.5 * self.one_plus_dot)

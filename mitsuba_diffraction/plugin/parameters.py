@@ -14,16 +14,18 @@ import numpy as np
 
 from ..errors import DiffractionError
 from ..heights.field import HeightField
-from ..heights.lengths import is_auto
+from ..heights.lengths import is_auto, numbers_of
 from ..heights.read import LoadOptions
-from ..settings import SCENE_SETTINGS, checked
+from ..settings import COHERENCES, SCENE_SETTINGS, SURFACE, checked
 from ..tables.table import DiffractionTable
 from .boundary import MODELS, Boundary, Kirchhoff, SmallSlope
 from .coat import UnderCoat
 from .film import COHERENCE, LEAST_THROUGH, UnderFilm
+from .height_scale import Varying
 from .layers import LAYERINGS, Blend, Layering, Transmission
 from .orientation import Constant, Orientation, Textured
 from .pair import SHADOWINGS
+from .places import TILINGS, Places
 from .reflectance import Conductor, Dielectric, Perfect, Reflectance
 from .roles import BSDF, Properties, Texture
 from .sources import (
@@ -37,12 +39,17 @@ from .sources import (
 
 SOURCES = ("heightfield", "table", "data")
 READING = tuple(field.name for field in fields(LoadOptions))
+#: Of coherence='surface'.
+PLACING = ("uv_scale", "world_scale", "tiling")
+#: µm: beyond, single precision holds places on the surface to no better than 1 µm.
+MOST_UV_SCALE = 1e7
 #: Of mono variants, nm.
 DEFAULT_WAVELENGTH = 550.0
 NAMES = (
     *SOURCES,
     *READING,
     *SCENE_SETTINGS,
+    *PLACING,
     "material",
     "eta",
     "k",
@@ -55,6 +62,7 @@ NAMES = (
     "model",
     "orientation",
     "height_scale",
+    "height_scale_max",
     "wavelength",
     "energy_conserving",
     "shadowing",
@@ -70,13 +78,14 @@ class Parameters:
     Attributes
     ----------
     table : the diffraction table.
+    places : where its windows sit, or None for wherever the table has them.
     heights : reads the heights that it was made of.
     reflectance : the surface's own reflectance, that of the faces of coat, film and structure
         together.
     coat : the clear layer over the structure, or None.
     boundary : what the material makes of the light, by model.
     orientation : from the first tangent to the patch's x axis.
-    height_scale : factor on all heights.
+    height_scale : factor on all heights, or how it varies.
     energy_conserving : whether to divide by a bound of the albedo.
     vcavity : whether the surface shadows itself like V-shaped grooves.
     layering : how diffraction and the nested BSDF share the light.
@@ -85,12 +94,13 @@ class Parameters:
     """
 
     table: DiffractionTable
+    places: Places | None
     heights: Callable[[], HeightField]
     reflectance: Reflectance | UnderCoat | UnderFilm
     coat: Dielectric | None
     boundary: Boundary
     orientation: Orientation
-    height_scale: float
+    height_scale: float | Varying
     energy_conserving: bool
     vcavity: bool
     layering: Layering
@@ -118,9 +128,7 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
             f"the nested BSDF {_kind(nested)} lets light through, which would be lost beneath; "
             "nest one that only reflects"
         )
-    height_scale = _number(props, "height_scale", 1.0)
-    if not 0.0 < height_scale <= 1e3:
-        raise DiffractionError(f"height_scale={height_scale:g} must be above 0 and at most 1000")
+    height_scale = _height_scale(props)
     coat = _coat(props)
     material = _reflectance(props, coat)
     if nested is not None and isinstance(material, Perfect | Conductor):
@@ -130,7 +138,8 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
         )
     # κ grows by the coat's index, as if heights did
     optical = 1.0 if coat is None else dr.slice(coat.eta)
-    table, heights = _table(props, height_scale * optical, provider)
+    largest = height_scale.high if isinstance(height_scale, Varying) else height_scale
+    table, heights = _table(props, largest * optical, provider)
     wavelength = _wavelength(props, table)
     reflectance = _under_film(props, material, wavelength, table.wavelength_range[0])
     if nested is not None and isinstance(reflectance, UnderFilm) and reflectance.numbers()[0].imag:
@@ -143,6 +152,7 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
         flat = UnderCoat(material, coat)
     return Parameters(
         table=table,
+        places=_places(props, table),
         heights=heights,
         reflectance=flat,
         coat=coat,
@@ -157,6 +167,19 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     )
 
 
+def _height_scale(props: Properties) -> float | Varying:
+    given = dict(props.objects()).get("height_scale")
+    most = _number(props, "height_scale_max", math.nan) if "height_scale_max" in props else None
+    if isinstance(given, mi.Texture):
+        return Varying(given, most)
+    if most is not None:
+        raise DiffractionError("height_scale_max is for a height_scale that is a texture")
+    number = _number(props, "height_scale", 1.0)
+    if not 0.0 < number <= 1e3:
+        raise DiffractionError(f"height_scale={number:g} must be above 0 and at most 1000")
+    return number
+
+
 def _table(
     props: Properties, height_scale: float, provider: TableProvider
 ) -> tuple[DiffractionTable, Callable[[], HeightField]]:
@@ -166,6 +189,8 @@ def _table(
             f"give exactly one of {', '.join(SOURCES)}; got {' and '.join(given) or 'none'}"
         )
     given_settings = {name: props.get(name) for name in SCENE_SETTINGS if name in props}
+    if _on_surface(props):
+        given_settings["coherence"] = "patch"
     if is_auto(given_settings.get("coherence_width", 0.0)):
         del given_settings["coherence_width"]
     asked = {name: checked(name, value) for name, value in given_settings.items()}
@@ -179,6 +204,40 @@ def _table(
     path = _found(value, given[0])
     table = table_of_file(path, given[0] == "table", options, asked, height_scale, provider)
     return table, lambda: heights_of_file(path, given[0] == "table", options)
+
+
+def _on_surface(props: Properties) -> bool:
+    """Whether the window sits where the light falls; the table is then that of one window."""
+    coherence = _choice(props, "coherence", (*COHERENCES, SURFACE))
+    if coherence != SURFACE:
+        return False
+    if mi.is_rgb:
+        raise DiffractionError(
+            f"coherence='{SURFACE}' needs wavelengths, whose speckle differs, and variant "
+            f"{mi.variant()} has none; use a spectral or a mono variant"
+        )
+    return True
+
+
+def _places(props: Properties, table: DiffractionTable) -> Places | None:
+    """From UV coordinates with a scale to places on the patch."""
+    tiling = _choice(props, "tiling", TILINGS)
+    given = [name for name in PLACING[:2] if name in props]
+    if not _on_surface(props):
+        return None  # a scene for all coherences may give the scale in all
+    if len(given) != 1:
+        raise DiffractionError(
+            f"coherence='{SURFACE}' takes one of uv_scale, µm a unit of UV coordinates, and "
+            f"world_scale, µm a unit of length of the scene; got {' and '.join(given) or 'none'}"
+        )
+    name, value = given[0], props.get(given[0])
+    numbers, most = numbers_of(value) or (), 1 if name == "world_scale" else 2
+    if not (1 <= len(numbers) <= most and all(0.0 < n <= MOST_UV_SCALE for n in numbers)):
+        expected = "one number" if most == 1 else "one number or two, 'u, v',"
+        raise DiffractionError(
+            f"{name}={value!r} must be {expected} of µm, above 0 and at most {MOST_UV_SCALE:g}"
+        )
+    return Places((numbers[0], numbers[-1]), name == "world_scale", tiling, table)
 
 
 def _found(name: str, parameter: str) -> Path:

@@ -14,6 +14,7 @@ import mitsuba as mi
 
 from ..tables.table import DiffractionTable
 from .pair import Pair
+from .places import Places
 from .restricted import device_table
 from .rgb_power import rgb_power
 from .roles import Colour, Float, Index, Interaction, Vector2f
@@ -53,22 +54,25 @@ class SpectralPower:
     ----------
     table : the diffraction table.
     wavelength : nm, for mono variants.
+    places : where windows sit; None for the table's own.
 
     Attributes
     ----------
     device : the table in the variant's memory.
     """
 
-    def __init__(self, table: DiffractionTable, wavelength: float) -> None:
-        self.device = device_table(table)
-        self._sampler = order_sampler(table)
+    def __init__(
+        self, table: DiffractionTable, wavelength: float, places: Places | None = None
+    ) -> None:
+        self.device, self._places = device_table(table), places
+        self._sampler = order_sampler(table if places is None else table.averaged)
         self._sigma = table.sigma
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
     def power(self, pair: Pair, height_scale: Float, si: Interaction) -> Colour:
         """See `PowerModel.power`."""
-        functions = [self._power(pair, height_scale)]
+        functions = [self._power(pair, height_scale, si)]
         return mi.UnpolarizedSpectrum(self._each(functions, si, pair, height_scale)[0])
 
     def density(self, pair: Pair, height_scale: Float, si: Interaction) -> Float:
@@ -80,15 +84,16 @@ class SpectralPower:
         self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
     ) -> tuple[Colour, Float]:
         """See `PowerModel.both`; the density first, before its neighbours fill the caches."""
-        functions = [self._density(pair.outer, drawing_scale), self._power(pair, height_scale)]
+        functions = [self._density(pair.outer, drawing_scale), self._power(pair, height_scale, si)]
         densities, powers = self._each(functions, si, pair, height_scale)
         return mi.UnpolarizedSpectrum(powers), _mean(densities)
 
-    def _power(self, pair: Pair, height_scale: Float) -> Callable[[Float], Float]:
+    def _power(self, pair: Pair, height_scale: Float, si: Interaction) -> Callable[[Float], Float]:
         scaled_w = pair.w * height_scale
+        windows = () if self._places is None else self._places.at(si, pair.rotation)
 
         def of_wavelength(k: Float) -> Float:
-            found = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w)
+            found = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w, windows)
             return found * dr.square(k * (0.5 / dr.pi))
 
         return of_wavelength
@@ -167,6 +172,8 @@ def _mean(values: list[Float]) -> Float:
     return sum(values[1:], values[0]) * (1.0 / len(values))
 
 
-def power_model(table: DiffractionTable, wavelength: float) -> PowerModel:
-    """That of the current variant."""
-    return rgb_power(table) if mi.is_rgb else SpectralPower(table, wavelength)
+def power_model(
+    table: DiffractionTable, wavelength: float, places: Places | None = None
+) -> PowerModel:
+    """That of the current variant; places, which RGB variants do not know, as `SpectralPower`."""
+    return rgb_power(table) if mi.is_rgb else SpectralPower(table, wavelength, places)

@@ -136,7 +136,8 @@ def weighted_sum(
     x, y = qx / table.spacing[0], qy / table.spacing[1]
     column, distance_x = taps_at(x, grid.last[0], taps[0])
     row, distance_y = taps_at(y, grid.last[1], taps[1])
-    weight_x, weight_y = kernels[0](distance_x), kernels[1](distance_y)
+    weight_x: NDArray[Any] = kernels[0](distance_x)
+    weight_y: NDArray[Any] = kernels[1](distance_y)
     if place:  # what the table's phases, of a window on the patch's centre, are turned by
         weight_x = weight_x * _phases(column, taps[0], grid.last[0], place[0], table.spacing[0])
         weight_y = weight_y * _phases(row, taps[1], grid.last[1], place[1], table.spacing[1])

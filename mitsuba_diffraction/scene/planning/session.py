@@ -125,7 +125,9 @@ class Session:
         table = cached_table(digest, restricted, lambda: made[0] if made else build(restricted))
         self.tables[key] = table
         if key in self.sample_like:
-            share_sampler(table, self.sample_like[key])
+            like = self.sample_like[key]
+            share_sampler(table, like)
+            share_sampler(table.averaged, like.averaged)
         return table
 
     def start(self, lanes: int) -> None:
@@ -182,7 +184,7 @@ def _kind(session: Session) -> type[BSDF]:
         ) -> Spectrum:
             value = super().diffracted(ctx, si, pair, power, active)
             light = mi.unpolarized_spectrum(value)
-            session.record(self, si, pair.uv, pair.w * self.height_scale, light)
+            session.record(self, si, pair.uv, pair.w * self.scale_at(si, active), light)
             return value
 
     return RecordedDiffraction
