@@ -22,8 +22,13 @@ VARIANTS = ("llvm_ad_spectral", "cuda_ad_spectral")
 
 @pytest.fixture(scope="session", autouse=True)
 def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The cache of tables, for this session alone: tests never touch the user's."""
-    folder = tmp_path_factory.mktemp("cache")
+    """The cache of tables, for this session alone: tests never touch the user's.
+
+    Workers share it, for the tables of the measured patches above all.
+    """
+    root = tmp_path_factory.getbasetemp()
+    folder = (root.parent if "PYTEST_XDIST_WORKER" in os.environ else root) / "cache"
+    folder.mkdir(exist_ok=True)
     before = os.environ.get(VARIABLE)
     os.environ[VARIABLE] = str(folder)
     yield folder
