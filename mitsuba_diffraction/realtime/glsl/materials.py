@@ -100,9 +100,9 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
         if len(inner) > 1 and inner[0] is not inner[-1]:
             omissions.append(f"the back of {name}, another material")
         bsdf = inner[0]
+    if only := getattr(bsdf, "only_traced", None):
+        raise DiffractionError(f"{only} of {name} is for the path tracer alone")
     if _diffracts(bsdf):
-        if bsdf.only_traced:
-            raise DiffractionError(f"{bsdf.only_traced} of {name} is for the path tracer alone")
         pigment = Map(np.zeros(3))
         if bsdf.nested is not None:
             pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)
@@ -277,7 +277,7 @@ def diffracts(bsdf: Any) -> bool:
     """Whether a BSDF diffracts, or the first one that it is wrapped around."""
     while bsdf.class_name() in _WRAPPERS:
         bsdf = next(b for b in children(bsdf).values() if _is_bsdf(b))
-    return _diffracts(bsdf)
+    return hasattr(bsdf, "only_traced")
 
 
 def _diffuse(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Map:
