@@ -23,7 +23,11 @@ rgb_lookup      a colour table inside a kernel
 energy          the bound of the albedo that conserves energy
 reflectance     of the surface itself: dielectric, conductor, mirror
 boundary        what the material makes of the light, with its polarisation
+fresnel         fields at an interface, or at both of a film
 coat            a clear coat over the structure
+film            a thin film that follows the heights
+through         both sides of a dielectric or of a thin sheet
+crossing        pairs of directions that are not both above
 layers          how much light reaches what lies beneath
 orientation     how the patch is turned in the tangent plane
 memory          arrays in the variant's memory, and reading them

@@ -85,6 +85,15 @@ film_thickness : float ∂ [none]
     2 n d = 12 µm. RGB variants sum its colours over wavelengths, apart from those of the orders.
 film_k : float ∂ [0]
     The film's absorption, the k of n + ik over that of the medium above it; not over a nested BSDF.
+transmission : boolean [false]
+    Light goes through the dielectric, from both sides: orders of κ = k (n cosθt − cosθi). The side
+    that normals point to has ext_ior, the other one int_ior, which is at least 1.01 times that.
+    Component 0 is what is reflected, 1 what goes through. Orders that change the tangential part by
+    more than 2/λ are left out. It excludes coat, film, nested BSDF, shadowing and polarised
+    variants; nothing conserves its energy (docs/validation.md has figures).
+thin : boolean [false]
+    Light goes through a sheet, whose other side is flat; both sides have ext_ior. What that side
+    sends back is summed as between two mirrors; light beyond the sheet's critical angle is lost.
 model : string [small_slope]
     `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
     where the surface is rough at the scale of an order; polarised variants have its Mueller
@@ -169,7 +178,7 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..tables.energy.conservation import DirectionalTable
-from .boundary import Kirchhoff
+from .boundary import Boundary, Kirchhoff
 from .changing import Bounded, arrays_within, marks
 from .coat import CoatedPair
 from .energy import EnergyModel
@@ -214,11 +223,12 @@ class Diffraction(mi.BSDF):
         self.boundary, self.coat = parameters.boundary, parameters.coat
         self.mirror = Kirchhoff(self.coat) if self.coat is not None else None
         self.nested: BSDF = parameters.nested  # or None
+        self.through = parameters.through
         self._scale = Bounded(
             "height_scale",
             parameters.height_scale,
             _LEAST_SCALE,
-            self.table.height_scale_max / (1.0 if self.coat is None else dr.slice(self.coat.eta)),
+            self.table.height_scale_max / parameters.optical,
             self._scale_refusal,
         )
         self.height_scale = self._scale.value
@@ -226,18 +236,18 @@ class Diffraction(mi.BSDF):
         self.layering = parameters.layering
         self.vcavity = parameters.vcavity
         self.power = power_model(self.table, parameters.wavelength)
-        # Under a coat nothing is known of the albedo
+        # Under a coat, or of light that goes through, nothing is known of the albedo
         self._energy = (
             EnergyModel(
                 self.table, self.boundary, parameters.wavelength, parameters.energy_conserving
             )
-            if self.coat is None
+            if self.coat is None and self.through is None
             else None
         )
-        self._area_factor = 4.0 * dr.pi * self.table.sigma**2  # 4π²σ⁴ over the window's area πσ²
+        self.area_factor = 4.0 * dr.pi * self.table.sigma**2  # 4π²σ⁴ over the window's area πσ²
         front = mi.BSDFFlags.FrontSide
         glossy = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.Anisotropic | front
-        components = [glossy]
+        components = [glossy] if self.through is None else self.through.flags()
         if self.nested is not None:
             components += [self.nested.flags(n) for n in range(self.nested.component_count())]
         self.m_components = components  # at once: what it gives back is a copy
@@ -247,7 +257,9 @@ class Diffraction(mi.BSDF):
     # ------------------------------------------------------------------ Mitsuba's interface
 
     def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
-        """f·cosθo per wavelength."""
+        """f·cosθo per wavelength; where light goes through, as the context's mode has it."""
+        if self.through is not None:
+            return self.through.eval_pdf(self, ctx, si, wo, active)[0]
         active = self._above(si, wo, active)
         above, nested = self._lobes(ctx)
         value = mi.Spectrum(0.0)
@@ -262,6 +274,8 @@ class Diffraction(mi.BSDF):
 
     def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
         """Density of `sample` per solid angle."""
+        if self.through is not None:
+            return self.through.eval_pdf(self, ctx, si, wo, active)[1]
         active = self._above(si, wo, active)
         above, nested = self._lobes(ctx)
         density = mi.Float(0.0)
@@ -277,6 +291,8 @@ class Diffraction(mi.BSDF):
         self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
     ) -> tuple[Spectrum, Float]:
         """`eval` and `pdf` at once."""
+        if self.through is not None:
+            return self.through.eval_pdf(self, ctx, si, wo, active)
         active = self._above(si, wo, active)
         above, nested = self._lobes(ctx)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
@@ -305,6 +321,8 @@ class Diffraction(mi.BSDF):
         Of what lies beneath, lobes of one direction are returned alone: the diffraction has no
         share in them. All others are mixed with it, in value and density.
         """
+        if self.through is not None:
+            return self.through.sample(self, ctx, si, sample1, sample2, active)
         active = mi.Mask(active) & (mi.Frame3f.cos_theta(si.wi) > 0.0)
         above, nested = self._lobes(ctx)
         result = dr.zeros(mi.BSDFSample3f)
@@ -366,20 +384,22 @@ class Diffraction(mi.BSDF):
         """
         changing = (self._scale, self.orientation, self.fresnel)
         refused = [line for line in [one.settle() for one in changing] if line]
-        refused += self._coat_refusal()
+        refused += self._optical_refusal()
         if self._energy is not None:
             largest = dr.slice(dr.max(dr.detach(self.height_scale)))
             beneath = self.nested is not None and isinstance(self.layering, Transmission)
             self._energy.update(largest, dr.grad_enabled(self.height_scale), beneath)
         held = arrays_within(
-            self.power, self._energy, self.orientation, self.fresnel, self.boundary, self.mirror
-        )
+            self.power, self._energy, self.orientation, self.fresnel, self.boundary, self.mirror,
+            self.through,
+        )  # fmt: skip
         self._for_freezing = held + marks(
             self.table,
             self.vcavity,
             str(self.layering),
             str(self.boundary),
             self.coat is None,
+            self.through is None or self.through.thin,
             self._takes,
             getattr(self.boundary.material, "reflects_all", False),  # other kernels
             getattr(self.boundary.material, "channels", None),
@@ -387,16 +407,20 @@ class Diffraction(mi.BSDF):
         if refused:
             raise DiffractionError("; ".join(refused))
 
-    def _coat_refusal(self) -> list[str]:
-        """What to say where heights and coat together are beyond the table."""
-        if self.coat is None:
+    def _optical_refusal(self) -> list[str]:
+        """What to say where heights and the index they are in are beyond the table."""
+        medium = self.coat
+        if self.through is not None:
+            medium = self.through.material
+        if medium is None:
             return []
-        optical = float(dr.slice(dr.max(dr.detach(self.height_scale * self.coat.eta))))
+        name = "coat" if self.coat else "int"
+        optical = float(dr.slice(dr.max(dr.detach(self.height_scale * medium.eta))))
         if optical <= self.table.height_scale_max * (1.0 + 1e-6):
             return []
         return [
-            f"height_scale times coat_eta is {optical:g}, beyond the table's "
-            f"{self.table.height_scale_max:g}; load the plugin anew with that coat_ior"
+            f"height_scale times {'coat_' if self.coat else ''}eta is {optical:g}, beyond the "
+            f"table's {self.table.height_scale_max:g}; load the plugin anew with that {name}_ior"
         ]
 
     def _scale_refusal(self, height_scale: float) -> str:
@@ -442,10 +466,16 @@ class Diffraction(mi.BSDF):
             f"  height_scale = {dr.slice(self.height_scale):g},\n"
             f"  energy_conserving = {'true' if self.energy_conserving else 'false'},\n"
             f"  orientation = {self.orientation},\n"
+            f"{self._sides()}"
             f"  shadowing = {'vcavity' if self.vcavity else 'none'},\n"
             f"  layering = {self.layering},\n"
             f"{nested}]"
         )
+
+    def _sides(self) -> str:
+        if self.through is None:
+            return ""
+        return f"  {'thin' if self.through.thin else 'transmission'} = true,\n"
 
     # ------------------------------------------------------------------ the model
 
@@ -458,24 +488,44 @@ class Diffraction(mi.BSDF):
 
         power : what the power model says of this pair of directions.
         """
+        value = self.lobe(ctx, si, pair, self.boundary, active, power)
+        if self.mirror is not None:
+            value += self.face(ctx, si, pair.outer, self.mirror, active)
+        return value
+
+    def lobe(
+        self,
+        ctx: Context,
+        si: Interaction,
+        pair: Pair,
+        boundary: Boundary,
+        active: Mask,
+        power: Colour | None = None,
+    ) -> Spectrum:
+        """f·cosθo of the structure alone; power : what the power model says, if it was asked."""
         w = pair.cos_i + pair.cos_o
-        outside = self._area_factor * dr.rcp(dr.square(w) * pair.cos_i)
-        if self.coat is not None:
+        outside = self.area_factor * dr.rcp(dr.square(w) * pair.cos_i)
+        if isinstance(pair, CoatedPair):
             outside *= pair.outer.cos_o * dr.rcp(pair.cos_o)
         if self.vcavity:
             outside *= vcavity(pair.cos_i, pair.cos_o, pair.one_plus_dot)
         wavenumbers, scale = self.power.wavenumbers(si), self.height_scale
-        factor = self.boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)
+        if power is None:
+            power = self.power.power(pair, scale, si)
+        factor = boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)
         power = outside * power
         if self._energy is not None and self._energy.takes:
             power *= self._energy.factor(pair, wavenumbers, scale)
-        value = mi.Spectrum(power) * factor
-        if self.mirror is not None:
-            pair = pair.outer
-            outside = self._area_factor * dr.rcp(dr.square(pair.w) * pair.cos_i)
-            factor = self.mirror.factor(pair, scale, wavenumbers, si, active, ctx.mode)
-            value += mi.Spectrum(outside * self.power.flat(pair, si)) * factor
-        return dr.select(active, value, 0.0)
+        return dr.select(active, mi.Spectrum(power) * factor, 0.0)
+
+    def face(
+        self, ctx: Context, si: Interaction, pair: Pair, mirror: Boundary, active: Mask
+    ) -> Spectrum:
+        """f·cosθo of a flat face: the lobe of a flat patch."""
+        wavenumbers = self.power.wavenumbers(si)
+        outside = self.area_factor * dr.rcp(dr.square(pair.w) * pair.cos_i)
+        factor = mirror.factor(pair, self.height_scale, wavenumbers, si, active, ctx.mode)
+        return dr.select(active, mi.Spectrum(outside * self.power.flat(pair, si)) * factor, 0.0)
 
     def _beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
         """Factor of the nested BSDF."""

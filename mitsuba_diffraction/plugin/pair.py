@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import drjit as dr
@@ -63,6 +64,14 @@ class Pair:
         """Tangential part of the ωi + ωo beyond the horizon which `fold` makes the same ωo of."""
         tangential = mi.Vector2f(self.wi.x, self.wi.y) + unfolded(self.wo)
         return in_patch(tangential, self._rotation)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a table is looked up: of a `Pair` what the diffracted power and the roughness ask."""
+
+    uv: Vector2f
+    w: Float
 
 
 def in_patch(direction: Vector2f | Vector3f, rotation: Rotation) -> Vector2f:

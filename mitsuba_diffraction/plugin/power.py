@@ -13,7 +13,8 @@ import drjit as dr
 import mitsuba as mi
 
 from ..tables.table import DiffractionTable
-from .pair import Pair
+from .crossing import Crossing
+from .pair import Pair, Place
 from .restricted import device_table
 from .rgb_power import rgb_power
 from .roles import Colour, Float, Interaction, Vector2f
@@ -23,10 +24,10 @@ from .sampling import folded_cosine, order_sampler
 class PowerModel(Protocol):
     """What the BSDF asks of the diffracted power."""
 
-    def power(self, pair: Pair, height_scale: Float, si: Interaction) -> Colour:
+    def power(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
         """⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm², per channel."""
 
-    def density(self, pair: Pair, height_scale: Float, si: Interaction) -> Float:
+    def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
         """Density per solid angle of drawing ωo: by `draw`, then `sampling.fold`."""
 
     def wavenumbers(self, si: Interaction) -> list[Float]:
@@ -61,7 +62,7 @@ class SpectralPower:
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
-    def power(self, pair: Pair, height_scale: Float, si: Interaction) -> Colour:
+    def power(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
         """See `PowerModel.power`."""
         scaled_w = pair.w * height_scale
 
@@ -72,7 +73,7 @@ class SpectralPower:
         differentiable = dr.grad_enabled(pair.uv, scaled_w)
         return mi.UnpolarizedSpectrum(self._each(of_wavelength, si, differentiable))
 
-    def density(self, pair: Pair, height_scale: Float, si: Interaction) -> Float:
+    def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
         """See `PowerModel.density`; the mean of all wavelengths'."""
         folded, cos_folded = pair.folded, folded_cosine(pair.cos_o)  # the same at all
 
