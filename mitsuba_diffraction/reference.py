@@ -34,7 +34,7 @@ from .optics.coat import refracted, transmitted
 from .optics.fresnel import Filmed
 from .optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
 from .settings import COHERENCES as COHERENCES
-from .settings import checked
+from .settings import SURFACE, checked
 
 MODELS = ("kirchhoff", "small_slope")
 
@@ -50,6 +50,7 @@ def brdf(
     *,
     coherence_width: float = 65.0,
     coherence: str = "ensemble",
+    place: ArrayLike | None = None,
     model: str = "kirchhoff",
     eta: ArrayLike | None = None,
     k: ArrayLike = 0.0,
@@ -68,8 +69,9 @@ def brdf(
         x runs along rows, y along columns, z is the normal. Below the surface the BRDF is 0.
     wavelength : (n,) or scalar, vacuum wavelength in nm.
     coherence_width : 4σ of the amplitude window, µm.
-    coherence : "ensemble", the power averaged over every position of the window, or "patch", the
-        power under one window centred on the patch.
+    coherence : "ensemble", the power averaged over every position of the window; "patch", the
+        power under one window centred on the patch; "surface", under one centred on `place`.
+    place : (n, 2) or (2,), µm along x and y from the patch's first pixel; it tiles the plane.
     model : "kirchhoff", or "small_slope", which needs an index.
     eta, k : (n,) or scalar, the index eta + ik of the material over that of the medium above it;
         without eta R = 1.
@@ -81,20 +83,18 @@ def brdf(
     Raises
     ------
     DiffractionError
-        For an unknown coherence or model, a width that is not positive and finite, an index that
-        is missing or none, or arrays whose shapes do not fit.
+        For an unknown coherence or model, a width that is not positive and finite, an index or a
+        place that is missing or none, or arrays whose shapes do not fit.
     """
     width = _width(coherence_width)
-    checked("coherence", coherence)
     light = _broadcast(wi, wo, wavelength)
+    window = sigma_of(width), coherence, _places(coherence, place, len(light[2]))
     index = _index(model, eta, k, light[2], film)
     if index is not None:
-        return _measured(
-            boundary.unpolarised, field, light, model, index, coat, sigma_of(width), coherence
-        )
+        return _measured(boundary.unpolarised, field, light, model, index, coat, window)
     if coat is not None:
         raise DiffractionError(f"coat={coat} needs an index beneath it: give eta (and k)")
-    power = window_power(field, *light, sigma_of(width), coherence)
+    power = window_power(field, *light, *window)
     return kirchhoff_factor(*light, sigma_of(width)) * power
 
 
@@ -108,6 +108,7 @@ def mueller(
     k: ArrayLike = 0.0,
     coherence_width: float = 65.0,
     coherence: str = "ensemble",
+    place: ArrayLike | None = None,
     model: str = "small_slope",
     coat: float | None = None,
     film: tuple[complex, float] | None = None,
@@ -118,12 +119,12 @@ def mueller(
     `optics.boundary.polarisation_axes`. Entry (0, 0) is `brdf`.
     """
     width = _width(coherence_width)
-    checked("coherence", coherence)
     light = _broadcast(wi, wo, wavelength)
+    window = sigma_of(width), coherence, _places(coherence, place, len(light[2]))
     index = _index(model, eta, k, light[2], film)
     if index is None:
         raise DiffractionError("polarisation needs an index: give eta (and k of a conductor)")
-    return _measured(boundary.mueller, field, light, model, index, coat, sigma_of(width), coherence)
+    return _measured(boundary.mueller, field, light, model, index, coat, window)
 
 
 def btdf(
@@ -187,16 +188,21 @@ def window_power(
     wavelength: NDArray[np.float64],
     sigma: float,
     coherence: str,
+    places: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """⟨|P|²⟩ in µm⁴, shape (n,), one explicit integral per direction pair."""
+    """⟨|P|²⟩ in µm⁴, shape (n,), one explicit integral per direction pair.
+
+    places : (n, 2), centres of the windows in µm, instead of the patch's.
+    """
     k = wavenumber(wavelength)
     u, v, w = diffraction_coordinates(wi, wo)
     above = (wi[:, 2] > 0) & (wo[:, 2] > 0)
     power = np.zeros(len(k))
     for n in np.flatnonzero(above):
         phase_screen = np.exp(1j * (k[n] * w[n]) * field.heights)
+        place = None if places is None else (places[n, 0], places[n, 1])
         power[n] = screen_power(
-            phase_screen, field.pixel_size, k[n] * u[n], k[n] * v[n], sigma, coherence
+            phase_screen, field.pixel_size, k[n] * u[n], k[n] * v[n], sigma, coherence, place
         )
     return power
 
@@ -208,8 +214,12 @@ def screen_power(
     beta: float,
     sigma: float,
     coherence: str,
+    place: tuple[float, float] | None = None,
 ) -> float:
-    """⟨|P|²⟩ in µm⁴ of one phase screen (ny, nx) at the spatial frequency (α, β) in rad/µm."""
+    """⟨|P|²⟩ in µm⁴ of one phase screen (ny, nx) at the spatial frequency (α, β) in rad/µm.
+
+    place : centre of the window in µm, instead of the patch's.
+    """
     ny, nx = phase_screen.shape
     qx, waves_x = _plane_waves(nx, pixel_size[0], alpha, sigma)
     qy, waves_y = _plane_waves(ny, pixel_size[1], beta, sigma)
@@ -219,8 +229,8 @@ def screen_power(
     if coherence == "ensemble":
         total = window_y**2 @ np.abs(amplitude) ** 2 @ window_x**2
     else:
-        centre_x = np.exp(-0.5j * qx * nx * pixel_size[0])
-        centre_y = np.exp(-0.5j * qy * ny * pixel_size[1])
+        x, y = place or (0.5 * nx * pixel_size[0], 0.5 * ny * pixel_size[1])
+        centre_x, centre_y = np.exp(-1j * qx * x), np.exp(-1j * qy * y)
         total = np.abs((window_y * centre_y) @ amplitude @ (window_x * centre_x)) ** 2
     return float(4 * np.pi**2 * sigma**4 * total)
 
@@ -232,13 +242,13 @@ def _measured(
     model: str,
     index: NDArray[np.complex128] | Filmed,
     coat: float | None,
-    sigma: float,
-    coherence: str,
+    window: tuple[float, str, NDArray[np.float64] | None],
 ) -> NDArray[np.float64]:
     """The BRDF as a measure of its Jones matrices; under a coat, that of its face too.
 
-    light : wi, wo, wavelength.
+    light : wi, wo, wavelength; window : sigma, coherence, places.
     """
+    sigma = window[0]
 
     def weighed(factor: NDArray[np.float64], jones: NDArray[np.complex128]) -> NDArray[np.float64]:
         found = measure(jones)
@@ -246,7 +256,7 @@ def _measured(
 
     wi, wo, wavelength = light
     if coat is None:
-        power = window_power(field, *light, sigma, coherence)
+        power = window_power(field, *light, *window)
         return weighed(_order_factor(*light, sigma) * power, _jones(field, *light, model, index))
     if isinstance(index, Filmed):
         raise DiffractionError(f"coat={coat} and a film exclude each other: leave one of them out")
@@ -255,7 +265,7 @@ def _measured(
     below, above = refracted(wi, coat), refracted(wo, coat)
     below, above = (np.where(w[:, 2:] > 0, r, -r) for w, r in ((wi, below), (wo, above)))
     inside = below, above, wavelength / coat
-    power = window_power(field, *inside, sigma, coherence) / coat**2
+    power = window_power(field, *inside, *window) / coat**2
     lit = _lit(wi, wo)
     jones = transmitted(_jones(field, *inside, model, index / coat), *lit, coat, index / coat)
     structure = weighed(_order_factor(*inside, sigma) * power, jones)
@@ -313,6 +323,26 @@ def _width(value: float) -> float:
         shown = f"{value:g}" if number else quoted(value)
         raise DiffractionError(f"coherence_width={shown} must be a positive number of µm")
     return float(value)
+
+
+def _places(coherence: str, place: ArrayLike | None, n: int) -> NDArray[np.float64] | None:
+    """Centres (n, 2) of windows on the surface, µm."""
+    if coherence != SURFACE:
+        checked("coherence", coherence)
+    if (place is None) == (coherence == SURFACE):
+        given = "needs a place: (x, y) on the patch in µm" if place is None else "takes no place"
+        raise DiffractionError(f"coherence='{coherence}' {given}")
+    if place is None:
+        return None
+    try:
+        found = np.broadcast_to(np.asarray(place, np.float64), (n, 2))
+    except ValueError as error:
+        raise DiffractionError(
+            f"place has shape {np.shape(place)}; it must be ({n}, 2) or (2,), in µm"
+        ) from error
+    if not np.all(np.isfinite(found)):
+        raise DiffractionError("place must be finite, in µm")
+    return found
 
 
 def _index(

@@ -14,6 +14,9 @@ from typing import Any
 from .errors import DiffractionError, quoted
 
 COHERENCES = ("ensemble", "patch")
+#: Of scenes and the reference besides: one window, centred where the light falls. The table is
+#: that of "patch", whose amplitudes are those of all places but for their phases.
+SURFACE = "surface"
 BASES = ("svd", "chebyshev", "taylor")
 #: Most bins that a look-up reads in each direction: more would take minutes.
 MAX_TAPS = 64

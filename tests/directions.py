@@ -71,18 +71,25 @@ def _lit_pair(rng, kind, orders, sigma):
 
 
 def riemann_power(
-    field: HeightField, alpha: float, beta: float, kappa: float, sigma: float, coherence: str
+    field: HeightField,
+    alpha: float,
+    beta: float,
+    kappa: float,
+    sigma: float,
+    coherence: str,
+    place: tuple[float, float] | None = None,
 ) -> float:
     """⟨|P|²⟩ in µm⁴ as a sum over the pixels of the tiled plane, without any transform.
 
-    P = Σ g(x − x₀) exp(iκh(x)) exp(i(αx + βy)) dx dy. For `ensemble` the window sits on every pixel
-    in turn, which averages exactly: |P|² has no frequencies beyond those of the pixels in x₀.
+    P = Σ g(x − x₀) exp(iκh(x)) exp(i(αx + βy)) dx dy, x₀ = `place` for `surface`. For `ensemble`
+    the window sits on every pixel in turn, which averages exactly: |P|² has no frequencies beyond
+    those of the pixels in x₀.
     """
     (ny, nx), (dx, dy) = field.shape, field.pixel_size
     lx, ly = field.extent
     reach = 8.7 * sigma  # g is 4e-17 there
-    if coherence == "patch":
-        centres = [(0.5 * lx, 0.5 * ly)]
+    if coherence != "ensemble":
+        centres = [place or (0.5 * lx, 0.5 * ly)]
     else:
         centres = [(ix * dx, iy * dy) for iy in range(ny) for ix in range(nx)]
     total = 0.0

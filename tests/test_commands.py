@@ -34,6 +34,7 @@ SMALL = {
     "plan": ["-D", "resx=12", "-D", "resy=10", "--paths", "512"],
     "compare": [*PICTURE, "--full-spp", "1", "--supersampling", "1", "--method", "lut"],
     "export-viewer": ["--method", "spectral"],
+    "export-shader": ["--coherence-width", "4", "--tolerance", "0.05"],
     "survey": ["--coherence-width", "4", "--tolerance", "0.05", "--resolution", "16"],
 }
 # those of scenes, which would else take the scene's own patch

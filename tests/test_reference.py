@@ -44,14 +44,19 @@ def test_the_power_is_that_of_a_sum_over_pixels_of_the_plane(coherence, kappa):
         assert abs(computed - exact) < 1e-12 * 4 * np.pi**2 * SIGMA**4
 
 
-@pytest.mark.parametrize("coherence", reference.COHERENCES)
-def test_the_brdf_is_the_factor_times_that_power(coherence):
+@pytest.mark.parametrize(
+    ("coherence", "place"),
+    [("ensemble", None), ("patch", None), ("surface", (0.31, -5.02)), ("surface", (1.9, 0.0))],
+)
+def test_the_brdf_is_the_factor_times_that_power(coherence, place):
     wi, wo = polar(20, 30), polar(35, 160)
     k = float(wavenumber(600.0))
     u, v, w = wi + wo
-    power = riemann_power(SMALL, k * u, k * v, k * w, SIGMA, coherence)
+    power = riemann_power(SMALL, k * u, k * v, k * w, SIGMA, coherence, place)
     expected = float(kirchhoff_factor(wi, wo, 600.0, SIGMA)) * power
-    value = reference.brdf(SMALL, wi, wo, 600.0, coherence_width=4 * SIGMA, coherence=coherence)
+    value = reference.brdf(
+        SMALL, wi, wo, 600.0, coherence_width=4 * SIGMA, coherence=coherence, place=place
+    )
     assert value.shape == (1,)
     assert value[0] == pytest.approx(expected, rel=1e-9)  # rounding, of a small part of all power
 
@@ -74,6 +79,20 @@ def test_an_ensemble_is_the_mean_of_patches_under_windows_anywhere():
     ensemble = reference.brdf(SMALL, wi, wo, 550.0, coherence_width=4 * SIGMA)[0]
     # three standard errors of a mean of 400
     assert abs(np.mean(values) - ensemble) < 3 * np.std(values) / 20
+
+
+def test_an_ensemble_is_the_mean_over_all_places():
+    # |P|² has no frequencies beyond those of 12 × 15 pixels, twice over: this grid's mean is exact
+    n = 32
+    step = np.array(SMALL.extent) / n
+    places = np.indices((n, n)).reshape(2, -1).T * step + 0.017
+    wi, wo, given = polar(15, 200), polar(30, 30), {"coherence_width": 4 * SIGMA, "eta": 1.5}
+    values = reference.brdf(
+        SMALL, wi, wo, np.full(n * n, 550.0), coherence="surface", place=places, **given
+    )
+    assert values.std() > 0.3 * values.mean()  # there is speckle
+    # rounding
+    assert values.mean() == pytest.approx(reference.brdf(SMALL, wi, wo, 550.0, **given)[0], 1e-9)
 
 
 @pytest.mark.parametrize("kappa", [0.3, 10.0, 50.0])
@@ -258,6 +277,10 @@ def test_a_window_may_be_wider_than_any_table_s():
     ("arguments", "message"),
     [
         ({"coherence": "none"}, "coherence='none' must be one of ensemble, patch"),
+        ({"coherence": "surface"}, "coherence='surface' needs a place"),
+        ({"coherence": "patch", "place": (0.0, 0.0)}, "coherence='patch' takes no place"),
+        ({"coherence": "surface", "place": (1.0, 2.0, 3.0)}, r"place has shape \(3,\)"),
+        ({"coherence": "surface", "place": (1.0, np.nan)}, "place must be finite"),
         ({"coherence_width": 0.0}, "coherence_width=0 must be a positive number of µm"),
         ({"coherence_width": -1.0}, "coherence_width=-1 must be a positive"),
         ({"coherence_width": np.nan}, "coherence_width=nan must be a positive"),

@@ -12,7 +12,16 @@ from mitsuba_diffraction.scene.parameters import parameters_of
 
 SCENES = Path(__file__).resolve().parent.parent / "scenes"
 LARGE = ("sphere", "snake", "xenopeltis")
-STUDIO = ("cd", "cd_window", "grating", "grating_window", "material_ball", "own_mesh", "scales")
+STUDIO = (
+    "cd",
+    "cd_window",
+    "grating",
+    "grating_window",
+    "material_ball",
+    "own_mesh",
+    "scales",
+    "scales_macro",
+)
 SMALL = {"spp": "4", "resx": "48", "resy": "40"}
 
 # the look-alikes are as steep as the real scales, which the package says every time

@@ -13,6 +13,7 @@ survey                 many scans: a row, a table and a map each
 evaluate, sweep        the methods of the thesis
 view, compare          a scene in real time, and beside the path tracer
 export_viewer          a scene as a page for a browser
+export_shader          a surface as GLSL for other programs
 tangents               a patch laid smoothly over any mesh
 tradeoff, bench        accuracy, speed and memory
 workers                options of commands that may run on many processes

@@ -66,7 +66,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )  # fmt: skip
     add_mode(parser)
     _add_map_options(parser.add_argument_group("the map"))
-    _add_surface_options(parser.add_argument_group("the surface"))
+    add_surface(parser.add_argument_group("the surface"))
     group = parser.add_argument_group("methods of the 2014 thesis")
     add_method(
         group, None,
@@ -105,7 +105,8 @@ def _add_map_options(group: argparse._ArgumentGroup) -> None:
     )
 
 
-def _add_surface_options(group: argparse._ArgumentGroup) -> None:
+def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:
+    """Declare what reflects; see `surface_bsdf`. turned: whether the patch can be."""
     group.add_argument(
         "--material", metavar="NAME",
         help="conductor, e.g. Al, or none for a reflectance of 1; default: none",
@@ -120,7 +121,8 @@ def _add_surface_options(group: argparse._ArgumentGroup) -> None:
         "--model", choices=("small_slope", "kirchhoff"),
         help="what the material makes of the light; default: small_slope where there is an index",
     )  # fmt: skip
-    group.add_argument("--orientation", metavar="DEG", type=float, help="turns the patch")
+    if turned:
+        group.add_argument("--orientation", metavar="DEG", type=float, help="turns the patch")
     group.add_argument(
         "--height-scale", metavar="S", type=number_between(1e-6, 1000), help="multiplies heights"
     )
@@ -209,7 +211,7 @@ def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> 
     check_map(bands, args.resolution, args.samples, args.spectral)
     variant = set_variant(args.mode)
     with mitsuba_warnings(), Bar(args) as bar:
-        bsdf = _bsdf(args)
+        bsdf = surface_bsdf(args)
         result = brdf_map(
             bsdf, light.theta, light.phi, resolution=args.resolution, samples=args.samples,
             illuminant=args.illuminant, cosine=args.cosine, spectral=args.spectral, progress=bar,
@@ -276,13 +278,13 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
         args.parser.error(refused[0])
 
 
-def _bsdf(args: argparse.Namespace) -> Any:
-    """The plugin for what the command line says, in the variant that is set."""
+def surface_bsdf(args: argparse.Namespace) -> Any:
+    """The plugin for what `add_surface` and `add_heights` read, in the variant that is set."""
     import mitsuba as mi
 
     from ..plugin.bsdf import Diffraction
 
-    given = {n: getattr(args, n) for n in _SURFACE if getattr(args, n) is not None}
+    given = {n: getattr(args, n) for n in _SURFACE if getattr(args, n, None) is not None}
     settings = {k: v for k, v in table_options(args).items() if k in _TABLE}
     for option in given_for_heights(args):
         name = option.removeprefix("--").replace("-", "_")

@@ -22,6 +22,7 @@ from . import (
     brdf_map,
     compare,
     evaluate,
+    export_shader,
     export_viewer,
     info,
     plan,
@@ -40,7 +41,7 @@ from .report import check_writable
 
 COMMANDS = (
     precompute, info, tangents, plan, render, brdf_map, evaluate, survey, sweep, tradeoff, compare,
-    view, export_viewer, bench,
+    view, export_viewer, export_shader, bench,
 )  # fmt: skip
 
 FAILED = 1

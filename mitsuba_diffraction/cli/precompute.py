@@ -22,9 +22,12 @@ from .options import (
     table_options,
 )
 from .report import check_outputs, save_report
+from .workers import add_workers, client_of, on_workers
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
+    from ..progress import Progress
+    from ..settings import TableSettings
     from ..tables import DiffractionTable
 
 
@@ -52,6 +55,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     group = parser.add_argument_group("the table")
     add_table(group)
     add_wavelength_range(group)
+    add_workers(parser)
     add_json(parser, "what is in the table")
     parser.set_defaults(run=run, parser=parser)
 
@@ -80,7 +84,6 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
     from ..heights.read import is_recipe
     from ..heights.recipes import Recipe
     from ..settings import TableSettings
-    from ..tables.build.build import build_with
 
     start = time.perf_counter()
     options = load_options(args)
@@ -93,6 +96,8 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
     elif len(sources) > 1 and args.output is None:
         args.parser.error("argument -o/--output: name the one table of these files")
     settings = TableSettings(**given)
+    if (args.workers or args.scheduler) and settings.windows is None:
+        args.parser.error("argument --workers, --scheduler: are for windows, see --windows")
     by_recipe = recipe is not None and args.output is None
     output = args.output or (recipe.output if recipe else Path(f"{sources[0].stem}.exr"))
     check_outputs([output], inputs, "table", make_folder=by_recipe)
@@ -110,7 +115,7 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
     for line in said:
         warnings.warn(line, DiffractionWarning, stacklevel=1)
     with Bar(args) as bar:
-        table = build_with(fields, settings, bar)
+        table, workers = _built(args, fields, settings, bar)
         if by_recipe:
             output.parent.mkdir(parents=True, exist_ok=True)
         table.save(output)
@@ -120,7 +125,27 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
     print(f"{', '.join(map(str, sources))} -> {output}")
     for label, text in _report(fields, table, output, time.perf_counter() - start):
         print(f"  {label:<6} {text}")
-    return {"file": str(output), **table.summary()}
+    if workers:
+        print(
+            f"  work   {workers['tasks']} tasks of windows, {workers['retries']} given out again, "
+            f"{workers['busy']:.1f} s of workers' work, {workers['bytes'] / 1e6:.3g} MB sent"
+        )
+    return {"file": str(output), **table.summary(), **({"workers": workers} if workers else {})}
+
+
+def _built(
+    args: argparse.Namespace, fields: Sequence[HeightField], settings: TableSettings, bar: Progress
+) -> tuple[DiffractionTable, dict[str, Any]]:
+    """The table, and what workers did for it, if there are any and it is of windows."""
+    from ..tables.build.build import build_with
+
+    if settings.windows is None or not on_workers(args):
+        return build_with(fields, settings, bar), {}
+    from ..cluster.build import build_on_workers
+
+    with client_of(args) as client:
+        table, work = build_on_workers(fields, settings, client, bar)
+        return table, work.summary()
 
 
 def _report(

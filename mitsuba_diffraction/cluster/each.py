@@ -1,20 +1,24 @@
-"""Independent jobs, one by one here or on workers, in whatever order they are done."""
+"""Independent jobs, here or on workers: one by one as they are done, or in their order."""
 
 from __future__ import annotations
 
+import pickle
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import CancelledError
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from ..errors import one_line
+from ..errors import DiffractionError, one_line
 from ..scene.passes import Stop
 from .files import SceneFiles
-from .tasks import Failed, Lacking
-from .workers import require_dask
+from .tasks import Failed, Lacking, worker_address
+from .workers import outcome, wait_for_scheduler, workers_of
 
 _POLL = 0.02  # seconds
+#: Arguments that are with the scheduler for every worker: one is worked at, the other is there.
+_AHEAD = 2
 
 
 class HasFiles(Protocol):
@@ -40,6 +44,11 @@ def each(
     Returns
     -------
     Numbers and results; `Failed` where a worker died of a job, again and again.
+
+    Raises
+    ------
+    DiffractionError
+        If the scheduler is gone, and does not come back.
     """
     if client is None:
         for n, job in enumerate(jobs):
@@ -51,9 +60,11 @@ def each(
     try:
         while waiting and not stop.asked:
             for future in [future for future in waiting if future.done()]:
-                n = waiting.pop(future)
-                found = _result(future)
-                if isinstance(found, Lacking):
+                n, found = waiting.pop(future), outcome(future)
+                if found is None:
+                    wait_for_scheduler(client, stop)
+                    waiting[client.submit(work, jobs[n], pure=False)] = n
+                elif isinstance(found, Lacking):
                     again = client.submit(work, jobs[n], _contents(jobs[n], found), pure=False)
                     waiting[again] = n
                 else:
@@ -64,16 +75,85 @@ def each(
             future.cancel()
 
 
-def _result(future: Any) -> Any:
-    distributed = require_dask()
-    try:
-        return future.result()
-    except distributed.scheduler.KilledWorker as error:
-        return Failed("its worker died, as did others with it", error.last_worker.address)
-    except (CancelledError, OSError) as error:
-        return Failed(f"it was lost with the scheduler ({one_line(str(error))[:80]})", "")
-
-
 def _contents(job: HasFiles, lacking: Lacking) -> Mapping[str, bytes]:
     wanted = set(lacking.digests)
     return {d: Path(path).read_bytes() for path, d in job.files.files if d in wanted}
+
+
+class OrderedMap:
+    """`map` on workers: results in the order of the arguments, of which few are under way at once.
+
+    Attributes
+    ----------
+    tasks, retries : that were done, and given out again when the scheduler was lost.
+    bytes : that went to workers.
+    busy : seconds of all workers' work.
+    """
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        self.tasks = self.retries = self.bytes = 0
+        self.busy = 0.0
+
+    def summary(self) -> dict[str, Any]:
+        """What it cost, as plain data."""
+        names = "tasks", "retries", "bytes", "busy"
+        return {name: getattr(self, name) for name in names}
+
+    def __call__(self, work: Callable[[Any], Any], arguments: Iterable[Any]) -> Iterator[Any]:
+        """Results of `work` for each of the arguments.
+
+        Raises
+        ------
+        DiffractionError
+            Naming the worker, if one fails; or if the scheduler is gone.
+        """
+        waiting: deque[tuple[Any, Any]] = deque()
+        left = iter(arguments)
+        try:
+            while True:
+                while len(waiting) < _AHEAD * max(1, len(workers_of(self._client))):
+                    try:
+                        call = work, next(left)
+                    except StopIteration:
+                        break
+                    waiting.append((call, self._submitted(call)))
+                if not waiting:
+                    return
+                yield self._result(waiting)
+        finally:
+            for _, future in waiting:
+                future.cancel()
+
+    def _result(self, waiting: deque[tuple[Any, Any]]) -> Any:
+        while (found := outcome(waiting[0][1])) is None:
+            wait_for_scheduler(self._client)
+            self.retries += len(waiting)
+            for n, (call, _) in enumerate(waiting):
+                waiting[n] = call, self._submitted(call)
+        if isinstance(found, Failed):
+            raise DiffractionError(f"worker {found.worker}: {found.text}")
+        waiting.popleft()
+        result, seconds = found
+        self.tasks += 1
+        self.busy += seconds
+        return result
+
+    def _submitted(self, call: tuple[Any, Any]) -> Any:
+        content = pickle.dumps(call, protocol=5)
+        self.bytes += len(content)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Sending large graph")  # it is sent once
+            return self._client.submit(_done, content, pure=False)
+
+
+def _done(content: bytes) -> tuple[Any, float] | Failed:
+    """A call's result and its seconds."""
+    start = time.perf_counter()
+    work, argument = pickle.loads(content)
+    try:
+        return work(argument), time.perf_counter() - start
+    except Exception as error:  # a worker must answer, and its traceback is of no use elsewhere
+        return Failed(
+            f"unexpected {type(error).__name__}: {one_line(str(error))}", worker_address()
+        )

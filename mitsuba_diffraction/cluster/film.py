@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import DiffractionError, one_line
+from ..errors import DiffractionError
 from ..progress import Progress
 from ..scene.load import load_scene, preview_samples, sensor_of, shrink
 from ..scene.passes import Result, Stop, developed, groups_of, passes_of
 from .files import SceneFiles
 from .kept import Kept
-from .tasks import Failed, Lacking, Sums, Task, film_of, run_task, versions
-from .workers import check_workers, memory_warnings, require_dask
+from .tasks import Failed, Sums, Task, film_of, run_task, versions
+from .workers import check_workers, memory_warnings, outcome, wait_for_scheduler, workers_of
 
 #: Tasks that are with the scheduler for every worker: one is worked at, others wait.
 AHEAD = 3
@@ -29,7 +27,6 @@ HELD = 16
 #: Bytes that Dr.Jit takes for a sample of a pass, and for the rest of a process: estimates.
 BYTES_A_SAMPLE, BYTES_A_PROCESS = 400, 5e8
 _POLL, _COUNTED = 0.02, 2.0  # seconds
-_PATIENCE = 60.0  # seconds for a scheduler or the last worker to come back
 
 
 @dataclass
@@ -204,7 +201,6 @@ class _InOrder:
         self._with: dict[Any, Task] = {}
         self._ready: dict[str, Sums | None] = {}  # by key; None for those that are only on disk
         self._done = 0
-        self._lost_since: float | None = None
         self._contents: dict[str, Any] = {}
         self._counted = (-math.inf, 1)
         self._seen: set[str] = set()
@@ -260,53 +256,20 @@ class _InOrder:
         report = self._film.report
         for future in [future for future in self._with if future.done()]:
             task = self._with.pop(future)
-            found = self._result(future, task)
+            found = outcome(future)
+            if found is None:
+                self._contents.clear()
+                wait_for_scheduler(self._film._client, self._stop)
             if isinstance(found, Sums):
                 self._film._kept.write(task, found)
                 held = sum(sums is not None for sums in self._ready.values())
                 self._ready[task.key] = found if held < HELD else None
                 self._done += 1
-                self._lost_since = None
             elif isinstance(found, Failed):
                 raise DiffractionError(f"{task}, worker {found.worker}: {found.text}")
             else:
                 report.retries += 1
                 self._with[self._submitted(task, found.digests if found else ())] = task
-
-    def _result(self, future: Any, task: Task) -> Sums | Lacking | Failed | None:
-        """What a task gave; None if it was lost with the scheduler."""
-        distributed = require_dask()
-        try:
-            return future.result()
-        except distributed.scheduler.KilledWorker as error:
-            raise DiffractionError(
-                f"{task}, worker {error.last_worker.address}: it died, as did those before that "
-                "had the same passes; a worker may lack memory, see docs/cluster.md. What is done "
-                "is kept"
-            ) from error
-        except (CancelledError, distributed.client.FutureCancelledError, OSError) as error:
-            self._wait_for_scheduler(error)
-            return None
-
-    def _wait_for_scheduler(self, error: BaseException) -> None:
-        """Until it answers again.
-
-        Raises
-        ------
-        DiffractionError
-            If it does not.
-        """
-        now = time.perf_counter()
-        self._lost_since = self._lost_since or now
-        self._contents.clear()
-        while time.perf_counter() - self._lost_since < _PATIENCE and not self._stop.asked:
-            if self._film._client.status == "running":
-                return
-            time.sleep(10 * _POLL)
-        raise DiffractionError(
-            f"the scheduler is gone ({one_line(str(error))[:80]}); what is done is kept: run the "
-            "same command again to go on"
-        ) from error
 
     def _tell(self, task: Task) -> None:
         frames = len(self._film._frames)
@@ -317,9 +280,8 @@ class _InOrder:
         """How many there are, asked for every other second."""
         now = time.perf_counter()
         if now - self._counted[0] > _COUNTED:
-            with contextlib.suppress(OSError, CancelledError):  # the scheduler is gone
-                info = self._film._client.scheduler_info(n_workers=-1)
-                self._counted = now, len(info["workers"])
-                self._seen |= set(info["workers"])
-                self._film.report.lost = len(self._seen - set(info["workers"]))
+            there = set(workers_of(self._film._client))
+            self._counted = now, len(there)
+            self._seen |= there
+            self._film.report.lost = len(self._seen - there)
         return int(self._counted[1])

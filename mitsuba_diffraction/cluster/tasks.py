@@ -114,9 +114,11 @@ def run_task(task: Task, contents: Mapping[str, bytes] | None = None) -> Sums | 
             warnings.simplefilter("ignore")  # the client has loaded the scene, and said them
             return _sums(task)
     except DiffractionError as error:
-        return Failed(str(error), _address())
+        return Failed(str(error), worker_address())
     except Exception as error:  # a worker must answer, and its traceback is of no use elsewhere
-        return Failed(f"unexpected {type(error).__name__}: {one_line(str(error))}", _address())
+        return Failed(
+            f"unexpected {type(error).__name__}: {one_line(str(error))}", worker_address()
+        )
 
 
 def _sums(task: Task) -> Sums:
@@ -139,7 +141,7 @@ def _sums(task: Task) -> Sums:
         total = total + render_pass(scene, sensor, one)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     where = f"{processor()}, {threads} threads"
-    return Sums(total, where, _address(), time.perf_counter() - start, peak)
+    return Sums(total, where, worker_address(), time.perf_counter() - start, peak)
 
 
 @lru_cache(1)
@@ -190,7 +192,8 @@ def processor() -> str:
     return names[0] if names else platform.machine()
 
 
-def _address() -> str:
+def worker_address() -> str:
+    """Of this process, as Dask names it."""
     from distributed import get_worker
 
     try:

@@ -7,15 +7,18 @@ import logging
 import os
 import signal
 import threading
+import time
 from collections.abc import Iterator
+from concurrent.futures import CancelledError
 from typing import Any
 
 from ..errors import DiffractionError, one_line
-from .tasks import check_versions, versions
+from ..scene.passes import Stop
+from .tasks import Failed, check_versions, versions
 
 #: Names a running cluster, as Dask has it.
 VARIABLE = "DASK_SCHEDULER_ADDRESS"
-_PATIENCE = 60.0  # seconds for the first worker to come
+_PATIENCE = 60.0  # seconds for the first worker to come, and for a scheduler that was lost
 
 
 @contextlib.contextmanager
@@ -60,7 +63,9 @@ def connect(
         )
     named = {"scheduler_file" if address.endswith(".json") else "address": address}
     try:
-        client = distributed.Client(**named, timeout=patience)
+        distributed.Client(**named, timeout=patience).close()
+        # the same time is for a scheduler that is lost and comes back
+        client = distributed.Client(**named, timeout=_PATIENCE)
     except (OSError, ValueError, TimeoutError) as error:
         raise DiffractionError(
             f"no scheduler answers at '{address}' ({one_line(str(error))[:80]}); start one with "
@@ -107,7 +112,7 @@ def check_workers(client: Any, variant: str | None) -> list[str]:
         raise DiffractionError(
             f"no worker came within {_PATIENCE:.0f} s; start some with 'dask worker --nthreads 1'"
         ) from error
-    for address, about in client.scheduler_info(n_workers=-1)["workers"].items():
+    for address, about in workers_of(client).items():
         if about["nthreads"] != 1:
             raise DiffractionError(
                 f"worker {address} has {about['nthreads']} Dask threads, of which Dr.Jit takes one "
@@ -120,9 +125,52 @@ def check_workers(client: Any, variant: str | None) -> list[str]:
     return list(found)
 
 
+def workers_of(client: Any) -> dict[str, Any]:
+    """What the scheduler knows of its workers, by address; of none while it is gone."""
+    if client.status != "running":  # it would be waited for
+        return {}
+    try:
+        return dict(client.scheduler_info(n_workers=-1).get("workers", {}))
+    except (OSError, CancelledError):
+        return {}
+
+
+def outcome(future: Any) -> Any:
+    """What a task gave: `Failed` if its workers died; None if it was lost with the scheduler."""
+    distributed = require_dask()
+    try:
+        return future.result()
+    except distributed.scheduler.KilledWorker as error:
+        return Failed(
+            "it died, as did those before that had the same task; a worker may lack memory, see "
+            "docs/cluster.md",
+            error.last_worker.address,
+        )
+    except (CancelledError, distributed.client.FutureCancelledError, OSError):
+        return None
+
+
+def wait_for_scheduler(client: Any, stop: Stop | None = None) -> None:
+    """Until it answers again, or `stop` is asked.
+
+    Raises
+    ------
+    DiffractionError
+        If it does not.
+    """
+    end = time.monotonic() + _PATIENCE
+    while client.status != "running" and not (stop and stop.asked):
+        if client.status == "closed" or time.monotonic() > end:
+            raise DiffractionError(
+                "the scheduler is gone; start it and its workers, and run the same command again, "
+                "which goes on from what is kept"
+            )
+        time.sleep(0.1)
+
+
 def memory_warnings(client: Any, needed: float) -> Iterator[str]:
     """Lines on workers whose memory limit is below what a task is estimated to need, in bytes."""
-    for address, about in client.scheduler_info(n_workers=-1)["workers"].items():
+    for address, about in workers_of(client).items():
         limit = about.get("memory_limit") or 0
         if 0 < limit < needed:
             yield (

@@ -45,7 +45,7 @@ def pixel_size_of(value: PixelSize | None, where: str = "pixel_size") -> tuple[f
         f"{where}: expected one length or a pair (dx, dy) in µm, each from {SHORTEST_PIXEL:g} "
         f"to {LONGEST_PIXEL:g}, or 'auto'"
     )
-    numbers_ = _numbers_of(value)
+    numbers_ = numbers_of(value)
     if numbers_ is None or len(numbers_) not in (1, 2):
         raise DiffractionError(f"{expected}; got {quoted(value)}")
     for number in numbers_:
@@ -64,7 +64,7 @@ def height_of(value: Height | None, where: str = "max_height") -> float | None:
     """
     if is_auto(value):
         return None
-    numbers_ = _numbers_of(value)
+    numbers_ = numbers_of(value)
     if numbers_ is None or len(numbers_) != 1 or not 0 < numbers_[0] <= LONGEST_HEIGHT:
         raise DiffractionError(
             f"{where}: expected a height in µm above 0, at most {LONGEST_HEIGHT:g}, or 'auto'; "
@@ -108,7 +108,7 @@ def crop_of(value: Crop | None, where: str = "crop") -> tuple[float, float] | No
     """
     if value is None or (isinstance(value, str) and value.strip() == "none"):
         return None
-    numbers_ = _numbers_of(value)
+    numbers_ = numbers_of(value)
     if numbers_ is None or len(numbers_) not in (1, 2) or min(numbers_) <= 0:
         raise DiffractionError(
             f"{where}: expected a width or a pair (width, height) in µm, above 0, or 'none'; "
@@ -122,7 +122,7 @@ def is_auto(value: object) -> bool:
     return value is None or (isinstance(value, str) and value.strip().lower() == "auto")
 
 
-def _numbers_of(value: object) -> tuple[float, ...] | None:
+def numbers_of(value: object) -> tuple[float, ...] | None:
     """Plain floats of a number, a numeric string or a short sequence; `None` if it is neither."""
     parts: list[object]
     if isinstance(value, str):

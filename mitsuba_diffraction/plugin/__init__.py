@@ -20,6 +20,7 @@ series          weights of the terms at a κ
 restricted      a planned table, and its coarse cells beyond
 rgb_power       the same in the RGB variants' colours
 rgb_lookup      a colour table inside a kernel
+places          where on the patch the window sits at a point of the surface
 energy          the bound of the albedo that conserves energy
 reflectance     of the surface itself: dielectric, conductor, mirror
 boundary        what the material makes of the light, with its polarisation

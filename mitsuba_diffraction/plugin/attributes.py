@@ -13,14 +13,18 @@ from .names import name_of
 #: What `meshes.write_ply` calls a field of directions.
 ORIENTATION = "vertex_orientation"
 
+#: Of the plugin's `to_string`, where its windows follow places.
+PLACED = "coherence = surface"
+
 _MADE = "make it with 'mitsuba-diffraction tangents MESH -o FIELD.ply', and use that file"
 _READ = re.compile(r'MeshAttribute\[\s*name = "([^"]+)"')
 
 
 def check_attributes(shape: Any, number: int | None = None) -> None:
-    """Refuse a shape whose BSDF reads a mesh attribute that it lacks.
+    """Refuse a shape whose BSDF reads what it lacks: a mesh attribute, or where on it one is.
 
-    Mitsuba's kernels would go on with zeros, which turn no patch and colour nothing.
+    Mitsuba's kernels would go on with zeros, which turn no patch and colour nothing, and with UV
+    coordinates of each triangle.
 
     Parameters
     ----------
@@ -32,6 +36,11 @@ def check_attributes(shape: Any, number: int | None = None) -> None:
     DiffractionError
         Which names the attribute, and how to get one of directions.
     """
+    if PLACED in str(shape.bsdf()) and shape.is_mesh() and not shape.has_vertex_texcoords():
+        raise DiffractionError(
+            f"{name_of(shape, number)} has no UV coordinates, from which coherence='surface' has "
+            "places on the surface; unwrap it, or use coherence='ensemble'"
+        )
     for name in dict.fromkeys(_READ.findall(str(shape.bsdf()))):
         if np.all(shape.has_attribute(name)):
             continue

@@ -49,7 +49,19 @@ coherence_width : float or string [65]
     4σ of the Gaussian amplitude window, µm: the width over which light is coherent. `auto`, as
     without it: that of the table or the recipe, else 65.
 coherence : string [ensemble]
-    `ensemble`: what a pixel sees that covers many coherence areas; `patch`: one window's speckle.
+    `ensemble`: what a pixel sees that covers many coherence areas; `patch`: one window's speckle,
+    the same everywhere; `surface`: that of the window centred where the light falls, the grain seen
+    from close up, which averages to `ensemble` from afar. It needs UV coordinates and one of the
+    next two, and a spectral or mono variant. Directions and energy are those of `ensemble`.
+uv_scale : float or string [none]
+    µm a unit of the UV coordinates: one number, or "u, v".
+world_scale : float [none]
+    Or µm a unit of length of the scene, 1000 for mm: positions are then as far apart as UV
+    coordinates are on the surface, which must be alike all over it.
+tiling : string [periodic]
+    How the patch covers the surface: `periodic`, side by side; `random`, shifted at random and
+    blended such that mean and contrast stay, so that it does not show again and again (Heitz and
+    Neyret 2018; for rough surfaces: the lines of a grating would be broken).
 basis : string [auto]
     `svd` (also as `auto`), `chebyshev` or `taylor`: the series in κ.
 tolerance : float [0.001]
@@ -178,6 +190,7 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..tables.energy.conservation import DirectionalTable
+from .attributes import PLACED
 from .boundary import Boundary, Kirchhoff
 from .changing import Bounded, arrays_within, marks
 from .coat import CoatedPair
@@ -201,7 +214,7 @@ from .roles import (
     Vector2f,
     Vector3f,
 )
-from .sampling import COSINE, fold
+from .sampling import EVEN, direction_of, with_even_share
 from .sources import TableProvider, from_cache
 
 #: Flatter would be lost in single precision.
@@ -218,7 +231,7 @@ class Diffraction(mi.BSDF):
         super().__init__(props)
         parameters = read_parameters(props, provider)
         self.table = parameters.table
-        self.heights = parameters.heights
+        self.places, self.heights = parameters.places, parameters.heights
         self.fresnel = parameters.reflectance
         self.boundary, self.coat = parameters.boundary, parameters.coat
         self.mirror = Kirchhoff(self.coat) if self.coat is not None else None
@@ -235,12 +248,11 @@ class Diffraction(mi.BSDF):
         self.orientation = parameters.orientation
         self.layering = parameters.layering
         self.vcavity = parameters.vcavity
-        self.power = power_model(self.table, parameters.wavelength)
+        self.power = power_model(self.table, parameters.wavelength, self.places)
+        mean = self.table if self.places is None else self.table.averaged
         # Under a coat, or of light that goes through, nothing is known of the albedo
         self._energy = (
-            EnergyModel(
-                self.table, self.boundary, parameters.wavelength, parameters.energy_conserving
-            )
+            EnergyModel(mean, self.boundary, parameters.wavelength, parameters.energy_conserving)
             if self.coat is None and self.through is None
             else None
         )
@@ -280,8 +292,8 @@ class Diffraction(mi.BSDF):
         above, nested = self._lobes(ctx)
         density = mi.Float(0.0)
         if above:
-            pair = self._pair(si, wo, active)
-            density = self._density(pair, si)
+            pair = self._pair(si, wo, active).outer
+            density = with_even_share(self.power.density(pair, self._drawing_scale, si))
         if nested is not None:
             beneath = self.nested.pdf(nested, si, wo, active)
             density = dr.lerp(beneath, density, self._glossy_share(above, si, active))
@@ -298,8 +310,9 @@ class Diffraction(mi.BSDF):
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         if above:
             pair = self._pair(si, wo, active)
-            density = self._density(pair, si)  # before its neighbours fill the caches
-            power = self.power.power(pair, self.height_scale, si)
+            scales = self.height_scale, self._drawing_scale
+            power, orders = self.power.both(pair, *scales, si)
+            density = with_even_share(orders)
             value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
         if nested is not None:
             beneath = mi.Spectrum(self._beneath(si, wo, active))
@@ -395,6 +408,7 @@ class Diffraction(mi.BSDF):
         )  # fmt: skip
         self._for_freezing = held + marks(
             self.table,
+            str(self.places),
             self.vcavity,
             str(self.layering),
             str(self.boundary),
@@ -456,10 +470,12 @@ class Diffraction(mi.BSDF):
     def to_string(self) -> str:
         """All parameters, for people."""
         nested = "" if self.nested is None else f"  nested = {self.nested},\n"
+        places = "" if self.places is None else f"  {PLACED}, {self.places},\n"
         return (
             "Diffraction[\n"
             f"  table = {self.table},\n"
             f"  coherence_width = {self.table.coherence_width:g} µm,\n"
+            f"{places}"
             f"  tolerance = {self.table.tolerance:g},\n"
             f"  surface = {self.fresnel},\n"
             f"  model = {self.boundary},\n"
@@ -539,12 +555,6 @@ class Diffraction(mi.BSDF):
             )
         return self.layering.beneath(si, wo, active, ratios)
 
-    def _density(self, pair: Pair, si: Interaction) -> Float:
-        """Of drawing a pair: by the orders, and a little by the cosine."""
-        orders = self.power.density(pair.outer, self._drawing_scale, si)
-        cosine = mi.warp.square_to_cosine_hemisphere_pdf(pair.outer.wo)
-        return dr.lerp(orders, cosine, COSINE)
-
     @property
     def _drawing_scale(self) -> Float:
         """What directions are drawn for: under a coat κ is as if heights were larger."""
@@ -575,13 +585,13 @@ class Diffraction(mi.BSDF):
         uv = self.power.draw(
             mi.Frame3f.cos_theta(si.wi),
             dr.detach(self._drawing_scale),
-            dr.maximum((sample1 - COSINE) * (1.0 / (1.0 - COSINE)), 0.0),
+            dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
             sample2,
             si,
         )
         rotation = self.orientation.rotation(si, active)
-        ordered = fold(from_patch(uv, rotation) - mi.Vector2f(si.wi.x, si.wi.y))
-        return dr.select(sample1 < COSINE, mi.warp.square_to_cosine_hemisphere(sample2), ordered)
+        ordered = direction_of(from_patch(uv, rotation) - mi.Vector2f(si.wi.x, si.wi.y))
+        return dr.select(sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), ordered)
 
     def _glossy_share(self, above: bool, si: Interaction, active: Mask) -> Float:
         """Share of the samples for diffraction where something lies beneath: by reflected power."""

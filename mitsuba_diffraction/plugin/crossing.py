@@ -8,8 +8,7 @@ import drjit as dr
 import mitsuba as mi
 
 from .pair import Pair, Place, in_patch
-from .roles import Float, Interaction, Mask, Rotation, Vector2f, Vector3f
-from .sampling import unfolded
+from .roles import Float, Interaction, Mask, Rotation, Vector3f
 
 #: Least |w|: where n cosθt and cosθi are alike ⟨|P|²⟩/w² has a limit, but 0/0 has none.
 _LEAST_W = 1e-3
@@ -28,7 +27,6 @@ class Turned(Pair):
         turned = mi.SurfaceInteraction3f(si)
         turned.wi = si.wi * side
         super().__init__(turned, wo * side, rotation, active)
-        self._n = n
         self.uv, self.w = -n * self.uv, n * self.w
 
     @property
@@ -41,11 +39,6 @@ class Turned(Pair):
         """Whether tables reach so far."""
         return dr.squared_norm(self.uv) < _FARTHEST**2
 
-    @property
-    def folded(self) -> Vector2f:
-        """See `Pair.folded`."""
-        return -self._n * super().folded
-
 
 class Crossing:
     """One direction above and one below the surface, in any order.
@@ -54,7 +47,7 @@ class Crossing:
     ----------
     above, below : directions where they are measured; inside : the one in the dielectric.
     place : of the look-up.
-    uv, folded, cos_i, cos_o : what `PowerModel.density` asks of a pair.
+    uv, w, cos_i, cos_o : what `PowerModel.density` asks of a pair.
     """
 
     def __init__(
@@ -82,11 +75,9 @@ class Crossing:
             dr.maximum(dr.abs(w), _LEAST_W),
         )
         sides = Sides.of(n, thin, down)
-        outgoing = mi.Vector3f(wo.x, wo.y, dr.select(active, dr.abs(wo.z), 1.0))
-        self.cos_i, self.cos_o = sides.cosine(dr.abs(si.wi.z), n, down, thin), outgoing.z
-        came = sides.into * mi.Vector2f(si.wi.x, si.wi.y)
-        self.uv = -in_patch(came + sides.out * mi.Vector2f(wo.x, wo.y), rotation)
-        self.folded = -in_patch(came + sides.out * unfolded(outgoing), rotation)
+        self.cos_i = sides.cosine(dr.abs(si.wi.z), n, down, thin)
+        self.cos_o = dr.select(active, dr.abs(wo.z), 1.0)
+        self.uv, self.w = -in_patch(sides.into * si.wi + sides.out * wo, rotation), self.place.w
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,8 @@ from ..tables.packing import Record
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
 from .memory import index_between, packet_size, read_packets, upload
-from .roles import Float, Index, Mask, Packet
+from .places import Window
+from .roles import Float, Index, Mask, Packet, Rotation
 from .series import inner, series_of
 
 #: Look-ups of more taps run through their rows in a loop instead of one long program.
@@ -59,10 +60,13 @@ class DeviceTable:
         self.series = series_of(table)
         self._looped = not table.grid.trims and table.grid.taps_read > _UNROLLED_TAPS
 
-    def window_sum(self, qx: Float, qy: Float, kappa: Float) -> Float:
+    def window_sum(
+        self, qx: Float, qy: Float, kappa: Float, windows: Sequence[Window] = ()
+    ) -> Float:
         """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`).
 
         qx, qy, kappa : mi.Float, rad/µm. Outside the table the result is NaN, never a guess.
+        windows : where they are; none for that of the table itself.
         """
         grid, expansion = self.grid, self.expansion
         inside = within(qx, qy, self.radii) & (kappa <= expansion.kappa_max * (1 + 1e-6))
@@ -75,7 +79,14 @@ class DeviceTable:
         lobe_x, lobe_y = grid.order_0_exponents
         lobe = dr.exp2(dr.fma(_log2(lobe_x), dr.square(x), _log2(lobe_y) * dr.square(y)))
 
-        if self.record.components == 2 and not grid.coherent:
+        if windows:
+            total = self._over_windows(first, (x, y), weights_x, weight_y, weights, windows)
+            parts = [
+                dr.fma(lobe, c, part * self._inverse_scale)
+                for c, part in zip(centre, total, strict=True)
+            ]
+            result = dr.square(parts[0]) + dr.square(parts[1])
+        elif self.record.components == 2 and not grid.coherent:
             total = self._over_taps(
                 first, weights_x, weight_y, lambda packets: self._squares(packets, weights)
             )[0]
@@ -161,6 +172,63 @@ class DeviceTable:
                 total = [dr.fma(p, weight_y(j), t) for p, t in zip(found, total, strict=True)]
         return total
 
+    def _over_windows(
+        self,
+        first: Index,
+        position: tuple[Float, Float],
+        weights_x: list[Float],
+        weight_y: Weight,
+        weights: list[Float],
+        windows: Sequence[Window],
+    ) -> Rotation:
+        """Σ over windows and taps of amplitudes turned by exp(−i q·x): real, imaginary part.
+
+        position : (x, y) in bins; weights : of the terms.
+        """
+        rows, columns_a_row = self.grid.taps[1], self.grid.shape[1]
+        across = [_along(window.steps[0], weights_x) for window in windows]
+
+        def add_row(
+            start: Index, columns: range, weight: Float, phases: list[Rotation], total: Rotation
+        ) -> Rotation:
+            sums: list[Rotation] = [(mi.Float(0.0), mi.Float(0.0))] * len(windows)
+            for i in columns:
+                parts = self._components(self.read(start + i))
+                value = inner(parts[0], weights), inner(parts[1], weights)
+                sums = [_turned(value, x[i], found) for x, found in zip(across, sums, strict=True)]
+            for found, (cos, sin) in zip(sums, phases, strict=True):
+                total = _turned(found, (cos * weight, sin * weight), total)
+            return total
+
+        def next_row(phases: list[Rotation]) -> list[Rotation]:
+            pairs = zip(phases, windows, strict=True)
+            return [_summed(phase, window.steps[1]) for phase, window in pairs]
+
+        x, y = (_first_bin(p, taps) for p, taps in zip(position, self.grid.taps, strict=True))
+        phases = []
+        for window in windows:
+            turns = dr.fma(x, window.turn.x, y * window.turn.y)
+            sin, cos = dr.sincos((turns - dr.round(turns)) * (2.0 * dr.pi))
+            phases.append((cos * window.weight, sin * window.weight))
+        total = (mi.Float(0.0), mi.Float(0.0))
+        if self._looped:
+            every = range(self.grid.taps[0])
+            state = (mi.UInt32(0), first, phases, total)
+            return dr.while_loop(
+                state,
+                lambda j, index, phases, total: j < rows,
+                lambda j, index, phases, total: (
+                    j + 1,
+                    index + columns_a_row,
+                    next_row(phases),
+                    add_row(index, every, weight_y(mi.Float(j)), phases, total),
+                ),
+            )[3]
+        for j, columns in enumerate(self.grid.tapped()):
+            total = add_row(first + j * columns_a_row, columns, weight_y(j), phases, total)
+            phases = next_row(phases)
+        return total
+
     def _components(self, packets: list[Packet]) -> list[Sequence[Float]]:
         """The terms of each component, from packets that hold one component after the other."""
         return self.record.split([x for packet in packets for x in packet])
@@ -178,8 +246,7 @@ def _taps(
 
     looped : the function is to take variables, too.
     """
-    base = dr.floor(position) if taps % 2 == 0 else dr.floor(position + 0.5)
-    first = base + first_tap(taps)
+    first = _first_bin(position, taps)
     # Frequencies beyond the bins see the zeros at the margin, which is as wide as the taps
     index = mi.UInt32(index_between(first + last, 0.0, 2.0 * last + 1 - taps))
     offset = position - first
@@ -192,6 +259,33 @@ def _taps(
         weights.append(weights[-1] * ratio)
         ratio = ratio * math.exp(-2.0 * exponent)
     return index, weights.__getitem__
+
+
+def _first_bin(position: Float, taps: int) -> Float:
+    """The bin of the first tap."""
+    return dr.floor(position if taps % 2 == 0 else position + 0.5) + first_tap(taps)
+
+
+def _turned(value: Rotation, angle: Rotation, total: Rotation) -> Rotation:
+    """total + value·exp(−i angle), an angle given by (cos, sin), maybe times a weight."""
+    (x, y), (cos, sin) = value, angle
+    return dr.fma(x, cos, dr.fma(y, sin, total[0])), dr.fma(y, cos, dr.fma(-x, sin, total[1]))
+
+
+def _summed(one: Rotation, other: Rotation) -> Rotation:
+    """(cos, sin) of the sum of two angles, times what weights they have."""
+    (x, y), (cos, sin) = one, other
+    return dr.fma(x, cos, -y * sin), dr.fma(x, sin, y * cos)
+
+
+def _along(step: Rotation, weights: list[Float]) -> list[Rotation]:
+    """(cos, sin) of 0, 1, 2 … steps, times weights."""
+    phase: Rotation = (mi.Float(1.0), mi.Float(0.0))
+    found = []
+    for weight in weights:
+        found.append((phase[0] * weight, phase[1] * weight))
+        phase = _summed(phase, step)
+    return found
 
 
 def _log2(exponent: float) -> float:

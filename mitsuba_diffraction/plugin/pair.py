@@ -10,7 +10,6 @@ import mitsuba as mi
 import numpy as np
 
 from .roles import Float, Interaction, Mask, Rotation, Vector2f, Vector3f
-from .sampling import unfolded
 
 SHADOWINGS = ("none", "vcavity")
 
@@ -45,6 +44,11 @@ class Pair:
         return self
 
     @property
+    def rotation(self) -> Rotation:
+        """(cos, sin) of the angle from the first tangent to the patch's x axis."""
+        return self._rotation
+
+    @property
     def cos_half(self) -> Float:
         """Cosine of the angle between either direction and the half vector."""
         return dr.safe_sqrt(0.5 * self.one_plus_dot)
@@ -59,12 +63,6 @@ class Pair:
         """Tangential part of ωo, in the patch's frame."""
         return in_patch(self.wo, self._rotation)
 
-    @cached_property
-    def folded(self) -> Vector2f:
-        """Tangential part of the ωi + ωo beyond the horizon which `fold` makes the same ωo of."""
-        tangential = mi.Vector2f(self.wi.x, self.wi.y) + unfolded(self.wo)
-        return in_patch(tangential, self._rotation)
-
 
 @dataclass(frozen=True)
 class Place:
@@ -72,6 +70,8 @@ class Place:
 
     uv: Vector2f
     w: Float
+    cos_i: Float = 1.0
+    cos_o: Float = 1.0
 
 
 def in_patch(direction: Vector2f | Vector3f, rotation: Rotation) -> Vector2f:

@@ -14,9 +14,9 @@ import numpy as np
 
 from ..errors import DiffractionError
 from ..heights.field import HeightField
-from ..heights.lengths import is_auto
+from ..heights.lengths import is_auto, numbers_of
 from ..heights.read import LoadOptions
-from ..settings import SCENE_SETTINGS, checked
+from ..settings import COHERENCES, SCENE_SETTINGS, SURFACE, checked
 from ..tables.table import DiffractionTable
 from .boundary import MODELS, Boundary, Kirchhoff, SmallSlope
 from .coat import UnderCoat
@@ -24,6 +24,7 @@ from .film import COHERENCE, LEAST_THROUGH, UnderFilm
 from .layers import LAYERINGS, Blend, Layering, Transmission
 from .orientation import Constant, Orientation, Textured
 from .pair import SHADOWINGS
+from .places import TILINGS, Places
 from .reflectance import Conductor, Dielectric, Perfect, Reflectance
 from .roles import BSDF, Properties, Texture
 from .sources import (
@@ -38,12 +39,17 @@ from .through import LEAST_INDEX, Through
 
 SOURCES = ("heightfield", "table", "data")
 READING = tuple(field.name for field in fields(LoadOptions))
+#: Of coherence='surface'.
+PLACING = ("uv_scale", "world_scale", "tiling")
+#: µm: beyond, single precision holds places on the surface to no better than 1 µm.
+MOST_UV_SCALE = 1e7
 #: Of mono variants, nm.
 DEFAULT_WAVELENGTH = 550.0
 NAMES = (
     *SOURCES,
     *READING,
     *SCENE_SETTINGS,
+    *PLACING,
     "material",
     "eta",
     "k",
@@ -73,6 +79,7 @@ class Parameters:
     Attributes
     ----------
     table : the diffraction table.
+    places : where its windows sit, or None for wherever the table has them.
     heights : reads the heights that it was made of.
     reflectance : the surface's own reflectance, that of the faces of coat, film and structure
         together.
@@ -90,6 +97,7 @@ class Parameters:
     """
 
     table: DiffractionTable
+    places: Places | None
     heights: Callable[[], HeightField]
     reflectance: Reflectance | UnderCoat | UnderFilm
     coat: Dielectric | None
@@ -153,6 +161,7 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     boundary = _boundary(props, reflectance, table)
     return Parameters(
         table=table,
+        places=_places(props, table),
         heights=heights,
         reflectance=flat,
         coat=coat,
@@ -180,6 +189,8 @@ def _table(
             f"give exactly one of {', '.join(SOURCES)}; got {' and '.join(given) or 'none'}"
         )
     given_settings = {name: props.get(name) for name in SCENE_SETTINGS if name in props}
+    if _on_surface(props):
+        given_settings["coherence"] = "patch"
     if is_auto(given_settings.get("coherence_width", 0.0)):
         del given_settings["coherence_width"]
     asked = {name: checked(name, value) for name, value in given_settings.items()}
@@ -193,6 +204,40 @@ def _table(
     path = _found(value, given[0])
     table = table_of_file(path, given[0] == "table", options, asked, height_scale, provider)
     return table, lambda: heights_of_file(path, given[0] == "table", options)
+
+
+def _on_surface(props: Properties) -> bool:
+    """Whether the window sits where the light falls; the table is then that of one window."""
+    coherence = _choice(props, "coherence", (*COHERENCES, SURFACE))
+    if coherence != SURFACE:
+        return False
+    if mi.is_rgb:
+        raise DiffractionError(
+            f"coherence='{SURFACE}' needs wavelengths, whose speckle differs, and variant "
+            f"{mi.variant()} has none; use a spectral or a mono variant"
+        )
+    return True
+
+
+def _places(props: Properties, table: DiffractionTable) -> Places | None:
+    """From UV coordinates with a scale to places on the patch."""
+    tiling = _choice(props, "tiling", TILINGS)
+    given = [name for name in PLACING[:2] if name in props]
+    if not _on_surface(props):
+        return None  # a scene for all coherences may give the scale in all
+    if len(given) != 1:
+        raise DiffractionError(
+            f"coherence='{SURFACE}' takes one of uv_scale, µm a unit of UV coordinates, and "
+            f"world_scale, µm a unit of length of the scene; got {' and '.join(given) or 'none'}"
+        )
+    name, value = given[0], props.get(given[0])
+    numbers, most = numbers_of(value) or (), 1 if name == "world_scale" else 2
+    if not (1 <= len(numbers) <= most and all(0.0 < n <= MOST_UV_SCALE for n in numbers)):
+        expected = "one number" if most == 1 else "one number or two, 'u, v',"
+        raise DiffractionError(
+            f"{name}={value!r} must be {expected} of µm, above 0 and at most {MOST_UV_SCALE:g}"
+        )
+    return Places((numbers[0], numbers[-1]), name == "world_scale", tiling, table)
 
 
 def _found(name: str, parameter: str) -> Path:
@@ -267,6 +312,7 @@ def _passing(props: Properties, material: Reflectance) -> Dielectric | None:
         *(f"{one}_ior" for one in ("coat", "film") if f"{one}_ior" in props),
         *("a nested BSDF" for _, value in props.objects() if isinstance(value, mi.BSDF)),
         *(f"{one}={props.get(one)}" for one in ("layering", "shadowing") if one in props),
+        *("coherence=surface" for one in ("coherence",) if props.get(one, "") == "surface"),
     ]
     if excluded:
         raise DiffractionError(f"{name}=true and {excluded[0]} exclude each other; leave one out")

@@ -6,7 +6,7 @@ variants with wavelengths, `rgb_power` that of variants with colours.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import drjit as dr
@@ -15,10 +15,11 @@ import mitsuba as mi
 from ..tables.table import DiffractionTable
 from .crossing import Crossing
 from .pair import Pair, Place
+from .places import Places, Window
 from .restricted import device_table
 from .rgb_power import rgb_power
-from .roles import Colour, Float, Interaction, Vector2f
-from .sampling import folded_cosine, order_sampler
+from .roles import Colour, Float, Index, Interaction, Vector2f
+from .sampling import order_sampler
 
 
 class PowerModel(Protocol):
@@ -28,7 +29,12 @@ class PowerModel(Protocol):
         """⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm², per channel."""
 
     def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
-        """Density per solid angle of drawing ωo: by `draw`, then `sampling.fold`."""
+        """Density per solid angle of drawing ωo: by `draw`."""
+
+    def both(
+        self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
+    ) -> tuple[Colour, Float]:
+        """`power` at one height scale, and `density` outside of a coat at the other."""
 
     def wavenumbers(self, si: Interaction) -> list[Float]:
         """2π/λ of each channel, rad/µm."""
@@ -49,43 +55,61 @@ class SpectralPower:
     ----------
     table : the diffraction table.
     wavelength : nm, for mono variants.
+    places : where windows sit; None for the table's own.
 
     Attributes
     ----------
     device : the table in the variant's memory.
     """
 
-    def __init__(self, table: DiffractionTable, wavelength: float) -> None:
-        self.device = device_table(table)
-        self._sampler = order_sampler(table)
+    def __init__(
+        self, table: DiffractionTable, wavelength: float, places: Places | None = None
+    ) -> None:
+        self.device, self._places = device_table(table), places
+        self._sampler = order_sampler(table if places is None else table.averaged)
         self._sigma = table.sigma
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
     def power(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
         """See `PowerModel.power`."""
-        scaled_w = pair.w * height_scale
-
-        def of_wavelength(k: Float) -> Float:
-            found = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w)
-            return found * dr.square(k * (0.5 / dr.pi))
-
-        differentiable = dr.grad_enabled(pair.uv, scaled_w)
-        return mi.UnpolarizedSpectrum(self._each(of_wavelength, si, differentiable))
+        functions = [self._power(pair, height_scale, si)]
+        return mi.UnpolarizedSpectrum(self._each(functions, si, pair, height_scale)[0])
 
     def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
         """See `PowerModel.density`; the mean of all wavelengths'."""
-        folded, cos_folded = pair.folded, folded_cosine(pair.cos_o)  # the same at all
+        functions = [self._density(pair, height_scale)]
+        return _mean(self._each(functions, si, pair, height_scale)[0])
+
+    def both(
+        self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
+    ) -> tuple[Colour, Float]:
+        """See `PowerModel.both`; the density first, before its neighbours fill the caches."""
+        functions = [self._density(pair.outer, drawing_scale), self._power(pair, height_scale, si)]
+        densities, powers = self._each(functions, si, pair, height_scale)
+        return mi.UnpolarizedSpectrum(powers), _mean(densities)
+
+    def _power(
+        self, pair: Pair | Place, height_scale: Float, si: Interaction
+    ) -> Callable[[Float], Float]:
+        scaled_w = pair.w * height_scale
+        if self._places is None or not isinstance(pair, Pair):
+            windows: Sequence[Window] = ()
+        else:
+            windows = self._places.at(si, pair.rotation)
 
         def of_wavelength(k: Float) -> Float:
-            strategy = self._sampler.strategy(k, pair.cos_i, dr.detach(height_scale))
-            direct = self._sampler.density(k * pair.uv, *strategy)
-            beyond = self._sampler.density(k * folded, *strategy, cos_folded > 0.0)
-            return dr.fma(direct, pair.cos_o, cos_folded * beyond) * dr.square(k)
+            found = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w, windows)
+            return found * dr.square(k * (0.5 / dr.pi))
 
-        differentiable = dr.grad_enabled(pair.uv, pair.cos_i, pair.cos_o)
-        found = self._each(of_wavelength, si, differentiable)
-        return sum(found[1:], found[0]) * (1.0 / len(found))
+        return of_wavelength
+
+    def _density(self, pair: Pair | Crossing, height_scale: Float) -> Callable[[Float], Float]:
+        def of_wavelength(k: Float) -> Float:
+            strategy = self._sampler.strategy(k, pair.cos_i, dr.detach(height_scale))
+            return self._sampler.density(k * pair.uv, *strategy) * pair.cos_o * dr.square(k)
+
+        return of_wavelength
 
     def draw(
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
@@ -119,27 +143,43 @@ class SpectralPower:
         return [si.wavelengths[n] for n in range(len(si.wavelengths))]
 
     def _each(
-        self, function: Callable[[Float], Float], si: Interaction, differentiable: bool
-    ) -> list[Float]:
-        """function(k) for each wavelength.
+        self,
+        functions: Sequence[Callable[[Float], Float]],
+        si: Interaction,
+        pair: Pair | Place | Crossing,
+        scale: Float,
+    ) -> list[list[Float]]:
+        """Each function(k) for each wavelength.
 
         In a loop, which makes a smaller and faster kernel. Derivatives do not flow through loops
         without further ado, so then it is unrolled; so it is where there is no kernel.
         """
         wavenumbers = self.wavenumbers(si)
         count = len(wavenumbers)
+        differentiable = dr.grad_enabled(pair.uv, pair.w, pair.cos_i, pair.cos_o, scale)
         if differentiable or count == 1 or not dr.is_jit_v(mi.Float):
-            return [function(k) for k in wavenumbers]
+            return [[function(k) for k in wavenumbers] for function in functions]
 
         def body(
-            n: Float, inputs: list[Float], found: list[Float]
-        ) -> tuple[Float, list[Float], list[Float]]:
-            return n + 1, [*inputs[1:], inputs[0]], [*found[1:], function(inputs[0])]
+            n: Index, inputs: list[Float], found: list[list[Float]]
+        ) -> tuple[Index, list[Float], list[list[Float]]]:
+            added = [
+                [*of_one[1:], function(inputs[0])]
+                for of_one, function in zip(found, functions, strict=True)
+            ]
+            return n + 1, [*inputs[1:], inputs[0]], added
 
-        state = (mi.UInt32(0), wavenumbers, [mi.Float(0.0) for _ in wavenumbers])
-        return list(dr.while_loop(state, lambda n, *_: n < count, body)[2])
+        nothing = [[mi.Float(0.0) for _ in wavenumbers] for _ in functions]
+        state = (mi.UInt32(0), wavenumbers, nothing)
+        return [list(one) for one in dr.while_loop(state, lambda n, *_: n < count, body)[2]]
 
 
-def power_model(table: DiffractionTable, wavelength: float) -> PowerModel:
-    """That of the current variant."""
-    return rgb_power(table) if mi.is_rgb else SpectralPower(table, wavelength)
+def _mean(values: list[Float]) -> Float:
+    return sum(values[1:], values[0]) * (1.0 / len(values))
+
+
+def power_model(
+    table: DiffractionTable, wavelength: float, places: Places | None = None
+) -> PowerModel:
+    """That of the current variant; places, which RGB variants do not know, as `SpectralPower`."""
+    return rgb_power(table) if mi.is_rgb else SpectralPower(table, wavelength, places)

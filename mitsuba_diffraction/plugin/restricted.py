@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import weakref
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import drjit as dr
@@ -12,6 +13,7 @@ import numpy as np
 
 from ..tables.table import DiffractionTable
 from .lookup import DeviceTable, within
+from .places import Window
 from .roles import Float, Index
 
 _uploaded: weakref.WeakKeyDictionary[DiffractionTable, dict[str, DeviceTable | RestrictedTable]] = (
@@ -54,13 +56,15 @@ class RestrictedTable:
         self._deepest: Float = mi.Float(0.0)
         self.take()
 
-    def window_sum(self, qx: Float, qy: Float, kappa: Float) -> Float:
-        """See `DeviceTable.window_sum`."""
+    def window_sum(
+        self, qx: Float, qy: Float, kappa: Float, windows: Sequence[Window] = ()
+    ) -> Float:
+        """See `DeviceTable.window_sum`; coarse cells are the mean over all windows."""
         square = dr.square(qx) + dr.square(qy)
         inside = within(qx, qy, self._radii) & (kappa <= self._kappa_max)
         if not self._jit:
             if inside:
-                return self.fine.window_sum(qx, qy, kappa)
+                return self.fine.window_sum(qx, qy, kappa, windows)
             self._count += 1
             self._farthest = max(self._farthest, square)
             self._deepest = max(self._deepest, kappa)
@@ -82,7 +86,7 @@ class RestrictedTable:
 
         # Rare, so branched to: a kernel skips what none of its lanes needs
         return dr.if_stmt(
-            (qx, qy, kappa, self.fine.window_sum(qx, qy, kappa)),
+            (qx, qy, kappa, self.fine.window_sum(qx, qy, kappa, windows)),
             outside,
             beyond,
             lambda qx, qy, kappa, result: result,

@@ -23,7 +23,7 @@ from .memory import index_between, read, upload
 from .pair import Pair, Place
 from .rgb_lookup import ColourLookup
 from .roles import Buffer, Colour, Float, Index, Interaction, Vector2f
-from .sampling import BELOW_ONE, folded_cosine, invert, order_0_share
+from .sampling import BELOW_ONE, invert, order_0_share
 
 _models: weakref.WeakKeyDictionary[DiffractionTable, dict[str, RGBPower]] = (
     weakref.WeakKeyDictionary()
@@ -56,8 +56,14 @@ class RGBPower:
     def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
         """See `PowerModel.density`."""
         strategy = self._strategy(pair.cos_i, dr.detach(height_scale))
-        direct, beyond = (self._density(uv, *strategy) for uv in (pair.uv, pair.folded))
-        return dr.fma(direct, pair.cos_o, folded_cosine(pair.cos_o) * beyond)
+        return self._density(pair.uv, *strategy) * pair.cos_o
+
+    def both(
+        self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
+    ) -> tuple[Colour, Float]:
+        """See `PowerModel.both`."""
+        density = self.density(pair.outer, drawing_scale, si)
+        return self.power(pair, height_scale, si), density
 
     def wavenumbers(self, si: Interaction) -> list[Float]:
         """See `PowerModel.wavenumbers`; of the wavelength that is a channel's mean."""

@@ -5,12 +5,11 @@ For one wavelength the density of ωo per solid angle is
     [p₀ (σ²/π) exp(−σ²|q|²) + (1 − p₀) P(cell of q) / area] · k² cosθo,   q = k (ωi + ωo)_xy,
 
 with p₀ the power of order 0 towards the mirror direction and P as in `tables.proposals`. Dispersion
-is dealt with by drawing for one wavelength and using the mean of all wavelengths' densities. A
-little of the cosine density bounds the weights where the tables promise no light.
-
-Near the horizon that density vanishes with cosθo while the raw BRDF times cosθo does not, so that
-weights would have no bound. Meanwhile frequencies just beyond the horizon belong to no direction.
-`fold` turns these into directions near the horizon, with `folded_cosine` instead of cosθo.
+is dealt with by drawing for one wavelength and using the mean of all wavelengths' densities.
+Frequencies beyond the horizon belong to no direction: samples that fall there carry nothing. A
+little of an even density over the hemisphere bounds the weights where the tables promise no light,
+and near the horizon, where that density vanishes with cosθo and Kirchhoff's BRDF times cosθo does
+not.
 """
 
 from __future__ import annotations
@@ -25,12 +24,10 @@ import numpy as np
 from ..tables.sampling.proposals import BANDED, SHIFT, proposals
 from ..tables.table import DiffractionTable
 from .memory import float_of_bits, index_between, read, upload
-from .roles import Buffer, Float, Index, Mask, Vector2f, Vector3f
+from .roles import Buffer, Float, Index, Vector2f, Vector3f
 
-#: Share of the samples drawn from the cosine density.
-COSINE = 0.03
-#: Cosine up to which directions are near the horizon: few, as they need a second look-up.
-HORIZON = 0.4
+#: Share of the samples drawn evenly over the hemisphere.
+EVEN = 0.03
 #: Bounds of order 0's share: neither part may starve the other.
 LEAST_SHARE = 0.02
 
@@ -86,26 +83,26 @@ class OrderSampler:
         unit = read(mi.Float, self._units, band)
         return dr.select(unit > 0.0, share, 1.0), band, unit
 
-    def density(
-        self, q: Vector2f, share: Float, band: Index, unit: Float, active: Mask = True
-    ) -> Float:
-        """Density of drawing the frequency q, per (rad/µm)²; 0 where it is not active."""
+    def density(self, q: Vector2f, share: Float, band: Index, unit: Float) -> Float:
+        """Density of drawing the frequency q, per (rad/µm)²."""
         variance = self._sigma**2
-        glossy = dr.exp2(dr.squared_norm(q) * (-variance / np.log(2.0))) * (variance / dr.pi)
+        glossy = dr.exp2(dr.squared_norm(q) * (-variance / math.log(2.0))) * (variance / dr.pi)
         x, y = (
             dr.fma(part, 1.0 / cell, -origin / cell)
             for part, cell, origin in zip(q, self._cell, self._origin, strict=True)
         )
-        inside = (x >= 0.0) & (y >= 0.0) & (x < self._columns) & (y < self._rows) & active
+        inside = (x >= 0.0) & (y >= 0.0) & (x < self._columns) & (y < self._rows)
         column, row = mi.UInt32(dr.select(inside, x, 0.0)), mi.UInt32(dr.select(inside, y, 0.0))
         index = (band * self._rows + row) * self._words + column // 4
         level = (read(mi.UInt32, self._levels, index, inside) >> (8 * (column & 3))) & 255
         cell = unit * float_of_bits(level << SHIFT)
-        for position, number, n in ((x, column, 0), (y, row, 1)):
-            if self._lobes[n]:
-                distance = (position - mi.Float(number) - 0.5) * self._cell[n]
-                cell *= dr.exp(-variance * dr.square(distance))
-        return dr.select(active, dr.lerp(cell, glossy, share), 0.0)
+        if any(self._lobes):
+            apart = mi.Float(0.0)
+            for position, number, n in ((x, column, 0), (y, row, 1)):
+                if self._lobes[n]:
+                    apart += dr.square((position - mi.Float(number) - 0.5) * self._cell[n])
+            cell *= dr.exp2(apart * (-variance / math.log(2.0)))
+        return dr.lerp(cell, glossy, share)
 
     def draw(
         self, k: Float, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f
@@ -141,39 +138,16 @@ def order_0_share(power: Float, cos_i: Float) -> Float:
     return dr.clip(share, LEAST_SHARE, 1.0 - LEAST_SHARE)
 
 
-def fold(tangential: Vector2f) -> Vector3f:
-    """A unit vector from its tangential part; one from beyond the horizon is laid near it.
-
-    Beyond the horizon, ρ² = |tangential|² > 1, the direction has the same azimuth and
-    cosθ = h (1 − √(2 − ρ²)), h = `HORIZON`, so that their density fades to 0 at h. From ρ² = 2 on
-    there is none: z is −1.
-    """
+def direction_of(tangential: Vector2f) -> Vector3f:
+    """A unit vector from its tangential part; from beyond the horizon there is none: z is −1."""
     squared = dr.squared_norm(tangential)
-    beyond = squared > 1.0
-    cos = dr.select(
-        beyond, HORIZON * (1.0 - dr.safe_sqrt(2.0 - squared)), dr.safe_sqrt(1.0 - squared)
-    )
-    scale = dr.select(beyond, dr.safe_sqrt(1.0 - dr.square(cos)) * dr.rsqrt(squared), 1.0)
-    return mi.Vector3f(
-        tangential.x * scale, tangential.y * scale, dr.select(squared < 2.0, cos, -1.0)
-    )
+    cos = dr.select(squared <= 1.0, dr.safe_sqrt(1.0 - squared), -1.0)
+    return mi.Vector3f(tangential.x, tangential.y, cos)
 
 
-def unfolded(direction: Vector3f) -> Vector2f:
-    """The tangential part beyond the horizon that `fold` makes this direction of, if near it."""
-    sin_squared = dr.maximum(1.0 - dr.square(direction.z), _SMALLEST)
-    scale = dr.safe_sqrt((2.0 - dr.square(_before(direction.z))) * dr.rcp(sin_squared))
-    return mi.Vector2f(direction.x * scale, direction.y * scale)
-
-
-def folded_cosine(cosine: Float) -> Float:
-    """dω = ρ dρ dφ over this, of a direction that `fold` made: √(2 − ρ²) / h."""
-    return _before(cosine) * (1.0 / HORIZON)
-
-
-def _before(cosine: Float) -> Float:
-    """√(2 − ρ²) of what `fold` makes a direction of, 0 where it makes none."""
-    return dr.maximum(dr.fma(cosine, -1.0 / HORIZON, 1.0), 0.0)
+def with_even_share(density: Float) -> Float:
+    """The density of drawing a direction by the orders, and a little evenly."""
+    return dr.lerp(density, dr.inv_two_pi, EVEN)
 
 
 def invert(

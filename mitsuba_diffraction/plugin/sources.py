@@ -211,7 +211,8 @@ def _check_agreement(
         if value != own[name] and not (name == "basis" and value == "auto"):
             raise DiffractionError(
                 f"{name}={value} contradicts the table '{path}', which has {name}={own[name]}; "
-                f"{_remedy(name)}, or build another table with 'mitsuba-diffraction precompute'"
+                f"{_remedy(name)}, or build another table with 'mitsuba-diffraction precompute "
+                f"--{name.replace('_', '-')} {value}'"
             )
     for name, value in options.given().items():
         raise DiffractionError(

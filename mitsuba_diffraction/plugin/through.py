@@ -32,7 +32,7 @@ from .roles import (
     Vector2f,
     Vector3f,
 )
-from .sampling import COSINE, fold
+from .sampling import EVEN, direction_of, with_even_share
 
 if TYPE_CHECKING:
     from .bsdf import Diffraction
@@ -91,7 +91,7 @@ class Through:
             value = dr.select(lit, found, value)
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
             orders = bsdf.power.density(crossing, bsdf.height_scale, si) * dr.square(out)
-            density = dr.select(lit, (1.0 - share) * _mixed(orders, crossing.cos_o), density)
+            density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
         return value, density
 
     def sample(
@@ -122,14 +122,14 @@ class Through:
         drawn = bsdf.power.draw(
             dr.select(reflected, cosine, sides.cosine(cosine, n, down, self.thin)),
             dr.detach(bsdf.height_scale * dr.select(reflected & (cos_i < 0.0), n, 1.0)),
-            dr.maximum((sample1 - COSINE) * (1.0 / (1.0 - COSINE)), 0.0),
+            dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
             sample2,
             si,
         )
         rotation = bsdf.orientation.rotation(si, active)
         total = sign * from_patch(drawn, rotation) - into * mi.Vector2f(si.wi.x, si.wi.y)
         wo = dr.select(
-            sample1 < COSINE, mi.warp.square_to_cosine_hemisphere(sample2), fold(total / out)
+            sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), direction_of(total / out)
         )
         active &= wo.z > 0.0
         wo.z = dr.select(reflected == down, wo.z, -wo.z)
@@ -162,20 +162,20 @@ class Through:
             if self.thin:
                 value += self._returned(bsdf, si, pair)
             density = bsdf.power.density(pair, scale, si)
-            return value, _mixed(density, pair.cos_o)
+            return value, with_even_share(density)
         if self.thin:
             outer = Turned(si, wo, rotation, lit, mi.Float(1.0))
             pair = CoatedPair(outer, n)
             value = bsdf.lobe(ctx, si, pair, self.below, lit)
             value += bsdf.face(ctx, si, outer, self.mirror, lit)
             density = bsdf.power.density(outer, scale * n, si)
-            return value, _mixed(density, outer.cos_o)
+            return value, with_even_share(density)
         inner = Turned(si, wo, rotation, lit, n)
         lit &= inner.reached
         power = bsdf.power.power(inner.place, scale, si)
         value = bsdf.lobe(ctx, si, inner, self.below, lit, power) * dr.square(n)
         density = bsdf.power.density(inner, scale * n, si) * dr.square(n)
-        return value, _mixed(density, inner.cos_o)
+        return value, with_even_share(density)
 
     def _returned(self, bsdf: Diffraction, si: Interaction, pair: Pair) -> Spectrum:
         """f·cosθo of what the flat side of a sheet sends back through the structure."""
@@ -258,11 +258,6 @@ def _asked(ctx: Context) -> tuple[bool, bool]:
         ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0),
         ctx.is_enabled(mi.BSDFFlags.GlossyTransmission, 1),
     )
-
-
-def _mixed(orders: Float, cosine: Float) -> Float:
-    """Density by the orders, and a little by the cosine."""
-    return dr.lerp(orders, cosine * (1.0 / dr.pi), COSINE)
 
 
 def _axes(came: Vector3f, left: Vector3f) -> tuple[Vector3f, Vector3f]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..errors import DiffractionError
 from ..optics.geometry import diffraction_coordinates, kirchhoff_factor, wavenumber
 from .table import DiffractionTable
 from .window import taps_at
@@ -18,7 +20,11 @@ _CHUNK = 1 << 14  # look-ups at a time: (chunk × terms) floats stay in cache
 
 
 def window_sum(
-    table: DiffractionTable, qx: ArrayLike, qy: ArrayLike, kappa: ArrayLike
+    table: DiffractionTable,
+    qx: ArrayLike,
+    qy: ArrayLike,
+    kappa: ArrayLike,
+    place: ArrayLike | None = None,
 ) -> NDArray[np.float64]:
     """Σ_j |a_j|² exp(−σ²|q − q_j|²), or |Σ_j a_j exp(−σ²|q − q_j|²/2) exp(−i q_j·x₀)|² for `patch`.
 
@@ -28,17 +34,27 @@ def window_sum(
     ----------
     qx, qy : spatial frequencies k·u and k·v, rad/µm, any common shape.
     kappa : k·w·height_scale, rad/µm.
+    place : (..., 2), centre x₀ of the window in µm from the patch's first pixel, for a table of
+        `patch`, whose own is the patch's centre.
 
     Returns
     -------
     Array of that shape; NaN where the table holds nothing (beyond κ_max, or beyond the reach of
     its shortest wavelength): a table never extrapolates. One of a restricted domain has its coarse
     part there.
+
+    Raises
+    ------
+    DiffractionError
+        For a place in a table that holds no amplitudes of `patch`.
     """
-    qx, qy, kappa = np.broadcast_arrays(
-        np.asarray(qx, float), np.asarray(qy, float), np.asarray(kappa, float)
-    )
-    flat = [np.ravel(a) for a in (qx, qy, kappa)]
+    given = [qx, qy, kappa]
+    if place is not None:
+        if not table.grid.coherent:
+            raise DiffractionError("a window can only be moved in a table with coherence='patch'")
+        given += [np.asarray(place, float)[..., axis] for axis in (0, 1)]
+    qx, *rest = np.broadcast_arrays(*(np.asarray(a, float) for a in given))
+    flat = [np.ravel(a) for a in (qx, *rest)]
     result = np.empty(flat[0].size)
     for start in range(0, result.size, _CHUNK):
         part = slice(start, start + _CHUNK)
@@ -53,13 +69,18 @@ def brdf(
     wavelength: ArrayLike,
     *,
     height_scale: float = 1.0,
+    place: ArrayLike | None = None,
 ) -> NDArray[np.float64]:
-    """The BRDF for R = 1 from the table, 1/sr: the twin of `reference.brdf`, same shapes."""
+    """The BRDF for R = 1 from the table, 1/sr: the twin of `reference.brdf`, same shapes.
+
+    place : see `window_sum`.
+    """
     k = wavenumber(wavelength)
     u, v, w = diffraction_coordinates(wi, wo)
     above = (np.asarray(wi)[..., 2] > 0) & (np.asarray(wo)[..., 2] > 0)
     u, v, w = (np.where(above, c, 0.0) for c in (u, v, w))
-    power = 4 * np.pi**2 * table.sigma**4 * window_sum(table, k * u, k * v, k * w * height_scale)
+    power = window_sum(table, k * u, k * v, k * w * height_scale, place)
+    power *= 4 * np.pi**2 * table.sigma**4
     return kirchhoff_factor(wi, wo, wavelength, table.sigma) * power
 
 
@@ -68,10 +89,11 @@ def _window_sum(
     qx: NDArray[np.float64],
     qy: NDArray[np.float64],
     kappa: NDArray[np.float64],
+    *place: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     grid = table.grid
     kernels = (_gaussian(grid.exponents[0]), _gaussian(grid.exponents[1]))
-    summed = weighted_sum(table, qx, qy, kappa, kernels, grid.taps)
+    summed = weighted_sum(table, qx, qy, kappa, kernels, grid.taps, place)
     result = np.sum(summed**2, axis=1) if grid.coherent else np.maximum(summed[:, 0], 0.0)
     outside = ~table.covers(qx, qy, kappa)
     if table.coarse is None:
@@ -88,6 +110,7 @@ def weighted_sum(
     kappa: NDArray[np.float64],
     kernels: tuple[Kernel, Kernel],
     taps: tuple[int, int],
+    place: Sequence[NDArray[np.float64]] = (),
 ) -> NDArray[np.float64]:
     """Σ_j of the series at κ times kernel_x(x − j_x)·kernel_y(y − j_y), with x = qx/dqx in bins.
 
@@ -99,6 +122,7 @@ def weighted_sum(
     qx, qy, kappa : (n,), rad/µm, within what the table covers.
     kernels : weight of a bin by its distance in bins, along x and y.
     taps : bins to read along x and y; at most as many as the table was built for.
+    place : (x, y) of the window's centre in µm, each (n,), of a table of `patch`.
 
     Returns
     -------
@@ -112,24 +136,39 @@ def weighted_sum(
     x, y = qx / table.spacing[0], qy / table.spacing[1]
     column, distance_x = taps_at(x, grid.last[0], taps[0])
     row, distance_y = taps_at(y, grid.last[1], taps[1])
-    weight_x, weight_y = kernels[0](distance_x), kernels[1](distance_y)
-    incoherent_amplitudes = expansion.kind == "amplitude" and not grid.coherent
+    weight_x: NDArray[Any] = kernels[0](distance_x)
+    weight_y: NDArray[Any] = kernels[1](distance_y)
+    if place:  # what the table's phases, of a window on the patch's centre, are turned by
+        weight_x = weight_x * _phases(column, taps[0], grid.last[0], place[0], table.spacing[0])
+        weight_y = weight_y * _phases(row, taps[1], grid.last[1], place[1], table.spacing[1])
 
-    def squared(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.sum(values**2, axis=1, keepdims=True) if incoherent_amplitudes else values
+    def bin_value(values: NDArray[np.float64]) -> NDArray[Any]:
+        if grid.coherent:
+            return values[:, :1] + 1j * values[:, 1:]
+        if expansion.kind == "amplitude":
+            return np.sum(values**2, axis=1, keepdims=True)
+        return values
 
     if grid.order_0_steps is not None:
         lobe = [_gaussian(exponent) for exponent in grid.order_0_exponents]
     else:
         lobe = list(kernels)
-    total = squared(table.order_0_at(kappa)) * (lobe[0](x) * lobe[1](y))[:, None]
+    total = bin_value(table.order_0_at(kappa)) * (lobe[0](x) * lobe[1](y))[:, None]
     trims = grid.trims if taps == grid.taps and grid.trims else (0,) * taps[1]
     for j, trim in enumerate(trims):
         for i in range(trim, taps[0] - trim):
             packet = table.coefficients[interval, row + j, column + i].astype(float)
-            value = squared(np.einsum("npt,nt->np", packet, scaled))
+            value = bin_value(np.einsum("npt,nt->np", packet, scaled))
             total += (weight_x[:, i] * weight_y[:, j])[:, None] * value
-    return total
+    return np.concatenate([total.real, total.imag], axis=1) if grid.coherent else total
+
+
+def _phases(
+    first: NDArray[np.int64], taps: int, last: int, place: NDArray[np.float64], spacing: float
+) -> NDArray[np.complex128]:
+    """exp(−i q_j (x₀ − L/2)) of the taps (n, taps) along an axis, L = 2π/spacing."""
+    bins = first[:, None] + np.arange(taps) - last
+    return np.exp(-1j * bins * (place * spacing - np.pi)[:, None])
 
 
 def _gaussian(exponent: float) -> Kernel:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -111,6 +111,16 @@ class DiffractionTable:
     def q_max(self) -> tuple[float, float]:
         """Half axes (x, y) of the ellipse in which the table has the orders, rad/µm."""
         return self.settings.q_max or (self.q_limit, self.q_limit)
+
+    @cached_property
+    def averaged(self) -> DiffractionTable:
+        """The mean over all windows on the patch: of `patch` the same amplitudes, whose powers are
+        added; of `ensemble` itself.
+        """
+        if not self.grid.coherent:
+            return self
+        settings = replace(self.settings, coherence="ensemble")
+        return replace(self, grid=replace(self.grid, coherent=False), settings=settings)
 
     @property
     def parts(self) -> tuple[DiffractionTable, ...]:

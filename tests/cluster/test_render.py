@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import drjit as dr
@@ -20,17 +23,11 @@ from mitsuba_diffraction.cluster.kept import Kept  # noqa: E402
 from mitsuba_diffraction.cluster.tasks import Lacking, run_task  # noqa: E402
 from mitsuba_diffraction.scene import passes  # noqa: E402
 from mitsuba_diffraction.scene.load import load_scene, set_variant  # noqa: E402
-from tests.cli.conftest import run  # noqa: E402, F401
+from tests.cli.conftest import ROOT, run  # noqa: E402, F401
 from tests.cli.room import SCENE, pixels  # noqa: E402
 
 VARIANT = "llvm_ad_rgb"
 SPP = 24
-
-
-@pytest.fixture(scope="module")
-def client():
-    with cluster.connect(2) as found:
-        yield found
 
 
 @pytest.fixture(autouse=True)
@@ -122,6 +119,61 @@ def test_a_client_that_was_stopped_goes_on(client, scene, expected, tmp_path):
     np.testing.assert_array_equal(np.array(result.bitmap), expected)
     again.forget(0)
     assert not keep.exists()
+
+
+@pytest.fixture
+def start():
+    """`start(command, *arguments)`: a scheduler or worker as a user starts it, of its own."""
+    running = []
+
+    def call(command, *arguments):
+        path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+        running.append(
+            subprocess.Popen(
+                [sys.executable, "-m", f"distributed.cli.dask_{command}", *arguments],
+                env={**os.environ, "PYTHONPATH": path}, stderr=subprocess.DEVNULL,
+            )
+        )  # fmt: skip
+        return running[-1]
+
+    yield call
+    for process in running:
+        process.kill()
+        process.wait()
+
+
+def test_a_scheduler_that_is_killed_and_started_again_changes_nothing(
+    scene, expected, start, tmp_path
+):
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    address = f"tcp://127.0.0.1:{port}"
+
+    def start_all():
+        scheduler = start("scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard")
+        worker = start("worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard")
+        return scheduler, worker
+
+    first = start_all()
+    killed = []
+
+    def disturb(done, total, text):
+        if done >= 4 and not killed:
+            for process in first:
+                process.kill()
+                process.wait()
+            killed.extend((tmp_path / "passes").iterdir())
+            start_all()
+
+    with cluster.connect(scheduler=address, patience=60) as mine:
+        job = film(mine, scene, [Wanted({}, SPP, 3)], tmp_path / "passes")
+        (result,) = job.render(passes.Stop(), disturb)
+    np.testing.assert_array_equal(np.array(result.bitmap), expected)
+    assert len(killed) >= 4
+    assert job.report.tasks == 12  # none of those that were kept a second time
+    assert job.report.retries > 0
+    assert job.report.lost == 1
 
 
 def test_files_that_a_worker_lacks_come_by_content(client, scene, expected, monkeypatch):

@@ -5,9 +5,13 @@ from __future__ import annotations
 import mitsuba as mi
 import pytest
 
-from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction import DiffractionError, bsdf_dict
 from mitsuba_diffraction.plugin.attributes import check_attributes
 from mitsuba_diffraction.realtime.glsl.scene import read_scene
+from tests.directions import rough_patch
+
+PATCH = rough_patch((30, 32), (0.08, 0.08), 0.03)
+ON_SURFACE = {"coherence": "surface", "uv_scale": 10.0, "coherence_width": 2.4}
 
 pytestmark = pytest.mark.usefixtures("variant")
 
@@ -40,8 +44,22 @@ def test_one_that_is_there_is_read():
     check_attributes(mesh)
 
 
+def test_places_need_uv_coordinates():
+    mesh = plate("vertex_color")
+    mesh.set_bsdf(mi.load_dict(bsdf_dict(PATCH, **ON_SURFACE)))
+    with pytest.raises(DiffractionError, match="no UV coordinates, from which coherence='surface'"):
+        check_attributes(mesh)
+
+
 def test_the_realtime_renderer_asks_as_well():
     sensor = {"type": "perspective", "film": {"type": "hdrfilm"}}
     scene = mi.load_dict({"type": "scene", "plate": plate("vertex_orientation"), "s": sensor})
     with pytest.raises(DiffractionError, match="no attribute vertex_orientation"):
         read_scene(scene)
+
+
+def test_the_realtime_renderer_refuses_places():
+    sensor = {"type": "perspective", "film": {"type": "hdrfilm"}}
+    disk = {"type": "disk", "bsdf": bsdf_dict(PATCH, **ON_SURFACE)}
+    with pytest.raises(DiffractionError, match=r"coherence='surface' of .* path tracer"):
+        read_scene(mi.load_dict({"type": "scene", "disk": disk, "s": sensor}))

@@ -8,6 +8,7 @@ import pytest
 import mitsuba_diffraction as md  # before Mitsuba: it chooses Dr.Jit's LLVM
 from mitsuba_diffraction.optics.geometry import wavenumber
 from tests.directions import polar
+from tests.lanes import lanes
 
 import mitsuba as mi  # isort: skip
 import drjit as dr  # isort: skip
@@ -264,9 +265,7 @@ def test_kernels_twin_agrees_with_numpy():
     rng = np.random.default_rng(0)
     z, azimuth = rng.uniform(0.02, 1.0, 500), rng.uniform(-np.pi, np.pi, 500)
     sine = np.sqrt(1.0 - z**2)
-    x, y, cosine = (
-        mi.Float(c.astype(np.float32)) for c in (sine * np.cos(azimuth), sine * np.sin(azimuth), z)
-    )
+    x, y, cosine = (lanes(c) for c in (sine * np.cos(azimuth), sine * np.sin(azimuth), z))
     for wavelength in (360.0, 512.0, 830.0):
         k = mi.Float(float(wavenumber(wavelength)))
         ours = model._scale.at(mi.Vector2f(x, y), cosine, [k], mi.Float(1.0))[0]

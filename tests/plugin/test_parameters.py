@@ -192,7 +192,7 @@ def test_a_path_makes_a_dictionary_too(some_variant, png):
 REFUSED = [
     ({"foo": 1.0}, "unknown parameter 'foo'; Allowed: heightfield, table, data, pixel_size"),
     ({"coherence_widht": 60.0}, "unknown parameter 'coherence_widht'; did you mean coherence_wi"),
-    ({"coherence": "full"}, "coherence='full' must be one of ensemble, patch"),
+    ({"coherence": "full"}, "coherence='full' is unknown; choose one of ensemble, patch"),
     (
         {"basis": "fourier"},
         "basis='fourier' must be one of svd, chebyshev, taylor, auto",
@@ -297,7 +297,8 @@ def test_what_contradicts_a_table_is_refused(some_variant, table_file, parameter
     (name,) = parameters
     if name in SCENE_SETTINGS:
         assert "; leave it out, or " in text
-        assert text.endswith("or build another table with 'mitsuba-diffraction precompute'")
+        option = f"--{name.replace('_', '-')} {parameters[name]}"
+        assert text.endswith(f"build another table with 'mitsuba-diffraction precompute {option}'")
         assert ("-D coherence_width=auto" in text) == (name == "coherence_width")
 
 

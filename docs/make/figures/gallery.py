@@ -91,6 +91,14 @@ PICTURES = (
         "A small lamp: on each scale its mirror image, white along the keel, and on both sides "
         "the orders of the fingers.",
     ),
+    Picture(
+        "gallery", "scales_macro", "The grain of a scale",
+        "Two millimetres of one of them, each place with a coherence window of its own "
+        "(`coherence=surface`): colours break up into speckle, which moves with the lamp, here by "
+        "2°.",
+        ("render scenes/scales_macro.xml -D resx=300 -D resy=200 -s 48 --frames 10 "
+         "--animate lamp_azimuth=112:114 --fps 8 -o out/scales_macro.webp",),
+    ),
     _scene(
         "cd", "A compact disc under a lamp",
         "Colours lie where the tracks run across the plane of lamp and camera.",

@@ -102,7 +102,7 @@ class TermImages(DeviceTable):
         images = np.moveaxis(table.coefficients[0], -1, 0)  # (terms, ny, nx, re and im)
         self._images = upload(mi.Float, np.ascontiguousarray(images))
 
-    def window_sum(self, qx: Any, qy: Any, kappa: Any) -> Any:
+    def window_sum(self, qx: Any, qy: Any, kappa: Any, windows: Any = ()) -> Any:
         """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`)."""
         grid, expansion = self.grid, self.expansion
         x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
@@ -134,6 +134,9 @@ DEFAULT_AL = "diffraction, Al"
 KIRCHHOFF = "diffraction, kirchhoff"
 KIRCHHOFF_AL = "diffraction, Al, kirchhoff"
 COARSE = "diffraction, tolerance 1e-2"
+ONE_WINDOW = "diffraction, patch"
+ON_SURFACE = "diffraction, surface"
+TILED = "diffraction, surface, random tiles"
 THESIS = "thesis: Taylor, 37 terms, 3×3, an image a term"
 TAYLOR = "the same series, all terms of a bin together"
 
@@ -168,6 +171,7 @@ def build_tables(
     settings: dict[str, dict[str, Any]] = {
         "default": {},
         "1e-2": {"tolerance": 1e-2},
+        "patch": {"coherence": "patch"},
         # no tolerance could be met by this
         "thesis": {
             "coherence": "patch", "basis": "taylor", "terms": 37, "taps": 3, "tolerance": 0.999,
@@ -206,6 +210,9 @@ def bsdf_factories(tables: Tables) -> dict[str, Callable[[], Any]]:
         DEFAULT_AL: ours("default", material="Al"),
         KIRCHHOFF_AL: ours("default", material="Al", model="kirchhoff"),
         COARSE: ours("1e-2"),
+        ONE_WINDOW: ours("patch"),
+        ON_SURFACE: ours("patch", coherence="surface", uv_scale=1e4),
+        TILED: ours("patch", coherence="surface", uv_scale=1e4, tiling="random"),
         THESIS: lambda: thesis_bsdf(tables.paths["thesis"]),
         TAYLOR: ours("thesis"),
     }
@@ -227,7 +234,7 @@ class Queries:
 
     @classmethod
     def random(cls, lanes: int) -> Queries:
-        """Directions uniform over the hemisphere, wavelengths as Mitsuba draws them."""
+        """Directions uniform over the hemisphere, wavelengths as Mitsuba draws them, any place."""
         random = mi.PCG32(size=lanes, initstate=SEED)
 
         def hemisphere() -> Any:
@@ -241,6 +248,7 @@ class Queries:
             si.wavelengths = mi.sample_rgb_spectrum(mi.sample_shifted(random.next_float32()))[0]
         sample1 = random.next_float32()
         sample2 = mi.Point2f(random.next_float32(), random.next_float32())
+        si.uv = mi.Point2f(random.next_float32(), random.next_float32())
         dr.eval(si, wo, sample1, sample2)
         return cls(si, wo, sample1, sample2)
 

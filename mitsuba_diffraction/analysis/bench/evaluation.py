@@ -18,6 +18,8 @@ from .contenders import (
     DEFAULT_AL,
     KIRCHHOFF,
     KIRCHHOFF_AL,
+    ON_SURFACE,
+    ONE_WINDOW,
     THESIS,
     Queries,
     Tables,
@@ -33,7 +35,9 @@ from .figures import Goal, Plan, Row, Section
 FLOOR = "bare gathers of the defaults"
 _TIMES = "ns/call"
 _EVAL = "× eval"
-_BASELINES = {"× roughconductor": ALUMINIUM, "× defaults": DEFAULT, "× gathers": FLOOR}
+_BASELINES = {
+    "× roughconductor": ALUMINIUM, "× defaults": DEFAULT, "× patch": ONE_WINDOW, "× gathers": FLOOR,
+}  # fmt: skip
 
 
 def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
@@ -63,6 +67,9 @@ def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
         ],
         DEFAULT_AL: [Goal("at most 1.25× kirchhoff", metals <= 1.25)],
         COARSE: [Goal("at most 3× roughconductor", ratio(times[COARSE], times[ALUMINIUM]) <= 3.0)],
+        ON_SURFACE: [
+            Goal("at most 1.5× patch", ratio(times[ON_SURFACE], times[ONE_WINDOW]) <= 1.5)
+        ],
         THESIS: [Goal("at least 30× the defaults", to_thesis >= 30.0)],
     }
     return _section(f"eval: {_conditions(plan, tables)}", times, lanes, goals)

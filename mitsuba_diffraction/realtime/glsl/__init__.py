@@ -3,6 +3,7 @@
 Contents
 --------
 Renderer     draws a scene of Mitsuba by shaders, without a window (in `renderer`)
+export_shader  writes a surface's shader for other programs (in `export`)
 scene        a scene as the shaders know it, made of the next four
 shapes       triangles and their tangents
 materials    BSDFs and textures
@@ -17,6 +18,7 @@ textures     what a shader reads, as plain NumPy
 source       the shaders' text
 context      OpenGL without a window: programs, textures, pictures to draw into
 prepared     a method's tables and programs
+preprocess   shader text without what a surface lacks, under names of its own
 timing       how long fragments take
 viewer       a window on a scene (extra `view`)
 panel        its panel
@@ -25,6 +27,7 @@ navigation   the camera and the light, moved by hand
 
 from __future__ import annotations
 
+from .export import export_shader
 from .renderer import Renderer
 
-__all__ = ["Renderer"]
+__all__ = ["Renderer", "export_shader"]

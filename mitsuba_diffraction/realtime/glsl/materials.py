@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import DiffractionError
 from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from ...optics.geometry import wavenumber
 from ...plugin.changing import children
@@ -83,11 +84,18 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
             omissions.append(f"the back of {name}, another material")
         bsdf = inner[0]
     if _diffracts(bsdf):
+        if bsdf.places is not None:
+            raise DiffractionError(
+                f"coherence='surface' of {name} is for the path tracer, whose windows follow "
+                "places; shaders show 'ensemble' or 'patch'"
+            )
         pigment = Map(np.zeros(3))
         if bsdf.nested is not None:
             pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)
         if _is_filmed(bsdf.fresnel):
             omissions.append(f"the thin film of {name}")
+        if bsdf.through is not None:
+            omissions.append(f"light that goes through {name}")
         return Material(pigment, two_sided, bsdf, _axis(bsdf.orientation))
     return Material(_diffuse(bsdf, omissions, name, light), two_sided)
 

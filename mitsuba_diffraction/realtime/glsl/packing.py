@@ -33,19 +33,28 @@ _RESPONSES = 2048  # over k: 0.4 nm apart
 _ANGLES, _WAVELENGTHS = 129, 64  # of a conductor's reflectance
 
 
-def pack_colours(table: ColourTable) -> Packed:
-    """A colour table, for `lut`."""
+def pack_colours(table: ColourTable, *, floats: bool = False) -> Packed:
+    """A colour table, for `lut`; all of floats under `FLOAT_TEXTURES`, for other programs."""
     grid = table.grid
     starts = np.array([grid.start(n) for n in range(grid.rings)])
     counts = np.array(grid.counts)  # below 2¹⁶: the table would be too large before
     pairs = np.stack([starts[:-1], counts[:-1] | counts[1:] << 16], axis=1).astype(np.uint32)
     radii, zs = table.order_0.shape[:2]
-    return Packed(
-        textures=(
+    if floats:
+        bins = np.stack([starts[:-1], counts[:-1], counts[1:], counts[1:]], axis=1)
+        listings = (
+            listed("colours", table.coefficients.reshape(-1, 4)),
+            listed("rings", bins.astype(np.float32)),  # whole up to 2²⁴
+            listed("glossy", texels(table.order_0[..., :3].reshape(-1, 3)).astype(np.float32)),
+        )
+    else:
+        listings = (
             listed("colours", paired(table.coefficients).reshape(-1, 4)),
             listed("rings", pairs),
             listed("glossy", paired(_with_next(table.order_0[..., :3]))),
-        ),
+        )
+    return Packed(
+        textures=listings,
         uniforms={
             "bins": grid.bins,
             "last_ring": grid.rings - 1,

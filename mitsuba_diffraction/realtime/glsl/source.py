@@ -30,13 +30,14 @@ _PREAMBLES = {
 
 
 @functools.cache
-def _file(name: str) -> str:
+def shader_file(name: str) -> str:
+    """The text of one of the shaders' files."""
     return resources.files(__package__).joinpath("shaders", name).read_text(encoding="utf-8")
 
 
 def vertex_source(dialect: Dialect = "desktop", name: str = "surface.vert") -> str:
     """The vertex stage, the same for all methods."""
-    return _PREAMBLES[dialect] + _file(name)
+    return _PREAMBLES[dialect] + shader_file(name)
 
 
 def fragment_source(
@@ -80,9 +81,12 @@ def fragment_parts(
         shared.append("taylor.glsl")
     if "SHADOWED" in constants:
         shared.append("shadow.glsl")
-    return parts + [(name, _file(name)) for name in (*shared, f"{method}.glsl", main)]
+    shared += ["layers.glsl", f"{method}.glsl"]
+    if "DIFFRACTING" in constants:
+        shared.append("diffraction.glsl")
+    return parts + [(name, shader_file(name)) for name in (*shared, main)]
 
 
 def plain_source(name: str) -> str:
     """A stage that knows neither surfaces nor tables, for the desktop."""
-    return _PREAMBLES["desktop"] + _file(name)
+    return _PREAMBLES["desktop"] + shader_file(name)

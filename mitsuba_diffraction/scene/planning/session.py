@@ -125,7 +125,9 @@ class Session:
         table = cached_table(digest, restricted, lambda: made[0] if made else build(restricted))
         self.tables[key] = table
         if key in self.sample_like:
-            share_sampler(table, self.sample_like[key])
+            like = self.sample_like[key]
+            share_sampler(table, like)
+            share_sampler(table.averaged, like.averaged)
         return table
 
     def start(self, lanes: int) -> None:

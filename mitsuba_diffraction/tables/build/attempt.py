@@ -19,7 +19,7 @@ from .checks import check_size
 from .coefficients import coefficients_of
 from .error import FLOOR, ErrorMeter, Parts, worst
 from .half_precision import half_precision
-from .windows import spectra_of
+from .powers import Spectra
 
 #: Below it single precision transforms would spend a share of the tolerance themselves.
 DOUBLE_BELOW = 2e-4
@@ -56,21 +56,17 @@ class Attempt:
         double = expansion.basis == "taylor" or tolerance < DOUBLE_BELOW
         margin = math.ceil(FULL_REACH * math.sqrt(2.0) / min(grid.steps)) + 2
         outer = (grid.last[0] + margin, grid.last[1] + margin)
-        self._spectra = spectra_of(patches, outer, double)
+        self._spectra = Spectra(patches, outer, double, self._tick)
         self._checks = [expansion.extrema(interval) for interval in range(expansion.intervals)]
-        self._transforms = expansion.intervals * expansion.series_terms
-        self._total = self._transforms + sum(map(len, self._checks))
-        self._tell, self.grid = tell, grid
+        self._transforms = expansion.intervals * expansion.series_terms * self._spectra.count
+        self._total = self._transforms + sum(map(len, self._checks)) * self._spectra.count
+        self._tell, self._done, self.grid = tell, 0, grid
         self.measured: dict[str, float] = {}
         self._parts: list[Parts] = []
         self._trims: tuple[int, ...] | None = None
         self.coefficients: NDArray[Any]
         self.coefficients, self.order_0, self.expansion = coefficients_of(
-            self._spectra,
-            grid,
-            expansion,
-            functions,
-            lambda done: tell(done, self._total, "transforming"),
+            self._spectra, grid, expansion, functions
         )
         self.scale = 1.0
         if half:
@@ -80,14 +76,11 @@ class Attempt:
         """The larger of both errors, with some taps left out."""
         if trims != self._trims:
             self._meter = ErrorMeter(self._spectra, replace(self.grid, trims=trims), self.expansion)
-            self._parts = []
+            self._parts, self._done = [], self._transforms
             for values, centre, kappas in zip(
                 self.coefficients, self.order_0, self._checks, strict=True
             ):
-                for part in self._meter.series(values, centre, kappas, self.scale):
-                    self._parts.append(part)
-                    done = self._transforms + len(self._parts)
-                    self._tell(done, self._total, "measuring the error")
+                self._parts += self._meter.series(values, centre, kappas, self.scale)
             self.measured = worst(np.concatenate(self._checks).tolist(), self._parts)
             self._trims = trims
         return max(self.measured["near"], self.measured["far"])
@@ -100,3 +93,9 @@ class Attempt:
             alone = self._meter.taps_alone(self.measured[f"kappa_{name}"])
             shares.append(float(alone[0, n] / max(alone[1, n], floor[n], 1e-30)))
         return max(shares)
+
+    def _tick(self) -> None:
+        """Tell of a transform."""
+        self._done = min(self._done + 1, self._total)
+        text = "transforming" if self._done <= self._transforms else "measuring the error"
+        self._tell(self._done, self._total, text)

@@ -40,7 +40,7 @@ from .choose import (
 )
 from .coarse import coarse_table
 from .describe import describe, roughness_of
-from .windows import shape_of, windows_of
+from .windows import Run, shape_of, windows_of
 
 T = TypeVar("T")
 
@@ -156,10 +156,14 @@ def build_with(
     heights: HeightField | Sequence[HeightField],
     settings: TableSettings,
     progress: Progress | None = None,
+    run: Run = map,
 ) -> DiffractionTable:
-    """`build_table` with its arguments in one record."""
+    """`build_table` with its arguments in one record.
+
+    run : what does the work of windows, as `map` does here.
+    """
     scans = [heights] if isinstance(heights, HeightField) else list(heights)
-    patches = windows_of(scans, settings)
+    patches = windows_of(scans, settings, run)
     if patches is scans:
         check_patches(scans, settings)
     check_units(scans)

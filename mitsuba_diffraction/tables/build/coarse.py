@@ -14,7 +14,7 @@ coefficient p·(s/σD)².
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,8 @@ from .choose import svd_expansion
 from .coefficients import series_of
 from .describe import roughness_of
 from .half_precision import half_scale
-from .windows import shape_of, spectra_of
+from .powers import Spectra
+from .windows import shape_of
 
 #: Width of a cell in units of 1/σ, and fewest cells from the middle to the edge.
 CELL, FEWEST = 16.0, 24
@@ -133,21 +134,24 @@ def _coefficients(
     functions : see `series_of`.
     """
     outermost = [n * last + n // 2 for n, last in zip(each, grid.last, strict=True)]
-    spectra = spectra_of(patches, (outermost[0], outermost[1]))
-    ny, nx = grid.shape
-    total = expansion.intervals * expansion.terms
+    done = 0
 
-    def values_at(kappa: float, interval: int, values: NDArray[np.float32]) -> tuple[float]:
-        values[...], order_0 = 0.0, 0.0
-        for spectrum in spectra:
-            amplitude = spectrum.of_phase(kappa, minus_one=True)
-            zero = complex(amplitude[outermost[1], outermost[0]])
-            amplitude[outermost[1], outermost[0]] = 0.0
-            power = amplitude.real**2 + amplitude.imag**2
-            values[..., 0] += power.reshape(ny, each[1], nx, each[0]).sum(axis=(1, 3))
-            order_0 += abs(zero) ** 2 + 2.0 * zero.real  # |1 + (a_0 − 1)|² − 1
-        values /= np.float32(len(spectra))
-        return (order_0 / len(spectra) + (1.0 - float(expansion.order_0_offset(interval))),)
+    def tick() -> None:
+        nonlocal done
+        done += 1
+        total = expansion.intervals * expansion.terms * spectra.count
+        tell(done, total, "summing what lies outside")
+
+    spectra = Spectra(patches, (outermost[0], outermost[1]), tick=tick)
+    ny, nx = grid.shape
+
+    def values_at(interval: int, values: NDArray[np.float32]) -> Iterator[tuple[float]]:
+        specular = float(expansion.order_0_offset(interval))
+        for out, power in zip(
+            values, spectra.powers(expansion.nodes(interval).tolist()), strict=True
+        ):
+            out[..., 0] = power.bins.reshape(ny, each[1], nx, each[0]).sum(axis=(1, 3))
+            yield (power.change + (1.0 - specular),)
 
     none = np.zeros(0, np.int64)  # a cell is much wider than the light close to order 0
     return series_of(
@@ -156,5 +160,4 @@ def _coefficients(
         expansion,
         functions,
         none,
-        lambda done: tell(done, total, "summing what lies outside"),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from ..expansion import Expansion, principal_functions
 from ..packing import Grid
-from .error import NEAR, alternate
-from .spectrum import Spectrum
+from .error import alternate
+from .powers import Spectra
+from .spectrum import NEAR, Spectrum
 
-#: Fills an array with what is expanded, of all bins at one κ of an interval; returns order 0's.
-ValuesAt = Callable[[float, int, NDArray[np.float32]], Sequence[float]]
+#: Fills an array (nodes, …) with what is expanded, of all bins at the nodes of an interval, one
+#: after the other; gives order 0's.
+ValuesAt = Callable[[int, NDArray[np.float32]], Iterable[Sequence[float]]]
 
 
 def series_of(
@@ -25,18 +27,16 @@ def series_of(
     expansion: Expansion,
     functions: int | None,
     near: NDArray[np.int64],
-    done: Callable[[int], None],
 ) -> tuple[NDArray[np.float32], NDArray[np.float64], Expansion]:
     """Series coefficients (intervals, ny, nx, components, terms) of whatever has values at nodes.
 
     Parameters
     ----------
-    values_at : what is expanded, at one κ.
+    values_at : what is expanded, at the nodes of an interval.
     shape : (ny, nx, components) of the values.
     functions : how many functions of basis "svd" the Chebyshev series is made into, if it is; the
         expansion returned then has them.
     near : indices of the values close to order 0, see `principal_functions`.
-    done : called with the number of κ that are done.
     """
     terms = functions or expansion.terms
     result = np.empty((expansion.intervals, *shape, terms), np.float32)
@@ -45,10 +45,7 @@ def series_of(
     flat = values.reshape(expansion.terms, -1)
     found = []
     for interval in range(expansion.intervals):
-        at_nodes = []
-        for n, kappa in enumerate(expansion.nodes(interval)):
-            at_nodes.append(values_at(kappa, interval, values[n]))
-            done(interval * expansion.terms + n + 1)
+        at_nodes = list(values_at(interval, values))
         fit = expansion.fit(interval)
         order_0[interval] = np.transpose(at_nodes) @ fit
         if functions is not None:
@@ -61,40 +58,34 @@ def series_of(
 
 
 def coefficients_of(
-    spectra: Sequence[Spectrum],
-    grid: Grid,
-    expansion: Expansion,
-    functions: int | None,
-    done: Callable[[int], None],
+    spectra: Spectra, grid: Grid, expansion: Expansion, functions: int | None
 ) -> tuple[NDArray[np.float32], NDArray[np.float64], Expansion]:
     """Series coefficients of every bin, (intervals, ny, nx, components, terms), and of order 0.
 
     functions : see `series_of`.
     """
     if expansion.basis == "taylor":
-        return *_taylor(spectra[0], grid, expansion, done), expansion
+        return *_taylor(spectra, grid, expansion), expansion
     components = 1 if expansion.kind == "power" else 2
-
-    def values_at(kappa: float, interval: int, values: NDArray[np.float32]) -> Sequence[float]:
-        return _values_at(kappa, spectra, grid, expansion, interval, values)
-
+    of_kind = _powers_at if expansion.kind == "power" else _amplitudes_at
+    values_at = partial(of_kind, spectra, grid, expansion)
     near = _near(grid, components)
-    return series_of(values_at, (*grid.shape, components), expansion, functions, near, done)
+    return series_of(values_at, (*grid.shape, components), expansion, functions, near)
 
 
 def _taylor(
-    spectrum: Spectrum, grid: Grid, expansion: Expansion, done: Callable[[int], None]
+    spectra: Spectra, grid: Grid, expansion: Expansion
 ) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
     """Coefficients DFT[iⁿ(2h/H)ⁿ] of all bins, and of order 0."""
     result = np.empty((1, *grid.shape, 2, expansion.terms), np.float32)
     for n in range(1, expansion.terms + 1):
-        amplitude = spectrum.of(partial(_height_power, expansion.half_range, n))
-        amplitude = amplitude[_inner(spectrum, grid)]
+        amplitude = spectra.first.of(partial(_height_power, expansion.half_range, n))
+        amplitude = amplitude[_inner(spectra.first, grid)]
         if grid.coherent:
             alternate(amplitude, grid.last)
         amplitude *= 1j**n
         result[0, :, :, 0, n - 1], result[0, :, :, 1, n - 1] = amplitude.real, amplitude.imag
-        done(n)
+        spectra.tick()
     order_0 = result[:, *grid.middle].astype(float)
     result[0, *grid.middle] = 0.0
     return result, order_0
@@ -111,42 +102,44 @@ def _near(grid: Grid, components: int) -> NDArray[np.int64]:
     return np.asarray((bins[:, None] * components + np.arange(components)).ravel())
 
 
-def _values_at(
-    kappa: float,
-    spectra: Sequence[Spectrum],
+def _powers_at(
+    spectra: Spectra,
     grid: Grid,
     expansion: Expansion,
     interval: int,
     values: NDArray[np.float32],
-) -> list[float]:
-    """What is expanded, of all bins (ny, nx, components) at one κ, written to `values`.
+) -> Iterator[tuple[float]]:
+    """Powers of all bins (ny, nx, 1) at the nodes of an interval, written to `values`.
 
-    Returns
-    -------
-    that of order 0, whose bin is left empty: a grating may put it out nearly altogether, so that it
-    takes double precision.
+    Gives that of order 0, whose bin is left empty: a grating may put it out nearly altogether, so
+    that it takes double precision.
     """
     specular = float(expansion.order_0_offset(interval))
-    values[...] = 0.0
-    order_0 = np.zeros(values.shape[-1])
-    for spectrum in spectra:
+    inner = _inner(spectra.first, grid)
+    for out, power in zip(values, spectra.powers(expansion.nodes(interval).tolist()), strict=True):
+        out[..., 0] = power.bins[inner]
+        yield (power.change if specular else power.order_0,)
+
+
+def _amplitudes_at(
+    spectra: Spectra,
+    grid: Grid,
+    expansion: Expansion,
+    interval: int,
+    values: NDArray[np.float32],
+) -> Iterator[tuple[float, float]]:
+    """Real and imaginary parts of the only patch's (ny, nx, 2), likewise."""
+    specular, spectrum = float(expansion.order_0_offset(interval)), spectra.first
+    for out, kappa in zip(values, expansion.nodes(interval), strict=True):
         # The transform is of exp(iκh) − 1, so this is a_0 − 1
         amplitude = spectrum.of_phase(kappa, minus_one=True)[_inner(spectrum, grid)]
         less = complex(amplitude[grid.middle])
         amplitude[grid.middle] = 0.0
-        if expansion.kind == "power":
-            values[..., 0] += amplitude.real**2
-            values[..., 0] += amplitude.imag**2
-            # |a_0|² − 1 without cancellation as κ → 0, or |a_0|² without it where that vanishes
-            order_0 += abs(less) ** 2 + 2.0 * less.real if specular else abs(1.0 + less) ** 2
-        else:
-            if grid.coherent:
-                alternate(amplitude, grid.last)
-            values[..., 0], values[..., 1] = amplitude.real, amplitude.imag
-            order_0 += less.real + 1.0 - specular, less.imag
-    if len(spectra) > 1:
-        values /= len(spectra)
-    return list(order_0 / len(spectra))
+        if grid.coherent:
+            alternate(amplitude, grid.last)
+        out[..., 0], out[..., 1] = amplitude.real, amplitude.imag
+        spectra.tick()
+        yield less.real + 1.0 - specular, less.imag
 
 
 def _inner(spectrum: Spectrum, grid: Grid) -> tuple[slice, slice]:

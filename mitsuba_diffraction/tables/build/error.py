@@ -25,10 +25,9 @@ from scipy import sparse
 from ..expansion import Expansion
 from ..packing import Grid
 from ..window import apply_window, rows_by_trim, tap_matrix
-from .spectrum import Spectrum
+from .powers import Spectra
+from .spectrum import NEAR
 
-#: Radius of the bins counted as the glossy reflection, in units of 1/σ.
-NEAR = 3.0
 #: A part that vanishes at some κ is compared with this share of its largest value.
 FLOOR = 1e-3
 
@@ -47,9 +46,9 @@ class ErrorMeter:
     Several spectra are of several patches, whose powers are averaged.
     """
 
-    def __init__(self, spectra: Sequence[Spectrum], grid: Grid, expansion: Expansion) -> None:
+    def __init__(self, spectra: Spectra, grid: Grid, expansion: Expansion) -> None:
         self.spectra, self.grid, self.expansion = spectra, grid, expansion
-        spectrum = spectra[0]
+        spectrum = spectra.first
         self._real, self._outer = spectrum.real_type, spectrum.last
         rng = np.random.default_rng(_SEED)
         axes = []
@@ -101,15 +100,16 @@ class ErrorMeter:
         weights = self.expansion.weights(kappas).astype(self._real)
         centres = self.expansion.series_weights(kappas) @ order_0.T
         centres[:, 0] += self.expansion.order_0_offset(self.expansion.interval(kappas))
+        exact = self._exact(kappas.tolist())
         for start in range(0, len(kappas), _TOGETHER):
             few = slice(start, start + _TOGETHER)
             tables = self._tables(coefficients, weights[few].T / self._real(scale))
-            for kappa, centre, table in zip(kappas[few], centres[few], tables, strict=True):
+            for centre, table in zip(centres[few], tables, strict=True):
                 if self.expansion.kind == "power":
-                    yield self._compare(self._exact(kappa), table[..., 0], centre[0])
+                    yield self._compare(next(exact), table[..., 0], centre[0])
                 else:
                     bins = table[..., 0] + 1j * table[..., 1]
-                    yield self._compare(self._exact(kappa), bins, complex(*centre))
+                    yield self._compare(next(exact), bins, complex(*centre))
 
     def _tables(
         self, coefficients: NDArray[np.floating], weights: NDArray[np.floating]
@@ -128,23 +128,29 @@ class ErrorMeter:
 
     def taps_alone(self, kappa: float) -> Parts:
         """Parts of a table whose series and storage are perfect: the taps' share of the error."""
-        exact = self._exact(kappa)
+        (exact,) = self._exact([kappa])
         (y, x), (last_y, last_x) = self._outer[::-1], self.grid.last[::-1]
         inner = exact[y - last_y : y + last_y + 1, x - last_x : x + last_x + 1].copy()
         centre = inner[last_y, last_x]
         inner[last_y, last_x] = 0.0
         return self._compare(exact, inner, complex(centre))
 
-    def _exact(self, kappa: float) -> NDArray[Any]:
+    def _exact(self, kappas: Sequence[float]) -> Iterator[NDArray[Any]]:
         """Exact |a_j|², mean over the patches; for amplitudes, a_j of the only patch."""
-        amplitudes = (s.of_phase(kappa, minus_one=True) for s in self.spectra)
-        total: Any = 0.0
-        for amplitude in amplitudes:
-            amplitude[self._outer[1], self._outer[0]] += 1.0
+        middle = self._outer[1], self._outer[0]
+        if self.expansion.kind == "power":
+            for power in self.spectra.powers(kappas):
+                bins = power.bins.astype(self._real, copy=False)
+                bins[middle] = power.order_0
+                yield bins
+            return
+        for kappa in kappas:
+            amplitude = self.spectra.first.of_phase(kappa, minus_one=True)
+            amplitude[middle] += 1.0
             if self.grid.coherent:
                 alternate(amplitude, self._outer)
-            total = total + (_power(amplitude) if self.expansion.kind == "power" else amplitude)
-        return total / self._real(len(self.spectra))
+            self.spectra.tick()
+            yield amplitude
 
     def _tap(self, table: NDArray[Any]) -> NDArray[Any]:
         """What a look-up's taps add up to, without order 0."""

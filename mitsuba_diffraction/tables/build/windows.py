@@ -13,8 +13,9 @@ coherence window 1/(2σ²): with L = 8σ, twice the coherence width, lobes are 1
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any, overload
 
 import numpy as np
@@ -28,8 +29,7 @@ from ...optics.blend import ScaleRoughness
 from ...optics.geometry import sigma_of, wavenumber
 from ...settings import TableSettings
 from ..table import build_error
-from .error import NEAR
-from .spectrum import Spectrum
+from .spectrum import NEAR, Spectrum
 
 #: Width of a window, in coherence widths, of `windows="auto"`.
 AUTO = 2.0
@@ -38,8 +38,12 @@ _WIDE = 1.5
 #: Windows that the roughness by spatial frequency is taken from, which is smooth.
 _ROUGHNESS_OF = 16
 _GREEN = 550.0  # nm, where the standard error is stated
+#: Points of a scan that a batch of windows lies in, at most, unless one window is larger.
+_BATCH = 2**24
 
 Reals = NDArray[np.float64]
+#: As `map`: calls of a function, here or on workers, results in the order of the arguments.
+Run = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,7 @@ class Windows(Sequence[HeightField]):
     ----------
     scans : with pixels of one size.
     width : of a window, µm.
+    run : what does the work of batches, as `map` does here.
 
     Attributes
     ----------
@@ -92,8 +97,8 @@ class Windows(Sequence[HeightField]):
     variance_factor : variance of the mean over all windows, of one window's.
     """
 
-    def __init__(self, scans: Sequence[HeightField], width: float) -> None:
-        self.scans = list(scans)
+    def __init__(self, scans: Sequence[HeightField], width: float, run: Run = map) -> None:
+        self.scans, self.run = list(scans), run
         axes = [
             [_Axis.of(n, width / d) for n, d in zip(s.shape, self._pixels, strict=True)]
             for s in scans
@@ -147,6 +152,29 @@ class Windows(Sequence[HeightField]):
         heights.setflags(write=False)
         return HeightField(heights, scan.pixel_size, name=f"{scan.name}, window {n + 1}")
 
+    def batches(self) -> list[Windows]:
+        """All windows, some neighbours at a time; the same whoever does their work."""
+        ny, nx = self.shape
+        most = 1 + max(0, int((_BATCH / ny - nx) / (0.5 * nx)))
+        found = []
+        for _, row in groupby(self._places, key=lambda place: (id(place[0]), place[1])):
+            places = list(row)
+            for start in range(0, len(places), most):
+                batch = Windows.__new__(Windows)
+                own = {"scans": [places[0][0]], "_places": places[start : start + most]}
+                vars(batch).update(vars(self), **own)
+                found.append(batch)
+        return found
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is sent to workers of a batch: the part of its scan that it lies in."""
+        (scan,) = self.scans
+        corners = np.array([(top, left) for _, top, left in self._places])
+        (top, left), (bottom, right) = corners.min(axis=0), corners.max(axis=0) + self.shape
+        part = HeightField(scan.heights[top:bottom, left:right], scan.pixel_size, name=scan.name)
+        places = [(part, y - int(top), x - int(left)) for _, y, x in self._places]
+        return {**self.__dict__, "scans": [part], "_places": places, "run": map}
+
     def spectrum(self, n: int, last: tuple[int, int], double: bool = False) -> Spectrum:
         """Transforms of one window."""
         return Spectrum(self[n], last, double, self.tapers)
@@ -161,14 +189,14 @@ class Windows(Sequence[HeightField]):
         bins = [2.0 * math.pi / (n * d) for n, d in zip(self.shape, self._pixels, strict=True)]
         last = [min(int(kappa / q), n // 2) for q, n in zip(bins, self.shape, strict=True)]
         lobe = [1.0 / (math.sqrt(2.0) * sigma * q) for q in bins]
-        mean, squares = np.zeros(1), np.zeros(1)
-        for n in range(len(self)):
-            power = np.abs(self.spectrum(n, (last[1], last[0])).of_phase(kappa)) ** 2
-            power = gaussian_filter(power.astype(np.float64), lobe, mode="constant")
-            change = power - mean
-            mean = mean + change / (n + 1)
-            squares = squares + change * (power - mean)
-        error = np.sqrt(squares / (len(self) - 1) * self.variance_factor)
+        tasks = ((batch, (last[1], last[0]), kappa, lobe) for batch in self.batches())
+        count, mean, squares = 0, np.zeros(1), np.zeros(1)
+        for more, their_mean, their_squares in self.run(_scatter, tasks):
+            # Chan, Golub & LeVeque (1983, The American Statistician 37, 242), equation 2.1
+            change, count = their_mean - mean, count + more
+            mean = mean + change * (more / count)
+            squares = squares + their_squares + np.square(change) * (more * (count - more) / count)
+        error = np.sqrt(squares / (count - 1) * self.variance_factor)
         y, x = (q * np.arange(-n, n + 1) for q, n in zip(bins, last, strict=True))
         near = np.hypot(x, y[:, None]) <= NEAR / sigma
         return {
@@ -192,21 +220,27 @@ class Windows(Sequence[HeightField]):
         return dy, dx
 
 
-class _Spectra(Sequence[Spectrum]):
-    """Those of windows, made when they are asked for."""
+def _scatter(
+    task: tuple[Windows, tuple[int, int], float, Sequence[float]],
+) -> tuple[int, Reals, Reals]:
+    """Number of windows, mean and sum of squared deviations of what look-ups find in them."""
+    windows, last, kappa, lobe = task
+    mean, squares = np.zeros(1), np.zeros(1)
+    for n in range(len(windows)):
+        power = np.abs(windows.spectrum(n, last).of_phase(kappa)) ** 2
+        power = gaussian_filter(power.astype(np.float64), lobe, mode="constant")
+        change = power - mean
+        mean = mean + change / (n + 1)
+        squares = squares + change * (power - mean)
+    return len(windows), mean, squares
 
-    def __init__(self, windows: Windows, last: tuple[int, int], double: bool) -> None:
-        self._windows, self._of = windows, (last, double)
 
-    def __len__(self) -> int:
-        return len(self._windows)
-
-    def __getitem__(self, n: Any) -> Any:
-        return self._windows.spectrum(n, *self._of)
-
-
-def windows_of(scans: Sequence[HeightField], settings: TableSettings) -> Sequence[HeightField]:
+def windows_of(
+    scans: Sequence[HeightField], settings: TableSettings, run: Run = map
+) -> Sequence[HeightField]:
     """The windows of scans as `settings.windows` has them; the scans where none is wide enough.
+
+    run : what does their work.
 
     Raises
     ------
@@ -230,7 +264,7 @@ def windows_of(scans: Sequence[HeightField], settings: TableSettings) -> Sequenc
         )
     if min(width / d for d in scans[0].pixel_size) < 4:
         return scans  # pixels so coarse that something else is wrong
-    found = Windows(scans, width)
+    found = Windows(scans, width, run)
     return scans if len(found) == len(scans) else found
 
 
@@ -240,12 +274,3 @@ def shape_of(patches: Sequence[HeightField]) -> tuple[int, int]:
         return patches.shape
     ny, nx = np.max([patch.shape for patch in patches], axis=0)
     return int(ny), int(nx)
-
-
-def spectra_of(
-    patches: Sequence[HeightField], last: tuple[int, int], double: bool = False
-) -> Sequence[Spectrum]:
-    """Transforms of every patch."""
-    if isinstance(patches, Windows):
-        return _Spectra(patches, last, double)
-    return [Spectrum(patch, last, double) for patch in patches]

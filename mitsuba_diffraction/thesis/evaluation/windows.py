@@ -8,10 +8,10 @@ window. What is plotted is its relative reflectance. For an exact grating none o
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...optics.geometry import diffraction_coordinates, wavenumber
@@ -78,9 +78,9 @@ def window_fits(
     places = _lattice(count) * extent
     fits: list[Fit | None] = []
     for n, place in enumerate(places):
-        moved = moved_window(table, (float(place[0]), float(place[1])))
+        moved = partial(table.brdf, place=place)
         response = measure(
-            moved.brdf, beam, wavelengths, angles, sigma=table.sigma, label=f"window {n + 1}"
+            moved, beam, wavelengths, angles, sigma=table.sigma, label=f"window {n + 1}"
         )
         try:
             fits.append(fit_period(ridge_of(response, order, period=period, within=1.5)))
@@ -93,31 +93,6 @@ def window_fits(
             f"none of {count} windows shows order {order} at enough wavelengths to fit a period to"
         )
     return WindowFits(places, tuple(fits))
-
-
-def moved_window(table: DiffractionTable, place: tuple[float, float]) -> DiffractionTable:
-    """The table of a window centred on `place` (µm from the patch's first pixel).
-
-    A coherent table has the phases exp(−i q_j·x₀) of a window on the patch's centre; the rest of
-    the way turns them by exp(−i q_j·(place − x₀)).
-
-    Raises
-    ------
-    DiffractionError
-        If the table holds no amplitudes.
-    """
-    if not table.grid.coherent:
-        raise DiffractionError("a window can only be moved in a table with coherence='patch'")
-    phases: list[NDArray[np.complex128]] = []
-    for axis in (0, 1):
-        bins = np.arange(-table.grid.last[axis], table.grid.last[axis] + 1)
-        half = np.pi / table.spacing[axis]  # half of the extent
-        phases.append(np.exp(-1j * bins * table.spacing[axis] * (place[axis] - half)))
-    turn = (phases[1][:, None] * phases[0])[None, :, :, None]
-    real, imaginary = (table.coefficients[..., part, :].astype(np.float32) for part in (0, 1))
-    cos, sin = turn.real.astype(np.float32), turn.imag.astype(np.float32)
-    coefficients = np.stack([real * cos - imaginary * sin, real * sin + imaginary * cos], axis=-2)
-    return replace(table, coefficients=coefficients)
 
 
 def _lattice(count: int) -> Array:
@@ -136,13 +111,12 @@ def thesis_response(
     ----------
     table : with coherence="patch".
     """
-    corner = moved_window(table, (0.0, 0.0))
     gain = Gain()
 
     def relative(wi: Array, wo: Array, wavelength: Array) -> Array:
         k = wavenumber(wavelength)
         u, v, _ = diffraction_coordinates(wi, wo)
-        return gain.factor(wi, wo) * corner.window_sum(k * u, k * v, np.asarray(k))
+        return gain.factor(wi, wo) * table.window_sum(k * u, k * v, k, (0.0, 0.0))
 
     label = "thesis' procedure"
     return measure(relative, beam, wavelengths, angles, sigma=table.sigma, label=label)

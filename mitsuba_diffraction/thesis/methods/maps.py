@@ -9,7 +9,7 @@ from ...analysis.maps.light import Bands, Light
 from ...analysis.maps.result import BrdfMap
 from ...optics.geometry import wavenumber
 from ...progress import Progress
-from ...tables.build.error import NEAR
+from ...tables.build.spectrum import NEAR
 from .gain import Gain
 from .method import Method
 

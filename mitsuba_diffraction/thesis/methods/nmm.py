@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...optics.geometry import diffraction_coordinates, wavenumber
-from ...tables.build.error import NEAR
+from ...tables.build.spectrum import NEAR
 from .method import Array, FullSpectrum, Method
 
 WEIGHTS = ("step", "lobe")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mitsuba_diffraction import DiffractionError, HeightField, reference
+from mitsuba_diffraction import DiffractionError, HeightField
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.spectra import dominant_periods
 from mitsuba_diffraction.thesis import methods
@@ -21,8 +21,7 @@ from mitsuba_diffraction.thesis.evaluation import (
     thesis_fit,
     window_fits,
 )
-from mitsuba_diffraction.thesis.evaluation.windows import moved_window
-from tests.directions import polar, rough_patch
+from tests.directions import rough_patch
 
 WAVELENGTHS = np.arange(380.0, 781.0, 20.0)
 ANGLES = np.linspace(-75.0, 30.0, 1051)
@@ -93,22 +92,6 @@ def test_outliers_do_not_move_the_fit():
     fit = fit_period(ridge_of(Response(beam, wavelengths, ANGLES, values, sigma, "jumps")))
     assert fit.period == pytest.approx(1.2, rel=0.01)
     assert fit.largest > 1.0  # and is told
-
-
-def test_a_moved_window_is_the_reference_s_moved_patch():
-    rough = rough_patch((64, 96), (0.09, 0.1), 0.2)
-    table = methods.make("default", rough, coherence_width=9.0, coherence="patch").table
-    dx, dy = rough.pixel_size
-    shift = (17, 40)  # pixels that the patch is rolled by; the window stays on its centre
-    rolled = HeightField(np.roll(rough.heights, (-shift[1], -shift[0]), axis=(0, 1)), (dx, dy))
-    lx, ly = rough.extent
-    moved = moved_window(table, (0.5 * lx + shift[0] * dx, 0.5 * ly + shift[1] * dy))
-    wi = polar(30.0)
-    wo = np.array([polar(t, p) for t in (5.0, 20.0, 45.0) for p in (0.0, 100.0, 200.0)])
-    expected = reference.brdf(rolled, wi, wo, 500.0, coherence_width=9.0, coherence="patch")
-    found = moved.brdf(np.broadcast_to(wi, wo.shape), wo, np.full(len(wo), 500.0))
-    # the table's tolerance, on the sum
-    assert np.abs(found - expected).sum() < 1e-3 * expected.sum()
 
 
 def test_windows_of_a_grating_agree_and_those_of_a_scale_do_not(blazed):

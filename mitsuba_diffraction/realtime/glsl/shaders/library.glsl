@@ -8,6 +8,8 @@ vec4 entry(sampler2D list, int i)
     return texelFetch(list, ivec2(i & (PAGE - 1), i >> PAGE_BITS), 0);
 }
 
+#ifndef FLOAT_TEXTURES
+
 uvec4 entry(usampler2D list, int i)
 {
     return texelFetch(list, ivec2(i & (PAGE - 1), i >> PAGE_BITS), 0);
@@ -18,6 +20,8 @@ vec2 upper_halves(uint word)
 {
     return uintBitsToFloat(uvec2(word << 16, word & 0xffff0000u));
 }
+
+#endif
 
 // Angle from the x axis in turns, 0 to 1. Minimax polynomial, 3e-7: drivers' atan costs twice as much.
 float turn_of(vec2 p)
@@ -32,7 +36,11 @@ float turn_of(vec2 p)
     return p.y < 0.0 ? 1.0 - turn : turn;
 }
 
+#ifdef LIGHTS
 uniform vec3 light_colour[LIGHTS];  // irradiance, or intensity of a point light, linear sRGB
+#else
+const vec3 light_colour[1] = vec3[1](vec3(1.0));  // whoever calls multiplies by the light's own
+#endif
 
 // ---------------------------------------------------------------- reflectance
 

@@ -1,9 +1,15 @@
 // `lut`: the colours of daylight, summed over all wavelengths beforehand; the twin of
 // plugin/rgb_lookup.py. Rings even in ln r with azimuths of their own, a series of five terms in z.
 
+#ifdef FLOAT_TEXTURES            // the same in textures that every loader knows
+uniform sampler2D colours;      // four texels a bin
+uniform sampler2D rings;        // first bin of a ring, its azimuths, those of the next one
+uniform sampler2D glossy;       // order 0, radii × zs
+#else
 uniform usampler2D colours;     // two texels a bin: term t of channel c is number 5c + t
 uniform usampler2D rings;       // first bin of a ring; its azimuths, and of the next one
 uniform usampler2D glossy;      // order 0, radii × zs: colours of this z and the next
+#endif
 uniform int bins;               // of one interval of z
 uniform int last_ring;
 uniform float smallest_radius;
@@ -16,12 +22,19 @@ uniform ivec2 glossy_size;      // radii, zs
 
 void add_bin(int bin, float weight, inout vec4 a, inout vec4 b, inout vec4 c, inout vec4 d)
 {
+#ifdef FLOAT_TEXTURES
+    a += weight * entry(colours, 2 * bin);
+    b += weight * entry(colours, 2 * bin + 1);
+    c += weight * entry(colours, 2 * bin + 2);
+    d += weight * entry(colours, 2 * bin + 3);
+#else
     uvec4 low = entry(colours, bin);
     uvec4 high = entry(colours, bin + 1);
     a += weight * vec4(upper_halves(low.x), upper_halves(low.y));
     b += weight * vec4(upper_halves(low.z), upper_halves(low.w));
     c += weight * vec4(upper_halves(high.x), upper_halves(high.y));
     d += weight * vec4(upper_halves(high.z), upper_halves(high.w));
+#endif
 }
 
 void add_azimuth(int start, float azimuths, float turn, float share,
@@ -57,7 +70,12 @@ vec3 other_orders(vec2 uv, float squared_radius, float z)
     float share = min(ring - lower, 1.0);
     float turn = turn_of(uv);
 
+#ifdef FLOAT_TEXTURES
+    uvec3 ring_bins = uvec3(entry(rings, int(lower)).xyz);
+    uvec2 pair = uvec2(ring_bins.x, ring_bins.y | ring_bins.z << 16);
+#else
     uvec2 pair = entry(rings, int(lower)).xy;
+#endif
     uint azimuths = pair.y & 0xffffu;
     int start = interval * bins + int(pair.x);
     vec4 a = vec4(0.0), b = vec4(0.0), c = vec4(0.0), d = vec4(0.0);
@@ -71,10 +89,16 @@ vec3 other_orders(vec2 uv, float squared_radius, float z)
     return sum * (fade * inverse_scale);
 }
 
-vec3 between(uvec4 pair, float t)
+// Of an entry and the next z.
+vec3 glossy_between(int index, float t)
 {
+#ifdef FLOAT_TEXTURES
+    return mix(entry(glossy, index).rgb, entry(glossy, index + 1).rgb, t);
+#else
+    uvec4 pair = entry(glossy, index);
     vec2 middle = upper_halves(pair.y);
     return mix(vec3(upper_halves(pair.x), middle.x), vec3(middle.y, upper_halves(pair.z)), t);
+#endif
 }
 
 // The glossy reflection, bright within a degree or so.
@@ -85,8 +109,8 @@ vec3 order_0(float radius, float z)
     vec2 lower = floor(min(position, last - 1.0));
     vec2 t = clamp(position - lower, 0.0, 1.0);
     int index = int(lower.x) * glossy_size.y + int(lower.y);
-    vec3 inner = between(entry(glossy, index), t.y);
-    vec3 outer = between(entry(glossy, index + glossy_size.y), t.y);
+    vec3 inner = glossy_between(index, t.y);
+    vec3 outer = glossy_between(index + glossy_size.y, t.y);
     return mix(inner, outer, t.x);  // the last radius is dark
 }
 

@@ -13,10 +13,6 @@ uniform vec4 light_place[LIGHTS];   // w = 0: direction towards it; w = 1: posit
 uniform vec3 sky[4];              // irradiance over π: the mean, and its change along x, y, z
 
 uniform bool two_sided;
-uniform float area_factor;        // 4πσ², that is 4π²σ⁴ over the window's area πσ²
-uniform float height_scale;
-uniform float diffuse_weight;     // of layering `thesis`
-
 #ifdef COLOUR_MAPPED
 uniform sampler2D colour_map;
 uniform mat3 colour_uv;
@@ -29,81 +25,6 @@ uniform mat3 axis_uv;
 uniform float exposure;           // factor, for a display
 
 out vec4 fragment;
-
-vec2 in_patch(vec3 direction, vec2 rotation)
-{
-    return vec2(rotation.x * direction.x + rotation.y * direction.y,
-                rotation.x * direction.y - rotation.y * direction.x);
-}
-
-const float LOWEST = 1e-6;  // cosine of what is seen or lit, so that all is finite
-
-#ifdef DIFFRACTING
-
-// f·cosθ of the diffraction times the light's irradiance, wi towards the eye.
-vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
-{
-    vec3 sum = wi + wo;
-    vec2 uv = in_patch(sum, rotation);
-    float one_plus_dot = 0.5 * dot(sum, sum);
-    float ratio = one_plus_dot / sum.z;
-    float outside = area_factor * ratio * ratio / wi.z;
-    vec2 there = vec2(1.0), back = vec2(1.0);
-#ifdef COATED
-    there = transmittances(wi.z);
-    back = transmittances(wo.z);
-    float face = outside * face_reflectance(sqrt(min(0.5 * one_plus_dot, 1.0)));
-    float leaving = wo.z;
-    wi = refracted(wi);
-    wo = refracted(wo);
-    sum = wi + wo;
-    one_plus_dot = 0.5 * dot(sum, sum);
-    ratio = one_plus_dot / sum.z;
-    outside = area_factor * ratio * ratio / wi.z * leaving / wo.z;
-    sum.z *= coat;  // κ grows by the index
-#endif
-    begin_pair(wi, wo, there, back);
-#ifdef ENERGY_CONSERVING
-    outside *= energy_scale(in_patch(wi, rotation), wi.z)
-             * energy_scale(in_patch(wo, rotation), wo.z) * energy_fade(wi.z, wo.z);
-#endif
-#ifdef VCAVITY
-    outside *= groove_shadow(wi.z, wo.z, one_plus_dot);
-#endif
-#ifdef COATED
-    face_reflected = face / outside;
-#endif
-    float cos_half = sqrt(min(0.5 * one_plus_dot, 1.0));
-    return outside * diffracted(uv, sum.z * height_scale, cos_half, light);
-}
-
-#endif
-
-#ifdef DIFFRACTING
-
-// What the surface reflects of a direction's light, at most all.
-vec3 albedo(vec3 w, vec2 rotation)
-{
-    vec3 found = flat_reflectance(w.z);
-#ifdef BENEATH
-    found *= reflected_ratio(in_patch(w, rotation), w.z);
-#endif
-    return min(found, 1.0);
-}
-
-#endif
-
-// Share of the light that reaches what lies beneath and comes back.
-vec3 transmission(vec3 wi, vec3 wo, vec2 rotation)
-{
-#ifndef DIFFRACTING
-    return vec3(1.0);
-#elif defined(THESIS)
-    return 1.0 - reflectance(0.5 * length(wi + wo)) + diffuse_weight;
-#else
-    return (1.0 - albedo(wi, rotation)) * (1.0 - albedo(wo, rotation));
-#endif
-}
 
 void main()
 {

@@ -1,0 +1,260 @@
+"""A surface's diffraction for other programs: GLSL, its textures and constants, an example."""
+
+from __future__ import annotations
+
+import functools
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import resources
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+
+from ...atomic import atomic_path
+from ...errors import DiffractionError
+from ...tables.store.cache import cached_colours
+from .materials import Map, Material, height_scale, pack_conservation, pack_surface
+from .packing import pack_colours, pack_powers, pack_responses
+from .preprocess import global_names, renamed, resolved
+from .source import shader_file
+from .textures import PAGE, Packed, Texture
+
+#: Methods that other programs can have, and the functions that they become.
+EXPORTED = {"lut": "diffraction", "spectral": "diffraction_spectral"}
+
+_PREFIX = "md_"
+_HEAD = """// Diffraction of a measured surface, made by mitsuba_diffraction {version}: {surface}.
+//
+//   {functions}
+//
+// return f·cosθ_o, 1/sr, in linear sRGB under daylight: radiance towards wi for each unit of
+// irradiance (of a surface that faces the light) from wo. Both are unit vectors away from the
+// surface in its tangent frame: x along dp/du, y = cross(normal, x), z the normal; wi towards
+// the eye, wo towards the light. Zero unless both have z > 0.
+//
+//   vec3 diffraction_transmission(vec3 wi, vec3 wo)
+//
+// is the share of light that reaches a matt base beneath and comes back: multiply its radiance.
+// Uniforms: constants.json. GLSL ES 3.00 (precision highp float, int and sampler2D) or GLSL 3.30.
+"""
+_ENTRY = """
+vec3 {name}(vec3 wi, vec3 wo)
+{{
+    if (min(wi.z, wo.z) <= 0.0) return vec3(0.0);
+    return {prefix}diffraction(wi, wo, vec2(1.0, 0.0), 0);
+}}
+"""
+_BENEATH = f"""
+vec3 diffraction_transmission(vec3 wi, vec3 wo)
+{{
+    wi.z = max(wi.z, {_PREFIX}LOWEST);
+    wo.z = max(wo.z, {_PREFIX}LOWEST);
+    return {_PREFIX}transmission(wi, wo, vec2(1.0, 0.0));
+}}
+"""
+
+
+@dataclass(frozen=True)
+class Shader:
+    """A shader for other programs.
+
+    Attributes
+    ----------
+    code : GLSL.
+    uniforms : values, by name.
+    textures : whose names are those of the samplers.
+    functions : of `code`, by method.
+    surface : in a few words.
+    """
+
+    code: str
+    uniforms: dict[str, Any]
+    textures: tuple[Texture, ...]
+    functions: dict[str, str]
+    surface: str
+
+    def constants(self) -> dict[str, Any]:
+        """What a program must know beside the code, as JSON."""
+        return {
+            "generator": f"mitsuba_diffraction {version('mitsuba_diffraction')}",
+            "surface": self.surface,
+            "functions": self.functions,
+            "uniforms": self.uniforms,
+            "textures": {
+                t.name: {
+                    "file": f"{t.name}.exr",
+                    "width": t.data.shape[1], "height": t.data.shape[0],
+                    "type": "half" if t.data.dtype.itemsize == 2 else "float",
+                    "filter": "linear" if t.smooth else "nearest",
+                    "wrap": "repeat" if t.smooth else "clamp",
+                }
+                for t in self.textures
+            },
+        }  # fmt: skip
+
+
+def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
+    """The shader of a surface.
+
+    Parameters
+    ----------
+    bsdf : of the plugin `diffraction`, as `mi.load_dict` makes it; what lies beneath it and its
+        orientation are left to the program that draws.
+    methods : of `EXPORTED`, each at most once.
+
+    Raises
+    ------
+    DiffractionError
+        If the BSDF does not diffract, a method is unknown, or the table does not suit it.
+    """
+    from ...plugin.bsdf import Diffraction  # which only a variant has
+
+    if not isinstance(bsdf, Diffraction):
+        raise DiffractionError(
+            f"bsdf={type(bsdf).__name__} does not diffract: give one of type 'diffraction', as "
+            "mi.load_dict(md.bsdf_dict(...)) makes it"
+        )
+    if not methods or len(set(methods)) < len(methods) or not set(methods) <= set(EXPORTED):
+        raise DiffractionError(
+            f"methods={list(methods)!r}: choose from {', '.join(EXPORTED)}, each at most once"
+        )
+    material = Material(Map(np.zeros(3)), bsdf=bsdf)
+    common = pack_surface(material) | pack_conservation(material)
+    common |= Packed(
+        uniforms={"height_scale": height_scale(material)},
+        definitions={"PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1)},
+    )
+    common |= Packed(definitions={"SURFACE_KIND": "0", "FLOAT_TEXTURES": "", **common.definitions})
+    tables = {method: _tables(method, bsdf) for method in methods}
+    # of all methods the same, and read by what they share
+    common |= Packed(uniforms={"area_factor": tables[methods[0]].uniforms["area_factor"]})
+    return _Writer(common, tables).shader(_words(bsdf))
+
+
+def export_shader(
+    bsdf: Any, folder: str | Path, methods: Sequence[str] = tuple(EXPORTED)
+) -> Shader:
+    """Write the shader of a surface into a folder, with an example; see `make_shader`.
+
+    The folder is made if it is missing; files of the same names in it are replaced.
+
+    Raises
+    ------
+    DiffractionError
+        As of `make_shader`, or if the folder cannot be written.
+    """
+    folder = Path(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DiffractionError(
+            f"cannot write into '{folder}': {error.strerror}; name a folder that can be made"
+        ) from error
+    shader = make_shader(bsdf, methods)
+    for texture in shader.textures:
+        with atomic_path(folder / f"{texture.name}.exr") as path:
+            _save(texture, path)
+    texts = {
+        "diffraction.glsl": shader.code,
+        "constants.json": json.dumps(shader.constants(), indent=1, ensure_ascii=False) + "\n",
+        **{name: _example(name) for name in ("diffraction.js", "example.html")},
+    }
+    for name, text in texts.items():
+        with atomic_path(folder / name) as path:
+            path.write_text(text, encoding="utf-8")
+    return shader
+
+
+def _tables(method: str, bsdf: Any) -> Packed:
+    if method == "lut":
+        return pack_colours(cached_colours(bsdf.table), floats=True)
+    daylight = (np.array([360.0, 830.0]), np.ones(2))
+    return pack_powers(bsdf.table) | pack_responses([daylight])
+
+
+class _Writer:
+    """Joins shared text with that of each method, all under names of their own."""
+
+    def __init__(self, common: Packed, tables: dict[str, Packed]) -> None:
+        self._common, self._tables = common, tables
+        definitions = dict(common.definitions)
+        for packed in tables.values():
+            definitions |= packed.definitions
+        constants = "".join(
+            f"#define {name} {value}\n" for name, value in definitions.items() if value
+        )
+        files = map(shader_file, ("library.glsl", "boundary.glsl", "layers.glsl"))
+        self._shared = constants + resolved("\n".join(files), definitions)
+        self._names = global_names(self._shared)
+
+    def shader(self, surface: str) -> Shader:
+        code = [renamed(self._shared, [(_PREFIX, self._names)])]
+        found = self._named(self._common, _PREFIX, self._names, code[0])
+        for method, packed in self._tables.items():
+            prefix = f"{_PREFIX}{method[:4]}_"
+            definitions = {**self._common.definitions, **packed.definitions}
+            text = shader_file(f"{method}.glsl") + "\n" + shader_file("diffraction.glsl")
+            text = resolved(text, definitions)
+            own = global_names(text)
+            text = renamed(text, [(_PREFIX, self._names), (prefix, own)])
+            code.append(text + _ENTRY.format(name=EXPORTED[method], prefix=prefix))
+            found |= self._named(packed, prefix, own, text)
+            found |= self._named(packed, _PREFIX, self._names, code[0])
+        functions = {method: EXPORTED[method] for method in self._tables}
+        declared = "\n//   ".join(f"vec3 {name}(vec3 wi, vec3 wo)" for name in functions.values())
+        head = _HEAD.format(
+            version=version("mitsuba_diffraction"), surface=surface, functions=declared
+        )
+        return Shader(
+            "\n".join([head, *code]) + _BENEATH, dict(found.uniforms), found.textures,
+            functions, surface,
+        )  # fmt: skip
+
+    @staticmethod
+    def _named(packed: Packed, prefix: str, names: set[str], code: str) -> Packed:
+        """What of a part the code declares, under its names there."""
+        textures = [
+            Texture(prefix + t.name, _four(t.data), t.smooth)
+            for t in packed.textures
+            if t.name in names
+        ]
+        uniforms = {
+            prefix + name: _plain(value) for name, value in packed.uniforms.items() if name in names
+        }
+        return Packed(tuple(textures), uniforms)
+
+
+def _four(data: Any) -> Any:
+    """Four channels, of which some loaders know no fewer."""
+    missing = 4 - data.shape[2]
+    return np.pad(data, [(0, 0), (0, 0), (0, missing)]) if missing else data
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray | tuple):
+        return np.asarray(value).ravel().tolist()
+    return value
+
+
+def _words(bsdf: Any) -> str:
+    table = bsdf.table
+    return (
+        f"{bsdf.fresnel}, coherence width {table.coherence_width:g} µm, "
+        f"height scale {float(np.array(bsdf.height_scale).ravel()[0]):g}"
+    )
+
+
+def _save(texture: Texture, path: Path) -> None:
+    """As EXR, whose first line is a picture's top: the last row of the texture."""
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    channels = {"RGBA": np.ascontiguousarray(texture.data[::-1])}
+    OpenEXR.File(header, channels).write(str(path))
+
+
+@functools.cache
+def _example(name: str) -> str:
+    return resources.files(__package__).joinpath("three", name).read_text(encoding="utf-8")

@@ -1,0 +1,39 @@
+// A surface's own constants, the patch's frame, and what is left for what lies beneath.
+
+uniform float area_factor;        // 4πσ², that is 4π²σ⁴ over the window's area πσ²
+uniform float height_scale;
+uniform float diffuse_weight;     // of layering `thesis`
+
+vec2 in_patch(vec3 direction, vec2 rotation)
+{
+    return vec2(rotation.x * direction.x + rotation.y * direction.y,
+                rotation.x * direction.y - rotation.y * direction.x);
+}
+
+const float LOWEST = 1e-6;  // cosine of what is seen or lit, so that all is finite
+
+#ifdef DIFFRACTING
+
+// What the surface reflects of a direction's light, at most all.
+vec3 albedo(vec3 w, vec2 rotation)
+{
+    vec3 found = flat_reflectance(w.z);
+#ifdef BENEATH
+    found *= reflected_ratio(in_patch(w, rotation), w.z);
+#endif
+    return min(found, 1.0);
+}
+
+#endif
+
+// Share of the light that reaches what lies beneath and comes back.
+vec3 transmission(vec3 wi, vec3 wo, vec2 rotation)
+{
+#ifndef DIFFRACTING
+    return vec3(1.0);
+#elif defined(THESIS)
+    return 1.0 - reflectance(0.5 * length(wi + wo)) + diffuse_weight;
+#else
+    return (1.0 - albedo(wi, rotation)) * (1.0 - albedo(wo, rotation));
+#endif
+}

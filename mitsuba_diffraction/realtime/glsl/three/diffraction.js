@@ -1,0 +1,82 @@
+// Diffraction as a material of three.js (r158 or later; tested with r187): each of its lights
+// through `diffraction`, over a matt base of the colour `color`; an environment by samples.
+import * as THREE from "three";
+import { EXRLoader } from "three/addons/loaders/EXRLoader.js";
+
+async function texture(url, { type, filter, wrap }) {
+  const loaded = await new EXRLoader().setDataType(type === "half" ? THREE.HalfFloatType : THREE.FloatType).loadAsync(url);
+  loaded.magFilter = loaded.minFilter = filter === "linear" ? THREE.LinearFilter : THREE.NearestFilter;
+  loaded.wrapS = loaded.wrapT = wrap === "repeat" ? THREE.RepeatWrapping : THREE.ClampToEdgeWrapping;
+  loaded.colorSpace = THREE.NoColorSpace;
+  loaded.generateMipmaps = false;
+  return loaded;
+}
+
+const LIGHT = (name) => `
+void RE_Direct_Diffraction(const in IncidentLight light, const in vec3 position, const in vec3 normal,
+    const in vec3 eye, const in vec3 coat, const in LambertMaterial material, inout ReflectedLight reflected) {
+  vec3 s = normalize(vTangent - normal * dot(normal, vTangent)), t = cross(normal, s);
+  vec3 wi = vec3(dot(eye, s), dot(eye, t), dot(eye, normal));
+  vec3 wo = vec3(dot(light.direction, s), dot(light.direction, t), dot(light.direction, normal));
+  vec3 base = saturate(wo.z) * BRDF_Lambert(material.diffuseColor) * diffraction_transmission(wi, wo);
+  reflected.directDiffuse += light.color * (base + ${name}(wi, wo));
+}
+#undef RE_Direct
+#define RE_Direct RE_Direct_Diffraction
+#if SAMPLES > 0
+uniform vec3 md_environment[2 * SAMPLES];
+#endif
+`;
+const ENVIRONMENT = `
+for (int n = 0; n < SAMPLES; ++n) {
+  IncidentLight sample_;
+  sample_.direction = normalize((viewMatrix * vec4(md_environment[2 * n], 0.0)).xyz);
+  sample_.color = md_environment[2 * n + 1];
+  sample_.visible = true;
+  RE_Direct(sample_, geometryPosition, geometryNormal, geometryViewDir, geometryClearcoatNormal, material, reflectedLight);
+}
+`;
+
+// The material. folder: of constants.json; method: "lut" or "spectral"; environment: of
+// `sampled`; the rest: parameters of MeshLambertMaterial. Geometries need the attribute
+// `tangent` (`computeTangents()`), along the patch's x axis.
+export async function diffractionMaterial(folder = ".", { method = "lut", environment = [], ...parameters } = {}) {
+  const constants = await (await fetch(`${folder}/constants.json`)).json();
+  const code = await (await fetch(`${folder}/diffraction.glsl`)).text();
+  const name = constants.functions[method];
+  if (!name) throw new Error(`method ${method} was not exported, only ${Object.keys(constants.functions)}`);
+  const uniforms = { md_environment: { value: environment } };
+  for (const [key, value] of Object.entries(constants.uniforms)) uniforms[key] = { value };
+  for (const [key, entry] of Object.entries(constants.textures))
+    uniforms[key] = { value: await texture(`${folder}/${entry.file}`, entry) };
+  const material = new THREE.MeshLambertMaterial({ color: 0, ...parameters });
+  material.defines = { USE_TANGENT: "", SAMPLES: environment.length / 2 };
+  material.customProgramCacheKey = () => code + name;
+  material.onBeforeCompile = (shader) => {
+    Object.assign(shader.uniforms, uniforms);
+    const add = (chunk, text) => (shader.fragmentShader = shader.fragmentShader.replace(`#include <${chunk}>`, text));
+    add("lights_lambert_pars_fragment", `#include <lights_lambert_pars_fragment>\n${code}${LIGHT(name)}`);
+    if (environment.length) add("lights_fragment_end", `${ENVIRONMENT}#include <lights_fragment_end>`);
+  };
+  return material;
+}
+
+// Directions and irradiances of an equirectangular float texture (RGBA), one in each of `count`
+// equal shares of its light.
+export function sampled({ image: { data, width, height } }, count = 64) {
+  const weights = new Float64Array(width * height);
+  let total = 0;
+  for (let i = 0; i < weights.length; ++i) {
+    const solid = Math.sin((Math.PI * (Math.floor(i / width) + 0.5)) / height) * ((2 * Math.PI * Math.PI) / (width * height));
+    total += weights[i] = solid * (0.2126 * data[4 * i] + 0.7152 * data[4 * i + 1] + 0.0722 * data[4 * i + 2]);
+  }
+  const found = [];
+  for (let n = 0, i = 0, sum = weights[0]; n < count; ++n) {
+    while (sum < ((n + 0.5) / count) * total && i < weights.length - 1) sum += weights[++i];
+    const polar = (Math.PI * (Math.floor(i / width) + 0.5)) / height - Math.PI / 2, turn = 2 * Math.PI * (((i % width) + 0.5) / width - 0.5);
+    const solid = Math.cos(polar) * ((2 * Math.PI * Math.PI) / (width * height)), share = total / count / weights[i];
+    found.push(new THREE.Vector3(Math.cos(polar) * Math.cos(turn), Math.sin(polar), Math.cos(polar) * Math.sin(turn)));
+    found.push(new THREE.Vector3(...data.subarray(4 * i, 4 * i + 3)).multiplyScalar(solid * share));
+  }
+  return found;
+}

@@ -1,0 +1,151 @@
+"""The mean power of several patches' orders, κ after κ; of windows by batches, on workers if given.
+
+Sums are of the same batches in the same order whoever makes them, in double precision: a table is
+the same, to the last bit, with any number of workers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...heights.field import HeightField
+from .spectrum import Spectrum
+from .windows import Windows
+
+#: Bytes of sums that a batch of windows gives at once: of several κ, for which it is read once.
+_GROUP = 2**27
+
+
+@dataclass
+class Power:
+    """|a_j|² at one κ: of one patch, the sum over several, or their mean.
+
+    Attributes
+    ----------
+    bins : (ny, nx), without order 0, whose bin is empty.
+    change : |a_0|² − 1, without cancellation as κ → 0.
+    order_0 : |a_0|², without it where that vanishes.
+    """
+
+    bins: NDArray[Any]
+    change: float
+    order_0: float
+
+    @classmethod
+    def of(cls, spectrum: Spectrum, kappa: float) -> Power:
+        """That of one patch, in the precision of its spectrum."""
+        amplitude = spectrum.of_phase(kappa, minus_one=True)  # so that bin 0 is a_0 − 1
+        middle = spectrum.last[1], spectrum.last[0]
+        less = complex(amplitude[middle])
+        amplitude[middle] = 0.0
+        bins = np.square(amplitude.real)
+        bins += np.square(amplitude.imag)
+        return cls(bins, abs(less) ** 2 + 2.0 * less.real, abs(1.0 + less) ** 2)
+
+    def add(self, other: Power) -> None:
+        """Add up, in double precision."""
+        self.bins = np.asarray(self.bins, np.float64)
+        self.bins += other.bins
+        self.change += other.change
+        self.order_0 += other.order_0
+
+    def over(self, count: int) -> Power:
+        """The mean of so many, whose sum this is."""
+        if count > 1:
+            self.bins /= count
+        return Power(self.bins, self.change / count, self.order_0 / count)
+
+
+class Spectra:
+    """Transforms of patches.
+
+    Parameters
+    ----------
+    patches : `Windows`, or some of one extent.
+    last, double : as in `Spectrum`.
+    tick : called when one of the `count` parts of a κ's work is done.
+    """
+
+    def __init__(
+        self,
+        patches: Sequence[HeightField],
+        last: tuple[int, int],
+        double: bool = False,
+        tick: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.tick, self._patches = tick, patches
+        self._of = last, double
+        self._batches = patches.batches() if isinstance(patches, Windows) else []
+        kept = [patches[0]] if self._batches else patches
+        self._kept = [Spectrum(patch, last, double) for patch in kept]
+
+    @property
+    def first(self) -> Spectrum:
+        """That of the only patch, or one of the shape and precision of all."""
+        return self._kept[0]
+
+    @property
+    def count(self) -> int:
+        """Calls of `tick` for a κ."""
+        return len(self._batches) or 1
+
+    def powers(self, kappas: Sequence[float]) -> Iterator[Power]:
+        """The mean over all patches, at one κ after the other."""
+        if not self._batches:
+            for kappa in kappas:
+                (total,) = _sums(self._kept, [kappa])
+                self.tick()
+                yield total.over(len(self._kept))
+            return
+        ny, nx = self.first.shape
+        size = max(1, _GROUP // (8 * ny * nx))
+        for start in range(0, len(kappas), size):
+            yield from self._of_windows(tuple(kappas[start : start + size]))
+
+    def _of_windows(self, kappas: tuple[float, ...]) -> Iterator[Power]:
+        assert isinstance(self._patches, Windows)
+        tasks = (_Task(batch, *self._of, kappas) for batch in self._batches)
+        total: list[Power] = []
+        for found in self._patches.run(_Task.sums, tasks):
+            _add(total, found)
+            for _ in kappas:
+                self.tick()
+        for power in total:
+            yield power.over(len(self._patches))
+
+
+@dataclass(frozen=True)
+class _Task:
+    """Some windows, and the κ at which their powers are summed."""
+
+    windows: Windows
+    last: tuple[int, int]
+    double: bool
+    kappas: tuple[float, ...]
+
+    def sums(self) -> list[Power]:
+        own = (self.windows.spectrum(n, self.last, self.double) for n in range(len(self.windows)))
+        return _sums(own, self.kappas)
+
+
+def _sums(spectra: Iterable[Spectrum], kappas: Sequence[float]) -> list[Power]:
+    """Sums over spectra, one for every κ."""
+    total: list[Power] = []
+    for spectrum in spectra:
+        _add(total, (Power.of(spectrum, kappa) for kappa in kappas))
+    return total
+
+
+def _add(total: list[Power], more: Iterable[Power]) -> None:
+    """Add one power for every κ to those of the same κ; to none yet, append them."""
+    started = bool(total)
+    for n, power in enumerate(more):
+        if started:
+            total[n].add(power)
+        else:
+            total.append(power)

@@ -1,0 +1,137 @@
+"""Windows of a wide scan on workers: the same table, to the last bit, whatever happens to them."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import signal
+
+import numpy as np
+import pytest
+
+distributed = pytest.importorskip("distributed")
+
+from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster  # noqa: E402
+from mitsuba_diffraction.cluster.build import build_on_workers  # noqa: E402
+from mitsuba_diffraction.cluster.each import OrderedMap  # noqa: E402
+from mitsuba_diffraction.settings import TableSettings  # noqa: E402
+from mitsuba_diffraction.tables.build import windows as windows_module  # noqa: E402
+from mitsuba_diffraction.tables.build.windows import Windows  # noqa: E402
+from tests.cli.conftest import run  # noqa: E402, F401
+from tests.tables.build.test_windows import PIXEL, SETTINGS, rough  # noqa: E402
+
+WANTED = TableSettings(windows="auto", **SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def scan():
+    return HeightField(rough(300), PIXEL, name="scan")
+
+
+@pytest.fixture(scope="module")
+def alone(scan):
+    """The table that this process builds by itself."""
+    return DiffractionTable.build(scan, windows="auto", **SETTINGS)
+
+
+def test_two_workers_of_which_one_is_killed_build_the_same_table(client, scan, alone):
+    killed = []
+
+    def disturb(done, total, text):
+        if done >= 10 and not killed:
+            killed.append(next(iter(client.cluster.workers.values())).pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    table, work = build_on_workers(scan, WANTED, client, disturb)
+    assert killed
+    assert table.digest() == alone.digest()
+    assert table.error == alone.error
+    assert table.source == alone.source
+    assert work.tasks > 10
+    client.wait_for_workers(2, timeout=60)
+
+
+def test_workers_are_sent_the_part_of_the_scan_that_their_windows_lie_in(scan, monkeypatch):
+    monkeypatch.setattr(windows_module, "_BATCH", 1)
+    whole = Windows([scan], 12.0)
+    batches = whole.batches()
+    assert len(batches) == len(whole) == 16
+    sent = [pickle.loads(pickle.dumps(batch)) for batch in batches]
+    for n, batch in enumerate(sent):
+        assert batch.scans[0].shape == whole.shape
+        np.testing.assert_array_equal(batch[0].heights, whole[n].heights)
+
+
+def test_batches_are_of_neighbours_and_hold_every_window_once(scan, monkeypatch):
+    ny, nx = Windows([scan], 12.0).shape
+    monkeypatch.setattr(windows_module, "_BATCH", 2 * ny * nx)  # 3 windows that overlap by half
+    whole = Windows([scan, scan], 12.0)
+    batches = whole.batches()
+    assert [len(batch) for batch in batches] == [3, 1] * 8
+    found = [batch[n].heights for batch in batches for n in range(len(batch))]
+    np.testing.assert_array_equal(found, [one.heights for one in whole])
+    assert max(b.__getstate__()["scans"][0].heights.size for b in batches) <= 2.01 * ny * nx
+
+
+class _Workers:
+    """A client of so many workers, that counts what is under way."""
+
+    status = "running"
+
+    def __init__(self, count):
+        self.count, self.under_way, self.most = count, 0, 0
+
+    def scheduler_info(self, **_):
+        return {"workers": dict.fromkeys(range(self.count))}
+
+    def submit(self, work, content, **_):
+        self.under_way += 1
+        self.most = max(self.most, self.under_way)
+        return _Future(self, work, content)
+
+
+class _Future:
+    def __init__(self, client, work, content):
+        self.client, self.work, self.content = client, work, content
+
+    def result(self):
+        self.client.under_way -= 1
+        return self.work(self.content)
+
+    def cancel(self):
+        pass
+
+
+def test_few_tasks_are_under_way_however_many_there_are():
+    client = _Workers(3)
+    assert list(OrderedMap(client)(abs, range(-50, 0))) == list(range(50, 0, -1))
+    assert client.most == 6
+
+
+def test_an_error_on_a_worker_is_one_line_with_its_name():
+    with pytest.raises(DiffractionError, match=r"^worker this process: unexpected TypeError: bad"):
+        list(OrderedMap(_Workers(1))(abs, ["no number"]))
+
+
+def test_without_windows_there_is_nothing_for_workers(scan, run, tmp_path):  # noqa: F811
+    with pytest.raises(DiffractionError, match="windows=auto"):
+        cluster.build(scan, client=None, **SETTINGS)
+    np.save(tmp_path / "scan.npy", scan.heights)
+    ran = run("precompute", tmp_path / "scan.npy", "--pixel-size", PIXEL, "--workers", 2)
+    assert ran.code == 2
+    assert "--windows" in ran.err.splitlines()[-1]
+
+
+def test_the_command_builds_the_same_table_on_one_worker(scan, alone, run, tmp_path, monkeypatch):  # noqa: F811
+    monkeypatch.chdir(tmp_path)
+    np.save("scan.npy", scan.heights)
+    ran = run(
+        "precompute", "scan.npy", "--pixel-size", PIXEL, "--coherence-width", 6, "--tolerance",
+        0.02, "--wavelength-range", 500, 600, "--windows", "auto", "--workers", 1,
+        "--json", "out.json",
+    )  # fmt: skip
+    assert ran.code == 0, ran
+    assert "tasks of windows" in ran.out
+    assert DiffractionTable.load("scan.exr").digest() == alone.digest()
+    assert json.loads((tmp_path / "out.json").read_text())["workers"]["tasks"] > 10
