@@ -159,6 +159,10 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     if coat is not None and not isinstance(material, Perfect):
         flat = UnderCoat(material, coat)
     boundary = _boundary(props, reflectance, table)
+    conserving, through = _flag(props, "energy_conserving", True), None
+    if passing is not None:
+        thin = _flag(props, "thin", False)
+        through = Through(passing, boundary, thin, table if conserving else None)
     return Parameters(
         table=table,
         places=_places(props, table),
@@ -168,14 +172,12 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
         boundary=boundary,
         orientation=_orientation(props),
         height_scale=height_scale,
-        energy_conserving=_flag(props, "energy_conserving", True),
+        energy_conserving=conserving,
         vcavity=_choice(props, "shadowing", SHADOWINGS) == "vcavity",
         layering=_layering(props, flat, nested is not None),
         wavelength=wavelength,
         nested=nested,
-        through=None
-        if passing is None
-        else Through(passing, boundary, _flag(props, "thin", False)),
+        through=through,
         optical=optical,
     )
 

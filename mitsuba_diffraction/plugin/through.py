@@ -15,9 +15,12 @@ from typing import TYPE_CHECKING
 import drjit as dr
 import mitsuba as mi
 
+from ..tables.energy.sides import largest_sum
+from ..tables.table import DiffractionTable
 from .boundary import LEVEL, Boundary, Jones, Kirchhoff, SmallSlope, turn, turned
 from .coat import CoatedPair, transmittances
 from .crossing import Crossing, Sides, Turned
+from .film import plain
 from .fresnel import root, squared
 from .pair import Pair, Place, from_patch
 from .reflectance import Dielectric, Inside
@@ -50,16 +53,37 @@ class Through:
     material : of the surface.
     boundary : of light from above; the one of light from within follows.
     thin : whether below is beyond the flat side of a sheet.
+    conserving : the table, of which no direction within 75° of the normal is to gain energy.
     """
 
-    def __init__(self, material: Dielectric, boundary: Boundary, thin: bool) -> None:
-        self.material, self.thin = material, thin
+    def __init__(
+        self,
+        material: Dielectric,
+        boundary: Boundary,
+        thin: bool,
+        conserving: DiffractionTable | None,
+    ) -> None:
+        self.material, self.thin, self.conserving = material, thin, conserving
+        self._kept = mi.Float(1.0)
         self.boundary = boundary
         within = Inside(material, thin)
         self.below: Boundary = (
             boundary.of(within) if isinstance(boundary, SmallSlope) else Kirchhoff(within)
         )
         self.mirror = Kirchhoff(material)
+
+    def update(self, height_scale: Float) -> None:
+        """Divide by the largest R + T at this height scale and index, if that is above 1."""
+        if self.conserving is None:
+            return
+        scale, index = plain(dr.max(height_scale)), plain(self.material.eta)
+        state = max(round(scale, 2), 0.01), round(index, 2)
+        known: dict[object, float] = self.conserving.__dict__.setdefault("_sums", {})
+        key = *state, str(self.boundary), self.thin
+        if key not in known:
+            known[key] = largest_sum(self.conserving, *state, str(self.boundary), self.thin)
+        self._kept = mi.Float(1.0 / max(known[key], 1.0))
+        dr.make_opaque(self._kept)
 
     def flags(self) -> list[int]:
         """Of reflection and of transmission."""
@@ -92,7 +116,7 @@ class Through:
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
             orders = bsdf.power.density(crossing, bsdf.height_scale, si) * dr.square(out)
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
-        return value, density
+        return value if self.conserving is None else value * self._kept, density
 
     def sample(
         self,

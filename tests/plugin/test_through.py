@@ -154,6 +154,15 @@ def test_of_gentle_surfaces_both_sides_add_up_to_all_light(some_variant, kind):
             assert weights[reflected].sum() / len(weights) == pytest.approx(expected, abs=0.01)
 
 
+def test_energy_is_conserved_where_the_model_gains(some_variant):
+    grating = md.gratings.sinusoidal(2.5, 0.08, periods=8, pixels_per_period=28)
+    common = {"field": grating, "coherence_width": 20.0, **SIDES["dielectric"]}
+    raw, conserved = (sampled(both(energy_conserving=e, **common), 60.0)[0] for e in (False, True))
+    error = 3 * raw.std() / np.sqrt(len(raw))
+    assert raw.mean() > 1.0 + error
+    assert 0.97 < conserved.mean() < 1.0 + error
+
+
 @pytest.mark.parametrize("kind", SIDES)
 def test_of_a_component_alone_there_is_that_share_of_the_whole(some_variant, kind):
     wi, wo, lam = (a[:40] for a in pairs())
