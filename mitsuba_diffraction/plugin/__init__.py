@@ -30,6 +30,7 @@ film            a thin film that follows the heights
 through         both sides of a dielectric or of a thin sheet
 crossing        pairs of directions that are not both above
 layers          how much light reaches what lies beneath
+height_scale    how heights vary over the surface
 orientation     how the patch is turned in the tangent plane
 memory          arrays in the variant's memory, and reading them
 """

@@ -40,8 +40,11 @@ orientation : float or texture ∂ [0]
     which are (cos, sin) of that angle. Tangents follow UV coordinates: on a mesh without them they
     are arbitrary, and turn from triangle to triangle. A BSDF cannot see that; `info MESH` and
     `render` warn.
-height_scale : float ∂ [1]
-    Multiplies the heights, up to 1.5 × max(1, value given).
+height_scale : float or texture ∂ [1]
+    Multiplies the heights, up to 1.5 × max(1, value given); or, worn and fresh places: a raw bitmap
+    or another texture or mesh attribute of one channel.
+height_scale_max : float [of a bitmap]
+    The largest factor of such a texture, which all but bitmaps need; larger ones are taken for it.
 
 The table
 ---------
@@ -196,6 +199,7 @@ from .boundary import Boundary, Kirchhoff
 from .changing import Bounded, arrays_within, marks
 from .coat import CoatedPair
 from .energy import EnergyModel
+from .height_scale import LEAST_SCALE, Varying
 from .layers import Transmission
 from .llvm import require_loaded_llvm
 from .pair import Pair, from_patch, in_patch, vcavity
@@ -218,8 +222,6 @@ from .roles import (
 from .sampling import EVEN, direction_of, with_even_share
 from .sources import TableProvider, from_cache
 
-#: Flatter would be lost in single precision.
-_LEAST_SCALE = 1e-30
 #: The component of a context that asks for all of them.
 _ALL = 0xFFFFFFFF
 
@@ -238,14 +240,7 @@ class Diffraction(mi.BSDF):
         self.mirror = Kirchhoff(self.coat) if self.coat is not None else None
         self.nested: BSDF = parameters.nested  # or None
         self.through = parameters.through
-        self._scale = Bounded(
-            "height_scale",
-            parameters.height_scale,
-            _LEAST_SCALE,
-            self.table.height_scale_max / parameters.optical,
-            self._scale_refusal,
-        )
-        self.height_scale = self._scale.value
+        self._set_height_scale(parameters.height_scale, parameters.optical)
         self.orientation = parameters.orientation
         self.layering = parameters.layering
         self.vcavity = parameters.vcavity
@@ -267,6 +262,17 @@ class Diffraction(mi.BSDF):
         self.m_flags = functools.reduce(operator.or_, components)
         self.parameters_changed([])
 
+    def _set_height_scale(self, given: float | Varying, optical: float) -> None:
+        """A bounded number; or factors that vary, of which `height_scale` is the largest."""
+        if isinstance(given, Varying):
+            self._scale: Varying | Bounded = given
+            self._varying: Varying | None = given
+            self.height_scale: Float = mi.Float(given.high)
+            return
+        most = self.table.height_scale_max / optical
+        bounded = Bounded("height_scale", given, LEAST_SCALE, most, self._scale_refusal)
+        self._scale, self._varying, self.height_scale = bounded, None, bounded.value
+
     # ------------------------------------------------------------------ Mitsuba's interface
 
     def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
@@ -278,7 +284,7 @@ class Diffraction(mi.BSDF):
         value = mi.Spectrum(0.0)
         if above:
             pair = self._pair(si, wo, active)
-            power = self.power.power(pair, self.height_scale, si)
+            power = self.power.power(pair, self.scale_at(si, active), si)
             value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
         if nested is not None:
             beneath = mi.Spectrum(self._beneath(si, wo, active))
@@ -294,7 +300,7 @@ class Diffraction(mi.BSDF):
         density = mi.Float(0.0)
         if above:
             pair = self._pair(si, wo, active).outer
-            density = with_even_share(self.power.density(pair, self._drawing_scale, si))
+            density = with_even_share(self.power.density(pair, self._drawing_scale(si, active), si))
         if nested is not None:
             beneath = self.nested.pdf(nested, si, wo, active)
             density = dr.lerp(beneath, density, self._glossy_share(above, si, active))
@@ -311,7 +317,7 @@ class Diffraction(mi.BSDF):
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         if above:
             pair = self._pair(si, wo, active)
-            scales = self.height_scale, self._drawing_scale
+            scales = self.scale_at(si, active), self._drawing_scale(si, active)
             power, orders = self.power.both(pair, *scales, si)
             density = with_even_share(orders)
             value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
@@ -402,16 +408,24 @@ class Diffraction(mi.BSDF):
         if self._energy is not None:
             largest = dr.slice(dr.max(dr.detach(self.height_scale)))
             beneath = self.nested is not None and isinstance(self.layering, Transmission)
-            self._energy.update(largest, dr.grad_enabled(self.height_scale), beneath)
+            lowest = self._varying.range()[0] if self._varying else None
+            self._energy.update(largest, dr.grad_enabled(self.height_scale), beneath, lowest)
         if self.through is not None:
             self.through.update(self.height_scale)
         held = arrays_within(
-            self.power, self._energy, self.orientation, self.fresnel, self.boundary, self.mirror,
+            self.power,
+            self._energy,
+            self.orientation,
+            self.fresnel,
+            self.boundary,
+            self.mirror,
             self.through,
-        )  # fmt: skip
+            self._varying,
+        )
         self._for_freezing = held + marks(
             self.table,
             str(self.places),
+            str(self._varying),
             self.vcavity,
             str(self.layering),
             str(self.boundary),
@@ -445,6 +459,13 @@ class Diffraction(mi.BSDF):
             f"height_scale={height_scale:g} is outside what the table serves, above 0 and up to "
             f"{self._scale.high:g}; load the plugin anew with that height_scale"
         )
+
+    @property
+    def only_traced(self) -> str | None:
+        """What it has that only the path tracer shows."""
+        if self.places is not None:
+            return "coherence='surface'"
+        return "a height_scale that varies" if self._varying else None
 
     @property
     def energy_conserving(self) -> bool:
@@ -484,7 +505,7 @@ class Diffraction(mi.BSDF):
             f"  tolerance = {self.table.tolerance:g},\n"
             f"  surface = {self.fresnel},\n"
             f"  model = {self.boundary},\n"
-            f"  height_scale = {dr.slice(self.height_scale):g},\n"
+            f"  height_scale = {self._varying or f'{dr.slice(self.height_scale):g}'},\n"
             f"  energy_conserving = {'true' if self.energy_conserving else 'false'},\n"
             f"  orientation = {self.orientation},\n"
             f"{self._sides()}"
@@ -530,7 +551,7 @@ class Diffraction(mi.BSDF):
             outside *= pair.outer.cos_o * dr.rcp(pair.cos_o)
         if self.vcavity:
             outside *= vcavity(pair.cos_i, pair.cos_o, pair.one_plus_dot)
-        wavenumbers, scale = self.power.wavenumbers(si), self.height_scale
+        wavenumbers, scale = self.power.wavenumbers(si), self.scale_at(si, active)
         if power is None:
             power = self.power.power(pair, scale, si)
         factor = boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)
@@ -553,17 +574,21 @@ class Diffraction(mi.BSDF):
         ratios = mi.UnpolarizedSpectrum(1.0), mi.UnpolarizedSpectrum(1.0)
         if self._energy is not None and isinstance(self.layering, Transmission):
             rotation = self.orientation.rotation(si, active)
-            k, scale = self.power.wavenumbers(si), self.height_scale
+            k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
             ratios = tuple(
                 self._energy.reflected(in_patch(d, rotation), mi.Frame3f.cos_theta(d), k, scale)
                 for d in (si.wi, wo)
             )
         return self.layering.beneath(si, wo, active, ratios)
 
-    @property
-    def _drawing_scale(self) -> Float:
+    def scale_at(self, si: Interaction, active: Mask) -> Float:
+        """The factor on the heights at points of the surface."""
+        return self._varying.at(si, active) if self._varying else self.height_scale
+
+    def _drawing_scale(self, si: Interaction, active: Mask) -> Float:
         """What directions are drawn for: under a coat κ is as if heights were larger."""
-        return self.height_scale if self.coat is None else self.height_scale * self.coat.eta
+        scale = self.scale_at(si, active)
+        return scale if self.coat is None else scale * self.coat.eta
 
     def _pair(self, si: Interaction, wo: Vector3f, active: Mask) -> Pair:
         pair = Pair(si, wo, self.orientation.rotation(si, active), active)
@@ -589,7 +614,7 @@ class Diffraction(mi.BSDF):
         """A direction, possibly below the surface (then it has no density and no value)."""
         uv = self.power.draw(
             mi.Frame3f.cos_theta(si.wi),
-            dr.detach(self._drawing_scale),
+            dr.detach(self._drawing_scale(si, active)),
             dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
             sample2,
             si,

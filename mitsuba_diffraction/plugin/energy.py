@@ -77,23 +77,33 @@ class EnergyModel:
         self._scale = _Lookup()
         self._reflected = _Lookup()
 
-    def update(self, height_scale: float, differentiable: bool, beneath: bool) -> None:
+    def update(
+        self,
+        height_scale: float,
+        differentiable: bool,
+        beneath: bool,
+        lowest: float | None = None,
+    ) -> None:
         """Look up, or compute, what belongs to another height scale or material.
 
         beneath : whether light goes on to something.
+        lowest : where height scales vary, the least of them; then height_scale is the largest.
         """
         if not (self.conserving or beneath):
             return
-        nodes = self._energy.nodes(height_scale, interval=differentiable)
+        if lowest is None:
+            nodes = list(self._energy.nodes(height_scale, interval=differentiable))
+        else:
+            nodes = self._energy.between(lowest, height_scale)
         found = [self._energy.at(node) for node in nodes]
         if self.conserving:
             scales = _scales_of(found)
             self._warn(found)
             self._fades = self._kirchhoff and (scales is None or scales[0].grating is None)
-            self._scale.update(scales, nodes, height_scale)
+            self._scale.update(scales, nodes, height_scale, lowest is not None)
         if beneath:
             ratios = [self._ratio(one) for one in _alike([one.albedo for one in found])]
-            self._reflected.update(ratios, nodes, height_scale)
+            self._reflected.update(ratios, nodes, height_scale, lowest is not None)
 
     def _warn(self, found: list[Conservation]) -> None:
         """Say once that much is taken of a real material."""
@@ -142,7 +152,8 @@ class EnergyModel:
     def factor(self, pair: Pair, wavenumbers: list[Float], height_scale: Float) -> Colour:
         """s(ωi) s(ωo), and for Kirchhoff's model `tables.energy.gain.fade`, per channel.
 
-        height_scale : the one given to `update`; needed where derivatives with respect to it are.
+        height_scale : the one given to `update`; needed where derivatives with respect to it are,
+            and where it varies.
         """
         both = zip(
             self._scale.at(pair.incident, pair.cos_i, wavenumbers, height_scale),
@@ -193,7 +204,8 @@ class _Lookup:
     def __init__(self) -> None:
         self.present = False
         self._values: Buffer = None
-        self._ends: tuple[Buffer, Buffer] = (None, None)
+        self._nodes: Buffer = None
+        self._last, self._varies = 0, False
         self._low, self._slope = mi.Float(0.0), mi.Float(0.0)
         self._first, self._pages_per_log = mi.Float(0.0), mi.Float(0.0)
         self._pages = self._polar = self._azimuthal = 1
@@ -202,20 +214,23 @@ class _Lookup:
     def update(
         self,
         tables: list[DirectionalTable] | None,
-        nodes: tuple[float, float],
+        nodes: list[float],
         height_scale: float,
+        varies: bool,
     ) -> None:
-        """Take the tables at two height scales, or none."""
+        """Take the tables at evenly spaced height scales, or none."""
         self.present = tables is not None
         if tables is None:
             return
         self._grating = None if mi.is_rgb else tables[0].grating
-        low, high = (_pages(table) for table in tables)
-        self._pages, self._polar, self._azimuthal = low.shape[:3]
-        width = nodes[1] - nodes[0]
-        share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
-        self._values = upload(mi.Float, low * (1 - share) + high * share)
-        self._ends = upload(mi.Float, low), upload(mi.Float, high)
+        maps = np.stack([_pages(table) for table in tables])
+        self._pages, self._polar, self._azimuthal = maps.shape[1:4]
+        self._last, self._varies = len(nodes) - 2, varies
+        width = (nodes[-1] - nodes[0]) / (len(nodes) - 1)
+        if not varies:
+            share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
+            self._values = upload(mi.Float, maps[0] * (1 - share) + maps[1] * share)
+        self._nodes = upload(mi.Float, maps)
         wavelengths = tables[0].wavelengths
         self._low = mi.Float(nodes[0])
         self._slope = mi.Float(1.0 / width if width > 0.0 else 0.0)
@@ -229,7 +244,7 @@ class _Lookup:
     ) -> list[Float]:
         """For each channel; tangential in the patch's frame."""
         share = None
-        if dr.grad_enabled(height_scale):
+        if self._varies or dr.grad_enabled(height_scale):
             share = (height_scale - self._low) * self._slope
         if self._grating is None:
             at = self._cell(*self._place(tangential, cosine))
@@ -267,11 +282,18 @@ class _Lookup:
         return i * self._azimuthal + j, s, t
 
     def _corners(self, cell: Index, share: Float | None) -> list[Float]:
-        """Values at a cell's corners; interpolated here only where a derivative is wanted."""
+        """Values at a cell's corners; interpolated here only where they vary or a derivative is
+        wanted.
+
+        share : of the way to the second node, or the number of one and the share of the way on.
+        """
         if share is None:
             return read_record(self._values, cell, 4)
-        low, high = (read_record(end, cell, 4) for end in self._ends)
-        return [dr.lerp(*ends, share) for ends in zip(low, high, strict=True)]
+        lower = index_between(dr.floor(share), 0.0, float(self._last))
+        size = self._pages * self._polar * self._azimuthal
+        cell = cell + mi.UInt32(lower) * size
+        ends = (read_record(self._nodes, at, 4) for at in (cell, cell + size))
+        return [dr.lerp(*both, share - lower) for both in zip(*ends, strict=True)]
 
 
 def _chain(grating: Grating, tangential: Vector2f, wavenumber: Float) -> tuple[Float, Float]:

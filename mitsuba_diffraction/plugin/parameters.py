@@ -21,6 +21,7 @@ from ..tables.table import DiffractionTable
 from .boundary import MODELS, Boundary, Kirchhoff, SmallSlope
 from .coat import UnderCoat
 from .film import COHERENCE, LEAST_THROUGH, UnderFilm
+from .height_scale import Varying
 from .layers import LAYERINGS, Blend, Layering, Transmission
 from .orientation import Constant, Orientation, Textured
 from .pair import SHADOWINGS
@@ -64,6 +65,7 @@ NAMES = (
     "model",
     "orientation",
     "height_scale",
+    "height_scale_max",
     "wavelength",
     "energy_conserving",
     "shadowing",
@@ -86,7 +88,7 @@ class Parameters:
     coat : the clear layer over the structure, or None.
     boundary : what the material makes of the light, by model.
     orientation : from the first tangent to the patch's x axis.
-    height_scale : factor on all heights.
+    height_scale : factor on all heights, or how it varies.
     energy_conserving : whether to divide by a bound of the albedo.
     vcavity : whether the surface shadows itself like V-shaped grooves.
     layering : how diffraction and the nested BSDF share the light.
@@ -103,7 +105,7 @@ class Parameters:
     coat: Dielectric | None
     boundary: Boundary
     orientation: Orientation
-    height_scale: float
+    height_scale: float | Varying
     energy_conserving: bool
     vcavity: bool
     layering: Layering
@@ -133,9 +135,7 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
             f"the nested BSDF {_kind(nested)} lets light through, which would be lost beneath; "
             "nest one that only reflects"
         )
-    height_scale = _number(props, "height_scale", 1.0)
-    if not 0.0 < height_scale <= 1e3:
-        raise DiffractionError(f"height_scale={height_scale:g} must be above 0 and at most 1000")
+    height_scale = _height_scale(props)
     coat = _coat(props)
     material = _reflectance(props, coat)
     if nested is not None and isinstance(material, Perfect | Conductor):
@@ -147,7 +147,8 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     # κ grows by the coat's index, or in a dielectric by its own, as if heights did
     medium = coat or passing
     optical = 1.0 if medium is None else float(dr.slice(medium.eta))
-    table, heights = _table(props, height_scale * optical, provider)
+    largest = height_scale.high if isinstance(height_scale, Varying) else height_scale
+    table, heights = _table(props, largest * optical, provider)
     wavelength = _wavelength(props, table)
     reflectance = _under_film(props, material, wavelength, table.wavelength_range[0])
     if nested is not None and isinstance(reflectance, UnderFilm) and reflectance.numbers()[0].imag:
@@ -180,6 +181,19 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
         through=through,
         optical=optical,
     )
+
+
+def _height_scale(props: Properties) -> float | Varying:
+    given = dict(props.objects()).get("height_scale")
+    most = _number(props, "height_scale_max", math.nan) if "height_scale_max" in props else None
+    if isinstance(given, mi.Texture):
+        return Varying(given, most)
+    if most is not None:
+        raise DiffractionError("height_scale_max is for a height_scale that is a texture")
+    number = _number(props, "height_scale", 1.0)
+    if not 0.0 < number <= 1e3:
+        raise DiffractionError(f"height_scale={number:g} must be above 0 and at most 1000")
+    return number
 
 
 def _table(

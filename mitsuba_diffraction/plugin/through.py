@@ -114,7 +114,8 @@ class Through:
             found = self._passed(bsdf, ctx, si, crossing) * dr.abs(cos_o)
             value = dr.select(lit, found, value)
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
-            orders = bsdf.power.density(crossing, bsdf.height_scale, si) * dr.square(out)
+            scale = bsdf.scale_at(si, active)
+            orders = bsdf.power.density(crossing, scale, si) * dr.square(out)
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
         return value if self.conserving is None else value * self._kept, density
 
@@ -145,7 +146,7 @@ class Through:
         cosine = dr.abs(cos_i)
         drawn = bsdf.power.draw(
             dr.select(reflected, cosine, sides.cosine(cosine, n, down, self.thin)),
-            dr.detach(bsdf.height_scale * dr.select(reflected & (cos_i < 0.0), n, 1.0)),
+            dr.detach(bsdf.scale_at(si, active) * dr.select(reflected & (cos_i < 0.0), n, 1.0)),
             dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
             sample2,
             si,
@@ -179,12 +180,12 @@ class Through:
         front: bool,
     ) -> tuple[Spectrum, Float]:
         """Value and density of light that stays on one side."""
-        n, scale = self.material.eta, bsdf.height_scale
+        n, scale = self.material.eta, bsdf.scale_at(si, lit)
         if front:
             pair = Pair(si, wo, rotation, lit)
             value = bsdf.lobe(ctx, si, pair, self.boundary, lit)
             if self.thin:
-                value += self._returned(bsdf, si, pair)
+                value += self._returned(bsdf, si, pair, scale)
             density = bsdf.power.density(pair, scale, si)
             return value, with_even_share(density)
         if self.thin:
@@ -201,7 +202,7 @@ class Through:
         density = bsdf.power.density(inner, scale * n, si) * dr.square(n)
         return value, with_even_share(density)
 
-    def _returned(self, bsdf: Diffraction, si: Interaction, pair: Pair) -> Spectrum:
+    def _returned(self, bsdf: Diffraction, si: Interaction, pair: Pair, scale: Float) -> Spectrum:
         """f·cosθo of what the flat side of a sheet sends back through the structure."""
         n = self.material.eta
         ends, kept = [], []
@@ -211,7 +212,7 @@ class Through:
             # T² R/(1 − R²) of each polarisation
             kept.append(0.5 * sum(t * (1.0 - t) * dr.rcp(2.0 - t) for t in passed))
         place = Place(pair.uv, dr.sqrt(dr.fma(ends[0], ends[0], dr.square(ends[1]))))
-        power = bsdf.power.power(place, bsdf.height_scale, si)
+        power = bsdf.power.power(place, scale, si)
         factor = bsdf.area_factor * dr.safe_sqrt(kept[0] * kept[1]) * pair.cos_o
         return mi.Spectrum(power * factor)
 
@@ -219,9 +220,11 @@ class Through:
         self, bsdf: Diffraction, ctx: Context, si: Interaction, crossing: Crossing
     ) -> Spectrum:
         """BSDF of light that goes through, as the mode of transport has it."""
-        place, scale = crossing.place, bsdf.height_scale
+        place, scale = crossing.place, bsdf.scale_at(si, crossing.active)
         power = bsdf.power.power(place, scale, si)
-        factors = [self._power(crossing, jones) for jones in self._matrices(bsdf, si, crossing)]
+        factors = [
+            self._power(crossing, jones) for jones in self._matrices(bsdf, si, crossing, scale)
+        ]
         factor = mi.UnpolarizedSpectrum(factors if len(factors) > 1 else factors[0])
         outside = bsdf.area_factor * crossing.n * dr.rcp(dr.square(place.w) * crossing.q0)
         outside *= dr.rcp(-crossing.inside.z)
@@ -234,7 +237,9 @@ class Through:
             outside *= dr.select(down, *scales)
         return mi.Spectrum(dr.select(crossing.active, power * factor * outside, 0.0))
 
-    def _matrices(self, bsdf: Diffraction, si: Interaction, crossing: Crossing) -> list[Jones]:
+    def _matrices(
+        self, bsdf: Diffraction, si: Interaction, crossing: Crossing, scale: Float
+    ) -> list[Jones]:
         """2 cosθi cosθt times the Jones matrices of light from above, of each channel or of all."""
         axes = _axes(-crossing.above, crossing.inside)
         tangent = _tangent(crossing, axes)
@@ -242,7 +247,7 @@ class Through:
             return [tangent]
         first = _first_order(crossing, axes, self.thin)
         shares = self.boundary.shares(
-            crossing.place, bsdf.height_scale, bsdf.power.wavenumbers(si), [crossing.n]
+            crossing.place, scale, bsdf.power.wavenumbers(si), [crossing.n]
         )
         return [
             tuple(b + (k - b) * share for k, b in zip(tangent, first, strict=True))

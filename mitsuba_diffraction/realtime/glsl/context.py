@@ -121,10 +121,20 @@ def compile_program(
         raise DiffractionError(f"the driver cannot compile method {method}: {words}") from None
 
 
-def compile_plain(context: Any, vertex: str, fragment: str) -> Any:
-    """A program of two files that know neither surfaces nor tables."""
+def compile_plain(
+    context: Any,
+    vertex: str,
+    fragment: str,
+    shared: Sequence[str] = (),
+    definitions: Mapping[str, str] | None = None,
+) -> Any:
+    """A program of two files that know neither surfaces nor tables.
+
+    shared, definitions : of the fragment stage, as of `source.plain_source`.
+    """
     return context.program(
-        vertex_shader=plain_source(vertex), fragment_shader=plain_source(fragment)
+        vertex_shader=plain_source(vertex),
+        fragment_shader=plain_source(fragment, shared, definitions),
     )
 
 

@@ -184,7 +184,7 @@ def _kind(session: Session) -> type[BSDF]:
         ) -> Spectrum:
             value = super().diffracted(ctx, si, pair, power, active)
             light = mi.unpolarized_spectrum(value)
-            session.record(self, si, pair.uv, pair.w * self.height_scale, light)
+            session.record(self, si, pair.uv, pair.w * self.scale_at(si, active), light)
             return value
 
     return RecordedDiffraction

@@ -69,10 +69,7 @@ class Energy:
 
         interval : two nodes even if the scale is at one, for derivatives.
         """
-        phase = 2.0 * self.table.q_limit * self.table.expansion.half_range
-        steps = max(_FEWEST_STEPS, math.ceil(phase / _PHASE))
-        # Beyond the table's own limit nothing can be looked up, so the last interval is shorter
-        most = max(self.table.height_scale_max, _FLAT)
+        steps, most = self._lattice
 
         def node(n: int) -> float:
             return min(max(n / steps, _FLAT), most)
@@ -81,6 +78,21 @@ class Energy:
         lower = min(math.floor(position + 1e-4), math.ceil(most * steps - 1e-4) - 1)
         at_node = abs(position - lower) < 1e-4
         return node(lower), node(lower if at_node and not interval else lower + 1)
+
+    @property
+    def _lattice(self) -> tuple[int, float]:
+        """Height scales a unit, and the largest."""
+        phase = 2.0 * self.table.q_limit * self.table.expansion.half_range
+        # Beyond the table's own limit nothing can be looked up, so the last interval is shorter
+        most = max(self.table.height_scale_max, _FLAT)
+        return max(_FEWEST_STEPS, math.ceil(phase / _PHASE)), most
+
+    def between(self, low: float, high: float) -> list[float]:
+        """Height scales at even distances, as close together, for all between two."""
+        steps, most = self._lattice
+        first = max(math.floor(low * steps) / steps, _FLAT)
+        last = min(math.ceil(high * steps) / steps, most)
+        return np.linspace(first, last, 1 + max(1, math.ceil((last - first) * steps))).tolist()
 
     def at(self, height_scale: float) -> Conservation:
         """From memory, from disk, or computed."""

@@ -82,6 +82,14 @@ def test_rows_have_periods_to_a_percent_and_directions_to_a_degree(survey, tmp_p
     assert (tmp_path / "out" / "sheet.png").is_file()
 
 
+def test_a_table_that_cannot_be_mapped_is_a_row_with_its_reason(scans, tmp_path):
+    own = Treatment(settings={**SMALL, "wavelength_range": (500.0, 600.0)})
+    options = treatments_of(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'))
+    (row,) = run_survey(scans[:1], tmp_path / "out", treatments=options, own=own, resolution=8)
+    assert row["reason"].startswith("cannot map it: ")
+    assert "starts at 500 nm" in row["reason"]
+
+
 def test_a_second_run_does_only_what_is_new(survey, scans, monkeypatch):
     first = survey()
     measured = []
