@@ -108,6 +108,8 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
             pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)
         if _is_filmed(bsdf.fresnel):
             omissions.append(f"the thin film of {name}")
+        if bsdf.through is not None:
+            omissions.append(f"light that goes through {name}")
         return Material(
             pigment, two_sided, bsdf, _axis(bsdf.orientation), bumps=bumps, normals=normals
         )
