@@ -312,7 +312,7 @@ def colour_map(texture: Any, light: Spectrum) -> Map:
     found = _lit(texture, uv, light) if mi.is_spectral else _evaluated(texture, uv, np.zeros(3))
     if width * height == 1:
         return Map(found[0].astype(float))
-    clamped = _clamps(lambda uv: _evaluated(texture, uv, np.full(3, 550.0)), to_uv)
+    clamped = _clamps(lambda uv: _evaluated(texture, uv, np.full(4, 550.0)), to_uv)
     return Map(np.ones(3), found.reshape(height, width, 3), to_uv, clamped=clamped)
 
 
