@@ -106,7 +106,7 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
         pigment = Map(np.zeros(3))
         if bsdf.nested is not None:
             pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)
-        if _is_filmed(bsdf.fresnel):
+        if is_filmed(bsdf.fresnel):
             omissions.append(f"the thin film of {name}")
         if bsdf.through is not None:
             omissions.append(f"light that goes through {name}")
@@ -193,7 +193,7 @@ def pack_surface(material: Material) -> Packed:
         definitions["COATED"] = ""
         uniforms["coat"] = coat_index(material)
         uniforms["channel_wavenumbers"] = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
-    elif _is_filmed(surface):
+    elif is_filmed(surface):
         surface = surface.material
     if isinstance(bsdf.boundary, SmallSlope):
         packed |= pack_roughness(material.table.roughness)
@@ -263,7 +263,8 @@ def _is_bsdf(thing: Any) -> bool:
     return isinstance(thing, mi.BSDF)
 
 
-def _is_filmed(surface: Any) -> bool:
+def is_filmed(surface: Any) -> bool:
+    """Whether a thin film lies over the structure, which shaders do not know."""
     from ...plugin.film import UnderFilm  # which only a variant has
 
     return isinstance(surface, UnderFilm)
