@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,8 +22,13 @@ VARIANTS = ("llvm_ad_spectral", "cuda_ad_spectral")
 
 @pytest.fixture(scope="session", autouse=True)
 def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The cache of tables, for this session alone: tests never touch the user's."""
-    folder = tmp_path_factory.mktemp("cache")
+    """The cache of tables, for this session alone: tests never touch the user's.
+
+    Workers share it, for the tables of the measured patches above all.
+    """
+    root = tmp_path_factory.getbasetemp()
+    folder = (root.parent if "PYTEST_XDIST_WORKER" in os.environ else root) / "cache"
+    folder.mkdir(exist_ok=True)
     before = os.environ.get(VARIABLE)
     os.environ[VARIABLE] = str(folder)
     yield folder
@@ -29,6 +36,23 @@ def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         del os.environ[VARIABLE]
     else:
         os.environ[VARIABLE] = before
+
+
+_imported = 0
+
+
+@pytest.fixture(autouse=True)
+def alone() -> None:
+    """Without the BSDFs of earlier tests.
+
+    A kernel that calls BSDFs holds the code of all there are: with those of a few tests it takes
+    ten times as long to compile, and it is another one whenever tests run in another order.
+    """
+    global _imported
+    gc.collect()
+    if len(sys.modules) > _imported:  # modules stay: later collections need not look at them
+        _imported = len(sys.modules)
+        gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)

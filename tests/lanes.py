@@ -11,11 +11,21 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_diffraction.plugin.memory import upload
+
+
+def lanes(values: ArrayLike) -> Any:
+    """mi.Float of numbers (n,), in Dr.Jit's own memory.
+
+    NumPy's is aligned by chance, and kernels that read it differ by that: they would be compiled
+    again in every run instead of being found in Dr.Jit's cache.
+    """
+    return upload(mi.Float, np.asarray(values, np.float32))
+
 
 def vectors(directions: ArrayLike) -> Any:
     """mi.Vector3f of directions (n, 3)."""
-    columns = np.atleast_2d(np.asarray(directions, np.float32)).T
-    return mi.Vector3f(*(mi.Float(np.ascontiguousarray(c)) for c in columns))
+    return mi.Vector3f(*map(lanes, np.atleast_2d(np.asarray(directions, np.float32)).T))
 
 
 def interaction(wi: ArrayLike, wavelengths: ArrayLike) -> Any:
@@ -26,7 +36,7 @@ def interaction(wi: ArrayLike, wavelengths: ArrayLike) -> Any:
     si.wi = vectors(directions)
     lam = np.asarray(wavelengths, np.float32)
     lam = np.broadcast_to(lam if lam.ndim == 2 else lam.reshape(-1, 1), (n, 4))
-    si.wavelengths = mi.Spectrum(*(mi.Float(np.ascontiguousarray(c)) for c in lam.T))
+    si.wavelengths = mi.Spectrum(*map(lanes, lam.T))
     si.sh_frame = mi.Frame3f(mi.Normal3f(0, 0, 1))
     return si
 

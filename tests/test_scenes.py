@@ -21,6 +21,8 @@ STUDIO = (
     "own_mesh",
     "scales",
     "scales_macro",
+    "film",
+    "spectrometer",
 )
 SMALL = {"spp": "4", "resx": "48", "resy": "40"}
 

@@ -21,9 +21,9 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="compare the realtime picture of a scene with the path-traced one",
         description=(
             "Render a scene by shaders and by path tracing, aligned to the pixel, and measure the "
-            "difference where both see the same lit surface. Lights with an extent are replaced "
-            "by points and directions in both: the sun of a sky by its direction. A second "
-            "path-traced picture, of the scene as it is, shows what realtime leaves out."
+            "difference: over all pixels in all direct light of the scene, and beside it in full "
+            "transport; and, as a detail, where both see the same lit surface under lights "
+            "without extent, by points and directions in place of the scene's."
         ),
     )
     add_scene(parser)
@@ -40,6 +40,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--full-spp", metavar="N", type=whole_number(0), default=64,
         help="samples per pixel of full transport; 0 leaves it out; default: 64",
+    )  # fmt: skip
+    parser.add_argument(
+        "--frames", metavar="N", type=whole_number(4), default=512,
+        help="of progressive light, in which lut and spectral are drawn; default: 512",
     )  # fmt: skip
     parser.add_argument(
         "--supersampling", metavar="N", type=whole_number(1), default=8,
@@ -73,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
         sensor_of(scene, args.sensor)
         comparison = Comparison(
             scene, str(args.scene), variant, folder, args.sensor, args.spp, args.full_spp,
-            args.supersampling, args.seed, bar,
+            args.frames // 4 * 4, args.supersampling, args.seed, bar,
         )  # fmt: skip
         found = comparison.run(METHODS if every else args.method, leave_out=every)
     found = {"scene": found["scene"], "parameters": parameters, **found}

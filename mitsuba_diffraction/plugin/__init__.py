@@ -25,7 +25,11 @@ places          where on the patch the window sits at a point of the surface
 energy          the bound of the albedo that conserves energy
 reflectance     of the surface itself: dielectric, conductor, mirror
 boundary        what the material makes of the light, with its polarisation
+fresnel         fields at an interface, or at both of a film
 coat            a clear coat over the structure
+film            a thin film that follows the heights
+through         both sides of a dielectric or of a thin sheet
+crossing        pairs of directions that are not both above
 layers          how much light reaches what lies beneath
 height_scale    how heights vary over the surface
 orientation     how the patch is turned in the tangent plane

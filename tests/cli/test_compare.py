@@ -43,7 +43,20 @@ def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_pictures_a_sheet_and_numbers_are_written(run, scene, some_variant, gl_works):
-    ran = run("compare", scene, "--method", "all", "-s", 64, "--full-spp", 2, "--supersampling", 2)
+    ran = run(
+        "compare",
+        scene,
+        "--method",
+        "all",
+        "-s",
+        64,
+        "--full-spp",
+        2,
+        "--supersampling",
+        2,
+        "--frames",
+        8,
+    )
     assert ran.code == 0, ran
     folder = Path("plate_compare")
     document = json.loads((folder / "compare.json").read_text())
@@ -54,6 +67,13 @@ def test_pictures_a_sheet_and_numbers_are_written(run, scene, some_variant, gl_w
             32,
             40,
         )
+        whole = entry["whole"]
+        # a directional light and no more: nothing of it is drawn at random but edges
+        assert whole["direct"]["pixels"] == 40 * 32
+        noise = document["whole_noise"]["delta_e_mean"] + whole["noise"]["delta_e_mean"]
+        assert whole["direct"]["delta_e_mean"] < 1.5 * noise + 0.5
+        assert whole["full"]["delta_e_mean"] > 0.0
+        assert whole["frame_ms"] > 0.0
         assert (folder / f"{method}.png").stat().st_size > 10_000
         both = entry["both"]
         assert both["pixels"] > 200

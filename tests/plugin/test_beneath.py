@@ -11,7 +11,7 @@ from mitsuba_diffraction.optics import fresnel
 from mitsuba_diffraction.tables.energy.conservation import DirectionalTable
 from mitsuba_diffraction.tables.store.energy import Energy
 from tests.directions import polar
-from tests.lanes import evaluated, interaction, spectra, vectors
+from tests.lanes import evaluated, interaction, lanes, spectra, vectors
 from tests.plugin.gentle import load, pairs
 
 
@@ -49,7 +49,7 @@ def test_over_a_white_base_no_light_is_gained_where_a_mirror_would_gain_none(var
     bsdf = load(flat, int_ior=1.5, white=white)
     n = 1 << 14
     rng = np.random.default_rng(4)
-    s1, s2 = mi.Float(rng.random(n).astype("f4")), mi.Point2f(*rng.random((2, n)).astype("f4"))
+    s1, s2 = lanes(rng.random(n)), mi.Point2f(*map(lanes, rng.random((2, n))))
     for theta in (0.0, 50.0):
         si = interaction(np.tile(polar(theta), (n, 1)), 550.0)
         _, weight = bsdf.sample(mi.BSDFContext(), si, s1, s2)

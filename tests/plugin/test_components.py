@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from tests.directions import polar
-from tests.lanes import refusal, vectors
+from tests.lanes import lanes, refusal, vectors
 from tests.plugin.gentle import load
 
 THETA = 35.0
@@ -79,7 +79,7 @@ def lit(n: int) -> Any:
 def sampled(bsdf, context, n=1 << 15) -> Sampled:
     rng = np.random.default_rng(4)
     si = lit(n)
-    s1, s2 = mi.Float(rng.random(n).astype("f4")), mi.Point2f(*rng.random((2, n)).astype("f4"))
+    s1, s2 = lanes(rng.random(n)), mi.Point2f(*map(lanes, rng.random((2, n))))
     drawn, weight = bsdf.sample(context, si, s1, s2)
     weights = np.array(weight[0], float)
     delta = np.array(mi.has_flag(drawn.sampled_type, FLAGS.Delta))

@@ -11,7 +11,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from tests.directions import Array, uniform_directions
-from tests.lanes import interaction, spectra, vectors
+from tests.lanes import interaction, lanes, spectra, vectors
 
 # a steep grating bends light further than the model likes; that is not the point here
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
@@ -133,7 +133,7 @@ def test_derivatives_of_pictures_are_those_of_differences(name, broad):
     }
     keys = {k: f"plate.bsdf.{k}" for k in at}
     # a sum in which every pixel has a weight of its own: what moves within the picture counts
-    weights = mi.TensorXf(np.random.default_rng(3).random((6, 6, 1), np.float32))
+    weights = mi.TensorXf(lanes(np.random.default_rng(3).random(36)), (6, 6, 1))
 
     def weighted(values: dict[str, float], differentiable: bool = False) -> Any:
         for key, value in values.items():

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import gc
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from tests.lanes import interaction, vectors
+from tests.lanes import interaction, lanes, vectors
 from tests.plugin.plates import (
     OTHER,
     PATCH,
@@ -26,12 +24,6 @@ from tests.plugin.plates import (
 
 # coarse pixels keep the tables small; that is not the point here
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
-
-
-@pytest.fixture(autouse=True)
-def alone() -> None:
-    """Without what earlier tests loaded, calls of which a recording would have to be given."""
-    gc.collect()
 
 
 @pytest.mark.parametrize("name", ["llvm_ad_rgb", "llvm_ad_mono", "cuda_ad_rgb"])
@@ -86,7 +78,7 @@ def test_frozen_eval_and_sample_follow_their_parameters(variant):
             wi, wo = pairs(seed=n)
             si, wo = interaction(wi, WAVELENGTHS), vectors(wo)
             rng = np.random.default_rng(n)
-            one = mi.Float(rng.random(300).astype(np.float32))
+            one = lanes(rng.random(300))
             two = mi.Point2f(rng.random((2, 300)).astype(np.float32))
             dr.eval(si, wo, one, two)
             expected = [*bsdf.eval_pdf(context, si, wo), *bsdf.sample(context, si, one, two)]

@@ -10,7 +10,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.plugin.restricted import device_table
 from tests.directions import polar, rough_patch, uniform_directions
-from tests.lanes import evaluated, interaction, refusal, vectors
+from tests.lanes import evaluated, interaction, lanes, refusal, vectors
 
 #: Of coarse pixels: small tables. The plugin warns of that, and this is not about that.
 PATCH = rough_patch((64, 64), (0.3, 0.3), 0.2)
@@ -49,7 +49,7 @@ def test_the_plugin_reads_what_numpy_reads_and_counts(variant, table):
     x, y, kappa = lookups(2000)
     device = device_table(table)
     device.take()
-    found = np.array(device.window_sum(mi.Float(x), mi.Float(y), mi.Float(kappa)))
+    found = np.array(device.window_sum(*map(lanes, (x, y, kappa))))
     expected = table.window_sum(x, y, kappa)
     # sums of float32 products: 1e-5 of the largest
     assert found == pytest.approx(expected, rel=1e-4, abs=1e-6 * expected.max())

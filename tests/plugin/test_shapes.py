@@ -10,6 +10,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.plugin.lookup import _UNROLLED_TAPS
 from mitsuba_diffraction.plugin.restricted import device_table
 from tests.directions import rough_patch
+from tests.lanes import lanes
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
 VARIANTS = ("scalar_spectral", "llvm_ad_mono", "llvm_ad_spectral")
@@ -45,7 +46,7 @@ def test_every_table_is_looked_up_as_numpy_does(seed):
         if name.startswith("scalar"):
             found = [device.window_sum(*map(float, q)) for q in zip(*asked, strict=True)]
         else:
-            found = np.array(device.window_sum(*(mi.Float(q.astype("f4")) for q in asked)))
+            found = np.array(device.window_sum(*map(lanes, asked)))
         # frequencies in single precision, over lobes that are 1/σ wide
         assert found == pytest.approx(expected, rel=2e-3, abs=2e-5 * expected.max()), name
 

@@ -123,6 +123,14 @@ PICTURES = (
         "The panes' spectra overlap; only beside the mullion and the frame are colours pure.",
     ),
     _scene(
+        "film", "A diffraction film before lamps",
+        "A thin sheet with shallow waves on one side (`thin`): every lamp between its spectra.",
+    ),
+    _scene(
+        "spectrometer", "A grating spectrometer",
+        "Lamp light through a slit and a clear grating, traced from the lamp: orders on a screen.",
+    ),
+    _scene(
         "material_ball", "A ball of any material",
         "To look at a patch of your own: `-D patch=\"$PWD/scale.exr\" -D material=Cr`. Here the "
         "sunbeam snake's relief in aluminium.",

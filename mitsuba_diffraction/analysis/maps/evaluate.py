@@ -13,6 +13,7 @@ from ...errors import DiffractionError
 from ...optics.colour import LONGEST, SHORTEST, check_illuminant, linear_srgb, response
 from ...optics.geometry import wavenumber
 from ...plugin.llvm import require_loaded_llvm
+from ...plugin.memory import upload
 from ...progress import Progress
 from ...tables.build.spectrum import NEAR
 from . import hemisphere
@@ -222,7 +223,7 @@ def _over_pixels(
     chunks = -(-rows.size // _PIXELS)
     for chunk in range(chunks):
         part = slice(chunk * _PIXELS, (chunk + 1) * _PIXELS)
-        x0, y0 = (mi.Float(low[index[part]].astype(np.float32)) for index in (columns, rows))
+        x0, y0 = (upload(mi.Float, low[index[part]]) for index in (columns, rows))
         si = dr.zeros(mi.SurfaceInteraction3f, dr.width(x0))
         si.n = mi.Normal3f(0.0, 0.0, 1.0)
         si.sh_frame = mi.Frame3f(si.n)

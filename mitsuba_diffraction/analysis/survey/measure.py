@@ -21,6 +21,7 @@ from ...heights.load import load_heights
 from ...heights.read import is_recipe
 from ...heights.recipes import Recipe
 from ...heights.spectra import dominant_periods
+from ...scene.mitsuba_text import error_of
 from ...settings import TableSettings
 from ...tables.build.build import build_with
 from ...tables.store.cache import cached_table
@@ -30,7 +31,7 @@ from .iridescence import colours_of, iridescence
 from .treatments import Treatment
 
 #: Raised whenever rows would differ.
-VERSION = 1
+VERSION = 2
 #: Gratings in a row.
 PERIODS = 3
 
@@ -125,7 +126,10 @@ def _measured(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
         file = Path(folder) / "table.exr"
         table.save(file)
         # ideal reflection: what the structure does, whatever it is made of
-        bsdf = mi.load_dict({"type": "diffraction", "table": str(file), "material": "none"})
+        try:
+            bsdf = mi.load_dict({"type": "diffraction", "table": str(file), "material": "none"})
+        except RuntimeError as error:
+            raise error_of("cannot map it", error) from error
         made = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
         content = file.read_bytes()
     row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}

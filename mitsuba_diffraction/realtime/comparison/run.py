@@ -14,15 +14,41 @@ from ...errors import DiffractionError, DiffractionWarning
 from ...progress import Progress, silent
 from ...scene.passes import Stop, render_passes
 from ...scene.pictures import write_exr
+from ..glsl.context import clock_of
 from ..glsl.source import THESIS_METHODS
 from ..glsl.timing import fragment_times
 from .measures import difference, exposure_of
 from .same_lights import SameLights
 from .sheet import write_sheet
-from .truth import box_sensor
+from .truth import box_sensor, direct_light
 
 #: Samples along either side of a pixel for the slow methods, whose own errors are far larger.
 _FEWER, _MOST = 2, 64
+_DETAIL = 1024  # samples per pixel at most, under lights without extent, which are quiet
+_STEP = 8  # frames between two looks at the clock
+
+
+@dataclass(frozen=True)
+class Halves:
+    """A picture as two of half of its samples each."""
+
+    first: Any
+    second: Any
+
+    @property
+    def mean(self) -> Any:
+        """The picture."""
+        return 0.5 * (self.first + self.second)
+
+    def noise(self, exposure: float) -> dict[str, float]:
+        """ΔE2000 between a picture and one without noise, over all pixels: mean and 99 %."""
+        everywhere = np.ones(self.first.shape[:2], bool)
+        apart = difference(self.first, self.second, everywhere, exposure)
+        # two halves of the samples differ by twice what their mean is off
+        return {
+            "delta_e_mean": 0.5 * apart.delta_e_mean,
+            "delta_e_99": 0.5 * apart.delta_e_percentiles["99"],
+        }
 
 
 @dataclass
@@ -37,6 +63,7 @@ class Comparison:
     folder : for pictures (EXR) and sheets (PNG); made when there is something to write.
     sensor : index of the camera.
     spp, full_spp : samples per pixel of the direct light and of full transport, which 0 leaves out.
+    frames : of progressive light, in which methods that are not the thesis' are drawn.
     supersampling : the shaders' samples along either side of a pixel.
     seed : of the random numbers.
     progress : called as progress(done, total, text).
@@ -49,6 +76,7 @@ class Comparison:
     sensor: int = 0
     spp: int = 1024
     full_spp: int = 64
+    frames: int = 512
     supersampling: int = 8
     seed: int = 0
     progress: Progress = silent
@@ -77,19 +105,29 @@ class Comparison:
         with Stop() as stop:
             direct = self.both.scene
             halves = [
-                self._traced(direct, direct.sensors()[0], self.spp // 2, seed, stop)
+                self._traced(direct, direct.sensors()[0], min(self.spp, _DETAIL) // 2, seed, stop)
                 for seed in (first, first + 1)
             ]
+            every = direct_light(self.scene, renderer.camera)
+            truth = Halves(
+                *(
+                    self._traced(every, every.sensors()[0], self.spp // 2, seed, stop)
+                    for seed in (first, first + 1)
+                )
+            )
             if self.full_spp:
                 sensor = box_sensor(renderer.camera)
                 full = self._traced(self.scene, sensor, self.full_spp, self.seed, stop)
         reference = 0.5 * (halves[0] + halves[1])
         exposure = exposure_of(reference)
         self._make_folder()
-        self._write(reference, "direct", self.spp)
+        self._write(truth.mean, "direct", self.spp)
         if full is not None:
             self._write(full, "full", self.full_spp)
-        table, compared = self._drawn(suited, reference, full, exposure)
+        table, compared = self._drawn(suited, reference, exposure)
+        for method in suited:
+            if method not in THESIS_METHODS:
+                table[method]["whole"] = self._whole(method, truth, full)
         noise = difference(halves[0], halves[1], compared, exposure)
         everywhere = np.ones(reference.shape[:2], bool)
         return {
@@ -99,9 +137,11 @@ class Comparison:
             "not_shown": list(renderer.scene.omissions),
             # two halves of the samples differ by twice what their mean is off
             "noise_delta_e_mean": 0.5 * noise.delta_e_mean,
+            "whole_noise": truth.noise(exposure_of(truth.mean)),
+            "frames": self.frames,
             "full_transport": None
             if full is None
-            else difference(full, reference, everywhere, exposure),
+            else difference(full, truth.mean, everywhere, exposure_of(full)),
             "methods": table,
         }  # fmt: skip
 
@@ -117,8 +157,40 @@ class Comparison:
             return False
         return True
 
+    def _whole(self, method: str, truth: Halves, full: Any) -> dict[str, Any]:
+        """All pixels in progressive light, against all direct light and against full transport."""
+        renderer = self.both.renderer
+        light, clock = renderer.progressive(method), clock_of(renderer.driver)
+        light.advance(2)  # compiles
+        light.restart()
+        halves, start = [], clock()
+        for half in range(2):
+            for done in range(0, self.frames // 2, _STEP):
+                self.progress(half * self.frames // 2 + done, self.frames, f"lighting {method}")
+                light.advance(min(_STEP, self.frames // 2 - done))
+            halves.append(light.image[..., :3])
+        seconds = clock() - start
+        light.release()
+        drawn = Halves(halves[0], 2.0 * halves[1] - halves[0])
+        exposure = exposure_of(truth.mean)
+        everywhere = np.ones(drawn.mean.shape[:2], bool)
+        found = difference(truth.mean, drawn.mean, everywhere, exposure)
+        self._write(drawn.mean, f"{method}_whole", self.frames)
+        write_sheet(
+            self.folder / f"{method}.png", truth.mean, drawn.mean, full, method=method,
+            found=found, compared=everywhere, exposure=exposure,
+        )  # fmt: skip
+        return {
+            "direct": found,
+            "full": None
+            if full is None
+            else difference(full, drawn.mean, everywhere, exposure_of(full)),
+            "noise": drawn.noise(exposure),
+            "frame_ms": 1e3 * seconds / self.frames,
+        }
+
     def _drawn(
-        self, methods: Sequence[str], reference: Any, full: Any, exposure: float
+        self, methods: Sequence[str], reference: Any, exposure: float
     ) -> tuple[dict[str, dict[str, Any]], Any]:
         """Errors, times and memory of all methods; pixels that both renderers see lit."""
         renderer, table = self.both.renderer, {}
@@ -126,7 +198,9 @@ class Comparison:
         for n, method in enumerate(methods):
             self.progress(n, len(methods), f"drawing with {method}")
             samples = min(self.supersampling, _FEWER if method in THESIS_METHODS else _MOST)
-            drawn = renderer.render(method, supersampling=samples)
+            with warnings.catch_warnings():  # its lights are those of both renderers
+                warnings.simplefilter("ignore", DiffractionWarning)
+                drawn = renderer.render(method, supersampling=samples)
             areas, picture = self.both.regions(drawn), drawn[..., :3]
             compared = areas["both"]
             errors = {
@@ -134,10 +208,11 @@ class Comparison:
             }
             seconds = renderer.frame_time(method, frames=1 if method in THESIS_METHODS else 3)
             self._write(picture, method, samples**2)
-            write_sheet(
-                self.folder / f"{method}.png", reference, picture, full, method=method,
-                found=errors["diffracting"], compared=compared, exposure=exposure,
-            )  # fmt: skip
+            if method in THESIS_METHODS:
+                write_sheet(
+                    self.folder / f"{method}.png", reference, picture, None, method=method,
+                    found=errors["diffracting"], compared=compared, exposure=exposure,
+                )  # fmt: skip
             table[method] = {
                 "supersampling": samples,
                 "frame_ms": 1e3 * seconds,

@@ -60,11 +60,10 @@ def write_sheet(
         np.nan_to_num(errors), cmap="magma", vmin=0.0, vmax=_WORST,
         alpha=np.where(compared, 1.0, 0.25),
     )  # fmt: skip
-    axes[1, 0].set_title(
-        f"difference, mean {found.delta_e_mean:.2f}, 99 % {found.delta_e_percentiles['99']:.1f}\n"
-        "(pale where shadows, edges and materials differ)",
-        fontsize="medium",
-    )
+    title = f"difference, mean {found.delta_e_mean:.2f}, 99 % {found.delta_e_percentiles['99']:.1f}"
+    if not compared.all():
+        title += "\n(pale where shadows, edges and materials differ)"
+    axes[1, 0].set_title(title, fontsize="medium")
     figure.colorbar(shown, ax=axes[1, 0], label="ΔE2000", extend="max", shrink=0.8)
     for axis in axes.ravel():
         axis.set_axis_off()

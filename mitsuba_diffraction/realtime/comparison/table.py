@@ -11,8 +11,14 @@ _HEAD = (
 )
 
 
+_WHOLE = (
+    "| method | ΔE2000 mean | 99 % | noise | FLIP | relative RMSE | ΔE2000 to full light "
+    "| frame, ms | × without shadows |\n|---|---|---|---|---|---|---|---|---|"
+)
+
+
 def markdown(document: dict[str, Any]) -> str:
-    """The methods' table, and what it was measured with.
+    """The methods' tables, over all pixels and under lights without extent; how it was measured.
 
     Parameters
     ----------
@@ -20,18 +26,41 @@ def markdown(document: dict[str, Any]) -> str:
     """
     slow = document["methods"].get("flss", {}).get("fragment_ns")
     rows = [_row(method, entry, slow) for method, entry in document["methods"].items()]
+    whole = [_whole_row(m, entry) for m, entry in document["methods"].items() if "whole" in entry]
     share = next(iter(document["methods"].values()))["diffracting"]["share"]
     width, height = document["size"]
     return "\n".join(
         [
+            *([_WHOLE, *whole, ""] if whole else []),
+            f"All {width} × {height} pixels in all direct light, {document['frames']} frames; "
+            f"noise of the path-traced picture: ΔE2000 "
+            f"{plain_number(document['whole_noise']['delta_e_mean'])}.",
+            "",
             _HEAD,
             *rows,
             "",
-            f"{100 * share:.0f} % of {width} × {height} pixels, those that diffract and are lit in "
-            f"both; {document['driver']}; noise of the path-traced picture: ΔE2000 "
-            f"{plain_number(document['noise_delta_e_mean'])}.",
+            f"Lights without extent, no shadows: {100 * share:.0f} % of the pixels, those that "
+            f"diffract and are lit in both; {document['driver']}; noise of the path tracer: "
+            f"ΔE2000 {plain_number(document['noise_delta_e_mean'])}.",
         ]
     )
+
+
+def _whole_row(method: str, entry: dict[str, Any]) -> str:
+    found = entry["whole"]
+    direct, full = found["direct"], found["full"]
+    cells = (
+        f"`{method}`",
+        plain_number(direct["delta_e_mean"]),
+        plain_number(direct["delta_e_percentiles"]["99"]),
+        plain_number(found["noise"]["delta_e_mean"]),
+        plain_number(direct["flip"]),
+        plain_number(direct["relative_rmse"]),
+        plain_number(full and full["delta_e_mean"]),
+        plain_number(found["frame_ms"]),
+        plain_number(found["frame_ms"] / entry["frame_ms"]),
+    )
+    return "| " + " | ".join(cells) + " |"
 
 
 def _row(method: str, entry: dict[str, Any], slow: float | None) -> str:

@@ -1,8 +1,9 @@
-"""The scene that a path tracer renders for comparison: the same surfaces, the shader's lights."""
+"""The scenes that a path tracer renders for comparison: all light once reflected, or few lights."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,29 @@ from numpy.typing import NDArray
 from ...optics.colour import daylight
 from ..glsl.camera import Camera
 from ..glsl.lights import Light
+
+
+def direct_light(scene: Any, camera: Camera) -> Any:
+    """The scene with its own emitters, whose light is reflected once at most.
+
+    Returns
+    -------
+    mi.Scene
+        With one sensor, whose film averages evenly over each pixel.
+    """
+    import mitsuba as mi
+
+    parts: dict[str, Any] = {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": 2},
+        "sensor": box_sensor(camera),
+    }
+    for number, shape in enumerate(scene.shapes()):
+        parts[f"shape_{number}"] = shape
+    for number, emitter in enumerate(scene.emitters()):
+        if emitter.get_shape() is None:
+            parts[f"emitter_{number}"] = emitter
+    return mi.load_dict(parts)
 
 
 def with_lights(scene: Any, camera: Camera, lights: Sequence[Light]) -> Any:
@@ -29,7 +53,7 @@ def with_lights(scene: Any, camera: Camera, lights: Sequence[Light]) -> Any:
         "type": "scene",
         # lights without extent are never hit: no samples for that
         "integrator": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0},
-        "sensor": box_sensor(camera),
+        "sensor": box_sensor(replace(camera, lens=0.0)),
     }
     for number, shape in enumerate(scene.shapes()):
         if not shape.is_emitter():
@@ -44,14 +68,21 @@ def box_sensor(camera: Camera) -> Any:
     import mitsuba as mi
 
     width, height = camera.size
+    lens: dict[str, Any] = {
+        "type": "perspective",
+        "principal_point_offset_x": camera.offset[0],
+        "principal_point_offset_y": camera.offset[1],
+    }
+    if camera.lens > 0.0:
+        lens = {
+            "type": "thinlens", "aperture_radius": camera.lens, "focus_distance": camera.focus
+        }  # fmt: skip
     return mi.load_dict(
         {
-            "type": "perspective",
+            **lens,
             "to_world": mi.ScalarTransform4f(camera.to_world),
             "fov": camera.fov,
             "fov_axis": "x",
-            "principal_point_offset_x": camera.offset[0],
-            "principal_point_offset_y": camera.offset[1],
             "sampler": {"type": "independent"},
             "film": {
                 "type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb",

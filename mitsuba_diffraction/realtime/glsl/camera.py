@@ -23,12 +23,15 @@ class Camera:
     fov : across the picture, degrees.
     size : width and height, pixels.
     offset : of the principal point, in widths and heights.
+    lens, focus : radius of a thin lens, and how far away it is sharp.
     """
 
     to_world: Array
     fov: float
     size: tuple[int, int]
     offset: tuple[float, float] = (0.0, 0.0)
+    lens: float = 0.0
+    focus: float = 1.0
 
     @property
     def eye(self) -> Array:
@@ -42,6 +45,27 @@ class Camera:
     def resized(self, width: int, height: int) -> Camera:
         """The same camera with a picture of another size."""
         return replace(self, size=(width, height))
+
+    def sampled(self, pixel: Array, lens: Array) -> Camera:
+        """The same camera through one place of each pixel and of the lens.
+
+        Parameters
+        ----------
+        pixel : (2,) from the middle, −1/2 to 1/2 pixels.
+        lens : (2,) 0 to 1, even over the lens.
+        """
+        width, height = self.size
+        radius, turn = self.lens * np.sqrt(lens[0]), 2.0 * np.pi * lens[1]
+        beside = radius * np.array([np.cos(turn), np.sin(turn)])
+        moved = self.to_world.copy()
+        moved[:3, 3] += moved[:3, :2] @ beside
+        # what is in focus stays where it is
+        shift = beside / (2.0 * self.focus * np.tan(np.radians(0.5 * self.fov)))
+        offset = (
+            self.offset[0] + pixel[0] / width - shift[0],
+            self.offset[1] + pixel[1] / height - shift[1] * width / height,
+        )
+        return replace(self, to_world=moved, offset=offset)
 
     def view_projection(self, low: Array, high: Array) -> Array:
         """From world space to OpenGL's clip space, for a scene between two corners.
@@ -84,7 +108,7 @@ def read_camera(sensor: Any) -> tuple[Camera, list[str]]:
             f"the sensor is a {kind}; the realtime renderer has perspective cameras only: "
             "give the scene a <sensor type='perspective'>"
         )
-    omissions = ["the lens (shown as a pinhole)"] if kind == "ThinLensCamera" else []
+    omissions = list[str]()
     width, height = (int(n) for n in sensor.film().size())
     if tuple(sensor.film().crop_size()) != (width, height):
         omissions.append("the film's crop")
@@ -97,5 +121,7 @@ def read_camera(sensor: Any) -> tuple[Camera, list[str]]:
         fov=number("x_fov"),
         size=(width, height),
         offset=(number("principal_point_offset_x"), number("principal_point_offset_y")),
+        lens=number("aperture_radius"),
+        focus=number("focus_distance") or 1.0,
     )
     return camera, omissions

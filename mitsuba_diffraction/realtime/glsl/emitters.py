@@ -38,6 +38,7 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...plugin.names import name_of
 from .lights import Light, sampled_directions, sampled_positions, without_extent
+from .surroundings import Environment, is_flat
 
 Array = NDArray[np.float64]
 
@@ -59,6 +60,7 @@ class Emitters:
     ----------
     names : of the emitters that are drawn from.
     probabilities : (n,) of each.
+    environment : what lies around the scene.
     omissions : emitters of other kinds, in a few words each.
 
     Raises
@@ -73,9 +75,10 @@ class Emitters:
         self._drawn: list[_Drawn] = []
         self._scene = scene  # area lights look their shapes up in it
         self._middle = middle
+        self.environment = Environment.of(scene)
         brought = []
         for emitter in scene.emitters():
-            drawn = _Drawn(emitter, middle)
+            drawn = _Drawn(emitter, middle, self.environment)
             if drawn.kind == "":
                 self.omissions.append(f"{name_of(emitter)} ({emitter.class_name()})")
             elif (brings := drawn.irradiance()) > 0.0:
@@ -99,11 +102,17 @@ class Emitters:
             found = []
             for chosen in choices:
                 light = self._drawn[chosen].light(taken[chosen])
-                spectrum = light.spectrum / self.probabilities[chosen]
-                found.append(replace(light, spectrum=spectrum))
+                share = float(self.probabilities[chosen])
+                density = light.density * (share if light.density > 0.0 else 1.0)
+                found.append(replace(light, spectrum=light.spectrum / share, density=density))
                 taken[chosen] += 1
             for number in _nearest_to_mean(np.stack([self._features(one) for one in found])):
                 yield found[number]
+
+    def share_of(self, emitter: Any) -> float:
+        """With what probability an emitter is drawn; 0 if never."""
+        found = [d.stands_for(emitter) for d in self._drawn]
+        return float(self.probabilities @ np.array(found, float))
 
     def _features(self, light: Light) -> Array:
         """What a light brings to the middle, by colour and spherical harmonics, (27,)."""
@@ -128,11 +137,15 @@ def _nearest_to_mean(features: Array) -> list[int]:
 class _Drawn:
     """One emitter, and the lights that stand for it."""
 
-    def __init__(self, emitter: Any, middle: Array) -> None:
-        self._emitter, self._middle = emitter, middle
+    def __init__(self, emitter: Any, middle: Array, environment: Environment | None) -> None:
+        self._emitter, self._middle, self._environment = emitter, middle, environment
         self._fixed = without_extent(emitter, middle)
         self._blocks: dict[int, list[Light]] = {}
         self.kind = "fixed" if self._fixed is not None else _kind_of(emitter)
+
+    def stands_for(self, emitter: Any) -> bool:
+        """Whether this is the one."""
+        return bool(self._emitter.ptr == emitter.ptr)
 
     def light(self, number: int) -> Light:
         """The number-th of its sequence."""
@@ -158,16 +171,23 @@ class _Drawn:
         if self.kind == "area":
             values, places, normals, waves = sampled_positions(self._emitter, _BLOCK, start)
             points = np.pad(places, [(0, 0), (0, 1)], constant_values=1.0)
+            shape = self._emitter.get_shape()
+            density = np.full(_BLOCK, 1.0 / _area(shape) if is_flat(shape) else 0.0)
         else:
             values, places, _, waves = sampled_directions(
                 self._emitter, self._middle, _BLOCK * _CANDIDATES, start * _CANDIDATES
             )
             kept, values = _evenly_bright(values, places, start)
             points, normals = np.pad(places[kept], [(0, 0), (0, 1)]), np.zeros((_BLOCK, 3))
+            assert self._environment is not None
+            density = np.where(self._environment.in_sun(places[kept]), 0.0, -1.0)
         return [
-            Light(name, point, waves, value[:, 0] if value.shape[1] == 1 else value, normal)
-            for point, value, normal in zip(points, values, normals, strict=True)
-        ]
+            Light(
+                name, point, waves, value[:, 0] if value.shape[1] == 1 else value, normal,
+                density=float(of_place),
+            )
+            for point, value, normal, of_place in zip(points, values, normals, density, strict=True)
+        ]  # fmt: skip
 
 
 def _evenly_bright(values: Array, directions: Array, start: int) -> tuple[NDArray[np.int64], Array]:
@@ -198,6 +218,10 @@ def _evenly_bright(values: Array, directions: Array, start: int) -> tuple[NDArra
     kept = kept[np.argsort(np.argsort(inside))]  # the first few lie all along the curve
     share = bright.mean() / bright[kept]
     return kept, values[kept] * share[:, None, None]
+
+
+def _area(shape: Any) -> float:
+    return float(np.array(shape.surface_area()).ravel()[0])
 
 
 def _kind_of(emitter: Any) -> str:

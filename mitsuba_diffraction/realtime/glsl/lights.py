@@ -32,6 +32,8 @@ class Light:
     axis : (3,) what a light shines along, or zeros where it shines alike to all sides.
     cone : cutoff and beam of a spot, angles from its axis in rad; None for a piece of a plane,
         whose intensity falls with the cosine.
+    density : with which a place was drawn on an area light, per area; −1 for a direction drawn from
+        an environment's picture, 0 for what is drawn in no other way (`surroundings`).
     """
 
     name: str
@@ -40,6 +42,7 @@ class Light:
     spectrum: Array
     axis: Array = field(default_factory=lambda: np.zeros(3))
     cone: tuple[float, float] | None = None
+    density: float = 0.0
 
     @property
     def colour(self) -> Array:
@@ -253,6 +256,30 @@ def sampled_positions(
     lanes.set_wavelengths(si)
     values, wavelengths = lanes.spectra(emitter.eval(si) * weight)
     return values, lanes.vectors(drawn.p), lanes.vectors(drawn.n), wavelengths
+
+
+def radiance_along(emitter: Any, directions: Array) -> Array:
+    """What an environment sends from directions (n, 3), linear sRGB (n, 3)."""
+    import drjit as dr
+    import mitsuba as mi
+
+    lanes = _Lanes(len(directions))
+    si = dr.zeros(mi.SurfaceInteraction3f, lanes.count)
+    towards = np.repeat(-directions.T, lanes.quads, axis=1).astype(np.float32)
+    si.wi = mi.Vector3f(*(mi.Float(np.ascontiguousarray(x)) for x in towards))
+    lanes.set_wavelengths(si)
+    values, waves = lanes.spectra(emitter.eval(si))
+    if values.shape[2] == 3:
+        return values[:, 0]
+    weights = np.array([daylight_colour(waves, one) for one in np.eye(len(waves))])
+    return np.asarray(values[:, :, 0] @ weights)
+
+
+def emitted_radiance(shape: Any) -> Array:
+    """What a shape emits on average, linear sRGB (3,)."""
+    values, _, _, waves = sampled_positions(shape.emitter(), 64)
+    mean = values.mean(axis=0) / float(np.array(shape.surface_area()).ravel()[0])
+    return daylight_colour(waves, mean[:, 0] if mean.shape[1] == 1 else mean)
 
 
 class _Lanes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +15,7 @@ from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from ...optics.geometry import wavenumber
 from ...plugin.changing import children
 from ...tables.table import DiffractionTable
+from .gloss import Gloss
 from .packing import pack_beneath, pack_conductor, pack_energy, pack_roughness
 from .textures import Packed, Texture, Uniform, as_half
 
@@ -22,9 +23,10 @@ Array = NDArray[np.float64]
 #: Wavelengths (n,) in nm, and values (n,).
 Spectrum = tuple[Array, Array]
 
-#: BSDFs around another one, by class, and whether they change anything that is not shown.
-_WRAPPERS = {"TwoSidedBRDF": "", "BumpMap": "bumps", "NormalMap": "normal map", "MaskBSDF": "mask"}
+#: BSDFs around another one, by class, and what they change that is not shown.
+_WRAPPERS = {"TwoSidedBRDF": "", "BumpMap": "", "NormalMap": "", "MaskBSDF": "mask"}
 _OTHER_GREY = 0.5
+_CHEQUERS = 512  # texels along either side of two by two
 
 
 @dataclass(frozen=True)
@@ -36,12 +38,14 @@ class Map:
     value : (channels,), where it is the same.
     picture : (rows, columns, channels), row 0 at v = 0, and `to_uv` (3, 3) that leads into it.
     attribute : name of a mesh attribute.
+    clamped : whether the picture's edges go on beyond it, which else repeats.
     """
 
     value: Array
     picture: NDArray[np.floating] | None = None
     to_uv: Array = field(default_factory=lambda: np.eye(3))
     attribute: str | None = None
+    clamped: bool = False
 
 
 @dataclass(frozen=True)
@@ -54,12 +58,18 @@ class Material:
     two_sided : whether the back reflects like the front.
     bsdf : the diffraction BSDF, or None.
     axis : (cos, sin) from the tangent to the patch's x axis.
+    gloss : what a BSDF that does not diffract mirrors, or None.
+    bumps : heights (rows, columns, 1) in the scene's unit, or None.
+    normals : (rows, columns, 3) in the shading frame, or None.
     """
 
     pigment: Map
     two_sided: bool = False
     bsdf: Any = None
     axis: Map = field(default_factory=lambda: Map(np.array([1.0, 0.0])))
+    gloss: Gloss | None = None
+    bumps: Map | None = None
+    normals: Map | None = None
 
     @property
     def table(self) -> DiffractionTable:
@@ -73,12 +83,19 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
 
     light : wavelengths and a spectrum relative to D65, under which pigments get their colours.
     """
+    import mitsuba as mi
+
     two_sided = False
+    bumps, normals = None, None
     while bsdf.class_name() in _WRAPPERS:
-        lost = _WRAPPERS[bsdf.class_name()]
-        two_sided = two_sided or not lost
+        kind, lost = bsdf.class_name(), _WRAPPERS[bsdf.class_name()]
+        two_sided = two_sided or kind == "TwoSidedBRDF"
         if lost:
             omissions.append(f"the {lost} of {name}")
+        if kind == "BumpMap":
+            bumps = _picture(bsdf, "nested_texture", 1, float(mi.traverse(bsdf)["scale"]))
+        if kind == "NormalMap":
+            normals = _picture(bsdf, "normalmap", 3, 2.0, -1.0)
         inner = [b for b in children(bsdf).values() if _is_bsdf(b)]
         if len(inner) > 1 and inner[0] is not inner[-1]:
             omissions.append(f"the back of {name}, another material")
@@ -91,8 +108,29 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
             pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)
         if _is_filmed(bsdf.fresnel):
             omissions.append(f"the thin film of {name}")
-        return Material(pigment, two_sided, bsdf, _axis(bsdf.orientation))
-    return Material(_diffuse(bsdf, omissions, name, light), two_sided)
+        if bsdf.through is not None:
+            omissions.append(f"light that goes through {name}")
+        return Material(
+            pigment, two_sided, bsdf, _axis(bsdf.orientation), bumps=bumps, normals=normals
+        )
+    gloss = Gloss.of(bsdf)
+    if gloss is None:
+        return Material(
+            _diffuse(bsdf, omissions, name, light), two_sided, bumps=bumps, normals=normals
+        )
+    pigment = Map(np.zeros(3)) if gloss.pigment is None else colour_map(gloss.pigment, light)
+    return Material(pigment, two_sided, gloss=gloss, bumps=bumps, normals=normals)
+
+
+def _picture(bsdf: Any, name: str, channels: int, scale: float, shift: float = 0.0) -> Map:
+    """The numbers of a wrapper's raw texture, of one or three channels, scaled and shifted."""
+    texture = children(bsdf)[name]
+    width, height = (int(n) for n in texture.resolution())
+    uv, to_uv = _centres(texture, width, height)
+    si = _interaction(uv)
+    value = texture.eval_1(si) if channels == 1 else texture.eval_3(si)
+    found = np.array(value, np.float32).reshape(channels, height, width)
+    return Map(np.zeros(channels), scale * found.transpose(1, 2, 0) + shift, to_uv)
 
 
 def pack_conservation(material: Material, factors: Sequence[float] = (1.0,)) -> Packed:
@@ -125,14 +163,20 @@ def pack_surface(material: Material) -> Packed:
     }
     definitions: dict[str, str] = {}
     textures = []
-    for name, picture in (("colour", material.pigment.picture), ("axis", material.axis.picture)):
-        if picture is not None:
-            textures.append(Texture(f"{name}_map", as_half(_four(picture)), smooth=True))
+    for name, found in (("colour", material.pigment), ("axis", material.axis)):
+        if found.picture is not None:
+            textures.append(Texture(f"{name}_map", as_half(_four(found.picture)), smooth=True))
             definitions[f"{name.upper()}_MAPPED"] = ""
+            if found.clamped:
+                definitions[f"{name.upper()}_CLAMPED"] = ""
     packed = Packed(tuple(textures), uniforms, definitions)
-    bsdf = material.bsdf
-    if bsdf is None or bsdf.nested is not None:
+    bsdf, gloss = material.bsdf, material.gloss
+    if bsdf is not None and bsdf.nested is None:
+        pass
+    elif gloss is None or gloss.through is not None:
         definitions["PIGMENTED"] = ""
+    if gloss is not None:
+        return packed | gloss.packed(_spectra)
     if bsdf is None:
         return packed
     definitions["DIFFRACTING"] = ""
@@ -147,7 +191,7 @@ def pack_surface(material: Material) -> Packed:
     if bsdf.coat is not None:
         surface = surface.material
         definitions["COATED"] = ""
-        uniforms["coat"] = _number(bsdf.coat.eta)
+        uniforms["coat"] = coat_index(material)
         uniforms["channel_wavenumbers"] = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
     elif _is_filmed(surface):
         surface = surface.material
@@ -156,9 +200,30 @@ def pack_surface(material: Material) -> Packed:
     return packed | _reflectance(surface)
 
 
+def pack_relief(material: Material) -> Packed:
+    """Its bumps and normals."""
+    packed = Packed()
+    for name, relief in (("bump", material.bumps), ("normal", material.normals)):
+        if relief is None or relief.picture is None:
+            continue
+        picture = relief.picture if name == "bump" else _four(relief.picture)
+        definition = {"bump": "BUMPED", "normal": "NORMAL_MAPPED"}[name]
+        packed |= Packed(
+            (Texture(f"{name}_map", picture.astype(np.float32), smooth=True),),
+            {f"{name}_uv": tuple(relief.to_uv.T.ravel().tolist())},
+            {definition: ""},
+        )
+    return packed
+
+
 def height_scale(material: Material) -> float:
     """The factor on the heights."""
-    return float(np.array(material.bsdf.height_scale).ravel()[0])
+    return _number(material.bsdf.height_scale)
+
+
+def coat_index(material: Material) -> float:
+    """Of the layer over the structure, over that outside; 1 without one."""
+    return 1.0 if material.bsdf.coat is None else _number(material.bsdf.coat.eta)
 
 
 def _number(value: Any) -> float:
@@ -239,13 +304,16 @@ def colour_map(texture: Any, light: Spectrum) -> Map:
     import mitsuba as mi
 
     width, height = (int(n) for n in texture.resolution())
-    if width * height <= 1:
+    if texture.class_name() == "Checkerboard":
+        width = height = _CHEQUERS  # filtered only as far as a texel reaches
+    elif width * height <= 1:
         width = height = 1
     uv, to_uv = _centres(texture, width, height)
     found = _lit(texture, uv, light) if mi.is_spectral else _evaluated(texture, uv, np.zeros(3))
     if width * height == 1:
         return Map(found[0].astype(float))
-    return Map(np.ones(3), found.reshape(height, width, 3), to_uv)
+    clamped = _clamps(lambda uv: _evaluated(texture, uv, np.full(3, 550.0)), to_uv)
+    return Map(np.ones(3), found.reshape(height, width, 3), to_uv, clamped=clamped)
 
 
 def _lit(texture: Any, uv: Array, light: Spectrum) -> NDArray[np.float32]:
@@ -271,8 +339,26 @@ def _axis(orientation: Any) -> Map:
         return Map(np.array([1.0, 0.0]), attribute=attribute)
     width, height = (int(n) for n in texture.resolution())
     uv, to_uv = _centres(texture, width, height)
-    value = np.array(texture.eval_3(_interaction(uv)), np.float64).T.reshape(height, width, 3)
-    return Map(np.array([1.0, 0.0]), value[..., :2], to_uv)
+
+    def evaluated(uv: Array) -> Array:
+        return np.array(texture.eval_3(_interaction(uv)), np.float64).T
+
+    value = evaluated(uv).reshape(height, width, 3)[..., :2]
+    return Map(np.array([1.0, 0.0]), value, to_uv, clamped=_clamps(evaluated, to_uv))
+
+
+def _clamps(evaluated: Callable[[Array], NDArray[np.floating]], to_uv: Array) -> bool:
+    """Whether a texture is beyond its edge more like the edge than like the other side."""
+    along = np.linspace(0.02, 0.98, 16)
+    back = np.linalg.inv(to_uv)
+
+    def values(across: float) -> NDArray[np.floating]:
+        both = [np.stack([np.full(16, across), along]), np.stack([along, np.full(16, across)])]
+        places = np.concatenate([np.concatenate(both, axis=1), np.ones((1, 32))])
+        return evaluated((back @ places)[:2].T)
+
+    beyond = values(-0.3)
+    return bool(np.abs(beyond - values(1e-4)).sum() < np.abs(beyond - values(0.7)).sum())
 
 
 def _attribute(texture: Any) -> str | None:

@@ -70,25 +70,32 @@ class Prepared:
         ]
         self.nbytes = sum(p.nbytes for p in packed.values())
         self._programs: dict[tuple[tuple[str, str], ...], Any] = {}
-        self._parts: dict[tuple[tuple[str, str], ...], list[Part]] = {}
+        self._parts: dict[object, list[Part]] = {}
 
-    def parts(self, light: Mapping[str, str]) -> list[Part]:
+    def parts(
+        self, light: Mapping[str, str], extras: Sequence[Mapping[str, str]] = ()
+    ) -> list[Part]:
         """One part a surface.
 
         Parameters
         ----------
         light : of `lights.light_definitions`.
+        extras : more definitions of each surface.
 
         Raises
         ------
         DiffractionError
             If the driver refuses a program.
         """
-        key = tuple(sorted(light.items()))
+        more = list(extras) or [{}] * len(self._surfaces)
+        key = tuple(tuple(sorted({**light, **one}.items())) for one in more)
         if key not in self._parts:
             made = []
-            for own, tables, buffer in zip(self._surfaces, self.tables, self._buffers, strict=True):
-                program = self.program({**own.definitions, **tables.definitions, **light})
+            for own, tables, buffer, extra in zip(
+                self._surfaces, self.tables, self._buffers, more, strict=True
+            ):
+                of_light = {**tables.definitions, **light, **extra}
+                program = self.program({**own.definitions, **of_light})
                 array = vertex_array(self._context, program, buffer)
                 made.append(Part(program, array, tables))
             self._parts[key] = made

@@ -1,24 +1,44 @@
 """Direct light of all emitters with soft shadows, one light without extent after the other.
 
-See `emitters` for what is drawn and why its mean is right, `shadows` for the shadows. Pixels are
-sampled at another place in every frame, so their edges become smooth as the light does.
+Frames are of two kinds in turn. One draws a light with its shadows: see `emitters` for what is
+drawn and why its mean is right, `shadows` for the shadows. The other looks up what each pixel's
+lobes meet (`surroundings`), and shows what is behind the scene and what emits light. The balance
+heuristic shares the light between them. Pixels and the lens are sampled at another place in every
+frame, so their edges become smooth as the light does.
 """
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...tables.store.cache import cached_colours
 from .camera import Camera
-from .context import Target, compile_plain, require_moderngl
+from .context import Bindings, Target, compile_plain, require_moderngl, set_uniforms
 from .emitters import Emitters
-from .lights import Light
-from .scene import RealtimeScene
+from .lights import Light, light_definitions
+from .lobes import pack_lobes
+from .materials import coat_index, height_scale
+from .prepared import vertex_array
+from .scene import RealtimeScene, box_of
 from .shadows import SIZE, Casters, ShadowMap
-from .textures import Uniform
+from .surroundings import DepthMaps, flat_shapes, pack_flats
+from .textures import Packed, Uniform
+
+Array = NDArray[np.float64]
+
+# generalised golden ratio of ten numbers a frame: two each for the pixel, the lens and the shadow
+# map, three for lobes (Roberts 2018)
+_RATIO = 1.0653066442
+_STEPS = _RATIO ** -np.arange(1.0, 10.0)
+
+#: Towards what the second kind of frame looks: all spectra are daylight's, the colours come later.
+_WHITE = Light("surroundings", np.array([0.0, 0.0, 1.0, 0.0]), np.array([360.0, 830.0]), np.ones(2))
 
 
 class Drawing(Protocol):
@@ -33,10 +53,120 @@ class Drawing(Protocol):
         """A framebuffer of floats."""
 
     def draw_light(
-        self, frame: Any, method: str, camera: Camera, light: Light, shadow_map: Any,
-        shadows: dict[str, Uniform],
+        self, frame: Any, method: str, camera: Camera, light: Light, definitions: dict[str, str],
+        uniforms: dict[str, Uniform], extras: Any, **surface: float | None,
     ) -> None:  # fmt: skip
-        """Draw one light, with its shadows."""
+        """Draw one light, or what the surroundings send."""
+
+
+class Stage:
+    """What does not depend on the camera: emitters, surroundings, what casts shadows.
+
+    Parameters
+    ----------
+    renderer : whose scene it is.
+
+    Raises
+    ------
+    DiffractionError
+        If no emitter brings light, or the environment is not finite.
+    """
+
+    def __init__(self, renderer: Drawing) -> None:
+        context, scene = renderer.context, renderer.scene
+        self.emitters = Emitters(renderer.mitsuba_scene, scene.middle)
+        self._glow = compile_plain(context, "surface.vert", "glow.frag")
+        self._vertices = [context.buffer(glow.vertices.tobytes()) for glow in scene.emitting]
+        self._glowing = [vertex_array(context, self._glow, buffer) for buffer in self._vertices]
+        self._radiances = [tuple(float(x) for x in glow.radiance) for glow in scene.emitting]
+        self.casters = Casters(context, renderer.buffers, scene.low, scene.high, self._vertices)
+        environment, flats = self.emitters.environment, flat_shapes(renderer.mitsuba_scene)
+        packed = pack_flats(flats, self.emitters.share_of)
+        packed |= Packed((), {"least_distance": 1e-4 * float(np.ptp([scene.low, scene.high]))})
+        if environment is not None:
+            packed |= environment.packed(self.emitters.share_of(environment.emitter))
+        self._bound = [Bindings(context, packed)]
+        solid = [
+            n for n, s in enumerate(scene.surfaces) if s.shape.ptr not in {f.ptr for f in flats}
+        ]
+        if solid:
+            low, high = box_of([scene.surfaces[n].vertices[:, :3] for n in solid])
+            obstacles = Casters(context, [renderer.buffers[n] for n in solid], low, high)
+            self._bound.append(DepthMaps(obstacles).bindings)
+            obstacles.release()
+        self.background, self._triangle = None, None
+        if environment is not None:
+            self.background = compile_plain(
+                context, "whole.vert", "background.frag",
+                ("library.glsl", "surroundings.glsl"), self._bound[0].definitions,
+            )  # fmt: skip
+            self._triangle = context.vertex_array(self.background, [])
+        lobes: dict[int, Bindings] = {}
+        self.extras = []
+        for surface in scene.surfaces:
+            own = []
+            if surface.material.bsdf is not None:
+                table = surface.material.table
+                if id(table) not in lobes:
+                    factor = height_scale(surface.material) * coat_index(surface.material)
+                    lobes[id(table)] = Bindings(context, pack_lobes(cached_colours(table), factor))
+                own.append(lobes[id(table)])
+            self.extras.append(_Joined([*self._bound, *own]))
+        self._bound += lobes.values()
+        self._triangle = (
+            None if self.background is None else context.vertex_array(self.background, [])
+        )
+        self._context, self._scene = context, scene
+        self.looks_up = bool(self._glowing) or self.background is not None
+
+    def draw_behind(self, frame: Any, camera: Camera, bright: bool) -> None:
+        """The background and what emits light into a framebuffer; dark, it only covers."""
+        moderngl = require_moderngl()
+        matrix = camera.view_projection(self._scene.low, self._scene.high)
+        frame.use()
+        frame.clear(0.0, 0.0, 0.0, 0.0)
+        if bright and self.background is not None and self._triangle is not None:
+            self._context.enable_only(moderngl.NOTHING)
+            self._bound[0].use(self.background)
+            set_uniforms(
+                self.background,
+                {
+                    "from_clip": tuple(np.linalg.inv(matrix).T.ravel().tolist()),
+                    "eye": tuple(camera.eye.tolist()),
+                    "picture_size": tuple(float(n) for n in camera.size),
+                },
+            )
+            self._triangle.render(moderngl.TRIANGLES, vertices=3)
+        self._context.enable_only(moderngl.DEPTH_TEST)
+        shared: dict[str, Uniform] = {
+            "view_projection": tuple(matrix.T.ravel().tolist()), "eye": tuple(camera.eye.tolist())
+        }  # fmt: skip
+        set_uniforms(self._glow, shared)
+        for array, radiance in zip(self._glowing, self._radiances, strict=True):
+            set_uniforms(self._glow, {"radiance": radiance if bright else (0.0, 0.0, 0.0)})
+            array.render(moderngl.TRIANGLES)
+
+    def release(self) -> None:
+        """Free what lies in the graphics card's memory."""
+        for thing in (*self._bound, *self._glowing, *self._vertices, self._glow, self.casters):
+            thing.release()
+        for shown in (self._triangle, self.background):
+            if shown is not None:
+                shown.release()
+
+
+class _Joined:
+    """Several bindings as one."""
+
+    def __init__(self, parts: list[Bindings]) -> None:
+        self._parts = parts
+        self.definitions = {k: v for part in parts for k, v in part.definitions.items()}
+
+    def use(self, program: Any, first_unit: int = 0) -> int:
+        """As of `Bindings`."""
+        for part in self._parts:
+            first_unit = part.use(program, first_unit)
+        return first_unit
 
 
 class ProgressiveLight:
@@ -45,58 +175,98 @@ class ProgressiveLight:
     Parameters
     ----------
     renderer, method, camera : what is drawn, how, and from where.
+    stage : of the renderer's scene.
+    lights : these alone, instead of the scene's emitters and what surrounds it.
     shadow_size : texels along either side of a shadow map.
 
     Attributes
     ----------
     frames : how many are in the picture.
-    emitters : that are drawn from.
     """
 
     def __init__(
-        self, renderer: Drawing, method: str, camera: Camera, *, shadow_size: int = SIZE
-    ) -> None:
+        self, renderer: Drawing, method: str, camera: Camera, stage: Stage, *,
+        lights: Sequence[Light] = (), shadow_size: int = SIZE,
+    ) -> None:  # fmt: skip
         self._renderer, self._method, self._camera = renderer, method, camera
-        context, scene = renderer.context, renderer.scene
-        self.emitters = Emitters(renderer.mitsuba_scene, scene.middle)
-        self._lights = self.emitters.lights()
-        self._casters = Casters(context, renderer.buffers, scene.low, scene.high)
-        self._places = self._casters.seen(camera)
-        self._map = ShadowMap(self._casters, shadow_size)
+        self._stage = stage
+        self._fixed = [replace(one, spectrum=len(lights) * one.spectrum) for one in lights]
+        self._looks_up = stage.looks_up and not lights
+        self._surface: dict[str, float | None] = {}
+        context = renderer.context
+        self._map = ShadowMap(stage.casters, shadow_size)
         width, height = camera.size
-        self._frame, self._sum = renderer.target(width, height), renderer.target(width, height)
-        self._sum.frame.clear(0.0, 0.0, 0.0, 0.0)
+        self._frame = renderer.target(width, height)
+        self._sums = [renderer.target(width, height) for _ in range(2)]  # of either kind of frame
+        self._counts = [0, 0]
+        self._lights: Iterator[Light] = iter(())
+        self.restart(camera)
         self._add = compile_plain(context, "whole.vert", "add.frag")
         self._triangle = context.vertex_array(self._add, [])
-        self.frames = 0
+        self._mean = compile_plain(context, "whole.vert", "mean.frag", ("library.glsl",))
+        self._whole = context.vertex_array(self._mean, [])
+
+    @property
+    def frames(self) -> int:
+        """How many there are."""
+        return sum(self._counts)
+
+    def restart(self, camera: Camera | None = None, **surface: float | None) -> None:
+        """Start again, with another camera of the same size or other surfaces.
+
+        surface : height scale and coherence width as of `Renderer.draw`.
+        """
+        if camera is not None:
+            self._camera, self._surface = camera, surface
+            self._places = self._stage.casters.seen(camera)
+        for target in self._sums:
+            target.frame.clear(0.0, 0.0, 0.0, 0.0)
+        self._counts = [0, 0]
+        emitters = self._stage.emitters
+        self._lights = itertools.cycle(self._fixed) if self._fixed else emitters.lights()
 
     def advance(self, frames: int = 1) -> None:
-        """Add this many frames, each with one light."""
+        """Add this many frames."""
         for _ in range(frames):
-            self._one()
+            kind = self.frames % 2 if self._looks_up else 0
+            places = (0.5 + (self._counts[kind] + 1) * _STEPS) % 1.0
+            camera = self._camera.sampled(places[:2] - 0.5, places[2:4])
+            self._stage.draw_behind(self._frame.frame, camera, bright=kind == 1)
+            if kind == 0:
+                self._light(camera, places[4:6])
+            else:
+                self._look_up(camera, places[6:9])
+            self._accumulate(self._sums[kind])
+            self._counts[kind] += 1
 
-    def _one(self) -> None:
+    def _light(self, camera: Camera, beside: Array) -> None:
+        """One light with its shadows."""
         light = next(self._lights)
-        width, height = self._camera.size
-        # two sequences that have nothing to do with those of the lights
-        inside = (0.5 + self.frames * np.array([0.8191725134, 0.6710436067])) % 1.0 - 0.5
-        beside = (0.5 + self.frames * np.array([0.5497004779, 0.2207440846])) % 1.0
-        x, y = self._camera.offset
-        camera = replace(self._camera, offset=(x + inside[0] / width, y + inside[1] / height))
-        self._frame.frame.use()
-        self._frame.frame.clear(0.0, 0.0, 0.0, 0.0)
-        if len(self._places):
-            shadows = self._map.draw(light, self._places, (float(beside[0]), float(beside[1])))
-            self._renderer.draw_light(
-                self._frame.frame, self._method, camera, light, self._map.texture, shadows
-            )
-        self._accumulate()
-        self.frames += 1
+        if not len(self._places):
+            return
+        uniforms = self._map.draw(light, self._places, (float(beside[0]), float(beside[1])))
+        uniforms["light_density"] = light.density
+        definitions = light_definitions(1, False) | {"SHADOWED": ""}
+        if self._looks_up:
+            definitions["WEIGHTED"] = ""
+        extras = [_WithMap(extra, self._map.texture) for extra in self._stage.extras]
+        self._renderer.draw_light(
+            self._frame.frame, self._method, camera, light, definitions, uniforms, extras,
+            **self._surface,
+        )  # fmt: skip
 
-    def _accumulate(self) -> None:
+    def _look_up(self, camera: Camera, numbers: Array) -> None:
+        """What each pixel's lobes meet."""
+        self._renderer.draw_light(
+            self._frame.frame, self._method, camera, _WHITE,
+            light_definitions(1, False) | {"LOOKED_UP": ""},
+            {"sequence": tuple(numbers.tolist())}, self._stage.extras, **self._surface,
+        )  # fmt: skip
+
+    def _accumulate(self, target: Target) -> None:
         moderngl = require_moderngl()
         context: Any = self._renderer.context
-        self._sum.frame.use()
+        target.frame.use()
         context.enable_only(moderngl.BLEND)
         context.blend_func = moderngl.ONE, moderngl.ONE
         self._frame.colour.use(0)
@@ -104,15 +274,52 @@ class ProgressiveLight:
         self._triangle.render(moderngl.TRIANGLES, vertices=3)
         context.enable_only(moderngl.NOTHING)
 
+    def show(self, frame: Any, exposure: float) -> None:
+        """The picture so far into a framebuffer of the same size, exposed, as sRGB."""
+        moderngl = require_moderngl()
+        context: Any = self._renderer.context
+        frame.use()
+        context.enable_only(moderngl.NOTHING)
+        for unit, target in enumerate(self._sums):
+            target.colour.use(unit)
+        weights = tuple(1.0 / max(count, 1) for count in self._counts)
+        shown: dict[str, Uniform] = {
+            "first": 0, "second": 1, "weights": weights, "exposure": exposure
+        }  # fmt: skip
+        set_uniforms(self._mean, shown)
+        self._whole.render(moderngl.TRIANGLES, vertices=3)
+
     @property
     def image(self) -> NDArray[np.float32]:
-        """The mean so far (height, width, 4): linear sRGB, and the share that is covered."""
+        """The picture so far (height, width, 4): linear sRGB, and the share that is covered."""
         width, height = self._camera.size
-        found = np.frombuffer(self._sum.frame.read(components=4, dtype="f4"), np.float32)
-        mean = found.reshape(height, width, 4)[::-1] / np.float32(max(self.frames, 1))
-        return np.ascontiguousarray(mean, np.float32)
+        total = np.zeros((height, width, 4), np.float32)
+        for target, count in zip(self._sums, self._counts, strict=True):
+            found = np.frombuffer(target.frame.read(components=4, dtype="f4"), np.float32)
+            mean = found.reshape(height, width, 4)[::-1] / np.float32(max(count, 1))
+            total += mean
+        total[..., 3] /= np.float32(max(sum(count > 0 for count in self._counts), 1))
+        return total
 
     def release(self) -> None:
         """Free what lies in the graphics card's memory."""
-        for thing in (self._triangle, self._add, self._frame, self._sum, self._map, self._casters):
+        made = (self._triangle, self._add, self._whole, self._mean)
+        for thing in (*made, self._frame, *self._sums, self._map):
             thing.release()
+
+
+class _WithMap:
+    """A surface's extras and a light's shadow map."""
+
+    def __init__(self, extra: _Joined, texture: Any) -> None:
+        self._extra, self._texture = extra, texture
+        self.definitions = extra.definitions
+
+    def use(self, program: Any, first_unit: int = 0) -> int:
+        """As of `Bindings`."""
+        first_unit = self._extra.use(program, first_unit)
+        if "shadow_map" in program:
+            self._texture.use(first_unit)
+            program["shadow_map"].value = first_unit
+            first_unit += 1
+        return first_unit

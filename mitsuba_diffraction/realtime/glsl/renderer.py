@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,16 @@ from .context import (
     set_uniforms,
 )
 from .lights import Light, light_definitions
-from .materials import conservation_at, height_scale, pack_conservation, pack_surface
+from .materials import (
+    conservation_at,
+    height_scale,
+    pack_conservation,
+    pack_relief,
+    pack_surface,
+)
 from .packing import pack_energy, pack_responses
 from .prepared import Prepared, window
-from .progressive import ProgressiveLight
+from .progressive import ProgressiveLight, Stage
 from .scene import RealtimeScene, load, read_scene
 from .shadows import SIZE
 from .source import LIGHTS
@@ -34,13 +40,23 @@ from .textures import Uniform
 Image = NDArray[np.float32]
 
 
+class Extra(Protocol):
+    """What a surface's shader reads besides its material and tables."""
+
+    definitions: dict[str, str]
+
+    def use(self, program: Any, first_unit: int = 0) -> int:
+        """Set it in a program; returns the next free texture unit."""
+
+
 class Renderer:
     """Draws a scene of Mitsuba with a method of the shaders.
 
-    Meshes, rectangles, spheres, disks and cylinders; diffraction over a diffuse BSDF, and diffuse
-    ones. `render` and `draw` know directional and point lights, and a smooth sky, without shadows;
-    `progressive` all emitters, with shadows. There is no light between surfaces. All else is named
-    in one warning, and in `scene.omissions`.
+    Meshes, rectangles, spheres, disks and cylinders; diffraction over a diffuse BSDF, diffuse ones,
+    plastic and metal, smooth or rough, and bumps. `render` and `draw` know directional and point
+    lights, and a smooth sky, without shadows; `progressive` all emitters, with shadows, and the
+    lens. There is no light between surfaces. All else is named in a warning, and in
+    `scene.omissions`.
 
     Parameters
     ----------
@@ -57,11 +73,8 @@ class Renderer:
     def __init__(self, scene: Any, *, sensor: int = 0, context: Any = None) -> None:
         self.mitsuba_scene = load(scene)
         self.scene: RealtimeScene = read_scene(self.mitsuba_scene, sensor)
-        if self.scene.omissions:
-            listed = "; ".join(dict.fromkeys(self.scene.omissions))
-            warnings.warn(
-                f"the realtime picture does not show: {listed}", DiffractionWarning, stacklevel=2
-            )
+        self._warn([o for o in self.scene.omissions if o not in self.scene.of_light])
+        self._of_light = list(self.scene.of_light)
         self.camera = self.scene.camera
         self.lights: list[Light] = list(self.scene.lighting.lights)
         self.sky = self.scene.lighting.sky
@@ -70,12 +83,23 @@ class Renderer:
         check_version(self.context)
         self.buffers = [self.context.buffer(s.vertices.tobytes()) for s in self.scene.surfaces]
         self.bindings = [
-            Bindings(self.context, pack_surface(s.material) | pack_conservation(s.material))
+            Bindings(
+                self.context,
+                pack_surface(s.material) | pack_relief(s.material) | pack_conservation(s.material),
+            )
             for s in self.scene.surfaces
         ]
         self._methods: dict[str, Prepared] = {}
         self._responses: Bindings | None = None
+        self._stage: Stage | None = None
         self._lit_by: list[NDArray[np.float64]] = []
+
+    def _warn(self, omissions: Sequence[str]) -> None:
+        if omissions:
+            listed = "; ".join(dict.fromkeys(omissions))
+            warnings.warn(
+                f"the realtime picture does not show: {listed}", DiffractionWarning, stacklevel=3
+            )
 
     @property
     def driver(self) -> str:
@@ -93,6 +117,8 @@ class Renderer:
         supersampling : samples along either side of a pixel, averaged evenly.
         size : width and height; the scene's by default.
         """
+        self._warn(self._of_light)
+        self._of_light.clear()
         width, height = size or self.camera.size
         n = supersampling
         target = self.target(width * n, height * n)
@@ -163,19 +189,22 @@ class Renderer:
         method: str,
         camera: Camera,
         light: Light,
-        shadow_map: Any,
-        shadows: dict[str, Uniform],
+        definitions: dict[str, str],
+        uniforms: dict[str, Uniform],
+        extras: Sequence[Extra],
+        **surface: float | None,
     ) -> None:
-        """Draw one light, with its shadows, into a framebuffer.
+        """Draw one light, or what the surroundings send, into a framebuffer that is cleared.
 
         Parameters
         ----------
         frame, method, camera : as of `draw`.
         light : without extent.
-        shadow_map, shadows : texture, and what `ShadowMap.draw` returned with it.
+        definitions, uniforms : what of it the shaders know.
+        extras : what each surface's shader reads of it.
+        surface : `scale` and `coherence_width` as of `draw`.
         """
-        definitions = light_definitions(1, False) | {"SHADOWED": ""}
-        self._draw(frame, method, camera, [light], definitions, shadows, shadow_map=shadow_map)
+        self._draw(frame, method, camera, [light], definitions, uniforms, extras=extras, **surface)
 
     def progressive(
         self,
@@ -183,6 +212,7 @@ class Renderer:
         *,
         size: tuple[int, int] | None = None,
         camera: Camera | None = None,
+        lights: Sequence[Light] = (),
         shadow_size: int = SIZE,
     ) -> ProgressiveLight:
         """A picture of all emitters' direct light, with shadows, that gets better by frames.
@@ -192,6 +222,7 @@ class Renderer:
         method : one of `source.METHODS`.
         size : width and height; the camera's by default.
         camera : the scene's by default.
+        lights : these alone, instead of all that the scene has.
         shadow_size : texels along either side of a shadow map.
 
         Raises
@@ -201,7 +232,15 @@ class Renderer:
         """
         camera = camera or self.camera
         resized = camera.resized(*(size or camera.size))
-        return ProgressiveLight(self, method, resized, shadow_size=shadow_size)
+        return ProgressiveLight(
+            self, method, resized, self.stage(), lights=lights, shadow_size=shadow_size
+        )
+
+    def stage(self) -> Stage:
+        """What progressive light needs of the scene, made when it is first wanted."""
+        if self._stage is None:
+            self._stage = Stage(self)
+        return self._stage
 
     def _draw(
         self,
@@ -214,12 +253,14 @@ class Renderer:
         *,
         scale: float | None = None,
         coherence_width: float | None = None,
-        shadow_map: Any = None,
+        extras: Sequence[Extra] | None = None,
     ) -> None:
         moderngl = require_moderngl()
-        parts = self.prepared(method).parts(definitions)
+        own_definitions = [extra.definitions for extra in extras or ()]
+        parts = self.prepared(method).parts(definitions, own_definitions)
         frame.use()
-        frame.clear(0.0, 0.0, 0.0, 0.0)
+        if extras is None:
+            frame.clear(0.0, 0.0, 0.0, 0.0)
         self.context.enable_only(moderngl.DEPTH_TEST)
         matrix = camera.view_projection(self.scene.low, self.scene.high)
         places = np.zeros((LIGHTS, 4), np.float32)
@@ -237,14 +278,14 @@ class Renderer:
             "light_colour": colours,
             **uniforms,
         }
-        for surface, own, part in zip(self.scene.surfaces, self.bindings, parts, strict=True):
+        for n, (surface, own, part) in enumerate(
+            zip(self.scene.surfaces, self.bindings, parts, strict=True)
+        ):
             program = part.program
             set_uniforms(program, shared)
             unit = part.tables.use(program, own.use(program))
-            if shadow_map is not None:
-                shadow_map.use(unit)
-                program["shadow_map"].value = unit
-                unit += 1
+            if extras is not None:
+                unit = extras[n].use(program, unit)
             self.use_responses(program, unit, lights)
             if surface.material.bsdf is not None:
                 factor = scale if scale is not None else height_scale(surface.material)
@@ -270,8 +311,9 @@ class Renderer:
             prepared.release()
         for thing in (*self.bindings, *self.buffers):
             thing.release()
-        if self._responses is not None:
-            self._responses.release()
+        for thing in (self._responses, self._stage):
+            if thing is not None:
+                thing.release()
         if self._own_context:
             self.context.release()
 

@@ -15,7 +15,7 @@ from ...errors import DiffractionError
 from ...plugin.attributes import check_attributes
 from ...plugin.names import name_of
 from .camera import Camera, read_camera
-from .lights import Lighting, read_lights
+from .lights import Lighting, emitted_radiance, read_lights
 from .materials import Map, Material, diffracts, read_material
 from .shapes import Triangles, across, triangles_of
 from .source import LIGHTS
@@ -49,6 +49,22 @@ class Surface:
 
 
 @dataclass(frozen=True)
+class Glow:
+    """A shape that emits light.
+
+    Attributes
+    ----------
+    vertices : as of a surface.
+    radiance : (3,) linear sRGB, the mean.
+    shape : of Mitsuba.
+    """
+
+    vertices: NDArray[np.float32]
+    radiance: Array
+    shape: Any
+
+
+@dataclass(frozen=True)
 class RealtimeScene:
     """What is shown of a scene.
 
@@ -57,6 +73,8 @@ class RealtimeScene:
     surfaces, camera, lighting : in world space.
     low, high : (3,) corners of a box around all surfaces.
     omissions : what is not shown, or shown otherwise, in a few words each.
+    emitting : shapes that emit light, and their colours; they reflect none.
+    of_light : of the omissions, what progressive light does show.
     """
 
     surfaces: tuple[Surface, ...]
@@ -65,6 +83,8 @@ class RealtimeScene:
     low: Array
     high: Array
     omissions: tuple[str, ...]
+    emitting: tuple[Glow, ...] = ()
+    of_light: tuple[str, ...] = ()
 
     @property
     def diffracting(self) -> tuple[Surface, ...]:
@@ -131,16 +151,19 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
     if not 0 <= sensor < len(sensors):
         raise DiffractionError(f"sensor={sensor}: the scene has {len(sensors)} sensors")
     camera, omissions = read_camera(sensors[sensor])
-    shown = []
+    shown, emitting = [], []
     for number, shape in enumerate(scene.shapes()):
         name = name_of(shape, number)
-        if shape.is_emitter():
-            continue  # seen as a light
         check_attributes(shape, number)
         triangles = triangles_of(shape)
         if triangles is None:
             omissions.append(f"{name} ({shape.class_name()})")
             continue
+        if shape.is_emitter():
+            black = _vertices(triangles, Material(Map(np.zeros(3))), shape)
+            emitting.append(Glow(black, emitted_radiance(shape), shape))
+            continue
+        _check_texcoords(shape, name)
         shown.append((name, shape, triangles))
     middle = _middle([t for _, shape, t in shown if diffracts(shape.bsdf())])
     lighting = read_lights(scene, middle, LIGHTS)
@@ -151,9 +174,21 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
         vertices = _vertices(triangles, material, shape)
         surfaces.append(Surface(name, vertices, material, shape, len(omissions) == before))
     low, high = box_of([s.vertices[:, :3] for s in surfaces])
+    lens = ("the lens (shown as a pinhole)",) if camera.lens > 0.0 else ()
+    of_light = (*lens, *lighting.omissions)
     return RealtimeScene(
-        tuple(surfaces), camera, lighting, low, high, (*omissions, *lighting.omissions)
-    )
+        tuple(surfaces), camera, lighting, low, high, (*omissions, *of_light), tuple(emitting),
+        of_light,
+    )  # fmt: skip
+
+
+def _check_texcoords(shape: Any, name: str) -> None:
+    """Raise a DiffractionError for a mesh that diffracts but has no tangents of its own."""
+    if shape.is_mesh() and diffracts(shape.bsdf()) and not shape.has_vertex_texcoords():
+        raise DiffractionError(
+            f"{name}: the mesh has no texture coordinates, along which the patch's axes lie; "
+            "give it some (u along the patch's x axis), or use 'tangents' to make them"
+        )
 
 
 def _middle(triangles: list[Triangles]) -> Array:

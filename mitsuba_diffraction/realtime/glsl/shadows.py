@@ -39,21 +39,33 @@ class Casters:
     context : of moderngl.
     buffers : each surface's vertices.
     low, high : (3,) corners of a box around all of them.
+    emitting : vertices of what emits light, which stands in the way of light from far away.
     """
 
-    def __init__(self, context: Any, buffers: Sequence[Any], low: Array, high: Array) -> None:
+    def __init__(
+        self,
+        context: Any,
+        buffers: Sequence[Any],
+        low: Array,
+        high: Array,
+        emitting: Sequence[Any] = (),
+    ) -> None:
         self.context = context
         self.program = compile_plain(context, "surface.vert", "position.frag")
         self._arrays = [vertex_array(context, self.program, buffer) for buffer in buffers]
+        self._emitting = [vertex_array(context, self.program, buffer) for buffer in emitting]
         self.low, self.high = low, high
         self.corners = np.array([[(low, high)[n >> i & 1][i] for i in range(3)] for n in range(8)])
 
-    def draw(self, matrix: Array) -> None:
-        """Into the framebuffer in use, from the scene to clip space by a matrix (4, 4)."""
+    def draw(self, matrix: Array, *, from_far: bool = False) -> None:
+        """Into the framebuffer in use, from the scene to clip space by a matrix (4, 4).
+
+        from_far : with what emits light.
+        """
         moderngl = require_moderngl()
         self.context.enable_only(moderngl.DEPTH_TEST)
         set_uniforms(self.program, {"view_projection": tuple(matrix.T.ravel().tolist())})
-        for array in self._arrays:
+        for array in (*self._arrays, *(self._emitting if from_far else ())):
             array.render(moderngl.TRIANGLES)
 
     def seen(self, camera: Camera) -> Array:
@@ -71,7 +83,7 @@ class Casters:
 
     def release(self) -> None:
         """Free the graphics card's memory."""
-        for thing in (*self._arrays, self.program):
+        for thing in (*self._arrays, *self._emitting, self.program):
             thing.release()
 
 
@@ -103,12 +115,13 @@ class ShadowMap:
         beside : 0 to 1, parts of a texel by which the map is shifted.
         """
         if light.place[3] == 0.0:
-            matrix, scale = self._parallel(light.place[:3], places, beside)
+            corners = self.casters.corners
+            matrix, scale = parallel_view(light.place[:3], places, corners, self.size, beside)
         else:
             matrix, scale = self._perspective(light.place[:3], places, beside)
         self._frame.use()
         self._frame.clear(depth=1.0)
-        self.casters.draw(matrix)
+        self.casters.draw(matrix, from_far=light.place[3] == 0.0)
         cone = (0.0, 0.0)
         if light.cone is not None:
             cone = light.cone[0], 1.0 / max(light.cone[0] - light.cone[1], 1e-6)
@@ -121,22 +134,6 @@ class ShadowMap:
             "shadow_steepest": _STEEPEST * scale,
         }
 
-    def _parallel(
-        self, towards: Array, places: Array, beside: tuple[float, float]
-    ) -> tuple[Array, float]:
-        """The matrix, and the depth in clip space of as much as a texel is wide."""
-        axes = _frame_along(-towards / np.linalg.norm(towards))
-        low, high = _bounds(places @ axes[:2].T, self.size, beside)
-        depths = self.casters.corners @ axes[2]
-        near, far = _apart(depths.min(), depths.max())
-        matrix = np.eye(4)
-        for n in range(2):
-            matrix[n, :3] = axes[n] * 2.0 / (high[n] - low[n])
-            matrix[n, 3] = -(high[n] + low[n]) / (high[n] - low[n])
-        matrix[2, :3] = axes[2] * 2.0 / (far - near)
-        matrix[2, 3] = -(far + near) / (far - near)
-        return matrix, float((high - low).max()) / self.size * 2.0 / (far - near)
-
     def _perspective(
         self, eye: Array, places: Array, beside: tuple[float, float]
     ) -> tuple[Array, float]:
@@ -144,7 +141,7 @@ class ShadowMap:
         away = places - eye
         away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
         mean = away.mean(axis=0)
-        axes = _frame_along(mean / max(float(np.linalg.norm(mean)), 1e-12))
+        axes = frame_along(mean / max(float(np.linalg.norm(mean)), 1e-12))
         ahead = away @ axes[2]
         inside = ahead > _WIDEST
         seen = away[inside] if inside.any() else axes[2:]
@@ -174,7 +171,39 @@ class ShadowMap:
         self.texture.release()
 
 
-def _frame_along(axis: Array) -> Array:
+def parallel_view(
+    towards: Array,
+    places: Array,
+    corners: Array,
+    size: int,
+    beside: tuple[float, float] = (0.5, 0.5),
+) -> tuple[Array, float]:
+    """From the scene to clip space, seen in parallel from a direction.
+
+    Parameters
+    ----------
+    towards : (3,) the direction.
+    places, corners : (n, 3) what lies within the map, and between its planes.
+    size, beside : texels, and parts of one by which the map is shifted, 0 to 1.
+
+    Returns
+    -------
+    matrix (4, 4), and the depth in clip space of as much as a texel is wide.
+    """
+    axes = frame_along(-towards / np.linalg.norm(towards))
+    low, high = _bounds(places @ axes[:2].T, size, beside)
+    depths = corners @ axes[2]
+    near, far = _apart(depths.min(), depths.max())
+    matrix = np.eye(4)
+    for n in range(2):
+        matrix[n, :3] = axes[n] * 2.0 / (high[n] - low[n])
+        matrix[n, 3] = -(high[n] + low[n]) / (high[n] - low[n])
+    matrix[2, :3] = axes[2] * 2.0 / (far - near)
+    matrix[2, 3] = -(far + near) / (far - near)
+    return matrix, float((high - low).max()) / size * 2.0 / (far - near)
+
+
+def frame_along(axis: Array) -> Array:
     """(3, 3) unit vectors, the last of them the axis."""
     first = np.cross(np.eye(3)[np.abs(axis).argmin()], axis)
     first /= np.linalg.norm(first)

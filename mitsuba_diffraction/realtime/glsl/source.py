@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Literal
 
@@ -19,6 +19,11 @@ THESIS_METHODS = METHODS[2:]
 
 #: Lights at once.
 LIGHTS = 4
+
+_CONSTANTS = {
+    "PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1), "LIGHTS": str(LIGHTS),
+    "SURFACE_KIND": "0", "LIGHTS_LIT": "1",
+}  # fmt: skip
 
 _PREAMBLES = {
     "desktop": "#version 330 core\n",
@@ -72,8 +77,7 @@ def fragment_parts(
     """The names and texts that `fragment_source` joins; parameters and errors as there."""
     if method not in METHODS:
         raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
-    constants = {"PAGE": str(PAGE), "PAGE_BITS": str(PAGE.bit_length() - 1), "LIGHTS": str(LIGHTS)}
-    constants |= {"SURFACE_KIND": "0", "LIGHTS_LIT": "1", **definitions}
+    constants = _CONSTANTS | dict(definitions)
     lines = [f"#define {name} {value}\n" for name, value in constants.items()]
     parts = [("preamble", _PREAMBLES[dialect] + "".join(lines))]
     shared = ["library.glsl", "boundary.glsl"]
@@ -81,12 +85,27 @@ def fragment_parts(
         shared.append("taylor.glsl")
     if "SHADOWED" in constants:
         shared.append("shadow.glsl")
-    shared += ["layers.glsl", f"{method}.glsl"]
+    shared.append("layers.glsl")
+    if "GLOSS" in constants:
+        shared.append("gloss.glsl")
+    if "WEIGHTED" in constants or "LOOKED_UP" in constants:
+        shared += ["surroundings.glsl", "lobes.glsl"]
+    shared.append(f"{method}.glsl")
     if "DIFFRACTING" in constants:
         shared.append("diffraction.glsl")
     return parts + [(name, shader_file(name)) for name in (*shared, main)]
 
 
-def plain_source(name: str) -> str:
-    """A stage that knows neither surfaces nor tables, for the desktop."""
-    return _PREAMBLES["desktop"] + shader_file(name)
+def plain_source(
+    name: str,
+    shared: Sequence[str] = (),
+    definitions: Mapping[str, str] | None = None,
+    dialect: Dialect = "desktop",
+) -> str:
+    """A stage that knows neither surfaces nor tables.
+
+    shared : files that it uses.
+    """
+    constants = _CONSTANTS | dict(definitions or {})
+    lines = [f"#define {key} {value}\n" for key, value in constants.items()]
+    return _PREAMBLES[dialect] + "".join((*lines, *map(shader_file, shared), shader_file(name)))

@@ -16,13 +16,14 @@ from typing import Any
 from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...progress import Progress, silent
+from ..glsl.emitters import Emitters
 from ..glsl.scene import load, read_scene
 from .scene import MAX_BYTES, WebScene, web_scene
 from .tables import WEB_METHODS
 
 _SCRIPTS = (
-    "vectors.js", "data.js", "mesh.js", "camera.js", "light.js", "drawing.js", "viewer.js",
-    "controls.js", "main.js",
+    "vectors.js", "data.js", "mesh.js", "camera.js", "light.js", "drawing.js", "shadow.js",
+    "viewer.js", "link.js", "map.js", "controls.js", "main.js",
 )  # fmt: skip
 
 
@@ -76,15 +77,17 @@ def make_page(
     if title is None:
         named = isinstance(scene, str | os.PathLike)
         title = Path(scene).stem if named else "Diffraction"
-    realtime = read_scene(load(scene), sensor)
-    packed = web_scene(realtime, title, methods, progress)
+    loaded = load(scene)
+    realtime = read_scene(loaded, sensor)
+    emitters = Emitters(loaded, realtime.middle) if loaded.emitters() else None
+    packed = web_scene(realtime, emitters, title, methods, progress)
     text = _filled(packed)
     if len(text.encode()) > MAX_BYTES:
         raise DiffractionError(
             f"the page would have {len(text.encode()) / 1e6:.1f} MB, more than "
             f"{MAX_BYTES / 1e6:.0f}; use fewer triangles or a smaller coherence_width"
         )
-    return Page(text, packed.loss, packed.left_out, realtime.omissions)
+    return Page(text, packed.loss, packed.left_out, tuple(packed.header["omissions"]))
 
 
 def export_viewer(scene: Any, path: str | os.PathLike[str], **options: Any) -> Page:

@@ -14,15 +14,21 @@ from ...errors import DiffractionError
 from ...optics.colour import encode_srgb
 from ...progress import Progress
 from ...tables.table import DiffractionTable
-from ..glsl.lights import light_definitions
+from ..glsl.emitters import Emitters
 from ..glsl.materials import height_scale, pack_conservation, pack_surface
-from ..glsl.packing import pack_responses
 from ..glsl.scene import RealtimeScene, box_of
-from ..glsl.source import fragment_source, vertex_source
+from ..glsl.source import (
+    fragment_parts,
+    fragment_source,
+    plain_source,
+    shader_file,
+    vertex_source,
+)
 from ..glsl.textures import Packed, Texture
 from .geometry import packed_mesh, sections_of
+from .light import packed_light
 from .sections import Sections, packed_array, packed_file
-from .tables import as_columns, fitting_tables
+from .tables import as_columns, fitting_tables, strongest_orders
 
 #: Largest page, bytes.
 MAX_BYTES = 25_000_000
@@ -52,13 +58,18 @@ class WebScene:
 
 
 def web_scene(
-    scene: RealtimeScene, title: str, methods: Sequence[str], progress: Progress
+    scene: RealtimeScene,
+    emitters: Emitters | None,
+    title: str,
+    methods: Sequence[str],
+    progress: Progress,
 ) -> WebScene:
     """Pack a scene.
 
     Parameters
     ----------
     scene : of `glsl.scene.read_scene`.
+    emitters : of the same scene; None where none of them brings light.
     title : for people.
     methods : of `tables.WEB_METHODS`, the first being shown first; those whose tables do not fit
         are left out, from the last on.
@@ -88,16 +99,14 @@ def web_scene(
                 tables.append(material.table)
             entry["table"] = next(n for n, t in enumerate(tables) if t is material.table)
         surfaces.append((entry, common))
-    lights = scene.lighting.lights
-    pairs = [(light.wavelengths, light.spectrum) for light in lights]
-    responses = _parts(pack_responses(pairs), sections)
+    light = packed_light(scene, emitters, sections)
 
     room = (MAX_BYTES - _HEADER) // 4 * 3 - sections.nbytes
     shown, packed, left_out = _fitted(methods, tables, room, progress)
     header: dict[str, Any] = {
         "title": title,
         "surfaces": [entry for entry, _ in surfaces],
-        "responses": responses,
+        "light": light,
         "tables": {
             method: [
                 _parts(packed[method, n].packed, sections, packed[method, n].sections)
@@ -108,12 +117,7 @@ def web_scene(
         "methods": shown,
         "octaves": [OCTAVES[0], OCTAVES[-1]],
         "energy_pages": len(OCTAVES),
-        "omissions": list(dict.fromkeys(scene.omissions)),
-        "lights": [
-            {"name": light.name, "place": light.place.tolist(), "colour": light.colour.tolist()}
-            for light in lights
-        ],
-        "sky": scene.lighting.sky.ravel().tolist(),
+        "omissions": _omissions(scene, emitters),
         "background": _zenith(scene.lighting.sky),
         "camera": {
             "to_world": scene.camera.to_world.tolist(),
@@ -124,12 +128,12 @@ def web_scene(
         "box": [scene.low.tolist(), scene.high.tolist()],
         "subject": [x.tolist() for x in box_of([s.vertices[:, :3] for s in scene.diffracting])],
     }
-    lit = light_definitions(len(lights), any(x != 0.0 for x in header["sky"]))
-    _add_programs(header, surfaces, shown, packed, lit)
+    _add_programs(header, surfaces, shown, packed)
     loss = {
         method: _worst([packed[method, n].loss for n in range(len(tables))]) for method in shown
     }
-    header["loss"] = loss
+    header["loss"], header["left_out"] = loss, left_out
+    header["orders"] = [strongest_orders(table) for table in tables]
     data, header["sections"] = sections.joined()
     return WebScene(header, data, loss, left_out)
 
@@ -203,9 +207,12 @@ def _add_programs(
     surfaces: Sequence[tuple[dict[str, Any], Packed]],
     methods: Sequence[str],
     packed: Any,
-    lit: dict[str, str],
 ) -> None:
-    """The shaders, each once, and which surface is drawn with which."""
+    """The shaders, each once, and which surface is drawn with which.
+
+    The page puts what it knows of the light where LIGHTS_LIT is defined, and appends one of the
+    main functions.
+    """
     sources: list[str] = []
     for entry, common in surfaces:
         # what does not diffract is drawn by any of the programs
@@ -213,13 +220,18 @@ def _add_programs(
         entry["programs"] = {}
         for method in methods:
             tables = packed[method, table].packed.definitions
-            definitions = {**common.definitions, **tables, **lit}
-            source = fragment_source(method, definitions, "web")
+            parts = fragment_parts(method, {**common.definitions, **tables, "SHADOWED": ""}, "web")
+            source = "".join(text for name, text in parts[:-1])
             if source not in sources:
                 sources.append(source)
             entry["programs"][method] = sources.index(source)
     header["programs"] = sources
+    header["mains"] = {
+        main: shader_file(f"{file}.frag")
+        for main, file in (("surface", "surface"), ("picked", "picked"), ("map", "map"))
+    }
     header["vertex"] = vertex_source("web")
+    header["shadow"] = plain_source("position.frag", dialect="web")
     whole = fragment_source(
         methods[0], packed[methods[0], 0].packed.definitions, "web", "shown.frag"
     )
@@ -232,6 +244,15 @@ def _plain(value: Any) -> Any:
     if isinstance(value, tuple):
         return [_plain(v) for v in value]
     return value.item() if isinstance(value, np.generic) else value
+
+
+def _omissions(scene: RealtimeScene, emitters: Emitters | None) -> list[str]:
+    """What the page does not show: of emitters only what the sequence of lights leaves out."""
+    found = [text for text in scene.omissions if text not in scene.lighting.omissions]
+    found += [] if emitters is None else emitters.omissions
+    if scene.emitting:
+        found.append("shapes that emit light (only their light)")
+    return list(dict.fromkeys(found))
 
 
 def _zenith(sky: NDArray[np.float64]) -> list[float]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...optics.geometry import wavenumber
 from ...progress import Progress
 from ...tables.colour.colour_difference import colour_difference, power_colour_difference
 from ...tables.energy.powers import power_series
@@ -120,3 +121,32 @@ def fitting_tables(
         if least <= room:
             return found
     return least
+
+
+def strongest_orders(table: DiffractionTable, count: int = 5) -> list[list[float]]:
+    """The brightest orders in green light along the normal, each apart from the others.
+
+    Returns
+    -------
+    of each q_x and q_y, rad/µm, and its share of the light; of a pair ±q one. None of a table whose
+    orders interfere.
+    """
+    if table.grid.coherent:
+        return []
+    series, _, scale, expansion = power_series(table)
+    kappa = np.array(2.0 * wavenumber(550.0))
+    weights = expansion.weights(kappa)
+    powers = series[int(expansion.interval(kappa))].astype(float) @ weights / scale
+    last = np.array(table.grid.last)
+    y, x = np.divmod(np.argsort(powers, axis=None)[::-1], powers.shape[1])
+    q = (np.stack([x, y], axis=1) - last) * table.spacing
+    shares, apart = np.sort(powers, axis=None)[::-1], 2.0 / table.sigma
+    found: list[list[float]] = []
+    for at, share in zip(q, shares, strict=True):
+        if len(found) == count or share <= 1e-5:
+            break
+        taken = np.array([one[:2] for one in found] or [[0.0, 0.0]])
+        near = np.minimum(*(np.linalg.norm(taken - sign * at, axis=1) for sign in (1.0, -1.0)))
+        if min(near.min(), np.linalg.norm(at)) > apart:
+            found.append([float(at[0]), float(at[1]), float(share)])
+    return found

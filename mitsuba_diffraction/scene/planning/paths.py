@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...optics.colour import response
+from ...plugin.memory import upload
 from .session import Session
 
 #: Longest paths that are followed, vertices and camera included.
@@ -137,7 +138,7 @@ def _follow(
     )
     rng = np.random.default_rng(seed)
     pixel = np.repeat(np.floor(rng.random((paths // 2, 2)) * crop), 2, axis=0) + offset
-    place = mi.Point2f(*(mi.Float(a.astype(np.float32)) for a in (pixel / size).T))
+    place = mi.Point2f(*(upload(mi.Float, a) for a in (pixel / size).T))
     place += sampler.next_2d() * mi.Vector2f(*(1.0 / float(n) for n in size))
     ray, throughput = sensor.sample_ray(
         0.0, sampler.next_1d(), place, sampler.next_2d(), mi.Mask(True)

@@ -51,8 +51,8 @@ def colour_proposals(table: ColourTable) -> ColourProposals:
     rings = np.zeros((BANDS, grid.rings), np.float32)
     azimuths = np.zeros((BANDS, grid.bins), np.float32)
     for band in range(BANDS):
-        brightness = _brightness(table, band)
-        inside = [_inside(brightness, table, ring) for ring in range(grid.rings)]
+        bright = _of_band(table, band)
+        inside = [_inside(bright, table, ring) for ring in range(grid.rings)]
         power = np.zeros(grid.rings - 1)
         for ring in range(grid.rings - 1):
             count = grid.counts[ring]
@@ -69,24 +69,28 @@ def colour_proposals(table: ColourTable) -> ColourProposals:
     return ColourProposals(rings, azimuths, rings[:, -1] > 0.0, _order_0(table))
 
 
-def _brightness(table: ColourTable, band: int) -> NDArray[np.float32]:
-    """Mean brightness (bins,) over the band's range of z, without order 0."""
-    expansion = table.expansion
+def _of_band(table: ColourTable, band: int) -> NDArray[np.float32]:
+    """Brightness (bins,) over the band's range of z, without order 0."""
     centre = BANDED * (band + 0.5) / BANDS
     shares = np.clip(centre + _SPREAD * np.linspace(-0.75, 0.75, _ZS), 0.02, 1.0)
-    zs = shares * expansion.kappa_max
+    return brightness(table, shares * table.expansion.kappa_max)
+
+
+def brightness(table: ColourTable, zs: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Sum over some z of the brightness in each bin, without order 0, (bins,)."""
+    expansion = table.expansion
     total = np.zeros(table.grid.bins, np.float32)
     for interval, weights in zip(expansion.interval(zs), expansion.weights(zs), strict=True):
         packet = np.zeros(PACKET, np.float32)
-        packet[: 3 * TERMS] = np.outer(IMPORTANCE, weights).ravel()
+        packet[: 3 * TERMS] = np.outer(IMPORTANCE, weights).ravel() / table.scale
         total += np.maximum(table.coefficients[interval].astype(np.float32) @ packet, 0.0)
     return total
 
 
-def _inside(brightness: NDArray[np.float32], table: ColourTable, ring: int) -> NDArray[np.float64]:
+def _inside(bright: NDArray[np.float32], table: ColourTable, ring: int) -> NDArray[np.float64]:
     """Mean brightness between the azimuths of a ring (count,)."""
     start, count = table.grid.start(ring), table.grid.counts[ring]
-    values = brightness[start : start + count + 1].astype(float)
+    values = bright[start : start + count + 1].astype(float)
     return values[1:] + values[:-1]
 
 

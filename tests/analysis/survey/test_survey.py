@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction import DiffractionError, HeightField
+from mitsuba_diffraction import DiffractionError, HeightField, gratings
 from mitsuba_diffraction.analysis.maps import Bands, BrdfMap, Light
 from mitsuba_diffraction.analysis.survey import (
     Treatment,
@@ -82,6 +82,14 @@ def test_rows_have_periods_to_a_percent_and_directions_to_a_degree(survey, tmp_p
     assert (tmp_path / "out" / "sheet.png").is_file()
 
 
+def test_a_table_that_cannot_be_mapped_is_a_row_with_its_reason(scans, tmp_path):
+    own = Treatment(settings={**SMALL, "wavelength_range": (500.0, 600.0)})
+    options = treatments_of(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'))
+    (row,) = run_survey(scans[:1], tmp_path / "out", treatments=options, own=own, resolution=8)
+    assert row["reason"].startswith("cannot map it: ")
+    assert "starts at 500 nm" in row["reason"]
+
+
 def test_a_second_run_does_only_what_is_new(survey, scans, monkeypatch):
     first = survey()
     measured = []
@@ -125,6 +133,24 @@ def test_treatments_are_those_of_all_patterns_that_match(tmp_path):
 def test_treatments_that_are_none_are_one_line(tmp_path, text):
     with pytest.raises(DiffractionError, match=r"treatments\.toml"):
         treatments_of(_toml(tmp_path, text))
+
+
+def test_a_disc_is_more_iridescent_than_a_scale_and_both_than_a_mirror(tmp_path):
+    made = {
+        "mirror": np.zeros((160, 160)), "scale": gratings.elaphe_like(20.0, 160).heights,
+        "disc": gratings.cd(20.0, 160).heights,
+    }  # fmt: skip
+    for name, heights in made.items():
+        np.save(tmp_path / f"{name}.npy", heights)
+    options = treatments_of(_toml(tmp_path, '["*.npy"]\npixel_size = 0.125\n'))
+    rows = run_survey(
+        [tmp_path / f"{name}.npy" for name in made], tmp_path / "out", treatments=options,
+        own=Treatment(settings={"coherence_width": 20.0, "tolerance": 0.05}), resolution=32,
+    )  # fmt: skip
+    assert [row["reason"] for row in rows] == ["", "", ""]
+    mirror, scale, disc = (row["iridescence"] for row in rows)
+    assert mirror < 0.2 * scale  # a lobe of 20 µm is wider in red light
+    assert scale < disc
 
 
 def _map(spectrum, n=32):

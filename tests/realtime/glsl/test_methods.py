@@ -137,6 +137,29 @@ def test_spectral_knows_the_lights_own_spectrum(gl: Any, table: DiffractionTable
     assert difference(probed(gl, "spectral", packed, at), summed(table, at, lit)) < 1e-2
 
 
+@pytest.mark.parametrize("wavelength", [400.0, 550.0, 700.0])
+def test_light_of_one_wavelength_is_the_table_there(
+    gl: Any, table: DiffractionTable, wavelength: float
+) -> None:
+    at = places(360)
+    k = 2e3 * np.pi / wavelength
+    one = Packed(uniforms={"wavenumber": k}, definitions={"MONOCHROME": ""})
+    found = probed(gl, "spectral", pack_powers(table) | one | PERFECT, at)
+    exact = table.window_sum(*(k * at.T[:3])) / (wavelength * 1e-3) ** 2
+    # cut windows
+    assert difference(found[:, 0], exact) < 2e-3
+    np.testing.assert_array_equal(found[:, 0], found[:, 2])
+
+
+def test_textures_of_floats_hold_the_same_colours(gl: Any, table: DiffractionTable) -> None:
+    colours = ColourTable.build(table)
+    at = places(1000)
+    floats = pack_colours(colours, floats=True) | Packed(definitions={"FLOAT_TEXTURES": ""})
+    found = probed(gl, "lut", floats | PERFECT, at)
+    # single precision, in the logarithm of the radius above all
+    assert difference(found, colours.colour(*at.T[:3])) < 1e-4
+
+
 def test_amplitudes_serve_spectral_as_powers(gl: Any, patch: HeightField) -> None:
     tables = [
         DiffractionTable.build(patch, coherence_width=6.5, basis=basis, tolerance=1e-3)

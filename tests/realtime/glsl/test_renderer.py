@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import types
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -236,7 +237,7 @@ def beneath(plate: Any, wo: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(found @ (weights / weights.sum(axis=0)))
 
 
-def test_all_that_is_not_shown_is_named_in_one_warning(
+def test_all_that_is_not_shown_is_named_in_warnings(
     gl: Any, some_variant: str, table_file: Path
 ) -> None:
     # what the shaders draw
@@ -256,10 +257,17 @@ def test_all_that_is_not_shown_is_named_in_one_warning(
             "room": {"type": "constant", "radiance": 0.25},
         }
     )  # fmt: skip
-    with pytest.warns(DiffractionWarning) as caught:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", DiffractionWarning)
         made = Renderer(scene, context=gl)
-    (text,) = [str(w.message) for w in caught if "realtime" in str(w.message)]
-    for part in ("the lens", "hair (SDFGrid)", "the material of glass", "torch (SpotLight)"):
+        for _ in range(2):
+            made.render("lut", supersampling=1)
+    # what no picture shows, and what progressive light does; each once
+    never, single = [str(w.message) for w in caught if "realtime" in str(w.message)]
+    for text, part in (
+        (single, "the lens"), (never, "hair (SDFGrid)"), (never, "the material of glass"),
+        (single, "torch (SpotLight)"),
+    ):  # fmt: skip
         assert part in text
     np.testing.assert_allclose(made.sky[0], 0.25, rtol=0.02)  # its sampling
     assert np.abs(made.sky[1:]).max() < 0.02
@@ -289,9 +297,9 @@ def test_a_sky_over_one_half_lights_what_faces_it(
             "sky": {"type": "envmap", "bitmap": mi.Bitmap(half), "to_world": upright},
         }
     )  # fmt: skip
+    made = Renderer(scene, context=gl)
     with pytest.warns(DiffractionWarning, match="shown as a smooth one"):
-        made = Renderer(scene, context=gl)
-    drawn = made.render("lut", supersampling=2)
+        drawn = made.render("lut", supersampling=2)
     traced = path_traced(with_lights_of(scene, made), 1024, 1)
     ball = binary_erosion(drawn[..., 3] > 0.999, np.ones((3, 3)))
     assert ball.sum() > 60
@@ -343,6 +351,28 @@ def test_an_old_driver_is_refused_with_what_it_is() -> None:
     old = types.SimpleNamespace(version_code=310, info={"GL_RENDERER": "Ancient"})
     with pytest.raises(DiffractionError, match=r"Ancient has OpenGL 3\.1, .*need 3\.3"):
         check_version(old)
+
+
+def test_a_driver_with_small_textures_is_refused() -> None:
+    info = {"GL_RENDERER": "Tiny", "GL_MAX_TEXTURE_SIZE": 1024}
+    with pytest.raises(DiffractionError, match=r"Tiny has textures of 1024 .* need 4096"):
+        check_version(types.SimpleNamespace(version_code=330, info=info))
+
+
+def test_a_mesh_without_texture_coordinates_is_refused(
+    gl: Any, some_variant: str, table_file: Path, tmp_path: Path
+) -> None:
+    mesh = mi.Mesh("flake", 3, 1)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = np.array([0.0, 0, 0, 1, 0, 0, 0, 1, 0])
+    parameters["faces"] = np.arange(3)
+    parameters.update()
+    mesh.write_ply(str(tmp_path / "flake.ply"))
+    flake = {"type": "ply", "filename": str(tmp_path / "flake.ply")}
+    skin = {"type": "diffraction", "table": str(table_file)}
+    scene = {"type": "scene", "sensor": sensor(), "flake": {**flake, "bsdf": skin}}
+    with pytest.raises(DiffractionError, match="flake: the mesh has no texture coordinates"):
+        Renderer(mi.load_dict(scene), context=gl)
 
 
 def test_a_missing_driver_is_one_line_that_says_what_to_install(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from pathlib import Path
 from typing import Any
 
@@ -15,22 +14,7 @@ from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.realtime.web import Viewer
 from mitsuba_diffraction.realtime.web.export import Page, make_page
 from mitsuba_diffraction.realtime.web.scene import MAX_BYTES
-
-_READ = """async () => {
-    viewer.most = 1;  // through the middles of pixels, as the desktop's
-    viewer.touch();
-    await viewer.settled();
-    let text = "";
-    for (const byte of new Uint8Array(viewer.drawing.read(viewer.count).buffer))
-        text += String.fromCharCode(byte);
-    return [btoa(text), viewer.drawing.width, viewer.drawing.height];
-}"""
-
-
-def picture(tab: Any) -> NDArray[np.float32]:
-    """What the page draws, linear sRGB and coverage, from the top row down."""
-    text, width, height = tab.page.evaluate(_READ)
-    return np.frombuffer(base64.b64decode(text), np.float32).reshape(height, width, 4)[::-1]
+from tests.realtime.web.pictures import picture
 
 
 @pytest.fixture(scope="session")

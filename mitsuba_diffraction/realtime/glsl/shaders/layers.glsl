@@ -26,10 +26,26 @@ vec3 albedo(vec3 w, vec2 rotation)
 
 #endif
 
+#ifdef THROUGH
+
+uniform sampler2D through;        // what a plain material's face lets through, over cosθ
+
+float passed(float cosine)
+{
+    float last = float(textureSize(through, 0).x - 1);
+    float lower = min(floor(cosine * last), last - 1.0);
+    float left = texelFetch(through, ivec2(int(lower), 0), 0).r;
+    return mix(left, texelFetch(through, ivec2(int(lower) + 1, 0), 0).r, cosine * last - lower);
+}
+
+#endif
+
 // Share of the light that reaches what lies beneath and comes back.
 vec3 transmission(vec3 wi, vec3 wo, vec2 rotation)
 {
-#ifndef DIFFRACTING
+#if defined(THROUGH)
+    return vec3(passed(wi.z) * passed(wo.z));
+#elif !defined(DIFFRACTING)
     return vec3(1.0);
 #elif defined(THESIS)
     return 1.0 - reflectance(0.5 * length(wi + wo)) + diffuse_weight;

@@ -126,53 +126,72 @@ vec3 from_order_to_order(vec2 uv, float r, float z, float cos_half, int light)
     return sum * (0.5 * inverse_scale * sqrt(PI) / (sigma * r));
 }
 
+// Power times reflectance at one wavenumber, over all orders in reach.
+float reflected_at(vec2 uv, float r, float z, float k, float cos_half)
+{
+    vec2 falloff = sigma * spacing;
+    float step_factor = exp(-2.0 * falloff.x * falloff.x);
+    vec4 weights[TEXELS];
+    int interval = interval_of(k * z);
+    float specular = series(k * z, interval, weights);
+    vec2 place = k * uv / spacing;
+    float reach = REACH / falloff.y;
+    int low = max(int(ceil(place.y - reach)), -last_order.y);
+    int high = min(int(floor(place.y + reach)), last_order.y);
+    float power = 0.0;
+    for (int y = low; y <= high; ++y) {
+        float apart = falloff.y * (float(y) - place.y);
+        float width = sqrt(max(REACH * REACH - apart * apart, 0.0)) / falloff.x;  // of a disc
+        int first = max(int(ceil(place.x - width)), -last_order.x);
+        int last = min(int(floor(place.x + width)), last_order.x);
+        float from = falloff.x * (float(first) - place.x);
+        float weight = exp(-apart * apart - from * from);
+        float factor = exp(-falloff.x * (2.0 * from + falloff.x));
+        int texel = first_texel(interval, ivec2(first, y));
+        for (int x = first; x <= last; ++x) {
+            float value = 0.0;
+            for (int i = 0; i < TEXELS; ++i) value += dot(entry(orders, texel + i), weights[i]);
+            power += weight * value;
+            weight *= factor;
+            factor *= step_factor;
+            texel += TEXELS;
+        }
+    }
+    power *= inverse_scale;
+    float apart = sigma * k * r;
+    power += exp(-apart * apart) * specular;
+    float reflected = power * boundary_at(cos_half, k, r, z);
+#ifdef COATED
+    reflected += exp(-apart * apart) * face_reflected;
+#endif
+    return reflected;
+}
+
 vec3 from_wavelength_to_wavelength(vec2 uv, float r, float z, float cos_half, int light)
 {
     float deviation = sqrt(0.5) / (sigma * max(r, 1e-6));
     int count = int(ceil((wavenumbers.y - wavenumbers.x) / min(LARGEST_STEP, 1.5 * deviation)));
     float delta = (wavenumbers.y - wavenumbers.x) / float(count);
-    vec2 falloff = sigma * spacing;
-    float step_factor = exp(-2.0 * falloff.x * falloff.x);
     vec3 sum = vec3(0.0);
-    vec4 weights[TEXELS];
     for (int n = 0; n < count; ++n) {
         float k = wavenumbers.x + (float(n) + 0.5) * delta;
-        int interval = interval_of(k * z);
-        float specular = series(k * z, interval, weights);
-        vec2 place = k * uv / spacing;
-        float reach = REACH / falloff.y;
-        int low = max(int(ceil(place.y - reach)), -last_order.y);
-        int high = min(int(floor(place.y + reach)), last_order.y);
-        float power = 0.0;
-        for (int y = low; y <= high; ++y) {
-            float apart = falloff.y * (float(y) - place.y);
-            float width = sqrt(max(REACH * REACH - apart * apart, 0.0)) / falloff.x;  // of a disc
-            int first = max(int(ceil(place.x - width)), -last_order.x);
-            int last = min(int(floor(place.x + width)), last_order.x);
-            float from = falloff.x * (float(first) - place.x);
-            float weight = exp(-apart * apart - from * from);
-            float factor = exp(-falloff.x * (2.0 * from + falloff.x));
-            int texel = first_texel(interval, ivec2(first, y));
-            for (int x = first; x <= last; ++x) {
-                float value = 0.0;
-                for (int i = 0; i < TEXELS; ++i) value += dot(entry(orders, texel + i), weights[i]);
-                power += weight * value;
-                weight *= factor;
-                factor *= step_factor;
-                texel += TEXELS;
-            }
-        }
-        power *= inverse_scale;
-        float apart = sigma * k * r;
-        power += exp(-apart * apart) * specular;
-        float reflected = power * boundary_at(cos_half, k, r, z);
-#ifdef COATED
-        reflected += exp(-apart * apart) * face_reflected;
-#endif
-        sum += reflected * response(k, light);
+        sum += reflected_at(uv, r, z, k, cos_half) * response(k, light);
     }
     return sum * delta;
 }
+
+#ifdef MONOCHROME
+
+uniform float wavenumber;        // of the only light, rad/µm, whose colour is `light_colour`
+
+vec3 diffracted(vec2 uv, float z, float cos_half, int light)
+{
+    float k = wavenumber / (2.0 * PI);
+    return light_colour[light] * boundary_at_all(cos_half) * k * k
+        * reflected_at(uv, length(uv), z, wavenumber, cos_half);
+}
+
+#else
 
 // R ⟨|P|²⟩ / (4π²σ⁴ λ²) over the light's wavelengths, linear sRGB, 1/µm².
 vec3 diffracted(vec2 uv, float z, float cos_half, int light)
@@ -183,3 +202,5 @@ vec3 diffracted(vec2 uv, float z, float cos_half, int light)
     else sum = from_wavelength_to_wavelength(uv, r, z, cos_half, light);
     return boundary_at_all(cos_half) * sum;
 }
+
+#endif

@@ -1,4 +1,5 @@
-// One fragment: lights over the surface. What a method adds is `diffracted`.
+// One fragment: lights over the surface, or what its lobes meet of the surroundings (LOOKED_UP).
+// What a method adds is `diffracted`.
 
 in vec3 v_position;
 in vec3 v_normal;
@@ -22,9 +23,79 @@ uniform sampler2D axis_map;
 uniform mat3 axis_uv;
 #endif
 
+#ifdef BUMPED
+uniform sampler2D bump_map;       // heights along the normal, in the scene's unit
+uniform mat3 bump_uv;
+#endif
+#ifdef NORMAL_MAPPED
+uniform sampler2D normal_map;
+uniform mat3 normal_uv;
+#endif
+#ifdef WEIGHTED
+uniform float light_density;      // as `lights.Light.density`
+#endif
+
 uniform float exposure;           // factor, for a display
 
 out vec4 fragment;
+
+#if defined(DIFFRACTING) || defined(GLOSS)
+#define LOBES
+
+// f·cosθ of what is mirrored or diffracted times the light's irradiance.
+vec3 lobes(vec3 wi, vec3 wo, vec2 rotation, int light)
+{
+#ifdef GLOSS
+    return light_colour[light] * gloss(wi, wo);
+#elif defined(THESIS)
+    return (1.0 - diffuse_weight) * diffraction(wi, wo, rotation, light);
+#else
+    return diffraction(wi, wo, rotation, light);
+#endif
+}
+
+#endif
+
+#ifdef BUMPED
+
+float bump_at(ivec2 texel)
+{
+    ivec2 size = textureSize(bump_map, 0);
+    return texelFetch(bump_map, ((texel % size) + size) % size, 0).r;
+}
+
+// The gradient of the heights over (u, v), between the four texels around.
+vec2 bump_gradient()
+{
+    vec2 size = vec2(textureSize(bump_map, 0));
+    vec2 place = (bump_uv * vec3(v_texcoord, 1.0)).xy * size - 0.5;
+    ivec2 texel = ivec2(floor(place));
+    vec2 t = place - floor(place);
+    float a = bump_at(texel), b = bump_at(texel + ivec2(1, 0));
+    float c = bump_at(texel + ivec2(0, 1)), d = bump_at(texel + ivec2(1, 1));
+    vec2 gradient = vec2(mix(b - a, d - c, t.y), mix(c - a, d - b, t.x)) * size;
+    return vec2(dot(bump_uv[0].xy, gradient), dot(bump_uv[1].xy, gradient));
+}
+
+// The normal of a surface that is displaced along its own (Blinn 1978).
+vec3 bumped(vec3 n)
+{
+    vec3 x = dFdx(v_position), y = dFdy(v_position);
+    vec2 u = dFdx(v_texcoord), v = dFdy(v_texcoord);
+    float area = u.x * v.y - u.y * v.x;
+    if (abs(area) < 1e-30) return n;
+    vec3 along_u = (x * v.y - y * u.y) / area, along_v = (y * u.x - x * v.x) / area;
+    vec2 gradient = bump_gradient();
+    along_u += n * (gradient.x - dot(n, along_u));
+    along_v += n * (gradient.y - dot(n, along_v));
+    vec3 found = normalize(cross(along_u, along_v));
+    return dot(found, n) < 0.0 ? -found : found;
+}
+
+#endif
+
+// A place in a picture whose edges go on beyond it.
+vec2 within(vec2 place, vec2 size) { return clamp(place, 0.5 / size, 1.0 - 0.5 / size); }
 
 void main()
 {
@@ -32,6 +103,18 @@ void main()
     vec3 s = v_tangent - n * dot(n, v_tangent);
     s *= inversesqrt(max(dot(s, s), 1e-20));
     vec3 t = cross(n, s);
+    vec3 smooth_normal = n;
+#ifdef BUMPED
+    n = bumped(n);
+#endif
+#ifdef NORMAL_MAPPED
+    vec3 mapped = texture(normal_map, (normal_uv * vec3(v_texcoord, 1.0)).xy).xyz;
+    n = normalize(mapped.x * s + mapped.y * t + mapped.z * n);
+#endif
+#if defined(BUMPED) || defined(NORMAL_MAPPED)
+    s = normalize(s - n * dot(n, s));
+    t = cross(n, s);
+#endif
     vec3 towards_eye = dot(view_axis, view_axis) > 0.0 ? view_axis : normalize(eye - v_position);
     vec3 wi = vec3(dot(towards_eye, s), dot(towards_eye, t), dot(towards_eye, n));
     float side = two_sided && wi.z < 0.0 ? -1.0 : 1.0;
@@ -40,27 +123,55 @@ void main()
 
     vec3 pigment = v_colour;
 #ifdef COLOUR_MAPPED
-    pigment = texture(colour_map, (colour_uv * vec3(v_texcoord, 1.0)).xy).rgb;
+    vec2 of_colour = (colour_uv * vec3(v_texcoord, 1.0)).xy;
+#ifdef COLOUR_CLAMPED
+    of_colour = within(of_colour, vec2(textureSize(colour_map, 0)));
+#endif
+    pigment = texture(colour_map, of_colour).rgb;
 #endif
     vec2 rotation = v_axis;
 #ifdef AXIS_MAPPED
-    rotation = texture(axis_map, (axis_uv * vec3(v_texcoord, 1.0)).xy).rg;
+    vec2 of_axis = (axis_uv * vec3(v_texcoord, 1.0)).xy;
+#ifdef AXIS_CLAMPED
+    of_axis = within(of_axis, vec2(textureSize(axis_map, 0)));
+#endif
+    rotation = texture(axis_map, of_axis).rg;
 #endif
     float turned = length(rotation);
     rotation = turned > 1e-6 ? rotation / turned : vec2(1.0, 0.0);
 
-#ifdef SHADOWED
+#if defined(SHADOWED) || defined(LOOKED_UP)
     vec3 flat_normal = cross(dFdx(v_position), dFdy(v_position));
     flat_normal *= inversesqrt(max(dot(flat_normal, flat_normal), 1e-30));
 #endif
 
     vec3 radiance = vec3(0.0);
+#ifdef LOOKED_UP
+#ifdef LOBES
+    vec3 drawn = drawn_numbers();
+    vec3 wo = lobe_direction(wi, rotation, drawn.xy);
+    vec3 direction = wo.x * s + wo.y * t + side * wo.z * n;
+    if (seen && wo.z > LOWEST && side * dot(direction, smooth_normal) > 0.0) {
+        vec4 light = arriving(v_position, direction);
+        float density = lobe_density(wi, wo, rotation);
+#ifdef DEPTH_ROWS
+        vec3 above = dot(flat_normal, towards_eye) < 0.0 ? -flat_normal : flat_normal;
+        if (hidden(v_position, above, direction, drawn.yz)) light = vec4(0.0);
+#endif
+#ifdef MIRROR
+        light.w = 0.0;
+#endif
+        if (density > 0.0 && light.rgb != vec3(0.0))
+            radiance = light.rgb * lobes(wi, wo, rotation, 0) / (density + light.w);
+    }
+#endif
+#else
     for (int i = 0; i < LIGHTS_LIT; ++i) {
         vec3 away = light_place[i].xyz - light_place[i].w * v_position;
         float square = dot(away, away);
         vec3 direction = away * inversesqrt(square);
         vec3 wo = vec3(dot(direction, s), dot(direction, t), side * dot(direction, n));
-        bool lit = seen && wo.z > 0.0;
+        bool lit = seen && wo.z > 0.0 && side * dot(direction, smooth_normal) > 0.0;
 #ifdef SKIPS_UNLIT
         if (!lit) continue;
 #endif
@@ -69,16 +180,20 @@ void main()
 #ifdef PIGMENTED
         added += light_colour[i] * wo.z * (1.0 / PI) * pigment * transmission(wi, wo, rotation);
 #endif
-#ifdef DIFFRACTING
-        vec3 diffracting = diffraction(wi, wo, rotation, i);
-#ifdef THESIS
-        diffracting *= 1.0 - diffuse_weight;
+#if defined(LOBES) && !defined(MIRROR)
+        float share = 1.0;
+#ifdef WEIGHTED
+        float drawn = light_density * square / max(emitted(direction), 1e-6);
+#ifdef ENVIRONMENT
+        if (light_density < 0.0) drawn = density_of_environment(environment_radiance(direction));
 #endif
-        added += diffracting;
+        if (light_density != 0.0) share = drawn / max(drawn + lobe_density(wi, wo, rotation), 1e-20);
+#endif
+        added += share * lobes(wi, wo, rotation, i);
 #endif
         float falloff = light_place[i].w > 0.0 ? 1.0 / square : 1.0;
 #ifdef SHADOWED
-        falloff *= emitted(direction) * reached(v_position, flat_normal);
+        if (i == 0) falloff *= emitted(direction) * reached(v_position, flat_normal);
 #endif
         radiance += lit ? falloff * added : vec3(0.0);
     }
@@ -90,6 +205,7 @@ void main()
     returned += albedo(wi, rotation);
 #endif
     radiance += seen ? max(above, 0.0) * returned : vec3(0.0);
+#endif
 #endif
 #ifdef DISPLAYED
     radiance = encode_srgb(radiance * exposure);

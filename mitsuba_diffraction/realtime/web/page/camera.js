@@ -10,6 +10,11 @@ class Camera {
     this.target = plus(this.eye, this.axis(2), distance > 0 ? distance : norm(minus(middle, this.eye)));
     this.reach = norm(minus(subject[1], subject[0]));
     this.up = this.upright();
+    // where the subject is in the picture, from side to side, in tangents of angles
+    const toCamera = inverse(this.matrix);
+    const across = cornersOf(subject).map((p) => [0, 2].map((n) => dot(toCamera[n], p) + toCamera[n][3])).map(([x, z]) => -x / z);
+    const [left, right] = [Math.min(...across), Math.max(...across)];
+    this.subject = distance > 0 && Number.isFinite(right - left) ? [0.5 * (left + right), 0.52 * (right - left)] : [0, Infinity];
   }
 
   // The axis of the world that points up: a camera that looks at a ground looks against it.
@@ -62,17 +67,19 @@ class Camera {
     this.set([0, 1, 2].map((n) => this.axis(n)), plus(this.target, this.axis(2), -distance));
   }
 
-  // Tangents of half the angles of view: all of the scene's picture is in what the panel leaves of
-  // the window, `free` of its width.
+  // Tangents of half the angles of view, and of the middle: all of the scene's picture is in what the
+  // panel leaves of the window, `free` of its width; all of the subject where it is upright.
   view(aspect, free = 1) {
     const { fov, size } = this.described;
     const across = Math.tan((fov * Math.PI) / 360), own = size[0] / size[1];
-    const upright = aspect * free >= own ? across / own : across / (aspect * free);
-    return [upright * aspect, upright];
+    if (aspect * free >= own) return [(across / own) * aspect, across / own, 0];
+    const [middle, half] = aspect < 0.8 ? this.subject : [0, Infinity];
+    const upright = Math.min(across, half) / (aspect * free);
+    return [upright * aspect, upright, half < across ? middle : 0];
   }
 
-  // From world to clip space; `jitter` shifts the picture, in units of half of it.
-  projection(aspect, free, jitter) {
+  // From world to clip space; `jitter` shifts the picture, in units of half of it, and so does `lift`.
+  projection(aspect, free, jitter, lift) {
     const toCamera = inverse(this.matrix);
     const [low, high] = this.box;
     const depths = [0, 1, 2, 3, 4, 5, 6, 7].map(
@@ -80,11 +87,11 @@ class Camera {
     const outside = [0, 1, 2].map((i) => Math.max(low[i] - this.eye[i], this.eye[i] - high[i], 0));
     const far = Math.max(1.001 * Math.max(...depths), 1e-6, 2 * this.distance);
     const near = Math.max(0.5 * norm(outside), 0.999 * Math.min(...depths), 5e-3 * this.distance);
-    const [x, y] = this.view(aspect, free);
+    const [x, y, middle] = this.view(aspect, free);
     const [right, down] = this.described.offset;
     return product([
-      [-1 / x, 0, 2 * right + jitter[0] + free - 1, 0],
-      [0, 1 / y, -2 * down + jitter[1], 0],
+      [-1 / x, 0, 2 * right + jitter[0] + free - 1 - middle / x, 0],
+      [0, 1 / y, -2 * down + jitter[1] + lift, 0],
       [0, 0, (far + near) / (far - near), (-2 * far * near) / (far - near)],
       [0, 0, 1, 0],
     ], toCamera);

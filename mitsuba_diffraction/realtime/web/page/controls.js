@@ -8,9 +8,25 @@ class Controls {
     this.fail = fail;
     this.pointers = new Map();
     this.canvas();
+    this.map = new BrdfMap(viewer, element("map"), element("map_words"));
     this.panel();
     this.disc();
-    viewer.report = (time, count, sample) => this.report(time, count, sample);
+    this.link();
+    viewer.report = (sample, count) => this.report(sample, count);
+    this.all();
+  }
+
+  // The panel as the viewer is.
+  all() {
+    const { viewer } = this;
+    element("exposure").value = Math.log2(viewer.exposure);
+    element("heights").value = Math.log2(viewer.heights);
+    element("wavelength").value = viewer.wavelength ?? 375;
+    element("shadows").checked = viewer.shadows;
+    element("kind").value = viewer.lights.kind;
+    this.mark();
+    this.label();
+    this.drawDisc();
   }
 
   canvas() {
@@ -19,12 +35,17 @@ class Controls {
       canvas.setPointerCapture(event.pointerId);
       this.pointers.set(event.pointerId, event);
       element("hint").classList.add("gone");
+      this.look(event);
     });
     for (const name of ["pointerup", "pointercancel"])
       canvas.addEventListener(name, (event) => this.pointers.delete(event.pointerId));
+    canvas.addEventListener("pointerleave", () => clearTimeout(this.looking));
     canvas.addEventListener("pointermove", (event) => {
       const before = this.pointers.get(event.pointerId);
-      if (!before) return;
+      if (!before) {
+        this.look(event);
+        return;
+      }
       if (this.pointers.size === 2) this.pinch(before, event);
       else this.drag(before, event);
       this.pointers.set(event.pointerId, event);
@@ -47,23 +68,71 @@ class Controls {
     new ResizeObserver(() => this.arrange()).observe(element("panel"));
   }
 
-  // The picture is beside the panel where there is room.
+  // The map of what the cursor rests on.
+  look({ clientX, clientY }) {
+    if (!element("map_of").open) return;
+    this.map.at = [clientX, clientY];
+    clearTimeout(this.looking);
+    this.looking = setTimeout(() => this.map.update(), 30);
+  }
+
+  // The address says what is seen, once nothing moves.
+  link() {
+    const { viewer } = this;
+    this.linked = setInterval(() => {
+      if (viewer.moving || viewer.lost) return;
+      const text = `#${viewToText(viewer)}`;
+      if (text === this.address) return;
+      if (this.address !== undefined)
+        try {
+          history.replaceState(null, "", text);
+        } catch {
+          clearInterval(this.linked); // in a cell of a notebook there is no address
+        }
+      this.address = text;
+    }, 500);
+    window.addEventListener("hashchange", async () => {
+      textToView(location.hash.slice(1), viewer);
+      await this.change({});
+      this.all();
+    });
+    element("link").addEventListener("click", async () => {
+      const text = `${location.href.split("#")[0]}#${viewToText(viewer)}`;
+      try {
+        await navigator.clipboard.writeText(text);
+        this.say("Link copied");
+      } catch {
+        prompt("The link", text);
+      }
+    });
+  }
+
+  say(text) {
+    element("hint").textContent = text;
+    element("hint").classList.remove("gone");
+    setTimeout(() => element("hint").classList.add("gone"), 2000);
+  }
+
+  // The picture is beside the panel where there is room, above it where that is a sheet.
   arrange() {
     const { viewer } = this;
-    const panel = element("panel").offsetWidth + 12, whole = viewer.canvas.clientWidth;
-    const beside = panel > 100 && whole > 2 * panel;
-    const free = beside ? 1 - panel / whole : 1;
+    const { clientWidth: whole, clientHeight: high } = viewer.canvas;
+    const { offsetWidth: wide, offsetHeight: tall } = element("panel");
+    const open = !document.body.matches(".folded, .bare");
+    const sheet = open && wide === whole;
+    const free = open && !sheet && whole > 2 * wide + 24 ? 1 - (wide + 12) / whole : 1;
+    const lift = sheet ? tall / high : 0;
     viewer.fit();
-    if (free === viewer.free) return;
-    viewer.free = free;
+    if (free === viewer.free && lift === viewer.lift) return;
+    Object.assign(viewer, { free, lift });
     viewer.touch();
   }
 
   drag(before, event) {
-    const { camera, sun, canvas } = this.viewer;
+    const { camera, lights, canvas } = this.viewer;
     const right = event.clientX - before.clientX, down = event.clientY - before.clientY;
     if (event.shiftKey || event.buttons & 2) {
-      if (sun.lights.length) sun.move(right / 220, -down / 220);
+      if (lights.movable) lights.move(right / 220, -down / 220);
     } else if (event.ctrlKey || event.metaKey || event.buttons & 4) this.pan(right, down);
     else camera.orbit((3 * right) / canvas.clientHeight, (3 * down) / canvas.clientHeight);
   }
@@ -98,7 +167,15 @@ class Controls {
       button.addEventListener("click", () => this.choose(method));
       element("methods").append(button);
     }
-    this.mark();
+    for (const kind of viewer.lights.kinds) element("kind").add(new Option(KINDS[kind], kind));
+    element("kind").addEventListener("change", () => this.change({ kind: element("kind").value }));
+    element("shadows").addEventListener("change", () => {
+      viewer.shadows = element("shadows").checked;
+      viewer.touch();
+    });
+    element("wavelength").parentElement.hidden = !header.methods.includes("spectral");
+    element("wavelength").addEventListener("input", () => this.scrub(Number(element("wavelength").value)));
+    element("map_of").addEventListener("toggle", () => element("map_of").open && this.map.update());
     element("exposure").addEventListener("input", () => {
       viewer.exposure = 2 ** Number(element("exposure").value);
       this.label();
@@ -114,29 +191,43 @@ class Controls {
     element("reset").addEventListener("click", () => this.reset());
     element("save").addEventListener("click", () => this.save());
     element("fold").addEventListener("click", () => document.body.classList.toggle("folded"));
+    if (matchMedia("(max-width: 560px)").matches) document.body.classList.add("folded");
+    if (matchMedia("(pointer: coarse)").matches) element("hint").textContent = "One finger: orbit · two: pan and zoom · +: light and colours";
     const losses = Object.entries(header.loss).map(
       ([method, [mean, most]]) => `${method}: ΔE2000 ${mean.toFixed(2)}, 99 % below ${most.toFixed(2)}`);
     const lines = [`Rounded tables: ${losses.join("; ")}.`];
     if (header.omissions.length) lines.push(`Not shown: ${header.omissions.join("; ")}.`);
-    lines.push("No shadows, no light between surfaces.");
+    for (const [method, reason] of Object.entries(header.left_out)) lines.push(`Without ${method}: ${reason}.`);
+    lines.push("No light between surfaces; while something moves, few lights stand for all.");
     element("about").textContent = lines.join(" ");
-    this.label();
   }
 
-  async choose(method) {
+  choose(method) {
+    return this.change({ method });
+  }
+
+  // Below its scale, all wavelengths.
+  scrub(nm) {
+    const wavelength = nm < 380 ? null : nm;
+    if (wavelength !== null && this.viewer.wavelength !== null) {
+      this.viewer.wavelength = wavelength; // programs are there
+      this.viewer.touch();
+      this.label();
+      this.map.update();
+    } else return this.change({ wavelength });
+  }
+
+  async change(change) {
     try {
-      await this.viewer.choose(method, (text) => this.busy(text));
+      await this.viewer.change(change, busy);
       this.mark();
+      this.label();
+      this.drawDisc();
+      this.map.update();
     } catch (error) {
       this.fail(error);
     }
     element("busy").hidden = true;
-  }
-
-  async busy(text) {
-    element("busy").textContent = `${text} …`;
-    element("busy").hidden = false;
-    await new Promise((resolve) => setTimeout(resolve, 20)); // so that it is seen
   }
 
   mark() {
@@ -148,16 +239,19 @@ class Controls {
     const stops = Number(element("exposure").value);
     element("exposure_value").textContent = `${stops > 0 ? "+" : stops < 0 ? "−" : ""}${Math.abs(stops).toFixed(1)} EV`;
     element("heights_value").textContent = `× ${this.viewer.heights.toFixed(2)}`;
+    const { wavelength } = this.viewer;
+    element("wavelength_value").textContent = wavelength === null ? "all" : `${wavelength} nm`;
   }
 
   reset() {
     const { viewer } = this;
     const { header } = viewer;
     Object.assign(viewer.camera, new Camera(header.camera, header.subject, header.box));
-    viewer.sun.lights = new Sun(header.lights, viewer.camera).lights;
-    element("exposure").value = element("heights").value = 0;
+    viewer.lights.reset();
     viewer.exposure = viewer.heights = 1;
-    this.label();
+    viewer.shadows = true;
+    this.change({ wavelength: null, kind: viewer.lights.kinds[0] });
+    this.all();
     this.moved();
   }
 
@@ -173,23 +267,18 @@ class Controls {
   }
 
   disc() {
-    const { sun } = this.viewer;
+    const { lights } = this.viewer;
     const disc = element("disc");
-    if (!sun.lights.length) {
-      element("light").hidden = true;
-      return;
-    }
     const choice = element("light_choice");
-    choice.hidden = sun.lights.length < 2;
-    sun.lights.forEach((light, n) => choice.add(new Option(light.name, n)));
+    lights.own.forEach((light, n) => choice.add(new Option(light.name, n)));
     choice.addEventListener("change", () => {
-      sun.chosen = Number(choice.value);
+      lights.chosen = Number(choice.value);
       this.drawDisc();
     });
     const follow = (event) => {
       if (!(event.buttons & 1)) return;
       const box = disc.getBoundingClientRect();
-      sun.point = [(2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height];
+      lights.point = [(2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height];
       this.moved();
     };
     disc.addEventListener("pointerdown", (event) => {
@@ -201,25 +290,28 @@ class Controls {
       const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
       if (!step) return;
       event.preventDefault();
-      sun.move(0.02 * step[0], 0.02 * step[1]);
+      lights.move(0.02 * step[0], 0.02 * step[1]);
       this.moved();
     });
     this.drawDisc();
   }
 
   drawDisc() {
-    const { sun } = this.viewer;
-    if (!sun.lights.length) return;
-    const [x, y] = sun.point;
+    const { lights } = this.viewer;
+    element("light_choice").hidden = lights.kind !== "scene" || lights.own.length < 2;
+    element("disc").style.display = lights.movable && lights.kind !== "sky" ? "" : "none";
+    if (!lights.movable) return;
+    const [x, y] = lights.point;
     const dot = element("dot");
     dot.setAttribute("cx", 50 * (1 + x));
     dot.setAttribute("cy", 50 * (1 - y));
     dot.classList.toggle("below", Math.hypot(x, y) > HORIZON);
   }
 
-  report(time, count, sample) {
-    const digits = time < 10 ? 1 : 0;
-    element("time").textContent =
-      `${time.toFixed(digits)} ms a frame, ${sample.width} × ${sample.height}\n${count} of ${this.viewer.most} frames averaged`;
+  report(sample, count) {
+    const { time, width, height, preview } = sample;
+    const digits = time < 10 ? 1 : 0, { enough } = this.viewer;
+    const many = preview ? "" : `\n${count} of ${enough} ${this.viewer.shadows ? "lights" : "frames"} averaged`;
+    element("time").textContent = `${time.toFixed(digits)} ms a frame, ${width} × ${height}${many}`;
   }
 }

@@ -143,10 +143,12 @@ class Target {
   }
 }
 
+const RESPONSES = 4; // rows: lights at once
+
 class Drawing {
   static async load(gl, header, data, progress) {
     const drawing = new Drawing();
-    Object.assign(drawing, { gl, header, data, programs: {}, methods: {} });
+    Object.assign(drawing, { gl, header, data, programs: {}, tables: {} });
     drawing.surfaces = [];
     for (const surface of header.surfaces) {
       await progress(`Unpacking ${surface.name}`);
@@ -154,33 +156,92 @@ class Drawing {
         ...surface, mesh: await uploadMesh(gl, data, surface.mesh), part: await Part.load(gl, data, surface.parts),
       });
     }
-    drawing.responses = await Part.load(gl, data, header.responses);
+    const { light } = header;
+    drawing.daylight = await data.array(light.daylight);
+    drawing.spectra = light.spectra === null ? null : await data.array(light.spectra);
+    drawing.responses = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, drawing.responses);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, drawing.daylight.length / 4, RESPONSES);
+    for (const side of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, side, gl.NEAREST);
     const whole = header.shown.vertex;
     drawing.add = new Program(gl, whole, ADD);
     drawing.shown = new Program(gl, whole, header.shown.fragment);
+    drawing.shadows = { fine: new ShadowMap(gl, header, 2048), coarse: new ShadowMap(gl, header, 256) };
     drawing.empty = gl.createVertexArray();
     return drawing;
   }
 
-  // A method's tables and programs, when it is first wanted.
-  async prepare(method, progress) {
-    if (this.methods[method]) return;
-    await progress(`Unpacking the tables of ${method}`);
-    const tables = [];
-    for (const table of this.header.tables[method]) tables.push(await Part.load(this.gl, this.data, table));
-    await progress(`Compiling ${method}`);
-    for (const surface of this.surfaces) {
-      const n = surface.programs[method];
-      this.programs[n] ??= new Program(this.gl, this.header.vertex, this.header.programs[n]);
+  // A method's tables and programs, when it is first wanted; lit: of `viewer.lit`.
+  async prepare(method, lit, progress) {
+    if (!this.tables[method]) {
+      await progress(`Unpacking the tables of ${method}`);
+      const tables = [];
+      for (const table of this.header.tables[method]) tables.push(await Part.load(this.gl, this.data, table));
+      this.tables[method] = tables;
     }
-    this.methods[method] = tables;
+    await progress(`Compiling ${method}`);
+    for (const surface of this.surfaces) for (const light of lit) this.program(surface, method, light);
+  }
+
+  // Compiled once for each of: a surface's source, definitions of its light, main function.
+  program(surface, method, lit, main = "surface") {
+    const { gl, header } = this;
+    const number = surface.programs[method], key = `${number} ${lit} ${main}`;
+    const fragment = () => header.programs[number].replace("#define LIGHTS_LIT 1\n", lit) + header.mains[main];
+    return (this.programs[key] ??= new Program(gl, main === "map" ? header.shown.vertex : header.vertex, fragment()));
   }
 
   resize(width, height) {
-    for (const target of [this.sample, ...(this.sums ?? [])]) target?.release();
+    for (const target of [this.sample, this.held, ...(this.sums ?? [])]) target?.release();
     Object.assign(this, { width, height });
     this.sample = new Target(this.gl, width, height, true);
+    this.held = new Target(this.gl, width, height);
     this.sums = [new Target(this.gl, width, height), new Target(this.gl, width, height)];
+  }
+
+  // The lights' spectra, for the method that adds up wavelengths.
+  setResponses(lights) {
+    const { gl, daylight, spectra, header } = this;
+    const columns = header.light.columns, channels = header.light.channels, waves = columns / channels;
+    const [first, last] = header.light.wavenumbers, n = daylight.length / 4;
+    gl.bindTexture(gl.TEXTURE_2D, this.responses);
+    lights.slice(0, RESPONSES).forEach((light, row) => {
+      const found = new Float32Array(daylight);
+      if (light.spectrum < 0) for (let i = 0; i < found.length; ++i) found[i] *= light.colour[Math.min(i % 4, 2)];
+      else
+        for (let i = 0; i < n; ++i) {
+          const nm = (2e3 * Math.PI) / (first + ((last - first) * i) / (n - 1));
+          const place = clamp(((nm - 360) / 470) * (waves - 1), 0, waves - 1), low = Math.min(Math.floor(place), waves - 2);
+          for (let c = 0; c < 3; ++c) {
+            const at = light.spectrum * columns + low * channels + Math.min(c, channels - 1);
+            found[4 * i + c] *= spectra[at] + (spectra[at + channels] - spectra[at]) * (place - low);
+          }
+        }
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, n, 1, gl.RGBA, gl.FLOAT, found);
+    });
+  }
+
+  // The surfaces with a main function; view: as Viewer.begin makes it.
+  drawSurfaces(view, main) {
+    const octaves = Math.log2(view.heights);
+    const [first, last] = this.header.octaves;
+    const page = ((octaves - first) / (last - first)) * (this.header.energy_pages - 1);
+    this.surfaces.forEach((surface, number) => {
+      const program = this.program(surface, view.method, view.lit, main);
+      program.use();
+      surface.part.use(program);
+      this.tables[view.method][surface.table].use(program);
+      program.texture("responses", this.responses);
+      program.texture("shadow_map", this.shadows[view.coarse ? "coarse" : "fine"].texture);
+      program.set({
+        ...view.uniforms,
+        wavenumbers: this.header.light.wavenumbers,
+        height_scale: (surface.height_scale ?? 1) * view.heights,
+        energy_page: page,
+        surface_number: number,
+      });
+      surface.mesh.draw(view.coarse);
+    });
   }
 
   // One sample of every pixel in rows [bottom, top) of a picture, linear.
@@ -193,22 +254,7 @@ class Drawing {
     gl.enable(gl.DEPTH_TEST);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    const octaves = Math.log2(view.heights);
-    const [first, last] = this.header.octaves;
-    const page = ((octaves - first) / (last - first)) * (this.header.energy_pages - 1);
-    for (const surface of this.surfaces) {
-      const program = this.programs[surface.programs[view.method]];
-      program.use();
-      surface.part.use(program);
-      this.methods[view.method][surface.table].use(program);
-      this.responses.use(program);
-      program.set({
-        ...view.uniforms,
-        height_scale: (surface.height_scale ?? 1) * view.heights,
-        energy_page: page,
-      });
-      surface.mesh.draw();
-    }
+    this.drawSurfaces(view, "surface");
     gl.disable(gl.SCISSOR_TEST);
   }
 
@@ -222,24 +268,28 @@ class Drawing {
     gl.bindVertexArray(null);
   }
 
-  // Adds the sample to the sums.
+  // Adds the sample to the sums; or, of a preview, holds it beside them.
   keep(view, first) {
-    this.sums.reverse();
+    let to = this.held;
+    if (!view.preview) {
+      this.sums.reverse();
+      [to] = this.sums;
+    }
     this.add.use();
-    this.add.set({ first });
+    this.add.set({ first: first || view.preview });
     this.add.texture("sums", this.sums[1].texture);
     this.add.texture("sample_", this.sample.texture);
-    this.full(this.sums[0].frame, view.width, view.height);
+    this.full(to.frame, view.width, view.height);
   }
 
   // On the screen: the mean of the samples so far.
   show(view, count, exposure) {
     this.shown.use();
     this.shown.set({
-      sample_count: count, exposure, pixel: [view.width / this.width, view.height / this.height],
+      sample_count: view.preview ? 1 : count, exposure, pixel: [view.width / this.width, view.height / this.height],
       background: this.header.background.map((x) => Math.max(x * exposure, 0)),
     });
-    this.shown.texture("samples", this.sums[0].texture);
+    this.shown.texture("samples", view.preview ? this.held.texture : this.sums[0].texture);
     this.full(null, this.width, this.height);
   }
 

@@ -1,11 +1,32 @@
 // From the page's data to a viewer, or to words about why not.
 
+const state = (name) => (document.documentElement.dataset.state = name);
+
 function fail(error) {
-  const text = error instanceof Error ? error.message : String(error);
-  element("message").textContent = text;
+  element("message").textContent = error instanceof Error ? error.message : String(error);
   element("message").hidden = false;
   element("busy").hidden = true;
-  document.documentElement.dataset.state = "failed";
+  state("failed");
+}
+
+async function busy(text) {
+  element("busy").textContent = `${text} …`;
+  element("busy").hidden = false;
+  await new Promise((resolve) => setTimeout(resolve, 20)); // so that it is seen
+}
+
+// The page's own text, all of which must be there.
+function contents() {
+  const cut = new Error("This page is not complete: its data is missing or cut off. Export it again, or copy all of the file.");
+  try {
+    const header = JSON.parse(element("header").textContent);
+    const bytes = bytesOf("data");
+    const last = header.sections.at(-1);
+    if (bytes.length < last.start + last.length) throw cut;
+    return { header, bytes };
+  } catch {
+    throw cut;
+  }
 }
 
 function context(canvas, header) {
@@ -15,9 +36,7 @@ function context(canvas, header) {
   if (!gl)
     throw new Error(
       "This browser has no WebGL 2. Update it, switch on hardware acceleration in its settings, or take another one.");
-  const textures = [
-    ...Object.values(header.tables).flat(), header.responses, ...header.surfaces.map((surface) => surface.parts),
-  ].flatMap((part) => part.textures);
+  const textures = [...Object.values(header.tables).flat(), ...header.surfaces.map((surface) => surface.parts)].flatMap((part) => part.textures);
   const needs = { EXT_color_buffer_float: "pictures of floats" };
   if (textures.some(({ smooth, kind }) => smooth && kind === "single"))
     needs.OES_texture_float_linear = "linear filtering of float textures";
@@ -31,27 +50,46 @@ function context(canvas, header) {
 }
 
 async function start() {
-  const header = JSON.parse(element("header").textContent);
+  const { header, bytes } = contents();
   document.title = header.title;
   const canvas = element("canvas");
   const gl = context(canvas, header);
-  canvas.addEventListener("webglcontextlost", () => fail("The graphics driver stopped. Load the page again."));
-  const progress = async (text) => {
-    element("busy").textContent = `${text} …`;
-    element("busy").hidden = false;
-    await new Promise((resolve) => setTimeout(resolve, 0));
-  };
-  await progress("Reading");
-  const data = new Data(bytesOf("data"), header.sections);
-  const drawing = await Drawing.load(gl, header, data, progress);
-  const viewer = new Viewer(canvas, drawing, header);
-  await drawing.prepare(viewer.method, progress);
-  viewer.fit();
+  await busy("Reading");
+  const data = new Data(bytes, header.sections);
+  const viewer = new Viewer(canvas, await Drawing.load(gl, header, data, busy), header);
   window.viewer = viewer;
+  textToView(location.hash.slice(1), viewer);
+  const prepared = () => viewer.drawing.prepare(viewer.drawn, viewer.lit, busy);
+  await prepared();
+  viewer.fit();
   viewer.controls = new Controls(viewer, fail);
-  await viewer.settled(1);
+  canvas.addEventListener("webglcontextlost", (event) => {
+    event.preventDefault();
+    viewer.lost = true;
+    element("message").textContent = "The graphics driver stopped. The picture comes back when it does; if not, load the page again.";
+    element("message").hidden = false;
+    state("lost");
+  });
+  canvas.addEventListener("webglcontextrestored", async () => {
+    try {
+      context(canvas, header); // extensions have to be asked for anew
+      viewer.drawing = await Drawing.load(gl, header, data, busy);
+      await prepared();
+      viewer.lost = false;
+      viewer.sample = viewer.shown = undefined;
+      viewer.controls.map.gl = undefined;
+      viewer.fit();
+      viewer.touch();
+      await viewer.settled(0);
+      element("message").hidden = element("busy").hidden = true;
+      state("ready");
+    } catch (error) {
+      fail(error);
+    }
+  });
+  await viewer.settled(0);
   element("busy").hidden = true;
-  document.documentElement.dataset.state = "ready";
+  state("ready");
 }
 
 start().catch(fail);

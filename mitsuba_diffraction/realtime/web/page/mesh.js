@@ -24,6 +24,7 @@ async function uploadMesh(gl, data, mesh) {
   const count = corners.length, width = data.layouts[mesh.columns].columns;
   const signed = new Int16Array(columns.buffer);
   const array = gl.createVertexArray(), constants = [];
+  let positions;
   gl.bindVertexArray(array);
   Object.entries(ATTRIBUTES).forEach(([name, size], location) => {
     const place = mesh.layout[name];
@@ -48,18 +49,54 @@ async function uploadMesh(gl, data, mesh) {
           values[i * stride + c] = place.low[c] + place.step[c] * columns[from + place.column + c];
       }
     }
+    if (name === "position") positions = values;
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
     gl.enableVertexAttribArray(location);
     gl.vertexAttribPointer(location, size, direction ? gl.SHORT : gl.FLOAT, direction, stride * values.BYTES_PER_ELEMENT, 0);
   });
+  const few = count > 3 * FEW ? coarser(positions) : null;
+  if (few) {
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, few, gl.STATIC_DRAW);
+  }
   gl.bindVertexArray(null);
   return {
-    draw() {
+    count,
+    // coarse: fewer triangles, while something moves
+    draw(coarse) {
       for (const [location, value] of constants) gl.vertexAttrib4fv(location, value);
       gl.bindVertexArray(array);
-      gl.drawArrays(gl.TRIANGLES, 0, count);
+      if (coarse && few) gl.drawElements(gl.TRIANGLES, few.length, gl.UNSIGNED_INT, 0);
+      else gl.drawArrays(gl.TRIANGLES, 0, count);
       gl.bindVertexArray(null);
     },
   };
+}
+
+const FEW = 20000; // triangles that every rasteriser in software draws at once
+const CELLS = 100; // along the longest side, or fewer
+
+// Corners of triangles that are left when one vertex stands for all in its cell (Rossignac and
+// Borrel 1993), few enough.
+function coarser(positions, cells = CELLS) {
+  const low = [0, 1, 2].map(() => Infinity), high = [0, 1, 2].map(() => -Infinity);
+  for (let i = 0; i < positions.length; ++i) {
+    if (positions[i] < low[i % 3]) low[i % 3] = positions[i];
+    if (positions[i] > high[i % 3]) high[i % 3] = positions[i];
+  }
+  const step = cells / Math.max(...high.map((x, n) => x - low[n]), 1e-30);
+  const first = new Map();
+  const standing = (i) => {
+    let key = 0;
+    for (let c = 0; c < 3; ++c) key = 1024 * key + Math.floor((positions[3 * i + c] - low[c]) * step);
+    if (!first.has(key)) first.set(key, i);
+    return first.get(key);
+  };
+  const found = [];
+  for (let i = 0; i < positions.length / 3; i += 3) {
+    const a = standing(i), b = standing(i + 1), c = standing(i + 2);
+    if (a !== b && b !== c && c !== a) found.push(a, b, c);
+  }
+  return found.length > 3 * FEW ? coarser(positions, 0.7 * cells) : new Uint32Array(found);
 }

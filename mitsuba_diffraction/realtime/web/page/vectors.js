@@ -27,3 +27,22 @@ function inverse(m) {
 }
 
 const columnMajor = (m) => new Float32Array([0, 1, 2, 3].flatMap((j) => m.map((row) => row[j])));
+
+const transposed = (m) => m.map((_, i) => m.map((row) => row[i]));
+
+// Inverse of any matrix that has one, by Gauss and Jordan.
+function invertible(m) {
+  const rows = m.map((row, i) => [...row, ...row.map((_, j) => (i === j ? 1 : 0))]);
+  for (let c = 0; c < rows.length; ++c) {
+    let best = c;
+    for (let r = c; r < rows.length; ++r) if (Math.abs(rows[r][c]) > Math.abs(rows[best][c])) best = r;
+    [rows[c], rows[best]] = [rows[best], rows[c]];
+    rows[c] = rows[c].map((x) => x / rows[c][c]);
+    rows.forEach((row, r) => {
+      if (r !== c) rows[r] = row.map((x, i) => x - row[c] * rows[c][i]);
+    });
+  }
+  return rows.map((row) => row.slice(m.length));
+}
+
+const cornersOf = (box) => [0, 1, 2, 3, 4, 5, 6, 7].map((n) => [0, 1, 2].map((i) => box[(n >> i) & 1][i]));

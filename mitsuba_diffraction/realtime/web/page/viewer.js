@@ -1,10 +1,16 @@
-// What is drawn when: at once while something moves, then sample after sample until it is smooth.
+// What is drawn when. While something moves: few lights, few pixels, few triangles. Then once all
+// pixels, and after that one light after another, or sample after sample, until it is smooth.
 
-const SAMPLES = 64;
-const BUSY = 200;  // ms that a step may take before the page answers again
-const STEPS = 16;  // at most, of one sample: each draws all triangles anew
-const FLUENT = 30; // ms that a picture may take while something moves
-const STILL = 200; // ms after the last change
+const BUSY = 100;   // ms that a step may take before the page answers again
+const STEPS = 8;    // at most, of one sample: each draws all triangles anew
+const FLUENT = 35;  // ms that a picture should take while something moves
+const SMALLEST = 0.1; // share of either side
+const STILL = 200;  // ms after the last change
+const SMOOTH = 8;   // lights before their mean is shown
+const LIGHT = { few: (n, sky) => `#define LIGHTS_LIT ${n}\n${sky ? "#define SKY\n" : ""}`, one: "#define LIGHTS_LIT 1\n" };
+const MONOCHROME = "#define MONOCHROME\n";
+// of a light that casts no shadow
+const UNSHADOWED = { light_axis: [0, 0, 0], light_cone: [0, 0], shadow_matrix: new Float32Array(16), shadow_planes: new Float32Array(16), shadow_bias: 0, shadow_steepest: 0 };
 
 // Evenly spread places in a pixel, from its middle on (the R₂ sequence of M. Roberts).
 const spread = (n, share) => ((0.5 + n * share) % 1) * 2 - 1;
@@ -13,24 +19,48 @@ class Viewer {
   constructor(canvas, drawing, header) {
     Object.assign(this, { canvas, drawing, header });
     this.camera = new Camera(header.camera, header.subject, header.box);
-    this.sun = new Sun(header.lights, this.camera);
+    this.lights = new Lights(header, this.camera);
     this.method = header.methods[0];
+    this.wavelength = null; // nm, of light of one wavelength
+    this.shadows = true;
     this.exposure = 1;
     this.heights = 1;
     this.free = 1;        // share of the width that the panel leaves
-    this.most = SAMPLES;
+    this.lift = 0;        // share of the height that it takes, as a sheet below
+    this.most = undefined; // samples, where the default is not wanted
     this.count = 0;       // samples in the sums
     this.steps = 8;       // of one sample, from the bottom up
-    this.fullTime = {};   // ms of a whole sample, by method
+    this.share = 0.25;    // of either side, while something moves
     this.changed = 0;
     this.dirty = true;
     this.waiting = [];
     this.report = () => {};
   }
 
+  get enough() {
+    return this.most ?? (this.shadows && this.lights.count > 1 ? 256 : 64);
+  }
+
+  get moving() {
+    return performance.now() - this.changed < STILL;
+  }
+
+  // The method that draws: one wavelength is looked up where all are.
+  get drawn() {
+    return this.wavelength === null ? this.method : "spectral";
+  }
+
+  // Definitions of the light that programs are compiled with: few lights at once, or one.
+  get lit() {
+    const { lights, sky } = this.lights.few;
+    const one = this.wavelength === null ? "" : MONOCHROME;
+    return [LIGHT.few(lights.length, sky.some((x) => x)) + one, LIGHT.one + one];
+  }
+
   // Something that is drawn is another now.
   touch() {
     this.dirty = true;
+    this.sample = undefined;
     this.changed = performance.now();
     this.wake();
   }
@@ -47,74 +77,101 @@ class Viewer {
     this.canvas.width = width;
     this.canvas.height = height;
     this.drawing.resize(width, height);
-    this.sample = this.shownSample = undefined;
-    this.count = 0;
+    this.shown = undefined;
     this.touch();
   }
 
   begin() {
-    const moving = performance.now() - this.changed < STILL;
-    const time = this.fullTime[this.method] ?? 0;
-    const share = moving ? clamp(Math.sqrt(FLUENT / Math.max(time, 1)), 0.2, 1) : 1;
-    if (this.dirty || share !== this.share) this.count = 0;
+    const { drawing, lights, moving } = this;
+    if (this.dirty) {
+      this.count = 0;
+      this.whole = false;
+    }
     this.dirty = false;
-    this.share = share;
-    const width = Math.max(1, Math.round(this.drawing.width * share));
-    const height = Math.max(1, Math.round(this.drawing.height * share));
-    const jitter = [spread(this.count, 0.7548776662) / width, spread(this.count, 0.5698402910) / height];
-    const matrix = this.camera.projection(this.drawing.width / this.drawing.height, this.free, jitter);
-    const uniforms = {
-      view_projection: columnMajor(matrix),
-      eye: this.camera.eye,
-      view_axis: [0, 0, 0],
-      sky: this.header.sky,
-      exposure: 1,
-      ...this.sun.uniforms(),
-    };
-    this.sample = { width, height, method: this.method, heights: this.heights, uniforms, row: 0, time: 0 };
+    const preview = moving || (this.shadows && !this.whole);
+    const one = !preview && this.shadows;
+    const { lights: few, sky } = lights.few;
+    const chosen = one ? [lights.sample(this.count)] : few;
+    const share = moving ? this.share : 1;
+    const width = Math.max(1, Math.round(drawing.width * share));
+    const height = Math.max(1, Math.round(drawing.height * share));
+    const shadow = this.shadows && chosen.length ? drawing.shadows[moving ? "coarse" : "fine"].draw(chosen[0], drawing.surfaces, moving, one ? this.count : 0) : UNSHADOWED;
+    // the quick method stands for the other
+    const method = moving && this.wavelength === null && drawing.tables.lut ? "lut" : this.drawn;
+    if (method === "spectral") drawing.setResponses(chosen);
+    const view = this.viewed([spread(this.count, 0.7548776662) / width, spread(this.count, 0.569840291) / height]);
+    const colour = this.colour();
+    Object.assign(view.uniforms, { sky: colour ? monochrome(sky, colour) : sky, ...lightUniforms(chosen, colour), ...shadow });
+    this.sample = { ...view, method, width, height, preview, moving, coarse: moving, lit: this.lit[one ? 1 : 0], row: 0, time: 0 };
+  }
+
+  // What does not depend on the light.
+  viewed(jitter = [0, 0]) {
+    const matrix = this.camera.projection(this.drawing.width / this.drawing.height, this.free, jitter, this.lift);
+    const uniforms = { view_projection: columnMajor(matrix), eye: this.camera.eye, view_axis: [0, 0, 0], exposure: 1 };
+    if (this.wavelength !== null) uniforms.wavenumber = (2e3 * Math.PI) / this.wavelength;
+    return { matrix, method: this.drawn, heights: this.heights, uniforms };
+  }
+
+  // Linear sRGB of the one wavelength, as bright as the light; null of all.
+  colour() {
+    if (this.wavelength === null) return null;
+    const { first, step, colours } = this.header.light.monochrome;
+    const place = clamp((this.wavelength - first) / step, 0, colours.length - 1.001), low = Math.floor(place);
+    return plus(times(colours[low], 1 - (place - low)), colours[low + 1], place - low);
   }
 
   step() {
     this.frame = undefined;
+    if (this.lost) return;
     this.fit();
     const start = performance.now();
-    let shown;
-    do {
+    let shown, done;
+    while (this.dirty || this.sample || this.latest?.moving || this.count < this.enough) {
       if (!this.sample) this.begin();
       const { sample } = this;
       this.draw(sample, start);
       if (sample.row < sample.height) break;
       this.drawing.keep(sample, this.count === 0);
-      this.count += 1;
-      if (this.share === 1) this.fullTime[sample.method] = sample.time;
-      this.shownSample = shown = sample;
+      if (sample.moving) this.adapt(sample.time);
+      else if (sample.preview) this.whole = true;
+      else this.count += 1;
+      const early = this.shadows && !sample.preview && this.count < Math.min(SMOOTH, this.enough) && this.shown;
+      if (!early) this.shown = shown = sample;
+      this.latest = done = sample;
       this.sample = undefined;
       // several at once where they are quick, but one while something moves
-    } while (this.share === 1 && this.count < this.most && performance.now() - start < BUSY / 2);
-    if (shown) {
-      this.present();
-      this.report(shown.time, this.count, shown);
+      if (this.moving || performance.now() - start > BUSY / 2) break;
     }
-    const still = !this.dirty && !this.sample && this.share === 1;
-    if (!still || this.count < this.most) this.wake();
-    this.waiting = this.waiting.filter(({ count, resolve }) => {
-      const there = still && this.count >= count;
-      if (there) resolve();
-      return !there;
-    });
+    if (shown) this.present();
+    if (done) this.report(done, this.count);
+    const still = !this.dirty && this.latest && !this.latest.moving;
+    if (!still || this.count < this.enough) this.wake();
+    if (still)
+      this.waiting = this.waiting.filter(({ count, resolve }) => {
+        if (this.count >= count) resolve();
+        return this.count < count;
+      });
+  }
+
+  // The next picture's size, so that it takes as long as it may.
+  adapt(time) {
+    const factor = clamp(Math.sqrt(FLUENT / Math.max(time, 1)), 0.5, 1.3);
+    this.share = clamp(this.share * factor, SMALLEST, 1);
   }
 
   // Rows of a sample, until it has all or the page should answer again.
   draw(sample, start) {
     let last = performance.now();
+    const steps = sample.moving ? 1 : this.steps;
     while (sample.row < sample.height && last - start < BUSY / 2) {
-      const top = Math.min(sample.row + Math.ceil(sample.height / this.steps), sample.height);
+      const top = Math.min(sample.row + Math.ceil(sample.height / steps), sample.height);
       this.drawing.drawRows(sample, sample.row, top);
       this.drawing.finish();
       const now = performance.now();
       // as many rows at once as can be drawn while nobody notices
-      if (now - last > BUSY) this.steps = Math.min(STEPS, this.steps * 2);
-      else if (now - last < BUSY / 3) this.steps = Math.max(1, this.steps / 2);
+      if (!sample.moving && now - last > BUSY) this.steps = Math.min(STEPS, this.steps * 2);
+      else if (!sample.moving && now - last < BUSY / 3) this.steps = Math.max(1, this.steps / 2);
       sample.time += now - last;
       sample.row = top;
       last = now;
@@ -123,11 +180,11 @@ class Viewer {
 
   // The samples so far, at another exposure perhaps.
   present() {
-    if (this.shownSample) this.drawing.show(this.shownSample, this.count, this.exposure);
+    if (this.shown) this.drawing.show(this.shown, this.count, this.exposure);
   }
 
   // Resolves when a still picture has so many samples, fails after some ms.
-  settled(count = this.most, patience = 120e3) {
+  settled(count = this.enough, patience = 120e3) {
     this.wake();
     return new Promise((resolve, reject) => {
       this.waiting.push({ count, resolve });
@@ -135,9 +192,22 @@ class Viewer {
     });
   }
 
-  async choose(method, progress) {
-    await this.drawing.prepare(method, progress);
-    this.method = method;
+  // Another method, wavelength or kind of light: what the change makes is compiled first.
+  async change(change, progress) {
+    const before = { method: this.method, wavelength: this.wavelength, kind: this.lights.kind };
+    const set = ({ method = this.method, wavelength = this.wavelength, kind = this.lights.kind }) => {
+      Object.assign(this, { method, wavelength });
+      this.lights.kind = kind;
+    };
+    set(change);
+    const { drawn, lit } = this;
+    set(before); // what is drawn meanwhile is there
+    await this.drawing.prepare(drawn, lit, progress);
+    set(change);
     this.touch();
   }
 }
+
+// Light of one colour as bright as a smooth sky's.
+const monochrome = (sky, colour) =>
+  [0, 3, 6, 9].flatMap((n) => times(colour, dot(sky.slice(n, n + 3), LUMINANCE)));

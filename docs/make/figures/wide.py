@@ -1,0 +1,131 @@
+"""A scan of 16,384² points as a table, whole and by windows: memory, time, and how they agree.
+
+python -m docs.make.figures.wide -o docs/cluster.md
+
+A look-alike of 2,048² points is interpolated to so many, and saved in single precision (1 GB). Both
+commands run in processes of their own, whose largest resident memory the kernel tells (VmHWM).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import zoom
+
+from mitsuba_diffraction import DiffractionTable, gratings
+from mitsuba_diffraction.tables.build.spectrum import NEAR
+
+from . import markers
+from .program import exit_code
+
+EXTENT, MADE = 328.0, 2048  # µm and points a side of the look-alike
+#: Coherence windows of 40 µm: the whole scan is eight of them wide, which tables just read.
+SETTINGS = ("--coherence-width", "40", "--tolerance", "5e-3", "--wavelength-range", "400", "700")
+WAVELENGTH = 0.55  # µm
+DIRECTIONS = 97  # a side
+
+
+@dataclass(frozen=True)
+class Run:
+    """A table that a command has built, with its seconds and most bytes of memory."""
+
+    table: DiffractionTable
+    seconds: float
+    peak: int
+
+
+def field(file: Path, pixels: int) -> None:
+    """Write the scan."""
+    made = gratings.elaphe_like(EXTENT, MADE, seed=5, bending=0.0)
+    heights = made.heights.astype(np.float32)
+    if pixels != MADE:
+        heights = zoom(heights, pixels / MADE, order=3, mode="grid-wrap", grid_mode=True)
+    np.save(file, heights)
+
+
+def built(scan: Path, pixels: int, more: Sequence[str] = ()) -> Run:
+    """Run `precompute` in a process of its own."""
+    command = [
+        sys.executable, "-m", "mitsuba_diffraction", "precompute", str(scan), "--pixel-size",
+        str(EXTENT / pixels), "-o", str(scan.with_suffix(".exr")), *SETTINGS, *more,
+    ]  # fmt: skip
+    start = time.perf_counter()
+    process = subprocess.Popen(command)
+    _, status, used = os.wait4(process.pid, 0)
+    if status:
+        raise subprocess.CalledProcessError(status, command)
+    seconds = time.perf_counter() - start
+    return Run(DiffractionTable.load(scan.with_suffix(".exr")), seconds, 1024 * used.ru_maxrss)
+
+
+def agreement(
+    windowed: DiffractionTable, whole: DiffractionTable
+) -> dict[str, tuple[float, float]]:
+    """Σ |windowed − whole| / Σ whole, and the windows' standard error of it, by part.
+
+    At normal incidence and reflection, near order 0 and in the directions of visible light.
+    """
+    kappa = 4 * np.pi / WAVELENGTH
+    axis = np.linspace(-0.7, 0.7, DIRECTIONS) * kappa
+    close = np.linspace(-NEAR, NEAR, DIRECTIONS) / whole.sigma
+    error = windowed.source["windows"]["standard_error"]
+    result = {}
+    for name, along in (("glossy", close), ("colours", axis)):
+        qx, qy = np.meshgrid(along, along)
+        distance = np.hypot(qx, qy)
+        inside = distance * whole.sigma <= NEAR
+        part = inside if name == "glossy" else ~inside & (distance <= kappa)
+        found, exact = (t.window_sum(qx[part], qy[part], kappa) for t in (windowed, whole))
+        result[name] = float(np.abs(found - exact).sum() / exact.sum()), error[name]
+    return result
+
+
+def report(whole: Run, windowed: Run, pixels: int) -> str:
+    """What was measured, as a paragraph."""
+    windows = windowed.table.source["windows"]
+    parts = agreement(windowed.table, whole.table)
+    (near, near_error), (far, far_error) = parts["glossy"], parts["colours"]
+    return (
+        f"A look-alike of {pixels:,}² points, {EXTENT:.0f} µm wide, coherence width 40 µm: as a "
+        f"whole it becomes a table in {whole.seconds:.0f} s and {whole.peak / 1e9:.2g} GB of "
+        f"memory, by {windows['number']} windows in {windowed.seconds:.0f} s and "
+        f"{windowed.peak / 1e9:.2g} GB. The tables differ by {far:.1%} of the light of the orders, "
+        f"where the windows' standard error is {far_error:.1%}, and by {near:.2%} of that near "
+        f"order 0, where it is {near_error:.2%}."
+    )
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measure, and write the paragraph between the markers `wide` of a page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--pixels", type=int, default=16384)
+    parser.add_argument("-o", "--output", type=Path, help="the page; default: print only")
+    parser.add_argument("--folder", type=Path, help="for files; default: a temporary one")
+    args = parser.parse_args(argv)
+
+    def work() -> None:
+        with tempfile.TemporaryDirectory(dir=args.folder) as folder:
+            scan = Path(folder) / "scan.npy"
+            field(scan, args.pixels)
+            windowed = built(scan, args.pixels, ["--windows", "auto"])
+            whole = built(scan, args.pixels)
+        text = report(whole, windowed, args.pixels)
+        print(text, json.dumps(agreement(windowed.table, whole.table)), sep="\n")
+        if args.output:
+            markers.update(args.output, {"wide": text})
+
+    return exit_code("wide", work)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,41 @@
+// What plain materials mirror: microfacets (Walter et al. 2007), or a smooth face; the twin of
+// gloss.py.
+
+uniform float gloss_alpha;        // roughness
+
+float microfacets(float cosine)
+{
+    float squared = max(cosine * cosine, 1e-8);
+    float steepness = (1.0 / squared - 1.0) / (gloss_alpha * gloss_alpha);
+    float below = PI * gloss_alpha * gloss_alpha * squared * squared;
+#ifdef GGX
+    return 1.0 / (below * (1.0 + steepness) * (1.0 + steepness));
+#else
+    return exp(-steepness) / below;
+#endif
+}
+
+// What of the facets is seen along a direction (Smith 1967).
+float unshadowed(float cosine)
+{
+    float squared = max(cosine * cosine, 1e-8);
+    float slope = gloss_alpha * sqrt(max(1.0 / squared - 1.0, 0.0));
+#ifdef GGX
+    return 2.0 / (1.0 + sqrt(1.0 + slope * slope));
+#else
+    float a = 1.0 / max(slope, 1e-6);
+    return a >= 1.6 ? 1.0 : a * (3.535 + 2.181 * a) / (1.0 + a * (2.276 + 2.577 * a));
+#endif
+}
+
+// f·cosθ, wi towards the eye.
+vec3 gloss(vec3 wi, vec3 wo)
+{
+#ifdef MIRROR
+    return reflectance(wi.z);  // along the one direction that is mirrored
+#else
+    vec3 h = normalize(wi + wo);
+    return reflectance(dot(wi, h)) * (microfacets(h.z) * unshadowed(wi.z) * unshadowed(wo.z)
+                                      / (4.0 * wi.z));
+#endif
+}

@@ -1,0 +1,88 @@
+"""The light of a page: a scene's lights, and a sequence of them that stands for all."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...optics.colour import linear_srgb, response
+from ..glsl.emitters import Emitters
+from ..glsl.lights import Light
+from ..glsl.packing import WAVENUMBERS, pack_responses
+from ..glsl.scene import RealtimeScene
+from .sections import Sections, packed_array
+
+#: Lights of the sequence: their mean is the scene's light.
+SAMPLES = 256
+
+_FIRST, _LAST, _STEP = 380.0, 780.0, 5.0  # nm, of the light of one wavelength
+_NEAR = float(np.cos(np.radians(3.0)))  # of a light without extent: what moves with it
+
+
+def packed_light(
+    scene: RealtimeScene, emitters: Emitters | None, sections: Sections
+) -> dict[str, Any]:
+    """All that the page knows of light, as JSON.
+
+    `own` are the lights without extent that show while something moves, `samples` the sequence, of
+    which each knows to which of `own` it belongs (−1: to none).
+    """
+    own = scene.lighting.lights
+    drawn = list(itertools.islice(emitters.lights(), SAMPLES)) if emitters else []
+    if len({id(light) for light in drawn}) < len(drawn) and _alike(drawn):
+        drawn = drawn[:1]
+    spectra = [np.asarray(light.spectrum, np.float32).ravel() for light in [*own, *drawn]]
+    values = np.stack(spectra) if spectra else None
+    daylight = pack_responses([(np.array([360.0, 830.0]), np.ones(2))]).textures[0]
+    return {
+        "own": [_described(light, n) for n, light in enumerate(own)],
+        "samples": [
+            _described(light, len(own) + n) | {"of": _owner(light, own)}
+            for n, light in enumerate(drawn)
+        ],
+        "sky": scene.lighting.sky.ravel().tolist(),
+        "spectra": None if values is None else sections.add(packed_array(values)),
+        "columns": 0 if values is None else values.shape[1],
+        "channels": 3 if spectra and [*own, *drawn][0].spectrum.ndim > 1 else 1,
+        "daylight": sections.add(packed_array(daylight.data.reshape(-1, 4))),
+        "wavenumbers": list(WAVENUMBERS),
+        "monochrome": {"first": _FIRST, "step": _STEP, "colours": _monochrome().tolist()},
+    }
+
+
+def _described(light: Light, spectrum: int) -> dict[str, Any]:
+    return {
+        "name": light.name, "spectrum": spectrum, "cone": list(light.cone or (0.0, 0.0)),
+        **{n: np.round(getattr(light, n), 7).tolist() for n in ("place", "colour", "axis")},
+    }  # fmt: skip
+
+
+def _alike(lights: Sequence[Light]) -> bool:
+    """Whether all are the same light."""
+    first = lights[0]
+    return all(
+        np.array_equal(one.place, first.place) and np.array_equal(one.spectrum, first.spectrum)
+        for one in lights
+    )
+
+
+def _owner(light: Light, own: Sequence[Light]) -> int:
+    """The light without extent that stands for this one, −1 where none does."""
+    for number, other in enumerate(own):
+        if not other.name.endswith(light.name) or light.place[3] != other.place[3]:
+            continue
+        a, b = (one.place[:3] / np.linalg.norm(one.place[:3]) for one in (light, other))
+        if light.place[3] or float(a @ b) > _NEAR:
+            return number
+    return -1
+
+
+def _monochrome() -> NDArray[np.float64]:
+    """Linear sRGB of each wavelength, as saturated as a display can, the brightest channel 1."""
+    lam = np.arange(_FIRST, _LAST + _STEP, _STEP)
+    colours = np.maximum(linear_srgb(response(lam)), 0.0)
+    return np.round(colours / colours.max(axis=1, keepdims=True), 4)

@@ -1,0 +1,47 @@
+// What is seen as a page's address, behind its #.
+
+const numbers = (list) => list.map((x) => Number(x.toPrecision(6))).join(",");
+const listed = (text, n) => {
+  const found = (text ?? "").split(",").map(Number);
+  return found.length === n && found.every(Number.isFinite) ? found : null;
+};
+
+function viewToText(viewer) {
+  const { camera, lights } = viewer;
+  const found = {
+    eye: numbers(camera.eye), target: numbers(camera.target), x: numbers(camera.axis(0)),
+    method: viewer.method, light: lights.kind, towards: numbers(lights.direction),
+    exposure: Number(Math.log2(viewer.exposure).toFixed(2)), heights: Number(Math.log2(viewer.heights).toFixed(3)),
+  };
+  if (lights.own.length) found.places = numbers(lights.own.flatMap(({ place }) => place));
+  if (viewer.wavelength !== null) found.nm = viewer.wavelength;
+  if (!viewer.shadows) found.shadows = 0;
+  return new URLSearchParams(found).toString().replaceAll("%2C", ",");
+}
+
+// What of an address a page can show; parts that make no sense are as at first.
+function textToView(text, viewer) {
+  const given = new URLSearchParams(text), { camera, lights, header } = viewer;
+  const [eye, target, x] = ["eye", "target", "x"].map((name) => listed(given.get(name), 3));
+  if (eye && target && x && norm(minus(target, eye)) > 0 && norm(x) > 0) {
+    const ahead = unit(minus(target, eye));
+    const right = unit(minus(x, times(ahead, dot(x, ahead))));
+    camera.target = target;
+    camera.set([right, cross(ahead, right), ahead], eye);
+  }
+  const towards = listed(given.get("towards"), 3);
+  if (towards && norm(towards) > 0) lights.direction = unit(towards);
+  const places = listed(given.get("places"), 4 * lights.own.length);
+  if (places) lights.own.forEach((light, n) => (light.place = places.slice(4 * n, 4 * n + 4)));
+  const number = (name, low, high) => {
+    const value = Number(given.get(name) ?? NaN);
+    return Number.isFinite(value) ? clamp(value, low, high) : 0;
+  };
+  viewer.exposure = 2 ** number("exposure", -5, 5);
+  viewer.heights = 2 ** number("heights", ...header.octaves);
+  viewer.shadows = given.get("shadows") !== "0";
+  const nm = Number(given.get("nm") ?? NaN);
+  if (header.methods.includes("spectral") && nm >= 380 && nm <= 780) viewer.wavelength = nm;
+  if (header.methods.includes(given.get("method"))) viewer.method = given.get("method");
+  if (lights.kinds.includes(given.get("light"))) lights.kind = given.get("light");
+}

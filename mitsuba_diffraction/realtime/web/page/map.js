@@ -1,0 +1,129 @@
+// The BRDF of the point under the cursor, over all view directions, and its strongest orders.
+
+const SIDE = 144; // pixels
+
+class BrdfMap {
+  constructor(viewer, canvas, words) {
+    Object.assign(this, { viewer, canvas, words });
+    canvas.width = canvas.height = SIDE;
+    this.at = null; // on the viewer's canvas, CSS pixels
+  }
+
+  // Textures and framebuffers, in the context that there is now.
+  prepare() {
+    const { gl } = this.viewer.drawing;
+    if (this.gl === gl) return;
+    this.gl = gl;
+    const target = (format, side, places) => {
+      const frame = gl.createFramebuffer();
+      gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+      for (let n = 0; n < places; ++n) {
+        const texture = gl.createTexture();
+        gl.bindTexture(gl.TEXTURE_2D, texture);
+        gl.texStorage2D(gl.TEXTURE_2D, 1, format, side, side);
+        gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + n, gl.TEXTURE_2D, texture, 0);
+      }
+      if (places > 1) {
+        const depth = gl.createRenderbuffer();
+        gl.bindRenderbuffer(gl.RENDERBUFFER, depth);
+        gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_COMPONENT32F, side, side);
+        gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.RENDERBUFFER, depth);
+        gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
+      }
+      return frame;
+    };
+    this.picked = target(gl.RGBA32F, 1, 2);
+    this.drawn = target(gl.RGBA8, SIDE, 1);
+  }
+
+  // Directions of eye and light there, in the patch's axes, and the surface; null where none is.
+  pick(x, y) {
+    const { viewer, gl } = this;
+    const { drawing, canvas } = viewer;
+    const view = viewer.viewed();
+    // the pixel is all of the picture
+    const [w, h] = [canvas.clientWidth, canvas.clientHeight];
+    const row = (n, scale, middle) => view.matrix[n].map((value, i) => scale * (value - middle * view.matrix[3][i]));
+    const matrix = [row(0, w, (2 * (x + 0.5)) / w - 1), row(1, h, 1 - (2 * (y + 0.5)) / h), view.matrix[2], view.matrix[3]];
+    const light = viewer.lights.few.lights[0] ?? viewer.lights.sample(0);
+    Object.assign(view.uniforms, { view_projection: columnMajor(matrix), ...lightUniforms([light]) });
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.picked);
+    gl.viewport(0, 0, 1, 1);
+    gl.enable(gl.DEPTH_TEST);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    drawing.drawSurfaces({ ...view, lit: viewer.lit[1] }, "picked");
+    const read = (n) => {
+      const found = new Float32Array(4);
+      gl.readBuffer(gl.COLOR_ATTACHMENT0 + n);
+      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.FLOAT, found);
+      return found;
+    };
+    const wi = read(0), wo = read(1);
+    gl.readBuffer(gl.COLOR_ATTACHMENT0);
+    return wi[3] ? { wi: [...wi.slice(0, 3)], wo: [...wo.slice(0, 3)], surface: drawing.surfaces[wi[3] - 1], light } : null;
+  }
+
+  update() {
+    if (!this.at || this.viewer.lost) return;
+    this.prepare();
+    this.found = this.pick(...this.at);
+    const diffracts = this.found && this.found.surface.height_scale !== undefined;
+    this.canvas.hidden = !diffracts;
+    if (!diffracts) {
+      this.words.textContent = "Point at a surface that diffracts: this is what it reflects, and where to.";
+      return;
+    }
+    this.draw(this.found);
+    this.words.textContent = this.orders(this.found);
+  }
+
+  draw({ wi, wo, surface, light }) {
+    const { viewer, gl } = this;
+    const { drawing } = viewer;
+    const program = drawing.program(surface, viewer.drawn, viewer.lit[1], "map");
+    if (viewer.drawn === "spectral") drawing.setResponses([light]);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.drawn);
+    program.use();
+    surface.part.use(program);
+    drawing.tables[viewer.drawn][surface.table].use(program);
+    program.texture("responses", drawing.responses);
+    const white = { ...light, place: [0, 0, 1, 0], colour: [1, 1, 1] };
+    program.set({
+      ...viewer.viewed().uniforms, ...lightUniforms([white], viewer.colour()), wavenumbers: viewer.header.light.wavenumbers,
+      height_scale: surface.height_scale * viewer.heights, light_direction: wo, side: SIDE,
+      exposure: 4 * viewer.exposure / (viewer.drawn === "spectral" && viewer.wavelength === null ? Math.max(dot(light.colour, LUMINANCE), 1e-6) : 1),
+    });
+    drawing.full(this.drawn, SIDE, SIDE);
+    const pixels = new Uint8ClampedArray(4 * SIDE * SIDE), picture = new ImageData(SIDE, SIDE);
+    gl.readPixels(0, 0, SIDE, SIDE, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    for (let y = 0; y < SIDE; ++y) picture.data.set(pixels.subarray(4 * SIDE * y, 4 * SIDE * (y + 1)), 4 * SIDE * (SIDE - 1 - y));
+    const flat = this.canvas.getContext("2d");
+    flat.putImageData(picture, 0, 0);
+    const mark = (direction, radius, colour) => {
+      flat.beginPath();
+      flat.arc((0.5 + 0.5 * direction[0]) * SIDE, (0.5 - 0.5 * direction[1]) * SIDE, radius, 0, 2 * Math.PI);
+      flat.strokeStyle = colour;
+      flat.stroke();
+    };
+    mark([0, 0], SIDE / 2 - 0.5, "#ffffff40");
+    mark(wi, 4, "#ffffff"); // the eye
+    if (wo[2] > 0) mark(times(wo, -1), 2, "#8ab8ff"); // the mirror's direction
+  }
+
+  // The strongest orders, and which wavelength of each leaves in the plane of the eye.
+  orders({ wi, wo, surface }) {
+    if (wo[2] <= 0) return "In the light's back.";
+    const list = this.viewer.header.orders[surface.table];
+    if (!list.length) return "White ring: the eye. Blue: the mirror's direction.";
+    const [u, v] = plus(wi, wo);
+    const lines = list.slice(0, 3).map(([x, y]) => {
+      const length = Math.hypot(x, y), angle = ((Math.atan2(y, x) * 180) / Math.PI + 180) % 180;
+      const along = Math.abs(u * x + v * y) / length, nm = (2e3 * Math.PI * along) / length;
+      const off = (Math.asin(clamp(Math.abs(u * y - v * x) / length, 0, 1)) * 180) / Math.PI;
+      const seen = nm >= 380 && nm <= 780 ? `${nm.toFixed(0)} nm${off < 1 ? "" : `, ${off.toFixed(0)}° off`}` : "no colour here";
+      return `${((2 * Math.PI) / length).toFixed(2)} µm at ${angle.toFixed(0)}°: ${seen}`;
+    });
+    return `Strongest periods, and what of each goes to the eye (ring):\n${lines.join("\n")}`;
+  }
+}

@@ -1,0 +1,73 @@
+"""A survey of measured and made scans, and of a damaged one, on two workers."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import gratings
+from tests.cli.conftest import run  # noqa: F401
+from tests.conftest import ROOT
+
+AFM = ROOT.parent / "shared" / "afm"
+OPTIONS = (
+    "--coherence-width", 6, "--tolerance", 0.05, "--resolution", 24,
+    "--treatments", "treatments.toml", "--threads", 1, "-o", "out",
+)  # fmt: skip
+TREATMENTS = """
+["elaphe-65um.png"]
+pixel_size = 0.0488
+max_height = 0.375
+crop = 8
+["elaphe-small*.png"]
+pixel_size = 0.0488
+max_height = 0.375
+["*.bmp"]
+pixel_size = 0.025
+max_height = 0.25
+["*.di"]
+crop = 8
+["*.npy"]
+pixel_size = 0.05
+"""
+
+
+@pytest.fixture
+def scans(tmp_path, monkeypatch):
+    """Look-alikes, a damaged file, and what is measured, where it is kept."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "treatments.toml").write_text(TREATMENTS)
+    made = {"elaphe": gratings.elaphe_like(8.0, 160), "disc": gratings.cd(8.0, 160)}
+    for name, field in made.items():
+        np.save(f"{name}.npy", field.heights)
+    whole = (tmp_path / "disc.npy").read_bytes()
+    (tmp_path / "damaged.npy").write_bytes(whole[: len(whole) // 2])
+    measured = [path for path in AFM.glob("*") if path.suffix != ".md"]
+    return [*sorted(measured), *(tmp_path / f"{name}.npy" for name in (*made, "damaged"))]
+
+
+def test_a_survey_on_two_workers_and_what_is_new_in_the_next(client, scans, run, tmp_path):  # noqa: F811
+    command = "survey", *OPTIONS, "--scheduler", client.scheduler.address
+    ran = run(*command, *scans[:-2], scans[-1])
+    assert ran.code == 0, ran
+    assert "1 failed" in ran.out, ran
+    assert "damaged.npy" in ran.err
+
+    first = {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / "scans").iterdir()}
+    ran = run(*command, *scans)
+    assert ran.code == 0, ran
+    second = {path: path.stat().st_mtime_ns for path in (tmp_path / "out" / "scans").iterdir()}
+    assert {path: second[path] for path in first} == first
+    new = sorted(path.name.split("-")[0] + path.suffix for path in set(second) - set(first))
+    assert new == ["disc.exr", "disc.json", "disc.png"]
+
+    with (tmp_path / "out" / "survey.csv").open(encoding="utf-8") as file:
+        rows = {row["file"].rpartition("/")[2]: row for row in csv.DictReader(file)}
+    assert list(rows) == [path.name for path in scans]
+    assert [name for name, row in rows.items() if row["reason"]] == ["damaged.npy"]
+    if AFM.is_dir():
+        assert float(rows["blazed-one-period-100px.bmp"]["period_1_um"]) == pytest.approx(2.5)
+        assert float(rows["elaphe-65um.png"]["period_1_um"]) == pytest.approx(1.1, abs=0.15)
+        assert abs(float(rows["elaphe-65um.png"]["direction_1_deg"])) < 3.0

@@ -1,0 +1,236 @@
+"""The page as an instrument: all of the light, other lights, one wavelength, the cursor, links."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.optics.colour import delta_e
+from tests.realtime.web.conftest import Tab
+from tests.realtime.web.pictures import picture
+
+SIZE = (240, 180)
+PHONE = (390, 844)
+
+
+@pytest.fixture(scope="module")
+def one(browser: Any, page_file: Path) -> Iterator[Tab]:
+    """One page for the whole file; `opened` sets it back."""
+    tab = Tab(browser, SIZE)
+    assert tab.open(page_file) == "ready", tab.page.inner_text("#message")
+    yield tab
+    tab.page.close()
+
+
+@pytest.fixture
+def opened(one: Tab) -> Iterator[Tab]:
+    one.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
+    one.page.evaluate("document.body.classList.add('folded')")
+    one.page.evaluate("viewer.most = undefined; viewer.controls.reset(); viewer.settled(0)")
+    yield one
+    assert one.said == []
+
+
+def test_all_light_is_that_of_the_desktop(scene: Any, page_file: Path, tab: Any) -> None:
+    pytest.importorskip("moderngl")
+    from mitsuba_diffraction.realtime.glsl import Renderer
+
+    try:
+        renderer = Renderer(scene)
+    except DiffractionError as error:
+        pytest.skip(str(error))
+    light = renderer.progressive("lut")
+    light.advance(16)
+    expected = light.image
+    light.release()
+    renderer.release()
+    opened = tab()
+    assert opened.open(page_file) == "ready"
+    found = picture(opened, shadows=True, samples=16)
+    inside = (found[..., 3] > 0.99) & (expected[..., 3] > 0.99)
+    errors = delta_e(expected[..., :3], found[..., :3])[inside]
+    # rounded tables; edges of shadows fall between other texels of the maps, in a few pixels
+    assert np.nanmedian(errors) < 0.3
+    total = expected[inside, :3].sum(axis=0)
+    np.testing.assert_allclose(found[inside, :3].sum(axis=0), total, rtol=0.02)
+    # a shadow at all: what lies beneath the roll is darker than without
+    lit = picture(opened, shadows=False)
+    assert (found[inside, 1] < 0.5 * lit[inside, 1]).mean() > 0.02
+
+
+@pytest.mark.parametrize("kind", ["sun", "lamp", "window", "sky"])
+def test_lights_in_the_scenes_place_are_about_as_bright(opened: Tab, kind: str) -> None:
+    own = picture(opened, shadows=True, samples=4)[..., 1].mean()
+    opened.page.evaluate(f"viewer.controls.change({{kind: '{kind}'}})")
+    found = picture(opened, shadows=True, samples=4)
+    assert np.isfinite(found).all()
+    assert 0.2 * own < found[..., 1].mean() < 5.0 * own
+    if kind != "sky":  # which has no direction
+        opened.page.evaluate("viewer.lights.move(0.5, 0.2); viewer.touch()")
+        moved = picture(opened, shadows=True, samples=4)
+        assert np.abs(moved - found)[..., 1].mean() > 0.05 * found[..., 1].mean()
+
+
+def test_one_wavelength_has_its_colour_and_its_place(opened: Tab) -> None:
+    places = {}
+    for nm in (480, 620):
+        opened.page.evaluate(f"viewer.controls.scrub({nm})")
+        colour = np.array(opened.page.evaluate("viewer.colour()"))
+        image = picture(opened).astype(float)[..., :3]
+        bright = image.sum(axis=-1) > 0.05 * image.sum(axis=-1).max()
+        # the ground's reflectance has a colour of its own, the roll's none: some pixels at least
+        shares = image[bright] / image[bright].sum(axis=1, keepdims=True)
+        same = np.abs(shares - colour / colour.sum()).max(axis=1) < 0.01
+        assert same.mean() > 0.3
+        places[nm] = image.sum(axis=-1)
+    assert opened.page.text_content("#wavelength_value") == "620 nm"
+    # orders lie elsewhere, not only in another colour
+    blue, red = (p / p.mean() for p in places.values())
+    assert np.abs(blue - red).max() > 1.0
+    opened.page.evaluate("viewer.controls.scrub(375)")
+    assert opened.page.evaluate("viewer.wavelength") is None
+
+
+def test_the_brdf_under_the_cursor_follows_it(opened: Tab) -> None:
+    opened.page.evaluate("element('map_of').open = true; viewer.most = 1; viewer.settled(1)")
+    shown = "[element('map').toDataURL(), element('map_words').textContent]"
+    found = []
+    for x, y in ((50, 70), (70, 85)):
+        opened.page.mouse.move(x, y)
+        opened.page.wait_for_function(
+            "(at) => String(viewer.controls.map.at) === at && viewer.controls.map.found",
+            arg=f"{x},{y}",
+        )
+        opened.page.wait_for_timeout(100)
+        found.append(opened.page.evaluate(shown))
+    (first, words), (second, _) = found
+    assert first != second
+    # the grating's own orders, along the patch's x axis
+    assert re.search(r"1\.60 µm at (0|180)°", words), words
+    assert re.search(r"0\.80 µm at (0|180)°", words), words
+    opened.page.mouse.move(5, 175)  # the ground, which does not diffract
+    opened.page.wait_for_function("element('map').hidden")
+    opened.page.evaluate("element('map_of').open = false")
+
+
+def test_dragging_draws_less_and_rest_draws_all(opened: Tab) -> None:
+    page = opened.page
+    page.evaluate(
+        """() => {
+            window.drawn = [];
+            const report = viewer.report;
+            viewer.report = (sample, count) => {
+                drawn.push([sample.moving, sample.width, sample.time]);
+                report(sample, count);
+            };
+            viewer.share = 0.9;
+        }"""
+    )
+    page.mouse.move(40, 120)
+    page.mouse.down()
+    for n in range(10):
+        page.mouse.move(40 + 4 * n, 120)
+        page.wait_for_timeout(20)
+    page.mouse.up()
+    page.evaluate("viewer.settled(1)")
+    drawn = page.evaluate("drawn")
+    moving = [width for is_moving, width, _ in drawn if is_moving]
+    assert moving
+    assert all(width < SIZE[0] for width in moving)
+    assert drawn[-1][:2] == [False, SIZE[0]]
+    # pictures get smaller while they take too long, and larger again while they do not
+    shares = page.evaluate(
+        """() => (viewer.share = 0.9, [400, 400, 400, 10, 10, 10].map((ms) => {
+            viewer.adapt(ms);
+            return viewer.share;
+        }))"""
+    )
+    assert shares[0] > shares[1] >= shares[2]
+    assert shares[2] < shares[3] < shares[4] < shares[5]
+
+
+def test_a_window_of_another_size_is_filled(opened: Tab) -> None:
+    opened.page.set_viewport_size({"width": 200, "height": 260})
+    opened.page.wait_for_function("viewer.drawing.width === 200")
+    assert picture(opened).shape == (260, 200, 4)
+
+
+def test_a_link_carries_the_view(opened: Tab, page_file: Path, tab: Any) -> None:
+    opened.page.evaluate(
+        """() => {
+            viewer.camera.orbit(0.4, 0.1);
+            viewer.camera.zoom(0.8);
+            viewer.lights.point = [0.2, 0.3];
+            viewer.exposure = 2;
+            viewer.controls.change({method: "spectral", wavelength: 530});
+        }"""
+    )
+    before = picture(opened)
+    opened.page.wait_for_function("location.hash.includes('nm=530')")
+    address = opened.page.url.partition("#")[2]
+    other = tab(SIZE)
+    other.page.goto(f"{page_file.as_uri()}#{address}")
+    assert other.state(other.page) == "ready"
+    np.testing.assert_allclose(picture(other), before, atol=2e-3 * before.max())
+    assert other.page.text_content("#exposure_value") == "+1.0 EV"
+    # whatever stands there
+    other.page.goto("about:blank")
+    other.page.goto(f"{page_file.as_uri()}#eye=1,2&target=x&nm=1e9&method=flss&exposure=NaN&light=")
+    assert other.state(other.page) == "ready"
+    assert other.page.evaluate("viewer.method") == "lut"
+    assert other.said == []
+
+
+def test_a_lost_context_comes_back(opened: Tab) -> None:
+    before = picture(opened)
+    opened.page.evaluate(
+        """() => {
+            window.lose = viewer.drawing.gl.getExtension("WEBGL_lose_context");
+            lose.loseContext();
+        }"""
+    )
+    state = "document.documentElement.dataset.state"
+    opened.page.wait_for_function(f"{state} === 'lost'")
+    assert "graphics driver stopped" in opened.page.inner_text("#message")
+    opened.page.evaluate("lose.restoreContext()")
+    opened.page.wait_for_function(f"{state} === 'ready'")
+    assert not opened.page.is_visible("#message")
+    np.testing.assert_allclose(picture(opened), before, atol=1e-5)
+    opened.said[:] = [line for line in opened.said if "CONTEXT_LOST" not in line]
+
+
+@pytest.mark.parametrize(
+    ("pattern", "left"),
+    [(r'(<script id="data"[^>]*>)[^<]*', r"\1"), (r'(<script id="data"[^>]*>.{400})[^<]*', r"\1"),
+     (r'(<script id="header"[^>]*>.{400})[^<]*', r"\1")],
+    ids=["none", "cut", "header"],
+)  # fmt: skip
+def test_a_page_without_its_data_says_so(
+    page_file: Path, tab: Any, tmp_path: Path, pattern: str, left: str
+) -> None:
+    text, changes = re.subn(pattern, left, page_file.read_text(encoding="utf-8"))
+    assert changes == 1
+    path = tmp_path / "cut.html"
+    path.write_text(text, encoding="utf-8")
+    opened = tab()
+    assert opened.open(path) == "failed"
+    assert "not complete" in opened.page.inner_text("#message")
+    assert opened.said == []
+
+
+def test_a_phone_shows_the_subject_with_the_panel_folded(page_file: Path, tab: Any) -> None:
+    opened = tab(PHONE)
+    assert opened.open(page_file) == "ready"
+    assert not opened.page.is_visible("#body")
+    opened.page.click("#fold")
+    assert opened.page.is_visible("#body")
+    box = opened.page.locator("#panel").bounding_box()
+    assert box["height"] < PHONE[1] / 2
+    assert box["y"] > PHONE[1] / 2 - 1  # a sheet at the lower end, the picture above
+    assert opened.said == []
