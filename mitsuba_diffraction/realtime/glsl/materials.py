@@ -78,14 +78,16 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
         if len(inner) > 1 and inner[0] is not inner[-1]:
             omissions.append(f"the back of {name}, another material")
         bsdf = inner[0]
+    if only := getattr(bsdf, "only_traced", None):
+        raise DiffractionError(f"{only} of {name} is for the path tracer alone")
     if _diffracts(bsdf):
-        if bsdf.only_traced:
-            raise DiffractionError(f"{bsdf.only_traced} of {name} is for the path tracer alone")
         pigment = Map(np.zeros(3))
         if bsdf.nested is not None:
             pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)
-        if _is_filmed(bsdf.fresnel):
+        if is_filmed(bsdf.fresnel):
             omissions.append(f"the thin film of {name}")
+        if bsdf.through is not None:
+            omissions.append(f"light that goes through {name}")
         return Material(
             pigment, two_sided, bsdf, axis_map(bsdf.orientation), bumps=bumps, normals=normals
         )
@@ -158,7 +160,7 @@ def pack_surface(material: Material) -> Packed:
         definitions["COATED"] = ""
         uniforms["coat"] = coat_index(material)
         uniforms["channel_wavenumbers"] = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
-    elif _is_filmed(surface):
+    elif is_filmed(surface):
         surface = surface.material
     if isinstance(bsdf.boundary, SmallSlope):
         packed |= pack_roughness(material.table.roughness)
@@ -228,7 +230,8 @@ def _is_bsdf(thing: Any) -> bool:
     return isinstance(thing, mi.BSDF)
 
 
-def _is_filmed(surface: Any) -> bool:
+def is_filmed(surface: Any) -> bool:
+    """Whether a thin film lies over the structure, which shaders do not know."""
     from ...plugin.film import UnderFilm  # which only a variant has
 
     return isinstance(surface, UnderFilm)
@@ -244,7 +247,7 @@ def diffracts(bsdf: Any) -> bool:
     """Whether a BSDF diffracts, or the first one that it is wrapped around."""
     while bsdf.class_name() in _WRAPPERS:
         bsdf = next(b for b in children(bsdf).values() if _is_bsdf(b))
-    return _diffracts(bsdf)
+    return hasattr(bsdf, "only_traced")
 
 
 def _diffuse(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Map:

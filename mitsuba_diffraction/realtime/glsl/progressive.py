@@ -26,8 +26,8 @@ from .textures import Uniform
 
 Array = NDArray[np.float64]
 
-# two numbers each for the pixel, the lens and the shadow map, and three for lobes: fractional parts of
-# multiples of the roots of primes, which have nothing to do with each other (Richtmyer 1951)
+# two numbers each for the pixel, the lens and the shadow map, and three for lobes: multiples of the
+# roots of primes less their whole parts have nothing to do with each other (Richtmyer 1951)
 _STEPS = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0]) % 1.0
 
 #: Towards what the second kind of frame looks: all spectra are daylight's, the colours come later.
