@@ -238,7 +238,7 @@ def _on_surface(props: Properties) -> bool:
 def _places(props: Properties, table: DiffractionTable) -> Places | None:
     """From UV coordinates with a scale to places on the patch."""
     tiling = _choice(props, "tiling", TILINGS)
-    given = [name for name in PLACING[:2] if name in props]
+    given = {name: props.get(name) for name in PLACING[:2] if name in props}  # read in any case
     if not _on_surface(props):
         return None  # a scene for all coherences may give the scale in all
     if len(given) != 1:
@@ -246,7 +246,7 @@ def _places(props: Properties, table: DiffractionTable) -> Places | None:
             f"coherence='{SURFACE}' takes one of uv_scale, µm a unit of UV coordinates, and "
             f"world_scale, µm a unit of length of the scene; got {' and '.join(given) or 'none'}"
         )
-    name, value = given[0], props.get(given[0])
+    ((name, value),) = given.items()
     numbers, most = numbers_of(value) or (), 1 if name == "world_scale" else 2
     if not (1 <= len(numbers) <= most and all(0.0 < n <= MOST_UV_SCALE for n in numbers)):
         expected = "one number" if most == 1 else "one number or two, 'u, v',"

@@ -4,15 +4,17 @@ Contents
 --------
 Renderer     draws a scene of Mitsuba by shaders, without a window (in `renderer`)
 export_shader  writes a surface's shader for other programs (in `export`)
-scene        a scene as the shaders know it, made of the next four
+scene        a scene as the shaders know it, made of the next six
 shapes       triangles and their tangents
-materials    BSDFs and textures
+materials    BSDFs
+maps         their textures
 gloss        what plain BSDFs mirror
 lights       directions, points, spots, a smooth sky
 emitters     all emitters as a sequence of lights
 shadows      shadow maps
 surroundings what comes from a direction: environments, flat lights, what stands in the way
 lobes        directions that a surface sends light to
+stage        what progressive light needs of a scene from wherever it is seen
 progressive  frames with one light each, or what lobes meet, accumulated
 camera       sensors
 packing      tables as textures

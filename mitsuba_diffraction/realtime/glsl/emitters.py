@@ -110,9 +110,12 @@ class Emitters:
                 yield found[number]
 
     def share_of(self, emitter: Any) -> float:
-        """With what probability an emitter is drawn; 0 if never."""
-        found = [d.stands_for(emitter) for d in self._drawn]
-        return float(self.probabilities @ np.array(found, float))
+        """With what probability a light is drawn from an emitter that lobes look up as well.
+
+        Of a sky with a sun, that of the sky alone.
+        """
+        found = [d.looked_up() if d.stands_for(emitter) else 0.0 for d in self._drawn]
+        return float(self.probabilities @ np.array(found))
 
     def _features(self, light: Light) -> Array:
         """What a light brings to the middle, by colour and spherical harmonics, (27,)."""
@@ -146,6 +149,10 @@ class _Drawn:
     def stands_for(self, emitter: Any) -> bool:
         """Whether this is the one."""
         return bool(self._emitter.ptr == emitter.ptr)
+
+    def looked_up(self) -> float:
+        """Share of its lights that lobes may meet as well."""
+        return float(np.mean([self.light(number).density != 0.0 for number in range(_BLOCK)]))
 
     def light(self, number: int) -> Light:
         """The number-th of its sequence."""

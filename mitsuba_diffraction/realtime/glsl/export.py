@@ -17,7 +17,8 @@ import OpenEXR
 from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...tables.store.cache import cached_colours
-from .materials import Map, Material, height_scale, is_filmed, pack_conservation, pack_surface
+from .maps import Map
+from .materials import Material, height_scale, is_filmed, pack_conservation, pack_surface
 from .packing import pack_colours, pack_powers, pack_responses
 from .preprocess import global_names, renamed, resolved
 from .source import shader_file

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,41 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, response
+from ...optics.colour import RGB_WAVELENGTHS
 from ...optics.geometry import wavenumber
 from ...plugin.changing import children
 from ...tables.table import DiffractionTable
 from .gloss import Gloss
+from .maps import Map, Spectrum, axis_map, colour_map, evaluated, raw_picture
 from .packing import pack_beneath, pack_conductor, pack_energy, pack_roughness
 from .textures import Packed, Texture, Uniform, as_half
 
 Array = NDArray[np.float64]
-#: Wavelengths (n,) in nm, and values (n,).
-Spectrum = tuple[Array, Array]
 
 #: BSDFs around another one, by class, and what they change that is not shown.
 _WRAPPERS = {"TwoSidedBRDF": "", "BumpMap": "", "NormalMap": "", "MaskBSDF": "mask"}
 _OTHER_GREY = 0.5
-_CHEQUERS = 512  # texels along either side of two by two
-
-
-@dataclass(frozen=True)
-class Map:
-    """A value over a surface: the same everywhere, at every vertex, or a picture.
-
-    Attributes
-    ----------
-    value : (channels,), where it is the same.
-    picture : (rows, columns, channels), row 0 at v = 0, and `to_uv` (3, 3) that leads into it.
-    attribute : name of a mesh attribute.
-    clamped : whether the picture's edges go on beyond it, which else repeats.
-    """
-
-    value: Array
-    picture: NDArray[np.floating] | None = None
-    to_uv: Array = field(default_factory=lambda: np.eye(3))
-    attribute: str | None = None
-    clamped: bool = False
 
 
 @dataclass(frozen=True)
@@ -93,9 +71,9 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
         if lost:
             omissions.append(f"the {lost} of {name}")
         if kind == "BumpMap":
-            bumps = _picture(bsdf, "nested_texture", 1, float(mi.traverse(bsdf)["scale"]))
+            bumps = raw_picture(bsdf, "nested_texture", 1, float(mi.traverse(bsdf)["scale"]))
         if kind == "NormalMap":
-            normals = _picture(bsdf, "normalmap", 3, 2.0, -1.0)
+            normals = raw_picture(bsdf, "normalmap", 3, 2.0, -1.0)
         inner = [b for b in children(bsdf).values() if _is_bsdf(b)]
         if len(inner) > 1 and inner[0] is not inner[-1]:
             omissions.append(f"the back of {name}, another material")
@@ -111,7 +89,7 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
         if bsdf.through is not None:
             omissions.append(f"light that goes through {name}")
         return Material(
-            pigment, two_sided, bsdf, _axis(bsdf.orientation), bumps=bumps, normals=normals
+            pigment, two_sided, bsdf, axis_map(bsdf.orientation), bumps=bumps, normals=normals
         )
     gloss = Gloss.of(bsdf)
     if gloss is None:
@@ -120,17 +98,6 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
         )
     pigment = Map(np.zeros(3)) if gloss.pigment is None else colour_map(gloss.pigment, light)
     return Material(pigment, two_sided, gloss=gloss, bumps=bumps, normals=normals)
-
-
-def _picture(bsdf: Any, name: str, channels: int, scale: float, shift: float = 0.0) -> Map:
-    """The numbers of a wrapper's raw texture, of one or three channels, scaled and shifted."""
-    texture = children(bsdf)[name]
-    width, height = (int(n) for n in texture.resolution())
-    uv, to_uv = _centres(texture, width, height)
-    si = _interaction(uv)
-    value = texture.eval_1(si) if channels == 1 else texture.eval_3(si)
-    found = np.array(value, np.float32).reshape(channels, height, width)
-    return Map(np.zeros(channels), scale * found.transpose(1, 2, 0) + shift, to_uv)
 
 
 def pack_conservation(material: Material, factors: Sequence[float] = (1.0,)) -> Packed:
@@ -251,10 +218,10 @@ def _spectra(eta: Any, k: Any) -> tuple[Array, Array, Array]:
     if mi.is_spectral:
         lam = np.linspace(360.0, 830.0, 96)
         uv = np.full((1, 2), 0.5)
-        return lam, *(_evaluated(t, uv, lam)[0].astype(float) for t in (eta, k))
+        return lam, *(evaluated(t, uv, lam)[0].astype(float) for t in (eta, k))
     colours = np.array([464.0, 549.0, 611.0])  # of sRGB's primaries
     uv = np.full((1, 2), 0.5)
-    return colours, *(_evaluated(t, uv, colours)[0][::-1].astype(float) for t in (eta, k))
+    return colours, *(evaluated(t, uv, colours)[0][::-1].astype(float) for t in (eta, k))
 
 
 def _is_bsdf(thing: Any) -> bool:
@@ -295,117 +262,6 @@ def _diffuse(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Map
             return colour_map(textures[key], light)
     omissions.append(f"the material of {name} ({kind}, shown as grey)")
     return Map(np.full(3, _OTHER_GREY))
-
-
-def colour_map(texture: Any, light: Spectrum) -> Map:
-    """A texture of reflectances in linear sRGB, right when multiplied with the light's colour."""
-    attribute = _attribute(texture)
-    if attribute is not None:
-        return Map(np.ones(3), attribute=attribute)
-    import mitsuba as mi
-
-    width, height = (int(n) for n in texture.resolution())
-    if texture.class_name() == "Checkerboard":
-        width = height = _CHEQUERS  # filtered only as far as a texel reaches
-    elif width * height <= 1:
-        width = height = 1
-    uv, to_uv = _centres(texture, width, height)
-    found = _lit(texture, uv, light) if mi.is_spectral else _evaluated(texture, uv, np.zeros(3))
-    if width * height == 1:
-        return Map(found[0].astype(float))
-    clamped = _clamps(lambda uv: _evaluated(texture, uv, np.full(4, 550.0)), to_uv)
-    return Map(np.ones(3), found.reshape(height, width, 3), to_uv, clamped=clamped)
-
-
-def _lit(texture: Any, uv: Array, light: Spectrum) -> NDArray[np.float32]:
-    """A texture's values (points, 3) under a light, over the light's own, in linear sRGB."""
-    lam = np.linspace(380.0, 740.0, 36)
-    weights = linear_srgb(response(lam)) * np.interp(lam, *light)[:, None]
-    weights /= weights.sum(axis=0)
-    total = np.zeros((len(uv), 3), np.float32)
-    for start in range(0, len(lam), 4):
-        four = slice(start, start + 4)
-        total += _evaluated(texture, uv, lam[four]) @ weights[four].astype(np.float32)
-    return total
-
-
-def _axis(orientation: Any) -> Map:
-    """Where the patch's x axis points."""
-    if not hasattr(orientation, "texture"):
-        angle = np.radians(float(np.array(orientation.degrees).ravel()[0]))
-        return Map(np.array([np.cos(angle), np.sin(angle)]))
-    texture = orientation.texture
-    attribute = _attribute(texture)
-    if attribute is not None:
-        return Map(np.array([1.0, 0.0]), attribute=attribute)
-    width, height = (int(n) for n in texture.resolution())
-    uv, to_uv = _centres(texture, width, height)
-
-    def evaluated(uv: Array) -> Array:
-        return np.array(texture.eval_3(_interaction(uv)), np.float64).T
-
-    value = evaluated(uv).reshape(height, width, 3)[..., :2]
-    return Map(np.array([1.0, 0.0]), value, to_uv, clamped=_clamps(evaluated, to_uv))
-
-
-def _clamps(evaluated: Callable[[Array], NDArray[np.floating]], to_uv: Array) -> bool:
-    """Whether a texture is beyond its edge more like the edge than like the other side."""
-    along = np.linspace(0.02, 0.98, 16)
-    back = np.linalg.inv(to_uv)
-
-    def values(across: float) -> NDArray[np.floating]:
-        both = [np.stack([np.full(16, across), along]), np.stack([along, np.full(16, across)])]
-        places = np.concatenate([np.concatenate(both, axis=1), np.ones((1, 32))])
-        return evaluated((back @ places)[:2].T)
-
-    beyond = values(-0.3)
-    return bool(np.abs(beyond - values(1e-4)).sum() < np.abs(beyond - values(0.7)).sum())
-
-
-def _attribute(texture: Any) -> str | None:
-    if texture.class_name() != "MeshAttribute":
-        return None
-    found = re.search(r'name = "?(\w+)', str(texture))
-    return found[1] if found else None
-
-
-def _centres(texture: Any, width: int, height: int) -> tuple[Array, Array]:
-    """(u, v) of all texels' middles, and the transform that the texture puts before its picture."""
-    import mitsuba as mi
-
-    parameters = mi.traverse(texture)
-    to_uv = np.eye(3)
-    if "to_uv" in parameters:
-        to_uv = np.array(parameters["to_uv"].matrix, np.float64).reshape(3, 3)
-    x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
-    inside = np.stack([x.ravel(), y.ravel(), np.ones(x.size)])
-    return (np.linalg.inv(to_uv) @ inside)[:2].T, to_uv
-
-
-def _interaction(uv: Array) -> Any:
-    import drjit as dr
-    import mitsuba as mi
-
-    si = dr.zeros(mi.SurfaceInteraction3f, len(uv))
-    single = np.ascontiguousarray(uv.T, np.float32)
-    si.uv = mi.Point2f(mi.Float(single[0]), mi.Float(single[1]))
-    return si
-
-
-def _evaluated(texture: Any, uv: Array, wavelengths: Array) -> NDArray[np.float32]:
-    """A texture's values (points, wavelengths), or its three colours."""
-    import mitsuba as mi
-
-    si = _interaction(uv)
-    found = []
-    step = 4 if mi.is_spectral else len(wavelengths)
-    for start in range(0, len(wavelengths), step):
-        if mi.is_spectral:
-            si.wavelengths = mi.Spectrum(*(float(w) for w in wavelengths[start : start + 4]))
-        value = np.array(texture.eval(si), np.float32)
-        value = value.reshape(value.shape[0], -1)
-        found.append(np.broadcast_to(value, (value.shape[0], len(uv))))
-    return np.concatenate(found).T
 
 
 def _four(picture: NDArray[np.floating]) -> NDArray[np.float32]:

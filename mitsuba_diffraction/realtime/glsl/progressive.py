@@ -12,161 +12,26 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...tables.store.cache import cached_colours
 from .camera import Camera
-from .context import Bindings, Target, compile_plain, require_moderngl, set_uniforms
-from .emitters import Emitters
+from .context import Target, compile_plain, require_moderngl, set_uniforms
 from .lights import Light, light_definitions
-from .lobes import pack_lobes
-from .materials import coat_index, height_scale
-from .prepared import vertex_array
-from .scene import RealtimeScene, box_of
-from .shadows import SIZE, Casters, ShadowMap
-from .surroundings import DepthMaps, flat_shapes, pack_flats
-from .textures import Packed, Uniform
+from .shadows import SIZE, ShadowMap
+from .stage import Drawing, Joined, Stage
+from .textures import Uniform
 
 Array = NDArray[np.float64]
 
-# generalised golden ratio of nine numbers a frame: two each for the pixel, the lens and the shadow
-# map, three for lobes (Roberts 2018): x¹⁰ = x + 1
-_RATIO = 1.0757660661
-_STEPS = _RATIO ** -np.arange(1.0, 10.0)
+# two numbers each for the pixel, the lens and the shadow map, and three for lobes: multiples of the
+# roots of primes less their whole parts have nothing to do with each other (Richtmyer 1951)
+_STEPS = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0]) % 1.0
 
 #: Towards what the second kind of frame looks: all spectra are daylight's, the colours come later.
 _WHITE = Light("surroundings", np.array([0.0, 0.0, 1.0, 0.0]), np.array([360.0, 830.0]), np.ones(2))
-
-
-class Drawing(Protocol):
-    """What of `renderer.Renderer` is used here, which imports this."""
-
-    context: Any
-    scene: RealtimeScene
-    mitsuba_scene: Any
-    buffers: list[Any]
-
-    def target(self, width: int, height: int) -> Target:
-        """A framebuffer of floats."""
-
-    def draw_light(
-        self, frame: Any, method: str, camera: Camera, light: Light, definitions: dict[str, str],
-        uniforms: dict[str, Uniform], extras: Any, **surface: float | None,
-    ) -> None:  # fmt: skip
-        """Draw one light, or what the surroundings send."""
-
-
-class Stage:
-    """What does not depend on the camera: emitters, surroundings, what casts shadows.
-
-    Parameters
-    ----------
-    renderer : whose scene it is.
-
-    Raises
-    ------
-    DiffractionError
-        If no emitter brings light, or the environment is not finite.
-    """
-
-    def __init__(self, renderer: Drawing) -> None:
-        context, scene = renderer.context, renderer.scene
-        self.emitters = Emitters(renderer.mitsuba_scene, scene.middle)
-        self._glow = compile_plain(context, "surface.vert", "glow.frag")
-        self._vertices = [context.buffer(glow.vertices.tobytes()) for glow in scene.emitting]
-        self._glowing = [vertex_array(context, self._glow, buffer) for buffer in self._vertices]
-        self._radiances = [tuple(float(x) for x in glow.radiance) for glow in scene.emitting]
-        self.casters = Casters(context, renderer.buffers, scene.low, scene.high, self._vertices)
-        environment, flats = self.emitters.environment, flat_shapes(renderer.mitsuba_scene)
-        packed = pack_flats(flats, self.emitters.share_of)
-        packed |= Packed((), {"least_distance": 1e-4 * float(np.ptp([scene.low, scene.high]))})
-        if environment is not None:
-            packed |= environment.packed(self.emitters.share_of(environment.emitter))
-        self._bound = [Bindings(context, packed)]
-        solid = [
-            n for n, s in enumerate(scene.surfaces) if s.shape.ptr not in {f.ptr for f in flats}
-        ]
-        if solid:
-            low, high = box_of([scene.surfaces[n].vertices[:, :3] for n in solid])
-            obstacles = Casters(context, [renderer.buffers[n] for n in solid], low, high)
-            self._bound.append(DepthMaps(obstacles).bindings)
-            obstacles.release()
-        self.background, self._triangle = None, None
-        if environment is not None:
-            self.background = compile_plain(
-                context, "whole.vert", "background.frag",
-                ("library.glsl", "surroundings.glsl"), self._bound[0].definitions,
-            )  # fmt: skip
-            self._triangle = context.vertex_array(self.background, [])
-        lobes: dict[int, Bindings] = {}
-        self.extras = []
-        for surface in scene.surfaces:
-            own = []
-            if surface.material.bsdf is not None:
-                table = surface.material.table
-                if id(table) not in lobes:
-                    factor = height_scale(surface.material) * coat_index(surface.material)
-                    lobes[id(table)] = Bindings(context, pack_lobes(cached_colours(table), factor))
-                own.append(lobes[id(table)])
-            self.extras.append(_Joined([*self._bound, *own]))
-        self._bound += lobes.values()
-        self._triangle = (
-            None if self.background is None else context.vertex_array(self.background, [])
-        )
-        self._context, self._scene = context, scene
-        self.looks_up = bool(self._glowing) or self.background is not None
-
-    def draw_behind(self, frame: Any, camera: Camera, bright: bool) -> None:
-        """The background and what emits light into a framebuffer; dark, it only covers."""
-        moderngl = require_moderngl()
-        matrix = camera.view_projection(self._scene.low, self._scene.high)
-        frame.use()
-        frame.clear(0.0, 0.0, 0.0, 0.0)
-        if bright and self.background is not None and self._triangle is not None:
-            self._context.enable_only(moderngl.NOTHING)
-            self._bound[0].use(self.background)
-            set_uniforms(
-                self.background,
-                {
-                    "from_clip": tuple(np.linalg.inv(matrix).T.ravel().tolist()),
-                    "eye": tuple(camera.eye.tolist()),
-                    "picture_size": tuple(float(n) for n in camera.size),
-                },
-            )
-            self._triangle.render(moderngl.TRIANGLES, vertices=3)
-        self._context.enable_only(moderngl.DEPTH_TEST)
-        shared: dict[str, Uniform] = {
-            "view_projection": tuple(matrix.T.ravel().tolist()), "eye": tuple(camera.eye.tolist())
-        }  # fmt: skip
-        set_uniforms(self._glow, shared)
-        for array, radiance in zip(self._glowing, self._radiances, strict=True):
-            set_uniforms(self._glow, {"radiance": radiance if bright else (0.0, 0.0, 0.0)})
-            array.render(moderngl.TRIANGLES)
-
-    def release(self) -> None:
-        """Free what lies in the graphics card's memory."""
-        for thing in (*self._bound, *self._glowing, *self._vertices, self._glow, self.casters):
-            thing.release()
-        for shown in (self._triangle, self.background):
-            if shown is not None:
-                shown.release()
-
-
-class _Joined:
-    """Several bindings as one."""
-
-    def __init__(self, parts: list[Bindings]) -> None:
-        self._parts = parts
-        self.definitions = {k: v for part in parts for k, v in part.definitions.items()}
-
-    def use(self, program: Any, first_unit: int = 0) -> int:
-        """As of `Bindings`."""
-        for part in self._parts:
-            first_unit = part.use(program, first_unit)
-        return first_unit
 
 
 class ProgressiveLight:
@@ -311,7 +176,7 @@ class ProgressiveLight:
 class _WithMap:
     """A surface's extras and a light's shadow map."""
 
-    def __init__(self, extra: _Joined, texture: Any) -> None:
+    def __init__(self, extra: Joined, texture: Any) -> None:
         self._extra, self._texture = extra, texture
         self.definitions = extra.definitions
 

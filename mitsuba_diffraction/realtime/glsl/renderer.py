@@ -31,10 +31,11 @@ from .materials import (
 )
 from .packing import pack_energy, pack_responses
 from .prepared import Prepared, window
-from .progressive import ProgressiveLight, Stage
+from .progressive import ProgressiveLight
 from .scene import RealtimeScene, load, read_scene
 from .shadows import SIZE
 from .source import LIGHTS
+from .stage import Stage
 from .textures import Uniform
 
 Image = NDArray[np.float32]

@@ -16,7 +16,8 @@ from ...plugin.attributes import check_attributes
 from ...plugin.names import name_of
 from .camera import Camera, read_camera
 from .lights import Lighting, emitted_radiance, read_lights
-from .materials import Map, Material, diffracts, read_material
+from .maps import Map
+from .materials import Material, diffracts, read_material
 from .shapes import Triangles, across, triangles_of
 from .source import LIGHTS
 
