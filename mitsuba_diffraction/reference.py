@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import DiffractionError, quoted
 from .heights.field import HeightField
-from .optics import blend, boundary
+from .optics import blend, boundary, through
 from .optics.coat import refracted, transmitted
 from .optics.fresnel import Filmed
 from .optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
@@ -125,6 +125,60 @@ def mueller(
     if index is None:
         raise DiffractionError("polarisation needs an index: give eta (and k of a conductor)")
     return _measured(boundary.mueller, field, light, model, index, coat, window)
+
+
+def btdf(
+    field: HeightField,
+    wi: ArrayLike,
+    wo: ArrayLike,
+    wavelength: ArrayLike,
+    *,
+    eta: float,
+    thin: bool = False,
+    coherence_width: float = 65.0,
+    coherence: str = "ensemble",
+    model: str = "small_slope",
+) -> NDArray[np.float64]:
+    """BTDF of a dielectric with these heights over n², symmetric in both directions, (n,), 1/sr.
+
+    Radiance in the dielectric over n² is what a BTDF over n² transmits (`optics.through`).
+    Arguments and errors as `brdf`, but for:
+
+    wi, wo : above and below the surface, in any order; below, in the dielectric.
+    eta : real index of the dielectric, above 1.
+    thin : below is outside of a thin sheet, beyond its other side, which is flat.
+    """
+    width = _width(coherence_width)
+    checked("coherence", coherence)
+    first, second, lam = _broadcast(wi, wo, wavelength)
+    _index(model, eta, 0.0, lam, None)
+    if not 1.0 < float(eta) < np.inf:
+        raise DiffractionError(f"eta={eta} must be one real index above 1")
+    swapped = first[:, 2:] < 0
+    above, below = np.where(swapped, second, first), np.where(swapped, first, second)
+    lit = (above[:, 2] > 0) & (below[:, 2] < 0)
+    above, below = (
+        np.where(lit[:, None], w, [0.0, 0.0, side]) for w, side in ((above, 1.0), (below, -1.0))
+    )
+    inside = below
+    if thin:
+        inside = refracted(below * [1, 1, -1], eta) * [1, 1, -1]
+    k, total = wavenumber(lam), above + eta * inside
+    kappa, sigma = -k * total[:, 2], sigma_of(width)
+    roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
+    jones = through.kirchhoff(above, inside, eta)
+    if model == "small_slope":
+        s = blend.weight(kappa, roughness.at(k * np.hypot(*total[:, :2].T)), eta)[:, None, None]
+        jones = np.asarray((1 - s) * jones + s * through.small_slope(above, inside, eta))
+    if thin:
+        jones = through.out_of_sheet(jones, above, below, eta)
+    power = [
+        screen_power(np.exp(1j * one * field.heights), field.pixel_size, x, y, sigma, coherence)
+        for one, (x, y) in zip(kappa, -k[:, None] * total[:, :2], strict=True)
+    ]
+    cosines = -4 * above[:, 2] * eta * inside[:, 2]
+    factor = cosines / ((lam * 1e-3) ** 2 * np.pi * sigma**2 * total[:, 2] ** 2)
+    return np.where(lit, factor * boundary.unpolarised(jones) * power, 0.0)
 
 
 def window_power(

@@ -7,5 +7,6 @@ fresnel    amplitudes and fields of a smooth interface, or of a thin film
 boundary   Jones and Mueller matrices of a pair of directions: small slope, Kirchhoff
 blend      which of the two an order of a surface follows
 coat       a clear coat over a structure
+through    light that goes through a dielectric, or a thin sheet
 colour     from spectra to XYZ and sRGB; differences of colours
 """

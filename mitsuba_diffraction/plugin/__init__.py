@@ -3,7 +3,8 @@
 Contents
 --------
 bsdf            `Diffraction`, the plugin; its docstring is docs/parameters.md
-registration    it is registered in every variant
+mix             `DiffractionMix`, several surfaces in one by weights
+registration    both are registered in every variant
 dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives
 parameters      read from Mitsuba's Properties, checked
@@ -24,7 +25,11 @@ places          where on the patch the window sits at a point of the surface
 energy          the bound of the albedo that conserves energy
 reflectance     of the surface itself: dielectric, conductor, mirror
 boundary        what the material makes of the light, with its polarisation
+fresnel         fields at an interface, or at both of a film
 coat            a clear coat over the structure
+film            a thin film that follows the heights
+through         both sides of a dielectric or of a thin sheet
+crossing        pairs of directions that are not both above
 layers          how much light reaches what lies beneath
 height_scale    how heights vary over the surface
 orientation     how the patch is turned in the tangent plane

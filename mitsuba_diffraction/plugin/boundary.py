@@ -10,6 +10,7 @@ and in polarised variants the Mueller matrix of J' takes the place of N'.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import drjit as dr
@@ -21,8 +22,8 @@ from .coat import CoatedPair, bounced, transmittances
 from .film import UnderFilm
 from .fresnel import Face, Filmed, Index, amplitudes, faces, squared
 from .memory import index_between, read_record, upload
-from .pair import Pair
-from .reflectance import Conductor, Dielectric, Perfect, Reflectance
+from .pair import Pair, Place
+from .reflectance import Conductor, Dielectric, Inside, Perfect, Reflectance
 from .roles import Float, Interaction, Mask, Number, Spectrum, Vector3f
 
 #: The first is the default of a material with an index.
@@ -31,15 +32,15 @@ MODELS = ("small_slope", "kirchhoff")
 #: Entries ss, sp, ps, pp of a Jones matrix: first the outgoing, then the incident polarisation.
 Jones = tuple[Number, Number, Number, Number]
 
-# Squared sines below which a direction is the normal itself, or two are one
-_NORMAL = 1e-20
+#: Squared sines below which a direction is the normal itself, or two are one
+LEVEL = 1e-20
 
 
 @dataclass(frozen=True)
 class Kirchhoff:
     """The tangent plane: Fresnel's coefficients at the half vector."""
 
-    material: Reflectance | UnderFilm
+    material: Reflectance | Inside | UnderFilm
 
     def factor(
         self,
@@ -72,7 +73,7 @@ class SmallSlope:
     """Small slope, blended with Kirchhoff where the surface is rough at the scale of an order."""
 
     def __init__(
-        self, material: Dielectric | Conductor | UnderFilm, roughness: RoughnessTable
+        self, material: Dielectric | Conductor | Inside | UnderFilm, roughness: RoughnessTable
     ) -> None:
         self.material = material
         self._first = roughness.first
@@ -80,6 +81,12 @@ class SmallSlope:
         self._last = len(nodes) - 2.0
         # A node and the next one side by side, so that one packet load fetches both
         self._nodes = upload(mi.Float, np.stack([nodes[:-1], nodes[1:]], axis=1))
+
+    def of(self, material: Inside) -> SmallSlope:
+        """That of another material with the same heights."""
+        other = copy.copy(self)
+        other.material = material
+        return other
 
     def factor(
         self,
@@ -99,15 +106,19 @@ class SmallSlope:
         if len(matrices) == 1:  # one index at all wavelengths
             matrices *= len(wavenumbers)
             indices *= len(wavenumbers)
-        shares = self._shares(pair, height_scale, wavenumbers, indices)
+        shares = self.shares(pair, height_scale, wavenumbers, indices)
         blended = [
             tuple(dr.fma(k - b, share, b) for k, b in zip(*both, strict=True))
             for both, share in zip(matrices, shares, strict=True)
         ]
         return light.of_jones(blended, indices, self.material)
 
-    def _shares(
-        self, pair: Pair, height_scale: Float, wavenumbers: list[Float], indices: list[Index]
+    def shares(
+        self,
+        pair: Pair | Place,
+        height_scale: Float,
+        wavenumbers: list[Float],
+        indices: list[Index],
     ) -> list[Float]:
         """Kirchhoff's share for each channel, 1 − s with s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3).
 
@@ -182,7 +193,7 @@ class _Path:
     def _level(self) -> None:
         """k̂·k̂0 and ẑ·(k̂0×k̂); one direction is the other where either is the normal."""
         first, second = self._first, self._second
-        slanted = (self._square0 > _NORMAL) & (self._square > _NORMAL)
+        slanted = (self._square0 > LEVEL) & (self._square > LEVEL)
         inverse = dr.rsqrt(dr.select(slanted, self._square0, 1.0)) * dr.rsqrt(
             dr.select(slanted, self._square, 1.0)
         )
@@ -204,7 +215,7 @@ class _Path:
         turn0 = dr.fma(x, first.y, -y * first.x)
         turn = dr.fma(y, second.x, -x * second.y)
         length0, length = (dr.fma(t, t, z * z) for t in (turn0, turn))
-        found = (length0 > _NORMAL) & (length > _NORMAL)
+        found = (length0 > LEVEL) & (length > LEVEL)
         inverse = dr.rsqrt(dr.select(found, length0, 1.0)) * dr.rsqrt(dr.select(found, length, 1.0))
         # Where both directions are one, any facet's axis does: s0
         self._cc = dr.select(found, turn * turn0 * inverse, self._dot)
@@ -242,7 +253,10 @@ class _Path:
         )
 
     def of_jones(
-        self, matrices: list[Jones], indices: list[Index], material: Reflectance | UnderFilm
+        self,
+        matrices: list[Jones],
+        indices: list[Index],
+        material: Reflectance | Inside | UnderFilm,
     ) -> Spectrum:
         """What Jones matrices and indices make of light, for each channel; one may stand for all.
 
@@ -281,9 +295,9 @@ class _Path:
 
     def _mueller(self, matrices: list[Jones]) -> Spectrum:
         incident, outgoing = self._frames
-        turn0 = _turn(self._axis(incident), mi.mueller.stokes_basis(incident), incident)
-        turn = _turn(mi.mueller.stokes_basis(outgoing), self._axis(outgoing), outgoing)
-        entries = [_mueller(_turned(jones, turn, turn0)) for jones in matrices]
+        before = turn(self._axis(incident), mi.mueller.stokes_basis(incident), incident)
+        after = turn(mi.mueller.stokes_basis(outgoing), self._axis(outgoing), outgoing)
+        entries = [_mueller(turned(jones, after, before)) for jones in matrices]
         if len(entries) == 1:
             return mi.Spectrum(*entries[0])
         return mi.Spectrum(*(mi.UnpolarizedSpectrum(list(x)) for x in zip(*entries, strict=True)))
@@ -293,18 +307,18 @@ class _Path:
         level = mi.Vector3f(0.0, 1.0, 0.0)
         for one in (self._second, -self._first, direction):
             square = dr.square(one.x) + dr.square(one.y)
-            slanted = square > _NORMAL
+            slanted = square > LEVEL
             inverse = dr.rsqrt(dr.select(slanted, square, 1.0))
             level = dr.select(slanted, mi.Vector3f(-one.y * inverse, one.x * inverse, 0.0), level)
         return level
 
 
-def _turn(to: Vector3f, start: Vector3f, direction: Vector3f) -> tuple[Float, Float]:
+def turn(to: Vector3f, start: Vector3f, direction: Vector3f) -> tuple[Float, Float]:
     """(cos, sin) from components along (start, d×start) to those along (to, d×to)."""
     return dr.dot(to, start), dr.dot(to, dr.cross(direction, start))
 
 
-def _turned(jones: Jones, out: tuple[Float, Float], into: tuple[Float, Float]) -> Jones:
+def turned(jones: Jones, out: tuple[Float, Float], into: tuple[Float, Float]) -> Jones:
     """[[c, s], [−s, c]] of `out`, times the matrix, times that of `into`."""
     ss, sp, ps, pp = jones
     (c, s), (c0, s0) = out, into

@@ -100,6 +100,16 @@ film_thickness : float ∂ [none]
     2 n d = 12 µm. RGB variants sum its colours over wavelengths, apart from those of the orders.
 film_k : float ∂ [0]
     The film's absorption, the k of n + ik over that of the medium above it; not over a nested BSDF.
+transmission : boolean [false]
+    Light goes through the dielectric, from both sides: orders of κ = k (n cosθt − cosθi). The side
+    that normals point to has ext_ior, the other one int_ior, which is at least 1.01 times that.
+    Component 0 is what is reflected, 1 what goes through. Orders that change the tangential part by
+    more than 2/λ are left out. It excludes coat, film, nested BSDF, shadowing and polarised
+    variants. energy_conserving divides all by the largest R + T within 75° of the normal, at a few
+    directions and wavelengths: a second's work, in steps of 0.01 of height_scale and eta.
+thin : boolean [false]
+    Light goes through a sheet, whose other side is flat; both sides have ext_ior. What that side
+    sends back is summed as between two mirrors; light beyond the sheet's critical angle is lost.
 model : string [small_slope]
     `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
     where the surface is rough at the scale of an order; polarised variants have its Mueller
@@ -150,6 +160,8 @@ N is the mean power of a Jones matrix for unpolarised light; by Kirchhoff (Beckm
 Denoisers that ask for an albedo get the reflectance at normal incidence, that of what lies beneath
 included.
 
+Several such surfaces in one, by weights: the BSDF `diffraction_mix` (docs/own-scene.md).
+
 XML and the same in Python:
 
     <bsdf type="diffraction">
@@ -185,7 +197,7 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from ..tables.energy.conservation import DirectionalTable
 from .attributes import PLACED
-from .boundary import Kirchhoff
+from .boundary import Boundary, Kirchhoff
 from .changing import Bounded, arrays_within, marks
 from .coat import CoatedPair
 from .energy import EnergyModel
@@ -209,7 +221,7 @@ from .roles import (
     Vector2f,
     Vector3f,
 )
-from .sampling import EVEN, direction_of
+from .sampling import EVEN, direction_of, with_even_share
 from .sources import TableProvider, from_cache
 
 #: The component of a context that asks for all of them.
@@ -229,36 +241,36 @@ class Diffraction(mi.BSDF):
         self.boundary, self.coat = parameters.boundary, parameters.coat
         self.mirror = Kirchhoff(self.coat) if self.coat is not None else None
         self.nested: BSDF = parameters.nested  # or None
-        self._set_height_scale(parameters.height_scale)
+        self.through = parameters.through
+        self._set_height_scale(parameters.height_scale, parameters.optical)
         self.orientation = parameters.orientation
         self.layering = parameters.layering
         self.vcavity = parameters.vcavity
         self.power = power_model(self.table, parameters.wavelength, self.places)
         mean = self.table if self.places is None else self.table.averaged
-        # Under a coat nothing is known of the albedo
+        # Under a coat, or of light that goes through, nothing is known of the albedo
         self._energy = (
             EnergyModel(mean, self.boundary, parameters.wavelength, parameters.energy_conserving)
-            if self.coat is None
+            if self.coat is None and self.through is None
             else None
         )
-        self._area_factor = 4.0 * dr.pi * self.table.sigma**2  # 4π²σ⁴ over the window's area πσ²
+        self.area_factor = 4.0 * dr.pi * self.table.sigma**2  # 4π²σ⁴ over the window's area πσ²
         front = mi.BSDFFlags.FrontSide
         glossy = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.Anisotropic | front
-        components = [glossy]
+        components = [glossy] if self.through is None else self.through.flags()
         if self.nested is not None:
             components += [self.nested.flags(n) for n in range(self.nested.component_count())]
         self.m_components = components  # at once: what it gives back is a copy
         self.m_flags = functools.reduce(operator.or_, components)
         self.parameters_changed([])
 
-    def _set_height_scale(self, given: float | Varying) -> None:
+    def _set_height_scale(self, given: float | Varying, optical: float) -> None:
         """A bounded number; or factors that vary, of which `height_scale` is the largest."""
         if isinstance(given, Varying):
             self._scale: Varying | Bounded = given
             self._varying: Varying | None = given
             self.height_scale: Float = mi.Float(given.high)
             return
-        optical = 1.0 if self.coat is None else dr.slice(self.coat.eta)
         most = self.table.height_scale_max / optical
         bounded = Bounded("height_scale", given, LEAST_SCALE, most, self._scale_refusal)
         self._scale, self._varying, self.height_scale = bounded, None, bounded.value
@@ -266,7 +278,9 @@ class Diffraction(mi.BSDF):
     # ------------------------------------------------------------------ Mitsuba's interface
 
     def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
-        """f·cosθo per wavelength."""
+        """f·cosθo per wavelength; where light goes through, as the context's mode has it."""
+        if self.through is not None:
+            return self.through.eval_pdf(self, ctx, si, wo, active)[0]
         active = self._above(si, wo, active)
         above, nested = self._lobes(ctx)
         value = mi.Spectrum(0.0)
@@ -281,14 +295,14 @@ class Diffraction(mi.BSDF):
 
     def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
         """Density of `sample` per solid angle."""
+        if self.through is not None:
+            return self.through.eval_pdf(self, ctx, si, wo, active)[1]
         active = self._above(si, wo, active)
         above, nested = self._lobes(ctx)
         density = mi.Float(0.0)
         if above:
             pair = self._pair(si, wo, active).outer
-            density = _with_even_share(
-                self.power.density(pair, self._drawing_scale(si, active), si)
-            )
+            density = with_even_share(self.power.density(pair, self._drawing_scale(si, active), si))
         if nested is not None:
             beneath = self.nested.pdf(nested, si, wo, active)
             density = dr.lerp(beneath, density, self._glossy_share(above, si, active))
@@ -298,6 +312,8 @@ class Diffraction(mi.BSDF):
         self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
     ) -> tuple[Spectrum, Float]:
         """`eval` and `pdf` at once."""
+        if self.through is not None:
+            return self.through.eval_pdf(self, ctx, si, wo, active)
         active = self._above(si, wo, active)
         above, nested = self._lobes(ctx)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
@@ -305,7 +321,7 @@ class Diffraction(mi.BSDF):
             pair = self._pair(si, wo, active)
             scales = self.scale_at(si, active), self._drawing_scale(si, active)
             power, orders = self.power.both(pair, *scales, si)
-            density = _with_even_share(orders)
+            density = with_even_share(orders)
             value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
         if nested is not None:
             beneath = mi.Spectrum(self._beneath(si, wo, active))
@@ -327,6 +343,8 @@ class Diffraction(mi.BSDF):
         Of what lies beneath, lobes of one direction are returned alone: the diffraction has no
         share in them. All others are mixed with it, in value and density.
         """
+        if self.through is not None:
+            return self.through.sample(self, ctx, si, sample1, sample2, active)
         active = mi.Mask(active) & (mi.Frame3f.cos_theta(si.wi) > 0.0)
         above, nested = self._lobes(ctx)
         result = dr.zeros(mi.BSDFSample3f)
@@ -388,12 +406,14 @@ class Diffraction(mi.BSDF):
         """
         changing = (self._scale, self.orientation, self.fresnel)
         refused = [line for line in [one.settle() for one in changing] if line]
-        refused += self._coat_refusal()
+        refused += self._optical_refusal()
         if self._energy is not None:
             largest = dr.slice(dr.max(dr.detach(self.height_scale)))
             beneath = self.nested is not None and isinstance(self.layering, Transmission)
             lowest = self._varying.range()[0] if self._varying else None
             self._energy.update(largest, dr.grad_enabled(self.height_scale), beneath, lowest)
+        if self.through is not None:
+            self.through.update(self.height_scale)
         held = arrays_within(
             self.power,
             self._energy,
@@ -401,6 +421,7 @@ class Diffraction(mi.BSDF):
             self.fresnel,
             self.boundary,
             self.mirror,
+            self.through,
             self._varying,
         )
         self._for_freezing = held + marks(
@@ -411,6 +432,7 @@ class Diffraction(mi.BSDF):
             str(self.layering),
             str(self.boundary),
             self.coat is None,
+            self.through is None or self.through.thin,
             self._takes,
             getattr(self.boundary.material, "reflects_all", False),  # other kernels
             getattr(self.boundary.material, "channels", None),
@@ -418,16 +440,20 @@ class Diffraction(mi.BSDF):
         if refused:
             raise DiffractionError("; ".join(refused))
 
-    def _coat_refusal(self) -> list[str]:
-        """What to say where heights and coat together are beyond the table."""
-        if self.coat is None:
+    def _optical_refusal(self) -> list[str]:
+        """What to say where heights and the index they are in are beyond the table."""
+        medium = self.coat
+        if self.through is not None:
+            medium = self.through.material
+        if medium is None:
             return []
-        optical = float(dr.slice(dr.max(dr.detach(self.height_scale * self.coat.eta))))
+        name = "coat" if self.coat else "int"
+        optical = float(dr.slice(dr.max(dr.detach(self.height_scale * medium.eta))))
         if optical <= self.table.height_scale_max * (1.0 + 1e-6):
             return []
         return [
-            f"height_scale times coat_eta is {optical:g}, beyond the table's "
-            f"{self.table.height_scale_max:g}; load the plugin anew with that coat_ior"
+            f"height_scale times {'coat_' if self.coat else ''}eta is {optical:g}, beyond the "
+            f"table's {self.table.height_scale_max:g}; load the plugin anew with that {name}_ior"
         ]
 
     def _scale_refusal(self, height_scale: float) -> str:
@@ -446,6 +472,8 @@ class Diffraction(mi.BSDF):
     @property
     def energy_conserving(self) -> bool:
         """Whether it takes what it would reflect too much."""
+        if self.through is not None:
+            return self.through.conserving is not None
         return self._energy is not None and self._energy.conserving
 
     def energy_scale(self, height_scale: float) -> tuple[NDArray[np.float32], bool] | None:
@@ -482,10 +510,16 @@ class Diffraction(mi.BSDF):
             f"  height_scale = {self._varying or f'{dr.slice(self.height_scale):g}'},\n"
             f"  energy_conserving = {'true' if self.energy_conserving else 'false'},\n"
             f"  orientation = {self.orientation},\n"
+            f"{self._sides()}"
             f"  shadowing = {'vcavity' if self.vcavity else 'none'},\n"
             f"  layering = {self.layering},\n"
             f"{nested}]"
         )
+
+    def _sides(self) -> str:
+        if self.through is None:
+            return ""
+        return f"  {'thin' if self.through.thin else 'transmission'} = true,\n"
 
     # ------------------------------------------------------------------ the model
 
@@ -498,24 +532,44 @@ class Diffraction(mi.BSDF):
 
         power : what the power model says of this pair of directions.
         """
+        value = self.lobe(ctx, si, pair, self.boundary, active, power)
+        if self.mirror is not None:
+            value += self.face(ctx, si, pair.outer, self.mirror, active)
+        return value
+
+    def lobe(
+        self,
+        ctx: Context,
+        si: Interaction,
+        pair: Pair,
+        boundary: Boundary,
+        active: Mask,
+        power: Colour | None = None,
+    ) -> Spectrum:
+        """f·cosθo of the structure alone; power : what the power model says, if it was asked."""
         w = pair.cos_i + pair.cos_o
-        outside = self._area_factor * dr.rcp(dr.square(w) * pair.cos_i)
-        if self.coat is not None:
+        outside = self.area_factor * dr.rcp(dr.square(w) * pair.cos_i)
+        if isinstance(pair, CoatedPair):
             outside *= pair.outer.cos_o * dr.rcp(pair.cos_o)
         if self.vcavity:
             outside *= vcavity(pair.cos_i, pair.cos_o, pair.one_plus_dot)
         wavenumbers, scale = self.power.wavenumbers(si), self.scale_at(si, active)
-        factor = self.boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)
+        if power is None:
+            power = self.power.power(pair, scale, si)
+        factor = boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)
         power = outside * power
         if self._energy is not None and self._energy.takes:
             power *= self._energy.factor(pair, wavenumbers, scale)
-        value = mi.Spectrum(power) * factor
-        if self.mirror is not None:
-            pair = pair.outer
-            outside = self._area_factor * dr.rcp(dr.square(pair.w) * pair.cos_i)
-            factor = self.mirror.factor(pair, scale, wavenumbers, si, active, ctx.mode)
-            value += mi.Spectrum(outside * self.power.flat(pair, si)) * factor
-        return dr.select(active, value, 0.0)
+        return dr.select(active, mi.Spectrum(power) * factor, 0.0)
+
+    def face(
+        self, ctx: Context, si: Interaction, pair: Pair, mirror: Boundary, active: Mask
+    ) -> Spectrum:
+        """f·cosθo of a flat face: the lobe of a flat patch."""
+        wavenumbers = self.power.wavenumbers(si)
+        outside = self.area_factor * dr.rcp(dr.square(pair.w) * pair.cos_i)
+        factor = mirror.factor(pair, self.height_scale, wavenumbers, si, active, ctx.mode)
+        return dr.select(active, mi.Spectrum(outside * self.power.flat(pair, si)) * factor, 0.0)
 
     def _beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
         """Factor of the nested BSDF."""
@@ -579,11 +633,6 @@ class Diffraction(mi.BSDF):
         mean = dr.mean(mi.unpolarized_spectrum(reflectance))
         # What lies beneath is taken to return half of what it gets
         return dr.clip(mean / (0.5 + 0.5 * mean), 0.1, 0.9)
-
-
-def _with_even_share(density: Float) -> Float:
-    """The density of drawing a direction by the orders, and a little evenly."""
-    return dr.lerp(density, dr.inv_two_pi, EVEN)
 
 
 mi.register_bsdf("diffraction", Diffraction)

@@ -30,7 +30,7 @@ from .boundary import Boundary, Kirchhoff
 from .film import UnderFilm, plain
 from .memory import index_between, read_record, upload
 from .pair import Pair
-from .reflectance import Perfect, Reflectance
+from .reflectance import Inside, Perfect, Reflectance
 from .roles import Buffer, Colour, Float, Index, Vector2f
 
 Array = NDArray[np.float32]
@@ -314,7 +314,7 @@ def _chain(grating: Grating, tangential: Vector2f, wavenumber: Float) -> tuple[F
 
 
 def indices_of(
-    material: Reflectance | UnderFilm, wavelengths: NDArray[np.float64]
+    material: Reflectance | Inside | UnderFilm, wavelengths: NDArray[np.float64]
 ) -> Indices | None:
     """n + ik of a material at wavelengths (n,), nm, in the variant's colours; None for R = 1."""
     if isinstance(material, Perfect):

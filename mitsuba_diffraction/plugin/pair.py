@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import drjit as dr
@@ -61,6 +62,16 @@ class Pair:
     def outgoing(self) -> Vector2f:
         """Tangential part of ωo, in the patch's frame."""
         return in_patch(self.wo, self._rotation)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a table is looked up: of a `Pair` what the diffracted power and the roughness ask."""
+
+    uv: Vector2f
+    w: Float
+    cos_i: Float = 1.0
+    cos_o: Float = 1.0
 
 
 def in_patch(direction: Vector2f | Vector3f, rotation: Rotation) -> Vector2f:

@@ -36,6 +36,7 @@ from .sources import (
     table_of_file,
     table_of_heights,
 )
+from .through import LEAST_INDEX, Through
 
 SOURCES = ("heightfield", "table", "data")
 READING = tuple(field.name for field in fields(LoadOptions))
@@ -59,6 +60,8 @@ NAMES = (
     "film_ior",
     "film_k",
     "film_thickness",
+    "transmission",
+    "thin",
     "model",
     "orientation",
     "height_scale",
@@ -91,6 +94,8 @@ class Parameters:
     layering : how diffraction and the nested BSDF share the light.
     wavelength : nm, that of mono variants.
     nested : the BSDF beneath, or None.
+    through : both sides of a surface that lets light through, or None.
+    optical : index that heights are in, of coat or dielectric, over that of the medium above.
     """
 
     table: DiffractionTable
@@ -106,6 +111,8 @@ class Parameters:
     layering: Layering
     wavelength: float
     nested: BSDF | None
+    through: Through | None
+    optical: float
 
 
 def read_parameters(props: Properties, provider: TableProvider = from_cache) -> Parameters:
@@ -136,8 +143,10 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
             f"a nested BSDF lies beneath a surface that lets no light through (material="
             f"'{material}'); give int_ior instead, or remove the nested BSDF"
         )
-    # κ grows by the coat's index, as if heights did
-    optical = 1.0 if coat is None else dr.slice(coat.eta)
+    passing = _passing(props, material)
+    # κ grows by the coat's index, or in a dielectric by its own, as if heights did
+    medium = coat or passing
+    optical = 1.0 if medium is None else float(dr.slice(medium.eta))
     largest = height_scale.high if isinstance(height_scale, Varying) else height_scale
     table, heights = _table(props, largest * optical, provider)
     wavelength = _wavelength(props, table)
@@ -150,20 +159,27 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     flat: Reflectance | UnderCoat | UnderFilm = reflectance
     if coat is not None and not isinstance(material, Perfect):
         flat = UnderCoat(material, coat)
+    boundary = _boundary(props, reflectance, table)
+    conserving, through = _flag(props, "energy_conserving", True), None
+    if passing is not None:
+        thin = _flag(props, "thin", False)
+        through = Through(passing, boundary, thin, table if conserving else None)
     return Parameters(
         table=table,
         places=_places(props, table),
         heights=heights,
         reflectance=flat,
         coat=coat,
-        boundary=_boundary(props, reflectance, table),
+        boundary=boundary,
         orientation=_orientation(props),
         height_scale=height_scale,
-        energy_conserving=_flag(props, "energy_conserving", True),
+        energy_conserving=conserving,
         vcavity=_choice(props, "shadowing", SHADOWINGS) == "vcavity",
         layering=_layering(props, flat, nested is not None),
         wavelength=wavelength,
         nested=nested,
+        through=through,
+        optical=optical,
     )
 
 
@@ -286,6 +302,37 @@ def _coat(props: Properties) -> Dielectric | None:
     if props.get("layering", LAYERINGS[0]) == "thesis":
         raise DiffractionError("layering='thesis' knows no coat; leave coat_ior or layering out")
     return coat
+
+
+def _passing(props: Properties, material: Reflectance) -> Dielectric | None:
+    """The dielectric, if light is to go through it, which excludes much."""
+    thin = _flag(props, "thin", False)
+    if not _flag(props, "transmission", thin):
+        if thin:
+            raise DiffractionError("thin=true lets light through; leave transmission=false out")
+        return None
+    name = "thin" if thin else "transmission"
+    if not isinstance(material, Dielectric):
+        raise DiffractionError(
+            f"{name}=true lets light through, which the material '{material}' does not; give "
+            "int_ior instead"
+        )
+    if dr.slice(material.eta) < LEAST_INDEX:
+        raise DiffractionError(
+            f"{name}=true needs int_ior at least {LEAST_INDEX:g} times ext_ior; turn the surface "
+            "round where the denser medium is above"
+        )
+    if mi.is_polarized:
+        raise DiffractionError(f"{name}=true has no Mueller matrices; take a variant without")
+    excluded = [
+        *(f"{one}_ior" for one in ("coat", "film") if f"{one}_ior" in props),
+        *("a nested BSDF" for _, value in props.objects() if isinstance(value, mi.BSDF)),
+        *(f"{one}={props.get(one)}" for one in ("layering", "shadowing") if one in props),
+        *("coherence=surface" for one in ("coherence",) if props.get(one, "") == "surface"),
+    ]
+    if excluded:
+        raise DiffractionError(f"{name}=true and {excluded[0]} exclude each other; leave one out")
+    return material
 
 
 def _under_film(

@@ -13,8 +13,9 @@ import drjit as dr
 import mitsuba as mi
 
 from ..tables.table import DiffractionTable
-from .pair import Pair
-from .places import Places
+from .crossing import Crossing
+from .pair import Pair, Place
+from .places import Places, Window
 from .restricted import device_table
 from .rgb_power import rgb_power
 from .roles import Colour, Float, Index, Interaction, Vector2f
@@ -24,10 +25,10 @@ from .sampling import order_sampler
 class PowerModel(Protocol):
     """What the BSDF asks of the diffracted power."""
 
-    def power(self, pair: Pair, height_scale: Float, si: Interaction) -> Colour:
+    def power(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
         """⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm², per channel."""
 
-    def density(self, pair: Pair, height_scale: Float, si: Interaction) -> Float:
+    def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
         """Density per solid angle of drawing ωo: by `draw`."""
 
     def both(
@@ -70,12 +71,12 @@ class SpectralPower:
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
-    def power(self, pair: Pair, height_scale: Float, si: Interaction) -> Colour:
+    def power(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
         """See `PowerModel.power`."""
         functions = [self._power(pair, height_scale, si)]
         return mi.UnpolarizedSpectrum(self._each(functions, si, pair, height_scale)[0])
 
-    def density(self, pair: Pair, height_scale: Float, si: Interaction) -> Float:
+    def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
         """See `PowerModel.density`; the mean of all wavelengths'."""
         functions = [self._density(pair, height_scale)]
         return _mean(self._each(functions, si, pair, height_scale)[0])
@@ -88,9 +89,14 @@ class SpectralPower:
         densities, powers = self._each(functions, si, pair, height_scale)
         return mi.UnpolarizedSpectrum(powers), _mean(densities)
 
-    def _power(self, pair: Pair, height_scale: Float, si: Interaction) -> Callable[[Float], Float]:
+    def _power(
+        self, pair: Pair | Place, height_scale: Float, si: Interaction
+    ) -> Callable[[Float], Float]:
         scaled_w = pair.w * height_scale
-        windows = () if self._places is None else self._places.at(si, pair.rotation)
+        if self._places is None or not isinstance(pair, Pair):
+            windows: Sequence[Window] = ()
+        else:
+            windows = self._places.at(si, pair.rotation)
 
         def of_wavelength(k: Float) -> Float:
             found = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w, windows)
@@ -98,7 +104,7 @@ class SpectralPower:
 
         return of_wavelength
 
-    def _density(self, pair: Pair, height_scale: Float) -> Callable[[Float], Float]:
+    def _density(self, pair: Pair | Crossing, height_scale: Float) -> Callable[[Float], Float]:
         def of_wavelength(k: Float) -> Float:
             strategy = self._sampler.strategy(k, pair.cos_i, dr.detach(height_scale))
             return self._sampler.density(k * pair.uv, *strategy) * pair.cos_o * dr.square(k)
@@ -140,7 +146,7 @@ class SpectralPower:
         self,
         functions: Sequence[Callable[[Float], Float]],
         si: Interaction,
-        pair: Pair,
+        pair: Pair | Place | Crossing,
         scale: Float,
     ) -> list[list[Float]]:
         """Each function(k) for each wavelength.

@@ -89,6 +89,24 @@ def _ratio_refusal(name: str, least: float, ratio: float) -> str:
     )
 
 
+class Inside:
+    """A dielectric seen from within, over the medium above it; `Dielectric` of the reciprocal."""
+
+    reflects_all = True
+
+    def __init__(self, outside: Dielectric, thin: bool) -> None:
+        self._outside, self._thin = outside, thin
+
+    def reflectance(self, cosine: Float, si: Interaction, active: Mask) -> Colour:
+        """R for the cosine inside."""
+        return mi.UnpolarizedSpectrum(mi.fresnel(cosine, dr.rcp(self._outside.eta))[0])
+
+    def indices(self, si: Interaction, active: Mask) -> list[Number]:
+        """The index, one for all channels; light from outside is never reflected totally."""
+        index = dr.rcp(self._outside.eta)
+        return [index if self._thin else mi.Complex2f(index, 0.0)]
+
+
 class Conductor:
     """Fresnel reflectance of a conductor, eta and k as textures over wavelength."""
 

@@ -18,8 +18,9 @@ from ..tables.colour.proposals import BANDED, BANDS, LOBES, colour_proposals
 from ..tables.colour.table import ColourTable
 from ..tables.store.cache import cached_colours
 from ..tables.table import DiffractionTable
+from .crossing import Crossing
 from .memory import index_between, read, upload
-from .pair import Pair
+from .pair import Pair, Place
 from .rgb_lookup import ColourLookup
 from .roles import Buffer, Colour, Float, Index, Interaction, Vector2f
 from .sampling import BELOW_ONE, invert, order_0_share
@@ -48,11 +49,11 @@ class RGBPower:
         # 1/(2·variance) of the lobes in (u, v)
         self._sharpness = [(2.0 * math.pi * table.sigma / lam) ** 2 for lam in LOBES]
 
-    def power(self, pair: Pair, height_scale: Float, si: Interaction) -> Colour:
+    def power(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
         """See `PowerModel.power`."""
         return self._lookup.colour(pair.uv, pair.w * height_scale)
 
-    def density(self, pair: Pair, height_scale: Float, si: Interaction) -> Float:
+    def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
         """See `PowerModel.density`."""
         strategy = self._strategy(pair.cos_i, dr.detach(height_scale))
         return self._density(pair.uv, *strategy) * pair.cos_o

@@ -145,6 +145,11 @@ def direction_of(tangential: Vector2f) -> Vector3f:
     return mi.Vector3f(tangential.x, tangential.y, cos)
 
 
+def with_even_share(density: Float) -> Float:
+    """The density of drawing a direction by the orders, and a little evenly."""
+    return dr.lerp(density, dr.inv_two_pi, EVEN)
+
+
 def invert(
     sums: Buffer, start: Index, count: Index | int, most: int, sample: Float
 ) -> tuple[Index, Float]:

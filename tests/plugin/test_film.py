@@ -131,6 +131,23 @@ def test_it_samples_what_it_says_and_reflects_no_more_than_it_gets(some_variant,
     assert weights.mean() < 1.0 + 3 * weights.std() / np.sqrt(count)
 
 
+@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")  # of its slope
+def test_energy_is_conserved_as_of_the_bare_metal(some_variant):
+    grating = md.gratings.sinusoidal(1.6, 0.12, periods=10, pixels_per_period=24)
+    silver = {"eta": 0.05, "k": 4.0, "coherence_width": 16.0, "field": grating}
+    means = []
+    for conserving in (False, True):
+        bsdf = load(energy_conserving=conserving, **silver, **OXIDE)
+        si = interaction(np.tile(as_single(polar(75.0)), (1 << 15, 1)), 550.0)
+        rng = mi.PCG32(1 << 15)
+        one, two = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+        weights = np.array(bsdf.sample(mi.BSDFContext(), si, one, two)[1], float)[0]
+        means.append(weights.mean())
+    error = 3 * weights.std() / np.sqrt(len(weights))
+    assert means[0] > 1.0 + error
+    assert 0.95 < means[1] < 1.0 + error
+
+
 @pytest.mark.parametrize("theta", [0.0, 45.0])
 def test_over_white_it_returns_what_the_film_lets_through(some_variant, theta):
     count = 1 << 14

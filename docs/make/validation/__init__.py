@@ -18,6 +18,7 @@ crossed          another: coupled waves in layers
 patch_solutions  solutions of all of them
 coated           solutions of gratings under a coat
 filmed           solutions of gratings under a film
+passed           orders that go through a dielectric
 model            what the package says of the same surfaces
 compare          how far apart they are
 limits           up to which slopes that is little

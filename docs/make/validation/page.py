@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.progress import Progress, silent
 
-from . import coated, filmed, models, patch_sections, plots, sections, statistics
+from . import coated, filmed, models, passed, patch_sections, plots, sections, statistics
 from .cases import FEW_WAVELENGTHS, MATERIALS, PROBE_GRATING, Grating
 from .compare import Comparison, compare
 from .patches import KINDS
@@ -81,6 +81,7 @@ def write_report(folder: Path, *, quick: bool = False, progress: Progress | None
         sections.edges(kirchhoff, default),
         coated.section(coated.GRATINGS[:1] if quick else coated.GRATINGS),
         filmed.section(filmed.STACKS[:1] if quick else filmed.STACKS),
+        passed.section(passed.GRATINGS[:1] if quick else passed.GRATINGS),
         sections.probe(perfect),
         sections.polarisation(perfect),
         sections.solutions(comparisons, patch_sections.second_solver()),

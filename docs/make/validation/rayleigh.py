@@ -66,20 +66,21 @@ def solve(
     reflected = waves.coupling(tests, down, _axes(waves.above, 1.0), waves.above)
     incident = waves.coupling(tests, down, _axes(into, 1.0), into)
     found = _solved(reflected, -incident)
-    return _orders(waves, wi, found, waves.k * float(field.heights.mean()))
+    out, mean = waves.above, waves.k * float(field.heights.mean())
+    return _orders(waves, wi, found, mean, out, np.where(out[:, 2].imag == 0, out[:, 2].real, 0.0))
 
 
-def transmitted(
+def through(
     field: HeightField,
     index: complex,
     wavelength: float,
     wi: NDArray[np.float64],
     harmonics: int,
-) -> float:
-    """Share of unpolarised light that a dielectric lets through, all orders; as `solve`.
+) -> Orders:
+    """Amplitudes of every order in a dielectric; as `solve`, `wo` within it, below the surface.
 
     From equations of its own: with test waves that go up in the air, whose product with all that is
-    reflected carries nothing. That both add up to 1 is thus no matter of course.
+    reflected carries nothing. That both powers add up to 1 is thus no matter of course.
     """
     waves = _Waves(field, index, wavelength, wi, harmonics)
     up, down = waves.above * [-1, -1, 1], waves.below * [1, 1, -1]
@@ -92,8 +93,22 @@ def transmitted(
         for column, e in enumerate(_axes(waves.incident, 1.0)[:, 0]):
             flux = np.cross(e, np.cross(up[zeroth], test)) - np.cross(test, np.cross(into, e))
             right[row * len(up) + zeroth, column] = flux[2]
-    power = np.abs(_solved(matrix, right)) ** 2
-    return float(0.5 * np.sum(np.tile(waves.below[:, 2].real, 2)[:, None] * power) / wi[2])
+    found = _solved(matrix, right)
+    mean = waves.k * float(field.heights.mean())
+    return _orders(waves, wi, found, mean, down / index, waves.below[:, 2].real)
+
+
+def transmitted(
+    field: HeightField,
+    index: complex,
+    wavelength: float,
+    wi: NDArray[np.float64],
+    harmonics: int,
+) -> float:
+    """Share of unpolarised light that a dielectric lets through, all orders; as `solve`."""
+    orders = through(field, index, wavelength, wi, harmonics)
+    cosines = -complex(index).real * orders.wo[:, 2]
+    return float(np.sum(boundary.unpolarised(orders.jones) * cosines) / wi[2])
 
 
 class _Waves:
@@ -193,18 +208,20 @@ class _Spectra:
         return found
 
 
-def _orders(waves: _Waves, wi: Real, found: Complex, mean: float) -> Orders:
+def _orders(
+    waves: _Waves, wi: Real, found: Complex, mean: float, out: Complex, travels: Real
+) -> Orders:
     """Of the amplitudes (2n, 2), those that travel, about `boundary.polarisation_axes`.
 
-    mean : of the heights, which the amplitudes' phases are from.
+    mean : of the heights, which the amplitudes' phases are from; out : (n, 3) unit vectors;
+    travels : (n,) their cosines, 0 of those that fade.
     """
-    out = waves.above
-    kept = (np.abs(out[:, 2].imag) == 0) & (out[:, 2].real > HORIZON)
+    kept = travels > HORIZON
     wo = out[kept].real
     both = np.moveaxis(found.reshape(2, len(out), 2), 1, 0)[kept]
     axes = _axes(out[kept], 1.0)[0].real
     basis = _axes(waves.incident, 1.0)[0].real[0]
     s_in, s_out = boundary.polarisation_axes(wi, wo)
     turned = boundary.turn(s_out, axes, wo) @ both @ boundary.turn(basis, s_in, -wi)
-    phase = np.exp(-1j * mean * (wi[2] + wo[:, 2]))
+    phase = np.exp(-1j * mean * (wi[2] + travels[kept] * np.sign(wo[:, 2])))
     return Orders(waves.orders[kept], wo, phase[:, None, None] * turned)

@@ -65,7 +65,8 @@ def record_scene(
     Raises
     ------
     DiffractionError
-        If no surface diffracts, if no path meets one that does, or if the plan is for others.
+        If no surface diffracts or one lets light through, if no path meets one, or if the plan is
+        for others.
     """
     session = Session(limits=plan.limits() if plan else {}, recording=True, timing=timing)
     with session:
@@ -73,6 +74,12 @@ def record_scene(
     if not session.bsdfs:
         raise DiffractionError(
             "the scene has no BSDF 'diffraction'; there is nothing to plan, render it as it is"
+        )
+    passed = [name for name, bsdf in session.bsdfs if bsdf.through is not None]
+    if passed:
+        raise DiffractionError(
+            f"light goes through {', '.join(sorted(set(passed)))}, which plans do not record; "
+            "render the scene without a plan"
         )
     if plan is not None:
         _check_match(session, plan)

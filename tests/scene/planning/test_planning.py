@@ -224,6 +224,11 @@ def test_scenes_without_anything_to_plan_are_refused(tmp_path):
             record_scene(lambda parts=parts: mi.load_dict(parts), sensor, 100)
 
 
+def test_a_sheet_that_lets_light_through_is_refused():
+    with pytest.raises(DiffractionError, match="light goes through foil, which plans do not"):
+        record_scene(lambda: plate(thin=True), sensor, 100)
+
+
 def test_a_scene_in_the_dark_is_refused():
     with pytest.raises(DiffractionError, match="none of 100 paths through the scene carries light"):
         record_scene(lambda: plate(polar(120.0, 25.0)), sensor, 100)

@@ -1,0 +1,112 @@
+"""What a dielectric boundary makes of the light that goes through it: Jones matrices (NumPy).
+
+With w = n cosθt − cosθi, lengths over 2π/λ and q = 2π/λ (ωi + n ωo) tangential, the light that goes
+from above into a dielectric of index n has
+
+    f = n² · 4 cosθi n cosθt N / (λ² A w²) · ⟨|P|²⟩,   ⟨|P|²⟩ at −q and κ = 2π w/λ,
+
+with N the mean power of the Jones matrix as in `boundary`: orders add up to a flat interface's
+transmittance as κh → 0. f/n² is the same for reversed light. Where w → 0, so does ⟨|P|²⟩ but for
+order 0, whose lobe is not there.
+
+- Small slope: first-order perturbation (Rice 1951; Voronovich 1985), from the fields that light
+  along ωi and reversed light along ωo make at the flat interface, as in `boundary.small_slope`.
+- Kirchhoff's tangent plane: Fresnel's coefficients of the facet that refracts ωi to ωo, along
+  ωi + n ωo, in the limit of short waves that of Walter, Marschner, Li and Torrance 2007 (eq. 21).
+
+In the refracted direction both are w/(2 cosθi) times Fresnel's t_s and t_p. Axes as in `boundary`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .boundary import Complex, Real, polarisation_axes, turn
+from .fresnel import amplitudes, decaying_root
+
+
+def small_slope(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
+    """Jones matrices of first order, (..., 2, 2).
+
+    With k0, k the tangential parts of −ωi and n ωo and q0, q, q0', q' the normal ones above and
+    inside (q beyond the critical angle is imaginary),
+
+        B_ss = (ε−1) (k̂·k̂0)                     / ((q+q')(q0+q0'))
+        B_pp = (ε−1) n (q q0' (k̂·k̂0) + |k||k0|)  / ((εq+q')(εq0+q0'))
+        B_ps = (ε−1) n q  ẑ·(k̂0×k̂)              / ((εq+q')(q0+q0'))    s in, p out
+        B_sp = −(ε−1) q0' ẑ·(k̂0×k̂)              / ((q+q')(εq0+q0'))    p in, s out
+
+    Parameters
+    ----------
+    wi : (..., 3) unit vectors above the surface; wo : unit vectors below it, in the dielectric.
+    index : real, of the dielectric over that of the medium above it.
+    """
+    s_in, s_out = polarisation_axes(wi, wo)
+    n = float(index)
+    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    sine0 = np.hypot(incident[..., 0], incident[..., 1])
+    sine = n * np.hypot(outgoing[..., 0], outgoing[..., 1])
+    q0, q_inside = incident[..., 2], -n * outgoing[..., 2]
+    q = decaying_root(np.asarray(1.0 - sine**2, np.complex128))
+    q0_inside = np.sqrt(np.maximum(n * n - sine0**2, 0.0))
+    dot = np.sum(s_in * s_out, axis=-1)
+    cross = s_in[..., 0] * s_out[..., 1] - s_in[..., 1] * s_out[..., 0]
+    s0, s = 1.0 / (q0 + q0_inside), 1.0 / (q + q_inside)
+    p0, p = 1.0 / (n * n * q0 + q0_inside), n / (n * n * q + q_inside)
+    rows = [
+        [s * s0 * dot, -s * q0_inside * p0 * cross],
+        [q * p * s0 * cross, p * p0 * (q * q0_inside * dot + sine * sine0)],
+    ]
+    matrix = np.stack([np.stack(np.broadcast_arrays(*row), axis=-1) for row in rows], axis=-2)
+    return np.asarray((n * n - 1.0) * matrix)
+
+
+def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
+    """Jones matrices of the tangent plane, (..., 2, 2); 0 where no facet refracts ωi to ωo."""
+    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    n = float(index)
+    s_in, s_out = polarisation_axes(incident, outgoing)
+    total = -(incident + n * outgoing)
+    length = np.linalg.norm(total, axis=-1, keepdims=True)
+    normal = total / np.maximum(length, 1e-12) * np.sign(n - 1.0)
+    cos_in = np.sum(incident * normal, axis=-1)
+    cos_out = -np.sum(outgoing * normal, axis=-1)
+    refracts = (cos_in > 0) & (cos_out > 0)
+    cos_in = np.where(refracts, cos_in, 1.0)
+    axis = _facet_axis(incident, outgoing, s_in)
+    scale = np.where(refracts, cos_out * cos_in * length[..., 0], 0.0)
+    scale /= -incident[..., 2] * outgoing[..., 2]
+    t_s, t_p = scale / (cos_in + n * cos_out), scale / (n * cos_in + cos_out)
+    zero = np.zeros_like(t_s)
+    facet = np.stack([t_s, zero, zero, t_p], axis=-1).reshape(*t_s.shape, 2, 2)
+    return np.asarray(turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident))
+
+
+def out_of_sheet(jones: ArrayLike, wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
+    """Jones matrices (..., 2, 2) of light that leaves a thin sheet through its flat other side.
+
+    That transmits T_b, and what goes to and fro between two mirrors of reflectances R as if both
+    were flat adds up to 1/(1 − R R) (Born and Wolf, section 7.6, without interference):
+
+        J'_ab = √(T_a(ωo) / (1 − R_a(ωo) R_b(ωi))) J_ab.
+
+    Parameters
+    ----------
+    wi, wo : outside of the sheet, above and below, (..., 3).
+    """
+    came, left = (
+        np.abs(np.stack(amplitudes(np.abs(np.asarray(w)[..., 2]), index), axis=-1)) ** 2
+        for w in (wi, wo)
+    )
+    both = left[..., :, None] * came[..., None, :]
+    return np.asarray(np.sqrt((1.0 - left[..., :, None]) / (1.0 - both)) * np.asarray(jones))
+
+
+def _facet_axis(incident: Real, outgoing: Real, fallback: Real) -> Real:
+    """s of the facet that refracts ωi to ωo: normal to both, along that of light on a level one."""
+    # h × (−ωi) of h along −(ωi + n ωo) is along ωo × … = ωi × ωo reversed for n > 1
+    normal = np.cross(outgoing, incident)
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    found = length > 1e-12
+    return np.where(found, normal / np.where(found, length, 1.0), fallback)

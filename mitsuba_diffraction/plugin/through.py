@@ -1,0 +1,344 @@
+"""Light on both sides of a dielectric, or of a thin sheet with one structured side (Dr.Jit).
+
+The twin of `optics.through`, which has the formulas. From below, a dielectric reflects like a
+surface of index 1/n in light of λ/n, and a thin sheet like such a surface under a coat of index n,
+its flat side (`optics.coat`). What the flat side sends back to light from above passes the
+structure twice, at places that have nothing to do with each other: to first order in κ² that is one
+passage of κ = √(κi² + κo²), exact for order 0 of a Gaussian surface, with the power that two
+mirrors leave it. Light that the structure sends beyond the sheet's critical angle is lost.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import drjit as dr
+import mitsuba as mi
+
+from ..tables.energy.sides import largest_sum
+from ..tables.table import DiffractionTable
+from .boundary import LEVEL, Boundary, Jones, Kirchhoff, SmallSlope, turn, turned
+from .coat import CoatedPair, transmittances
+from .crossing import Crossing, Sides, Turned
+from .film import plain
+from .fresnel import root, squared
+from .pair import Pair, Place, from_patch
+from .reflectance import Dielectric, Inside
+from .roles import (
+    Context,
+    Float,
+    Interaction,
+    Mask,
+    Rotation,
+    Sample,
+    Spectrum,
+    Vector2f,
+    Vector3f,
+)
+from .sampling import EVEN, direction_of, with_even_share
+
+if TYPE_CHECKING:
+    from .bsdf import Diffraction
+
+_LEAST_SHARE = 0.1
+#: Of a dielectric over the medium above it.
+LEAST_INDEX = 1.01
+
+
+class Through:
+    """Both sides of a BSDF without anything nested.
+
+    Parameters
+    ----------
+    material : of the surface.
+    boundary : of light from above; the one of light from within follows.
+    thin : whether below is beyond the flat side of a sheet.
+    conserving : the table, of which no direction within 75° of the normal is to gain energy.
+    """
+
+    def __init__(
+        self,
+        material: Dielectric,
+        boundary: Boundary,
+        thin: bool,
+        conserving: DiffractionTable | None,
+    ) -> None:
+        self.material, self.thin, self.conserving = material, thin, conserving
+        self._kept = mi.Float(1.0)
+        self.boundary = boundary
+        within = Inside(material, thin)
+        self.below: Boundary = (
+            boundary.of(within) if isinstance(boundary, SmallSlope) else Kirchhoff(within)
+        )
+        self.mirror = Kirchhoff(material)
+
+    def update(self, height_scale: Float) -> None:
+        """Divide by the largest R + T at this height scale and index, if that is above 1."""
+        if self.conserving is None:
+            return
+        scale, index = plain(dr.max(height_scale)), plain(self.material.eta)
+        state = max(round(scale, 2), 0.01), round(index, 2)
+        known: dict[object, float] = self.conserving.__dict__.setdefault("_sums", {})
+        key = *state, str(self.boundary), self.thin
+        if key not in known:
+            known[key] = largest_sum(self.conserving, *state, str(self.boundary), self.thin)
+        self._kept = mi.Float(1.0 / max(known[key], 1.0))
+        dr.make_opaque(self._kept)
+
+    def flags(self) -> list[int]:
+        """Of reflection and of transmission."""
+        sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide | mi.BSDFFlags.Anisotropic
+        through = mi.BSDFFlags.GlossyTransmission | sides
+        if not self.thin:
+            through = through | mi.BSDFFlags.NonSymmetric
+        return [mi.BSDFFlags.GlossyReflection | sides, through]
+
+    def eval_pdf(
+        self, bsdf: Diffraction, ctx: Context, si: Interaction, wo: Vector3f, active: Mask
+    ) -> tuple[Spectrum, Float]:
+        """`eval` and `pdf` of the BSDF."""
+        cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
+        reflects, passes = _asked(ctx)
+        share = self._share(cos_i, si, active, reflects, passes)
+        rotation = bsdf.orientation.rotation(si, active)
+        value, density = mi.Spectrum(0.0), mi.Float(0.0)
+        if reflects:
+            for front in (True, False):
+                lit = active & ((cos_i > 0.0) == front) & (cos_i * cos_o > 0.0)
+                found, one = self._reflected(bsdf, ctx, si, wo, rotation, lit, front)
+                value = dr.select(lit, found, value)
+                density = dr.select(lit, share * one, density)
+        if passes:
+            lit = active & (cos_i * cos_o < 0.0)
+            crossing = Crossing(si, wo, rotation, lit, self.material.eta, self.thin)
+            found = self._passed(bsdf, ctx, si, crossing) * dr.abs(cos_o)
+            value = dr.select(lit, found, value)
+            out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
+            scale = bsdf.scale_at(si, active)
+            orders = bsdf.power.density(crossing, scale, si) * dr.square(out)
+            density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
+        return value if self.conserving is None else value * self._kept, density
+
+    def sample(
+        self,
+        bsdf: Diffraction,
+        ctx: Context,
+        si: Interaction,
+        sample1: Float,
+        sample2: Vector2f,
+        active: Mask,
+    ) -> tuple[Sample, Spectrum]:
+        """`sample` of the BSDF: one of the sides by its flat reflectance, then by the orders."""
+        cos_i = mi.Frame3f.cos_theta(si.wi)
+        reflects, passes = _asked(ctx)
+        active = mi.Mask(active) & (cos_i != 0.0)
+        share = self._share(cos_i, si, active, reflects, passes)
+        reflected = sample1 < share
+        sample1 = dr.select(
+            reflected, sample1 / dr.maximum(share, 1e-6), (sample1 - share) / (1.0 - share + 1e-6)
+        )
+        down, n = cos_i > 0.0, dr.detach(self.material.eta)
+        sides = Sides.of(n, self.thin, down)
+        inner = mi.Float(1.0) if self.thin else n
+        into = dr.select(reflected, dr.select(down, 1.0, inner), sides.into)
+        out = dr.select(reflected, into, sides.out)
+        sign = dr.select(reflected & down, 1.0, -1.0)
+        cosine = dr.abs(cos_i)
+        drawn = bsdf.power.draw(
+            dr.select(reflected, cosine, sides.cosine(cosine, n, down, self.thin)),
+            dr.detach(bsdf.scale_at(si, active) * dr.select(reflected & (cos_i < 0.0), n, 1.0)),
+            dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
+            sample2,
+            si,
+        )
+        rotation = bsdf.orientation.rotation(si, active)
+        total = sign * from_patch(drawn, rotation) - into * mi.Vector2f(si.wi.x, si.wi.y)
+        wo = dr.select(
+            sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), direction_of(total / out)
+        )
+        active &= wo.z > 0.0
+        wo.z = dr.select(reflected == down, wo.z, -wo.z)
+        value, density = self.eval_pdf(bsdf, ctx, si, wo, active)
+        active &= density > 0.0
+        result = dr.zeros(mi.BSDFSample3f)
+        result.wo = wo
+        result.pdf = dr.select(active, density, 0.0)
+        result.eta = dr.select(reflected, 1.0, out / into)
+        kinds = mi.BSDFFlags.GlossyReflection, mi.BSDFFlags.GlossyTransmission
+        result.sampled_type = dr.select(reflected, mi.UInt32(+kinds[0]), mi.UInt32(+kinds[1]))
+        result.sampled_component = dr.select(reflected, mi.UInt32(0), mi.UInt32(1))
+        return result, dr.select(active, value / dr.select(active, density, 1.0), 0.0)
+
+    def _reflected(
+        self,
+        bsdf: Diffraction,
+        ctx: Context,
+        si: Interaction,
+        wo: Vector3f,
+        rotation: Rotation,
+        lit: Mask,
+        front: bool,
+    ) -> tuple[Spectrum, Float]:
+        """Value and density of light that stays on one side."""
+        n, scale = self.material.eta, bsdf.scale_at(si, lit)
+        if front:
+            pair = Pair(si, wo, rotation, lit)
+            value = bsdf.lobe(ctx, si, pair, self.boundary, lit)
+            if self.thin:
+                value += self._returned(bsdf, si, pair, scale)
+            density = bsdf.power.density(pair, scale, si)
+            return value, with_even_share(density)
+        if self.thin:
+            outer = Turned(si, wo, rotation, lit, mi.Float(1.0))
+            pair = CoatedPair(outer, n)
+            value = bsdf.lobe(ctx, si, pair, self.below, lit)
+            value += bsdf.face(ctx, si, outer, self.mirror, lit)
+            density = bsdf.power.density(outer, scale * n, si)
+            return value, with_even_share(density)
+        inner = Turned(si, wo, rotation, lit, n)
+        lit &= inner.reached
+        power = bsdf.power.power(inner.place, scale, si)
+        value = bsdf.lobe(ctx, si, inner, self.below, lit, power) * dr.square(n)
+        density = bsdf.power.density(inner, scale * n, si) * dr.square(n)
+        return value, with_even_share(density)
+
+    def _returned(self, bsdf: Diffraction, si: Interaction, pair: Pair, scale: Float) -> Spectrum:
+        """f·cosθo of what the flat side of a sheet sends back through the structure."""
+        n = self.material.eta
+        ends, kept = [], []
+        for cosine in (pair.cos_i, pair.cos_o):
+            ends.append(dr.sqrt(dr.fma(cosine, cosine, n * n - 1.0)) - cosine)
+            passed = transmittances(cosine, n)
+            # T² R/(1 − R²) of each polarisation
+            kept.append(0.5 * sum(t * (1.0 - t) * dr.rcp(2.0 - t) for t in passed))
+        place = Place(pair.uv, dr.sqrt(dr.fma(ends[0], ends[0], dr.square(ends[1]))))
+        power = bsdf.power.power(place, scale, si)
+        factor = bsdf.area_factor * dr.safe_sqrt(kept[0] * kept[1]) * pair.cos_o
+        return mi.Spectrum(power * factor)
+
+    def _passed(
+        self, bsdf: Diffraction, ctx: Context, si: Interaction, crossing: Crossing
+    ) -> Spectrum:
+        """BSDF of light that goes through, as the mode of transport has it."""
+        place, scale = crossing.place, bsdf.scale_at(si, crossing.active)
+        power = bsdf.power.power(place, scale, si)
+        factors = [
+            self._power(crossing, jones) for jones in self._matrices(bsdf, si, crossing, scale)
+        ]
+        factor = mi.UnpolarizedSpectrum(factors if len(factors) > 1 else factors[0])
+        outside = bsdf.area_factor * crossing.n * dr.rcp(dr.square(place.w) * crossing.q0)
+        outside *= dr.rcp(-crossing.inside.z)
+        if not self.thin:
+            # Radiance over n² is transmitted; light along ωi or ωo
+            down = mi.Frame3f.cos_theta(si.wi) > 0.0
+            scales = mi.Float(1.0), dr.square(crossing.n)
+            if ctx.mode == mi.TransportMode.Importance:
+                scales = scales[::-1]
+            outside *= dr.select(down, *scales)
+        return mi.Spectrum(dr.select(crossing.active, power * factor * outside, 0.0))
+
+    def _matrices(
+        self, bsdf: Diffraction, si: Interaction, crossing: Crossing, scale: Float
+    ) -> list[Jones]:
+        """2 cosθi cosθt times the Jones matrices of light from above, of each channel or of all."""
+        axes = _axes(-crossing.above, crossing.inside)
+        tangent = _tangent(crossing, axes)
+        if not isinstance(self.boundary, SmallSlope):
+            return [tangent]
+        first = _first_order(crossing, axes, self.thin)
+        shares = self.boundary.shares(
+            crossing.place, scale, bsdf.power.wavenumbers(si), [crossing.n]
+        )
+        return [
+            tuple(b + (k - b) * share for k, b in zip(tangent, first, strict=True))
+            for share in shares
+        ]
+
+    def _power(self, crossing: Crossing, jones: Jones) -> Float:
+        """½ Σ|J|², out of the flat side of a sheet (`optics.through.out_of_sheet`)."""
+        powers = [squared(entry) for entry in jones]
+        if self.thin:
+            left, came = (
+                transmittances(cosine, crossing.n)
+                for cosine in (-crossing.below.z, crossing.above.z)
+            )
+            weights = [
+                t * dr.rcp(dr.fma(-(1.0 - t), 1.0 - other, 1.0)) for t in left for other in came
+            ]
+            powers = [p * w for p, w in zip(powers, weights, strict=True)]
+        return 0.5 * sum(powers[1:], powers[0])
+
+    def _share(
+        self, cos_i: Float, si: Interaction, active: Mask, reflects: bool, passes: bool
+    ) -> Float:
+        """Share of the samples that stay on their side: by the flat reflectance."""
+        if not (reflects and passes):
+            return mi.Float(1.0 if reflects else 0.0)
+        cosine = dr.abs(cos_i) if self.thin else cos_i
+        flat = dr.detach(mi.fresnel(cosine, self.material.eta)[0])
+        if self.thin:
+            flat = 2.0 * flat * dr.rcp(1.0 + flat)
+        return dr.clip(flat, _LEAST_SHARE, 1.0 - _LEAST_SHARE)
+
+
+def _asked(ctx: Context) -> tuple[bool, bool]:
+    """Whether a context asks for reflection, and for transmission."""
+    return (
+        ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0),
+        ctx.is_enabled(mi.BSDFFlags.GlossyTransmission, 1),
+    )
+
+
+def _axes(came: Vector3f, left: Vector3f) -> tuple[Vector3f, Vector3f]:
+    """s of light along two directions; each other's along the normal (`optics.boundary`)."""
+    found = []
+    for direction in (came, left):
+        square = dr.square(direction.x) + dr.square(direction.y)
+        slanted = square > LEVEL
+        inverse = dr.rsqrt(dr.select(slanted, square, 1.0))
+        found.append((slanted, mi.Vector3f(-direction.y * inverse, direction.x * inverse, 0.0)))
+    (is_came, s_came), (is_left, s_left) = found
+    s_came = dr.select(is_came, s_came, dr.select(is_left, s_left, mi.Vector3f(0.0, 1.0, 0.0)))
+    return s_came, dr.select(is_left, s_left, s_came)
+
+
+def _first_order(crossing: Crossing, axes: tuple[Vector3f, Vector3f], thin: bool) -> Jones:
+    """2 cosθi cosθt B (`optics.through.small_slope`)."""
+    n, above, inside = crossing.n, crossing.above, crossing.inside
+    squares = [dr.square(d.x) + dr.square(d.y) for d in (above, inside)]
+    epsilon = n * n
+    outer = 1.0 - epsilon * squares[1]
+    # Beyond the critical angle light fades outside; from outside it never is there
+    q = root(outer if thin else mi.Complex2f(outer, 0.0))
+    q0_inside = dr.sqrt(epsilon - squares[0])
+    dot = dr.dot(*axes)
+    cross = dr.fma(axes[0].x, axes[1].y, -axes[0].y * axes[1].x)
+    contrast = (epsilon - 1.0) * -2.0 * above.z * inside.z
+    s0, p0 = dr.rcp(crossing.q0 + q0_inside), dr.rcp(epsilon * crossing.q0 + q0_inside)
+    s, p = contrast * dr.rcp(q + crossing.q), contrast * n * dr.rcp(epsilon * q + crossing.q)
+    sines = n * dr.safe_sqrt(squares[0] * squares[1])
+    return (
+        s * (s0 * dot),
+        -(s * (q0_inside * p0 * cross)),
+        q * p * (s0 * cross),
+        p * p0 * (q * (q0_inside * dot) + sines),
+    )
+
+
+def _tangent(crossing: Crossing, axes: tuple[Vector3f, Vector3f]) -> Jones:
+    """2 cosθi cosθt K (`optics.through.kirchhoff`)."""
+    n, above, inside = crossing.n, crossing.above, crossing.inside
+    total = -(above + n * inside)
+    length = dr.norm(total)
+    normal = total * dr.rcp(dr.maximum(length, 1e-6))
+    cos_in, cos_out = dr.dot(above, normal), -dr.dot(inside, normal)
+    refracts = (cos_in > 0.0) & (cos_out > 0.0)
+    cos_in = dr.select(refracts, cos_in, 1.0)
+    scale = dr.select(refracts, 2.0 * cos_in * cos_out * length, 0.0)
+    t_s, t_p = scale * dr.rcp(cos_in + n * cos_out), scale * dr.rcp(n * cos_in + cos_out)
+    axis = dr.cross(inside, above)
+    square = dr.squared_norm(axis)
+    found = square > LEVEL
+    axis = dr.select(found, axis * dr.rsqrt(dr.select(found, square, 1.0)), axes[0])
+    zero = mi.Float(0.0)
+    return turned((t_s, zero, zero, t_p), turn(axes[1], axis, inside), turn(axis, axes[0], -above))
