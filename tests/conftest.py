@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 import mitsuba_diffraction  # noqa: F401 - first of all: it chooses the LLVM that Dr.Jit loads
@@ -37,6 +38,10 @@ def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     else:
         os.environ[VARIABLE] = before
 
+
+# the machine may be busy
+hypothesis.settings.register_profile("tests", deadline=None)
+hypothesis.settings.load_profile("tests")
 
 _imported = 0
 

@@ -267,6 +267,12 @@ def test_workers_with_several_dask_threads_are_refused(scene):
         rendered(mine, scene)
 
 
+def test_a_worker_that_has_just_gone_is_no_reason_to_refuse():
+    leaving = _Recorder()
+    leaving.run = lambda *_, **__: {"one": None, "gone": distributed.comm.CommClosedError("closed")}
+    assert workers_module.check_workers(leaving, None) == ["one"]
+
+
 def test_no_scheduler_is_one_line():
     with (
         pytest.raises(DiffractionError, match=r"no scheduler answers at 'tcp://127\.0\.0\.1:1'"),

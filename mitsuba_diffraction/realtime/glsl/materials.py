@@ -106,7 +106,7 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
         pigment = Map(np.zeros(3))
         if bsdf.nested is not None:
             pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)
-        if _is_filmed(bsdf.fresnel):
+        if is_filmed(bsdf.fresnel):
             omissions.append(f"the thin film of {name}")
         if bsdf.through is not None:
             omissions.append(f"light that goes through {name}")
@@ -193,7 +193,7 @@ def pack_surface(material: Material) -> Packed:
         definitions["COATED"] = ""
         uniforms["coat"] = coat_index(material)
         uniforms["channel_wavenumbers"] = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
-    elif _is_filmed(surface):
+    elif is_filmed(surface):
         surface = surface.material
     if isinstance(bsdf.boundary, SmallSlope):
         packed |= pack_roughness(material.table.roughness)
@@ -263,7 +263,8 @@ def _is_bsdf(thing: Any) -> bool:
     return isinstance(thing, mi.BSDF)
 
 
-def _is_filmed(surface: Any) -> bool:
+def is_filmed(surface: Any) -> bool:
+    """Whether a thin film lies over the structure, which shaders do not know."""
     from ...plugin.film import UnderFilm  # which only a variant has
 
     return isinstance(surface, UnderFilm)
@@ -312,7 +313,7 @@ def colour_map(texture: Any, light: Spectrum) -> Map:
     found = _lit(texture, uv, light) if mi.is_spectral else _evaluated(texture, uv, np.zeros(3))
     if width * height == 1:
         return Map(found[0].astype(float))
-    clamped = _clamps(lambda uv: _evaluated(texture, uv, np.full(3, 550.0)), to_uv)
+    clamped = _clamps(lambda uv: _evaluated(texture, uv, np.full(4, 550.0)), to_uv)
     return Map(np.ones(3), found.reshape(height, width, 3), to_uv, clamped=clamped)
 
 

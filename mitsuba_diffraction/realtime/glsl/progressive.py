@@ -32,9 +32,9 @@ from .textures import Packed, Uniform
 
 Array = NDArray[np.float64]
 
-# generalised golden ratio of ten numbers a frame: two each for the pixel, the lens and the shadow
-# map, three for lobes (Roberts 2018)
-_RATIO = 1.0653066442
+# generalised golden ratio of nine numbers a frame: two each for the pixel, the lens and the shadow
+# map, three for lobes (Roberts 2018): x¹⁰ = x + 1
+_RATIO = 1.0757660661
 _STEPS = _RATIO ** -np.arange(1.0, 10.0)
 
 #: Towards what the second kind of frame looks: all spectra are daylight's, the colours come later.
