@@ -56,8 +56,14 @@ def hits(wi, uv):
 )
 def test_each_place_is_as_with_the_number_that_it_has(mono, parameters):
     wi, wo, _ = pairs(60)
-    varying = load(height_scale=bitmap(), **parameters)
-    for factor, uv in zip(FACTORS.ravel()[:2], UV, strict=False):
+    # what conserves energy takes a second for each of the height scales that it is made at
+    factors = (
+        np.array([[1.1, 1.25], [1.0, 1.2]], np.float32)
+        if "energy_conserving" in parameters
+        else FACTORS
+    )
+    varying = load(height_scale=bitmap(factors), **parameters)
+    for factor, uv in zip(factors.ravel()[:2], UV, strict=False):
         constant = load(height_scale=float(factor), **parameters)
         (value, density), (expected, its) = (
             [np.array(found).ravel() for found in bsdf.eval_pdf(mi.BSDFContext(), si, vectors(wo))]

@@ -156,7 +156,7 @@ def test_shaders_refuse_it(some_variant):
         read_scene(mi.load_dict(scene))
 
 
-@pytest.mark.parametrize("name", ["scalar_spectral", "llvm_ad_rgb", "llvm_ad_spectral_polarized"])
+@pytest.mark.parametrize("name", ["scalar_spectral", "llvm_ad_spectral_polarized"])
 def test_other_variants_mix_too(name):
     try:
         mi.set_variant(name)
