@@ -104,9 +104,9 @@ transmission : boolean [false]
     Light goes through the dielectric, from both sides: orders of κ = k (n cosθt − cosθi). The side
     that normals point to has ext_ior, the other one int_ior, which is at least 1.01 times that.
     Component 0 is what is reflected, 1 what goes through. Orders that change the tangential part by
-    more than 2/λ are left out. It excludes coat, film, nested BSDF, shadowing and polarised
-    variants. energy_conserving divides all by the largest R + T within 75° of the normal, at a few
-    directions and wavelengths: a second's work, in steps of 0.01 of height_scale and eta.
+    more than 2/λ are left out. It excludes coat, film, nested BSDF and shadowing. energy_conserving
+    divides all by the largest R + T within 75° of the normal, at a few directions and wavelengths:
+    a second's work, in steps of 0.01 of height_scale and eta.
 thin : boolean [false]
     Light goes through a sheet, whose other side is flat; both sides have ext_ior. What that side
     sends back is summed as between two mirrors; light beyond the sheet's critical angle is lost.
