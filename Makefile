@@ -93,11 +93,14 @@ energy: setup  ## measure what energy conservation takes: docs/energy.md
 	@$(PYTHON3) -m docs.make.figures.energy $(SURFACES:%=out/energy/%.json)
 
 COMPARE := $(RUN) compare
+WHOLE := --method lut spectral -s 8192 --full-spp 256 --frames 1024 --supersampling 3
 realtime: setup  ## compare the shaders with the path tracer: docs/realtime.md
-	@$(COMPARE) scenes/snake.xml --method all -s 768 --full-spp 48 -o out/compare/snake
-	@$(COMPARE) scenes/plate.xml --method lut spectral -s 2048 --full-spp 0 -D resx=240 -D resy=200 -o out/compare/plate
-	@$(COMPARE) scenes/sphere.xml --method lut spectral -s 1024 --full-spp 0 -D resx=240 -D resy=200 -o out/compare/sphere
-	@$(PYTHON3) -m docs.make.figures.realtime $(addprefix out/compare/,snake plate sphere)
+	@$(COMPARE) scenes/snake.xml $(WHOLE) -D resx=144 -D resy=90 -o out/compare/snake
+	@$(COMPARE) scenes/xenopeltis.xml $(WHOLE) -D resx=144 -D resy=90 -o out/compare/xenopeltis
+	@$(COMPARE) scenes/cd.xml $(WHOLE) -D resx=120 -D resy=88 -o out/compare/cd
+	@$(COMPARE) scenes/material_ball.xml $(WHOLE) -D resx=96 -D resy=88 -o out/compare/material_ball
+	@$(COMPARE) scenes/scales.xml $(WHOLE) -D resx=120 -D resy=80 -o out/compare/scales
+	@$(PYTHON3) -m docs.make.figures.realtime $(addprefix out/compare/,snake xenopeltis cd material_ball scales)
 
 lint: setup  ## check style, types and the layers of imports
 	@$(PYTHON3) -m ruff check

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 import mitsuba_diffraction  # noqa: F401 - first of all: it chooses the LLVM that Dr.Jit loads
@@ -22,8 +23,13 @@ VARIANTS = ("llvm_ad_spectral", "cuda_ad_spectral")
 
 @pytest.fixture(scope="session", autouse=True)
 def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The cache of tables, for this session alone: tests never touch the user's."""
-    folder = tmp_path_factory.mktemp("cache")
+    """The cache of tables, for this session alone: tests never touch the user's.
+
+    Workers share it, for the tables of the measured patches above all.
+    """
+    root = tmp_path_factory.getbasetemp()
+    folder = (root.parent if "PYTEST_XDIST_WORKER" in os.environ else root) / "cache"
+    folder.mkdir(exist_ok=True)
     before = os.environ.get(VARIABLE)
     os.environ[VARIABLE] = str(folder)
     yield folder
@@ -32,6 +38,10 @@ def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     else:
         os.environ[VARIABLE] = before
 
+
+# the machine may be busy
+hypothesis.settings.register_profile("tests", deadline=None)
+hypothesis.settings.load_profile("tests")
 
 _imported = 0
 

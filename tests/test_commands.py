@@ -7,6 +7,7 @@ still by their own tests. test_docs.py checks what these would be given.
 
 from __future__ import annotations
 
+import gc
 import re
 import shutil
 from pathlib import Path
@@ -91,6 +92,7 @@ def commands(page: str) -> list[list[str]]:
 
 def run(words: list[str]) -> None:
     """Run a command, smaller than it stands there."""
+    gc.collect()  # as in a process of its own, without the BSDFs of the command before
     if words[1] == "-m":
         assert make_mesh(words[3:]) == 0
         return

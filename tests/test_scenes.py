@@ -47,6 +47,19 @@ def test_it_renders_at_its_defaults(name: str) -> None:
     assert 0.02 < np.median(image.mean(axis=2)) < 0.8
 
 
+@pytest.mark.usefixtures("variant")
+def test_two_patches_share_the_snake_s_skin(gentle: dict[str, str]) -> None:
+    import mitsuba as mi
+
+    given = SMALL | {name: gentle[name] for name in ("patch", "pixel_size")}
+    skin = {"skin": "skin_two.xml", "belly_patch": gentle["patch"]}
+    scene = mi.load_file(str(SCENES / "snake.xml"), **given, **skin)
+    values = mi.traverse(scene)
+    (name,) = (name for name, _ in values if name.endswith("weight_back.data"))
+    weight = values[name]
+    assert np.array(weight)[[0, 32, -1], 0, 0] == pytest.approx([0.0, 1.0, 0.0])
+
+
 @pytest.fixture(scope="module")
 def gentle(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Parameters of any scene: a grating whose table and bound take a second."""

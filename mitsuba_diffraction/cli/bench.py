@@ -9,27 +9,24 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ..errors import DiffractionError
+from . import options
 from .arguments import path_ending_in
 from .console import Bar, say_warning
-from .options import add_json, add_own_patch, check_own_patch, own_patch
 from .report import save_report
 
 PARTS = ("build", "eval", "sample", "snake", "noise", "efficiency", "colours")
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(subparsers: options.Subparsers) -> None:
     """Declare the sub-command."""
-    parser = subparsers.add_parser(
-        "bench",
-        help="measure speed and memory",
-        description=(
-            "Measure what tables cost to build, and what evaluation costs beside Mitsuba's "
-            "roughconductor and other baselines, all in one run: compare its ratios, and its "
-            "times only on an idle machine."
-        ),
-    )
+    parser = options.add_command(
+        subparsers, "bench", run, "measure speed and memory",
+        "Measure what tables cost to build, and what evaluation costs beside Mitsuba's "
+        "roughconductor and other baselines, all in one run: compare its ratios, and its "
+        "times only on an idle machine.",
+    )  # fmt: skip
     parser.add_argument("--quick", action="store_true", help="fewer, smaller and shorter runs")
-    add_json(parser, "every single measurement")
+    options.add_json(parser, "every single measurement")
     parser.add_argument(
         "--against", metavar="FILE", type=path_ending_in(".json"),
         help="compare with an earlier run, written by --json",
@@ -39,13 +36,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--scenes", metavar="FOLDER", type=Path, default=Path("scenes"),
         help="where the project's scenes are, for its snake; default: scenes",
     )  # fmt: skip
-    add_own_patch(parser)
-    parser.set_defaults(run=run, parser=parser)
+    options.add_own_patch(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure and print, and return the exit code; a missed goal is no failure."""
-    check_own_patch(args)
+    options.check_own_patch(args)
     from ..analysis.bench.figures import compared, read_run
 
     earlier = read_run(args.against) if args.against is not None else None
@@ -65,7 +61,9 @@ def run(args: argparse.Namespace) -> int:
         say_warning("the machine is busy: trust the ratios, not the times")
     measured = []
     with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder, Bar(args) as bar:
-        for section in sections(parts, chosen, Path(folder), bar, args.scenes, own_patch(args)):
+        for section in sections(
+            parts, chosen, Path(folder), bar, args.scenes, options.own_patch(args)
+        ):
             tqdm.write("\n".join(["", *section.lines()]))  # above the progress bar
             sys.stdout.flush()
             measured.append(section)

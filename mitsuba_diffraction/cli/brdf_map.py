@@ -10,25 +10,9 @@ from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
 from ..optics.colour import ILLUMINANTS
+from . import options
 from .arguments import number_between, path_ending_in
 from .console import Bar
-from .options import (
-    add_direction,
-    add_exposure,
-    add_heights,
-    add_json,
-    add_method,
-    add_mode,
-    add_resolution,
-    add_table,
-    add_wavelengths,
-    given_for_heights,
-    in_library,
-    load_options,
-    load_patch,
-    table_options,
-    wavelengths,
-)
 from .report import check_outputs, save_report
 
 _KEPT = "that of the table or recipe, else "
@@ -44,17 +28,14 @@ _OF_THE_BSDF = (
 )  # fmt: skip
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(subparsers: options.Subparsers) -> None:
     """Declare the sub-command."""
-    parser = subparsers.add_parser(
-        "brdf-map",
-        help="picture what a surface reflects in every direction",
-        description=(
-            "Picture the BRDF over all view directions for one light direction, seen from above: "
-            "x = sin θ cos φ, y = sin θ sin φ, the normal in the middle. Writes linear numbers "
-            "(EXR, 1/sr) and a picture with axes (PNG) beside them."
-        ),
-    )
+    parser = options.add_command(
+        subparsers, "brdf-map", run, "picture what a surface reflects in every direction",
+        "Picture the BRDF over all view directions for one light direction, seen from above: "
+        "x = sin θ cos φ, y = sin θ sin φ, the normal in the middle. Writes linear numbers "
+        "(EXR, 1/sr) and a picture with axes (PNG) beside them.",
+    )  # fmt: skip
     parser.add_argument(
         "source", metavar="SOURCE", type=Path,
         help="table, recipe (.toml), or heights of any format",
@@ -64,27 +45,26 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="EXR, with a PNG beside it, or only a PNG; default: SOURCE's name with -map.exr in "
         "the current folder",
     )  # fmt: skip
-    add_mode(parser)
+    options.add_mode(parser)
     _add_map_options(parser.add_argument_group("the map"))
     add_surface(parser.add_argument_group("the surface"))
     group = parser.add_argument_group("methods of the 2014 thesis")
-    add_method(
+    options.add_method(
         group, None,
         "evaluate by this method in NumPy instead of the renderer's BSDF; R is 1, the light D65",
     )  # fmt: skip
     add_relative(group)
-    add_heights(parser)
-    add_json(parser, "what was mapped")
-    parser.set_defaults(run=run, parser=parser)
+    options.add_heights(parser)
+    options.add_json(parser, "what was mapped")
 
 
 def _add_map_options(group: argparse._ArgumentGroup) -> None:
-    add_direction(group)
-    add_wavelengths(group)
+    options.add_direction(group)
+    options.add_wavelengths(group)
     group.add_argument(
         "--wavelength", metavar="NM", type=float, help="one wavelength only, in false colours"
     )
-    add_resolution(group, 512)
+    options.add_resolution(group, 512)
     group.add_argument(
         "--samples", metavar="N", type=int,
         help="directions in a pixel; default: enough to find every lobe",
@@ -96,7 +76,7 @@ def _add_map_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--cosine", action="store_true", help="map f·cosθo, what a lit surface shows, instead of f"
     )
-    add_exposure(
+    options.add_exposure(
         group, None,
         "of the PNG, in stops; default: half of the diffracted light is darker than white",
     )  # fmt: skip
@@ -126,7 +106,7 @@ def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:
     group.add_argument(
         "--height-scale", metavar="S", type=number_between(1e-6, 1000), help="multiplies heights"
     )
-    add_table(group, tuple(_TABLE), **_TABLE)
+    options.add_table(group, tuple(_TABLE), **_TABLE)
 
 
 def add_relative(group: argparse._ArgumentGroup) -> None:
@@ -173,11 +153,11 @@ def run(args: argparse.Namespace) -> int:
         args.parser.error(f"argument --spectral: bands need an EXR, e.g. -o {output.stem}.exr")
     written = [png] if only_png else [output, png]
     check_outputs(written, [args.source], "map")
-    load_options(args)  # what does not fit is reported before Mitsuba is loaded
+    options.load_options(args)  # what does not fit is reported before Mitsuba is loaded
 
     from ..analysis.maps import Bands, save_exr, save_png
 
-    spectrum = wavelengths(args)
+    spectrum = options.wavelengths(args)
     bands = Bands.of(spectrum["wavelength_range"], spectrum["step"], args.wavelength)
     evaluate = _by_bsdf if args.method is None else _by_method
     result, surface, how = evaluate(args, bands, spectrum)
@@ -229,14 +209,15 @@ def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -
     light, samples, single = Light(args.theta, args.phi), args.samples or 1, args.wavelength
     check_map(bands, args.resolution, args.samples, spectral=False)
     gain = gain_of(args)
-    patch, settings = load_patch(args)
+    patch, settings = options.load_patch(args)
     if single is not None:
         spectrum = {"wavelength_range": (0.999 * single, 1.001 * single), "step": 0.001 * single}
     with Bar(args) as bar, warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
         method = make(
-            in_library(args.method), patch, period=args.period, progress=bar, **settings, **spectrum
-        )
+            options.in_library(args.method), patch, period=args.period, progress=bar,
+            **settings, **spectrum,
+        )  # fmt: skip
         start = time.perf_counter()
         result = method_map(
             method, light, step=bands.width, wavelength=single, resolution=args.resolution,
@@ -285,8 +266,8 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
     from ..plugin.bsdf import Diffraction
 
     given = {n: getattr(args, n) for n in _SURFACE if getattr(args, n, None) is not None}
-    settings = {k: v for k, v in table_options(args).items() if k in _TABLE}
-    for option in given_for_heights(args):
+    settings = {k: v for k, v in options.table_options(args).items() if k in _TABLE}
+    for option in options.given_for_heights(args):
         name = option.removeprefix("--").replace("-", "_")
         given[name] = getattr(args, name)
     if "int_ior" not in given:

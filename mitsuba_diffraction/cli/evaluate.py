@@ -12,21 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, DiffractionWarning
 from ..settings import TableSettings
+from . import options
 from .arguments import path_ending_in, whole_number
 from .console import Bar, say_warning
-from .options import (
-    TABLE_NAMES,
-    add_direction,
-    add_heights,
-    add_json,
-    add_method,
-    add_table,
-    add_wavelengths,
-    in_library,
-    load_patch,
-    table_warnings,
-    wavelengths,
-)
 from .report import check_outputs, save_report
 
 if TYPE_CHECKING:
@@ -42,17 +30,14 @@ _LEAST_COSINE = 0.2
 _NARROWEST = 20.0
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(subparsers: options.Subparsers) -> None:
     """Declare the sub-command."""
-    parser = subparsers.add_parser(
-        "evaluate",
-        help="compare the angles of maxima with the grating equation",
-        description=(
-            "Put a patch under a monochromatic beam, follow the brightest viewing angle through "
-            "the spectrum, and fit the period of the grating equation to it. Writes a picture, and "
-            "the numbers as CSV (the ridge) and NPZ (everything) beside it."
-        ),
-    )
+    parser = options.add_command(
+        subparsers, "evaluate", run, "compare the angles of maxima with the grating equation",
+        "Put a patch under a monochromatic beam, follow the brightest viewing angle through "
+        "the spectrum, and fit the period of the grating equation to it. Writes a picture, and "
+        "the numbers as CSV (the ridge) and NPZ (everything) beside it.",
+    )  # fmt: skip
     parser.add_argument(
         "source", metavar="SOURCE", type=Path, help="heights of any format, or a recipe (.toml)"
     )
@@ -62,23 +47,24 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )  # fmt: skip
     _add_beam_options(parser.add_argument_group("the beam"))
     group = parser.add_argument_group("the model")
-    add_method(group, "spectral", "what evaluates")
-    add_table(
-        group, TABLE_NAMES, coherence="ensemble for spectral, patch for the thesis' own methods"
+    options.add_method(group, "spectral", "what evaluates")
+    options.add_table(
+        group,
+        options.TABLE_NAMES,
+        coherence="ensemble for spectral, patch for the thesis' own methods",
     )
     group.add_argument(
         "--windows", dest="positions", metavar="N", type=whole_number(0), default=_WINDOWS,
         help="window positions whose own periods are fitted, for the spread; 0 leaves them out; "
         f"default: {_WINDOWS}",
     )  # fmt: skip
-    add_json(parser)
-    add_heights(parser)
-    parser.set_defaults(run=run, parser=parser)
+    options.add_json(parser)
+    options.add_heights(parser)
 
 
 def _add_beam_options(group: argparse._ArgumentGroup) -> None:
-    add_direction(group, theta=75.0, phi=None)
-    add_wavelengths(group)
+    options.add_direction(group, theta=75.0, phi=None)
+    options.add_wavelengths(group)
     group.add_argument(
         "--angles", metavar=("LOW", "HIGH"), nargs=2, type=float,
         help="viewing angles, degrees, positive on the light's side; default: from the mirror "
@@ -110,10 +96,10 @@ def run(args: argparse.Namespace) -> int:
     beam = Beam(args.theta, args.phi or 0.0)
     if args.period is not None:
         check_period(args.period)
-    spectrum = wavelengths(args)
+    spectrum = options.wavelengths(args)
     steps = trapezoid_rule(spectrum["wavelength_range"], spectrum["step"])[0]
     viewing_angles(args.angles, args.angle_step, args.theta, args.order)
-    patch, settings = load_patch(args)
+    patch, settings = options.load_patch(args)
     width = settings.get("coherence_width", 65.0)
     gratings = dominant_periods(patch)
     if args.phi is None and gratings:
@@ -125,7 +111,9 @@ def run(args: argparse.Namespace) -> int:
     settings |= spectrum
     with Bar(args) as bar, warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)  # said above
-        method = make(in_library(args.method), patch, period=args.period, progress=bar, **settings)
+        method = make(
+            options.in_library(args.method), patch, period=args.period, progress=bar, **settings
+        )
         response = measure(
             method.brdf, beam, steps, angles, sigma=method.sigma, label=args.method,
             progress=bar,
@@ -159,7 +147,7 @@ def run(args: argparse.Namespace) -> int:
     for name, text in report:
         print(f"  {name:<9} {text}")
     asked = TableSettings(coherence_width=width, wavelength_range=spectrum["wavelength_range"])
-    for text in table_warnings(patch, asked):
+    for text in options.table_warnings(patch, asked):
         say_warning(text)
     save_report(args, {"patch": patch.name, "method": args.method, "theta": beam.theta,
                        "phi": beam.phi, **more})  # fmt: skip

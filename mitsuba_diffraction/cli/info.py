@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
 from ..settings import TableSettings
+from . import options
 from .arguments import path_ending_in
 from .console import Bar, mitsuba_warnings
-from .options import STDOUT, add_heights, add_json, given_for_heights, load_options, table_warnings
 from .report import lines_of, plain, save_report
 
 if TYPE_CHECKING:
@@ -22,18 +22,15 @@ _MESHES = (".ply", ".obj", ".serialized")
 _OTHER_MESHES = (".stl", ".glb", ".gltf", ".fbx", ".dae", ".3ds", ".3mf", ".off", ".blend")
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(subparsers: options.Subparsers) -> None:
     """Declare the sub-command."""
-    parser = subparsers.add_parser(
-        "info",
-        help="describe a table, a height field, a recipe or a mesh",
-        description=(
-            "Describe a table, a file of heights, a recipe, or a mesh (PLY, OBJ, serialized) and "
-            "whether its tangents suit a measured patch."
-        ),
-    )
+    parser = options.add_command(
+        subparsers, "info", run, "describe a table, a height field, a recipe or a mesh",
+        "Describe a table, a file of heights, a recipe, or a mesh (PLY, OBJ, serialized) and "
+        "whether its tangents suit a measured patch.",
+    )  # fmt: skip
     parser.add_argument("file", metavar="FILE", type=Path, help="what to describe")
-    add_json(parser, "the description", nargs="?", const=STDOUT)
+    options.add_json(parser, "the description", nargs="?", const=options.STDOUT)
     parser.add_argument(
         "--albedo", metavar="OUT", type=path_ending_in(".png", ".pdf", ".svg"),
         help="of a table: plot its raw directional albedo against angle and azimuth",
@@ -48,8 +45,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="of heights or a recipe: draw them, their distribution and spectrum, and the light "
         "that they scatter",
     )  # fmt: skip
-    add_heights(parser)
-    parser.set_defaults(run=run, parser=parser)
+    options.add_heights(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -69,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
             args.parser.error(f"argument --picture: '{args.file}' is a {data['kind']}, not heights")
         _draw(args)
         data["picture"] = str(args.picture)
-    if args.json == STDOUT:
+    if args.json == options.STDOUT:
         print(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
     else:
         print("\n".join(lines_of(data)))
@@ -101,7 +97,7 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _refuse_heights_options(args: argparse.Namespace, what: str) -> None:
-    given = given_for_heights(args)
+    given = options.given_for_heights(args)
     if given:
         args.parser.error(f"argument {given[0]}: '{args.file}' is {what}, not heights")
 
@@ -136,11 +132,11 @@ def _draw(args: argparse.Namespace) -> None:
     from ..heights.read import is_recipe
     from ..heights.recipes import Recipe
 
-    options = load_options(args)
+    how = options.load_options(args)
     if is_recipe(args.file):
-        fields = Recipe.load(args.file).fields(options)
+        fields = Recipe.load(args.file).fields(how)
     else:
-        fields = [load_heights(args.file, options)]
+        fields = [load_heights(args.file, how)]
     with atomic_path(args.picture) as temporary:
         patches_figure(fields).savefig(temporary, dpi=80)
 
@@ -148,12 +144,12 @@ def _draw(args: argparse.Namespace) -> None:
 def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     from ..heights.load import load_heights
 
-    field = load_heights(file, load_options(args))
+    field = load_heights(file, options.load_options(args))
     return {
         "kind": "height field",
         **field.summary(),
         **_periods(field),
-        "warnings": table_warnings(field, TableSettings()),
+        "warnings": options.table_warnings(field, TableSettings()),
     }
 
 
@@ -172,9 +168,9 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     table = recipe.table
     with Bar(args) as bar:
         bar(0, 0, "making heights")
-        fields = recipe.fields(load_options(args))
+        fields = recipe.fields(options.load_options(args))
     settings = TableSettings(**table)
-    warnings = [line for field in fields for line in table_warnings(field, settings)]
+    warnings = [line for field in fields for line in options.table_warnings(field, settings)]
     return {
         "kind": "recipe",
         **({"generator": recipe.generator} if recipe.generator else {}),

@@ -7,7 +7,7 @@ given. Modules of the library are imported where values are read, so that --help
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 Group = argparse._ActionsContainer
+Subparsers = argparse._SubParsersAction
 
 #: Default of --wavelength-range and of --step, nm.
 WAVELENGTH_RANGE, STEP = TableSettings.wavelength_range, 5.0
@@ -56,6 +57,17 @@ _TABLE = (
     "coherence_width", "coherence", "basis", "tolerance", "terms", "taps", "height_scale_max",
     "windows",
 )  # fmt: skip
+
+
+def add_command(
+    subparsers: Subparsers, name: str, run: Callable[..., int], help: str, description: str
+) -> argparse.ArgumentParser:
+    """The parser of a sub-command, which knows what runs it: `main` calls run(args)."""
+    parser: argparse.ArgumentParser = subparsers.add_parser(
+        name, help=help, description=description
+    )
+    parser.set_defaults(run=run, parser=parser)
+    return parser
 
 
 def add_heights(parser: argparse.ArgumentParser) -> None:

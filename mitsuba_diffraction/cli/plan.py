@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from ..errors import DiffractionError
 from ..progress import Progress
 from ..scene.load import sensor_of, set_variant
+from . import options
 from .arguments import number_between, path_ending_in, whole_number
 from .console import Bar, mitsuba_warnings, say, say_warning
-from .options import add_json, add_scene, scene_parameters
 from .report import check_writable, lines_of, save_report
 
 if TYPE_CHECKING:
@@ -25,25 +25,21 @@ PATHS, TOLERANCE = 1 << 15, 1e-3
 _MOST_PATHS = 1 << 22  # lanes are counted in single precision
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(subparsers: options.Subparsers) -> None:
     """Declare the sub-command."""
-    parser = subparsers.add_parser(
-        "plan",
-        help="find out which part of its tables a scene needs",
-        description=(
-            "Trace paths through an XML scene and report which spatial frequencies, kappa and "
-            "wavelengths its diffracting surfaces are asked for, what tables of only these save "
-            "and what they change, measured on a small picture. `render --plan` renders with them."
-        ),
-    )
-    add_scene(parser)
+    parser = options.add_command(
+        subparsers, "plan", run, "find out which part of its tables a scene needs",
+        "Trace paths through an XML scene and report which spatial frequencies, kappa and "
+        "wavelengths its diffracting surfaces are asked for, what tables of only these save "
+        "and what they change, measured on a small picture. `render --plan` renders with them.",
+    )  # fmt: skip
+    options.add_scene(parser)
     add_plan_options(parser)
     parser.add_argument(
         "-o", "--output", metavar="PLAN", type=path_ending_in(".json"),
         help="write the plan, for `render --plan PLAN`",
     )  # fmt: skip
-    add_json(parser)
-    parser.set_defaults(run=run, parser=parser)
+    options.add_json(parser)
 
 
 def add_plan_options(parser: argparse.ArgumentParser) -> None:
@@ -79,7 +75,7 @@ def planning_variant(asked: str | None) -> str:
 
 def run(args: argparse.Namespace) -> int:
     """Plan, report, and return the exit code."""
-    parameters = scene_parameters(args)
+    parameters = options.scene_parameters(args)
     if args.output is not None:
         check_writable(args.output)
     if args.paths > _MOST_PATHS:

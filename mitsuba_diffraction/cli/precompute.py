@@ -11,16 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionWarning
+from . import options
 from .arguments import path_ending_in
 from .console import Bar
-from .options import (
-    add_heights,
-    add_json,
-    add_table,
-    add_wavelength_range,
-    load_options,
-    table_options,
-)
 from .report import check_outputs, save_report
 from .workers import add_workers, client_of, on_workers
 
@@ -31,16 +24,13 @@ if TYPE_CHECKING:
     from ..tables import DiffractionTable
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(subparsers: options.Subparsers) -> None:
     """Declare the sub-command."""
-    parser = subparsers.add_parser(
-        "precompute",
-        help="build the table of a height field",
-        description=(
-            "Build a table of diffraction orders from measured or made heights, and measure its "
-            "error. What a recipe says is overridden by options."
-        ),
-    )
+    parser = options.add_command(
+        subparsers, "precompute", run, "build the table of a height field",
+        "Build a table of diffraction orders from measured or made heights, and measure its "
+        "error. What a recipe says is overridden by options.",
+    )  # fmt: skip
     parser.add_argument(
         "sources", metavar="SOURCE", nargs="+", type=Path,
         help="image, array, text, AFM file or recipe (.toml); several patches of one surface make "
@@ -51,13 +41,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="the table; default: where the recipe says, or else SOURCE's name with .exr in the "
         "current folder",
     )  # fmt: skip
-    add_heights(parser)
+    options.add_heights(parser)
     group = parser.add_argument_group("the table")
-    add_table(group)
-    add_wavelength_range(group)
+    options.add_table(group)
+    options.add_wavelength_range(group)
     add_workers(parser)
-    add_json(parser, "what is in the table")
-    parser.set_defaults(run=run, parser=parser)
+    options.add_json(parser, "what is in the table")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -86,8 +75,8 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
     from ..settings import TableSettings
 
     start = time.perf_counter()
-    options = load_options(args)
-    given = table_options(args)
+    how = options.load_options(args)
+    given = options.table_options(args)
     recipe = Recipe.load(sources[0]) if is_recipe(sources[0]) else None
     inputs = list(sources)
     if recipe is not None:
@@ -104,9 +93,9 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
     with Bar(args) as bar:
         bar(0, 0, "making heights" if recipe and recipe.generator else "reading heights")
         if recipe is not None:
-            fields = recipe.fields(options)
+            fields = recipe.fields(how)
         else:
-            fields = [load_heights(source, options) for source in sources]
+            fields = [load_heights(source, how) for source in sources]
     # Before the table is waited for: whoever treats the heights will not want this one
     shortest = settings.wavelength_range[0] / 1000
     # windows are levelled, and fade at their edges

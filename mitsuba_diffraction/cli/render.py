@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
+from . import options
 from .arguments import change, number_between, whole_number
 from .console import Bar, mitsuba_warnings, say, say_warning
 from .interrupts import INTERRUPTED
-from .options import add_exposure, add_json, add_samples, add_scene, scene_parameters
 from .plan import (
     MAKE,
     add_plan_options,
@@ -27,27 +27,24 @@ if TYPE_CHECKING:
     from ..scene.passes import Result
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(subparsers: options.Subparsers) -> None:
     """Declare the sub-command."""
-    parser = subparsers.add_parser(
-        "render",
-        help="render a Mitsuba scene",
-        description=(
-            "Render an XML scene to a linear EXR and a PNG beside it. Ctrl-C stops after the "
-            "current pass and keeps the picture so far. With --frames, render a folder of PNG "
-            "files while parameters of the scene change; frames that are there already, with the "
-            "same settings, are kept, so an interrupted run goes on where it was."
-        ),
-    )
-    add_scene(parser)
+    parser = options.add_command(
+        subparsers, "render", run, "render a Mitsuba scene",
+        "Render an XML scene to a linear EXR and a PNG beside it. Ctrl-C stops after the "
+        "current pass and keeps the picture so far. With --frames, render a folder of PNG "
+        "files while parameters of the scene change; frames that are there already, with the "
+        "same settings, are kept, so an interrupted run goes on where it was.",
+    )  # fmt: skip
+    options.add_scene(parser)
     parser.add_argument(
         "-o", "--output", metavar="OUT", type=Path,
         help="EXR, with a PNG beside it, or only a PNG; default: the scene's name with .exr in "
         "the current folder. With --frames: a folder, or a film, .webp or .gif, whose frames go "
         "into a folder of its name; default: the folder SCENE_frames",
     )  # fmt: skip
-    add_samples(parser, 1, None)
-    add_exposure(parser, 0.0, "of the PNG, in stops: +1 doubles the light; default: 0")
+    options.add_samples(parser, 1, None)
+    options.add_exposure(parser, 0.0, "of the PNG, in stops: +1 doubles the light; default: 0")
     parser.add_argument(
         "--preview", action="store_true",
         help="half the width and height, and at most 16 samples, unless -s is given",
@@ -58,7 +55,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "that `plan -o` wrote",
     )  # fmt: skip
     add_plan_options(parser)
-    add_json(parser, "what was rendered")
+    options.add_json(parser, "what was rendered")
     film = parser.add_argument_group("animation")
     film.add_argument(
         "--frames", metavar="N", type=whole_number(1), help="render N pictures, frame_0000.png on"
@@ -80,7 +77,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )  # fmt: skip
     add_workers(parser)
     add_threads(parser)
-    parser.set_defaults(run=run, parser=parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -120,7 +116,7 @@ def _outputs(args: argparse.Namespace) -> tuple[Path, Path, bool]:
 
 
 def _on_workers(args: argparse.Namespace) -> int:
-    parameters = scene_parameters(args)
+    parameters = options.scene_parameters(args)
     output, png, only_png = _outputs(args)
 
     from ..cluster.film import Wanted
@@ -148,7 +144,7 @@ def _on_workers(args: argparse.Namespace) -> int:
 
 
 def _run_one(args: argparse.Namespace) -> int:
-    parameters = scene_parameters(args)
+    parameters = options.scene_parameters(args)
     output, png, only_png = _outputs(args)
 
     from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink

@@ -11,25 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
+from . import options
 from .arguments import path_ending_in
 from .brdf_map import add_relative, gain_of
 from .console import Bar
-from .options import (
-    METHODS,
-    TABLE_NAMES,
-    add_direction,
-    add_exposure,
-    add_heights,
-    add_json,
-    add_method,
-    add_resolution,
-    add_table,
-    add_wavelengths,
-    in_library,
-    load_patch,
-    method,
-    wavelengths,
-)
 from .report import check_outputs, save_report
 
 # Written out so that --help need not load what makes maps; a test holds them against the library.
@@ -38,18 +23,16 @@ KINDS = ("wavelength-step", "coherence-width", "terms", "light-angle", "method")
 _COLUMNS = ("value", "seconds", "delta_e_mean", "delta_e_95", "delta_e_own_exposure", "blueness")
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(subparsers: options.Subparsers) -> None:
     """Declare the sub-command."""
-    parser = subparsers.add_parser(
-        "sweep",
-        help="BRDF maps over one parameter: wavelength step, coherence width, terms, light, method",
-        description=(
-            "Evaluate BRDF maps for several values of one parameter by the methods of the 2014 "
-            "thesis, and put them on a contact sheet, with times and ΔE2000 from the best. A "
-            "sweep over methods also times the package's own look-up against flss with both "
-            "compiled. Writes a picture, and the numbers as CSV beside it."
-        ),
-    )
+    parser = options.add_command(
+        subparsers, "sweep", run,
+        "BRDF maps over one parameter: wavelength step, coherence width, terms, light, method",
+        "Evaluate BRDF maps for several values of one parameter by the methods of the 2014 "
+        "thesis, and put them on a contact sheet, with times and ΔE2000 from the best. A "
+        "sweep over methods also times the package's own look-up against flss with both "
+        "compiled. Writes a picture, and the numbers as CSV beside it.",
+    )  # fmt: skip
     parser.add_argument("kind", metavar="KIND", choices=KINDS, help=f"one of {', '.join(KINDS)}")
     parser.add_argument(
         "source", metavar="SOURCE", type=Path, help="heights of any format, or a recipe (.toml)"
@@ -62,21 +45,20 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--values", metavar="V", nargs="+", help="of the parameter; default: the thesis'"
     )
     _add_options(parser.add_argument_group("the maps"))
-    add_json(parser)
-    add_heights(parser)
-    parser.set_defaults(run=run, parser=parser)
+    options.add_json(parser)
+    options.add_heights(parser)
 
 
 def _add_options(group: argparse._ArgumentGroup) -> None:
-    add_method(group, "flss", "what evaluates, except in a sweep over methods")
-    add_direction(group)
-    add_wavelengths(group)
-    add_resolution(group, 128)
+    options.add_method(group, "flss", "what evaluates, except in a sweep over methods")
+    options.add_direction(group)
+    options.add_wavelengths(group)
+    options.add_resolution(group, 128)
     group.add_argument(
         "--samples", metavar="N", type=int, default=1, help="directions in a pixel; default: 1"
     )
-    add_exposure(group, None, "of all maps, in stops; default: the best map's own")
-    add_table(group, TABLE_NAMES, coherence="patch")
+    options.add_exposure(group, None, "of all maps, in stops; default: the best map's own")
+    options.add_table(group, options.TABLE_NAMES, coherence="patch")
     add_relative(group)
     group.add_argument("--int-ior", metavar="N", help="of --relative; default: 1.5")
     group.add_argument(
@@ -97,17 +79,17 @@ def run(args: argparse.Namespace) -> int:
     numbers = output.with_suffix(".csv")
     check_outputs((output, numbers), [args.source], "sheet")
     light, values, gain = Light(args.theta, args.phi), _values(args), gain_of(args)
-    patch, settings = load_patch(args)
-    settings |= wavelengths(args)
+    patch, settings = options.load_patch(args)
+    settings |= options.wavelengths(args)
     if args.period is not None:
         settings["period"] = args.period
     if values is None and args.kind == "method" and gain is not None:
-        values = [in_library(name) for name in METHODS if name != "rainbow"]
+        values = [options.in_library(name) for name in options.METHODS if name != "rainbow"]
     with Bar(args) as bar, warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
         result = sweep(
-            args.kind, patch, light, values=values, method=in_library(args.method), gain=gain,
-            resolution=args.resolution, samples=args.samples, progress=bar, **settings,
+            args.kind, patch, light, values=values, method=options.in_library(args.method),
+            gain=gain, resolution=args.resolution, samples=args.samples, progress=bar, **settings,
         )  # fmt: skip
         compiled = _compiled(args, patch, light, settings, bar)
     best = next((s for s in result.steps if s.label == result.reference), None)
@@ -134,7 +116,7 @@ def _values(args: argparse.Namespace) -> list[Any] | None:
     if args.values is None:
         return None
     if args.kind == "method":
-        return [in_library(value) for value in args.values]
+        return [options.in_library(value) for value in args.values]
     try:
         return [int(v) if args.kind == "terms" else float(v) for v in args.values]
     except ValueError as error:
@@ -167,16 +149,16 @@ def _compiled(
 
 def _title(step: Any, result: Any) -> str:
     if result.reference is None:
-        return method(step.label)
+        return options.method(step.label)
     if step.label == result.reference:
-        return f"{method(step.label)} (reference)"
-    return f"{method(step.label)}; ΔE {step.mean:.2g}"
+        return f"{options.method(step.label)} (reference)"
+    return f"{options.method(step.label)}; ΔE {step.mean:.2g}"
 
 
 def _lines(result: Any) -> list[str]:
     lines = []
     for step in result.steps:
-        text = f"{method(step.label):<12} {step.seconds:7.2f} s"
+        text = f"{options.method(step.label):<12} {step.seconds:7.2f} s"
         if step.label == result.reference:
             text += "  reference"
         elif math.isfinite(step.mean):
@@ -202,6 +184,6 @@ def _save(path: Path, result: Any) -> None:
 
 
 def _row(step: Any) -> dict[str, Any]:
-    value = method(step.value) if isinstance(step.value, str) else step.value
+    value = options.method(step.value) if isinstance(step.value, str) else step.value
     numbers = (step.seconds, step.mean, step.high, step.own_mean, step.blueness)
     return dict(zip(_COLUMNS, (value, *numbers), strict=True))

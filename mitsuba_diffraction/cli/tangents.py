@@ -6,9 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from . import options
 from .arguments import number_between, path_ending_in
 from .console import Bar, mitsuba_warnings, say_warning
-from .options import add_json
 from .report import check_writable, save_report
 
 if TYPE_CHECKING:
@@ -18,18 +18,15 @@ _GUIDES = ("smooth", "x", "y", "z", "body")
 _NAMED = 6  # singular points that are named
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(subparsers: options.Subparsers) -> None:
     """Declare the sub-command."""
-    parser = subparsers.add_parser(
-        "tangents",
-        help="give a mesh a smooth field of directions for its patch",
-        description=(
-            "Write a mesh (PLY, OBJ, serialized) as a PLY whose attribute vertex_orientation lays "
-            "the patch's x axis along a smooth field of directions. Texture coordinates are kept; "
-            "a mesh without them gets some that carry only the direction. On a closed surface that "
-            "is no torus every field has singular points, around which the patch turns."
-        ),
-    )
+    parser = options.add_command(
+        subparsers, "tangents", run, "give a mesh a smooth field of directions for its patch",
+        "Write a mesh (PLY, OBJ, serialized) as a PLY whose attribute vertex_orientation lays "
+        "the patch's x axis along a smooth field of directions. Texture coordinates are kept; "
+        "a mesh without them gets some that carry only the direction. On a closed surface that "
+        "is no torus every field has singular points, around which the patch turns.",
+    )  # fmt: skip
     parser.add_argument("mesh", metavar="MESH", type=Path, help="what to read")
     parser.add_argument(
         "-o", "--output", metavar="OUT", type=path_ending_in(".ply"), required=True,
@@ -50,8 +47,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="distance within which the field may leave an axis or the body's direction to stay "
         "smooth, as a share of the mesh's size; default: 0.03",
     )  # fmt: skip
-    add_json(parser, "what the field is like")
-    parser.set_defaults(run=run, parser=parser)
+    options.add_json(parser, "what the field is like")
 
 
 def run(args: argparse.Namespace) -> int:

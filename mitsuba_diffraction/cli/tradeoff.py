@@ -7,33 +7,31 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from . import options
 from .arguments import number_between
 from .console import Bar
-from .options import Renamed, add_json, add_own_patch, add_table, check_own_patch, own_patch
 from .report import check_writable, save_json, save_report
 
 #: Pixels of the default patch, pairs of directions, calls at once, timed rounds, depths.
 _FULL, _QUICK = (1332, 240, 1 << 19, 7, 14), (400, 160, 1 << 17, 5, 9)
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(subparsers: options.Subparsers) -> None:
     """Declare the sub-command."""
-    parser = subparsers.add_parser(
-        "tradeoff",
-        help="measure accuracy against speed and memory, setting by setting",
-        description=(
-            "Build a patch's table with many settings and measure each: its error against the "
-            "integral in double precision, the colours' ΔE2000, the time of eval beside "
-            "roughconductor, memory and build time. Writes the figures as CSV and JSON, a plot of "
-            "error against time, and one of error against depth; recommends a setting."
-        ),
-    )
+    parser = options.add_command(
+        subparsers, "tradeoff", run,
+        "measure accuracy against speed and memory, setting by setting",
+        "Build a patch's table with many settings and measure each: its error against the "
+        "integral in double precision, the colours' ΔE2000, the time of eval beside "
+        "roughconductor, memory and build time. Writes the figures as CSV and JSON, a plot of "
+        "error against time, and one of error against depth; recommends a setting.",
+    )  # fmt: skip
     parser.add_argument(
         "-o", "--output", metavar="FOLDER", type=Path, default=Path("tradeoff"),
         help="where files go; default: tradeoff",
     )  # fmt: skip
     parser.add_argument("--quick", action="store_true", help="fewer settings, a smaller patch")
-    add_table(
+    options.add_table(
         parser, ["coherence_width"], coherence_width="65, or the default patch's width if less"
     )
     budget = parser.add_argument_group("recommend a setting with")
@@ -42,8 +40,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         help="a measured error of at most this; default: 1e-3",
     )  # fmt: skip
     budget.add_argument(
-        "--tolerance", action=Renamed, now="is the error that a table is built to; the budget of "
-        "this command is --max-error",
+        "--tolerance", action=options.Renamed,
+        now="is the error that a table is built to; the budget of this command is --max-error",
     )  # fmt: skip
     budget.add_argument(
         "--memory", metavar="MB", type=number_between(0.0, 1e6), help="a table of at most this"
@@ -52,14 +50,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--time", metavar="X", type=number_between(0.0, 1e6),
         help="an eval that takes at most X times as long as roughconductor's",
     )  # fmt: skip
-    add_json(parser)
-    add_own_patch(parser)
-    parser.set_defaults(run=run, parser=parser)
+    options.add_json(parser)
+    options.add_own_patch(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure, write and recommend, and return the exit code."""
-    check_own_patch(args)
+    options.check_own_patch(args)
     check_writable(args.output / "tradeoff.json", make_folder=True)
     from ..analysis.bench.figures import PIXEL
     from ..analysis.bench.machine import describe_machine
@@ -79,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
 
     side, pairs, lanes, rounds, depths = _QUICK if args.quick else _FULL
     width = args.coherence_width or (65.0 if args.heights else min(65.0, side * PIXEL))
-    field = own_patch(args)
+    field = options.own_patch(args)
     if field is None:
         field = gratings.elaphe_like(side * PIXEL, side)
     set_variant("llvm_ad_spectral")

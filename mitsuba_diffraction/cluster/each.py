@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from ..errors import DiffractionError, one_line
 from ..scene.passes import Stop
 from .files import SceneFiles
-from .tasks import Failed, Lacking, worker_address
+from .tasks import Failed, Lacking, check_versions, versions, worker_address
 from .workers import outcome, wait_for_scheduler, workers_of
 
 _POLL = 0.02  # seconds
@@ -140,7 +140,7 @@ class OrderedMap:
         return result
 
     def _submitted(self, call: tuple[Any, Any]) -> Any:
-        content = pickle.dumps(call, protocol=5)
+        content = pickle.dumps((versions(), *call), protocol=5)
         self.bytes += len(content)
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Sending large graph")  # it is sent once
@@ -150,9 +150,12 @@ class OrderedMap:
 def _done(content: bytes) -> tuple[Any, float] | Failed:
     """A call's result and its seconds."""
     start = time.perf_counter()
-    work, argument = pickle.loads(content)
     try:
+        wanted, work, argument = pickle.loads(content)
+        check_versions(wanted)  # of a worker that has come late
         return work(argument), time.perf_counter() - start
+    except DiffractionError as error:
+        return Failed(str(error), worker_address())
     except Exception as error:  # a worker must answer, and its traceback is of no use elsewhere
         return Failed(
             f"unexpected {type(error).__name__}: {one_line(str(error))}", worker_address()

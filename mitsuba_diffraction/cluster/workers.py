@@ -119,10 +119,11 @@ def check_workers(client: Any, variant: str | None) -> list[str]:
                 "at a time: start it with 'dask worker --nthreads 1'"
             )
     found = client.run(_trouble, versions(), variant, on_error="return")
-    for address, trouble in found.items():
+    answers = {a: trouble for a, trouble in found.items() if not isinstance(trouble, OSError)}
+    for address, trouble in answers.items():  # the others have just gone
         if trouble is not None:
             raise DiffractionError(f"worker {address} is of no use: {one_line(str(trouble))}")
-    return list(found)
+    return list(answers)
 
 
 def workers_of(client: Any) -> dict[str, Any]:

@@ -66,16 +66,9 @@ def load(
         an option does not fit.
     """
     options = LoadOptions.of(
-        pixel_size=pixel_size,
-        max_height=max_height,
-        height_unit=height_unit,
-        channel=channel,
-        crop=crop,
-        fill=fill,
-        level=level,
-        clip=clip,
-        periodic=periodic,
-    )
+        pixel_size=pixel_size, max_height=max_height, height_unit=height_unit, channel=channel,
+        crop=crop, fill=fill, level=level, clip=clip, periodic=periodic,
+    )  # fmt: skip
     return load_heights(path, options)
 
 

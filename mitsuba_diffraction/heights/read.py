@@ -6,7 +6,9 @@ import math
 import numbers
 import os
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +22,6 @@ from .formats.images import is_park_tiff, read_exr, read_image
 from .formats.raw import RawHeights, existing_file
 from .formats.text import read_text
 from .lengths import (
-    Crop,
-    Height,
-    PixelSize,
     crop_of,
     height_of,
     height_unit_of,
@@ -58,33 +57,9 @@ class LoadOptions:
     periodic: str | None = None
 
     @classmethod
-    def of(
-        cls,
-        *,
-        pixel_size: PixelSize | None = None,
-        max_height: Height | None = None,
-        height_unit: str | None = None,
-        channel: str | int | None = None,
-        crop: Crop | None = None,
-        fill: str | None = None,
-        level: str | None = None,
-        clip: float | str | None = None,
-        periodic: str | None = None,
-    ) -> LoadOptions:
-        """Check the values as users write them and settle their types."""
-        if isinstance(channel, bool) or not isinstance(channel, (str, int, type(None))):
-            raise DiffractionError(f"channel: expected a channel's name or index, got {channel!r}")
-        return cls(
-            pixel_size=pixel_size_of(pixel_size),
-            max_height=height_of(max_height),
-            height_unit=height_unit_of(height_unit),
-            channel=channel,
-            crop=crop_of(crop),
-            fill=_choice(fill, "fill", ("none", *FILLS)),
-            level=_choice(level, "level", LEVELS),
-            clip=_sigmas(clip),
-            periodic=_choice(periodic, "periodic", PERIODICS),
-        )
+    def of(cls, **given: Any) -> LoadOptions:
+        """Check the values as users write them, see `load.load`, and settle their types."""
+        return cls(**{name: _CHECKS[name](value) for name, value in given.items()})
 
     def updated(self, other: LoadOptions) -> LoadOptions:
         """These options, with those that `other` sets in their place."""
@@ -95,6 +70,12 @@ class LoadOptions:
         """The options that were set, by name."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         return {name: value for name, value in values.items() if value is not None}
+
+
+def _channel(value: object) -> str | int | None:
+    if isinstance(value, bool) or not isinstance(value, (str, int, type(None))):
+        raise DiffractionError(f"channel: expected a channel's name or index, got {value!r}")
+    return value
 
 
 def _choice(value: object, name: str, choices: tuple[str, ...]) -> str | None:
@@ -123,6 +104,18 @@ def _sigmas(value: object) -> float | None:
         ) from error
     return number
 
+
+_CHECKS: dict[str, Callable[[Any], Any]] = {
+    "pixel_size": pixel_size_of,
+    "max_height": height_of,
+    "height_unit": height_unit_of,
+    "channel": _channel,
+    "crop": crop_of,
+    "fill": partial(_choice, name="fill", choices=("none", *FILLS)),
+    "level": partial(_choice, name="level", choices=LEVELS),
+    "clip": _sigmas,
+    "periodic": partial(_choice, name="periodic", choices=PERIODICS),
+}
 
 # What files begin with. Content decides before the suffix does, so a misnamed file still loads.
 _MAGIC = (

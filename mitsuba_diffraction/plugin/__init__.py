@@ -3,7 +3,8 @@
 Contents
 --------
 bsdf            `Diffraction`, the plugin; its docstring is docs/parameters.md
-registration    it is registered in every variant
+mix             `DiffractionMix`, several surfaces in one by weights
+registration    both are registered in every variant
 dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives
 parameters      read from Mitsuba's Properties, checked

@@ -1,4 +1,4 @@
-"""Whether a shape has the mesh attributes that its BSDF reads; the BSDF itself cannot see it."""
+"""Whether textures are what a BSDF reads, and a shape has the attributes; BSDFs cannot see it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import DiffractionError
 from .names import name_of
+from .roles import Texture
 
 #: What `meshes.write_ply` calls a field of directions.
 ORIENTATION = "vertex_orientation"
@@ -51,4 +52,29 @@ def check_attributes(shape: Any, number: int | None = None) -> None:
             remedy = _MADE if name == ORIENTATION else added
         raise DiffractionError(
             f"{name_of(shape, number)} has no attribute {name}, which its BSDF reads; {remedy}"
+        )
+
+
+def is_bitmap(texture: Texture) -> bool:
+    """Whether it is a picture, whose numbers can be looked at."""
+    return str(texture).startswith("BitmapTexture[")
+
+
+def is_attribute(texture: Texture) -> bool:
+    """Whether it is a mesh attribute, which has values on that mesh only."""
+    return str(texture).startswith("MeshAttribute[")
+
+
+def require_raw(texture: Texture, parameter: str, meaning: str) -> None:
+    """Refuse a picture whose numbers Mitsuba would take for colours.
+
+    Raises
+    ------
+    DiffractionError
+        With the remedy.
+    """
+    if is_bitmap(texture) and "raw = 1" not in str(texture):
+        raise DiffractionError(
+            f"{parameter}: the bitmap is not raw, so that Mitsuba takes {meaning} for colours; "
+            'add <boolean name="raw" value="true"/> to the texture ("raw": True in Python)'
         )

@@ -160,6 +160,8 @@ N is the mean power of a Jones matrix for unpolarised light; by Kirchhoff (Beckm
 Denoisers that ask for an albedo get the reflectance at normal incidence, that of what lies beneath
 included.
 
+Several such surfaces in one, by weights: the BSDF `diffraction_mix` (docs/own-scene.md).
+
 XML and the same in Python:
 
     <bsdf type="diffraction">

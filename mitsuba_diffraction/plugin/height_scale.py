@@ -6,6 +6,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from .attributes import is_bitmap, require_raw
 from .memory import index_between
 from .roles import Callback, Float, Interaction, Mask, Texture
 
@@ -28,17 +29,13 @@ class Varying:
     """
 
     def __init__(self, texture: Texture, most: float | None) -> None:
-        self.texture, self._is_bitmap = texture, str(texture).startswith("BitmapTexture[")
+        self.texture, self._is_bitmap = texture, is_bitmap(texture)
         if not self._is_bitmap and most is None:
             raise DiffractionError(
                 "height_scale of a texture that is no bitmap, or of a mesh attribute, needs "
                 "height_scale_max, the largest factor that it has"
             )
-        if self._is_bitmap and "raw = 1" not in str(texture):
-            raise DiffractionError(
-                "height_scale: the bitmap is not raw, so that Mitsuba takes factors for colours; "
-                'add <boolean name="raw" value="true"/> to the texture ("raw": True in Python)'
-            )
+        require_raw(texture, "height_scale", "factors")
         self.high = self.range()[1] if most is None else most
         if not 0.0 < self.high <= 1e3:  # also refuses NaN
             given = "its largest factor" if most is None else "height_scale_max"

@@ -7,6 +7,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from .attributes import is_bitmap, require_raw
 from .changing import Bounded
 from .roles import Callback, Interaction, Mask, Rotation, Texture
 
@@ -73,8 +74,7 @@ def _check(texture: Texture) -> None:
     DiffractionError
         If it has one channel, is taken for colours, or cannot hold negative numbers.
     """
-    described = str(texture)
-    if not described.startswith("BitmapTexture["):
+    if not is_bitmap(texture):
         return  # attributes of meshes are checked where there is a mesh
     data = np.array(mi.traverse(texture)["data"])
     if data.shape[-1] < 3:
@@ -82,11 +82,7 @@ def _check(texture: Texture) -> None:
             f"orientation: the bitmap has {data.shape[-1]} channel, but directions take three: "
             "cos, sin, and one that is not read"
         )
-    if "raw = 1" not in described:
-        raise DiffractionError(
-            "orientation: the bitmap is not raw, so that Mitsuba takes (cos, sin) for a colour; "
-            'add <boolean name="raw" value="true"/> to the texture ("raw": True in Python)'
-        )
+    require_raw(texture, "orientation", "(cos, sin)")
     levels, lengths = data[..., :2] * 65535.0, np.hypot(data[..., 0], data[..., 1])
     within = levels.min() >= 0.0 and levels.max() <= 65535.5
     from_integers = within and np.all(np.abs(levels - np.rint(levels)) < 0.02)

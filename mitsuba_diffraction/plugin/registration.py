@@ -1,4 +1,4 @@
-"""The plugin `diffraction`, registered in every variant of Mitsuba that is set."""
+"""The plugins `diffraction` and `diffraction_mix`, in every variant of Mitsuba that is set."""
 
 from __future__ import annotations
 
@@ -7,17 +7,18 @@ import sys
 
 import mitsuba as mi
 
-_PLUGIN = f"{__package__}.bsdf"
+_PLUGINS = (f"{__package__}.bsdf", f"{__package__}.mix")
 
 
 def register(old: str | None, new: str | None) -> None:
-    """Define the plugin for the variant just set: its base class is another in each."""
+    """Define the plugins for the variant just set: their base class is another in each."""
     if new is None:
         return
-    if _PLUGIN in sys.modules:
-        importlib.reload(sys.modules[_PLUGIN])
-    else:
-        importlib.import_module(_PLUGIN)
+    for plugin in _PLUGINS:
+        if plugin in sys.modules:
+            importlib.reload(sys.modules[plugin])
+        else:
+            importlib.import_module(plugin)
 
 
 mi.detail.add_variant_callback(register)

@@ -211,6 +211,12 @@ def eye(iris: Floats, width: int = 128) -> Floats:
     return np.broadcast_to(colour, (4, width, 3))
 
 
+def back(height: int = 64) -> Floats:
+    """Where a snake's back is, (height, 2): 1 there, 0 on its belly; v runs around it."""
+    v = (np.arange(height) + 0.5) / height
+    return np.repeat(_step(np.abs(v - 0.5), 0.29, 0.25)[:, None], 2, axis=1)
+
+
 def stone(size: int = 768, seed: int = 3) -> Floats:
     """A slab of weathered stone that tiles, (size, size, 3)."""
     rng = np.random.default_rng(seed)

@@ -17,14 +17,14 @@ data = st.recursive(
 )
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.dictionaries(st.text(), data))
 def test_any_data_prints_without_stray_line_ends(content):
     for line in lines_of(content):
         assert len(line.splitlines()) <= 1
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(data)
 def test_any_data_is_strict_json(content):
     json.loads(json.dumps(plain(content), allow_nan=False))

@@ -13,6 +13,7 @@ import pytest
 distributed = pytest.importorskip("distributed")
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster  # noqa: E402
+from mitsuba_diffraction.cluster import each as each_module  # noqa: E402
 from mitsuba_diffraction.cluster.build import build_on_workers  # noqa: E402
 from mitsuba_diffraction.cluster.each import OrderedMap  # noqa: E402
 from mitsuba_diffraction.settings import TableSettings  # noqa: E402
@@ -112,6 +113,12 @@ def test_few_tasks_are_under_way_however_many_there_are():
 def test_an_error_on_a_worker_is_one_line_with_its_name():
     with pytest.raises(DiffractionError, match=r"^worker this process: unexpected TypeError: bad"):
         list(OrderedMap(_Workers(1))(abs, ["no number"]))
+
+
+def test_a_late_worker_with_another_version_is_named(monkeypatch):
+    monkeypatch.setattr(each_module, "versions", lambda: ("0.1", "0.1", "0.1"))
+    with pytest.raises(DiffractionError, match=r"^worker this process: it has .* the client 0\.1"):
+        list(OrderedMap(_Workers(1))(abs, [1]))
 
 
 def test_without_windows_there_is_nothing_for_workers(scan, run, tmp_path):  # noqa: F811

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import signal
 import socket
 import subprocess
 import sys
+import time
+from dataclasses import replace
 from pathlib import Path
 
 import drjit as dr
@@ -126,12 +130,12 @@ def start():
     """`start(command, *arguments)`: a scheduler or worker as a user starts it, of its own."""
     running = []
 
-    def call(command, *arguments):
+    def call(command, *arguments, **variables):
         path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
         running.append(
             subprocess.Popen(
                 [sys.executable, "-m", f"distributed.cli.dask_{command}", *arguments],
-                env={**os.environ, "PYTHONPATH": path}, stderr=subprocess.DEVNULL,
+                env={**os.environ, "PYTHONPATH": path, **variables}, stderr=subprocess.DEVNULL,
             )
         )  # fmt: skip
         return running[-1]
@@ -198,12 +202,12 @@ def test_a_copy_of_a_scene_is_the_scene(scene, expected, monkeypatch, tmp_path):
 
 
 class _Recorder:
-    """A client that keeps what is submitted."""
+    """A client of one worker that is given nothing."""
 
     status = "running"
 
-    def __init__(self):
-        self.tasks = []
+    def __init__(self, **about):
+        self.about = {"nthreads": 1, **about}
 
     def wait_for_workers(self, *_, **__):
         pass
@@ -212,7 +216,7 @@ class _Recorder:
         return {"one": None}
 
     def scheduler_info(self, **_):
-        return {"workers": {"one": {"nthreads": 1}}}
+        return {"workers": {"one": self.about}}
 
     @classmethod
     def first_task(cls, scene):
@@ -224,13 +228,32 @@ def test_an_error_names_frame_pass_and_worker(client, scene, tmp_path):
     job = film(client, scene, frames, tmp_path / "passes")
     with pytest.raises(DiffractionError, match=r"^frame 1, pass 0, worker tcp://\S+: cannot load"):
         list(job.render(passes.Stop(), lambda *_: None))
+    assert job.report.retries == 0
 
 
-def test_other_versions_are_refused_by_name(client, scene, monkeypatch):
-    versions = workers_module.versions()
-    monkeypatch.setattr(workers_module, "versions", lambda: (*versions[:2], "0.1"))
-    with pytest.raises(DiffractionError, match=r"worker tcp://\S+ is of no use: .*drjit .* 0\.1"):
+@pytest.mark.parametrize("number", range(3))
+def test_other_versions_are_refused_by_name(number, client, scene, monkeypatch):
+    versions = list(workers_module.versions())
+    versions[number] = "0.1"
+    monkeypatch.setattr(workers_module, "versions", lambda: tuple(versions))
+    name = ("mitsuba_diffraction", "mitsuba", "drjit")[number]
+    words = rf"worker tcp://\S+ is of no use: it has {name} \S+, and the client 0\.1"
+    with pytest.raises(DiffractionError, match=words):
         rendered(client, scene)
+
+
+def test_a_worker_without_llvm_is_refused_by_name(client, scene, start):
+    missing = str(scene.parent / "libLLVM.so")
+    bad = start(
+        "worker", client.scheduler.address, "--nthreads", "1", "--no-nanny", "--no-dashboard",
+        DRJIT_LIBLLVM_PATH=missing,
+    )  # fmt: skip
+    client.wait_for_workers(3, timeout=60)
+    with pytest.raises(DiffractionError, match=rf"^worker tcp://\S+ is of no use: .*{missing}"):
+        rendered(client, scene)
+    bad.kill()
+    while len(workers_module.workers_of(client)) > 2:
+        time.sleep(0.1)
 
 
 def test_workers_with_several_dask_threads_are_refused(scene):
@@ -244,12 +267,61 @@ def test_workers_with_several_dask_threads_are_refused(scene):
         rendered(mine, scene)
 
 
+def test_a_worker_that_has_just_gone_is_no_reason_to_refuse():
+    leaving = _Recorder()
+    leaving.run = lambda *_, **__: {"one": None, "gone": distributed.comm.CommClosedError("closed")}
+    assert workers_module.check_workers(leaving, None) == ["one"]
+
+
 def test_no_scheduler_is_one_line():
     with (
         pytest.raises(DiffractionError, match=r"no scheduler answers at 'tcp://127\.0\.0\.1:1'"),
         cluster.connect(scheduler="tcp://127.0.0.1:1", patience=1),
     ):
         pass
+
+
+def test_a_scheduler_file_stands_for_the_address(client, tmp_path):
+    client.write_scheduler_file(str(tmp_path / "scheduler.json"))
+    with cluster.connect(scheduler=str(tmp_path / "scheduler.json")) as mine:
+        assert mine.scheduler.address == client.scheduler.address
+
+
+def test_workers_with_too_little_memory_are_named(scene, tmp_path):
+    lines = []
+    small = _Recorder(memory_limit=1e8)
+    set_variant(VARIANT)
+    job = Film(small, scene, [Wanted({}, SPP, 3)], VARIANT, keep=tmp_path, warn=lines.append)
+    assert job.needed > 5e8
+    (line,) = lines
+    assert re.search(r"worker one may use 0\.1 GB, .* estimated to need 0\.5 GB", line)
+
+
+def test_processors_that_were_mixed_are_named(scene, tmp_path):
+    lines = []
+    set_variant(VARIANT)
+    job = Film(_Recorder(), scene, [Wanted({}, SPP, 3)], VARIANT, keep=tmp_path, warn=lines.append)
+    first = run_task(job._frames[0][0])
+    for n, task in enumerate(job._frames[0]):
+        Kept(tmp_path).write(task, replace(first, where=f"processor {n % 2}, 1 threads"))
+    (result,) = job.render(passes.Stop(), lambda *_: None)
+    assert result.spp == SPP
+    (line,) = lines
+    assert "mixed" in line
+    assert "processor 0, 1 threads; processor 1, 1 threads" in line
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # of its processes
+def test_jobs_of_a_queue_are_workers(scene, expected):
+    jobqueue = pytest.importorskip("dask_jobqueue.local")
+    with (
+        jobqueue.LocalCluster(
+            cores=1, processes=1, memory="2GB", scheduler_options={"dashboard_address": ":0"}
+        ) as queue,
+        distributed.Client(queue) as mine,
+    ):
+        queue.scale(1)
+        np.testing.assert_array_equal(np.array(rendered(mine, scene).bitmap), expected)
 
 
 def test_damaged_sums_are_rendered_again(scene, tmp_path):
@@ -271,8 +343,15 @@ def test_the_command_renders_on_a_cluster(client, scene, expected, run, tmp_path
     )  # fmt: skip
     assert ran.code == 0, ran
     assert "12 tasks" in ran.out
+    assert "workers at http://" in ran.err  # Dask's dashboard
+    assert "GB of memory" in ran.err
     np.testing.assert_allclose(pixels("a.exr"), expected, atol=1e-3)
-    assert '"tasks": 12' in (tmp_path / "a.json").read_text()
+    report = json.loads((tmp_path / "a.json").read_text())["workers"]
+    assert report["tasks"] == 12
+    assert report["bytes"] == 12 * 24 * 16 * 4 * 8  # pixels of four channels in double precision
+    assert report["retries"] == 0
+    assert 0.0 < report["seconds"]
+    assert len(report["where"]) == 1
 
 
 def test_the_command_renders_frames_on_a_cluster(client, scene, run, monkeypatch):  # noqa: F811

@@ -59,7 +59,7 @@ def angle_between(one, other):
     return abs((one - other + 90) % 180 - 90)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     st.floats(0.5, 3.5), st.floats(-89.0, 90.0),
     st.one_of(st.sampled_from([np.cos, sawtooth]), st.floats(0.25, 0.75).map(lamellar)),
@@ -79,7 +79,7 @@ def test_periods_to_one_per_cent_and_directions_to_a_degree(
         assert found.share == pytest.approx(6 / np.pi**2 / (1.0 + noise**2), abs=0.06)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(
     st.floats(-89.0, 90.0), st.integers(0, 20), st.floats(20.0, 40.0),
     st.tuples(st.integers(300, 400), st.integers(300, 400)),

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mitsuba_diffraction.errors import DiffractionError
@@ -153,7 +153,6 @@ def test_unusable_pixel_sizes_are_refused(pixel_size):
     assert "\n" not in str(caught.value)
 
 
-@settings(deadline=None)  # the machine may be busy
 @given(st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(), st.binary(),
                  st.complex_numbers(), st.lists(st.floats(), max_size=4)))  # fmt: skip
 def test_any_pixel_size_works_or_is_one_clear_line(value):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mitsuba_diffraction.errors import DiffractionError
@@ -25,7 +25,6 @@ anything = st.one_of(
     ],
     ids=["scales", "discs"],
 )
-@settings(deadline=None)
 @given(data=st.data(), value=anything)
 def test_any_value_works_or_is_one_clear_line(makers, names, extent, data, value):
     make, name = data.draw(st.sampled_from(makers)), data.draw(st.sampled_from(names))

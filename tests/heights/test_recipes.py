@@ -176,7 +176,6 @@ keys = st.sampled_from(["source", "generator", "arguments", "seeds", "output", "
 
 @settings(
     max_examples=200,
-    deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(st.dictionaries(keys, values, max_size=5))

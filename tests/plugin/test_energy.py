@@ -14,17 +14,14 @@ import mitsuba as mi  # isort: skip
 import drjit as dr  # isort: skip
 
 # the surfaces are steep on purpose
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+    pytest.mark.usefixtures("variant"),
+]
 
 ANGLES = (0.0, 20.0, 40.0, 55.0, 65.0, 75.0, 80.0, 84.0, 87.0, 89.0)
 AZIMUTHS = (0.0, 37.0, 90.0, 180.0)
 SAMPLES = 1 << 13
-
-
-@pytest.fixture(autouse=True)
-def _variant(variant, tmp_path_factory, monkeypatch):
-    # its own cache, shared by the tests of this run only
-    monkeypatch.setenv("MITSUBA_DIFFRACTION_CACHE", str(tmp_path_factory.getbasetemp() / "cache"))
 
 
 def sinusoid() -> md.HeightField:
@@ -148,7 +145,7 @@ def test_white_furnace_over_a_white_base(name):
     assert_at_most_white(white_pair(name))
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("base", [False, True])
 @pytest.mark.parametrize("name", SURFACES)
 def test_white_furnace_at_random_directions(name, base, seed):

@@ -19,24 +19,25 @@ mi.set_variant("llvm_ad_spectral")
 heights = np.random.default_rng(0).uniform(0.0, 0.2, (300, 300))
 field = md.HeightField(heights, 0.08)
 bsdf = mi.load_dict(md.bsdf_dict(field, material="none", coherence_width=24.0))
-wrong = mi.Float(np.full(1000, float("VALUE"), np.float32))
 right = dr.opaque(mi.Float, 0.5, 1000)
 si = dr.zeros(mi.SurfaceInteraction3f, 1000)
 si.wavelengths = mi.Spectrum(550.0)
-for n in range(3):
-    for side in ("wi", "wo"):
-        directions = {}
-        for name in ("wi", "wo"):
-            parts = [right, right, dr.sqrt(right)]
-            if name == side:
-                parts[n] = wrong
-            directions[name] = mi.Vector3f(*parts)
-        si.wi = directions["wi"]
-        value, density = bsdf.eval_pdf(mi.BSDFContext(), si, directions["wo"])
-        drawn, weight = bsdf.sample(mi.BSDFContext(), si, right, mi.Point2f(right, right))
-        dr.eval(value, density, drawn, weight)
-dr.sync_thread()
-print("alive")
+for number in ("nan", "1e30"):
+    wrong = dr.opaque(mi.Float, float(number), 1000)
+    for n in range(3):
+        for side in ("wi", "wo"):
+            directions = {}
+            for name in ("wi", "wo"):
+                parts = [right, right, dr.sqrt(right)]
+                if name == side:
+                    parts[n] = wrong
+                directions[name] = mi.Vector3f(*parts)
+            si.wi = directions["wi"]
+            value, density = bsdf.eval_pdf(mi.BSDFContext(), si, directions["wo"])
+            drawn, weight = bsdf.sample(mi.BSDFContext(), si, right, mi.Point2f(right, right))
+            dr.eval(value, density, drawn, weight)
+    dr.sync_thread()
+    print(number, "is survived")
 """
 
 
@@ -49,10 +50,9 @@ def test_an_index_is_always_in_its_range():
     np.testing.assert_array_equal(index_between(values, 0.0, 3.0), [0, 3, 0, 2, 0, 3])
 
 
-@pytest.mark.parametrize("value", ["nan", "1e30"])
-def test_directions_that_are_no_numbers_do_not_end_the_process(value):
-    program = PROGRAM.replace("VALUE", value)
+def test_directions_that_are_no_numbers_do_not_end_the_process():
     ran = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120
+        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=120
     )
-    assert (ran.returncode, ran.stdout.strip()) == (0, "alive"), ran.stderr
+    said = ["nan is survived", "1e30 is survived"]
+    assert (ran.returncode, ran.stdout.splitlines()) == (0, said), ran.stderr

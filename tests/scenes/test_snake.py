@@ -199,7 +199,7 @@ def test_loops_lie_on_the_ground_and_on_each_other(committed: tuple[str, Snake])
     ),
     st.floats(),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_any_proportions_work_or_are_refused_in_one_line(
     proportions: dict[str, float], coils: float
 ) -> None:

@@ -79,6 +79,12 @@ PICTURES = (
         "The same scales, lit from one direction: colours shrink to spots.",
         "-D light=daylight.xml", "xenopeltis",
     ),
+    _scene(
+        "snake_two", "A snake with two patches",
+        "The corn snake's relief on the back, the sunbeam snake's on flanks and belly "
+        "(`diffraction_mix`).",
+        "-D skin=skin_two.xml -D resx=480 -D resy=300 -s 32", "snake",
+    ),
     Picture(
         "gallery", "turning", "The snake turns",
         "Every frame is path-traced; tables are loaded once. `--turn sun_azimuth` turns the light "

@@ -5,9 +5,9 @@ No warning tells how far the model holds for the patch: here it is there to be l
 
 from __future__ import annotations
 
+import contextlib
 import os
 import statistics
-import struct
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +17,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from mitsuba.python import tensor_io
 from numpy.typing import NDArray
 
 from ...errors import DiffractionWarning
@@ -283,7 +284,6 @@ def bare_gathers(table: DiffractionTable, queries: Queries) -> Callable[[], Any]
 
 # what an anisotropic surface takes, in the sampling of Dupuy and Jakob 2018
 AZIMUTHS, ANGLES, WAVELENGTHS, SIDE = 8, 8, 195, 32
-_TYPES = {"uint8": 1, "float32": 10}  # of the file
 
 
 def write_measured(path: Path) -> None:
@@ -292,8 +292,8 @@ def write_measured(path: Path) -> None:
     def ones(*shape: int) -> NDArray[np.float32]:
         return np.ones(shape, np.float32)
 
-    arrays: dict[str, NDArray[Any]] = {
-        "description": np.frombuffer(b"even", np.uint8),
+    arrays: dict[str, Any] = {
+        "description": "even",
         "theta_i": np.linspace(0.0, 1.5, ANGLES, dtype=np.float32),
         "phi_i": np.linspace(-np.pi, np.pi, AZIMUTHS, dtype=np.float32),
         "ndf": ones(128, 128),
@@ -304,15 +304,5 @@ def write_measured(path: Path) -> None:
         "wavelengths": np.linspace(360.0, 1000.0, WAVELENGTHS, dtype=np.float32),
         "jacobian": np.zeros(1, np.uint8),
     }
-    size = 18 + sum(len(n) + 13 + 8 * array.ndim for n, array in arrays.items())
-    header = [b"tensor_file\0", struct.pack("<BBI", 1, 0, len(arrays))]
-    offset = -(-size // 8) * 8
-    contents = []
-    for name, array in arrays.items():
-        header.append(struct.pack("<H", len(name)) + name.encode())
-        header.append(struct.pack("<HBQ", array.ndim, _TYPES[array.dtype.name], offset))
-        header.append(struct.pack(f"<{array.ndim}Q", *array.shape))
-        data = array.tobytes()
-        contents.append(data.ljust(-(-len(data) // 8) * 8, b"\0"))
-        offset += len(contents[-1])
-    path.write_bytes(b"".join(header).ljust(-(-size // 8) * 8, b"\0") + b"".join(contents))
+    with contextlib.redirect_stdout(None):  # it says what it wrote
+        tensor_io.write(str(path), **arrays)

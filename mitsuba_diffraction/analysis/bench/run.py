@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+import gc
+from collections.abc import Callable, Collection, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 
 from ...heights.field import HeightField
@@ -48,15 +50,15 @@ def sections(
         if not dr.has_backend(getattr(dr.JitBackend, backend.upper())):
             continue
         set_variant(f"{backend}_ad_spectral")
-        if "eval" in parts:
-            yield measure_eval(plan, tables, progress)
-        if "sample" in parts:
-            yield from measure_sampling(plan, tables, progress)
-        if "snake" in parts:
-            yield measure_snake(plan, tables, scenes, progress)
-        if "noise" in parts:
-            yield measure_noise(plan, tables, progress)
-        if "efficiency" in parts:
-            yield measure_efficiency(plan, tables, scenes, progress)
-        if "colours" in parts:
-            yield from measure_colours(plan, tables, scenes, backend, progress)
+        measured: dict[str, Callable[[], Iterable[Section]]] = {
+            "eval": lambda: [measure_eval(plan, tables, progress)],
+            "sample": lambda: measure_sampling(plan, tables, progress),
+            "snake": lambda: [measure_snake(plan, tables, scenes, progress)],
+            "noise": lambda: [measure_noise(plan, tables, progress)],
+            "efficiency": lambda: [measure_efficiency(plan, tables, scenes, progress)],
+            "colours": partial(measure_colours, plan, tables, scenes, backend, progress),
+        }
+        for part, measure in measured.items():
+            if part in parts:
+                yield from measure()
+                gc.collect()  # the next part's kernels would hold the code of BSDFs of this one

@@ -137,7 +137,6 @@ def signed(stops: float) -> str:
     return f"{stops:+g}".replace("-", "−")
 
 
-_DPI = 100
 _SMALLEST_SIDE = 2.3  # inches, of a map
 _MOST_COLUMNS = 4
 

@@ -31,7 +31,7 @@ from .iridescence import colours_of, iridescence
 from .treatments import Treatment
 
 #: Raised whenever rows would differ.
-VERSION = 1
+VERSION = 2
 #: Gratings in a row.
 PERIODS = 3
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...heights.field import HeightField
+from ...plugin.memory import upload
 from ...progress import Progress, silent
 from ...tables.build.half_precision import half_scale
 from ...tables.colour.colour_difference import power_colour_difference
@@ -206,7 +207,7 @@ def _by_plugin(bsdf: Any, sample: Sample) -> NDArray[np.float64]:
     k = 2e3 * np.pi / sample.wavelength
     total = mi.Vector3f((sample.wi + sample.wo).T)
     device = bsdf.power.device
-    wavenumber = mi.Float(k)
+    wavenumber = upload(mi.Float, k)
     found = device.window_sum(wavenumber * total.x, wavenumber * total.y, wavenumber * total.z)
     return np.array(found, float)
 

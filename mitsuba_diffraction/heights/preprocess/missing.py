@@ -42,7 +42,7 @@ def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[Fl
     """
     missing = np.isnan(heights)
     count = int(np.count_nonzero(missing))
-    if count == 0:
+    if count == 0 or np.isinf(heights).any():  # which HeightField refuses, and no gap continues
         return heights, ""
     share = f"{count} of {heights.size} points ({count / heights.size:.2g} of all)"
     if count == heights.size:

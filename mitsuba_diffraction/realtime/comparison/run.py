@@ -24,6 +24,7 @@ from .truth import box_sensor, direct_light
 
 #: Samples along either side of a pixel for the slow methods, whose own errors are far larger.
 _FEWER, _MOST = 2, 64
+_DETAIL = 1024  # samples per pixel at most, under lights without extent, which are quiet
 _STEP = 8  # frames between two looks at the clock
 
 
@@ -104,7 +105,7 @@ class Comparison:
         with Stop() as stop:
             direct = self.both.scene
             halves = [
-                self._traced(direct, direct.sensors()[0], self.spp // 2, seed, stop)
+                self._traced(direct, direct.sensors()[0], min(self.spp, _DETAIL) // 2, seed, stop)
                 for seed in (first, first + 1)
             ]
             every = direct_light(self.scene, renderer.camera)
@@ -161,7 +162,7 @@ class Comparison:
         renderer = self.both.renderer
         light, clock = renderer.progressive(method), clock_of(renderer.driver)
         light.advance(2)  # compiles
-        light.clear()
+        light.restart()
         halves, start = [], clock()
         for half in range(2):
             for done in range(0, self.frames // 2, _STEP):
@@ -197,7 +198,9 @@ class Comparison:
         for n, method in enumerate(methods):
             self.progress(n, len(methods), f"drawing with {method}")
             samples = min(self.supersampling, _FEWER if method in THESIS_METHODS else _MOST)
-            drawn = renderer.render(method, supersampling=samples)
+            with warnings.catch_warnings():  # its lights are those of both renderers
+                warnings.simplefilter("ignore", DiffractionWarning)
+                drawn = renderer.render(method, supersampling=samples)
             areas, picture = self.both.regions(drawn), drawn[..., :3]
             compared = areas["both"]
             errors = {

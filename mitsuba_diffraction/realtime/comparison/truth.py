@@ -68,7 +68,11 @@ def box_sensor(camera: Camera) -> Any:
     import mitsuba as mi
 
     width, height = camera.size
-    lens: dict[str, Any] = {"type": "perspective"}
+    lens: dict[str, Any] = {
+        "type": "perspective",
+        "principal_point_offset_x": camera.offset[0],
+        "principal_point_offset_y": camera.offset[1],
+    }
     if camera.lens > 0.0:
         lens = {
             "type": "thinlens", "aperture_radius": camera.lens, "focus_distance": camera.focus
@@ -79,8 +83,6 @@ def box_sensor(camera: Camera) -> Any:
             "to_world": mi.ScalarTransform4f(camera.to_world),
             "fov": camera.fov,
             "fov_axis": "x",
-            "principal_point_offset_x": camera.offset[0],
-            "principal_point_offset_y": camera.offset[1],
             "sampler": {"type": "independent"},
             "film": {
                 "type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb",

@@ -7,10 +7,13 @@ export_shader  writes a surface's shader for other programs (in `export`)
 scene        a scene as the shaders know it, made of the next four
 shapes       triangles and their tangents
 materials    BSDFs and textures
+gloss        what plain BSDFs mirror
 lights       directions, points, spots, a smooth sky
 emitters     all emitters as a sequence of lights
 shadows      shadow maps
-progressive  frames with one light each, accumulated
+surroundings what comes from a direction: environments, flat lights, what stands in the way
+lobes        directions that a surface sends light to
+progressive  frames with one light each, or what lobes meet, accumulated
 camera       sensors
 packing      tables as textures
 thesis       the methods of the thesis as textures

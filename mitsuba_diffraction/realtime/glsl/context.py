@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import DiffractionError
 from .source import fragment_parts, plain_source, vertex_source
-from .textures import Packed, Texture, Uniform
+from .textures import PAGE, Packed, Texture, Uniform
 
 #: OpenGL 3.3.
 REQUIRED = 330
@@ -69,13 +69,19 @@ def require_moderngl() -> Any:
 
 
 def check_version(context: Any) -> None:
-    """Raise a DiffractionError for a driver older than OpenGL 3.3."""
+    """Raise a DiffractionError for a driver older than OpenGL 3.3, or with too small textures."""
     if context.version_code < REQUIRED:
         raise DiffractionError(
             f"the driver {context.info['GL_RENDERER']} has OpenGL "
             f"{context.version_code // 100}.{context.version_code % 100 // 10}, but the shaders "
             f"need {REQUIRED // 100}.{REQUIRED % 100 // 10}; update it, or use Mesa's software "
             f"rasteriser: LIBGL_ALWAYS_SOFTWARE=1"
+        )
+    largest = context.info["GL_MAX_TEXTURE_SIZE"]
+    if largest < PAGE:
+        raise DiffractionError(
+            f"the driver {context.info['GL_RENDERER']} has textures of {largest} texels at most, "
+            f"but the shaders need {PAGE}; use Mesa's software rasteriser: LIBGL_ALWAYS_SOFTWARE=1"
         )
 
 

@@ -21,8 +21,8 @@ order 2, which is nearly all of what a matt surface sees (Chen, Welling and Smol
 *Super-samples from kernel herding*; Ramamoorthi and Hanrahan 2001). So the first few lights look
 like all of them.
 
-What no light without extent shows are mirror images of lights with an extent: they are as many
-images as there were frames, until the lobe is wider than their distance.
+What no light without extent shows are mirror images of lights with an extent: those are looked up
+along the lobes of surfaces instead (`surroundings`).
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,12 +38,14 @@ class Map:
     value : (channels,), where it is the same.
     picture : (rows, columns, channels), row 0 at v = 0, and `to_uv` (3, 3) that leads into it.
     attribute : name of a mesh attribute.
+    clamped : whether the picture's edges go on beyond it, which else repeats.
     """
 
     value: Array
     picture: NDArray[np.floating] | None = None
     to_uv: Array = field(default_factory=lambda: np.eye(3))
     attribute: str | None = None
+    clamped: bool = False
 
 
 @dataclass(frozen=True)
@@ -98,13 +100,13 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
         if len(inner) > 1 and inner[0] is not inner[-1]:
             omissions.append(f"the back of {name}, another material")
         bsdf = inner[0]
+    if only := getattr(bsdf, "only_traced", None):
+        raise DiffractionError(f"{only} of {name} is for the path tracer alone")
     if _diffracts(bsdf):
-        if bsdf.only_traced:
-            raise DiffractionError(f"{bsdf.only_traced} of {name} is for the path tracer alone")
         pigment = Map(np.zeros(3))
         if bsdf.nested is not None:
             pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)
-        if _is_filmed(bsdf.fresnel):
+        if is_filmed(bsdf.fresnel):
             omissions.append(f"the thin film of {name}")
         if bsdf.through is not None:
             omissions.append(f"light that goes through {name}")
@@ -161,10 +163,12 @@ def pack_surface(material: Material) -> Packed:
     }
     definitions: dict[str, str] = {}
     textures = []
-    for name, picture in (("colour", material.pigment.picture), ("axis", material.axis.picture)):
-        if picture is not None:
-            textures.append(Texture(f"{name}_map", as_half(_four(picture)), smooth=True))
+    for name, found in (("colour", material.pigment), ("axis", material.axis)):
+        if found.picture is not None:
+            textures.append(Texture(f"{name}_map", as_half(_four(found.picture)), smooth=True))
             definitions[f"{name.upper()}_MAPPED"] = ""
+            if found.clamped:
+                definitions[f"{name.upper()}_CLAMPED"] = ""
     packed = Packed(tuple(textures), uniforms, definitions)
     bsdf, gloss = material.bsdf, material.gloss
     if bsdf is not None and bsdf.nested is None:
@@ -189,7 +193,7 @@ def pack_surface(material: Material) -> Packed:
         definitions["COATED"] = ""
         uniforms["coat"] = coat_index(material)
         uniforms["channel_wavenumbers"] = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
-    elif _is_filmed(surface):
+    elif is_filmed(surface):
         surface = surface.material
     if isinstance(bsdf.boundary, SmallSlope):
         packed |= pack_roughness(material.table.roughness)
@@ -259,7 +263,8 @@ def _is_bsdf(thing: Any) -> bool:
     return isinstance(thing, mi.BSDF)
 
 
-def _is_filmed(surface: Any) -> bool:
+def is_filmed(surface: Any) -> bool:
+    """Whether a thin film lies over the structure, which shaders do not know."""
     from ...plugin.film import UnderFilm  # which only a variant has
 
     return isinstance(surface, UnderFilm)
@@ -275,7 +280,7 @@ def diffracts(bsdf: Any) -> bool:
     """Whether a BSDF diffracts, or the first one that it is wrapped around."""
     while bsdf.class_name() in _WRAPPERS:
         bsdf = next(b for b in children(bsdf).values() if _is_bsdf(b))
-    return _diffracts(bsdf)
+    return hasattr(bsdf, "only_traced")
 
 
 def _diffuse(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Map:
@@ -308,7 +313,8 @@ def colour_map(texture: Any, light: Spectrum) -> Map:
     found = _lit(texture, uv, light) if mi.is_spectral else _evaluated(texture, uv, np.zeros(3))
     if width * height == 1:
         return Map(found[0].astype(float))
-    return Map(np.ones(3), found.reshape(height, width, 3), to_uv)
+    clamped = _clamps(lambda uv: _evaluated(texture, uv, np.full(4, 550.0)), to_uv)
+    return Map(np.ones(3), found.reshape(height, width, 3), to_uv, clamped=clamped)
 
 
 def _lit(texture: Any, uv: Array, light: Spectrum) -> NDArray[np.float32]:
@@ -334,8 +340,26 @@ def _axis(orientation: Any) -> Map:
         return Map(np.array([1.0, 0.0]), attribute=attribute)
     width, height = (int(n) for n in texture.resolution())
     uv, to_uv = _centres(texture, width, height)
-    value = np.array(texture.eval_3(_interaction(uv)), np.float64).T.reshape(height, width, 3)
-    return Map(np.array([1.0, 0.0]), value[..., :2], to_uv)
+
+    def evaluated(uv: Array) -> Array:
+        return np.array(texture.eval_3(_interaction(uv)), np.float64).T
+
+    value = evaluated(uv).reshape(height, width, 3)[..., :2]
+    return Map(np.array([1.0, 0.0]), value, to_uv, clamped=_clamps(evaluated, to_uv))
+
+
+def _clamps(evaluated: Callable[[Array], NDArray[np.floating]], to_uv: Array) -> bool:
+    """Whether a texture is beyond its edge more like the edge than like the other side."""
+    along = np.linspace(0.02, 0.98, 16)
+    back = np.linalg.inv(to_uv)
+
+    def values(across: float) -> NDArray[np.floating]:
+        both = [np.stack([np.full(16, across), along]), np.stack([along, np.full(16, across)])]
+        places = np.concatenate([np.concatenate(both, axis=1), np.ones((1, 32))])
+        return evaluated((back @ places)[:2].T)
+
+    beyond = values(-0.3)
+    return bool(np.abs(beyond - values(1e-4)).sum() < np.abs(beyond - values(0.7)).sum())
 
 
 def _attribute(texture: Any) -> str | None:

@@ -9,6 +9,9 @@ frame, so their edges become smooth as the light does.
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -29,9 +32,9 @@ from .textures import Packed, Uniform
 
 Array = NDArray[np.float64]
 
-# generalised golden ratio of ten numbers a frame: two each for the pixel, the lens and the shadow
-# map, three for lobes (Roberts 2018)
-_RATIO = 1.0653066442
+# generalised golden ratio of nine numbers a frame: two each for the pixel, the lens and the shadow
+# map, three for lobes (Roberts 2018): x¹⁰ = x + 1
+_RATIO = 1.0757660661
 _STEPS = _RATIO ** -np.arange(1.0, 10.0)
 
 #: Towards what the second kind of frame looks: all spectra are daylight's, the colours come later.
@@ -51,7 +54,7 @@ class Drawing(Protocol):
 
     def draw_light(
         self, frame: Any, method: str, camera: Camera, light: Light, definitions: dict[str, str],
-        uniforms: dict[str, Uniform], extras: Any,
+        uniforms: dict[str, Uniform], extras: Any, **surface: float | None,
     ) -> None:  # fmt: skip
         """Draw one light, or what the surroundings send."""
 
@@ -173,48 +176,59 @@ class ProgressiveLight:
     ----------
     renderer, method, camera : what is drawn, how, and from where.
     stage : of the renderer's scene.
+    lights : these alone, instead of the scene's emitters and what surrounds it.
     shadow_size : texels along either side of a shadow map.
 
     Attributes
     ----------
     frames : how many are in the picture.
-    emitters : that are drawn from.
     """
 
     def __init__(
         self, renderer: Drawing, method: str, camera: Camera, stage: Stage, *,
-        shadow_size: int = SIZE,
+        lights: Sequence[Light] = (), shadow_size: int = SIZE,
     ) -> None:  # fmt: skip
         self._renderer, self._method, self._camera = renderer, method, camera
         self._stage = stage
-        self.emitters = stage.emitters
+        self._fixed = [replace(one, spectrum=len(lights) * one.spectrum) for one in lights]
+        self._looks_up = stage.looks_up and not lights
+        self._surface: dict[str, float | None] = {}
         context = renderer.context
-        self._places = stage.casters.seen(camera)
         self._map = ShadowMap(stage.casters, shadow_size)
         width, height = camera.size
         self._frame = renderer.target(width, height)
         self._sums = [renderer.target(width, height) for _ in range(2)]  # of either kind of frame
         self._counts = [0, 0]
-        self.clear()
+        self._lights: Iterator[Light] = iter(())
+        self.restart(camera)
         self._add = compile_plain(context, "whole.vert", "add.frag")
         self._triangle = context.vertex_array(self._add, [])
+        self._mean = compile_plain(context, "whole.vert", "mean.frag", ("library.glsl",))
+        self._whole = context.vertex_array(self._mean, [])
 
     @property
     def frames(self) -> int:
         """How many there are."""
         return sum(self._counts)
 
-    def clear(self) -> None:
-        """Start again."""
+    def restart(self, camera: Camera | None = None, **surface: float | None) -> None:
+        """Start again, with another camera of the same size or other surfaces.
+
+        surface : height scale and coherence width as of `Renderer.draw`.
+        """
+        if camera is not None:
+            self._camera, self._surface = camera, surface
+            self._places = self._stage.casters.seen(camera)
         for target in self._sums:
             target.frame.clear(0.0, 0.0, 0.0, 0.0)
         self._counts = [0, 0]
-        self._lights = self.emitters.lights()
+        emitters = self._stage.emitters
+        self._lights = itertools.cycle(self._fixed) if self._fixed else emitters.lights()
 
     def advance(self, frames: int = 1) -> None:
         """Add this many frames."""
         for _ in range(frames):
-            kind = self.frames % 2 if self._stage.looks_up else 0
+            kind = self.frames % 2 if self._looks_up else 0
             places = (0.5 + (self._counts[kind] + 1) * _STEPS) % 1.0
             camera = self._camera.sampled(places[:2] - 0.5, places[2:4])
             self._stage.draw_behind(self._frame.frame, camera, bright=kind == 1)
@@ -233,19 +247,20 @@ class ProgressiveLight:
         uniforms = self._map.draw(light, self._places, (float(beside[0]), float(beside[1])))
         uniforms["light_density"] = light.density
         definitions = light_definitions(1, False) | {"SHADOWED": ""}
-        if self._stage.looks_up:
+        if self._looks_up:
             definitions["WEIGHTED"] = ""
         extras = [_WithMap(extra, self._map.texture) for extra in self._stage.extras]
         self._renderer.draw_light(
-            self._frame.frame, self._method, camera, light, definitions, uniforms, extras
-        )
+            self._frame.frame, self._method, camera, light, definitions, uniforms, extras,
+            **self._surface,
+        )  # fmt: skip
 
     def _look_up(self, camera: Camera, numbers: Array) -> None:
         """What each pixel's lobes meet."""
         self._renderer.draw_light(
             self._frame.frame, self._method, camera, _WHITE,
             light_definitions(1, False) | {"LOOKED_UP": ""},
-            {"sequence": tuple(numbers.tolist())}, self._stage.extras,
+            {"sequence": tuple(numbers.tolist())}, self._stage.extras, **self._surface,
         )  # fmt: skip
 
     def _accumulate(self, target: Target) -> None:
@@ -258,6 +273,21 @@ class ProgressiveLight:
         self._add["frame"].value = 0
         self._triangle.render(moderngl.TRIANGLES, vertices=3)
         context.enable_only(moderngl.NOTHING)
+
+    def show(self, frame: Any, exposure: float) -> None:
+        """The picture so far into a framebuffer of the same size, exposed, as sRGB."""
+        moderngl = require_moderngl()
+        context: Any = self._renderer.context
+        frame.use()
+        context.enable_only(moderngl.NOTHING)
+        for unit, target in enumerate(self._sums):
+            target.colour.use(unit)
+        weights = tuple(1.0 / max(count, 1) for count in self._counts)
+        shown: dict[str, Uniform] = {
+            "first": 0, "second": 1, "weights": weights, "exposure": exposure
+        }  # fmt: skip
+        set_uniforms(self._mean, shown)
+        self._whole.render(moderngl.TRIANGLES, vertices=3)
 
     @property
     def image(self) -> NDArray[np.float32]:
@@ -273,7 +303,8 @@ class ProgressiveLight:
 
     def release(self) -> None:
         """Free what lies in the graphics card's memory."""
-        for thing in (self._triangle, self._add, self._frame, *self._sums, self._map):
+        made = (self._triangle, self._add, self._whole, self._mean)
+        for thing in (*made, self._frame, *self._sums, self._map):
             thing.release()
 
 

@@ -192,6 +192,7 @@ class Renderer:
         definitions: dict[str, str],
         uniforms: dict[str, Uniform],
         extras: Sequence[Extra],
+        **surface: float | None,
     ) -> None:
         """Draw one light, or what the surroundings send, into a framebuffer that is cleared.
 
@@ -200,9 +201,10 @@ class Renderer:
         frame, method, camera : as of `draw`.
         light : without extent.
         definitions, uniforms : what of it the shaders know.
-        extras : of each surface, binds more textures from a unit on, and returns the next free one.
+        extras : what each surface's shader reads of it.
+        surface : `scale` and `coherence_width` as of `draw`.
         """
-        self._draw(frame, method, camera, [light], definitions, uniforms, extras=extras)
+        self._draw(frame, method, camera, [light], definitions, uniforms, extras=extras, **surface)
 
     def progressive(
         self,
@@ -210,6 +212,7 @@ class Renderer:
         *,
         size: tuple[int, int] | None = None,
         camera: Camera | None = None,
+        lights: Sequence[Light] = (),
         shadow_size: int = SIZE,
     ) -> ProgressiveLight:
         """A picture of all emitters' direct light, with shadows, that gets better by frames.
@@ -219,6 +222,7 @@ class Renderer:
         method : one of `source.METHODS`.
         size : width and height; the camera's by default.
         camera : the scene's by default.
+        lights : these alone, instead of all that the scene has.
         shadow_size : texels along either side of a shadow map.
 
         Raises
@@ -228,9 +232,15 @@ class Renderer:
         """
         camera = camera or self.camera
         resized = camera.resized(*(size or camera.size))
+        return ProgressiveLight(
+            self, method, resized, self.stage(), lights=lights, shadow_size=shadow_size
+        )
+
+    def stage(self) -> Stage:
+        """What progressive light needs of the scene, made when it is first wanted."""
         if self._stage is None:
             self._stage = Stage(self)
-        return ProgressiveLight(self, method, resized, self._stage, shadow_size=shadow_size)
+        return self._stage
 
     def _draw(
         self,

@@ -84,12 +84,14 @@ class Environment:
             aside = sun + np.tan(1.5 * _AROUND_SUN) * frame_along(sun)[0]
             directions[directions @ sun > np.cos(_AROUND_SUN)] = aside / np.linalg.norm(aside)
             radiance = radiance_along(emitter, _disc(sun, _SUN_RADIUS)).mean(axis=0)
-        picture = radiance_along(emitter, directions.reshape(-1, 3)).reshape(rows, columns, 3)
+        with np.errstate(invalid="ignore"):
+            picture = radiance_along(emitter, directions.reshape(-1, 3))
         if not (np.isfinite(picture).all() and np.isfinite(radiance).all()):
             raise DiffractionError(
                 f"{name_of(emitter)}: the environment has radiances that are not finite; "
                 "give a picture without them"
             )
+        picture = picture.reshape(rows, columns, 3)
         return cls(emitter, np.maximum(picture, 0.0).astype(np.float32), sun, radiance)
 
     def in_sun(self, directions: Array) -> NDArray[np.bool_]:

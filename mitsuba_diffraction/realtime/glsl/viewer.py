@@ -18,8 +18,10 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...optics.colour import encode_srgb
 from ..comparison.progressive import Progressive
+from .camera import Camera
 from .navigation import Orbit, dragged
 from .panel import TITLE, PanelWindow
+from .progressive import ProgressiveLight
 from .renderer import Renderer
 from .source import METHODS, THESIS_METHODS
 
@@ -31,6 +33,7 @@ HELP = (
 
 _TURN = 0.006  # rad per pixel
 _FRAMES = 30  # that the readout averages over
+_AT_ONCE, _ENOUGH = 4, 2048  # frames of progressive light at once, and when there is no more to see
 
 
 class Viewer(PanelWindow):
@@ -57,6 +60,9 @@ class Viewer(PanelWindow):
         self.message = ""
         self.renderer: Renderer | None = None
         self.tracing: Progressive | None = None
+        self.light: ProgressiveLight | None = None
+        self.shadows = True  # all light and shadows, or few lights without them at once
+        self._shown: tuple[Any, ...] = ()
         self._loading: Iterator[str] | None = self._load()
 
     # ---------------------------------------------------------------- loading
@@ -67,6 +73,8 @@ class Viewer(PanelWindow):
         self.renderer = Renderer(self.mitsuba_scene, sensor=self.sensor, context=self.ctx)
         yield f"tables of method {self.method} ..."
         self.renderer.texture_bytes(self.method)
+        yield "lights and what they meet ..."
+        self.renderer.stage()
         self._start()
 
     def _start(self) -> None:
@@ -78,6 +86,7 @@ class Viewer(PanelWindow):
         self.largest_scale = float(first.table.height_scale_max)
         self.own_width = self.width = float(first.table.coherence_width)
         renderer.lights = list(scene.lighting.lights)
+        self._dragged = False
 
     @property
     def _ready(self) -> Renderer:
@@ -106,17 +115,40 @@ class Viewer(PanelWindow):
             self.wnd.close()
 
     def _draw(self, frame: Any) -> None:
-        renderer = self._ready
-        camera = renderer.camera.moved(self.orbit.to_world)
-        width, height = frame.size
-        renderer.draw(
-            frame,
-            self.method,
-            camera.resized(width, height),
-            exposure=2.0**self.stops,
-            scale=self.scale,
-            coherence_width=None if self._baked else self.width,
-        )
+        if self.shadows:
+            self._light(frame.size).show(frame, 2.0**self.stops)
+            return
+        camera = self._camera(frame.size)
+        self._ready.draw(frame, self.method, camera, exposure=2.0**self.stops, **self._surface)
+
+    def _camera(self, size: tuple[int, int]) -> Camera:
+        return self._ready.camera.moved(self.orbit.to_world).resized(*size)
+
+    @property
+    def _surface(self) -> dict[str, float | None]:
+        return {"scale": self.scale, "coherence_width": None if self._baked else self.width}
+
+    def _light(self, size: tuple[int, int]) -> ProgressiveLight:
+        """The light so far, a few frames further; begun anew where anything has changed.
+
+        The first lights are those that look most like all of them, and always the same: what moves
+        is lit by them alone.
+        """
+        renderer, camera = self._ready, self._camera(size)
+        lights = tuple(renderer.lights) if self._dragged else ()
+        source = self.method, size, tuple(light.place.tobytes() for light in lights)
+        view = camera.to_world.tobytes(), *self._surface.values()
+        if self.light is None or source != self._shown[0]:
+            if self.light is not None:
+                self.light.release()
+            self.light = renderer.progressive(self.method, camera=camera, lights=lights)
+            self.light.restart(camera, **self._surface)
+        elif view != self._shown[1]:
+            self.light.restart(camera, **self._surface)
+        self._shown = source, view
+        if self.light.frames < _ENOUGH:
+            self.light.advance(_AT_ONCE)
+        return self.light
 
     @property
     def _baked(self) -> bool:
@@ -143,6 +175,7 @@ class Viewer(PanelWindow):
         if not self._baked:
             widest = 4.0 * self.own_width
             _, self.width = imgui.slider_float("coherence, µm", self.width, self.own_width, widest)
+        _, self.shadows = imgui.checkbox("all light, with shadows", self.shadows)
         imgui.text(HELP)
         imgui.text(self.message)
         imgui.end()
@@ -179,7 +212,7 @@ class Viewer(PanelWindow):
         """Send this view to the path tracer, which works between frames."""
         renderer = self._ready
         width, height = self.wnd.fbo.size
-        camera = renderer.camera.moved(self.orbit.to_world).resized(width, height)
+        camera = self._camera((width, height))
         self.tracing = Progressive(self.mitsuba_scene, camera, renderer.lights, self.spp)
         self.message = "path tracing ..."
 
@@ -206,6 +239,7 @@ class Viewer(PanelWindow):
             renderer = self._ready
             for n, light in enumerate(renderer.lights[:1]):
                 renderer.lights[n] = dragged(light, self.orbit, _TURN * dx, -_TURN * dy)
+                self._dragged = True
         elif buttons.middle or (buttons.left and self.wnd.modifiers.shift):
             height = self.wnd.size[1]
             self.orbit = self.orbit.panned(-dx / height, dy / height)
@@ -237,6 +271,9 @@ class Viewer(PanelWindow):
     def on_close(self) -> None:
         """Free the graphics card's memory, also of what was half loaded."""
         self._loading = None
+        if self.light is not None:
+            self.light.release()
+            self.light = None
         if self.renderer is not None:
             self.renderer.release()
             self.renderer = None

@@ -87,7 +87,7 @@ def make_page(
             f"the page would have {len(text.encode()) / 1e6:.1f} MB, more than "
             f"{MAX_BYTES / 1e6:.0f}; use fewer triangles or a smaller coherence_width"
         )
-    return Page(text, packed.loss, packed.left_out, realtime.omissions)
+    return Page(text, packed.loss, packed.left_out, tuple(packed.header["omissions"]))
 
 
 def export_viewer(scene: Any, path: str | os.PathLike[str], **options: Any) -> Page:

@@ -117,7 +117,7 @@ def web_scene(
         "methods": shown,
         "octaves": [OCTAVES[0], OCTAVES[-1]],
         "energy_pages": len(OCTAVES),
-        "omissions": list(dict.fromkeys(scene.omissions)),
+        "omissions": _omissions(scene, emitters),
         "background": _zenith(scene.lighting.sky),
         "camera": {
             "to_world": scene.camera.to_world.tolist(),
@@ -244,6 +244,15 @@ def _plain(value: Any) -> Any:
     if isinstance(value, tuple):
         return [_plain(v) for v in value]
     return value.item() if isinstance(value, np.generic) else value
+
+
+def _omissions(scene: RealtimeScene, emitters: Emitters | None) -> list[str]:
+    """What the page does not show: of emitters only what the sequence of lights leaves out."""
+    found = [text for text in scene.omissions if text not in scene.lighting.omissions]
+    found += [] if emitters is None else emitters.omissions
+    if scene.emitting:
+        found.append("shapes that emit light (only their light)")
+    return list(dict.fromkeys(found))
 
 
 def _zenith(sky: NDArray[np.float64]) -> list[float]:

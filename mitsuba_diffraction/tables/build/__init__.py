@@ -7,6 +7,7 @@ attempt         one try, and its error
 choose          how many terms and intervals a tolerance takes
 checks          what cannot be built
 windows         a wide scan cut into overlapping ones, averaged
+powers          the mean power of several patches, by batches, on workers if given
 spectrum        DFT of exp(iκh) at some κ, cropped to the orders that light can reach
 coefficients    of the series, from transforms of the heights
 half_precision  these as half floats

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -68,15 +69,21 @@ def describe(
 def roughness_of(patches: Sequence[HeightField], q_max: float) -> RoughnessTable:
     """Height variance by spatial frequency up to q_max (rad/µm), the mean of all patches'."""
     if isinstance(patches, Windows):
-        return ScaleRoughness.mean(patches.roughness()).table(q_max)
+        return ScaleRoughness.mean(_parts(patches).roughness()).table(q_max)
     each = []
     for patch in patches:
         if patch.heights.size <= LARGE:
             each.append(ScaleRoughness.of(patch.heights, patch.pixel_size))
-        else:  # whose transform would take ten times its memory
-            width = _PART * min(patch.pixel_size)
-            each.append(ScaleRoughness.mean(Windows([patch], width).roughness()))
+        else:
+            each.append(ScaleRoughness.mean(_parts(Windows([patch], math.inf)).roughness()))
     return ScaleRoughness.mean(each).table(q_max)
+
+
+def _parts(windows: Windows) -> Windows:
+    """Windows of at most so many points, whose transforms take ten times their memory."""
+    if max(windows.shape) <= _PART:
+        return windows
+    return Windows(windows.scans, _PART * min(windows.scans[0].pixel_size))
 
 
 def _variation(patches: Sequence[HeightField]) -> float:

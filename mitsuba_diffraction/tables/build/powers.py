@@ -18,7 +18,7 @@ from .spectrum import Spectrum
 from .windows import Windows
 
 #: Bytes of sums that a batch of windows gives at once: of several κ, for which it is read once.
-_GROUP = 2**27
+_GROUP = 2**26
 
 
 @dataclass

@@ -142,8 +142,9 @@ class Windows(Sequence[HeightField]):
         scan, top, left = self._places[n]
         ny, nx = self.shape
         heights = scan.heights[top : top + ny, left : left + nx].copy()
-        raw = HeightField(heights, scan.pixel_size)
-        slopes, (dx, dy) = plane_of(raw), scan.pixel_size
+        heights.setflags(write=False)  # so that it is not copied once more
+        slopes, (dx, dy) = plane_of(HeightField(heights, scan.pixel_size)), scan.pixel_size
+        heights.setflags(write=True)
         # A tilt turns the mirror direction; an axis of one window is periodic, and its own
         if self.tapers[1] is not None:
             heights -= slopes[0] * dx * np.arange(nx)

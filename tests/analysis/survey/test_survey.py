@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction import DiffractionError, HeightField
+from mitsuba_diffraction import DiffractionError, HeightField, gratings
 from mitsuba_diffraction.analysis.maps import Bands, BrdfMap, Light
 from mitsuba_diffraction.analysis.survey import (
     Treatment,
@@ -133,6 +133,24 @@ def test_treatments_are_those_of_all_patterns_that_match(tmp_path):
 def test_treatments_that_are_none_are_one_line(tmp_path, text):
     with pytest.raises(DiffractionError, match=r"treatments\.toml"):
         treatments_of(_toml(tmp_path, text))
+
+
+def test_a_disc_is_more_iridescent_than_a_scale_and_both_than_a_mirror(tmp_path):
+    made = {
+        "mirror": np.zeros((160, 160)), "scale": gratings.elaphe_like(20.0, 160).heights,
+        "disc": gratings.cd(20.0, 160).heights,
+    }  # fmt: skip
+    for name, heights in made.items():
+        np.save(tmp_path / f"{name}.npy", heights)
+    options = treatments_of(_toml(tmp_path, '["*.npy"]\npixel_size = 0.125\n'))
+    rows = run_survey(
+        [tmp_path / f"{name}.npy" for name in made], tmp_path / "out", treatments=options,
+        own=Treatment(settings={"coherence_width": 20.0, "tolerance": 0.05}), resolution=32,
+    )  # fmt: skip
+    assert [row["reason"] for row in rows] == ["", "", ""]
+    mirror, scale, disc = (row["iridescence"] for row in rows)
+    assert mirror < 0.2 * scale  # a lobe of 20 µm is wider in red light
+    assert scale < disc
 
 
 def _map(spectrum, n=32):

@@ -220,9 +220,7 @@ def test_signalling_not_a_numbers_are_one_clear_line(tmp_path):
     assert "\n" not in str(caught.value)
 
 
-@settings(
-    max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.sampled_from(HEADS), st.binary(max_size=200), st.sampled_from([".png", ".exr", ".x"]))
 def test_random_bytes_are_one_clear_line(tmp_path, head, tail, suffix):
     path = tmp_path / f"a{suffix}"
@@ -246,9 +244,7 @@ def samples(tmp_path_factory):
     return folder
 
 
-@settings(
-    max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_damaged_files_load_or_are_one_clear_line(samples, tmp_path, data):
     name = data.draw(st.sampled_from(["a.png", "a.bmp", "a.tif", "a.exr", "a.npy"]))

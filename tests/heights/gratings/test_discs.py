@@ -119,7 +119,7 @@ def test_irregularity_stays_small(make):
     assert field.heights.max() < depth + rough
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     make=st.sampled_from(list(STANDARD)),
     extent=st.floats(4, 12) | st.tuples(st.floats(4, 12), st.floats(4, 12)),

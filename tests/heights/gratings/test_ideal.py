@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import jv
 
@@ -99,7 +99,6 @@ def test_parameters_that_do_not_fit_are_named(make, word):
 anything = st.one_of(st.none(), st.integers(), st.floats(), st.text(max_size=5), st.booleans())
 
 
-@settings(deadline=None)  # the machine may be busy
 @given(
     make=st.sampled_from([sinusoidal, blazed, lamellar]),
     period=anything,

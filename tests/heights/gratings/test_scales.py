@@ -233,7 +233,7 @@ def test_extremes_work():
             assert math.isfinite(make(**arguments).rms_slope)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     make=st.sampled_from(list(MAKERS.values())),
     extent=st.floats(2, 12) | st.tuples(st.floats(2, 12), st.floats(2, 12)),

@@ -81,3 +81,9 @@ def test_a_start_that_is_the_solution_is_left_as_it_is():
     heights[1, 2:] = np.nan
     filled, _ = fill_missing(heights, "harmonic", "two gaps")
     assert np.array_equal(filled, np.ones((2, 4)))
+
+
+def test_infinite_heights_are_left_to_be_refused():
+    heights = np.ones((2, 5))
+    heights[0, 3:] = np.nan, np.inf
+    assert fill_missing(heights, "harmonic", "patch")[0] is heights

@@ -353,6 +353,28 @@ def test_an_old_driver_is_refused_with_what_it_is() -> None:
         check_version(old)
 
 
+def test_a_driver_with_small_textures_is_refused() -> None:
+    info = {"GL_RENDERER": "Tiny", "GL_MAX_TEXTURE_SIZE": 1024}
+    with pytest.raises(DiffractionError, match=r"Tiny has textures of 1024 .* need 4096"):
+        check_version(types.SimpleNamespace(version_code=330, info=info))
+
+
+def test_a_mesh_without_texture_coordinates_is_refused(
+    gl: Any, some_variant: str, table_file: Path, tmp_path: Path
+) -> None:
+    mesh = mi.Mesh("flake", 3, 1)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = np.array([0.0, 0, 0, 1, 0, 0, 0, 1, 0])
+    parameters["faces"] = np.arange(3)
+    parameters.update()
+    mesh.write_ply(str(tmp_path / "flake.ply"))
+    flake = {"type": "ply", "filename": str(tmp_path / "flake.ply")}
+    skin = {"type": "diffraction", "table": str(table_file)}
+    scene = {"type": "scene", "sensor": sensor(), "flake": {**flake, "bsdf": skin}}
+    with pytest.raises(DiffractionError, match="flake: the mesh has no texture coordinates"):
+        Renderer(mi.load_dict(scene), context=gl)
+
+
 def test_a_missing_driver_is_one_line_that_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

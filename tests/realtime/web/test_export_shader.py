@@ -276,6 +276,14 @@ def test_unknown_methods_are_refused_with_the_choices(scene: Any, methods: list[
         make_shader(bsdf, methods)
 
 
+def test_what_shaders_do_not_know_is_refused(scene: Any) -> None:
+    import mitsuba as mi
+
+    filmed = md.bsdf_dict(GRATING, coherence_width=6, int_ior=1.5, film_ior=1.8, film_thickness=90)
+    with pytest.raises(DiffractionError, match="a thin film, which shaders do not know"):
+        make_shader(mi.load_dict(filmed))
+
+
 def test_only_what_diffracts_has_a_shader(scene: Any) -> None:
     import mitsuba as mi
 

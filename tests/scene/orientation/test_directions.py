@@ -162,7 +162,7 @@ def test_what_is_oriented_is_usable_and_reads_back(tmp_path: Path) -> None:
     st.sampled_from(GUIDES),
     st.booleans(),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_any_triangles_get_a_finite_field_or_are_refused(faces, seed, along, own_uv):
     rng = np.random.default_rng(seed)
     positions = rng.normal(size=(8, 3))

@@ -140,7 +140,7 @@ def test_a_refused_mesh_leaves_later_scenes_alone(tmp_path: Path, some_variant: 
 
 
 @given(st.binary(max_size=300))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_any_bytes_after_a_ply_header_are_read_or_refused(
     tmp_path_factory: pytest.TempPathFactory, content: bytes
 ) -> None:

@@ -176,7 +176,7 @@ EIGHT_FUNCTIONS = {
 }
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.floats(0.0, 0.5), st.integers(2, 17), st.integers(2, 17), parameters)
 # four functions of a series of six do not suffice, and eight are more than it has
 @example(0.109375, 3, 3, EIGHT_FUNCTIONS)

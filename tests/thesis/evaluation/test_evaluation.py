@@ -56,7 +56,7 @@ def test_the_blazed_grating_follows_the_grating_equation(of_blazed, name):
     assert fit.points == len(WAVELENGTHS)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     st.floats(0.8, 3.0),
     st.floats(0.0, 75.0),

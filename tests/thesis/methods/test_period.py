@@ -14,7 +14,7 @@ from tests.directions import rough_patch
 from tests.thesis.methods.conftest import WIDTH
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(0.5, 5.0), st.sampled_from(["x", "y"]))
 def test_the_period_of_a_grating_is_found(length, axis):
     patch = gratings.blazed(length, 0.2, periods=6, axis=axis)

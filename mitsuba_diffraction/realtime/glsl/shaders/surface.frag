@@ -94,6 +94,9 @@ vec3 bumped(vec3 n)
 
 #endif
 
+// A place in a picture whose edges go on beyond it.
+vec2 within(vec2 place, vec2 size) { return clamp(place, 0.5 / size, 1.0 - 0.5 / size); }
+
 void main()
 {
     vec3 n = normalize(v_normal);
@@ -120,11 +123,19 @@ void main()
 
     vec3 pigment = v_colour;
 #ifdef COLOUR_MAPPED
-    pigment = texture(colour_map, (colour_uv * vec3(v_texcoord, 1.0)).xy).rgb;
+    vec2 of_colour = (colour_uv * vec3(v_texcoord, 1.0)).xy;
+#ifdef COLOUR_CLAMPED
+    of_colour = within(of_colour, vec2(textureSize(colour_map, 0)));
+#endif
+    pigment = texture(colour_map, of_colour).rgb;
 #endif
     vec2 rotation = v_axis;
 #ifdef AXIS_MAPPED
-    rotation = texture(axis_map, (axis_uv * vec3(v_texcoord, 1.0)).xy).rg;
+    vec2 of_axis = (axis_uv * vec3(v_texcoord, 1.0)).xy;
+#ifdef AXIS_CLAMPED
+    of_axis = within(of_axis, vec2(textureSize(axis_map, 0)));
+#endif
+    rotation = texture(axis_map, of_axis).rg;
 #endif
     float turned = length(rotation);
     rotation = turned > 1e-6 ? rotation / turned : vec2(1.0, 0.0);

@@ -78,8 +78,8 @@ class Camera {
     return [upright * aspect, upright, half < across ? middle : 0];
   }
 
-  // From world to clip space; `jitter` shifts the picture, in units of half of it.
-  projection(aspect, free, jitter) {
+  // From world to clip space; `jitter` shifts the picture, in units of half of it, and so does `lift`.
+  projection(aspect, free, jitter, lift) {
     const toCamera = inverse(this.matrix);
     const [low, high] = this.box;
     const depths = [0, 1, 2, 3, 4, 5, 6, 7].map(
@@ -91,7 +91,7 @@ class Camera {
     const [right, down] = this.described.offset;
     return product([
       [-1 / x, 0, 2 * right + jitter[0] + free - 1 - middle / x, 0],
-      [0, 1 / y, -2 * down + jitter[1], 0],
+      [0, 1 / y, -2 * down + jitter[1] + lift, 0],
       [0, 0, (far + near) / (far - near), (-2 * far * near) / (far - near)],
       [0, 0, 1, 0],
     ], toCamera);

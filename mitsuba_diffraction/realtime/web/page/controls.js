@@ -113,15 +113,18 @@ class Controls {
     setTimeout(() => element("hint").classList.add("gone"), 2000);
   }
 
-  // The picture is beside the panel where there is room.
+  // The picture is beside the panel where there is room, above it where that is a sheet.
   arrange() {
     const { viewer } = this;
-    const panel = element("panel").offsetWidth + 12, whole = viewer.canvas.clientWidth;
-    const beside = panel > 100 && whole > 2 * panel;
-    const free = beside ? 1 - panel / whole : 1;
+    const { clientWidth: whole, clientHeight: high } = viewer.canvas;
+    const { offsetWidth: wide, offsetHeight: tall } = element("panel");
+    const open = !document.body.matches(".folded, .bare");
+    const sheet = open && wide === whole;
+    const free = open && !sheet && whole > 2 * wide + 24 ? 1 - (wide + 12) / whole : 1;
+    const lift = sheet ? tall / high : 0;
     viewer.fit();
-    if (free === viewer.free) return;
-    viewer.free = free;
+    if (free === viewer.free && lift === viewer.lift) return;
+    Object.assign(viewer, { free, lift });
     viewer.touch();
   }
 

@@ -166,7 +166,7 @@ class Drawing {
     const whole = header.shown.vertex;
     drawing.add = new Program(gl, whole, ADD);
     drawing.shown = new Program(gl, whole, header.shown.fragment);
-    drawing.shadows = { fine: new ShadowMap(gl, header, 1024), coarse: new ShadowMap(gl, header, 256) };
+    drawing.shadows = { fine: new ShadowMap(gl, header, 2048), coarse: new ShadowMap(gl, header, 256) };
     drawing.empty = gl.createVertexArray();
     return drawing;
   }

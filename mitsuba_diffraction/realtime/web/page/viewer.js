@@ -26,6 +26,7 @@ class Viewer {
     this.exposure = 1;
     this.heights = 1;
     this.free = 1;        // share of the width that the panel leaves
+    this.lift = 0;        // share of the height that it takes, as a sheet below
     this.most = undefined; // samples, where the default is not wanted
     this.count = 0;       // samples in the sums
     this.steps = 8;       // of one sample, from the bottom up
@@ -106,7 +107,7 @@ class Viewer {
 
   // What does not depend on the light.
   viewed(jitter = [0, 0]) {
-    const matrix = this.camera.projection(this.drawing.width / this.drawing.height, this.free, jitter);
+    const matrix = this.camera.projection(this.drawing.width / this.drawing.height, this.free, jitter, this.lift);
     const uniforms = { view_projection: columnMajor(matrix), eye: this.camera.eye, view_axis: [0, 0, 0], exposure: 1 };
     if (this.wavelength !== null) uniforms.wavenumber = (2e3 * Math.PI) / this.wavelength;
     return { matrix, method: this.drawn, heights: this.heights, uniforms };

@@ -1,0 +1,16 @@
+// Sums of two kinds of frames as one picture, with the transfer curve of sRGB.
+
+uniform sampler2D first;
+uniform sampler2D second;
+uniform vec2 weights;        // one over the number of frames of either kind
+uniform float exposure;      // factor
+
+out vec4 fragment;
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    vec3 light = weights.x * texelFetch(first, pixel, 0).rgb
+               + weights.y * texelFetch(second, pixel, 0).rgb;
+    fragment = vec4(encode_srgb(exposure * light), 1.0);
+}
