@@ -201,6 +201,7 @@ from .boundary import Boundary, Kirchhoff
 from .changing import Bounded, arrays_within, marks
 from .coat import CoatedPair
 from .energy import EnergyModel
+from .film import UnderFilm
 from .height_scale import LEAST_SCALE, Varying
 from .layers import Transmission
 from .llvm import require_loaded_llvm
@@ -467,6 +468,10 @@ class Diffraction(mi.BSDF):
         """What it has that only the path tracer shows."""
         if self.places is not None:
             return "coherence='surface'"
+        if self.through is not None:
+            return "light that goes through"
+        if isinstance(self.fresnel, UnderFilm):
+            return "a thin film"
         return "a height_scale that varies" if self._varying else None
 
     @property
