@@ -10,8 +10,6 @@ mirrors leave it. Light that the structure sends beyond the sheet's critical ang
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import drjit as dr
 import mitsuba as mi
 
@@ -25,6 +23,7 @@ from .fresnel import root, squared
 from .pair import Pair, Place, from_patch
 from .reflectance import Dielectric, Inside
 from .roles import (
+    BSDF,
     Context,
     Float,
     Interaction,
@@ -36,9 +35,6 @@ from .roles import (
     Vector3f,
 )
 from .sampling import EVEN, direction_of, with_even_share
-
-if TYPE_CHECKING:
-    from .bsdf import Diffraction
 
 _LEAST_SHARE = 0.1
 #: Of a dielectric over the medium above it.
@@ -94,7 +90,7 @@ class Through:
         return [mi.BSDFFlags.GlossyReflection | sides, through]
 
     def eval_pdf(
-        self, bsdf: Diffraction, ctx: Context, si: Interaction, wo: Vector3f, active: Mask
+        self, bsdf: BSDF, ctx: Context, si: Interaction, wo: Vector3f, active: Mask
     ) -> tuple[Spectrum, Float]:
         """`eval` and `pdf` of the BSDF."""
         cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
@@ -121,7 +117,7 @@ class Through:
 
     def sample(
         self,
-        bsdf: Diffraction,
+        bsdf: BSDF,
         ctx: Context,
         si: Interaction,
         sample1: Float,
@@ -171,7 +167,7 @@ class Through:
 
     def _reflected(
         self,
-        bsdf: Diffraction,
+        bsdf: BSDF,
         ctx: Context,
         si: Interaction,
         wo: Vector3f,
@@ -202,7 +198,7 @@ class Through:
         density = bsdf.power.density(inner, scale * n, si) * dr.square(n)
         return value, with_even_share(density)
 
-    def _returned(self, bsdf: Diffraction, si: Interaction, pair: Pair, scale: Float) -> Spectrum:
+    def _returned(self, bsdf: BSDF, si: Interaction, pair: Pair, scale: Float) -> Spectrum:
         """f·cosθo of what the flat side of a sheet sends back through the structure."""
         n = self.material.eta
         ends, kept = [], []
@@ -216,9 +212,7 @@ class Through:
         factor = bsdf.area_factor * dr.safe_sqrt(kept[0] * kept[1]) * pair.cos_o
         return mi.depolarizer(power * factor)
 
-    def _passed(
-        self, bsdf: Diffraction, ctx: Context, si: Interaction, crossing: Crossing
-    ) -> Spectrum:
+    def _passed(self, bsdf: BSDF, ctx: Context, si: Interaction, crossing: Crossing) -> Spectrum:
         """BSDF of light that goes through, as the mode of transport has it."""
         place, scale = crossing.place, bsdf.scale_at(si, crossing.active)
         power = bsdf.power.power(place, scale, si)
@@ -235,7 +229,7 @@ class Through:
         return mi.Spectrum(dr.select(crossing.active, power * outside, 0.0)) * factor
 
     def _matrices(
-        self, bsdf: Diffraction, si: Interaction, crossing: Crossing, scale: Float
+        self, bsdf: BSDF, si: Interaction, crossing: Crossing, scale: Float
     ) -> list[Jones]:
         """2 cosθi cosθt times the Jones matrices of light from above, of each channel or of all."""
         axes = _axes(-crossing.above, crossing.inside)
