@@ -181,6 +181,10 @@ class _Path:
                 ends, cosines = ends[::-1], cosines[::-1]
             self._coat = tuple(transmittances(cosine, pair.n) for cosine in cosines)
             self._frames = (-ends[0], ends[1])
+        self._above = pair.outer.above
+        if not self._above:
+            side = mi.Vector3f(1.0, 1.0, -1.0)
+            self._frames = tuple(direction * side for direction in self._frames)
         cosines = (pair.cos_i, pair.cos_o)
         self._q0, self._q = cosines if forwards else cosines[::-1]
         self._cos_half, self._one_plus_dot, self._w = pair.cos_half, pair.one_plus_dot, pair.w
@@ -294,13 +298,11 @@ class _Path:
         return squared(r_s), squared(r_p)
 
     def _mueller(self, matrices: list[Jones]) -> Spectrum:
-        incident, outgoing = self._frames
-        before = turn(self._axis(incident), mi.mueller.stokes_basis(incident), incident)
-        after = turn(mi.mueller.stokes_basis(outgoing), self._axis(outgoing), outgoing)
-        entries = [_mueller(turned(jones, after, before)) for jones in matrices]
-        if len(entries) == 1:
-            return mi.Spectrum(*entries[0])
-        return mi.Spectrum(*(mi.UnpolarizedSpectrum(list(x)) for x in zip(*entries, strict=True)))
+        if not self._above:  # turned over, p points the other way
+            matrices = [(ss, -sp, -ps, pp) for ss, sp, ps, pp in matrices]
+        return mueller(
+            matrices, self._frames, (self._axis(self._frames[0]), self._axis(self._frames[1]))
+        )
 
     def _axis(self, direction: Vector3f) -> Vector3f:
         """s of light along a direction; of the other's where it is the normal, y where both are."""
@@ -324,6 +326,21 @@ def turned(jones: Jones, out: tuple[Float, Float], into: tuple[Float, Float]) ->
     (c, s), (c0, s0) = out, into
     ss, sp, ps, pp = ss * c + ps * s, sp * c + pp * s, ps * c - ss * s, pp * c - sp * s
     return ss * c0 - sp * s0, ss * s0 + sp * c0, ps * c0 - pp * s0, ps * s0 + pp * c0
+
+
+def mueller(
+    matrices: list[Jones], light: tuple[Vector3f, Vector3f], axes: tuple[Vector3f, Vector3f]
+) -> Spectrum:
+    """Mueller matrices between Mitsuba's bases of light along two directions, for each channel.
+
+    axes : s of both, which the Jones matrices are about.
+    """
+    before = turn(axes[0], mi.mueller.stokes_basis(light[0]), light[0])
+    after = turn(mi.mueller.stokes_basis(light[1]), axes[1], light[1])
+    entries = [_mueller(turned(jones, after, before)) for jones in matrices]
+    if len(entries) == 1:
+        return mi.Spectrum(*entries[0])
+    return mi.Spectrum(*(mi.UnpolarizedSpectrum(list(x)) for x in zip(*entries, strict=True)))
 
 
 def _mueller(jones: Jones) -> list[Float]:

@@ -104,9 +104,9 @@ transmission : boolean [false]
     Light goes through the dielectric, from both sides: orders of κ = k (n cosθt − cosθi). The side
     that normals point to has ext_ior, the other one int_ior, which is at least 1.01 times that.
     Component 0 is what is reflected, 1 what goes through. Orders that change the tangential part by
-    more than 2/λ are left out. It excludes coat, film, nested BSDF, shadowing and polarised
-    variants. energy_conserving divides all by the largest R + T within 75° of the normal, at a few
-    directions and wavelengths: a second's work, in steps of 0.01 of height_scale and eta.
+    more than 2/λ are left out. It excludes coat, film, nested BSDF and shadowing. energy_conserving
+    divides all by the largest R + T within 75° of the normal, at a few directions and wavelengths:
+    a second's work, in steps of 0.01 of height_scale and eta.
 thin : boolean [false]
     Light goes through a sheet, whose other side is flat; both sides have ext_ior. What that side
     sends back is summed as between two mirrors; light beyond the sheet's critical angle is lost.
@@ -201,6 +201,7 @@ from .boundary import Boundary, Kirchhoff
 from .changing import Bounded, arrays_within, marks
 from .coat import CoatedPair
 from .energy import EnergyModel
+from .film import UnderFilm
 from .height_scale import LEAST_SCALE, Varying
 from .layers import Transmission
 from .llvm import require_loaded_llvm
@@ -467,6 +468,10 @@ class Diffraction(mi.BSDF):
         """What it has that only the path tracer shows."""
         if self.places is not None:
             return "coherence='surface'"
+        if self.through is not None:
+            return "light that goes through"
+        if isinstance(self.fresnel, UnderFilm):
+            return "a thin film"
         return "a height_scale that varies" if self._varying else None
 
     @property

@@ -22,6 +22,8 @@ class Turned(Pair):
     n : optical index of the medium that both are in.
     """
 
+    above = False
+
     def __init__(self, si: Interaction, wo: Vector3f, rotation: Rotation, active: Mask, n: Float):
         side = mi.Vector3f(1.0, 1.0, -1.0)
         turned = mi.SurfaceInteraction3f(si)

@@ -26,7 +26,10 @@ class Pair:
     uv : tangential part of ωi + ωo, in the patch's frame.
     w : its normal part.
     one_plus_dot : 1 + ωi·ωo.
+    above : whether they are; else they are those below, turned over.
     """
+
+    above = True
 
     def __init__(self, si: Interaction, wo: Vector3f, rotation: Rotation, active: Mask) -> None:
         self.wi, self.wo, self._rotation = si.wi, wo, rotation

@@ -322,8 +322,6 @@ def _passing(props: Properties, material: Reflectance) -> Dielectric | None:
             f"{name}=true needs int_ior at least {LEAST_INDEX:g} times ext_ior; turn the surface "
             "round where the denser medium is above"
         )
-    if mi.is_polarized:
-        raise DiffractionError(f"{name}=true has no Mueller matrices; take a variant without")
     excluded = [
         *(f"{one}_ior" for one in ("coat", "film") if f"{one}_ior" in props),
         *("a nested BSDF" for _, value in props.objects() if isinstance(value, mi.BSDF)),

@@ -10,14 +10,12 @@ mirrors leave it. Light that the structure sends beyond the sheet's critical ang
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import drjit as dr
 import mitsuba as mi
 
 from ..tables.energy.sides import largest_sum
 from ..tables.table import DiffractionTable
-from .boundary import LEVEL, Boundary, Jones, Kirchhoff, SmallSlope, turn, turned
+from .boundary import LEVEL, Boundary, Jones, Kirchhoff, SmallSlope, mueller, turn, turned
 from .coat import CoatedPair, transmittances
 from .crossing import Crossing, Sides, Turned
 from .film import plain
@@ -25,6 +23,7 @@ from .fresnel import root, squared
 from .pair import Pair, Place, from_patch
 from .reflectance import Dielectric, Inside
 from .roles import (
+    BSDF,
     Context,
     Float,
     Interaction,
@@ -36,9 +35,6 @@ from .roles import (
     Vector3f,
 )
 from .sampling import EVEN, direction_of, with_even_share
-
-if TYPE_CHECKING:
-    from .bsdf import Diffraction
 
 _LEAST_SHARE = 0.1
 #: Of a dielectric over the medium above it.
@@ -94,7 +90,7 @@ class Through:
         return [mi.BSDFFlags.GlossyReflection | sides, through]
 
     def eval_pdf(
-        self, bsdf: Diffraction, ctx: Context, si: Interaction, wo: Vector3f, active: Mask
+        self, bsdf: BSDF, ctx: Context, si: Interaction, wo: Vector3f, active: Mask
     ) -> tuple[Spectrum, Float]:
         """`eval` and `pdf` of the BSDF."""
         cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
@@ -121,7 +117,7 @@ class Through:
 
     def sample(
         self,
-        bsdf: Diffraction,
+        bsdf: BSDF,
         ctx: Context,
         si: Interaction,
         sample1: Float,
@@ -171,7 +167,7 @@ class Through:
 
     def _reflected(
         self,
-        bsdf: Diffraction,
+        bsdf: BSDF,
         ctx: Context,
         si: Interaction,
         wo: Vector3f,
@@ -202,7 +198,7 @@ class Through:
         density = bsdf.power.density(inner, scale * n, si) * dr.square(n)
         return value, with_even_share(density)
 
-    def _returned(self, bsdf: Diffraction, si: Interaction, pair: Pair, scale: Float) -> Spectrum:
+    def _returned(self, bsdf: BSDF, si: Interaction, pair: Pair, scale: Float) -> Spectrum:
         """f·cosθo of what the flat side of a sheet sends back through the structure."""
         n = self.material.eta
         ends, kept = [], []
@@ -214,18 +210,13 @@ class Through:
         place = Place(pair.uv, dr.sqrt(dr.fma(ends[0], ends[0], dr.square(ends[1]))))
         power = bsdf.power.power(place, scale, si)
         factor = bsdf.area_factor * dr.safe_sqrt(kept[0] * kept[1]) * pair.cos_o
-        return mi.Spectrum(power * factor)
+        return mi.depolarizer(power * factor)
 
-    def _passed(
-        self, bsdf: Diffraction, ctx: Context, si: Interaction, crossing: Crossing
-    ) -> Spectrum:
+    def _passed(self, bsdf: BSDF, ctx: Context, si: Interaction, crossing: Crossing) -> Spectrum:
         """BSDF of light that goes through, as the mode of transport has it."""
         place, scale = crossing.place, bsdf.scale_at(si, crossing.active)
         power = bsdf.power.power(place, scale, si)
-        factors = [
-            self._power(crossing, jones) for jones in self._matrices(bsdf, si, crossing, scale)
-        ]
-        factor = mi.UnpolarizedSpectrum(factors if len(factors) > 1 else factors[0])
+        factor = self._factor(ctx, si, crossing, self._matrices(bsdf, si, crossing, scale))
         outside = bsdf.area_factor * crossing.n * dr.rcp(dr.square(place.w) * crossing.q0)
         outside *= dr.rcp(-crossing.inside.z)
         if not self.thin:
@@ -235,10 +226,10 @@ class Through:
             if ctx.mode == mi.TransportMode.Importance:
                 scales = scales[::-1]
             outside *= dr.select(down, *scales)
-        return mi.Spectrum(dr.select(crossing.active, power * factor * outside, 0.0))
+        return mi.Spectrum(dr.select(crossing.active, power * outside, 0.0)) * factor
 
     def _matrices(
-        self, bsdf: Diffraction, si: Interaction, crossing: Crossing, scale: Float
+        self, bsdf: BSDF, si: Interaction, crossing: Crossing, scale: Float
     ) -> list[Jones]:
         """2 cosθi cosθt times the Jones matrices of light from above, of each channel or of all."""
         axes = _axes(-crossing.above, crossing.inside)
@@ -254,19 +245,31 @@ class Through:
             for share in shares
         ]
 
-    def _power(self, crossing: Crossing, jones: Jones) -> Float:
-        """½ Σ|J|², out of the flat side of a sheet (`optics.through.out_of_sheet`)."""
-        powers = [squared(entry) for entry in jones]
+    def _factor(
+        self, ctx: Context, si: Interaction, crossing: Crossing, matrices: list[Jones]
+    ) -> Spectrum:
+        """½ Σ|J|², or Mueller matrices, for each channel; out of the flat side of a sheet."""
         if self.thin:
-            left, came = (
-                transmittances(cosine, crossing.n)
-                for cosine in (-crossing.below.z, crossing.above.z)
-            )
-            weights = [
-                t * dr.rcp(dr.fma(-(1.0 - t), 1.0 - other, 1.0)) for t in left for other in came
-            ]
-            powers = [p * w for p, w in zip(powers, weights, strict=True)]
-        return 0.5 * sum(powers[1:], powers[0])
+            matrices = [_out_of_sheet(jones, crossing) for jones in matrices]
+        if not mi.is_polarized:
+            powers = [0.5 * sum(map(squared, jones)) for jones in matrices]
+            return mi.UnpolarizedSpectrum(powers if len(powers) > 1 else powers[0])
+        # light that goes up is that which goes down, reversed: with other s, so other signs
+        importance = ctx.mode == mi.TransportMode.Importance
+        falls = (mi.Frame3f.cos_theta(si.wi) > 0.0) == mi.Mask(importance)
+        ends = -crossing.above, crossing.below
+        axes = _axes(-crossing.above, crossing.inside)
+        light = tuple(
+            dr.select(falls, *both) for both in ((ends[0], -ends[1]), (ends[1], -ends[0]))
+        )
+        about = tuple(
+            dr.select(falls, *both) for both in ((axes[0], -axes[1]), (axes[1], -axes[0]))
+        )
+        turned_round = [
+            (ss, dr.select(falls, sp, -ps), dr.select(falls, ps, -sp), pp)
+            for ss, sp, ps, pp in matrices
+        ]
+        return mueller(turned_round, light, about)
 
     def _share(
         self, cos_i: Float, si: Interaction, active: Mask, reflects: bool, passes: bool
@@ -300,6 +303,15 @@ def _axes(came: Vector3f, left: Vector3f) -> tuple[Vector3f, Vector3f]:
     (is_came, s_came), (is_left, s_left) = found
     s_came = dr.select(is_came, s_came, dr.select(is_left, s_left, mi.Vector3f(0.0, 1.0, 0.0)))
     return s_came, dr.select(is_left, s_left, s_came)
+
+
+def _out_of_sheet(jones: Jones, crossing: Crossing) -> Jones:
+    """See `optics.through.out_of_sheet`."""
+    left, came = (
+        transmittances(cosine, crossing.n) for cosine in (-crossing.below.z, crossing.above.z)
+    )
+    shares = [t * dr.rcp(dr.fma(-(1.0 - t), 1.0 - other, 1.0)) for t in left for other in came]
+    return tuple(entry * dr.sqrt(share) for entry, share in zip(jones, shares, strict=True))
 
 
 def _first_order(crossing: Crossing, axes: tuple[Vector3f, Vector3f], thin: bool) -> Jones:

@@ -129,6 +129,57 @@ def test_a_flat_patch_s_specular_light_is_mitsuba_s(polarised, ours, theirs, mod
         assert found[0] == pytest.approx(weight, abs=1e-4)
 
 
+@pytest.mark.parametrize("mode", ["Radiance", "Importance"])
+@pytest.mark.parametrize("theta", [30.0, 56.0, 75.0, 150.0, 120.0])
+def test_through_a_flat_dielectric_specular_light_is_mitsuba_s(polarised, mode, theta):
+    flat, n = md.HeightField(np.zeros((40, 40)), 0.08), {"int_ior": 1.5, "ext_ior": 1.0}
+    mode = getattr(mi.TransportMode, mode)
+    smooth, bsdf = mi.load_dict({"type": "dielectric", **n}), load(flat, transmission=True, **n)
+    wi, scalar = as_single(polar(theta, 70.0))[None], not dr.is_jit_v(mi.Float)
+    si = interaction(wi[0], LAM) if scalar else interaction(wi, LAM[None])
+    for component in (0, 1):
+        context = mi.BSDFContext(mode)
+        context.component = component
+        sample, weight = smooth.sample(context, si, 0.5, mi.Point2f(0.5))
+        wo = as_single(np.array(sample.wo, float).reshape(1, 3))
+        expected = np.moveaxis(np.array(weight, float).reshape(4, 4, 4), 2, 0)
+        if not expected.any():  # reflected totally
+            continue
+        found = matrices(bsdf, wi, wo, mode)[0]
+        assert found / found[:, :1, :1] == pytest.approx(expected / expected[:, :1, :1], abs=2e-4)
+
+
+@pytest.mark.parametrize("sides", [{"transmission": True}, {"thin": True}])
+def test_light_that_goes_through_reversed_has_the_transposed_matrix(polarised, sides):
+    wi, wo = pairs()
+    wo = as_single(wo * [1, 1, -1])
+    bsdf = load(int_ior=1.5, ext_ior=1.0, **sides)
+    there = matrices(bsdf, wi, wo) / -wo[:, None, 2, None, None]
+    back = matrices(bsdf, wo, wi) / wi[:, None, 2, None, None]
+    back = back / (1.0 if "thin" in sides else 2.25)  # radiance in the dielectric
+    after = rotation(bases(wo), bases(-wo), wo)[:, None]
+    before = rotation(bases(-wi), bases(wi), -wi)[:, None]
+    expected = REVERSAL @ there.swapaxes(-1, -2) @ REVERSAL
+    found = after @ back @ before
+    assert found == pytest.approx(expected, rel=1e-4, abs=1e-5 * np.abs(there).max())
+
+
+@pytest.mark.parametrize("sides", [{"transmission": True}, {"thin": True}])
+def test_the_first_entry_of_light_on_all_sides_is_that_of_unpolarised_variants(polarised, sides):
+    wi, wo = pairs()
+    turned = [1, 1, -1]
+    cases = [(wi, wo * turned), (wi * turned, wo), (wi * turned, wo * turned), (wi, wo)]
+    cases = [(as_single(a), as_single(b)) for a, b in cases]
+    given = {"int_ior": 1.5, "ext_ior": 1.0, **sides}
+    found = [matrices(load(**given), *case)[..., 0, 0] for case in cases]
+    mi.set_variant(mi.variant().removesuffix("_polarized"))
+    bsdf, lam = load(**given), np.tile(LAM, (len(wi), 1))
+    for one, (there, back) in zip(found, cases, strict=True):
+        si = interaction(there, lam)
+        expected = np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(back.T)), float).T
+        assert one == pytest.approx(expected, rel=1e-4, abs=1e-6 * expected.max())
+
+
 @pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
 def test_reversed_light_has_the_transposed_matrix(polarised, model):
     wi, wo = pairs()

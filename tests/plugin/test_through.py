@@ -17,7 +17,7 @@ from tests.lanes import evaluated, interaction, refusal, spectra, vectors
 from tests.plugin import test_chi2
 from tests.plugin.conftest import runs
 from tests.plugin.test_chi2 import SMALL, Case, chi_square
-from tests.plugin.test_coat import FLAT, load
+from tests.plugin.test_coat import load
 from tests.plugin.test_model import PATCH, WIDTH, pairs
 from tests.plugin.test_variants import evaluate
 
@@ -241,8 +241,3 @@ def test_derivatives_are_those_of_differences(some_variant, kind, name, at, step
 )
 def test_what_cannot_be_is_one_line(some_variant, parameters, line):
     assert line in refusal(lambda: load(**parameters))
-
-
-def test_polarised_variants_are_refused():
-    mi.set_variant("scalar_spectral_polarized")
-    assert "no Mueller matrices" in refusal(lambda: load(FLAT, transmission=True))

@@ -18,7 +18,7 @@ from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...tables.store.cache import cached_colours
 from .maps import Map
-from .materials import Material, height_scale, is_filmed, pack_conservation, pack_surface
+from .materials import Material, height_scale, pack_conservation, pack_surface
 from .packing import pack_colours, pack_powers, pack_responses
 from .preprocess import global_names, renamed, resolved
 from .source import shader_file
@@ -120,8 +120,7 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
             f"bsdf={type(bsdf).__name__} does not diffract: give one of type 'diffraction', as "
             "mi.load_dict(md.bsdf_dict(...)) makes it"
         )
-    lacking = "a thin film" if is_filmed(bsdf.fresnel) else bsdf.only_traced
-    if lacking:
+    if lacking := bsdf.only_traced:
         raise DiffractionError(
             f"the surface has {lacking}, which shaders do not know: export it without, or render "
             "it with Mitsuba"

@@ -84,10 +84,6 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
         pigment = Map(np.zeros(3))
         if bsdf.nested is not None:
             pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)
-        if is_filmed(bsdf.fresnel):
-            omissions.append(f"the thin film of {name}")
-        if bsdf.through is not None:
-            omissions.append(f"light that goes through {name}")
         return Material(
             pigment, two_sided, bsdf, axis_map(bsdf.orientation), bumps=bumps, normals=normals
         )
@@ -160,8 +156,6 @@ def pack_surface(material: Material) -> Packed:
         definitions["COATED"] = ""
         uniforms["coat"] = coat_index(material)
         uniforms["channel_wavenumbers"] = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
-    elif is_filmed(surface):
-        surface = surface.material
     if isinstance(bsdf.boundary, SmallSlope):
         packed |= pack_roughness(material.table.roughness)
     return packed | _reflectance(surface)
@@ -228,13 +222,6 @@ def _is_bsdf(thing: Any) -> bool:
     import mitsuba as mi
 
     return isinstance(thing, mi.BSDF)
-
-
-def is_filmed(surface: Any) -> bool:
-    """Whether a thin film lies over the structure, which shaders do not know."""
-    from ...plugin.film import UnderFilm  # which only a variant has
-
-    return isinstance(surface, UnderFilm)
 
 
 def _diffracts(bsdf: Any) -> bool:
