@@ -9,6 +9,7 @@ methods                 the table of docs/methods.md
 speed, tradeoff         tables of what `bench` and `tradeoff` measured
 realtime, plan          tables of what `compare` and `plan` measured
 energy                  the table of what `info --energy` found
+cluster, wide           a film on workers; a scan of 16,384² points, whole and by windows
 parameters              the reference of the plugin's parameters, from its own docstring
 notebooks               notebooks, run anew
 albedo                  the plot of `info --albedo`

@@ -16,16 +16,18 @@ def compared(tmp_path):
         "pixels": 640, "share": 0.25, "delta_e_mean": 0.4567, "delta_e_percentiles": {"99": 3.21},
         "flip": 0.0213, "relative_rmse": None,
     }  # fmt: skip
+    noise = {"delta_e_mean": 0.28, "delta_e_99": 1.5}
+    whole = {"direct": found, "full": None, "noise": noise, "frame_ms": 250.0}
     entry = {
-        "diffracting": found, "both": {**found, "pixels": 900}, "frame_ms": 1234.5,
+        "whole": whole, "diffracting": found, "both": {**found, "pixels": 900}, "frame_ms": 1234.5,
         "fragment_ns": 35.2, "look_up_ns": 12.3, "texture_bytes": 2.1e7,
     }  # fmt: skip
     document = {
         "scene": "scenes/plate.xml", "size": [64, 40], "driver": "abacus",
-        "noise_delta_e_mean": 0.29,
+        "noise_delta_e_mean": 0.29, "whole_noise": noise, "frames": 512,
         "methods": {
             "lut": entry,
-            "spectral": {**entry, "both": {**found, "delta_e_mean": 0.321}},
+            "spectral": {**entry, "whole": {**whole, "direct": {**found, "delta_e_mean": 0.321}}},
             "flss": {**entry, "fragment_ns": 35200.0},
         },
     }  # fmt: skip
@@ -48,7 +50,7 @@ def test_table_and_sheet_are_replaced(compared, page):
     assert realtime.main([str(compared), "-o", str(page)]) == 0
     text = page.read_text("utf-8")
     assert "| `lut` | 0.46 | 3.21 | 0.021 |  | 1230 | 35.2 | 1000 | 12.3 | 21.0 |" in text
-    assert "| [plate](../scenes/plate.xml) | 0.46 | 3.21 | 0.32 | 3.21 | 0.29 | 900 |" in text
+    assert "| [plate](../scenes/plate.xml) | 0.46 | 3.21 | 0.28 | 0.32 | 3.21 | 0.28 | 0.28 | 1.50 |" in text
     assert "25 % of 64 × 40 pixels" in text
     assert "stale" not in text
     with Image.open(page.parent / realtime.SHEET) as image:
