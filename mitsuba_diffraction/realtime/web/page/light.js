@@ -7,6 +7,7 @@ const HORIZON = 0.68;
 const POWER = Math.log(HORIZON) / Math.log(0.5);
 const SUN = (0.267 * Math.PI) / 180; // radius of its disc
 const KINDS = { scene: "The scene's", sun: "Sun", lamp: "Lamp", window: "Window", sky: "Environment" };
+const FILL = 0.12; // of a light that is not the scene's, from a dome, so that shadows are not black
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
 const DARK = [0, 0, 0];
 
@@ -94,11 +95,11 @@ class Lights {
   // Few lights that look like all, and a smooth sky, while something moves.
   get few() {
     if (this.kind === "scene") return { lights: this.own, sky: this.sky };
-    if (this.kind === "sky") {
-      const mean = this.level / (2 * Math.PI); // of a white dome, E/π of a plane that faces it
-      return { lights: [], sky: [0.5, ...times(this.camera.up, 0.5)].flatMap((x) => [x, x, x].map((one) => 2 * one * mean)) };
-    }
-    return { lights: [this.made(-1)], sky: new Array(12).fill(0) };
+    const only = this.kind === "sky";
+    // of a white dome, E/π of a plane that faces it
+    const mean = ((only ? 1 : FILL) * this.level) / Math.PI;
+    const sky = [0.5, ...times(this.camera.up, 0.5)].flatMap((x) => [x, x, x].map((one) => one * mean));
+    return { lights: only ? [] : [this.made(-1)], sky };
   }
 
   // How many lights differ.
@@ -120,16 +121,18 @@ class Lights {
 
   // A light of another kind than the scene's; n = -1 is its middle.
   made(n) {
-    const { direction, level, middle, reach } = this;
-    const [x, y] = n < 0 ? [0.5, 0.5] : even(n);
+    const { direction, level: brightness, middle, reach } = this;
+    const level = n < 0 ? brightness : (brightness * 4) / 3;
+    const filling = this.kind !== "sky" && n >= 0 && n % 4 === 3; // a quarter of the sequence
+    const [x, y] = n < 0 ? [0.5, 0.5] : even(filling ? (n - 3) / 4 : n);
     const across = unit(cross(Math.abs(dot(direction, this.camera.up)) > 0.99 ? this.camera.axis(0) : this.camera.up, direction));
     const upwards = cross(direction, across);
     const light = (place, power, axis = DARK) => ({ place, colour: [power, power, power], axis, cone: [0, 0], spectrum: -1 });
-    if (this.kind === "sky") {
+    if (this.kind === "sky" || filling) {
       const { up } = this.camera, cosine = 1 - x, sine = Math.sqrt(1 - cosine * cosine);
       const [right, away] = this.frame();
       const d = plus(plus(times(up, cosine), right, sine * Math.cos(2 * Math.PI * y)), away, sine * Math.sin(2 * Math.PI * y));
-      return light([...d, 0], 2 * level);
+      return light([...d, 0], (this.kind === "sky" ? 2 : 8 * FILL) * brightness);
     }
     const radius = n < 0 ? 0 : Math.sqrt(x), turn = 2 * Math.PI * y;
     const round = plus(times(across, radius * Math.cos(turn)), upwards, radius * Math.sin(turn));
