@@ -50,8 +50,12 @@ def test_table_and_sheet_are_replaced(compared, page):
     assert realtime.main([str(compared), "-o", str(page)]) == 0
     text = page.read_text("utf-8")
     assert "| `lut` | 0.46 | 3.21 | 0.021 |  | 1230 | 35.2 | 1000 | 12.3 | 21.0 |" in text
-    assert "| [plate](../scenes/plate.xml) | 0.46 | 3.21 | 0.28 | 0.32 | 3.21 | 0.28 | 0.28 | 1.50 |" in text
-    assert "25 % of 64 × 40 pixels" in text
+    assert (
+        "| [plate](../scenes/plate.xml) | 0.46 | 3.21 | 0.28 | 0.32 | 3.21 | 0.28 | 0.28 | 1.50 |"
+        in text
+    )
+    assert "All 64 × 40 pixels" in text
+    assert "25 % of the pixels" in text
     assert "stale" not in text
     with Image.open(page.parent / realtime.SHEET) as image:
         assert image.size == (1600, 400)
