@@ -35,6 +35,8 @@ Loss = Callable[[Real], tuple[float, Real]]
 #: What stands for the spectrum, nm.
 WAVELENGTHS = tuple(float(x) for x in range(400, 701, 20))
 
+_ALL = slice(None)
+_AT_ONCE = 2**20  # pixels of all screens that a BRDF takes at once, 40 MB
 _UP = (0.0, 0.0, 1.0)
 _NARROW = 1e-3  # µm: under so small a σ a flat patch reflects alike in all directions
 
@@ -46,7 +48,7 @@ class Views:
     ----------
     patch : HeightField, of which only the shape and the size of the pixels count.
     wi, wo, wavelength, coherence_width, eta, k : as in `reference.brdf`, whose
-        `coherence="ensemble"` and `model="kirchhoff"` this is; n pairs in all. Evaluations take
+        `coherence="ensemble"` and `model="kirchhoff"` this is; n pairs in all. A gradient takes
         some 50 bytes for each pixel and pair.
 
     Raises
@@ -85,7 +87,10 @@ class Views:
 
     def brdf(self, heights: ArrayLike) -> Real:
         """The BRDF in 1/sr, (n,), of heights (ny, nx) in µm."""
-        return self._seen(self._orders(self._screens(heights)))
+        size = max(1, _AT_ONCE // (self.shape[0] * self.shape[1]))
+        parts = [slice(start, start + size) for start in range(0, len(self), size)]
+        found = [self._seen(self._orders(self._screens(heights, part)), part) for part in parts]
+        return np.concatenate([np.empty(0), *found])
 
     def loss(self, heights: ArrayLike, of: Loss) -> tuple[float, Real]:
         """A loss of the BRDF and its gradient (ny, nx), per µm of height at each pixel."""
@@ -98,19 +103,19 @@ class Views:
         pulled = screens.imag * adjoint.real - screens.real * adjoint.imag
         return value, -2.0 / screens[0].size * np.einsum("n,nyx->yx", self.kappa, pulled)
 
-    def _screens(self, heights: ArrayLike) -> NDArray[np.complex128]:
+    def _screens(self, heights: ArrayLike, part: slice = _ALL) -> NDArray[np.complex128]:
         found = np.asarray(heights, np.float64)
         if found.shape != self.shape:
             raise DiffractionError(f"heights have shape {found.shape}, these views {self.shape}")
-        return np.asarray(np.exp(1j * self.kappa[:, None, None] * found))
+        return np.asarray(np.exp(1j * self.kappa[part, None, None] * found))
 
     def _orders(self, screens: NDArray[np.complex128]) -> NDArray[np.complex128]:
         return np.asarray(fft.ifft2(screens))
 
-    def _seen(self, orders: NDArray[np.complex128]) -> Real:
+    def _seen(self, orders: NDArray[np.complex128], part: slice = _ALL) -> Real:
         powers = orders.real**2 + orders.imag**2
-        rows = np.einsum("nyx,nx->ny", powers, self._window_x)
-        return np.asarray(self._factor * np.einsum("ny,ny->n", rows, self._window_y))
+        rows = np.einsum("nyx,nx->ny", powers, self._window_x[part])
+        return np.asarray(self._factor[part] * np.einsum("ny,ny->n", rows, self._window_y[part]))
 
 
 def _of_mirror(
