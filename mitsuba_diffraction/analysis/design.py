@@ -89,13 +89,13 @@ class Views:
         """The BRDF in 1/sr, (n,), of heights (ny, nx) in µm."""
         size = max(1, _AT_ONCE // (self.shape[0] * self.shape[1]))
         parts = [slice(start, start + size) for start in range(0, len(self), size)]
-        found = [self._seen(self._orders(self._screens(heights, part)), part) for part in parts]
+        found = [self._seen(fft.ifft2(self._screens(heights, part)), part) for part in parts]
         return np.concatenate([np.empty(0), *found])
 
     def loss(self, heights: ArrayLike, of: Loss) -> tuple[float, Real]:
         """A loss of the BRDF and its gradient (ny, nx), per µm of height at each pixel."""
         screens = self._screens(heights)
-        orders = self._orders(screens)
+        orders = fft.ifft2(screens)
         value, weights = of(self._seen(orders))
         wanted = (self._factor * weights)[:, None] * self._window_y
         orders *= np.einsum("ny,nx->nyx", wanted, self._window_x)
@@ -108,9 +108,6 @@ class Views:
         if found.shape != self.shape:
             raise DiffractionError(f"heights have shape {found.shape}, these views {self.shape}")
         return np.asarray(np.exp(1j * self.kappa[part, None, None] * found))
-
-    def _orders(self, screens: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        return np.asarray(fft.ifft2(screens))
 
     def _seen(self, orders: NDArray[np.complex128], part: slice = _ALL) -> Real:
         powers = orders.real**2 + orders.imag**2
