@@ -81,6 +81,7 @@ def test_everything_is_measured_and_written(measured):
         "at most 1.15× kirchhoff",
         "at most 1.25× kirchhoff",
         "at most 3× roughconductor",
+        "at most 1.5× patch",
         "at least 30× the defaults",
     }
 
