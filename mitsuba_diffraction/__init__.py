@@ -9,6 +9,7 @@ maps               what a surface reflects in every direction, as pictures
 evaluation         a beam on a patch: maxima against the grating equation
 tradeoff           accuracy against speed and memory, setting by setting
 glsl               the realtime renderer
+design             patches from their BRDF, reliefs for given colours
 comparison         how far its pictures are from path-traced ones
 cluster            rendering on many processes and machines
 web                pages that show a scene in a browser or a notebook
@@ -48,7 +49,7 @@ from .tables import DiffractionTable  # noqa: E402
 
 if TYPE_CHECKING:
     from . import cluster
-    from .analysis import maps, tradeoff
+    from .analysis import design, maps, tradeoff
     from .realtime import comparison
     from .thesis import evaluation
 
@@ -61,6 +62,7 @@ __all__ = [
     "bsdf_dict",
     "cluster",
     "comparison",
+    "design",
     "evaluation",
     "glsl",
     "gratings",
@@ -74,6 +76,7 @@ __all__ = [
 _ON_DEMAND = {
     "cluster": "cluster",
     "comparison": "realtime.comparison",
+    "design": "analysis.design",
     "evaluation": "thesis.evaluation",
     "maps": "analysis.maps",
     "tradeoff": "analysis.tradeoff",

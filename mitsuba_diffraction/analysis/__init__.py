@@ -7,5 +7,6 @@ survey     many scans: a row, a table and a map each
 tradeoff   accuracy against speed and memory
 bench      speed and noise
 pictures   patches and albedo as pictures
+design     surfaces from what they are to show, by gradients with respect to the heights
 energy     how much a table reflects before and after energy is conserved
 """
