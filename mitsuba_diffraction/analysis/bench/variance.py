@@ -13,6 +13,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from ...plugin.power import PowerModel
+from ...plugin.sampling import EVEN
 from ...progress import Progress
 from ..maps.light import Light
 from .contenders import Tables, ratio, rounds_of
@@ -102,10 +104,27 @@ def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progr
 
 
 def draws_by_cosine(bsdf: Any) -> Any:
-    """The same plugin, whose directions are drawn from the cosine lobe alone."""
-    bsdf.draw = lambda si, sample1, sample2, active: mi.warp.square_to_cosine_hemisphere(sample2)
-    bsdf.density = lambda si, wo, active: mi.warp.square_to_cosine_hemisphere_pdf(wo)
+    """The same plugin, whose directions are drawn from the cosine lobe instead of the orders."""
+
+    def draw(si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
+        even = mi.warp.square_to_uniform_hemisphere(sample2)
+        return dr.select(sample1 < EVEN, even, mi.warp.square_to_cosine_hemisphere(sample2))
+
+    bsdf._draw, bsdf.power = draw, _ByCosine(bsdf.power)
     return bsdf
+
+
+class _ByCosine:
+    """A power model with another density."""
+
+    def __init__(self, power: PowerModel) -> None:
+        self.power, self.wavenumbers, self.flat = power.power, power.wavenumbers, power.flat
+
+    def density(self, pair: Any, height_scale: Any, si: Any) -> Any:
+        return mi.warp.square_to_cosine_hemisphere_pdf(pair.outer.wo)
+
+    def both(self, pair: Any, height_scale: Any, drawing_scale: Any, si: Any) -> Any:
+        return self.power(pair, height_scale, si), self.density(pair, drawing_scale, si)
 
 
 def _deviation(
