@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 import mitsuba_diffraction as md  # before Mitsuba: it chooses Dr.Jit's LLVM
 from mitsuba_diffraction.analysis.bench.variance import draws_by_cosine
 
@@ -21,6 +23,8 @@ def drawn(bsdf, count=1 << 14):
     return np.array(sample.wo.z), np.array(sample.pdf), np.array(weight[0])
 
 
+# how well the model holds is no matter
+@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
 def test_directions_are_drawn_by_the_cosine_and_the_albedo_is_the_same(some_variant):
     grating = md.gratings.sinusoidal(period=1.6, depth=0.08, periods=4)
     parameters = md.bsdf_dict(grating, coherence_width=8.0, material="none")
