@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import drjit as dr
 import mitsuba as mi
 import pytest
@@ -23,3 +25,13 @@ def every_variant(request: pytest.FixtureRequest) -> str:
         pytest.skip(f"{request.param}: Dr.Jit finds no device for it")
     mi.set_variant(request.param)
     return str(request.param)
+
+
+@pytest.fixture
+def mono() -> Iterator[None]:
+    """A variant of one wavelength, for short kernels."""
+    if not dr.has_backend(dr.JitBackend.LLVM):
+        pytest.skip("Dr.Jit finds no LLVM")
+    mi.set_variant("llvm_ad_mono")
+    yield
+    mi.set_variant("llvm_ad_spectral")

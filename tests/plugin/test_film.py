@@ -16,7 +16,7 @@ from mitsuba_diffraction.plugin.film import Channels
 from tests.directions import as_single, polar
 from tests.lanes import evaluated, interaction, refusal
 from tests.plugin.conftest import runs
-from tests.plugin.test_coat import FLAT, load
+from tests.plugin.test_coat import FLAT, assert_values_are_the_reference_s, load
 from tests.plugin.test_model import PATCH, WIDTH, pairs
 from tests.plugin.test_variants import evaluate
 
@@ -35,18 +35,7 @@ FILMED = {
 @pytest.mark.parametrize("kind", FILMED)
 @pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
 def test_values_are_the_reference_s(some_variant, kind, model):
-    ours, theirs = FILMED[kind]
-    wi, wo, lam = (a[:120] for a in pairs())
-    found = evaluated(load(model=model, **ours), wi, wo, lam)
-    exact = np.stack(
-        [
-            reference.brdf(PATCH, wi, wo, one, coherence_width=WIDTH, model=model, **theirs)
-            for one in lam.T
-        ],
-        axis=1,
-    ) * wo[:, 2:]  # fmt: skip
-    # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
-    assert found == pytest.approx(exact, rel=1e-3, abs=1e-5 * exact.max())
+    assert_values_are_the_reference_s(model, *FILMED[kind])
 
 
 @pytest.mark.parametrize("material", [METAL, GLASS], ids=["metal", "dielectric"])

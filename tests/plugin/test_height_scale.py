@@ -26,16 +26,6 @@ def bitmap(values=FACTORS, **more):
     return {"type": "bitmap", "raw": True, "data": data, "filter_type": "nearest"} | more
 
 
-@pytest.fixture
-def mono():
-    """A variant of one wavelength, for short kernels."""
-    if not dr.has_backend(dr.JitBackend.LLVM):
-        pytest.skip("Dr.Jit finds no LLVM")
-    mi.set_variant("llvm_ad_mono")
-    yield
-    mi.set_variant("llvm_ad_spectral")
-
-
 def hits(wi, uv):
     """Surface interactions at one pair of UV coordinates."""
     si = dr.zeros(mi.SurfaceInteraction3f, len(wi))

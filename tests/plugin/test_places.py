@@ -114,16 +114,6 @@ def test_the_mean_is_the_ensemble_s_and_the_contrast_that_of_independent_windows
         assert contrast == pytest.approx(1 / np.sqrt(n), rel=0.05)
 
 
-@pytest.fixture
-def mono():
-    """A variant of one wavelength, for short kernels."""
-    if not dr.has_backend(dr.JitBackend.LLVM):
-        pytest.skip("Dr.Jit finds no LLVM")
-    mi.set_variant("llvm_ad_mono")
-    yield
-    mi.set_variant("llvm_ad_spectral")
-
-
 def hits(wi, uv):
     """Surface interactions at UV coordinates."""
     si = dr.zeros(mi.SurfaceInteraction3f, len(wi))
