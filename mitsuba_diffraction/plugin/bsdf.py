@@ -408,13 +408,14 @@ class Diffraction(mi.BSDF):
         changing = (self._scale, self.orientation, self.fresnel)
         refused = [line for line in [one.settle() for one in changing] if line]
         refused += self._optical_refusal()
+        largest = dr.slice(dr.max(dr.detach(self.height_scale)))
+        differentiable = dr.grad_enabled(self.height_scale)
+        lowest = self._varying.range()[0] if self._varying else None
         if self._energy is not None:
-            largest = dr.slice(dr.max(dr.detach(self.height_scale)))
             beneath = self.nested is not None and isinstance(self.layering, Transmission)
-            lowest = self._varying.range()[0] if self._varying else None
-            self._energy.update(largest, dr.grad_enabled(self.height_scale), beneath, lowest)
-        if self.through is not None:
-            self.through.update(self.height_scale)
+            self._energy.update(largest, differentiable, beneath, lowest)
+        if self.through is not None and self.through.balance is not None:
+            self.through.balance.update(largest, differentiable, lowest)
         held = arrays_within(
             self.power,
             self._energy,
@@ -478,7 +479,7 @@ class Diffraction(mi.BSDF):
     def energy_conserving(self) -> bool:
         """Whether it takes what it would reflect too much."""
         if self.through is not None:
-            return self.through.conserving is not None
+            return self.through.balance is not None
         return self._energy is not None and self._energy.conserving
 
     def energy_scale(self, height_scale: float) -> tuple[NDArray[np.float32], bool] | None:
@@ -498,7 +499,8 @@ class Diffraction(mi.BSDF):
 
     @property
     def _takes(self) -> bool:
-        return self._energy is not None and self._energy.takes
+        balance = self._energy if self.through is None else self.through.balance
+        return balance is not None and balance.takes
 
     def to_string(self) -> str:
         """All parameters, for people."""

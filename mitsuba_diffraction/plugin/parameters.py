@@ -36,6 +36,7 @@ from .sources import (
     table_of_file,
     table_of_heights,
 )
+from .sides import SidesModel
 from .through import LEAST_INDEX, Through
 
 SOURCES = ("heightfield", "table", "data")
@@ -161,12 +162,15 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
         flat = UnderCoat(material, coat)
     boundary = _boundary(props, reflectance, table)
     conserving, through = _flag(props, "energy_conserving", True), None
+    places = _places(props, table)
     if passing is not None:
         thin = _flag(props, "thin", False)
-        through = Through(passing, boundary, thin, table if conserving else None)
+        mean = table if places is None else table.averaged
+        balance = SidesModel(mean, passing, str(boundary), thin, wavelength) if conserving else None
+        through = Through(passing, boundary, thin, balance)
     return Parameters(
         table=table,
-        places=_places(props, table),
+        places=places,
         heights=heights,
         reflectance=flat,
         coat=coat,

@@ -13,12 +13,9 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..tables.energy.sides import largest_sum
-from ..tables.table import DiffractionTable
 from .boundary import LEVEL, Boundary, Jones, Kirchhoff, SmallSlope, mueller, turn, turned
 from .coat import CoatedPair, transmittances
 from .crossing import Crossing, Sides, Turned
-from .film import plain
 from .fresnel import root, squared
 from .pair import Pair, Place, from_patch
 from .reflectance import Dielectric, Inside
@@ -35,6 +32,7 @@ from .roles import (
     Vector3f,
 )
 from .sampling import EVEN, direction_of, with_even_share
+from .sides import SidesModel
 
 _LEAST_SHARE = 0.1
 #: Of a dielectric over the medium above it.
@@ -49,7 +47,7 @@ class Through:
     material : of the surface.
     boundary : of light from above; the one of light from within follows.
     thin : whether below is beyond the flat side of a sheet.
-    conserving : the table, of which no direction within 75° of the normal is to gain energy.
+    balance : what makes both sides add up to 1, if anything.
     """
 
     def __init__(
@@ -57,29 +55,15 @@ class Through:
         material: Dielectric,
         boundary: Boundary,
         thin: bool,
-        conserving: DiffractionTable | None,
+        balance: SidesModel | None,
     ) -> None:
-        self.material, self.thin, self.conserving = material, thin, conserving
-        self._kept = mi.Float(1.0)
+        self.material, self.thin, self.balance = material, thin, balance
         self.boundary = boundary
         within = Inside(material, thin)
         self.below: Boundary = (
             boundary.of(within) if isinstance(boundary, SmallSlope) else Kirchhoff(within)
         )
         self.mirror = Kirchhoff(material)
-
-    def update(self, height_scale: Float) -> None:
-        """Divide by the largest R + T at this height scale and index, if that is above 1."""
-        if self.conserving is None:
-            return
-        scale, index = plain(dr.max(height_scale)), plain(self.material.eta)
-        state = max(round(scale, 2), 0.01), round(index, 2)
-        known: dict[object, float] = self.conserving.__dict__.setdefault("_sums", {})
-        key = *state, str(self.boundary), self.thin
-        if key not in known:
-            known[key] = largest_sum(self.conserving, *state, str(self.boundary), self.thin)
-        self._kept = mi.Float(1.0 / max(known[key], 1.0))
-        dr.make_opaque(self._kept)
 
     def flags(self) -> list[int]:
         """Of reflection and of transmission."""
@@ -113,7 +97,10 @@ class Through:
             scale = bsdf.scale_at(si, active)
             orders = bsdf.power.density(crossing, scale, si) * dr.square(out)
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
-        return value if self.conserving is None else value * self._kept, density
+        if self.balance is not None and self.balance.takes:
+            k, scale = bsdf.power.wavenumbers(si), bsdf.scale_at(si, active)
+            value *= mi.Spectrum(self.balance.factor((si.wi, wo), rotation, k, scale))
+        return value, density
 
     def sample(
         self,
