@@ -28,6 +28,7 @@ from .pair import SHADOWINGS
 from .places import TILINGS, Places
 from .reflectance import Conductor, Dielectric, Perfect, Reflectance
 from .roles import BSDF, Properties, Texture
+from .sides import SidesModel
 from .sources import (
     TableProvider,
     from_cache,
@@ -36,7 +37,6 @@ from .sources import (
     table_of_file,
     table_of_heights,
 )
-from .sides import SidesModel
 from .through import LEAST_INDEX, Through
 
 SOURCES = ("heightfield", "table", "data")

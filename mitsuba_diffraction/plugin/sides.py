@@ -1,4 +1,4 @@
-"""What both sides of a dielectric send on adds up to 1 (Dr.Jit): `tables.energy.sides` in a kernel."""
+"""Both sides of a dielectric add up to 1: `tables.energy.sides` in a kernel (Dr.Jit)."""
 
 from __future__ import annotations
 
@@ -91,6 +91,4 @@ class SidesModel:
         n, cosine = self._index, dr.select(active, cosine, 1.0)
         sine = n * dr.safe_sqrt(dr.fma(-cosine, cosine, 1.0))
         beyond = dr.safe_acos(n * cosine * dr.rsqrt(dr.fma(n, n, -1.0)))
-        return dr.cos(
-            0.5 * dr.select(sine < 1.0, dr.safe_asin(sine), 0.5 * dr.pi + beyond)
-        )
+        return dr.cos(0.5 * dr.select(sine < 1.0, dr.safe_asin(sine), 0.5 * dr.pi + beyond))

@@ -120,7 +120,9 @@ def _spline(theta: Real) -> Real:
 
 def read(table: Real, cos_o: Real, turn: Real) -> Real:
     """One θi's table at (cosθo, φo − φi), bilinear."""
-    return bilinear(table, np.arccos(np.minimum(cos_o, 1.0)) * ((POLAR_FINE - 1) / (0.5 * np.pi)), turn)
+    return bilinear(
+        table, np.arccos(np.minimum(cos_o, 1.0)) * ((POLAR_FINE - 1) / (0.5 * np.pi)), turn
+    )
 
 
 def bilinear(table: Real, row: Real, turn: Real) -> Real:

@@ -96,7 +96,7 @@ class Link:
     #: Whether the orders are those of a flat surface.
     flat = False
 
-    def width(self, cos_i: float, cos_o: Real) -> Real:
+    def width(self, cos_i: Real | float, cos_o: Real) -> Real:
         """w."""
         q_i, q_o = self._normals(cos_i, cos_o)
         return np.asarray(q_i + q_o if self.came == self.left else np.abs(q_i - q_o))
@@ -110,7 +110,7 @@ class Link:
     def tables(
         self, parts: Real, theta: Real, k: float, table: DiffractionTable, scale: float
     ) -> Real:
-        """4 qi² qo² N at angles θi (rad), `Medium.angle` and azimuths, of `parts` at a wavenumber."""
+        """4 qi² qo² N at angles θi (rad), `Medium.angle` and azimuths, of `parts`; at k."""
         if self.medium.model == "kirchhoff":
             return parts[1]
         cos_i, cos_o, cos_turn = self._at(theta)
@@ -185,7 +185,7 @@ class Face(Link):
 class Returned(Link):
     """What the flat side of a sheet sends back through the structure (`plugin.through`)."""
 
-    def width(self, cos_i: float, cos_o: Real) -> Real:
+    def width(self, cos_i: Real | float, cos_o: Real) -> Real:
         n = self.medium.index
         deeper = [np.sqrt(n * n - 1.0 + cosine**2) - cosine for cosine in (cos_i, cos_o)]
         return np.hypot(*deeper)

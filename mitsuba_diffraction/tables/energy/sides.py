@@ -34,8 +34,12 @@ Array = NDArray[np.float32]
 GRID, WAVELENGTHS = DirectionGrid(56, 36), 6
 #: Light that goes to and fro beyond the critical angle takes more of them than reflection does.
 SWEEPS = 30
-#: R + T is left as it is between these, up to the angle, and brought between them elsewhere.
-LEAST, MOST, CERTAIN = 0.99, 0.999, np.radians(80.0)
+#: R + T is left as it is between these, and brought between them elsewhere; it is left altogether
+#: if it is nowhere above the last.
+LEAST, MOST, TOLERATED = 0.99, 0.999, 1.001
+#: Beyond this angle (rad) ever less is brought back, by so much a radian: part of a lobe is below
+#: the horizon.
+CERTAIN, FALL = np.radians(75.5), 1.0
 #: Where it differs between neighbours, this share of that is kept free below `MOST`, at most so
 #: much: for what lies between them.
 BETWEEN, MARGIN = 0.25, 0.006
@@ -43,7 +47,7 @@ BETWEEN, MARGIN = 0.25, 0.006
 
 @dataclass(frozen=True)
 class SideGrid(DirectionGrid):
-    """`GRID` by `Medium.angle` of a side."""
+    """A grid by `Medium.angle` of a side."""
 
     medium: Medium
     side: int
@@ -84,6 +88,7 @@ class Sides:
         self._flat.mixture, self._flat.has_weak = _level(self._orders.mixture), False
         self._links = medium.links()
         self._grids = [SideGrid(GRID.polar, GRID.azimuthal, medium, side) for side in (0, 1)]
+        self._ones = np.ones((2, GRID.polar + 1, GRID.azimuthal), np.float32)
         self._parts: dict[tuple[Link, bytes], Real] = {}
 
     def scale(self, wavelength_range: tuple[float, float]) -> list[DirectionalTable] | None:
@@ -96,17 +101,17 @@ class Sides:
         found = parallel(self._scale_at, wavelengths.tolist())
         if all(one is None for one in found):
             return None
-        pages = np.stack([_ones() if one is None else one for one in found])
+        pages = np.stack([self._ones if one is None else one for one in found])
         return [DirectionalTable(wavelengths, pages[:, side]) for side in (0, 1)]
 
     def _scale_at(self, wavelength: float) -> Array | None:
         theta = [grid.angles for grid in self._grids]
         transport = self.transport(theta, GRID.phi, wavelength)
-        sums, angle = transport(_ones()), np.stack(theta)[..., None]
+        sums, angle = transport(self._ones), np.stack(theta)[..., None]
         most = MOST - np.minimum(BETWEEN * _variation(sums), MARGIN)
-        least = np.where(angle <= CERTAIN, np.float32(LEAST), np.float32(0.0))
-        aim = np.clip(sums, least, most)
-        if np.all((aim == sums) | (angle > CERTAIN)):
+        least = LEAST - FALL * np.maximum(angle - CERTAIN, 0.0)
+        aim = np.clip(sums, least.astype(np.float32), most)
+        if np.all((sums >= LEAST) & (sums <= TOLERATED) | (angle > CERTAIN)):
             return None
         s = scaled(transport, aim, angle, SWEEPS)
         # Where there is no such scale, as of blazed gratings, light is lost rather than gained
@@ -120,7 +125,7 @@ class Sides:
         Exact sums at these angles (rad), not the grid's; nm.
         """
         transport = self.transport([theta, theta], phi, wavelength)
-        raw = transport(_ones())
+        raw = transport(self._ones)
         if scale is None:
             return raw, raw
         pages = [one.page(wavelength) for one in scale]
@@ -179,10 +184,6 @@ class _Linked(Row):
     def gain(self, cos_o: Real, turn: Real) -> Real:
         w = self.kappa(cos_o) / self._per_w
         return self._link.gain(self._table, w, self._cos, cos_o, turn)
-
-
-def _ones() -> Array:
-    return np.ones((2, GRID.polar + 1, GRID.azimuthal), np.float32)
 
 
 def _variation(sums: Array) -> Array:
