@@ -128,12 +128,20 @@ class Sides:
         raw = transport(self._ones)
         if scale is None:
             return raw, raw
-        pages = [one.page(wavelength) for one in scale]
-        found = [
-            grid.interpolation(theta[:, None], phi)(page)
-            for grid, page in zip(self._grids, pages, strict=True)
-        ]
-        return raw, np.stack(found) * transport(np.stack(pages))
+        found = [self.at(scale, side, theta[:, None], phi, wavelength) for side in (0, 1)]
+        weights = np.stack([one.page(wavelength) for one in scale])
+        return raw, np.stack(found) * transport(weights)
+
+    def at(
+        self,
+        scale: Sequence[DirectionalTable],
+        side: int,
+        theta: ArrayLike,
+        phi: ArrayLike,
+        wavelength: float,
+    ) -> Array:
+        """s of directions on a side: angles (rad) of any one shape, where they are measured."""
+        return self._grids[side].interpolation(theta, phi)(scale[side].page(wavelength))
 
     def transport(self, theta: Sequence[Real], phi: Real, wavelength: float) -> BothSides:
         """From weights on the grids to R + T at polar angles of either side, and azimuths, rad."""
