@@ -68,20 +68,24 @@ def orders_of(
         eta=KERATIN, coherence_width=WIDTHS_PER_SIGMA * sigma, model=model.split(",")[0],
     )  # fmt: skip
     if model == MODELS[-1]:
-        btdf = btdf * _kept(grating, wavelength, polar, turn, found.wo)
+        btdf = btdf * _kept(grating, wavelength, polar, turn, found)
     per_btdf = np.pi / (sigma * float(wavenumber(wavelength))) ** 2
     coloured = (found.order != 0).any(axis=1) & (-found.wo[:, 2] > np.cos(np.radians(GRAZING)))
     return per_btdf * btdf, exact, coloured.astype(float)
 
 
-def _kept(grating: Grating, wavelength: float, theta: float, phi: float, wo: Real) -> Real:
-    """s(ωi) s(ωo) of what conserves energy."""
+def _kept(
+    grating: Grating, wavelength: float, theta: float, phi: float, found: rayleigh.Orders
+) -> Real:
+    """What orders are multiplied by where energy is conserved."""
     sides, scale = _scale(grating, wavelength)
-    if scale is None:
-        return np.ones(len(wo))
-    into = sides.at(scale, 0, theta, phi, wavelength)
-    out = sides.at(scale, 1, np.arccos(-wo[:, 2]), np.arctan2(wo[:, 1], wo[:, 0]), wavelength)
-    return np.asarray(into * out, np.float64)
+    ends = (theta, phi), (np.arccos(-found.wo[:, 2]), np.arctan2(found.wo[:, 1], found.wo[:, 0]))
+    product = np.ones(len(found.wo))
+    for n, one in enumerate(scale or []):
+        changes = product * sides.at(one, n % 2, *ends[n % 2], wavelength)
+        zeroth = (found.order == 0).all(axis=1)
+        product = np.where(zeroth | (n > 1), changes, product)  # c is order 0's alone
+    return product
 
 
 @lru_cache

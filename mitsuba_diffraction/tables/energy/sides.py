@@ -1,18 +1,21 @@
-"""R + T of a dielectric surface, and a scale of directions on both sides that makes it 1.
+"""R + T of a dielectric surface, and scales of directions on both sides that make it 1.
 
-A lossless dielectric sends all light on, so s is sought on the directions of both sides such that
+A lossless dielectric sends all light on. What first order gains or lacks is order 0's: orders are
+right to second order in the heights, and order 0, ∝ |a_0|² alone, is not. So c is sought on the
+directions of both sides such that with f = f_0 + f_orders
 
-    f'(ωi, ωo) = f(ωi, ωo) s(ωi) s(ωo),   s(ωi) Σ_sides ∫ f s cosθo dωo = R + T near 1,
+    f'(ωi, ωo) = f_orders + f_0 c(ωi) c(ωo)   sends on   R + T near 1,
 
-as in `conservation`, but upwards too: what the model lacks in a direction, because first order
-keeps no energy or since a sheet loses what is beyond its critical angle, is put back in proportion
-to what there is. Sums as in `transport`, over the links of a side with a side.
+as in `conservation`, but upwards too. A sheet loses what is beyond its critical angle; that is put
+back likewise. Where order 0 is too weak, as of rough surfaces, all of f' is scaled by s(ωi) s(ωo)
+besides, evenly in proportion to what there is. Sums as in `transport`, over the links of a side
+with a side.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,6 +40,8 @@ SWEEPS = 30
 #: R + T is left as it is between these, and brought between them elsewhere; it is left altogether
 #: if it is nowhere above the last.
 LEAST, MOST, TOLERATED = 0.99, 0.999, 1.001
+#: Least that order 0 must leave for s not to be needed; and by how much order 0 may change.
+ENOUGH, STRONGEST = 0.98, 2.0
 #: Beyond this angle (rad) ever less is brought back, by so much a radian: part of a lobe is below
 #: the horizon.
 CERTAIN, FALL = np.radians(75.5), 1.0
@@ -73,8 +78,19 @@ class BothSides:
     parts: list[list[tuple[int, Transport]]]
 
     def __call__(self, s: Array) -> Array:
-        sums = [sum(transport(s[left]) for left, transport in side) for side in self.parts]
+        return self._sums(lambda link, weights: link(weights), s)
+
+    def zeroth(self, s: Array) -> Array:
+        """Order 0 alone."""
+        return self._sums(lambda link, weights: link.glossy * link.mirror(weights), s)
+
+    def _sums(self, of_link: Callable[[Transport, Array], Array | Real], s: Array) -> Array:
+        sums = [sum(of_link(link, s[left]) for left, link in side) for side in self.parts]
         return np.asarray(np.stack(sums), np.float32)
+
+    def changed(self, c: Array, here: Array) -> Callable[[Array], Array]:
+        """R + T from weights, with order 0 scaled by c on the grids and at the directions."""
+        return lambda s: self(s) - self.zeroth(s) + here * self.zeroth(c * s)
 
 
 class Sides:
@@ -92,30 +108,37 @@ class Sides:
         self._parts: dict[tuple[Link, bytes], Real] = {}
 
     def scale(self, wavelength_range: tuple[float, float]) -> list[DirectionalTable] | None:
-        """s above and below; None where R + T is near 1 as it is. A second or two.
+        """c above and below, then s if any is needed; None where R + T is near 1 as it is.
 
-        Their polar angles are `Medium.angle`.
+        A second or two. Their polar angles are `Medium.angle`.
         """
         low, high = wavelength_range
         wavelengths = np.geomspace(low, high, WAVELENGTHS if high > low else 1)
-        found = parallel(self._scale_at, wavelengths.tolist())
-        if all(one is None for one in found):
+        found = np.stack(parallel(self._scale_at, wavelengths.tolist()), axis=1)
+        if np.all(found == 1.0):
             return None
-        pages = np.stack([self._ones if one is None else one for one in found])
-        return [DirectionalTable(wavelengths, pages[:, side]) for side in (0, 1)]
+        needed = found if np.any(found[2:] != 1.0) else found[:2]
+        return [DirectionalTable(wavelengths, values) for values in needed]
 
-    def _scale_at(self, wavelength: float) -> Array | None:
+    def _scale_at(self, wavelength: float) -> Array:
+        """(4, polar + 1, azimuthal)."""
         theta = [grid.angles for grid in self._grids]
         transport = self.transport(theta, GRID.phi, wavelength)
         sums, angle = transport(self._ones), np.stack(theta)[..., None]
-        most = MOST - np.minimum(BETWEEN * _variation(sums), MARGIN)
-        least = LEAST - FALL * np.maximum(angle - CERTAIN, 0.0)
-        aim = np.clip(sums, least.astype(np.float32), most)
-        if np.all((sums >= LEAST) & (sums <= TOLERATED) | (angle > CERTAIN)):
-            return None
-        s = scaled(transport, aim, angle, SWEEPS)
-        # Where there is no such scale, as of blazed gratings, light is lost rather than gained
-        return s * np.minimum(1.0, aim / np.maximum(s * transport(s), 1e-6))
+        c, s = self._ones, self._ones
+        if not _near_1(sums, angle, LEAST):
+            zeroth = transport.zeroth(self._ones)
+            wanted = _aims(sums, angle) - (sums - zeroth)
+            wanted = np.clip(wanted, zeroth / STRONGEST, zeroth * STRONGEST)
+            c = scaled(transport.zeroth, wanted, angle, SWEEPS)
+            changed = transport.changed(c, c)
+            sums = changed(self._ones)
+            if not _near_1(sums, angle, ENOUGH):
+                aim = _aims(sums, angle)
+                s = scaled(changed, aim, angle, SWEEPS)
+                # Where there is no such scale, light is lost rather than gained
+                s = s * np.minimum(1.0, aim / np.maximum(s * changed(s), 1e-6))
+        return np.concatenate([c, s])
 
     def sums(
         self, scale: Sequence[DirectionalTable] | None, theta: Real, phi: Real, wavelength: float
@@ -128,20 +151,26 @@ class Sides:
         raw = transport(self._ones)
         if scale is None:
             return raw, raw
-        found = [self.at(scale, side, theta[:, None], phi, wavelength) for side in (0, 1)]
-        weights = np.stack([one.page(wavelength) for one in scale])
-        return raw, np.stack(found) * transport(weights)
+        pages = [one.page(wavelength) for one in scale]
+        here = [
+            self._grids[n % 2].interpolation(theta[:, None], phi)(page)
+            for n, page in enumerate(pages)
+        ]
+        changed = transport.changed(np.stack(pages[:2]), np.stack(here[:2]))
+        if len(pages) == 2:
+            return raw, changed(self._ones)
+        return raw, np.stack(here[2:]) * changed(np.stack(pages[2:]))
 
     def at(
         self,
-        scale: Sequence[DirectionalTable],
+        table: DirectionalTable,
         side: int,
         theta: ArrayLike,
         phi: ArrayLike,
         wavelength: float,
     ) -> Array:
-        """s of directions on a side: angles (rad) of any one shape, where they are measured."""
-        return self._grids[side].interpolation(theta, phi)(scale[side].page(wavelength))
+        """One of `scale` at directions on its side: angles (rad) of any one shape."""
+        return self._grids[side].interpolation(theta, phi)(table.page(wavelength))
 
     def transport(self, theta: Sequence[Real], phi: Real, wavelength: float) -> BothSides:
         """From weights on the grids to R + T at polar angles of either side, and azimuths, rad."""
@@ -192,6 +221,17 @@ class _Linked(Row):
     def gain(self, cos_o: Real, turn: Real) -> Real:
         w = self.kappa(cos_o) / self._per_w
         return self._link.gain(self._table, w, self._cos, cos_o, turn)
+
+
+def _near_1(sums: Array, angle: Real, least: float) -> bool:
+    return bool(np.all((sums >= least) & (sums <= TOLERATED) | (angle > CERTAIN)))
+
+
+def _aims(sums: Array, angle: Real) -> Array:
+    """What R + T is to be."""
+    most = MOST - np.minimum(BETWEEN * _variation(sums), MARGIN)
+    least = LEAST - FALL * np.maximum(angle - CERTAIN, 0.0)
+    return np.asarray(np.clip(sums, least.astype(np.float32), most), np.float32)
 
 
 def _variation(sums: Array) -> Array:
