@@ -500,9 +500,9 @@ class Diffraction(mi.BSDF):
         return self._energy.ratio(height_scale) if beneath and self._energy is not None else None
 
     @property
-    def _takes(self) -> bool:
+    def _takes(self) -> int:
         balance = self._energy if self.through is None else self.through.balance
-        return balance is not None and balance.takes
+        return 0 if balance is None else balance.takes
 
     def to_string(self) -> str:
         """All parameters, for people."""

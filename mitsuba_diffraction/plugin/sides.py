@@ -19,7 +19,7 @@ INDEX_STEP = 0.01
 
 
 class SidesModel:
-    """s(ωi) s(ωo), directions on either side, at the height scale and index last given.
+    """Scales of directions on either side, at the height scale and index last given.
 
     Parameters
     ----------
@@ -39,7 +39,8 @@ class SidesModel:
         self._table, self._material, self._model, self._thin = table, material, model, thin
         own = wavelength, wavelength
         self._range = own if mi.is_monochromatic else table.wavelength_range
-        self._scales = Lookup(), Lookup()
+        # c above and below, s likewise
+        self._scales = [Lookup() for _ in range(4)]
         self._index = mi.Float(1.0)
 
     def update(self, height_scale: float, differentiable: bool, lowest: float | None) -> None:
@@ -54,35 +55,42 @@ class SidesModel:
         else:
             nodes = energy.between(lowest, height_scale)
         found = [energy.at(node) for node in nodes]
-        for side, scale in enumerate(self._scales):
-            tables = scales_of([one[side] if one else None for one in found])
+        for n, scale in enumerate(self._scales):
+            tables = scales_of([one[n] if len(one) > n else None for one in found])
             scale.update(tables, nodes, height_scale, lowest is not None)
 
     @property
-    def takes(self) -> bool:
-        """Whether the BSDF is multiplied by anything."""
-        return self._scales[0].present
+    def takes(self) -> int:
+        """How many scales there are: 0, 2 or 4."""
+        return sum(scale.present for scale in self._scales)
 
-    def factor(
+    def products(
         self,
         directions: tuple[Vector3f, Vector3f],
         rotation: Rotation,
         wavenumbers: list[Float],
         height_scale: Float,
-    ) -> Colour:
-        """s(ωi) s(ωo) per channel, of directions in the shading frame."""
-        product = mi.UnpolarizedSpectrum(1.0)
-        for direction in directions:
-            tangential, cosine = in_patch(direction, rotation), mi.Frame3f.cos_theta(direction)
-            above, below = (
-                scale.at(tangential, one, wavenumbers, height_scale)
-                for scale, one in zip(
-                    self._scales, (cosine, self._within(-cosine, cosine < 0.0)), strict=True
+    ) -> list[Colour]:
+        """c(ωi) c(ωo), then s(ωi) s(ωo), per channel, as far as there are any.
+
+        directions : in the shading frame.
+        """
+        ends = [(in_patch(one, rotation), mi.Frame3f.cos_theta(one)) for one in directions]
+
+        def product(above: Lookup, below: Lookup) -> Colour:
+            result = mi.UnpolarizedSpectrum(1.0)
+            for tangential, cosine in ends:
+                given = wavenumbers, height_scale
+                both = zip(
+                    above.at(tangential, cosine, *given),
+                    below.at(tangential, self._within(-cosine, cosine < 0.0), *given),
+                    strict=True,
                 )
-            )
-            both = zip(above, below, strict=True)
-            product *= mi.UnpolarizedSpectrum([dr.select(cosine > 0.0, *s) for s in both])
-        return product
+                result *= mi.UnpolarizedSpectrum([dr.select(cosine > 0.0, *one) for one in both])
+            return result
+
+        pairs = self._scales[:2], self._scales[2:]
+        return [product(*pair) for pair in pairs if pair[0].present]
 
     def _within(self, cosine: Float, active: Mask) -> Float:
         """Cosine of `tables.energy.links.Medium.angle`."""

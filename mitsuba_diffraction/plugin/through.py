@@ -21,6 +21,7 @@ from .pair import Pair, Place, from_patch
 from .reflectance import Dielectric, Inside
 from .roles import (
     BSDF,
+    Colour,
     Context,
     Float,
     Interaction,
@@ -82,24 +83,28 @@ class Through:
         share = self._share(cos_i, si, active, reflects, passes)
         rotation = bsdf.orientation.rotation(si, active)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
+        scales: list[Colour] = []
+        if self.balance is not None and self.balance.takes:
+            k, scale = bsdf.power.wavenumbers(si), bsdf.scale_at(si, active)
+            scales = self.balance.products((si.wi, wo), rotation, k, scale)
+        change = scales[0] if scales else None
         if reflects:
             for front in (True, False):
                 lit = active & ((cos_i > 0.0) == front) & (cos_i * cos_o > 0.0)
-                found, one = self._reflected(bsdf, ctx, si, wo, rotation, lit, front)
+                found, one = self._reflected(bsdf, ctx, si, wo, rotation, lit, front, change)
                 value = dr.select(lit, found, value)
                 density = dr.select(lit, share * one, density)
         if passes:
             lit = active & (cos_i * cos_o < 0.0)
             crossing = Crossing(si, wo, rotation, lit, self.material.eta, self.thin)
-            found = self._passed(bsdf, ctx, si, crossing) * dr.abs(cos_o)
+            found = self._passed(bsdf, ctx, si, crossing, change) * dr.abs(cos_o)
             value = dr.select(lit, found, value)
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
             scale = bsdf.scale_at(si, active)
             orders = bsdf.power.density(crossing, scale, si) * dr.square(out)
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
-        if self.balance is not None and self.balance.takes:
-            k, scale = bsdf.power.wavenumbers(si), bsdf.scale_at(si, active)
-            value *= mi.Spectrum(self.balance.factor((si.wi, wo), rotation, k, scale))
+        if len(scales) > 1:
+            value *= mi.Spectrum(scales[1])
         return value, density
 
     def sample(
@@ -161,31 +166,37 @@ class Through:
         rotation: Rotation,
         lit: Mask,
         front: bool,
+        change: Colour | None,
     ) -> tuple[Spectrum, Float]:
         """Value and density of light that stays on one side."""
         n, scale = self.material.eta, bsdf.scale_at(si, lit)
         if front:
             pair = Pair(si, wo, rotation, lit)
-            value = bsdf.lobe(ctx, si, pair, self.boundary, lit)
+            power = _changed(bsdf, si, pair, scale, change)
+            value = bsdf.lobe(ctx, si, pair, self.boundary, lit, power)
             if self.thin:
-                value += self._returned(bsdf, si, pair, scale)
+                value += self._returned(bsdf, si, pair, scale, change)
             density = bsdf.power.density(pair, scale, si)
             return value, with_even_share(density)
         if self.thin:
             outer = Turned(si, wo, rotation, lit, mi.Float(1.0))
             pair = CoatedPair(outer, n)
-            value = bsdf.lobe(ctx, si, pair, self.below, lit)
-            value += bsdf.face(ctx, si, outer, self.mirror, lit)
+            power = _changed(bsdf, si, pair, scale, change)
+            value = bsdf.lobe(ctx, si, pair, self.below, lit, power)
+            face = bsdf.face(ctx, si, outer, self.mirror, lit)
+            value += face if change is None else mi.Spectrum(change) * face
             density = bsdf.power.density(outer, scale * n, si)
             return value, with_even_share(density)
         inner = Turned(si, wo, rotation, lit, n)
         lit &= inner.reached
-        power = bsdf.power.power(inner.place, scale, si)
+        power = _changed(bsdf, si, inner.place, scale, change)
         value = bsdf.lobe(ctx, si, inner, self.below, lit, power) * dr.square(n)
         density = bsdf.power.density(inner, scale * n, si) * dr.square(n)
         return value, with_even_share(density)
 
-    def _returned(self, bsdf: BSDF, si: Interaction, pair: Pair, scale: Float) -> Spectrum:
+    def _returned(
+        self, bsdf: BSDF, si: Interaction, pair: Pair, scale: Float, change: Colour | None
+    ) -> Spectrum:
         """f·cosθo of what the flat side of a sheet sends back through the structure."""
         n = self.material.eta
         ends, kept = [], []
@@ -195,14 +206,21 @@ class Through:
             # T² R/(1 − R²) of each polarisation
             kept.append(0.5 * sum(t * (1.0 - t) * dr.rcp(2.0 - t) for t in passed))
         place = Place(pair.uv, dr.sqrt(dr.fma(ends[0], ends[0], dr.square(ends[1]))))
-        power = bsdf.power.power(place, scale, si)
+        power = _changed(bsdf, si, place, scale, change)
         factor = bsdf.area_factor * dr.safe_sqrt(kept[0] * kept[1]) * pair.cos_o
         return mi.depolarizer(power * factor)
 
-    def _passed(self, bsdf: BSDF, ctx: Context, si: Interaction, crossing: Crossing) -> Spectrum:
+    def _passed(
+        self,
+        bsdf: BSDF,
+        ctx: Context,
+        si: Interaction,
+        crossing: Crossing,
+        change: Colour | None,
+    ) -> Spectrum:
         """BSDF of light that goes through, as the mode of transport has it."""
         place, scale = crossing.place, bsdf.scale_at(si, crossing.active)
-        power = bsdf.power.power(place, scale, si)
+        power = _changed(bsdf, si, place, scale, change)
         factor = self._factor(ctx, si, crossing, self._matrices(bsdf, si, crossing, scale))
         outside = bsdf.area_factor * crossing.n * dr.rcp(dr.square(place.w) * crossing.q0)
         outside *= dr.rcp(-crossing.inside.z)
@@ -269,6 +287,17 @@ class Through:
         if self.thin:
             flat = 2.0 * flat * dr.rcp(1.0 + flat)
         return dr.clip(flat, _LEAST_SHARE, 1.0 - _LEAST_SHARE)
+
+
+def _changed(
+    bsdf: BSDF, si: Interaction, place: Pair | Place, scale: Float, change: Colour | None
+) -> Colour:
+    """⟨|P|²⟩ as `PowerModel.power` has it, with order 0 multiplied by `change`."""
+    power = bsdf.power.power(place, scale, si)
+    if change is None:
+        return power
+    # of speckle, which may be dark, the ensemble's order 0 is not all there
+    return power + (change - 1.0) * dr.minimum(bsdf.power.zeroth(place, scale, si), power)
 
 
 def _asked(ctx: Context) -> tuple[bool, bool]:

@@ -40,8 +40,9 @@ SWEEPS = 30
 #: R + T is left as it is between these, and brought between them elsewhere; it is left altogether
 #: if it is nowhere above the last.
 LEAST, MOST, TOLERATED = 0.99, 0.999, 1.001
-#: Least that order 0 must leave for s not to be needed; and by how much order 0 may change.
-ENOUGH, STRONGEST = 0.98, 2.0
+#: Least that order 0 must leave for s not to be needed; by how much order 0 may change; and below
+#: what share it is not changed.
+ENOUGH, STRONGEST, FAINT = 0.98, 2.0, 1e-4
 #: Beyond this angle (rad) ever less is brought back, by so much a radian: part of a lobe is below
 #: the horizon.
 CERTAIN, FALL = np.radians(75.5), 1.0
@@ -131,6 +132,7 @@ class Sides:
             wanted = _aims(sums, angle) - (sums - zeroth)
             wanted = np.clip(wanted, zeroth / STRONGEST, zeroth * STRONGEST)
             c = scaled(transport.zeroth, wanted, angle, SWEEPS)
+            c = np.where(zeroth > FAINT, c, np.float32(1.0))
             changed = transport.changed(c, c)
             sums = changed(self._ones)
             if not _near_1(sums, angle, ENOUGH):

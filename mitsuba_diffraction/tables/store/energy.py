@@ -45,7 +45,7 @@ _SETTINGS = (
 _SIDES = (
     *_SETTINGS, str(sides.GRID), sides.WAVELENGTHS, sides.SWEEPS,
     sides.LEAST, sides.MOST,
-    sides.ENOUGH, sides.STRONGEST, sides.TOLERATED, sides.CERTAIN, sides.FALL, sides.BETWEEN,
+    sides.ENOUGH, sides.STRONGEST, sides.FAINT, sides.TOLERATED, sides.CERTAIN, sides.FALL, sides.BETWEEN,
     sides.MARGIN, links.POLAR, links.AZIMUTHS, links.FARTHEST,
 )  # fmt: skip
 
