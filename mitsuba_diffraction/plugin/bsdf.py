@@ -105,13 +105,13 @@ transmission : boolean [false]
     that normals point to has ext_ior, the other one int_ior, which is at least 1.01 times that.
     Component 0 is what is reflected, 1 what goes through. Orders that change the tangential part by
     more than 2/λ are left out. It excludes coat, film, nested BSDF and shadowing. energy_conserving
-    makes R + T 1: it multiplies all by s(ωi) s(ωo), a scale of directions on both sides, up to 75°
-    from the normal upwards too, since a dielectric loses no light; a few seconds' work, kept in the
-    cache, in steps of 0.01 of eta.
+    makes R + T 1, since a dielectric loses no light: order 0 is multiplied by c(ωi) c(ωo), c on the
+    directions of both sides, and where that is not enough all is scaled likewise; a few seconds'
+    work, kept in the cache, in steps of 0.01 of eta.
 thin : boolean [false]
     Light goes through a sheet, whose other side is flat; both sides have ext_ior. What that side
-    sends back is summed as between two mirrors. Light beyond the sheet's critical angle is lost;
-    energy_conserving puts it back evenly, in proportion to what there is.
+    sends back is summed as between two mirrors. Light beyond the sheet's critical angle is lost,
+    unless energy_conserving puts it back, into order 0.
 model : string [small_slope]
     `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
     where the surface is rough at the scale of an order; polarised variants have its Mueller

@@ -34,7 +34,7 @@ Real = NDArray[np.float64]
 Array = NDArray[np.float32]
 
 #: Directions of s on either side, and wavelengths; in variants of one wavelength there is one.
-GRID, WAVELENGTHS = DirectionGrid(56, 36), 6
+GRID, WAVELENGTHS = DirectionGrid(48, 48), 6
 #: Light that goes to and fro beyond the critical angle takes more of them than reflection does.
 SWEEPS = 30
 #: R + T is left as it is between these, and brought between them elsewhere; it is left altogether

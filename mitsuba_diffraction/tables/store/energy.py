@@ -43,10 +43,9 @@ _SETTINGS = (
 )  # fmt: skip
 
 _SIDES = (
-    *_SETTINGS, str(sides.GRID), sides.WAVELENGTHS, sides.SWEEPS,
-    sides.LEAST, sides.MOST,
-    sides.ENOUGH, sides.STRONGEST, sides.FAINT, sides.TOLERATED, sides.CERTAIN, sides.FALL, sides.BETWEEN,
-    sides.MARGIN, links.POLAR, links.AZIMUTHS, links.FARTHEST,
+    *_SETTINGS, str(sides.GRID), sides.WAVELENGTHS, sides.SWEEPS, sides.LEAST, sides.MOST,
+    sides.TOLERATED, sides.ENOUGH, sides.STRONGEST, sides.FAINT, sides.CERTAIN, sides.FALL,
+    sides.BETWEEN, sides.MARGIN, links.POLAR, links.AZIMUTHS, links.FARTHEST,
 )  # fmt: skip
 
 _known: weakref.WeakKeyDictionary[DiffractionTable, dict[str, Conservation]] = (

@@ -85,9 +85,9 @@ def test_scaled_both_sides_add_up_to_all_light(thin, monkeypatch):
     certain = kept if thin else kept[0]
     assert certain.max() < 1.001
     assert certain.min() > 0.98
-    # from within, close beyond the critical angle, orders come and go between nodes
-    assert kept.max() < 1.01
-    assert kept.min() > 0.97
+    # From within, close beyond the critical angle, R + T of a grating falls by 0.12 within two
+    # nodes of azimuth (at 46°); nodes half as far apart leave half of this
+    assert np.abs(kept - 1.0).max() < 0.02
 
 
 def test_what_is_near_1_stays_as_it_is():
