@@ -39,7 +39,7 @@ class Attempt:
     Attributes
     ----------
     coefficients, order_0, scale, expansion, grid : of the table.
-    measured : the error last measured, see `tables.error.worst`.
+    measured : the error last measured, see `tables.build.error.worst`.
     """
 
     def __init__(
