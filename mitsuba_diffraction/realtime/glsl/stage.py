@@ -65,7 +65,7 @@ class Stage:
         self.emitters = Emitters(renderer.mitsuba_scene, self._scene.middle)
         self._add_glowing(renderer.buffers)
         flats = flat_shapes(renderer.mitsuba_scene)
-        around = [self._bound(self._surroundings(flats))]
+        around = [self._bound(pack_surroundings(self._scene, self.emitters, flats))]
         exact = {shape.ptr for shape in flats}
         solid = [n for n, s in enumerate(self._scene.surfaces) if s.shape.ptr not in exact]
         if solid:
@@ -102,16 +102,6 @@ class Stage:
         self._glowing = [self._kept(vertex_array(context, self._glow, v)) for v in vertices]
         self._radiances = [tuple(float(x) for x in one.radiance) for one in scene.emitting]
         self.casters = self._kept(Casters(context, buffers, scene.low, scene.high, vertices))
-
-    def _surroundings(self, flats: Sequence[Any]) -> Packed:
-        """The environment, and what directions meet exactly."""
-        extent = float(np.ptp([self._scene.low, self._scene.high]))
-        packed = pack_flats(flats, self.emitters.share_of)
-        packed |= Packed((), {"least_distance": 1e-4 * extent})
-        environment = self.emitters.environment
-        if environment is not None:
-            packed |= environment.packed(self.emitters.share_of(environment.emitter))
-        return packed
 
     def _with_lobes(self, around: list[Bindings]) -> list[Joined]:
         """Of each surface, what surrounds it and where it sends light."""
@@ -157,6 +147,17 @@ class Stage:
         """Free what lies in the graphics card's memory."""
         for thing in reversed(self._owned):
             thing.release()
+
+
+def pack_surroundings(scene: RealtimeScene, emitters: Emitters, flats: Sequence[Any]) -> Packed:
+    """The environment, and shapes that directions meet exactly, for shaders/surroundings.glsl."""
+    extent = float(np.ptp([scene.low, scene.high]))
+    packed = pack_flats(flats, emitters.share_of)
+    packed |= Packed((), {"least_distance": 1e-4 * extent})
+    environment = emitters.environment
+    if environment is not None:
+        packed |= environment.packed(emitters.share_of(environment.emitter))
+    return packed
 
 
 class Joined:
