@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -26,6 +27,7 @@ from .truth import box_sensor, direct_light
 _FEWER, _MOST = 2, 64
 _DETAIL = 1024  # samples per pixel at most, under lights without extent, which are quiet
 _STEP = 8  # frames between two looks at the clock
+_IN_FRAME = 1 << 15  # samples that progressive light draws at once: fewer take about as long
 
 
 @dataclass(frozen=True)
@@ -42,8 +44,7 @@ class Halves:
 
     def noise(self, exposure: float) -> dict[str, float]:
         """ΔE2000 between a picture and one without noise, over all pixels: mean and 99 %."""
-        everywhere = np.ones(self.first.shape[:2], bool)
-        apart = difference(self.first, self.second, everywhere, exposure)
+        apart = difference(self.first, self.second, None, exposure)
         # two halves of the samples differ by twice what their mean is off
         return {
             "delta_e_mean": 0.5 * apart.delta_e_mean,
@@ -129,7 +130,6 @@ class Comparison:
             if method not in THESIS_METHODS:
                 table[method]["whole"] = self._whole(method, truth, full)
         noise = difference(halves[0], halves[1], compared, exposure)
-        everywhere = np.ones(reference.shape[:2], bool)
         return {
             "scene": self.name, "variant": self.variant, "driver": renderer.driver,
             "size": list(renderer.camera.size), "spp": self.spp, "exposure": exposure,
@@ -138,10 +138,11 @@ class Comparison:
             # two halves of the samples differ by twice what their mean is off
             "noise_delta_e_mean": 0.5 * noise.delta_e_mean,
             "whole_noise": truth.noise(exposure_of(truth.mean)),
+            "clipped": float((truth.mean * exposure_of(truth.mean) > 1.0).any(axis=2).mean()),
             "frames": self.frames,
             "full_transport": None
             if full is None
-            else difference(full, truth.mean, everywhere, exposure_of(full)),
+            else difference(full, truth.mean, None, exposure_of(full)),
             "methods": table,
         }  # fmt: skip
 
@@ -160,7 +161,11 @@ class Comparison:
     def _whole(self, method: str, truth: Halves, full: Any) -> dict[str, Any]:
         """All pixels in progressive light, against all direct light and against full transport."""
         renderer = self.both.renderer
-        light, clock = renderer.progressive(method), clock_of(renderer.driver)
+        width, height = renderer.camera.size
+        most = math.isqrt(max(_IN_FRAME // (width * height), 1))
+        side = min(self.supersampling, most)
+        fine = (side * width, side * height)
+        light, clock = renderer.progressive(method, size=fine), clock_of(renderer.driver)
         light.advance(2)  # compiles
         light.restart()
         halves, start = [], clock()
@@ -168,25 +173,25 @@ class Comparison:
             for done in range(0, self.frames // 2, _STEP):
                 self.progress(half * self.frames // 2 + done, self.frames, f"lighting {method}")
                 light.advance(min(_STEP, self.frames // 2 - done))
-            halves.append(light.image[..., :3])
+            parts = light.image[..., :3].reshape(height, side, width, side, 3)
+            halves.append(parts.mean(axis=(1, 3), dtype=np.float64))
         seconds = clock() - start
         light.release()
         drawn = Halves(halves[0], 2.0 * halves[1] - halves[0])
         exposure = exposure_of(truth.mean)
-        everywhere = np.ones(drawn.mean.shape[:2], bool)
-        found = difference(truth.mean, drawn.mean, everywhere, exposure)
+        found = difference(truth.mean, drawn.mean, None, exposure)
         self._write(drawn.mean, f"{method}_whole", self.frames)
         write_sheet(
             self.folder / f"{method}.png", truth.mean, drawn.mean, full, method=method,
-            found=found, compared=everywhere, exposure=exposure,
+            found=found, compared=None, exposure=exposure,
         )  # fmt: skip
         return {
             "direct": found,
-            "full": None
-            if full is None
-            else difference(full, drawn.mean, everywhere, exposure_of(full)),
+            "full": None if full is None else difference(full, drawn.mean, None, exposure_of(full)),
             "noise": drawn.noise(exposure),
+            "samples": self.frames * side**2,
             "frame_ms": 1e3 * seconds / self.frames,
+            "plain_frame_ms": 1e3 * renderer.frame_time(method, size=fine, frames=3),
         }
 
     def _drawn(

@@ -184,10 +184,11 @@ class _Drawn:
             values, places, _, waves = sampled_directions(
                 self._emitter, self._middle, _BLOCK * _CANDIDATES, start * _CANDIDATES
             )
-            kept, values = _evenly_bright(values, places, start)
-            points, normals = np.pad(places[kept], [(0, 0), (0, 1)]), np.zeros((_BLOCK, 3))
             assert self._environment is not None
-            density = np.where(self._environment.in_sun(places[kept]), 0.0, -1.0)
+            in_sun = self._environment.in_sun(places)
+            kept, values = _evenly_bright(values, places, in_sun, start)
+            points, normals = np.pad(places[kept], [(0, 0), (0, 1)]), np.zeros((_BLOCK, 3))
+            density = np.where(in_sun[kept], 0.0, -1.0)
         return [
             Light(
                 name, point, waves, value[:, 0] if value.shape[1] == 1 else value, normal,
@@ -197,8 +198,13 @@ class _Drawn:
         ]  # fmt: skip
 
 
-def _evenly_bright(values: Array, directions: Array, start: int) -> tuple[NDArray[np.int64], Array]:
+def _evenly_bright(
+    values: Array, directions: Array, in_sun: NDArray[np.bool_], start: int
+) -> tuple[NDArray[np.int64], Array]:
     """Of candidates, one in `_CANDIDATES`, chosen in proportion to what they bring.
+
+    Half of them from a sun, if there is one: it brings most of the light, and the sky, which brings
+    all of it in the sun's shadow, needs more directions.
 
     Stratified resampling along a curve through all directions, so that each part of the sky is
     chosen as often as it is bright (Talbot, Cline and Egbert 2005, *Importance resampling for
@@ -212,6 +218,9 @@ def _evenly_bright(values: Array, directions: Array, start: int) -> tuple[NDArra
     bright = values.mean(axis=(1, 2))
     if not bright.any():
         return np.arange(len(values) // _CANDIDATES), values[::_CANDIDATES]
+    totals = [float(bright[part].sum()) for part in (in_sun, ~in_sun)]
+    if min(totals) > 0.0:
+        bright = bright / np.where(in_sun, *totals)
     azimuth = np.arctan2(directions[:, 1], directions[:, 0]) / (2.0 * np.pi) + 0.5
     cells = (np.stack([azimuth, 0.5 * (directions[:, 2] + 1.0)]) * 255.99).astype(np.int64)
     # bits of both in turn: near in this order is near in the sky (Morton 1966)

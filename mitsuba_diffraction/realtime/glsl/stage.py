@@ -14,10 +14,11 @@ from .emitters import Emitters
 from .lights import Light
 from .lobes import pack_lobes
 from .materials import coat_index, height_scale
+from .obstacles import pack_obstacles
 from .prepared import vertex_array
-from .scene import RealtimeScene, box_of
+from .scene import RealtimeScene
 from .shadows import Casters
-from .surroundings import DepthMaps, flat_shapes, pack_flats
+from .surroundings import flat_shapes, pack_flats
 from .textures import Packed, Uniform
 
 
@@ -65,14 +66,10 @@ class Stage:
         self.emitters = Emitters(renderer.mitsuba_scene, self._scene.middle)
         self._add_glowing(renderer.buffers)
         flats = flat_shapes(renderer.mitsuba_scene)
-        around = [self._bound(pack_surroundings(self._scene, self.emitters, flats))]
-        exact = {shape.ptr for shape in flats}
-        solid = [n for n, s in enumerate(self._scene.surfaces) if s.shape.ptr not in exact]
-        if solid:
-            low, high = box_of([self._scene.surfaces[n].vertices[:, :3] for n in solid])
-            obstacles = Casters(self._context, [renderer.buffers[n] for n in solid], low, high)
-            around.append(self._kept(DepthMaps(obstacles).bindings))
-            obstacles.release()
+        around = [
+            self._bound(pack_surroundings(self._scene, self.emitters, flats)),
+            self._bound(pack_solid(self._scene, flats)),
+        ]
         self._around = around[0]
         self._background, self._triangle = None, None
         if self.emitters.environment is not None:
@@ -158,6 +155,17 @@ def pack_surroundings(scene: RealtimeScene, emitters: Emitters, flats: Sequence[
     if environment is not None:
         packed |= environment.packed(emitters.share_of(environment.emitter))
     return packed
+
+
+def pack_solid(scene: RealtimeScene, flats: Sequence[Any]) -> Packed:
+    """All else that stands in a direction's way, for shaders/obstacles.glsl."""
+    exact = {shape.ptr for shape in flats}
+    solid = [
+        surface.vertices[:, :3].reshape(-1, 3, 3)
+        for surface in scene.surfaces
+        if surface.shape.ptr not in exact
+    ]
+    return pack_obstacles(np.concatenate(solid)) if solid else Packed()
 
 
 class Joined:

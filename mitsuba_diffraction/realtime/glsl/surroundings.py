@@ -6,8 +6,7 @@ from there: area lights that are flat, and the environment. The two kinds of fra
 by the balance heuristic (Veach and Guibas 1995).
 
 What such a direction meets first is exact of rectangles and disks. All else that stands in the way
-is looked up in depth maps of 128 directions, of which each pixel draws one of the nearest; so an
-occluder's edge is blurred by some ten degrees, as seen along mirrored directions only.
+is found on a grid (`obstacles`).
 """
 
 from __future__ import annotations
@@ -21,9 +20,8 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...plugin.names import name_of
-from .context import Bindings, require_moderngl
 from .lights import emitted_radiance, radiance_along
-from .shadows import Casters, frame_along, parallel_view
+from .shadows import frame_along
 from .textures import Packed, Texture, Uniform, as_half
 
 Array = NDArray[np.float64]
@@ -33,8 +31,6 @@ _LARGEST = (512, 1024)  # of one that is
 _SUN_RADIUS = np.radians(0.2679)  # as Mitsuba has it
 _AROUND_SUN = np.radians(0.6)  # within this, a sky's sun is left to the lights
 _FLATS = 12
-_TILES, _TILE = (8, 16), 128  # rows over cosθ and columns around the z axis; texels
-_BIAS = 1.5  # texels, along the normal
 
 
 @dataclass(frozen=True)
@@ -158,44 +154,6 @@ def pack_flats(shapes: Sequence[Any], share_of: Callable[[Any], float]) -> Packe
     )
     disks = sum(shape.class_name() == "Disk" for shape in shapes)
     return Packed((), uniforms, {"FLATS": str(len(shapes)), "DISKS": str(disks)})
-
-
-class DepthMaps:
-    """Depths of a scene along many directions, as one texture.
-
-    Parameters
-    ----------
-    casters : what stands in the way.
-
-    Attributes
-    ----------
-    bindings : what shaders/surroundings.glsl reads.
-    """
-
-    def __init__(self, casters: Casters) -> None:
-        context, moderngl = casters.context, require_moderngl()
-        rows, columns = _TILES
-        texture = context.depth_texture((columns * _TILE, rows * _TILE))
-        texture.compare_func = ""
-        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        frame = context.framebuffer(depth_attachment=texture)
-        frame.clear(depth=1.0)
-        frame.use()
-        views = np.zeros((1, 3 * rows * columns, 4), np.float32)
-        for number in range(rows * columns):
-            row, column = divmod(number, columns)
-            theta = np.arccos(2.0 * (row + 0.5) / rows - 1.0)
-            towards = _directions(theta, 2.0 * np.pi * (column + 0.5) / columns)
-            matrix, _ = parallel_view(towards, casters.corners, casters.corners, _TILE)
-            views[0, 3 * number : 3 * number + 3] = matrix[:3]
-            frame.viewport = (column * _TILE, row * _TILE, _TILE, _TILE)
-            casters.draw(matrix)
-        frame.release()
-        bias = _BIAS * float(np.linalg.norm(casters.high - casters.low)) / _TILE
-        definitions = {"DEPTH_ROWS": str(rows), "DEPTH_COLUMNS": str(columns)}
-        packed = Packed((Texture("depth_views", views),), {"depth_bias": bias}, definitions)
-        self.bindings = Bindings(context, packed)
-        self.bindings.textures["depth_maps"] = texture
 
 
 def _directions(theta: Any, phi: Any) -> Array:

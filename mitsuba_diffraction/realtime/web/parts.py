@@ -14,6 +14,8 @@ from ..glsl.textures import Packed, Texture
 from .sections import Section, Sections, packed_array, packed_file
 from .tables import as_columns
 
+_LEVELS = 256  # of numbers that a byte stands for
+
 
 def packed_parts(
     packed: Packed, sections: Sections, done: Mapping[str, Section] | None = None
@@ -35,11 +37,15 @@ def _texture(texture: Texture, sections: Sections, done: Section | None) -> dict
         entry["kind"] = "picture"
         entry["section"] = sections.add(packed_file(_png(texture.data)))
         return entry
-    entry["kind"] = {2: "half", 4: "single"}[texture.data.dtype.itemsize]
-    if texture.data.dtype == np.uint32:
+    data = texture.data
+    entry["kind"] = {1: "bytes", 2: "half", 4: "single"}[data.dtype.itemsize]
+    if data.dtype == np.uint32:
         entry["kind"] = "words"
+    elif entry["kind"] == "single" and len(levels := np.unique(data)) <= _LEVELS:
+        entry["levels"] = levels.tolist()  # as of pictures of eight bits
+        data = np.searchsorted(levels, data).astype(np.uint8)
     if done is None:
-        done = packed_array(as_columns(texture.data, channels))
+        done = packed_array(as_columns(data, channels))
     entry["section"] = sections.add(done)
     return entry
 

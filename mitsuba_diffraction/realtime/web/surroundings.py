@@ -14,7 +14,7 @@ from ..glsl.lobes import pack_lobes
 from ..glsl.materials import Material, coat_index, height_scale
 from ..glsl.scene import RealtimeScene
 from ..glsl.source import plain_source, vertex_source
-from ..glsl.stage import pack_surroundings
+from ..glsl.stage import pack_solid, pack_surroundings
 from ..glsl.surroundings import flat_shapes
 from ..glsl.textures import Packed, shortened
 from .geometry import packed_mesh, sections_of
@@ -41,23 +41,21 @@ def packed_surroundings(
     if emitters is None or not (scene.emitting or environment):
         return None, {}
     flats = flat_shapes(mitsuba_scene)
-    exact = {shape.ptr for shape in flats}
-    packed = pack_surroundings(scene, emitters, flats)
+    packed, solid = pack_surroundings(scene, emitters, flats), pack_solid(scene, flats)
     lobes = [_lobes(material) for material in materials]
-    definitions = {k: v for part in (packed, *lobes) for k, v in part.definitions.items()}
+    definitions = {k: v for part in (packed, solid, *lobes) for k, v in part.definitions.items()}
     background = None
     if environment is not None:
         shared = ("library.glsl", "surroundings.glsl")
         background = plain_source("background.frag", shared, packed.definitions, "web")
     return {
-        "parts": packed_parts(packed, sections),
+        "parts": packed_parts(packed | solid, sections),
         "lobes": [packed_parts(one, sections) for one in lobes],
         "emitting": [
             {"mesh": sections_of(packed_mesh(one.vertices), sections.add),
              "radiance": one.radiance.tolist()}
             for one in scene.emitting
         ],
-        "solid": [n for n, s in enumerate(scene.surfaces) if s.shape.ptr not in exact],
         "glow": plain_source("glow.frag", dialect="web"),
         "background": background,
         "whole": vertex_source("web", "whole.vert"),

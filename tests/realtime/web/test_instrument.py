@@ -158,10 +158,10 @@ def test_dragging_draws_less_and_rest_draws_all(opened: Tab) -> None:
 def test_the_shadows_of_a_light_that_stands_still_are_drawn_once(opened: Tab) -> None:
     maps, moved = opened.page.evaluate(
         """async () => {
-            const map = viewer.drawing.shadows.coarse, meshes = map.meshes;
+            const map = viewer.drawing.shadows.coarse, { use } = map.program;
             let drawn = 0;
             map.key = undefined;
-            map.meshes = (...all) => (++drawn, meshes.apply(map, all));
+            map.program.use = () => (++drawn, use.apply(map.program));
             const frame = async (change) => {
                 change();
                 viewer.touch();
@@ -170,7 +170,7 @@ def test_the_shadows_of_a_light_that_stands_still_are_drawn_once(opened: Tab) ->
             for (let n = 0; n < 4; ++n) await frame(() => viewer.camera.orbit(0.01, 0));
             const still = drawn;
             for (let n = 0; n < 4; ++n) await frame(() => viewer.lights.move(0.01, 0));
-            delete map.meshes;
+            delete map.program.use;
             return [still, drawn - still];
         }"""
     )
@@ -186,13 +186,14 @@ def test_at_rest_nothing_is_drawn(opened: Tab) -> None:
             await viewer.settled();
             const { gl } = viewer.drawing;
             let drawn = 0;
-            for (const name of ["drawArrays", "drawElements", "readPixels"])
-                gl[name] = (...all) => (++drawn, WebGL2RenderingContext.prototype[name].apply(gl, all));
+            const names = ["drawArrays", "drawElements", "readPixels"];
+            const own = Object.getPrototypeOf(gl);
+            for (const name of names) gl[name] = (...all) => (++drawn, own[name].apply(gl, all));
             await pause(300);
             const still = [drawn, viewer.frame];
             viewer.touch();
             await viewer.settled();
-            for (const name of ["drawArrays", "drawElements", "readPixels"]) delete gl[name];
+            for (const name of names) delete gl[name];
             return [...still, drawn > 0];
         }"""
     )

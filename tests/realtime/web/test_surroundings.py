@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from mitsuba_diffraction.realtime.web.export import make_page
 from tests.realtime.web.conftest import SIZE, Tab
 from tests.realtime.web.pictures import picture
 
-SAMPLES = 96
+SAMPLES = 20
 
 
 @pytest.fixture(scope="module")
@@ -104,25 +103,28 @@ def test_lobes_mirror_lamp_and_sky_as_on_the_desktop(
     for region in (inside, outside):
         assert region.mean() > 0.05
         np.testing.assert_allclose(
-            found[region, :3].mean(axis=0), expected[region, :3].mean(axis=0), rtol=0.02
+            found[region, :3].mean(axis=0), expected[region, :3].mean(axis=0), rtol=0.03
         )
-    # each of 8 × 8 blocks, in which the noise of both is a few per cent
+    # each of 8 × 12 blocks, in which the noise of both is a few per cent
     blocks = [x[..., :3].reshape(8, 8, 12, 8, 3).mean(axis=(1, 3)) for x in (found, expected)]
     off = np.abs(blocks[0] - blocks[1]).sum(axis=-1) / blocks[1].sum(axis=-1)
-    assert np.median(off) < 0.03
-    assert np.percentile(off, 95) < 0.15
+    assert np.median(off) < 0.05
+    assert np.percentile(off, 95) < 0.25
 
 
 def test_a_lamp_is_seen_in_its_colour_until_another_light_is_chosen(opened: Tab) -> None:
-    red, green, blue = picture(opened, shadows=True, samples=4)[..., :3].reshape(-1, 3).max(axis=0)
-    np.testing.assert_allclose([red, green, blue], [9.0, 7.0, 4.0], rtol=0.1)
+    def pixels() -> int:
+        found = picture(opened, shadows=True, samples=2)[..., :3]
+        return int(np.isclose(found, [9.0, 7.0, 4.0], rtol=0.01).all(axis=-1).sum())
+
+    assert pixels() > 20
     opened.page.evaluate("viewer.controls.change({kind: 'sun'})")
-    assert picture(opened, shadows=True, samples=4)[..., 0].max() < 8.0
+    assert pixels() == 0
     opened.page.evaluate("viewer.controls.reset()")
 
 
 def test_what_moves_has_the_environment_behind_it(opened: Tab) -> None:
-    still = picture(opened, shadows=True, samples=4)
+    still = picture(opened, shadows=True, samples=2)
     opened.page.evaluate(
         """async () => {
             viewer.share = 1;

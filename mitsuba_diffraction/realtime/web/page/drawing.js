@@ -57,6 +57,7 @@ class Program {
       else if (type === gl.FLOAT_VEC3) gl.uniform3fv(location, value);
       else if (type === gl.FLOAT_VEC4) gl.uniform4fv(location, value);
       else if (type === gl.INT_VEC2) gl.uniform2iv(location, value);
+      else if (type === gl.INT_VEC3) gl.uniform3iv(location, value);
       else if (type === gl.FLOAT_MAT3) gl.uniformMatrix3fv(location, false, value);
       else if (type === gl.FLOAT_MAT4) gl.uniformMatrix4fv(location, false, value);
       else gl.uniform1i(location, value);
@@ -83,13 +84,15 @@ async function uploadTexture(gl, data, entry) {
   } else {
     const n = [1, 2, 4].indexOf(channels);
     const { internal, type } = {
+      bytes: { internal: [gl.R8, gl.RG8, gl.RGBA8], type: gl.UNSIGNED_BYTE },
       half: { internal: [gl.R16F, gl.RG16F, gl.RGBA16F], type: gl.HALF_FLOAT },
       single: { internal: [gl.R32F, gl.RG32F, gl.RGBA32F], type: gl.FLOAT },
       words: { internal: [gl.R32UI, gl.RG32UI, gl.RGBA32UI], type: gl.UNSIGNED_INT },
     }[entry.kind];
     const words = [gl.RED_INTEGER, gl.RG_INTEGER, gl.RGBA_INTEGER];
     const format = (entry.kind === "words" ? words : [gl.RED, gl.RG, gl.RGBA])[n];
-    const numbers = content.subarray(0, width * height * channels);
+    let numbers = content.subarray(0, width * height * channels);
+    if (entry.levels) numbers = Float32Array.from(numbers, (level) => entry.levels[level]);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     gl.texImage2D(gl.TEXTURE_2D, 0, internal[n], width, height, 0, format, type, numbers);
   }

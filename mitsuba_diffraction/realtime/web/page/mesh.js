@@ -65,9 +65,8 @@ async function uploadMesh(gl, data, mesh) {
   gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
   gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(lists.flat()), gl.STATIC_DRAW);
   gl.bindVertexArray(null);
-  const [low, high] = positions ? boundsOf(positions) : [mesh.layout.position.value, mesh.layout.position.value];
   return {
-    count, low, high,
+    count,
     // detail: 0 draws all triangles, each step fewer
     draw(detail) {
       const few = detail ? parts[detail - 1] : null;
@@ -83,19 +82,14 @@ async function uploadMesh(gl, data, mesh) {
 const FEWER = [20000, 5000]; // triangles while something moves: rasterisers in software draw few at once
 const CELLS = 100; // along the longest side, or fewer
 
-function boundsOf(positions) {
+// Corners of triangles that are left when one vertex stands for all in its cell (Rossignac and
+// Borrel 1993), few enough.
+function coarser(positions, most, cells = CELLS) {
   const low = [0, 1, 2].map(() => Infinity), high = [0, 1, 2].map(() => -Infinity);
   for (let i = 0; i < positions.length; ++i) {
     if (positions[i] < low[i % 3]) low[i % 3] = positions[i];
     if (positions[i] > high[i % 3]) high[i % 3] = positions[i];
   }
-  return [low, high];
-}
-
-// Corners of triangles that are left when one vertex stands for all in its cell (Rossignac and
-// Borrel 1993), few enough.
-function coarser(positions, most, cells = CELLS) {
-  const [low, high] = boundsOf(positions);
   const step = cells / Math.max(...high.map((x, n) => x - low[n]), 1e-30);
   const first = new Map();
   const standing = (i) => {

@@ -3,13 +3,13 @@
 const BIAS = 0.75, STEEPEST = 16; // in texels, as there
 
 class ShadowMap {
-  constructor(gl, header, size, width = size, height = size) {
+  constructor(gl, header, size) {
     Object.assign(this, { gl, size });
     const { box, subject, shadow } = header;
     this.program = new Program(gl, header.vertex, shadow);
     this.texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, this.texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.DEPTH_COMPONENT32F, width, height);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.DEPTH_COMPONENT32F, size, size);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
     this.frame = gl.createFramebuffer();
@@ -23,19 +23,6 @@ class ShadowMap {
     this.covered = cornersOf(around);
   }
 
-  begin() {
-    const { gl } = this;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
-    gl.enable(gl.DEPTH_TEST);
-    gl.clear(gl.DEPTH_BUFFER_BIT);
-    this.program.use();
-  }
-
-  meshes(matrix, casters, detail) {
-    this.program.set({ view_projection: columnMajor(matrix) });
-    for (const { mesh } of casters) mesh.draw(detail);
-  }
-
   // From what a light sees to uniforms; n: its number, by which the map is shifted within a texel.
   draw(light, casters, detail, n) {
     const { gl, size } = this;
@@ -45,9 +32,13 @@ class ShadowMap {
     this.key = key;
     const shift = even(n + 0.37);
     const { matrix, scale } = light.place[3] ? this.perspective(light.place, shift) : this.parallel(unit(light.place), shift);
-    this.begin();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
     gl.viewport(0, 0, size, size);
-    this.meshes(matrix, casters, detail);
+    gl.enable(gl.DEPTH_TEST);
+    gl.clear(gl.DEPTH_BUFFER_BIT);
+    this.program.use();
+    this.program.set({ view_projection: columnMajor(matrix) });
+    for (const { mesh } of casters) mesh.draw(detail);
     const [cutoff, beam] = light.cone;
     return (this.uniforms = {
       light_axis: light.axis,

@@ -9,7 +9,7 @@ const POOR = 0.3;   // below this, rather fewer triangles
 const STILL = 200;  // ms after the last change
 const SMOOTH = 8;   // lights before their mean is shown
 const LIGHT = { few: (n, sky) => `#define LIGHTS_LIT ${n}\n${sky ? "#define SKY\n" : ""}`, one: "#define LIGHTS_LIT 1\n" };
-const WEIGHTED = "#define WEIGHTED\n";
+const WEIGHTED = "#define WEIGHTED\n", LOOKED_UP = "#define LOOKED_UP\n";
 const MONOCHROME = "#define MONOCHROME\n";
 // of a light that casts no shadow
 const UNSHADOWED = { light_axis: [0, 0, 0], light_cone: [0, 0], shadow_matrix: new Float32Array(16), shadow_planes: new Float32Array(16), shadow_bias: 0, shadow_steepest: 0 };
@@ -114,7 +114,6 @@ class Viewer {
     // what emits light stands in the way of light from far away only
     const casters = around && chosen[0]?.place[3] === 0 ? [...drawing.surfaces, ...drawing.around.glowing] : drawing.surfaces;
     const shadow = this.shadows && chosen.length && !lookup ? drawing.shadows[moving ? "coarse" : "fine"].draw(chosen[0], casters, detail, one ? this.count : 0) : UNSHADOWED;
-    if (lookup && !drawing.around.depths) drawing.around.lookAround(this.header, drawing.surfaces);
     // the quick method stands for the other
     const method = moving && this.wavelength === null && drawing.tables.lut ? "lut" : this.drawn;
     if (method === "spectral") drawing.setResponses(chosen);
