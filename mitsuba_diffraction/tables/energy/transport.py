@@ -52,7 +52,9 @@ class Orders:
     """A table's orders, sorted for one height scale; `transport` sums over them."""
 
     def __init__(self, table: DiffractionTable, height_scale: float = 1.0) -> None:
-        self.table, self.height_scale = table, height_scale
+        # not the table, which may keep these
+        self.sigma, self.roughness = table.sigma, table.roughness
+        self.height_scale = height_scale
         self.grating: Grating | None = None
         if (found := grating_of(table)) is not None:
             self.grating, bins = found
@@ -85,7 +87,7 @@ class Orders:
     def gain(self, wavelength: float, model: str, index: complex | Filmed | None) -> Gain:
         """G of a model and material at a wavelength (nm)."""
         k = float(wavenumber(wavelength))
-        return Gain(self.table, model, index, k, self.height_scale)
+        return Gain(self.roughness, model, index, k, self.height_scale)
 
     def of_gain(
         self,
@@ -205,7 +207,7 @@ class Row(ABC):
         self.mixture, self.phi = orders.mixture, phi
         self.k, self.sin, self.mirrored = k, sin, mirrored
         self.nodes, self.weights = orders.nodes, orders.weights
-        self.sigma = orders.table.sigma
+        self.sigma = orders.sigma
 
     @abstractmethod
     def kappa(self, cos_o: Real) -> Real:
