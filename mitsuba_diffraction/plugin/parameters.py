@@ -22,7 +22,15 @@ from .coat import UnderCoat
 from .film import UnderFilm
 from .height_scale import Varying
 from .layers import LAYERINGS, Blend, Layering, Transmission
-from .materials import DEFAULT_WAVELENGTH, boundary_of, coat_of, material_of, passing_of, under_film
+from .materials import (
+    DEFAULT_WAVELENGTH,
+    boundary_of,
+    coat_of,
+    material_of,
+    passing_of,
+    under_film,
+    warn_of_film,
+)
 from .orientation import Constant, Orientation, Textured
 from .pair import SHADOWINGS
 from .places import TILINGS, Places
@@ -159,6 +167,7 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     flat: Reflectance | UnderCoat | UnderFilm = reflectance
     if coat is not None and not isinstance(material, Perfect):
         flat = UnderCoat(material, coat)
+    warn_of_film(reflectance, table, largest)
     boundary = boundary_of(props, reflectance, table)
     conserving, through = flag(props, "energy_conserving", True), None
     places = _places(props, table)

@@ -83,7 +83,7 @@ PICTURES = (
         "snake_two", "A snake with two patches",
         "The sunbeam snake's relief, and rings of a wider one, whose colours stay close to the "
         "window's mirror image (`diffraction_mix`).",
-        "-D skin=skin_two.xml -D resx=480 -D resy=300 -s 32", "xenopeltis",
+        "-D skin=skin_two.xml -D resx=480 -D resy=300 -s 64", "xenopeltis",
     ),
     Picture(
         "gallery", "turning", "The snake turns",
