@@ -83,7 +83,7 @@ def encode_srgb(linear: ArrayLike) -> NDArray[np.float64]:
 
 
 def delta_e(
-    reference: ArrayLike, other: ArrayLike, *, exposure: float | None = None
+    reference: ArrayLike, other: ArrayLike, *, exposure: float | None = None, least: float = 0.01
 ) -> NDArray[np.float64]:
     """ΔE2000 between what a display shows of two pictures; NaN where there is next to no light.
 
@@ -91,8 +91,8 @@ def delta_e(
     ----------
     reference, other : linear sRGB, shape (..., 3).
     exposure : factor on both; by default the one that makes the reference's 95th percentile of
-        Y white. Then both are clipped to what the display shows; pixels of the reference with Y
-        of at most 0.01 do not count.
+        Y white. Then both are clipped to what the display shows.
+    least : Y of the reference, exposed, that a pixel must have; 0 counts all.
     """
     import colour
 
@@ -104,7 +104,7 @@ def delta_e(
         exposure = 1.0 / white if white > 0.0 else 1.0
     lab = [colour.XYZ_to_Lab(np.clip(exposure * a, 0.0, 1.0) @ to_xyz) for a in (first, second)]
     difference = np.asarray(colour.delta_E(lab[0], lab[1], method="CIE 2000"))
-    return np.where(exposure * luminance > 0.01, difference, np.nan)
+    return np.where((exposure * luminance > least) | (least == 0.0), difference, np.nan)
 
 
 @functools.cache

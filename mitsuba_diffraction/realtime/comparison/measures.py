@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
 from ...errors import DiffractionError
-from ...optics.colour import delta_e, encode_srgb, linear_srgb
+from ...optics.colour import delta_e, encode_srgb
 
 Image = NDArray[np.floating]
 
@@ -41,9 +41,8 @@ class Difference:
 
 
 def exposure_of(reference: Image) -> float:
-    """The factor that makes the 95th percentile of Y white, as in `colour.delta_e`."""
-    luminance = np.asarray(reference, float) @ np.linalg.inv(linear_srgb(np.eye(3)))[:, 1]
-    white = float(np.percentile(luminance, 95.0))
+    """The factor with which a display clips one pixel in a hundred, and no more."""
+    white = float(np.percentile(np.asarray(reference, float).max(axis=2), 99.0))
     return 1.0 / white if white > 0.0 else 1.0
 
 
@@ -74,13 +73,17 @@ def flip_map(reference: Image, other: Image, exposure: float) -> NDArray[np.floa
 
 
 def difference(
-    reference: Image, other: Image, mask: NDArray[np.bool_], exposure: float
+    reference: Image, other: Image, mask: NDArray[np.bool_] | None, exposure: float
 ) -> Difference:
-    """How far a picture (height, width, 3) is from its reference over some pixels.
+    """How far a picture (height, width, 3) is from its reference over all pixels, or some.
 
-    FLIP's filters reach into neighbours: those outside the mask are taken to be alike.
+    Of some, those that are nearly black do not count for ΔE2000. FLIP's filters reach into
+    neighbours: those outside the mask are taken to be alike.
     """
-    values = delta_e(reference, other, exposure=exposure)[mask]
+    least = 0.01 if mask is not None else 0.0
+    if mask is None:
+        mask = np.ones(np.shape(reference)[:2], bool)
+    values = delta_e(reference, other, exposure=exposure, least=least)[mask]
     values = values[np.isfinite(values)]
     first, second = (np.asarray(image, float)[mask] for image in (reference, other))
     norm = float(np.linalg.norm(first))

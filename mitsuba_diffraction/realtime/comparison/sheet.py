@@ -22,7 +22,7 @@ def write_sheet(
     *,
     method: str,
     found: Difference,
-    compared: NDArray[np.bool_],
+    compared: NDArray[np.bool_] | None,
     exposure: float,
 ) -> None:
     """Write the sheet.
@@ -34,7 +34,7 @@ def write_sheet(
     full : full transport, or None.
     method : of the shader.
     found : over the pixels that count.
-    compared : those pixels; the map is pale elsewhere.
+    compared : those pixels, the map being pale elsewhere; None for all.
     exposure : factor on all pictures.
 
     Raises
@@ -55,13 +55,14 @@ def write_sheet(
     for axis, image, title in pictures:
         axis.imshow(encode_srgb(exposure * np.asarray(image, float)))
         axis.set_title(title)
-    errors = delta_e(reference, other, exposure=exposure)
+    least = 0.0 if compared is None else 0.01
+    errors = delta_e(reference, other, exposure=exposure, least=least)
     shown = axes[1, 0].imshow(
         np.nan_to_num(errors), cmap="magma", vmin=0.0, vmax=_WORST,
-        alpha=np.where(compared, 1.0, 0.25),
+        alpha=None if compared is None else np.where(compared, 1.0, 0.25),
     )  # fmt: skip
     title = f"difference, mean {found.delta_e_mean:.2f}, 99 % {found.delta_e_percentiles['99']:.1f}"
-    if not compared.all():
+    if compared is not None:
         title += "\n(pale where shadows, edges and materials differ)"
     axes[1, 0].set_title(title, fontsize="medium")
     figure.colorbar(shown, ax=axes[1, 0], label="ΔE2000", extend="max", shrink=0.8)

@@ -32,9 +32,9 @@ def markdown(document: dict[str, Any]) -> str:
     return "\n".join(
         [
             *([_WHOLE, *whole, ""] if whole else []),
-            f"All {width} × {height} pixels in all direct light, {document['frames']} frames; "
-            f"noise of the path-traced picture: ΔE2000 "
-            f"{plain_number(document['whole_noise']['delta_e_mean'])}.",
+            f"All {width} × {height} pixels in all direct light, {document['frames']} frames of "
+            f"{_samples(document)} samples a pixel, against {document['spp']} of the path tracer; "
+            f"{100 * document['clipped']:.1f} % of the pixels are clipped.",
             "",
             _HEAD,
             *rows,
@@ -44,6 +44,12 @@ def markdown(document: dict[str, Any]) -> str:
             f"ΔE2000 {plain_number(document['noise_delta_e_mean'])}.",
         ]
     )
+
+
+def _samples(document: dict[str, Any]) -> int:
+    """Of a pixel in a progressive frame."""
+    taken = [e["whole"]["samples"] for e in document["methods"].values() if "whole" in e]
+    return int(max(taken, default=0) / document["frames"])
 
 
 def _whole_row(method: str, entry: dict[str, Any]) -> str:
@@ -58,7 +64,7 @@ def _whole_row(method: str, entry: dict[str, Any]) -> str:
         plain_number(direct["relative_rmse"]),
         plain_number(full and full["delta_e_mean"]),
         plain_number(found["frame_ms"]),
-        plain_number(found["frame_ms"] / entry["frame_ms"]),
+        plain_number(found["frame_ms"] / found["plain_frame_ms"]),
     )
     return "| " + " | ".join(cells) + " |"
 

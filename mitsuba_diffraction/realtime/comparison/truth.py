@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.colour import daylight
+from ...plugin.memory import upload
 from ..glsl.camera import Camera
 from ..glsl.lights import Light
 
@@ -83,7 +84,7 @@ def box_sensor(camera: Camera) -> Any:
             "to_world": mi.ScalarTransform4f(camera.to_world),
             "fov": camera.fov,
             "fov_axis": "x",
-            "sampler": {"type": "independent"},
+            "sampler": {"type": "multijitter"},
             "film": {
                 "type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb",
                 "component_format": "float32", "rfilter": {"type": "box"},
@@ -142,7 +143,7 @@ def seen(scene: Any, lights: Sequence[Light], samples: int = 4) -> dict[str, NDA
             place = [(x + (i + 0.5) / samples) / width, (y + (j + 0.5) / samples) / height]
             ray, _ = sensor.sample_ray(
                 0.0, 0.5,
-                mi.Point2f(*(mi.Float(p.ravel().astype(np.float32)) for p in place)),
+                mi.Point2f(*(upload(mi.Float, p.astype(np.float32)) for p in place)),
                 mi.Point2f(0.5),
             )  # fmt: skip
             si = scene.ray_intersect(ray)

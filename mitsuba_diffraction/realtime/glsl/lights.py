@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.colour import daylight
+from ...plugin.memory import upload
 from ...plugin.names import name_of
 from .packing import daylight_colour
 
@@ -260,19 +261,23 @@ def sampled_positions(
 
 def radiance_along(emitter: Any, directions: Array) -> Array:
     """What an environment sends from directions (n, 3), linear sRGB (n, 3)."""
+    values, waves = spectra_along(emitter, directions)
+    if values.shape[2] == 3:
+        return values[:, 0]
+    weights = np.array([daylight_colour(waves, one) for one in np.eye(len(waves))])
+    return np.asarray(values[:, :, 0] @ weights)
+
+
+def spectra_along(emitter: Any, directions: Array) -> tuple[Array, Array]:
+    """The same (n, wavelengths, 1 or 3) relative to D65, and the wavelengths in nm."""
     import drjit as dr
     import mitsuba as mi
 
     lanes = _Lanes(len(directions))
     si = dr.zeros(mi.SurfaceInteraction3f, lanes.count)
-    towards = np.repeat(-directions.T, lanes.quads, axis=1).astype(np.float32)
-    si.wi = mi.Vector3f(*(mi.Float(np.ascontiguousarray(x)) for x in towards))
+    si.wi = mi.Vector3f(*(lanes.uploaded(-x) for x in directions.T))
     lanes.set_wavelengths(si)
-    values, waves = lanes.spectra(emitter.eval(si))
-    if values.shape[2] == 3:
-        return values[:, 0]
-    weights = np.array([daylight_colour(waves, one) for one in np.eye(len(waves))])
-    return np.asarray(values[:, :, 0] @ weights)
+    return lanes.spectra(emitter.eval(si))
 
 
 def emitted_radiance(shape: Any) -> Array:
@@ -297,8 +302,9 @@ class _Lanes:
         import mitsuba as mi
 
         if mi.is_spectral:
-            four = self._waves.reshape(4, self.quads)
-            si.wavelengths = mi.Spectrum(*(mi.Float(np.tile(w, self.samples)) for w in four))
+            waves = self._waves.astype(np.float32).reshape(4, self.quads)
+            each = (np.tile(four, self.samples) for four in waves)
+            si.wavelengths = mi.Spectrum(*(upload(mi.Float, four) for four in each))
 
     def points(self, start: int) -> Any:
         """The plastic number's sequence, even over the square from its middle on (Roberts 2018)."""
@@ -306,8 +312,13 @@ class _Lanes:
 
         number = np.arange(start, start + self.samples)[:, None]
         points = (0.5 + number * [0.7548776662, 0.5698402910]) % 1.0
-        points = np.repeat(points, self.quads, axis=0).astype(np.float32)
-        return mi.Point2f(*(mi.Float(np.ascontiguousarray(p)) for p in points.T))
+        return mi.Point2f(*(self.uploaded(p) for p in points.T))
+
+    def uploaded(self, values: Array) -> Any:
+        """One number a sample, (samples,)."""
+        import mitsuba as mi
+
+        return upload(mi.Float, np.repeat(values, self.quads).astype(np.float32))
 
     def vectors(self, values: Any) -> Array:
         """(samples, 3)."""

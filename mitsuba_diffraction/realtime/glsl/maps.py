@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ...optics.colour import linear_srgb, response
 from ...plugin.changing import children
+from ...plugin.memory import upload
 
 Array = NDArray[np.float64]
 #: Wavelengths (n,) in nm, and values (n,).
@@ -140,8 +141,7 @@ def _interaction(uv: Array) -> Any:
     import mitsuba as mi
 
     si = dr.zeros(mi.SurfaceInteraction3f, len(uv))
-    single = np.ascontiguousarray(uv.T, np.float32)
-    si.uv = mi.Point2f(mi.Float(single[0]), mi.Float(single[1]))
+    si.uv = mi.Point2f(*(upload(mi.Float, x.astype(np.float32)) for x in uv.T))
     return si
 
 

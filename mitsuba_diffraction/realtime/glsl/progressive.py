@@ -26,9 +26,10 @@ from .textures import Uniform
 
 Array = NDArray[np.float64]
 
-# two numbers each for the pixel, the lens and the shadow map, and three for lobes: multiples of the
-# roots of primes less their whole parts have nothing to do with each other (Richtmyer 1951)
-_STEPS = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0]) % 1.0
+# two numbers each for the pixel, the lens, the shadow map and the lobes: multiples of the roots of
+# primes less their whole parts have nothing to do with each other (Richtmyer 1951); those of the
+# golden ratio, (1 + √5)/2, are the most even, and lobes need that most
+_STEPS = np.append(np.sqrt([2.0, 3.0, 7.0, 11.0, 13.0, 17.0]), [0.5 + 1.25**0.5, 19.0**0.5]) % 1.0
 
 #: Towards what the second kind of frame looks: all spectra are daylight's, the colours come later.
 _WHITE = Light("surroundings", np.array([0.0, 0.0, 1.0, 0.0]), np.array([360.0, 830.0]), np.ones(2))
@@ -100,7 +101,7 @@ class ProgressiveLight:
             if kind == 0:
                 self._light(camera, places[4:6])
             else:
-                self._look_up(camera, places[6:9])
+                self._look_up(camera, places[6:8])
             self._accumulate(self._sums[kind])
             self._counts[kind] += 1
 

@@ -89,7 +89,7 @@ def fragment_parts(
     if "GLOSS" in constants:
         shared.append("gloss.glsl")
     if "WEIGHTED" in constants or "LOOKED_UP" in constants:
-        shared += ["surroundings.glsl", "lobes.glsl"]
+        shared += ["obstacles.glsl", "surroundings.glsl", "lobes.glsl"]
     shared.append(f"{method}.glsl")
     if "DIFFRACTING" in constants:
         shared.append("diffraction.glsl")

@@ -6,8 +6,7 @@ from there: area lights that are flat, and the environment. The two kinds of fra
 by the balance heuristic (Veach and Guibas 1995).
 
 What such a direction meets first is exact of rectangles and disks. All else that stands in the way
-is looked up in depth maps of 128 directions, of which each pixel draws one of the nearest; so an
-occluder's edge is blurred by some ten degrees, as seen along mirrored directions only.
+is found on a grid (`obstacles`).
 """
 
 from __future__ import annotations
@@ -21,10 +20,9 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...plugin.names import name_of
-from .context import Bindings, require_moderngl
 from .lights import emitted_radiance, radiance_along
-from .shadows import Casters, frame_along, parallel_view
-from .textures import Packed, Texture, Uniform
+from .shadows import frame_along
+from .textures import Packed, Texture, Uniform, as_half
 
 Array = NDArray[np.float64]
 
@@ -33,8 +31,7 @@ _LARGEST = (512, 1024)  # of one that is
 _SUN_RADIUS = np.radians(0.2679)  # as Mitsuba has it
 _AROUND_SUN = np.radians(0.6)  # within this, a sky's sun is left to the lights
 _FLATS = 12
-_TILES, _TILE = (8, 16), 128  # rows over cosθ and columns around the z axis; texels
-_BIAS = 1.5  # texels, along the normal
+_PLASTIC = [0.8191725134, 0.6710436067, 0.5497004779]  # steps in three numbers (Roberts 2018)
 
 
 @dataclass(frozen=True)
@@ -98,19 +95,47 @@ class Environment:
         """Which of (n, 3) unit vectors lead to the sun."""
         return np.asarray(directions @ self.sun > np.cos(_AROUND_SUN))
 
+    @property
+    def areas(self) -> Array:
+        """Solid angles of the picture's texels (rows, 1)."""
+        edges = np.cos(np.linspace(0.0, np.pi, len(self.picture) + 1))
+        return np.asarray(-np.diff(edges)[:, None] * 2.0 * np.pi / self.picture.shape[1])
+
+    def drawn(self, start: int, count: int) -> tuple[Array, Array]:
+        """Directions (count, 3) as dense as the picture is bright, and their densities (count,).
+
+        Stratified along a curve through all texels (Morton 1966), so that each part of the sky is
+        drawn as often as it is bright.
+
+        start : number of the first, in a sequence.
+        """
+        rows, columns, _ = self.picture.shape
+        row, column = np.indices((rows, columns)).reshape(2, -1)
+        # bits of both in turn: near in this order is near in the sky
+        bits = [(bit, 2 * bit) for bit in range(10)]
+        curve = sum((row >> a & 1) << b | (column >> a & 1) << (b + 1) for a, b in bits)
+        order = np.argsort(curve)
+        below = np.cumsum((self.picture.sum(axis=2) * self.areas).ravel()[order])
+        inside, across, down = ((0.5 + np.outer(np.arange(start, start + count), _PLASTIC)) % 1.0).T
+        places = (np.arange(count) + inside) / count * below[-1]
+        kept = order[np.minimum(np.searchsorted(below, places), len(order) - 1)]
+        chances = np.diff(below, prepend=0.0)[np.argsort(order)][kept] / below[-1]
+        edges = np.cos(np.linspace(0.0, np.pi, rows + 1))
+        cosine = edges[row[kept]] + down * np.diff(edges)[row[kept]]
+        phi = 2.0 * np.pi * (column[kept] + across) / columns
+        return _directions(np.arccos(cosine), phi), chances / self.areas[row[kept], 0]
+
     def packed(self, share: float) -> Packed:
         """For shaders/surroundings.glsl.
 
         share : of the lights that are drawn from it.
         """
         rows, columns, _ = self.picture.shape
-        theta = np.pi * (np.arange(rows) + 0.5) / rows
-        areas = np.sin(theta) * (np.pi / rows) * (2.0 * np.pi / columns)
-        total = float((self.picture.sum(axis=(1, 2)) * areas).sum())
+        total = float((self.picture.sum(axis=2) * self.areas).sum())
         four = np.concatenate([self.picture, np.zeros((rows, columns, 1), np.float32)], axis=2)
         cosine = np.cos(_SUN_RADIUS) if self.sun.any() else 2.0
         return Packed(
-            (Texture("environment", four, smooth=True),),
+            (Texture("environment", as_half(four), smooth=True),),
             {
                 "environment_density": share / total if total > 0.0 else 0.0,
                 "sun": (*self.sun.tolist(), float(cosine)),
@@ -158,44 +183,6 @@ def pack_flats(shapes: Sequence[Any], share_of: Callable[[Any], float]) -> Packe
     )
     disks = sum(shape.class_name() == "Disk" for shape in shapes)
     return Packed((), uniforms, {"FLATS": str(len(shapes)), "DISKS": str(disks)})
-
-
-class DepthMaps:
-    """Depths of a scene along many directions, as one texture.
-
-    Parameters
-    ----------
-    casters : what stands in the way.
-
-    Attributes
-    ----------
-    bindings : what shaders/surroundings.glsl reads.
-    """
-
-    def __init__(self, casters: Casters) -> None:
-        context, moderngl = casters.context, require_moderngl()
-        rows, columns = _TILES
-        texture = context.depth_texture((columns * _TILE, rows * _TILE))
-        texture.compare_func = ""
-        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        frame = context.framebuffer(depth_attachment=texture)
-        frame.clear(depth=1.0)
-        frame.use()
-        views = np.zeros((1, 3 * rows * columns, 4), np.float32)
-        for number in range(rows * columns):
-            row, column = divmod(number, columns)
-            theta = np.arccos(2.0 * (row + 0.5) / rows - 1.0)
-            towards = _directions(theta, 2.0 * np.pi * (column + 0.5) / columns)
-            matrix, _ = parallel_view(towards, casters.corners, casters.corners, _TILE)
-            views[0, 3 * number : 3 * number + 3] = matrix[:3]
-            frame.viewport = (column * _TILE, row * _TILE, _TILE, _TILE)
-            casters.draw(matrix)
-        frame.release()
-        bias = _BIAS * float(np.linalg.norm(casters.high - casters.low)) / _TILE
-        definitions = {"DEPTH_ROWS": str(rows), "DEPTH_COLUMNS": str(columns)}
-        packed = Packed((Texture("depth_views", views),), {"depth_bias": bias}, definitions)
-        self.bindings = Bindings(context, packed)
-        self.bindings.textures["depth_maps"] = texture
 
 
 def _directions(theta: Any, phi: Any) -> Array:

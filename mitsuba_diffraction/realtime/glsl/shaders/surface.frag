@@ -148,15 +148,15 @@ void main()
     vec3 radiance = vec3(0.0);
 #ifdef LOOKED_UP
 #ifdef LOBES
-    vec3 drawn = drawn_numbers();
-    vec3 wo = lobe_direction(wi, rotation, drawn.xy);
+    vec3 wo = lobe_direction(wi, rotation, drawn_numbers());
     vec3 direction = wo.x * s + wo.y * t + side * wo.z * n;
     if (seen && wo.z > LOWEST && side * dot(direction, smooth_normal) > 0.0) {
-        vec4 light = arriving(v_position, direction);
+        float distance;
+        vec4 light = arriving(v_position, direction, distance);
         float density = lobe_density(wi, wo, rotation);
-#ifdef DEPTH_ROWS
+#ifdef OBSTACLES
         vec3 above = dot(flat_normal, towards_eye) < 0.0 ? -flat_normal : flat_normal;
-        if (hidden(v_position, above, direction, drawn.yz)) light = vec4(0.0);
+        if (hidden(v_position, above, direction, distance)) light = vec4(0.0);
 #endif
 #ifdef MIRROR
         light.w = 0.0;

@@ -1,7 +1,7 @@
 // What comes from a direction: the environment, and area lights that are flat, or what stands before
 // them; see surroundings.py.
 
-uniform vec3 sequence;            // of the frame: what is drawn, and which depth map is looked at
+uniform vec2 sequence;            // of the frame: what is drawn
 uniform float least_distance;     // of what a surface sees: it does not see itself
 
 #ifdef ENVIRONMENT
@@ -28,9 +28,10 @@ uniform vec4 flat_z[FLATS];       // ... and the distance from its plane
 uniform vec4 flat_light[FLATS];   // radiance, and the density per area with which lights are drawn
 #endif
 
-// Radiance from a direction, and with which density lights are drawn there.
-vec4 arriving(vec3 position, vec3 direction)
+// Radiance from a direction, with which density lights are drawn there, and from how far it comes.
+vec4 arriving(vec3 position, vec3 direction, out float nearest)
 {
+    nearest = 1e30;
     vec4 found = vec4(0.0);
 #ifdef ENVIRONMENT
     found.rgb = environment_radiance(direction);
@@ -40,7 +41,6 @@ vec4 arriving(vec3 position, vec3 direction)
 #endif
 #endif
 #if FLATS > 0
-    float nearest = 1e30;
     for (int i = 0; i < FLATS; ++i) {
         vec4 place = vec4(position, 1.0);
         vec3 from = vec3(dot(flat_x[i], place), dot(flat_y[i], place), dot(flat_z[i], place));
@@ -60,38 +60,12 @@ vec4 arriving(vec3 position, vec3 direction)
 }
 #endif
 
-#ifdef DEPTH_ROWS
-uniform sampler2D depth_maps;     // tiles: rows over cosθ, columns around the z axis
-uniform sampler2D depth_views;    // three rows of each tile's matrix
-uniform float depth_bias;         // along the normal
-
-// Whether the scene stands in the way; of the tiles around the direction one is drawn.
-bool hidden(vec3 position, vec3 normal, vec3 direction, vec2 drawn)
-{
-    vec2 place = vec2(turn_of(direction.xy) * float(DEPTH_COLUMNS),
-                      (0.5 * direction.z + 0.5) * float(DEPTH_ROWS)) + drawn - 0.5;
-    ivec2 tile = ivec2(floor(place));
-    tile.x = (tile.x + DEPTH_COLUMNS) % DEPTH_COLUMNS;
-    tile.y = clamp(tile.y, 0, DEPTH_ROWS - 1);
-    int first = 3 * (tile.y * DEPTH_COLUMNS + tile.x);
-    vec4 moved = vec4(position + depth_bias * normal, 1.0);
-    vec4 away = texelFetch(depth_views, ivec2(first + 2, 0), 0);
-    vec3 at = vec3(dot(texelFetch(depth_views, ivec2(first, 0), 0), moved),
-                   dot(texelFetch(depth_views, ivec2(first + 1, 0), 0), moved), dot(away, moved));
-    // the tile may lie below the surface's own horizon, where the direction does not
-    if (max(abs(at.x), abs(at.y)) >= 1.0 || dot(away.xyz, normal) >= 0.0) return false;
-    ivec2 size = textureSize(depth_maps, 0) / ivec2(DEPTH_COLUMNS, DEPTH_ROWS);
-    ivec2 texel = tile * size + ivec2((0.5 * at.xy + 0.5) * vec2(size));
-    return 2.0 * texelFetch(depth_maps, texel, 0).r - 1.0 < at.z;
-}
-#endif
-
 // Numbers from 0 to 1, other ones at every pixel (the integer hash of Jarzynski and Olano 2020).
-vec3 drawn_numbers()
+vec2 drawn_numbers()
 {
     uvec3 v = uvec3(uvec2(gl_FragCoord.xy), 7u) * 1664525u + 1013904223u;
     v += v.yzx * v.zxy;
     v ^= v >> 16u;
     v += v.yzx * v.zxy;
-    return fract(vec3(v >> 8u) * (1.0 / 16777216.0) + sequence);
+    return fract(vec2(v.xy >> 8u) * (1.0 / 16777216.0) + sequence);
 }
