@@ -85,6 +85,20 @@ def test_unwritable_pages_are_refused_in_one_line(
     assert words in line
 
 
+@pytest.mark.parametrize("name", ["missing.exr", "empty.exr"])
+def test_an_environment_without_a_picture_is_refused_in_one_line(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, some_variant: str
+) -> None:
+    (tmp_path / "empty.exr").touch()
+    sky = f'<emitter type="envmap"><string name="filename" value="{name}"/></emitter></scene>'
+    scene.write_text(scene.read_text().replace("</scene>", sky))
+    out = tmp_path / "plate.html"
+    assert main(["export-viewer", str(scene), str(out)]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert name in line
+    assert not out.exists()
+
+
 def test_other_endings_are_usage_errors(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export-viewer", str(scene), "page.pdf"]) == 2
     assert ".html" in capsys.readouterr().err

@@ -167,10 +167,11 @@ def pack_relief(material: Material) -> Packed:
     for name, relief in (("bump", material.bumps), ("normal", material.normals)):
         if relief is None or relief.picture is None:
             continue
-        picture = relief.picture if name == "bump" else _four(relief.picture)
+        smooth = name == "normal"  # bumps are read texel by texel
+        picture = as_half(_four(relief.picture)) if smooth else relief.picture
         definition = {"bump": "BUMPED", "normal": "NORMAL_MAPPED"}[name]
         packed |= Packed(
-            (Texture(f"{name}_map", picture.astype(np.float32), smooth=True),),
+            (Texture(f"{name}_map", picture, smooth=smooth),),
             {f"{name}_uv": tuple(relief.to_uv.T.ravel().tolist())},
             {definition: ""},
         )

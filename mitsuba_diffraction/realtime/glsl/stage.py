@@ -66,15 +66,10 @@ class Stage:
         self.emitters = Emitters(renderer.mitsuba_scene, self._scene.middle)
         self._add_glowing(renderer.buffers)
         flats = flat_shapes(renderer.mitsuba_scene)
-        around = [self._bound(self._surroundings(flats))]
-        exact = {shape.ptr for shape in flats}
-        solid = [
-            surface.vertices[:, :3].reshape(-1, 3, 3)
-            for surface in self._scene.surfaces
-            if surface.shape.ptr not in exact
+        around = [
+            self._bound(pack_surroundings(self._scene, self.emitters, flats)),
+            self._bound(pack_solid(self._scene, flats)),
         ]
-        if solid:
-            around.append(self._bound(pack_obstacles(np.concatenate(solid))))
         self._around = around[0]
         self._background, self._triangle = None, None
         if self.emitters.environment is not None:
@@ -104,16 +99,6 @@ class Stage:
         self._glowing = [self._kept(vertex_array(context, self._glow, v)) for v in vertices]
         self._radiances = [tuple(float(x) for x in one.radiance) for one in scene.emitting]
         self.casters = self._kept(Casters(context, buffers, scene.low, scene.high, vertices))
-
-    def _surroundings(self, flats: Sequence[Any]) -> Packed:
-        """The environment, and what directions meet exactly."""
-        extent = float(np.ptp([self._scene.low, self._scene.high]))
-        packed = pack_flats(flats, self.emitters.share_of)
-        packed |= Packed((), {"least_distance": 1e-4 * extent})
-        environment = self.emitters.environment
-        if environment is not None:
-            packed |= environment.packed(self.emitters.share_of(environment.emitter))
-        return packed
 
     def _with_lobes(self, around: list[Bindings]) -> list[Joined]:
         """Of each surface, what surrounds it and where it sends light."""
@@ -159,6 +144,28 @@ class Stage:
         """Free what lies in the graphics card's memory."""
         for thing in reversed(self._owned):
             thing.release()
+
+
+def pack_surroundings(scene: RealtimeScene, emitters: Emitters, flats: Sequence[Any]) -> Packed:
+    """The environment, and shapes that directions meet exactly, for shaders/surroundings.glsl."""
+    extent = float(np.ptp([scene.low, scene.high]))
+    packed = pack_flats(flats, emitters.share_of)
+    packed |= Packed((), {"least_distance": 1e-4 * extent})
+    environment = emitters.environment
+    if environment is not None:
+        packed |= environment.packed(emitters.share_of(environment.emitter))
+    return packed
+
+
+def pack_solid(scene: RealtimeScene, flats: Sequence[Any]) -> Packed:
+    """All else that stands in a direction's way, for shaders/obstacles.glsl."""
+    exact = {shape.ptr for shape in flats}
+    solid = [
+        surface.vertices[:, :3].reshape(-1, 3, 3)
+        for surface in scene.surfaces
+        if surface.shape.ptr not in exact
+    ]
+    return pack_obstacles(np.concatenate(solid)) if solid else Packed()
 
 
 class Joined:

@@ -22,7 +22,7 @@ from ...errors import DiffractionError
 from ...plugin.names import name_of
 from .lights import emitted_radiance, radiance_along
 from .shadows import frame_along
-from .textures import Packed, Texture, Uniform
+from .textures import Packed, Texture, Uniform, as_half
 
 Array = NDArray[np.float64]
 
@@ -137,7 +137,7 @@ class Environment:
         four = np.concatenate([self.picture, np.zeros((rows, columns, 1), np.float32)], axis=2)
         cosine = np.cos(_SUN_RADIUS) if self.sun.any() else 2.0
         return Packed(
-            (Texture("environment", four, smooth=True),),
+            (Texture("environment", as_half(four), smooth=True),),
             {
                 "environment_density": share / total if total > 0.0 else 0.0,
                 "sun": (*self.sun.tolist(), float(cosine)),

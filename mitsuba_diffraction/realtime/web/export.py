@@ -23,7 +23,7 @@ from .tables import WEB_METHODS
 
 _SCRIPTS = (
     "vectors.js", "data.js", "mesh.js", "camera.js", "light.js", "drawing.js", "shadow.js",
-    "viewer.js", "link.js", "map.js", "controls.js", "main.js",
+    "surroundings.js", "viewer.js", "link.js", "map.js", "controls.js", "main.js",
 )  # fmt: skip
 
 
@@ -80,7 +80,7 @@ def make_page(
     loaded = load(scene)
     realtime = read_scene(loaded, sensor)
     emitters = Emitters(loaded, realtime.middle) if loaded.emitters() else None
-    packed = web_scene(realtime, emitters, title, methods, progress)
+    packed = web_scene(loaded, realtime, emitters, title, methods, progress)
     text = _filled(packed)
     if len(text.encode()) > MAX_BYTES:
         raise DiffractionError(

@@ -41,7 +41,7 @@ def packed_light(
     return {
         "own": [_described(light, n) for n, light in enumerate(own)],
         "samples": [
-            _described(light, len(own) + n) | {"of": _owner(light, own)}
+            _described(light, len(own) + n) | {"of": _owner(light, own), "density": light.density}
             for n, light in enumerate(drawn)
         ],
         "sky": scene.lighting.sky.ravel().tolist(),

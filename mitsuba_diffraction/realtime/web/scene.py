@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,11 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...optics.colour import encode_srgb
 from ...progress import Progress
 from ...tables.table import DiffractionTable
 from ..glsl.emitters import Emitters
-from ..glsl.materials import height_scale, pack_conservation, pack_surface
+from ..glsl.materials import (
+    Material,
+    height_scale,
+    pack_conservation,
+    pack_relief,
+    pack_surface,
+)
 from ..glsl.scene import RealtimeScene, box_of
 from ..glsl.source import (
     fragment_parts,
@@ -24,11 +28,13 @@ from ..glsl.source import (
     shader_file,
     vertex_source,
 )
-from ..glsl.textures import Packed, Texture
+from ..glsl.textures import Packed
 from .geometry import packed_mesh, sections_of
 from .light import packed_light
-from .sections import Sections, packed_array, packed_file
-from .tables import as_columns, fitting_tables, strongest_orders
+from .parts import packed_parts
+from .sections import Sections
+from .surroundings import packed_surroundings
+from .tables import fitting_tables, strongest_orders
 
 #: Largest page, bytes.
 MAX_BYTES = 25_000_000
@@ -58,6 +64,7 @@ class WebScene:
 
 
 def web_scene(
+    mitsuba_scene: Any,
     scene: RealtimeScene,
     emitters: Emitters | None,
     title: str,
@@ -68,7 +75,8 @@ def web_scene(
 
     Parameters
     ----------
-    scene : of `glsl.scene.read_scene`.
+    mitsuba_scene : of the variant that is set.
+    scene : of it, by `glsl.scene.read_scene`.
     emitters : of the same scene; None where none of them brings light.
     title : for people.
     methods : of `tables.WEB_METHODS`, the first being shown first; those whose tables do not fit
@@ -82,24 +90,28 @@ def web_scene(
     """
     sections = Sections()
     tables: list[DiffractionTable] = []
+    materials: list[Material] = []
     surfaces = []
     for number, surface in enumerate(scene.surfaces):
         progress(number, len(scene.surfaces), f"packing {surface.name}")
         material = surface.material
         # at all height scales that the slider offers
-        common = pack_surface(material) | pack_conservation(material, [2.0**n for n in OCTAVES])
+        common = pack_surface(material) | pack_relief(material)
+        common |= pack_conservation(material, [2.0**n for n in OCTAVES])
         entry: dict[str, Any] = {
             "name": surface.name,
             "mesh": sections_of(packed_mesh(surface.vertices), sections.add),
-            "parts": _parts(common, sections),
+            "parts": packed_parts(common, sections),
         }
         if material.bsdf is not None:
             entry["height_scale"] = height_scale(material)
             if not any(material.table is t for t in tables):
                 tables.append(material.table)
+                materials.append(material)
             entry["table"] = next(n for n, t in enumerate(tables) if t is material.table)
         surfaces.append((entry, common))
     light = packed_light(scene, emitters, sections)
+    around, definitions = packed_surroundings(mitsuba_scene, scene, emitters, materials, sections)
 
     room = (MAX_BYTES - _HEADER) // 4 * 3 - sections.nbytes
     shown, packed, left_out = _fitted(methods, tables, room, progress)
@@ -107,9 +119,10 @@ def web_scene(
         "title": title,
         "surfaces": [entry for entry, _ in surfaces],
         "light": light,
+        "around": around,
         "tables": {
             method: [
-                _parts(packed[method, n].packed, sections, packed[method, n].sections)
+                packed_parts(packed[method, n].packed, sections, packed[method, n].sections)
                 for n in range(len(tables))
             ]
             for method in shown
@@ -128,7 +141,7 @@ def web_scene(
         "box": [scene.low.tolist(), scene.high.tolist()],
         "subject": [x.tolist() for x in box_of([s.vertices[:, :3] for s in scene.diffracting])],
     }
-    _add_programs(header, surfaces, shown, packed)
+    _add_programs(header, surfaces, shown, packed, definitions)
     loss = {
         method: _worst([packed[method, n].loss for n in range(len(tables))]) for method in shown
     }
@@ -164,54 +177,19 @@ def _worst(losses: Sequence[tuple[float, float]]) -> tuple[float, float]:
     return max(mean for mean, _ in losses), max(most for _, most in losses)
 
 
-def _parts(packed: Packed, sections: Sections, done: Any = None) -> dict[str, Any]:
-    """Textures and uniforms as the header has them; `done` are sections that are there already."""
-    return {
-        "uniforms": {name: _plain(value) for name, value in packed.uniforms.items()},
-        "textures": [_texture(t, sections, (done or {}).get(t.name)) for t in packed.textures],
-    }
-
-
-def _texture(texture: Texture, sections: Sections, done: Any) -> dict[str, Any]:
-    rows, columns, channels = texture.data.shape
-    entry: dict[str, Any] = {
-        "name": texture.name, "width": columns, "height": rows, "channels": channels,
-        "smooth": texture.smooth,
-    }  # fmt: skip
-    if texture.name == "colour_map":
-        entry["kind"] = "picture"
-        entry["section"] = sections.add(packed_file(_png(texture.data)))
-        return entry
-    entry["kind"] = {2: "half", 4: "single"}[texture.data.dtype.itemsize]
-    if texture.data.dtype == np.uint32:
-        entry["kind"] = "words"
-    if done is None:
-        done = packed_array(as_columns(texture.data, channels))
-    entry["section"] = sections.add(done)
-    return entry
-
-
-def _png(data: NDArray[np.generic]) -> bytes:
-    """A picture of reflectances as eight bits of sRGB, as which nearly all of them began."""
-    from PIL import Image
-
-    linear = np.asarray(data, np.float64)[..., :3]
-    pixels = np.round(255.0 * encode_srgb(linear)).astype(np.uint8)
-    file = io.BytesIO()
-    Image.fromarray(pixels, "RGB").save(file, "PNG", optimize=True)
-    return file.getvalue()
-
-
 def _add_programs(
     header: dict[str, Any],
     surfaces: Sequence[tuple[dict[str, Any], Packed]],
     methods: Sequence[str],
     packed: Any,
+    around: dict[str, str],
 ) -> None:
     """The shaders, each once, and which surface is drawn with which.
 
     The page puts what it knows of the light where LIGHTS_LIT is defined, and appends one of the
     main functions.
+
+    around : definitions of what surrounds the scene.
     """
     sources: list[str] = []
     for entry, common in surfaces:
@@ -220,8 +198,7 @@ def _add_programs(
         entry["programs"] = {}
         for method in methods:
             tables = packed[method, table].packed.definitions
-            parts = fragment_parts(method, {**common.definitions, **tables, "SHADOWED": ""}, "web")
-            source = "".join(text for name, text in parts[:-1])
+            source = _source(method, {**common.definitions, **tables, **around, "SHADOWED": ""})
             if source not in sources:
                 sources.append(source)
             entry["programs"][method] = sources.index(source)
@@ -238,20 +215,19 @@ def _add_programs(
     header["shown"] = {"vertex": vertex_source("web", "whole.vert"), "fragment": whole}
 
 
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return value.ravel().tolist()
-    if isinstance(value, tuple):
-        return [_plain(v) for v in value]
-    return value.item() if isinstance(value, np.generic) else value
+def _source(method: str, definitions: dict[str, str]) -> str:
+    """All but the main function, with what looks up surroundings only where that is asked for."""
+    parts = dict(fragment_parts(method, definitions, "web")[:-1])
+    looked_up = fragment_parts(method, {**definitions, "LOOKED_UP": ""}, "web")[:-1]
+    more = "".join(text for name, text in looked_up if name not in parts)
+    within = f"#if defined(WEIGHTED) || defined(LOOKED_UP)\n{more}#endif\n"
+    return "".join((*parts.values(), within))
 
 
 def _omissions(scene: RealtimeScene, emitters: Emitters | None) -> list[str]:
     """What the page does not show: of emitters only what the sequence of lights leaves out."""
     found = [text for text in scene.omissions if text not in scene.lighting.omissions]
     found += [] if emitters is None else emitters.omissions
-    if scene.emitting:
-        found.append("shapes that emit light (only their light)")
     return list(dict.fromkeys(found))
 
 

@@ -155,6 +155,62 @@ def test_dragging_draws_less_and_rest_draws_all(opened: Tab) -> None:
     assert shares[2] < shares[3] < shares[4] < shares[5]
 
 
+def test_the_shadows_of_a_light_that_stands_still_are_drawn_once(opened: Tab) -> None:
+    maps, moved = opened.page.evaluate(
+        """async () => {
+            const map = viewer.drawing.shadows.coarse, { use } = map.program;
+            let drawn = 0;
+            map.key = undefined;
+            map.program.use = () => (++drawn, use.apply(map.program));
+            const frame = async (change) => {
+                change();
+                viewer.touch();
+                await new Promise(requestAnimationFrame);
+            };
+            for (let n = 0; n < 4; ++n) await frame(() => viewer.camera.orbit(0.01, 0));
+            const still = drawn;
+            for (let n = 0; n < 4; ++n) await frame(() => viewer.lights.move(0.01, 0));
+            delete map.program.use;
+            return [still, drawn - still];
+        }"""
+    )
+    assert maps == 1
+    assert moved >= 3  # a frame may still be under way
+
+
+def test_at_rest_nothing_is_drawn(opened: Tab) -> None:
+    drawn = opened.page.evaluate(
+        """async () => {
+            const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+            viewer.most = 4;
+            await viewer.settled();
+            const { gl } = viewer.drawing;
+            let drawn = 0;
+            const names = ["drawArrays", "drawElements", "readPixels"];
+            const own = Object.getPrototypeOf(gl);
+            for (const name of names) gl[name] = (...all) => (++drawn, own[name].apply(gl, all));
+            await pause(300);
+            const still = [drawn, viewer.frame];
+            viewer.touch();
+            await viewer.settled();
+            for (const name of names) delete gl[name];
+            return [...still, drawn > 0];
+        }"""
+    )
+    assert drawn == [0, None, True]
+
+
+@pytest.mark.parametrize("persisted", [False, True])
+def test_a_page_that_is_closed_frees_the_graphics_cards_memory(
+    page_file: Path, tab: Any, persisted: bool
+) -> None:
+    opened = tab()
+    assert opened.open(page_file) == "ready"
+    event = f"new PageTransitionEvent('pagehide', {{persisted: {str(persisted).lower()}}})"
+    opened.page.evaluate(f"window.dispatchEvent({event})")
+    assert opened.page.evaluate("viewer.drawing.gl.isContextLost()") is not persisted
+
+
 def test_a_window_of_another_size_is_filled(opened: Tab) -> None:
     opened.page.set_viewport_size({"width": 200, "height": 260})
     opened.page.wait_for_function("viewer.drawing.width === 200")

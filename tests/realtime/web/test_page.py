@@ -139,6 +139,13 @@ def test_sliders_change_the_picture(page_file: Path, tab: Any) -> None:
         ("HTMLCanvasElement.prototype.getContext = () => null", "has no WebGL 2"),
         ("WebGL2RenderingContext.prototype.getExtension = () => null", "EXT_color_buffer_float"),
         ("delete window.DecompressionStream", "cannot unpack"),
+        (
+            """const all = WebGL2RenderingContext.prototype.getParameter;
+            WebGL2RenderingContext.prototype.getParameter = function (name) {
+                return name === this.MAX_TEXTURE_SIZE ? 64 : all.call(this, name);
+            }""",
+            "this device has 64",
+        ),
     ],
 )
 def test_browsers_that_lack_something_are_told_so(

@@ -2,7 +2,6 @@
 
 uniform sampler2D samples;   // sums of linear sRGB and of what is covered
 uniform float sample_count;
-uniform vec2 pixel;          // of the picture shown, in those of the samples
 uniform vec3 background;     // linear sRGB, exposed
 uniform float exposure;      // factor
 
@@ -10,6 +9,6 @@ out vec4 fragment;
 
 void main()
 {
-    vec4 mean = texelFetch(samples, ivec2(gl_FragCoord.xy * pixel), 0) / sample_count;
+    vec4 mean = texelFetch(samples, ivec2(gl_FragCoord.xy), 0) / sample_count;
     fragment = vec4(encode_srgb(mean.rgb * exposure + background * (1.0 - mean.a)), 1.0);
 }

@@ -6,10 +6,11 @@ precision highp sampler2D;
 uniform sampler2D sums;
 uniform sampler2D sample_;
 uniform bool first;
+uniform float covers; // 0: what lobes meet covers nothing new
 out vec4 fragment;
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
-  fragment = texelFetch(sample_, at, 0) + (first ? vec4(0.0) : texelFetch(sums, at, 0));
+  fragment = vec4(1.0, 1.0, 1.0, covers) * texelFetch(sample_, at, 0) + (first ? vec4(0.0) : texelFetch(sums, at, 0));
 }`;
 
 function compiled(gl, kind, source) {
@@ -56,6 +57,7 @@ class Program {
       else if (type === gl.FLOAT_VEC3) gl.uniform3fv(location, value);
       else if (type === gl.FLOAT_VEC4) gl.uniform4fv(location, value);
       else if (type === gl.INT_VEC2) gl.uniform2iv(location, value);
+      else if (type === gl.INT_VEC3) gl.uniform3iv(location, value);
       else if (type === gl.FLOAT_MAT3) gl.uniformMatrix3fv(location, false, value);
       else if (type === gl.FLOAT_MAT4) gl.uniformMatrix4fv(location, false, value);
       else gl.uniform1i(location, value);
@@ -82,13 +84,15 @@ async function uploadTexture(gl, data, entry) {
   } else {
     const n = [1, 2, 4].indexOf(channels);
     const { internal, type } = {
+      bytes: { internal: [gl.R8, gl.RG8, gl.RGBA8], type: gl.UNSIGNED_BYTE },
       half: { internal: [gl.R16F, gl.RG16F, gl.RGBA16F], type: gl.HALF_FLOAT },
       single: { internal: [gl.R32F, gl.RG32F, gl.RGBA32F], type: gl.FLOAT },
       words: { internal: [gl.R32UI, gl.RG32UI, gl.RGBA32UI], type: gl.UNSIGNED_INT },
     }[entry.kind];
     const words = [gl.RED_INTEGER, gl.RG_INTEGER, gl.RGBA_INTEGER];
     const format = (entry.kind === "words" ? words : [gl.RED, gl.RG, gl.RGBA])[n];
-    const numbers = content.subarray(0, width * height * channels);
+    let numbers = content.subarray(0, width * height * channels);
+    if (entry.levels) numbers = Float32Array.from(numbers, (level) => entry.levels[level]);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     gl.texImage2D(gl.TEXTURE_2D, 0, internal[n], width, height, 0, format, type, numbers);
   }
@@ -117,9 +121,9 @@ class Part {
   }
 }
 
-// A picture of floats, with depth if it is drawn into.
+// A picture of floats, with depth if surfaces are drawn into it.
 class Target {
-  constructor(gl, width, height, depth) {
+  constructor(gl, width, height, depth = false) {
     this.gl = gl;
     this.texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, this.texture);
@@ -144,6 +148,7 @@ class Target {
 }
 
 const RESPONSES = 4; // rows: lights at once
+const PIXEL = { floats: new Float32Array(4), bytes: new Uint8Array(4) };
 
 class Drawing {
   static async load(gl, header, data, progress) {
@@ -168,6 +173,7 @@ class Drawing {
     drawing.shown = new Program(gl, whole, header.shown.fragment);
     drawing.shadows = { fine: new ShadowMap(gl, header, 2048), coarse: new ShadowMap(gl, header, 256) };
     drawing.empty = gl.createVertexArray();
+    drawing.around = header.around && (await Surroundings.load(gl, header, data));
     return drawing;
   }
 
@@ -195,7 +201,7 @@ class Drawing {
     for (const target of [this.sample, this.held, ...(this.sums ?? [])]) target?.release();
     Object.assign(this, { width, height });
     this.sample = new Target(this.gl, width, height, true);
-    this.held = new Target(this.gl, width, height);
+    this.held = new Target(this.gl, width, height, true);
     this.sums = [new Target(this.gl, width, height), new Target(this.gl, width, height)];
   }
 
@@ -232,7 +238,8 @@ class Drawing {
       surface.part.use(program);
       this.tables[view.method][surface.table].use(program);
       program.texture("responses", this.responses);
-      program.texture("shadow_map", this.shadows[view.coarse ? "coarse" : "fine"].texture);
+      program.texture("shadow_map", this.shadows[view.moving ? "coarse" : "fine"].texture);
+      if (view.looksUp) this.around.use(program, surface.table);
       program.set({
         ...view.uniforms,
         wavenumbers: this.header.light.wavenumbers,
@@ -240,7 +247,7 @@ class Drawing {
         energy_page: page,
         surface_number: number,
       });
-      surface.mesh.draw(view.coarse);
+      surface.mesh.draw(view.detail ?? 0);
     });
   }
 
@@ -254,6 +261,7 @@ class Drawing {
     gl.enable(gl.DEPTH_TEST);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    if (view.around) this.around.draw(view, this);
     this.drawSurfaces(view, "surface");
     gl.disable(gl.SCISSOR_TEST);
   }
@@ -263,6 +271,12 @@ class Drawing {
     gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
     gl.viewport(0, 0, width, height);
     gl.disable(gl.DEPTH_TEST);
+    this.triangle();
+  }
+
+  // One that covers the picture.
+  triangle() {
+    const { gl } = this;
     gl.bindVertexArray(this.empty);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.bindVertexArray(null);
@@ -270,34 +284,37 @@ class Drawing {
 
   // Adds the sample to the sums; or, of a preview, holds it beside them.
   keep(view, first) {
-    let to = this.held;
-    if (!view.preview) {
-      this.sums.reverse();
-      [to] = this.sums;
+    if (view.preview) {
+      [this.sample, this.held] = [this.held, this.sample];
+      return;
     }
+    this.sums.reverse();
     this.add.use();
-    this.add.set({ first: first || view.preview });
+    this.add.set({ first, covers: view.lookup ? 0 : 1 });
     this.add.texture("sums", this.sums[1].texture);
     this.add.texture("sample_", this.sample.texture);
-    this.full(to.frame, view.width, view.height);
+    this.full(this.sums[0].frame, view.width, view.height);
   }
 
-  // On the screen: the mean of the samples so far.
-  show(view, count, exposure) {
+  // On the screen: the mean of the samples so far; half: the last sum lacks its other half. Smaller
+  // pictures are stretched by the browser, several times as fast as drivers in software do it.
+  show(view, count, exposure, half) {
+    const { width, height } = view, { canvas } = this.gl;
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     this.shown.use();
     this.shown.set({
-      sample_count: view.preview ? 1 : count, exposure, pixel: [view.width / this.width, view.height / this.height],
-      background: this.header.background.map((x) => Math.max(x * exposure, 0)),
+      sample_count: view.preview ? 1 : count, exposure,
+      background: view.around && this.around.background ? DARK : this.header.background.map((x) => Math.max(x * exposure, 0)),
     });
-    this.shown.texture("samples", view.preview ? this.held.texture : this.sums[0].texture);
-    this.full(null, this.width, this.height);
+    this.shown.texture("samples", view.preview ? this.held.texture : this.sums[half ? 1 : 0].texture);
+    this.full(null, width, height);
   }
 
-  // Waits until all is drawn.
-  finish() {
+  // Waits until all is drawn; frame: null is the screen.
+  finish(frame = this.sample.frame) {
     const { gl } = this;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.sample.frame);
-    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.FLOAT, new Float32Array(4));
+    gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, frame ? gl.FLOAT : gl.UNSIGNED_BYTE, frame ? PIXEL.floats : PIXEL.bytes);
   }
 
   // Mean of the samples, linear sRGB and coverage, from the bottom row up.

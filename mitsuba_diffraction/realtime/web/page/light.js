@@ -82,6 +82,12 @@ class Lights {
     light.place = light.place[3] ? [...plus(this.middle, direction, distance), 1] : [...direction, 0];
   }
 
+  // Whether they are the scene's, and lights that have a place are where they were.
+  get whole() {
+    const was = this.header.light.own;
+    return this.kind === "scene" && this.own.every(({ place }, n) => !place[3] || place.every((x, i) => x === was[n].place[i]));
+  }
+
   // Whether there is a light that can be moved.
   get movable() {
     return this.kind !== "scene" || this.own.length > 0;

@@ -36,7 +36,9 @@ function context(canvas, header) {
   if (!gl)
     throw new Error(
       "This browser has no WebGL 2. Update it, switch on hardware acceleration in its settings, or take another one.");
-  const textures = [...Object.values(header.tables).flat(), ...header.surfaces.map((surface) => surface.parts)].flatMap((part) => part.textures);
+  const { tables, surfaces, around } = header;
+  const parts = [...Object.values(tables).flat(), ...surfaces.map((surface) => surface.parts), ...(around ? [around.parts, ...around.lobes] : [])];
+  const textures = parts.flatMap((part) => part.textures);
   const needs = { EXT_color_buffer_float: "pictures of floats" };
   if (textures.some(({ smooth, kind }) => smooth && kind === "single"))
     needs.OES_texture_float_linear = "linear filtering of float textures";
@@ -86,6 +88,10 @@ async function start() {
     } catch (error) {
       fail(error);
     }
+  });
+  // a page that is closed, or a notebook's cell that is run again, keeps no textures
+  window.addEventListener("pagehide", ({ persisted }) => {
+    if (!persisted) gl.getExtension("WEBGL_lose_context")?.loseContext();
   });
   await viewer.settled(0);
   element("busy").hidden = true;

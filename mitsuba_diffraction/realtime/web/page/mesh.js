@@ -55,31 +55,36 @@ async function uploadMesh(gl, data, mesh) {
     gl.enableVertexAttribArray(location);
     gl.vertexAttribPointer(location, size, direction ? gl.SHORT : gl.FLOAT, direction, stride * values.BYTES_PER_ELEMENT, 0);
   });
-  const few = count > 3 * FEW ? coarser(positions) : null;
-  if (few) {
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, few, gl.STATIC_DRAW);
+  // one buffer: an array has only one
+  const parts = [], lists = [];
+  for (const few of FEWER) {
+    const list = count > 3 * few ? coarser(positions, few) : null;
+    parts.push(list && { first: lists.reduce((sum, { length }) => sum + length, 0), length: list.length });
+    if (list) lists.push(list);
   }
+  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint32Array(lists.flat()), gl.STATIC_DRAW);
   gl.bindVertexArray(null);
   return {
     count,
-    // coarse: fewer triangles, while something moves
-    draw(coarse) {
+    // detail: 0 draws all triangles, each step fewer
+    draw(detail) {
+      const few = detail ? parts[detail - 1] : null;
       for (const [location, value] of constants) gl.vertexAttrib4fv(location, value);
       gl.bindVertexArray(array);
-      if (coarse && few) gl.drawElements(gl.TRIANGLES, few.length, gl.UNSIGNED_INT, 0);
+      if (few) gl.drawElements(gl.TRIANGLES, few.length, gl.UNSIGNED_INT, 4 * few.first);
       else gl.drawArrays(gl.TRIANGLES, 0, count);
       gl.bindVertexArray(null);
     },
   };
 }
 
-const FEW = 20000; // triangles that every rasteriser in software draws at once
+const FEWER = [20000, 5000]; // triangles while something moves: rasterisers in software draw few at once
 const CELLS = 100; // along the longest side, or fewer
 
 // Corners of triangles that are left when one vertex stands for all in its cell (Rossignac and
 // Borrel 1993), few enough.
-function coarser(positions, cells = CELLS) {
+function coarser(positions, most, cells = CELLS) {
   const low = [0, 1, 2].map(() => Infinity), high = [0, 1, 2].map(() => -Infinity);
   for (let i = 0; i < positions.length; ++i) {
     if (positions[i] < low[i % 3]) low[i % 3] = positions[i];
@@ -98,5 +103,5 @@ function coarser(positions, cells = CELLS) {
     const a = standing(i), b = standing(i + 1), c = standing(i + 2);
     if (a !== b && b !== c && c !== a) found.push(a, b, c);
   }
-  return found.length > 3 * FEW ? coarser(positions, 0.7 * cells) : new Uint32Array(found);
+  return found.length > 3 * most ? coarser(positions, most, 0.7 * cells) : found;
 }

@@ -24,8 +24,12 @@ class ShadowMap {
   }
 
   // From what a light sees to uniforms; n: its number, by which the map is shifted within a texel.
-  draw(light, surfaces, coarse, n) {
+  draw(light, casters, detail, n) {
     const { gl, size } = this;
+    // while the camera moves the light does not
+    const key = String([light.place, light.axis, light.cone, casters.length, detail, n]);
+    if (key === this.key) return this.uniforms;
+    this.key = key;
     const shift = even(n + 0.37);
     const { matrix, scale } = light.place[3] ? this.perspective(light.place, shift) : this.parallel(unit(light.place), shift);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
@@ -34,16 +38,16 @@ class ShadowMap {
     gl.clear(gl.DEPTH_BUFFER_BIT);
     this.program.use();
     this.program.set({ view_projection: columnMajor(matrix) });
-    for (const { mesh } of surfaces) mesh.draw(coarse);
+    for (const { mesh } of casters) mesh.draw(detail);
     const [cutoff, beam] = light.cone;
-    return {
+    return (this.uniforms = {
       light_axis: light.axis,
       light_cone: cutoff ? [cutoff, 1 / Math.max(cutoff - beam, 1e-6)] : [0, 0],
       shadow_matrix: columnMajor(matrix),
       shadow_planes: columnMajor(transposed(invertible(matrix))),
       shadow_bias: BIAS * scale,
       shadow_steepest: STEEPEST * scale,
-    };
+    });
   }
 
   bounds(seen, shift) {

@@ -5,9 +5,11 @@ const BUSY = 100;   // ms that a step may take before the page answers again
 const STEPS = 8;    // at most, of one sample: each draws all triangles anew
 const FLUENT = 35;  // ms that a picture should take while something moves
 const SMALLEST = 0.1; // share of either side
+const POOR = 0.3;   // below this, rather fewer triangles
 const STILL = 200;  // ms after the last change
 const SMOOTH = 8;   // lights before their mean is shown
 const LIGHT = { few: (n, sky) => `#define LIGHTS_LIT ${n}\n${sky ? "#define SKY\n" : ""}`, one: "#define LIGHTS_LIT 1\n" };
+const WEIGHTED = "#define WEIGHTED\n", LOOKED_UP = "#define LOOKED_UP\n";
 const MONOCHROME = "#define MONOCHROME\n";
 // of a light that casts no shadow
 const UNSHADOWED = { light_axis: [0, 0, 0], light_cone: [0, 0], shadow_matrix: new Float32Array(16), shadow_planes: new Float32Array(16), shadow_bias: 0, shadow_steepest: 0 };
@@ -31,6 +33,8 @@ class Viewer {
     this.count = 0;       // samples in the sums
     this.steps = 8;       // of one sample, from the bottom up
     this.share = 0.25;    // of either side, while something moves
+    this.detail = 1;      // of the triangles then: 0 is all
+    this.finest = 0;      // that it may be
     this.changed = 0;
     this.dirty = true;
     this.waiting = [];
@@ -50,11 +54,22 @@ class Viewer {
     return this.wavelength === null ? this.method : "spectral";
   }
 
+  // Whether the scene's environment and lights are seen: its own light, all of it, where it was.
+  get around() {
+    return this.drawing.around && this.wavelength === null && this.lights.whole;
+  }
+
+  // Whether lobes look up what they meet.
+  get looksUp() {
+    return this.around && this.shadows;
+  }
+
   // Definitions of the light that programs are compiled with: few lights at once, or one.
   get lit() {
     const { lights, sky } = this.lights.few;
     const one = this.wavelength === null ? "" : MONOCHROME;
-    return [LIGHT.few(lights.length, sky.some((x) => x)) + one, LIGHT.one + one];
+    const found = [LIGHT.few(lights.length, sky.some((x) => x)) + one, LIGHT.one + one];
+    return this.looksUp ? [found[0], LIGHT.one + WEIGHTED, LIGHT.one + LOOKED_UP] : found;
   }
 
   // Something that is drawn is another now.
@@ -74,35 +89,41 @@ class Viewer {
     const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
     if (width === this.drawing.width && height === this.drawing.height) return;
-    this.canvas.width = width;
-    this.canvas.height = height;
     this.drawing.resize(width, height);
     this.shown = undefined;
     this.touch();
   }
 
-  begin() {
-    const { drawing, lights, moving } = this;
+  begin(moving) {
+    const { drawing, lights } = this;
     if (this.dirty) {
       this.count = 0;
-      this.whole = false;
+      this.whole = this.half = false;
     }
     this.dirty = false;
     const preview = moving || (this.shadows && !this.whole);
     const one = !preview && this.shadows;
+    const { around, looksUp } = this, lookup = one && this.half;
     const { lights: few, sky } = lights.few;
-    const chosen = one ? [lights.sample(this.count)] : few;
-    const share = moving ? this.share : 1;
+    const chosen = lookup ? [WHITE] : one ? [lights.sample(this.count)] : few;
+    // few sizes: another one needs another canvas
+    const share = moving ? 2 ** (Math.floor(2 * Math.log2(this.share)) / 2) : 1;
+    const detail = moving ? this.detail : 0;
     const width = Math.max(1, Math.round(drawing.width * share));
     const height = Math.max(1, Math.round(drawing.height * share));
-    const shadow = this.shadows && chosen.length ? drawing.shadows[moving ? "coarse" : "fine"].draw(chosen[0], drawing.surfaces, moving, one ? this.count : 0) : UNSHADOWED;
+    // what emits light stands in the way of light from far away only
+    const casters = around && chosen[0]?.place[3] === 0 ? [...drawing.surfaces, ...drawing.around.glowing] : drawing.surfaces;
+    const shadow = this.shadows && chosen.length && !lookup ? drawing.shadows[moving ? "coarse" : "fine"].draw(chosen[0], casters, detail, one ? this.count : 0) : UNSHADOWED;
     // the quick method stands for the other
     const method = moving && this.wavelength === null && drawing.tables.lut ? "lut" : this.drawn;
     if (method === "spectral") drawing.setResponses(chosen);
     const view = this.viewed([spread(this.count, 0.7548776662) / width, spread(this.count, 0.569840291) / height]);
     const colour = this.colour();
     Object.assign(view.uniforms, { sky: colour ? monochrome(sky, colour) : sky, ...lightUniforms(chosen, colour), ...shadow });
-    this.sample = { ...view, method, width, height, preview, moving, coarse: moving, lit: this.lit[one ? 1 : 0], row: 0, time: 0 };
+    if (lookup) view.uniforms.sequence = drawnNumbers(this.count);
+    else view.uniforms.light_density = chosen[0]?.density ?? 0;
+    const lit = this.lit[lookup ? 2 : one ? 1 : 0], bright = lookup || !(one && looksUp);
+    this.sample = { ...view, method, width, height, preview, moving, detail, lit, around, looksUp: looksUp && one, lookup, bright, row: 0, time: 0 };
   }
 
   // What does not depend on the light.
@@ -125,27 +146,10 @@ class Viewer {
     this.frame = undefined;
     if (this.lost) return;
     this.fit();
-    const start = performance.now();
-    let shown, done;
-    while (this.dirty || this.sample || this.latest?.moving || this.count < this.enough) {
-      if (!this.sample) this.begin();
-      const { sample } = this;
-      this.draw(sample, start);
-      if (sample.row < sample.height) break;
-      this.drawing.keep(sample, this.count === 0);
-      if (sample.moving) this.adapt(sample.time);
-      else if (sample.preview) this.whole = true;
-      else this.count += 1;
-      const early = this.shadows && !sample.preview && this.count < Math.min(SMOOTH, this.enough) && this.shown;
-      if (!early) this.shown = shown = sample;
-      this.latest = done = sample;
-      this.sample = undefined;
-      // several at once where they are quick, but one while something moves
-      if (this.moving || performance.now() - start > BUSY / 2) break;
-    }
-    if (shown) this.present();
-    if (done) this.report(done, this.count);
-    const still = !this.dirty && this.latest && !this.latest.moving;
+    const { moving } = this;
+    if (!moving) this.improve();
+    else if (this.dirty || !this.latest?.moving) this.glance();
+    const still = !moving && !this.dirty && this.latest && !this.latest.moving;
     if (!still || this.count < this.enough) this.wake();
     if (still)
       this.waiting = this.waiting.filter(({ count, resolve }) => {
@@ -154,24 +158,74 @@ class Viewer {
       });
   }
 
-  // The next picture's size, so that it takes as long as it may.
+  // While something moves: one picture, so small that it takes no longer than it may.
+  glance() {
+    const start = performance.now();
+    this.begin(true);
+    const { sample } = this;
+    this.drawing.drawRows(sample, 0, sample.height);
+    this.keep(sample);
+    this.present();
+    this.drawing.finish(null);
+    sample.time = performance.now() - start;
+    this.adapt(sample.time);
+    this.report(sample, 0);
+  }
+
+  // While nothing moves: samples, or rows of one, until the page should answer again.
+  improve() {
+    const start = performance.now();
+    let shown, done;
+    while (this.dirty || this.sample || this.latest?.moving || this.count < this.enough) {
+      if (!this.sample) this.begin(false);
+      const { sample } = this;
+      this.draw(sample, start);
+      if (sample.row < sample.height) break;
+      const half = sample.looksUp && !sample.lookup; // the other one is what lobes meet
+      const few = this.shadows && this.count + 1 < Math.min(SMOOTH, this.enough);
+      const early = !sample.preview && (half || few) && this.shown;
+      this.keep(sample, early);
+      this.half = half;
+      if (sample.preview) this.whole = true;
+      else if (!half) this.count += 1;
+      if (!early) shown = true;
+      done = sample;
+      if (performance.now() - start > BUSY / 2) break; // else several at once
+    }
+    if (shown) this.present();
+    if (done) this.report(done, this.count);
+  }
+
+  // A sample that is drawn; early: too few are there to be shown.
+  keep(sample, early = false) {
+    this.drawing.keep(sample, this.count === 0 && !sample.lookup);
+    if (!early) this.shown = sample;
+    this.latest = sample;
+    this.sample = undefined;
+  }
+
+  // The next picture's size, so that it takes as long as it may; and its triangles, fewer for good
+  // where it would get too small.
   adapt(time) {
     const factor = clamp(Math.sqrt(FLUENT / Math.max(time, 1)), 0.5, 1.3);
     this.share = clamp(this.share * factor, SMALLEST, 1);
+    if (this.share < POOR && this.detail < FEWER.length) {
+      this.detail += 1;
+      this.finest = this.detail;
+    } else if (this.share === 1 && time < FLUENT / 4 && this.detail > this.finest) this.detail -= 1;
   }
 
   // Rows of a sample, until it has all or the page should answer again.
   draw(sample, start) {
     let last = performance.now();
-    const steps = sample.moving ? 1 : this.steps;
     while (sample.row < sample.height && last - start < BUSY / 2) {
-      const top = Math.min(sample.row + Math.ceil(sample.height / steps), sample.height);
+      const top = Math.min(sample.row + Math.ceil(sample.height / this.steps), sample.height);
       this.drawing.drawRows(sample, sample.row, top);
       this.drawing.finish();
       const now = performance.now();
       // as many rows at once as can be drawn while nobody notices
-      if (!sample.moving && now - last > BUSY) this.steps = Math.min(STEPS, this.steps * 2);
-      else if (!sample.moving && now - last < BUSY / 3) this.steps = Math.max(1, this.steps / 2);
+      if (now - last > BUSY) this.steps = Math.min(STEPS, this.steps * 2);
+      else if (now - last < BUSY / 3) this.steps = Math.max(1, this.steps / 2);
       sample.time += now - last;
       sample.row = top;
       last = now;
@@ -180,7 +234,7 @@ class Viewer {
 
   // The samples so far, at another exposure perhaps.
   present() {
-    if (this.shown) this.drawing.show(this.shown, this.count, this.exposure);
+    if (this.shown) this.drawing.show(this.shown, this.count, this.exposure, this.half);
   }
 
   // Resolves when a still picture has so many samples, fails after some ms.

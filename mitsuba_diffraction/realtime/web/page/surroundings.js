@@ -1,0 +1,47 @@
+// What surrounds the scene: its environment, shapes that emit light, and what lobes meet; as
+// glsl/stage.py and glsl/surroundings.py have it.
+
+const WHITE = { place: [0, 0, 1, 0], colour: [1, 1, 1], axis: DARK, cone: [0, 0], spectrum: -1, density: 0 };
+// Other numbers for each sample, as glsl/progressive.py has them.
+const drawnNumbers = (n) => [0.5 + Math.sqrt(1.25), Math.sqrt(19)].map((step) => (0.5 + (n + 1) * step) % 1);
+
+class Surroundings {
+  static async load(gl, header, data) {
+    const around = new Surroundings(), { parts, lobes, emitting, glow, background, whole } = header.around;
+    around.gl = gl;
+    around.part = await Part.load(gl, data, parts);
+    around.lobes = [];
+    for (const one of lobes) around.lobes.push(await Part.load(gl, data, one));
+    around.glowing = [];
+    for (const { mesh, radiance } of emitting) around.glowing.push({ mesh: await uploadMesh(gl, data, mesh), radiance });
+    around.glow = new Program(gl, header.vertex, glow);
+    around.background = background && new Program(gl, whole, background);
+    return around;
+  }
+
+  // For a surface whose lobes look it up.
+  use(program, table) {
+    this.part.use(program);
+    this.lobes[table]?.use(program);
+  }
+
+  // Behind the scene the environment, and what emits light; dark, that only covers.
+  draw(view, drawing) {
+    const { gl } = this, { uniforms, matrix, bright, width, height } = view;
+    if (bright && this.background) {
+      gl.disable(gl.DEPTH_TEST);
+      this.background.use();
+      this.part.use(this.background);
+      this.background.set({
+        ...uniforms, from_clip: columnMajor(invertible(matrix)), picture_size: [width, height],
+      });
+      drawing.triangle();
+      gl.enable(gl.DEPTH_TEST);
+    }
+    this.glow.use();
+    for (const { mesh, radiance } of this.glowing) {
+      this.glow.set({ ...uniforms, radiance: bright ? radiance : DARK });
+      mesh.draw(view.detail);
+    }
+  }
+}
