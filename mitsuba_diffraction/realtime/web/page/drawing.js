@@ -185,7 +185,7 @@ class Drawing {
       this.tables[method] = tables;
     }
     await progress(`Compiling ${method}`);
-    for (const surface of this.surfaces) for (const light of lit) this.program(surface, method, light);
+    for (const surface of this.surfaces) for (const light of Object.values(lit)) this.program(surface, method, light);
   }
 
   // Compiled once for each of: a surface's source, definitions of its light, main function.
