@@ -1,15 +1,13 @@
 """The commands that README and docs show run, in their order, on small patches and pictures.
 
 What is not run here: `make`, `pip` and `apt`, which set up what runs these tests; `view`, which
-opens a window; `bench` and `tradeoff`, which take minutes at their smallest, and are run smaller
-still by their own tests. test_docs.py checks what these would be given.
+opens a window; `bench`, `tradeoff` and `compare`, which take long at their smallest, and are run
+smaller still by their own tests. test_docs.py checks what these would be given.
 """
 
 from __future__ import annotations
 
 import gc
-import re
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -19,37 +17,23 @@ from PIL import Image
 import mitsuba_diffraction as md
 from mitsuba_diffraction.cli import main
 from scenes.make.__main__ import main as make_mesh
-from tests.conftest import ROOT
+from tests.clone import small_clone
 from tests.instruments import nanoscope
 from tests.test_docs import PAGES, blocks, spans, typed
 
-NOT_RUN = {"view", "bench", "tradeoff"}
+NOT_RUN = {"view", "bench", "tradeoff", "compare"}
 
 # as small as commands may be asked to be; the last option of a name counts
-PICTURE = ["-s", "2", "-D", "resx=12", "-D", "resy=10"]
 SMALL = {
-    "render": [*PICTURE, "-m", "scalar_spectral"],
+    "render": ["-s", "2", "-m", "scalar_spectral"],
     "brdf-map": ["--resolution", "24", "--step", "50", "--samples", "1"],
     "evaluate": ["--step", "50", "--angle-step", "2", "--windows", "2", "--coherence-width", "10"],
     "sweep": ["--coherence-width", "10", "--resolution", "12", "--step", "100", "--no-compiled"],
-    "plan": ["-D", "resx=12", "-D", "resy=10", "--paths", "512"],
-    "compare": [
-        *PICTURE,
-        "--full-spp",
-        "1",
-        "--supersampling",
-        "1",
-        "--method",
-        "lut",
-        "--frames",
-        "4",
-    ],
+    "plan": ["--paths", "128"],
     "export-viewer": ["--method", "spectral"],
     "export-shader": ["--coherence-width", "4", "--tolerance", "0.05"],
     "survey": ["--coherence-width", "4", "--tolerance", "0.05", "--resolution", "16"],
 }
-# those of scenes, which would else take the scene's own patch
-WITH_PATCH = {"render", "plan", "compare", "export-viewer"}
 
 pytestmark = [
     # heights as coarse and steep as the stand-ins' are worth a warning
@@ -61,19 +45,8 @@ pytestmark = [
 @pytest.fixture(scope="module")
 def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What a clone's folder holds, and the files that commands name, small."""
-    folder = tmp_path_factory.mktemp("clone")
-    (folder / "scenes").symlink_to(ROOT / "scenes")
-    shutil.copytree(ROOT / "precompute", folder / "precompute", ignore=lambda *_: {"tables"})
+    folder = small_clone(tmp_path_factory.mktemp("clone"))
     (folder / "out").mkdir()
-    # the recipes by name, each a coarser and smaller patch of its kind
-    for recipe in folder.glob("precompute/*_like.toml"):
-        text = recipe.read_text(encoding="utf-8")
-        text = re.sub(r"extent = .*", "extent = 4.0", text)
-        text = re.sub(r"pixels = .*", "pixels = 80", text)
-        recipe.write_text(f"coherence_width = 4.0\n{text}", encoding="utf-8")
-    blazed = folder / "precompute" / "blazed.toml"
-    text = blazed.read_text(encoding="utf-8")
-    blazed.write_text(f"{text}periods = 4\nrows = 16\n", encoding="utf-8")
     field = md.gratings.sinusoidal(period=1.6, depth=0.05, periods=4, rows=32)
     heights = np.tile(field.heights[:1], (32, 1))
     np.save(folder / "grating.npy", heights)
@@ -109,8 +82,6 @@ def run(words: list[str]) -> None:
     _, command, *rest = words
     rest = [word.replace("$PWD", str(Path.cwd())) for word in rest]
     rest = [*without_size(rest), *SMALL.get(command, [])]
-    if command in WITH_PATCH and not any(word.startswith("patch=") for word in rest):
-        rest += ["-D", f"patch={Path.cwd() / 'precompute' / 'elaphe_like.toml'}"]
     if "--workers" in rest:  # tests/cluster starts processes
         at = rest.index("--workers")
         del rest[at : at + 2]
@@ -129,7 +100,7 @@ def run(words: list[str]) -> None:
 
 
 def without_size(rest: list[str]) -> list[str]:
-    """Arguments without -D resx=... and -D resy=..., which may be given only once."""
+    """Arguments without -D resx=... and -D resy=..., larger than scenes are here."""
     sized = {i for i, word in enumerate(rest) if word.startswith(("resx=", "resy="))}
     return [word for i, word in enumerate(rest) if not {i, i + 1} & sized]
 

@@ -67,7 +67,7 @@ def _on_workers(
     args: argparse.Namespace, to_do: Sequence[Frame], folder: Path
 ) -> tuple[int, dict[str, Any]]:
     """Render frames on workers; how many came before Ctrl-C, and what the workers did."""
-    from ..cluster.film import Wanted
+    from ..cluster.frames import Wanted
     from ..scene.frames import write_frame
     from ..scene.load import set_variant
     from ..scene.passes import Stop

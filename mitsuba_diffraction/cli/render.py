@@ -119,7 +119,7 @@ def _on_workers(args: argparse.Namespace) -> int:
     parameters = options.scene_parameters(args)
     output, png, only_png = _outputs(args)
 
-    from ..cluster.film import Wanted
+    from ..cluster.frames import Wanted
     from ..scene.load import set_variant
     from ..scene.passes import Stop
 

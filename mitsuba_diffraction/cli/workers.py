@@ -14,7 +14,7 @@ from .arguments import whole_number
 from .console import say, say_warning
 
 if TYPE_CHECKING:
-    from ..cluster.film import Film, Wanted
+    from ..cluster.frames import Film, Wanted
 
 #: As `cluster.workers.VARIABLE`, which imports more than --help has time for.
 VARIABLE = "DASK_SCHEDULER_ADDRESS"
@@ -75,7 +75,7 @@ def film_of(
     args: argparse.Namespace, client: Any, frames: Sequence[Wanted], variant: str, keep: Path
 ) -> Film:
     """What renders frames of the command's scene on workers."""
-    from ..cluster.film import Film
+    from ..cluster.frames import Film
 
     film = Film(
         client, args.scene, frames, variant, keep=keep, warn=say_warning, sensor=args.sensor,

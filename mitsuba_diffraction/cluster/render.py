@@ -13,7 +13,7 @@ from ..errors import DiffractionError, DiffractionWarning
 from ..progress import Progress, silent
 from ..scene.load import set_variant
 from ..scene.passes import Result, Stop
-from .film import Film, Wanted
+from .frames import Film, Wanted
 
 
 def render(

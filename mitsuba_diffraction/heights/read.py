@@ -16,9 +16,9 @@ import numpy as np
 
 from ..errors import DiffractionError, DiffractionWarning
 from .field import HeightField
-from .formats.afm import read_instrument
 from .formats.arrays import read_npy
 from .formats.images import is_park_tiff, read_exr, read_image
+from .formats.instruments import read_instrument
 from .formats.raw import RawHeights, existing_file
 from .formats.text import read_text
 from .lengths import (

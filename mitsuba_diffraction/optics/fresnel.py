@@ -1,4 +1,4 @@
-"""Fresnel's coefficients of a flat interface in double precision (NumPy; the plugin has Mitsuba's).
+"""Fresnel's coefficients of a flat interface, bare or under a thin film (NumPy, float64).
 
 Time exp(−iωt), so an absorbing index is n + ik with k ≥ 0.
 """

@@ -273,7 +273,9 @@ class Diffraction(mi.BSDF):
             self.height_scale: Float = mi.Float(given.high)
             return
         most = self.table.height_scale_max / optical
-        bounded = Bounded("height_scale", given, LEAST_SCALE, most, self._scale_refusal)
+        bounded = Bounded(
+            "height_scale", given, LEAST_SCALE, most, functools.partial(_scale_refusal, most)
+        )
         self._scale, self._varying, self.height_scale = bounded, None, bounded.value
 
     # ------------------------------------------------------------------ Mitsuba's interface
@@ -457,12 +459,6 @@ class Diffraction(mi.BSDF):
             f"table's {self.table.height_scale_max:g}; load the plugin anew with that {name}_ior"
         ]
 
-    def _scale_refusal(self, height_scale: float) -> str:
-        return (
-            f"height_scale={height_scale:g} is outside what the table serves, above 0 and up to "
-            f"{self._scale.high:g}; load the plugin anew with that height_scale"
-        )
-
     @property
     def only_traced(self) -> str | None:
         """What it has that only the path tracer shows."""
@@ -638,6 +634,13 @@ class Diffraction(mi.BSDF):
         mean = dr.mean(mi.unpolarized_spectrum(reflectance))
         # What lies beneath is taken to return half of what it gets
         return dr.clip(mean / (0.5 + 0.5 * mean), 0.1, 0.9)
+
+
+def _scale_refusal(most: float, height_scale: float) -> str:
+    return (
+        f"height_scale={height_scale:g} is outside what the table serves, above 0 and up to "
+        f"{most:g}; load the plugin anew with that height_scale"
+    )
 
 
 mi.register_bsdf("diffraction", Diffraction)

@@ -65,15 +65,20 @@ class Bounded:
 
 def children(thing: Any) -> dict[str, Any]:
     """The objects that one of Mitsuba's shows to `traverse`, by name."""
-    found: dict[str, Any] = {}
 
     class Collector(mi.TraversalCallback):
+        def __init__(self) -> None:
+            super().__init__()
+            # not in a closure: a class is in a cycle of references, which would keep them
+            self.found: dict[str, Any] = {}
+
         def put(self, name: str, value: Any, *rest: Any) -> None:
             if isinstance(value, mi.Object):
-                found[name] = value
+                self.found[name] = value
 
-    thing.traverse(Collector())
-    return found
+    collector = Collector()
+    thing.traverse(collector)
+    return collector.found
 
 
 def arrays_within(*holders: Any) -> list[Any]:

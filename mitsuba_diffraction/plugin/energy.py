@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -69,9 +70,9 @@ class EnergyModel:
             low = high = wavelength
         kirchhoff = isinstance(boundary, Kirchhoff)
         self.conserving, self._material = conserving, boundary.material
-        self._energy = Energy(
-            table, "kirchhoff" if kirchhoff else "small_slope", self._indices, (low, high)
-        )
+        self._indices = partial(_rounded_indices, self._material)
+        model = "kirchhoff" if kirchhoff else "small_slope"
+        self._energy = Energy(table, model, self._indices, (low, high))
         self._kirchhoff = self._fades = kirchhoff
         self._warned = False
         self._scale = _Lookup()
@@ -173,18 +174,6 @@ class EnergyModel:
         return mi.UnpolarizedSpectrum(
             self._reflected.at(tangential, cosine, wavenumbers, height_scale)
         )
-
-    def _indices(self, wavelengths: NDArray[np.float64]) -> Indices | None:
-        """The material's n + ik, to `INDEX_STEP`: an optimisation of it waits rarely, and sees s
-        and the ratio of albedos as constants.
-        """
-        found = indices_of(self._material, wavelengths)
-        if found is None:
-            return None
-        if isinstance(found, fresnel.Filmed):
-            index, film, depth = found.parts
-            return fresnel.Filmed(_rounded(index, INDEX_STEP), _rounded(film, INDEX_STEP), depth)
-        return _rounded(found, INDEX_STEP)
 
     def _ratio(self, albedo: DirectionalTable) -> DirectionalTable:
         found = self._indices(albedo.wavelengths)
@@ -340,6 +329,21 @@ def indices_of(
 
 def _rounded(value: ArrayLike, step: float) -> NDArray[Any]:
     return np.asarray(np.round(np.asarray(value) / step) * step)
+
+
+def _rounded_indices(
+    material: Reflectance | Inside | UnderFilm, wavelengths: NDArray[np.float64]
+) -> Indices | None:
+    """`indices_of`, to `INDEX_STEP`: an optimisation of them waits rarely, and sees s and the ratio
+    of albedos as constants.
+    """
+    found = indices_of(material, wavelengths)
+    if found is None:
+        return None
+    if isinstance(found, fresnel.Filmed):
+        index, film, depth = found.parts
+        return fresnel.Filmed(_rounded(index, INDEX_STEP), _rounded(film, INDEX_STEP), depth)
+    return _rounded(found, INDEX_STEP)
 
 
 def _complex(number: Float) -> complex:

@@ -78,8 +78,8 @@ class UnderFilm:
     ) -> None:
         self.material, self.film, self._fixed = material, film, mi.Float(wavelength)
         dr.make_opaque(self._fixed)
-        self._k = Bounded("film_k", k, 0.0, math.inf, self._refusal)
-        self._thickness = Bounded("film_thickness", thickness, 0.0, COHERENCE, self._refusal)
+        self._k = Bounded("film_k", k, 0.0, math.inf, _refusal)
+        self._thickness = Bounded("film_thickness", thickness, 0.0, COHERENCE, _refusal)
         self.k, self.thickness = self._k.value, self._thickness.value
         self.channels: Channels | None = None
         self._path = -1.0
@@ -132,12 +132,6 @@ class UnderFilm:
         """The film's index and its thickness, nm."""
         return complex(plain(self.film.eta), plain(self.k)), plain(self.thickness)
 
-    def _refusal(self, value: float) -> str:
-        return (
-            f"film_k or film_thickness={value:g} must be at least 0, and the thickness at most "
-            f"{COHERENCE:g} nm"
-        )
-
     def _wavelengths(self, si: Interaction) -> list[Float]:
         if self.channels is not None:
             return [mi.Float(wavelength) for wavelength in self.channels.wavelengths]
@@ -146,6 +140,13 @@ class UnderFilm:
     def __str__(self) -> str:
         index, thickness = self.numbers()
         return f"{self.material} under film[eta = {index:.5g}, {thickness:.5g} nm]"
+
+
+def _refusal(value: float) -> str:
+    return (
+        f"film_k or film_thickness={value:g} must be at least 0, and the thickness at most "
+        f"{COHERENCE:g} nm"
+    )
 
 
 def _complex(index: Number) -> Number:

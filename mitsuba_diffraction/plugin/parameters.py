@@ -10,7 +10,6 @@ from pathlib import Path
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
 from ..errors import DiffractionError
 from ..heights.field import HeightField
@@ -18,16 +17,18 @@ from ..heights.lengths import is_auto, numbers_of
 from ..heights.read import LoadOptions
 from ..settings import COHERENCES, SCENE_SETTINGS, SURFACE, checked
 from ..tables.table import DiffractionTable
-from .boundary import MODELS, Boundary, Kirchhoff, SmallSlope
+from .boundary import Boundary
 from .coat import UnderCoat
-from .film import COHERENCE, LEAST_THROUGH, UnderFilm
+from .film import UnderFilm
 from .height_scale import Varying
 from .layers import LAYERINGS, Blend, Layering, Transmission
+from .materials import DEFAULT_WAVELENGTH, boundary_of, coat_of, material_of, passing_of, under_film
 from .orientation import Constant, Orientation, Textured
 from .pair import SHADOWINGS
 from .places import TILINGS, Places
+from .properties import choice, flag, kind_of, number
 from .reflectance import Conductor, Dielectric, Perfect, Reflectance
-from .roles import BSDF, Properties, Texture
+from .roles import BSDF, Properties
 from .sources import (
     TableProvider,
     from_cache,
@@ -36,7 +37,7 @@ from .sources import (
     table_of_file,
     table_of_heights,
 )
-from .through import LEAST_INDEX, Through
+from .through import Through
 
 SOURCES = ("heightfield", "table", "data")
 READING = tuple(field.name for field in fields(LoadOptions))
@@ -44,8 +45,6 @@ READING = tuple(field.name for field in fields(LoadOptions))
 PLACING = ("uv_scale", "world_scale", "tiling")
 #: µm: beyond, single precision holds places on the surface to no better than 1 µm.
 MOST_UV_SCALE = 1e7
-#: Of mono variants, nm.
-DEFAULT_WAVELENGTH = 550.0
 NAMES = (
     *SOURCES,
     *READING,
@@ -132,25 +131,25 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     _refuse_unknown(props, beneath)
     if nested is not None and nested.flags() & mi.BSDFFlags.Transmission:
         raise DiffractionError(
-            f"the nested BSDF {_kind(nested)} lets light through, which would be lost beneath; "
+            f"the nested BSDF {kind_of(nested)} lets light through, which would be lost beneath; "
             "nest one that only reflects"
         )
     height_scale = _height_scale(props)
-    coat = _coat(props)
-    material = _reflectance(props, coat)
+    coat = coat_of(props)
+    material = material_of(props, coat)
     if nested is not None and isinstance(material, Perfect | Conductor):
         raise DiffractionError(
             f"a nested BSDF lies beneath a surface that lets no light through (material="
             f"'{material}'); give int_ior instead, or remove the nested BSDF"
         )
-    passing = _passing(props, material)
+    passing = passing_of(props, material)
     # κ grows by the coat's index, or in a dielectric by its own, as if heights did
     medium = coat or passing
     optical = 1.0 if medium is None else float(dr.slice(medium.eta))
     largest = height_scale.high if isinstance(height_scale, Varying) else height_scale
     table, heights = _table(props, largest * optical, provider)
     wavelength = _wavelength(props, table)
-    reflectance = _under_film(props, material, wavelength, table.wavelength_range[0])
+    reflectance = under_film(props, material, wavelength, table.wavelength_range[0])
     if nested is not None and isinstance(reflectance, UnderFilm) and reflectance.numbers()[0].imag:
         raise DiffractionError(
             "film_k makes a film that absorbs, over a nested BSDF, which would get that light; "
@@ -159,10 +158,10 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     flat: Reflectance | UnderCoat | UnderFilm = reflectance
     if coat is not None and not isinstance(material, Perfect):
         flat = UnderCoat(material, coat)
-    boundary = _boundary(props, reflectance, table)
-    conserving, through = _flag(props, "energy_conserving", True), None
+    boundary = boundary_of(props, reflectance, table)
+    conserving, through = flag(props, "energy_conserving", True), None
     if passing is not None:
-        thin = _flag(props, "thin", False)
+        thin = flag(props, "thin", False)
         through = Through(passing, boundary, thin, table if conserving else None)
     return Parameters(
         table=table,
@@ -174,7 +173,7 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
         orientation=_orientation(props),
         height_scale=height_scale,
         energy_conserving=conserving,
-        vcavity=_choice(props, "shadowing", SHADOWINGS) == "vcavity",
+        vcavity=choice(props, "shadowing", SHADOWINGS) == "vcavity",
         layering=_layering(props, flat, nested is not None),
         wavelength=wavelength,
         nested=nested,
@@ -185,15 +184,15 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
 
 def _height_scale(props: Properties) -> float | Varying:
     given = dict(props.objects()).get("height_scale")
-    most = _number(props, "height_scale_max", math.nan) if "height_scale_max" in props else None
+    most = number(props, "height_scale_max", math.nan) if "height_scale_max" in props else None
     if isinstance(given, mi.Texture):
         return Varying(given, most)
     if most is not None:
         raise DiffractionError("height_scale_max is for a height_scale that is a texture")
-    number = _number(props, "height_scale", 1.0)
-    if not 0.0 < number <= 1e3:
-        raise DiffractionError(f"height_scale={number:g} must be above 0 and at most 1000")
-    return number
+    factor = number(props, "height_scale", 1.0)
+    if not 0.0 < factor <= 1e3:
+        raise DiffractionError(f"height_scale={factor:g} must be above 0 and at most 1000")
+    return factor
 
 
 def _table(
@@ -224,7 +223,7 @@ def _table(
 
 def _on_surface(props: Properties) -> bool:
     """Whether the window sits where the light falls; the table is then that of one window."""
-    coherence = _choice(props, "coherence", (*COHERENCES, SURFACE))
+    coherence = choice(props, "coherence", (*COHERENCES, SURFACE))
     if coherence != SURFACE:
         return False
     if mi.is_rgb:
@@ -237,7 +236,7 @@ def _on_surface(props: Properties) -> bool:
 
 def _places(props: Properties, table: DiffractionTable) -> Places | None:
     """From UV coordinates with a scale to places on the patch."""
-    tiling = _choice(props, "tiling", TILINGS)
+    tiling = choice(props, "tiling", TILINGS)
     given = {name: props.get(name) for name in PLACING[:2] if name in props}  # read in any case
     if not _on_surface(props):
         return None  # a scene for all coherences may give the scale in all
@@ -278,7 +277,7 @@ def _found(name: str, parameter: str) -> Path:
 
 def _wavelength(props: Properties, table: DiffractionTable) -> float:
     """The wavelength of mono variants in nm: a scene for all variants may give it in all."""
-    wavelength = _number(props, "wavelength", DEFAULT_WAVELENGTH)
+    wavelength = number(props, "wavelength", DEFAULT_WAVELENGTH)
     if not mi.is_monochromatic and "wavelength" not in props:
         return wavelength  # nobody asks for it
     shortest, longest = table.wavelength_range
@@ -287,177 +286,6 @@ def _wavelength(props: Properties, table: DiffractionTable) -> float:
             f"wavelength={wavelength:g} nm is outside the table's {shortest:g} to {longest:g} nm"
         )
     return wavelength
-
-
-def _coat(props: Properties) -> Dielectric | None:
-    if "coat_ior" not in props:
-        return None
-    medium = _index(props, "ext_ior", _above(props))
-    coat = Dielectric(_index(props, "coat_ior"), medium, "coat_eta", 1.0)
-    if dr.slice(coat.eta) < 1.0:
-        raise DiffractionError(
-            f"coat_ior={props.get('coat_ior')} is below the index of the medium above the coat; "
-            "a coat's is at least as large"
-        )
-    if props.get("layering", LAYERINGS[0]) == "thesis":
-        raise DiffractionError("layering='thesis' knows no coat; leave coat_ior or layering out")
-    return coat
-
-
-def _passing(props: Properties, material: Reflectance) -> Dielectric | None:
-    """The dielectric, if light is to go through it, which excludes much."""
-    thin = _flag(props, "thin", False)
-    if not _flag(props, "transmission", thin):
-        if thin:
-            raise DiffractionError("thin=true lets light through; leave transmission=false out")
-        return None
-    name = "thin" if thin else "transmission"
-    if not isinstance(material, Dielectric):
-        raise DiffractionError(
-            f"{name}=true lets light through, which the material '{material}' does not; give "
-            "int_ior instead"
-        )
-    if dr.slice(material.eta) < LEAST_INDEX:
-        raise DiffractionError(
-            f"{name}=true needs int_ior at least {LEAST_INDEX:g} times ext_ior; turn the surface "
-            "round where the denser medium is above"
-        )
-    excluded = [
-        *(f"{one}_ior" for one in ("coat", "film") if f"{one}_ior" in props),
-        *("a nested BSDF" for _, value in props.objects() if isinstance(value, mi.BSDF)),
-        *(f"{one}={props.get(one)}" for one in ("layering", "shadowing") if one in props),
-        *("coherence=surface" for one in ("coherence",) if props.get(one, "") == "surface"),
-    ]
-    if excluded:
-        raise DiffractionError(f"{name}=true and {excluded[0]} exclude each other; leave one out")
-    return material
-
-
-def _under_film(
-    props: Properties, material: Reflectance, wavelength: float, shortest: float
-) -> Reflectance | UnderFilm:
-    """The material, under a film if there is one.
-
-    wavelength : nm, of mono variants; shortest : the least that the table serves.
-    """
-    given = [name for name in ("film_ior", "film_k", "film_thickness") if name in props]
-    if not given:
-        return material
-    if not {"film_ior", "film_thickness"} <= set(given):
-        raise DiffractionError(
-            f"{given[0]} alone is no film; give both film_ior and film_thickness (nm)"
-        )
-    if isinstance(material, Perfect):
-        raise DiffractionError(
-            "film_ior needs a refractive index beneath it, which material='none' has not; give a "
-            "conductor, or int_ior"
-        )
-    for other, present in (
-        ("coat_ior", "coat_ior" in props),
-        ("layering='thesis'", props.get("layering", LAYERINGS[0]) == "thesis"),
-    ):
-        if present:
-            raise DiffractionError(
-                f"film_ior and {other} exclude each other; leave one of them out"
-            )
-    medium = _index(props, "ext_ior", _above(props))
-    film = Dielectric(_index(props, "film_ior"), medium, "film_eta")
-    k, thickness = _number(props, "film_k", 0.0), _number(props, "film_thickness", 0.0)
-    if k < 0.0:
-        raise DiffractionError(f"film_k={k:g} must be at least 0: the film's index is n + ik")
-    path = 2.0 * float(dr.slice(film.eta)) * thickness
-    if not 0.0 <= path <= COHERENCE:
-        raise DiffractionError(
-            f"film_thickness={thickness:g} nm must be at least 0, and 2 n d at most "
-            f"{COHERENCE:g} nm, over which light is coherent (λ²/Δλ of a band of 25 nm at 550 nm); "
-            "a layer so thick is a coat: coat_ior"
-        )
-    if math.exp(-8.0 * math.pi * k * thickness / shortest) < LEAST_THROUGH:
-        raise DiffractionError(
-            f"film_k={k:g} at film_thickness={thickness:g} nm absorbs all light on its way to the "
-            "material beneath; give the film's index as the material, eta and k"
-        )
-    return UnderFilm(material, film, k, thickness, wavelength)
-
-
-def _above(props: Properties) -> float:
-    """Index of the medium above: air; conductors have theirs given relative to it."""
-    return 1.0 if any(name in props for name in ("material", "eta", "k")) else 1.000277
-
-
-def _reflectance(props: Properties, coat: Dielectric | None) -> Reflectance:
-    conductor = [n for n in ("material", "eta", "k") if n in props]
-    dielectric = [n for n in ("int_ior", "ext_ior") if n in props]
-    if conductor and dielectric:
-        raise DiffractionError(
-            f"{conductor[0]} makes a conductor and {dielectric[0]} a dielectric; give one of them"
-        )
-    if "material" in conductor and len(conductor) > 1:
-        raise DiffractionError("material and eta, k both say what the conductor is; give one")
-    if "material" in conductor:
-        material = str(props.get("material"))
-        if material == "none" and coat is not None:
-            raise DiffractionError(
-                "coat_ior needs a refractive index beneath it, which material='none' has not; give "
-                "a conductor, or int_ior"
-            )
-        if material == "none":
-            return Perfect()
-        metal = Conductor.of_material(material, _number(props, "wavelength", DEFAULT_WAVELENGTH))
-        metal.medium = coat
-        return metal
-    if conductor:
-        if len(conductor) == 1:
-            raise DiffractionError(f"{conductor[0]} alone is no conductor; give both eta and k")
-        metal = Conductor(_index_part(props, "eta"), _index_part(props, "k"), "eta, k")
-        metal.medium = coat
-        return metal
-    medium = _index(props, "ext_ior", 1.000277) if coat is None else _index(props, "coat_ior")
-    return Dielectric(_index(props, "int_ior", 1.5), medium)
-
-
-def _boundary(
-    props: Properties, material: Reflectance | UnderFilm, table: DiffractionTable
-) -> Boundary:
-    """By default small slope where there is an index, unless it is the thesis' layering."""
-    scalar = isinstance(material, Perfect) or props.get("layering", LAYERINGS[0]) == "thesis"
-    if _choice(props, "model", MODELS[::-1] if scalar else MODELS) == "kirchhoff":
-        return Kirchhoff(material)
-    if isinstance(material, Perfect):
-        raise DiffractionError(
-            "model='small_slope' needs a refractive index, which material='none' has not; give "
-            "model='kirchhoff', a conductor, or int_ior"
-        )
-    return SmallSlope(material, table.roughness)
-
-
-def _index_part(props: Properties, name: str) -> Texture:
-    """Part of a complex index: a spectrum or texture whose numbers fit, as far as it shows them."""
-    texture = props.get_unbounded_texture(name)
-    shown = mi.traverse(texture)
-    keys = {"values", "data"}
-    if not (mi.is_spectral and props.type(name) == mi.Properties.Type.Color):
-        keys.add("value")  # else coefficients of a spectrum
-    for key in keys.intersection(name for name, _ in shown):
-        values = np.ravel(np.array(shown[key], float))
-        wrong = values[~(np.isfinite(values) & (values >= 0.0) & ((values > 0.0) | (name == "k")))]
-        if wrong.size:
-            least = "at least 0" if name == "k" else "above 0"
-            raise DiffractionError(
-                f"{name}={wrong[0]:g} must be finite and {least}: the index is eta + ik"
-            )
-    return texture
-
-
-def _index(props: Properties, name: str, default: float = 1.0) -> float | str:
-    value = props.get(name, default)
-    if isinstance(value, str):
-        return value
-    if not (isinstance(value, int | float) and math.isfinite(value) and value >= 1.0):
-        raise DiffractionError(
-            f"{name}={value} must be a refractive index of at least 1, or a name"
-        )
-    return float(value)
 
 
 def _refuse_unknown(props: Properties, objects: Collection[str]) -> None:
@@ -475,56 +303,23 @@ def _orientation(props: Properties) -> Orientation:
         texture = objects["orientation"]
         if not isinstance(texture, mi.Texture):
             raise DiffractionError(
-                f"orientation={_kind(texture)} must be degrees, or a raw texture or mesh "
+                f"orientation={kind_of(texture)} must be degrees, or a raw texture or mesh "
                 "attribute whose first two channels are (cos, sin)"
             )
         return Textured(texture)
-    return Constant(_number(props, "orientation", 0.0))
-
-
-def _kind(element: BSDF) -> str:
-    """What an element of a scene is: `SmoothDielectric`, say."""
-    return str(element.class_name())
+    return Constant(number(props, "orientation", 0.0))
 
 
 def _layering(
     props: Properties, reflectance: Reflectance | UnderCoat | UnderFilm, nested: bool
 ) -> Layering:
-    if _choice(props, "layering", LAYERINGS) == "transmission":
+    if choice(props, "layering", LAYERINGS) == "transmission":
         if "diffuse_weight" in props:
             raise DiffractionError("diffuse_weight belongs to layering='thesis'; leave it out")
         return Transmission(reflectance)
     if not nested:
         raise DiffractionError("layering='thesis' blends with a nested BSDF, but there is none")
-    weight = _number(props, "diffuse_weight", 0.0)
+    weight = number(props, "diffuse_weight", 0.0)
     if not 0.0 <= weight <= 1.0:
         raise DiffractionError(f"diffuse_weight={weight:g} must lie between 0 and 1")
     return Blend(reflectance, weight)
-
-
-def _choice(props: Properties, name: str, choices: tuple[str, ...]) -> str:
-    """One of some words; the first is the default."""
-    value = props.get(name, choices[0])
-    if value not in choices:
-        raise DiffractionError(f"{name}={value!r} is unknown; choose one of {', '.join(choices)}")
-    return str(value)
-
-
-def _flag(props: Properties, name: str, default: bool) -> bool:
-    value = props.get(name, default)
-    if not isinstance(value, bool):
-        raise DiffractionError(f"{name}={value!r} must be true or false")
-    return value
-
-
-def _number(props: Properties, name: str, default: float) -> float:
-    if name not in props:
-        return default
-    value = props.get(name)
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise DiffractionError(f"{name}={value!r} must be a number") from None
-    if not math.isfinite(number):
-        raise DiffractionError(f"{name}={value} must be a finite number")
-    return number

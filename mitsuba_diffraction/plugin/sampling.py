@@ -4,12 +4,12 @@ For one wavelength the density of ωo per solid angle is
 
     [p₀ (σ²/π) exp(−σ²|q|²) + (1 − p₀) P(cell of q) / area] · k² cosθo,   q = k (ωi + ωo)_xy,
 
-with p₀ the power of order 0 towards the mirror direction and P as in `tables.proposals`. Dispersion
-is dealt with by drawing for one wavelength and using the mean of all wavelengths' densities.
-Frequencies beyond the horizon belong to no direction: samples that fall there carry nothing. A
-little of an even density over the hemisphere bounds the weights where the tables promise no light,
-and near the horizon, where that density vanishes with cosθo and Kirchhoff's BRDF times cosθo does
-not.
+with p₀ the power of order 0 towards the mirror direction and P as in `tables.sampling.proposals`.
+Dispersion is dealt with by drawing for one wavelength and using the mean of all wavelengths'
+densities. Frequencies beyond the horizon belong to no direction: samples that fall there carry
+nothing. A little of an even density over the hemisphere bounds the weights where the tables promise
+no light, and near the horizon, where that density vanishes with cosθo and Kirchhoff's BRDF times
+cosθo does not.
 """
 
 from __future__ import annotations

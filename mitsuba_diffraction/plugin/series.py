@@ -37,7 +37,7 @@ class Recurrence:
         weights = series_weights(self._expansion, self._record.stored, offset, interval, kappa)
         values = read_record(self._order_0, interval, self._record.numbers)
         centre = [inner(part, weights) for part in self._record.split(values)]
-        factored = interval == 0 if self._expansion.basis == "chebyshev" else mi.Mask(True)
+        factored = mi.Mask(True) if self._expansion.basis == "taylor" else interval == 0
         centre[0] += dr.select(factored, mi.Float(1.0), 0.0)
         return interval, weights, centre
 

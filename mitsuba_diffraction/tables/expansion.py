@@ -39,7 +39,7 @@ from ..settings import BASES as BASES
 
 KINDS = ("power", "amplitude")
 
-_DARK = 1e-3  # the share of the brightest that tables.error compares the darkest κ with
+_DARK = 1e-3  # the share of the brightest that tables.build.error compares the darkest κ with
 _ROUNDING = 1e-13  # squares of what single precision leaves, and more
 _BLOCK = 1 << 15  # bins at a time
 _INSIDE = 1e-9  # keeps the ends of an interval on its own side of floor()

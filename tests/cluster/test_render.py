@@ -21,7 +21,7 @@ distributed = pytest.importorskip("distributed")
 from mitsuba_diffraction import DiffractionError, cluster  # noqa: E402
 from mitsuba_diffraction.cluster import film as film_module  # noqa: E402
 from mitsuba_diffraction.cluster import workers as workers_module  # noqa: E402
-from mitsuba_diffraction.cluster.film import Film, Wanted  # noqa: E402
+from mitsuba_diffraction.cluster.frames import Film, Wanted  # noqa: E402
 from mitsuba_diffraction.cluster.kept import Kept  # noqa: E402
 from mitsuba_diffraction.cluster.tasks import Lacking, run_task  # noqa: E402
 from mitsuba_diffraction.scene import passes  # noqa: E402

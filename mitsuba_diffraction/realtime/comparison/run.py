@@ -27,6 +27,9 @@ from .truth import box_sensor, direct_light
 _FEWER, _MOST = 2, 64
 _DETAIL = 1024  # samples per pixel at most, under lights without extent, which are quiet
 _STEP = 8  # frames between two looks at the clock
+#: Of other methods than this one a part of the frames is drawn. What they differ by from this one's
+#: in the same light, places and lobes has little noise, and is added to its picture of all frames.
+_QUICK, _SPARED = "lut", 8
 _IN_FRAME = 1 << 15  # samples that progressive light draws at once: fewer take about as long
 
 
@@ -82,6 +85,9 @@ class Comparison:
     seed: int = 0
     progress: Progress = silent
     both: SameLights = field(init=False)
+    _kept: dict[tuple[str, int], tuple[Halves, int, float]] = field(
+        init=False, repr=False, default_factory=dict
+    )
 
     def __post_init__(self) -> None:
         self.both = SameLights(self.scene, sensor=self.sensor, name=f"'{self.name}'")
@@ -160,24 +166,13 @@ class Comparison:
 
     def _whole(self, method: str, truth: Halves, full: Any) -> dict[str, Any]:
         """All pixels in progressive light, against all direct light and against full transport."""
-        renderer = self.both.renderer
-        width, height = renderer.camera.size
-        most = math.isqrt(max(_IN_FRAME // (width * height), 1))
-        side = min(self.supersampling, most)
-        fine = (side * width, side * height)
-        light, clock = renderer.progressive(method, size=fine), clock_of(renderer.driver)
-        light.advance(2)  # compiles
-        light.restart()
-        halves, start = [], clock()
-        for half in range(2):
-            for done in range(0, self.frames // 2, _STEP):
-                self.progress(half * self.frames // 2 + done, self.frames, f"lighting {method}")
-                light.advance(min(_STEP, self.frames // 2 - done))
-            parts = light.image[..., :3].reshape(height, side, width, side, 3)
-            halves.append(parts.mean(axis=(1, 3), dtype=np.float64))
-        seconds = clock() - start
-        light.release()
-        drawn = Halves(halves[0], 2.0 * halves[1] - halves[0])
+        frames = self.frames if method == _QUICK else max(self.frames // _SPARED // 4 * 4, 4)
+        drawn, side, seconds = self._lit(method, frames)
+        if method != _QUICK:
+            many, few = (self._lit(_QUICK, n)[0] for n in (self.frames, frames))
+            drawn = Halves(
+                many.first + (drawn.first - few.first), many.second + (drawn.second - few.second)
+            )
         exposure = exposure_of(truth.mean)
         found = difference(truth.mean, drawn.mean, None, exposure)
         self._write(drawn.mean, f"{method}_whole", self.frames)
@@ -185,14 +180,41 @@ class Comparison:
             self.folder / f"{method}.png", truth.mean, drawn.mean, full, method=method,
             found=found, compared=None, exposure=exposure,
         )  # fmt: skip
+        renderer = self.both.renderer
+        fine = (side * renderer.camera.size[0], side * renderer.camera.size[1])
         return {
             "direct": found,
             "full": None if full is None else difference(full, drawn.mean, None, exposure_of(full)),
             "noise": drawn.noise(exposure),
+            "frames": frames,
             "samples": self.frames * side**2,
-            "frame_ms": 1e3 * seconds / self.frames,
+            "frame_ms": 1e3 * seconds / frames,
             "plain_frame_ms": 1e3 * renderer.frame_time(method, size=fine, frames=3),
         }
+
+    def _lit(self, method: str, frames: int) -> tuple[Halves, int, float]:
+        """Progressive light, the samples along either side of a pixel, and the seconds."""
+        if (method, frames) in self._kept:
+            return self._kept[method, frames]
+        renderer = self.both.renderer
+        width, height = renderer.camera.size
+        side = min(self.supersampling, math.isqrt(max(_IN_FRAME // (width * height), 1)))
+        light = renderer.progressive(method, size=(side * width, side * height))
+        clock = clock_of(renderer.driver)
+        light.advance(2)  # compiles
+        light.restart()
+        halves, start = [], clock()
+        for half in range(2):
+            for done in range(0, frames // 2, _STEP):
+                self.progress(half * frames // 2 + done, frames, f"lighting {method}")
+                light.advance(min(_STEP, frames // 2 - done))
+            parts = light.image[..., :3].reshape(height, side, width, side, 3)
+            halves.append(parts.mean(axis=(1, 3), dtype=np.float64))
+        seconds = clock() - start
+        light.release()
+        found = Halves(halves[0], 2.0 * halves[1] - halves[0]), side, seconds
+        self._kept[method, frames] = found
+        return found
 
     def _drawn(
         self, methods: Sequence[str], reference: Any, exposure: float

@@ -37,13 +37,18 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...plugin.names import name_of
-from .lights import Light, sampled_directions, sampled_positions, without_extent
+from .lights import (
+    Light,
+    sampled_directions,
+    sampled_positions,
+    spectra_along,
+    without_extent,
+)
 from .surroundings import Environment, is_flat
 
 Array = NDArray[np.float64]
 
 _BLOCK = 256  # samples that an emitter draws at once
-_CANDIDATES = 16  # directions that are looked at for each that is drawn from a sky
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 _EVEN = 0.1  # share of the choices for all emitters alike: some light other places than the middle
 
@@ -181,14 +186,8 @@ class _Drawn:
             shape = self._emitter.get_shape()
             density = np.full(_BLOCK, 1.0 / _area(shape) if is_flat(shape) else 0.0)
         else:
-            values, places, _, waves = sampled_directions(
-                self._emitter, self._middle, _BLOCK * _CANDIDATES, start * _CANDIDATES
-            )
-            assert self._environment is not None
-            in_sun = self._environment.in_sun(places)
-            kept, values = _evenly_bright(values, places, in_sun, start)
-            points, normals = np.pad(places[kept], [(0, 0), (0, 1)]), np.zeros((_BLOCK, 3))
-            density = np.where(in_sun[kept], 0.0, -1.0)
+            values, places, density, waves = self._around(start)
+            points, normals = np.pad(places, [(0, 0), (0, 1)]), np.zeros((_BLOCK, 3))
         return [
             Light(
                 name, point, waves, value[:, 0] if value.shape[1] == 1 else value, normal,
@@ -197,43 +196,35 @@ class _Drawn:
             for point, value, normal, of_place in zip(points, values, normals, density, strict=True)
         ]  # fmt: skip
 
+    def _around(self, start: int) -> tuple[Array, Array, Array, Array]:
+        """Irradiances, directions, densities and wavelengths of a block of an environment.
 
-def _evenly_bright(
-    values: Array, directions: Array, in_sun: NDArray[np.bool_], start: int
-) -> tuple[NDArray[np.int64], Array]:
-    """Of candidates, one in `_CANDIDATES`, chosen in proportion to what they bring.
+        Half of them lead to a sun, if there is one: it brings most of the light, but the sky, which
+        brings all of it in the sun's shadow, needs more directions.
+        """
+        assert self._environment is not None
+        sun, places, waves = self._of_sun(start)
+        count = _BLOCK - len(sun)
+        towards, densities = self._environment.drawn(start, count)
+        found, waves = spectra_along(self._emitter, towards)
+        found = found * (_BLOCK / count / np.maximum(densities, 1e-12))[:, None, None]
+        # the first few of a block lie all along it
+        order = np.argsort(np.argsort(np.arange(_BLOCK) * _GOLDEN % 1.0))
+        values, places = np.concatenate([found, sun]), np.concatenate([towards, places])
+        return values[order], places[order], np.where(order < count, -1.0, 0.0), waves
 
-    Half of them from a sun, if there is one: it brings most of the light, and the sky, which brings
-    all of it in the sun's shadow, needs more directions.
-
-    Stratified resampling along a curve through all directions, so that each part of the sky is
-    chosen as often as it is bright (Talbot, Cline and Egbert 2005, *Importance resampling for
-    global illumination*). What is chosen brings about the same, where candidates differ by twenty
-    times near a sun.
-
-    Returns
-    -------
-    (n,) numbers of those that are chosen, and their values.
-    """
-    bright = values.mean(axis=(1, 2))
-    if not bright.any():
-        return np.arange(len(values) // _CANDIDATES), values[::_CANDIDATES]
-    totals = [float(bright[part].sum()) for part in (in_sun, ~in_sun)]
-    if min(totals) > 0.0:
-        bright = bright / np.where(in_sun, *totals)
-    azimuth = np.arctan2(directions[:, 1], directions[:, 0]) / (2.0 * np.pi) + 0.5
-    cells = (np.stack([azimuth, 0.5 * (directions[:, 2] + 1.0)]) * 255.99).astype(np.int64)
-    # bits of both in turn: near in this order is near in the sky (Morton 1966)
-    curve = sum((cells[n] >> bit & 1) << (2 * bit + n) for bit in range(8) for n in (0, 1))
-    order = np.argsort(curve, kind="stable")
-    below = np.cumsum(bright[order])
-    count = len(values) // _CANDIDATES
-    inside = (0.5 + (start + np.arange(count)) * _GOLDEN) % 1.0
-    places = (np.arange(count) + inside) / count * below[-1]
-    kept = order[np.minimum(np.searchsorted(below, places), len(order) - 1)]
-    kept = kept[np.argsort(np.argsort(inside))]  # the first few lie all along the curve
-    share = bright.mean() / bright[kept]
-    return kept, values[kept] * share[:, None, None]
+    def _of_sun(self, start: int) -> tuple[Array, Array, Array]:
+        """Irradiances and directions (n, 3) of half a block, none without a sun; wavelengths."""
+        assert self._environment is not None
+        asked = 4 * _BLOCK if self._environment.sun.any() else 1
+        values, places, _, waves = sampled_directions(self._emitter, self._middle, asked, 4 * start)
+        inside = np.flatnonzero(self._environment.in_sun(places) & values.any(axis=(1, 2)))
+        kept = inside[
+            np.linspace(0, len(inside) - 1, _BLOCK // 2 if len(inside) else 0).astype(int)
+        ]
+        total = values[inside].sum(axis=(0, 1, 2)) / asked
+        share = _BLOCK * total / max(float(values[kept].sum()), 1e-30)
+        return values[kept] * share, places[kept], waves
 
 
 def _area(shape: Any) -> float:

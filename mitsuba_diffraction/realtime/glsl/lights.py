@@ -261,6 +261,15 @@ def sampled_positions(
 
 def radiance_along(emitter: Any, directions: Array) -> Array:
     """What an environment sends from directions (n, 3), linear sRGB (n, 3)."""
+    values, waves = spectra_along(emitter, directions)
+    if values.shape[2] == 3:
+        return values[:, 0]
+    weights = np.array([daylight_colour(waves, one) for one in np.eye(len(waves))])
+    return np.asarray(values[:, :, 0] @ weights)
+
+
+def spectra_along(emitter: Any, directions: Array) -> tuple[Array, Array]:
+    """The same (n, wavelengths, 1 or 3) relative to D65, and the wavelengths in nm."""
     import drjit as dr
     import mitsuba as mi
 
@@ -268,11 +277,7 @@ def radiance_along(emitter: Any, directions: Array) -> Array:
     si = dr.zeros(mi.SurfaceInteraction3f, lanes.count)
     si.wi = mi.Vector3f(*(lanes.uploaded(-x) for x in directions.T))
     lanes.set_wavelengths(si)
-    values, waves = lanes.spectra(emitter.eval(si))
-    if values.shape[2] == 3:
-        return values[:, 0]
-    weights = np.array([daylight_colour(waves, one) for one in np.eye(len(waves))])
-    return np.asarray(values[:, :, 0] @ weights)
+    return lanes.spectra(emitter.eval(si))
 
 
 def emitted_radiance(shape: Any) -> Array:

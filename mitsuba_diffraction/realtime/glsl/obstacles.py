@@ -5,6 +5,8 @@ A ray may step as far as the nearest surface is without missing one (Hart 1996, 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
@@ -45,7 +47,7 @@ def pack_obstacles(triangles: Array) -> Packed:
     )
 
 
-def _places(triangles: Array):
+def _places(triangles: Array) -> Iterator[Array]:
     """Places (n, 3) all over triangles (n, 3, 3), in cells, some at a time."""
     sides = triangles - np.roll(triangles, 1, axis=1)
     longest = np.sqrt((sides**2).sum(axis=2).max(axis=1))

@@ -31,6 +31,7 @@ _LARGEST = (512, 1024)  # of one that is
 _SUN_RADIUS = np.radians(0.2679)  # as Mitsuba has it
 _AROUND_SUN = np.radians(0.6)  # within this, a sky's sun is left to the lights
 _FLATS = 12
+_PLASTIC = [0.8191725134, 0.6710436067, 0.5497004779]  # steps in three numbers (Roberts 2018)
 
 
 @dataclass(frozen=True)
@@ -94,15 +95,43 @@ class Environment:
         """Which of (n, 3) unit vectors lead to the sun."""
         return np.asarray(directions @ self.sun > np.cos(_AROUND_SUN))
 
+    @property
+    def areas(self) -> Array:
+        """Solid angles of the picture's texels (rows, 1)."""
+        edges = np.cos(np.linspace(0.0, np.pi, len(self.picture) + 1))
+        return np.asarray(-np.diff(edges)[:, None] * 2.0 * np.pi / self.picture.shape[1])
+
+    def drawn(self, start: int, count: int) -> tuple[Array, Array]:
+        """Directions (count, 3) as dense as the picture is bright, and their densities (count,).
+
+        Stratified along a curve through all texels (Morton 1966), so that each part of the sky is
+        drawn as often as it is bright.
+
+        start : number of the first, in a sequence.
+        """
+        rows, columns, _ = self.picture.shape
+        row, column = np.indices((rows, columns)).reshape(2, -1)
+        # bits of both in turn: near in this order is near in the sky
+        bits = [(bit, 2 * bit) for bit in range(10)]
+        curve = sum((row >> a & 1) << b | (column >> a & 1) << (b + 1) for a, b in bits)
+        order = np.argsort(curve)
+        below = np.cumsum((self.picture.sum(axis=2) * self.areas).ravel()[order])
+        inside, across, down = ((0.5 + np.outer(np.arange(start, start + count), _PLASTIC)) % 1.0).T
+        places = (np.arange(count) + inside) / count * below[-1]
+        kept = order[np.minimum(np.searchsorted(below, places), len(order) - 1)]
+        chances = np.diff(below, prepend=0.0)[np.argsort(order)][kept] / below[-1]
+        edges = np.cos(np.linspace(0.0, np.pi, rows + 1))
+        cosine = edges[row[kept]] + down * np.diff(edges)[row[kept]]
+        phi = 2.0 * np.pi * (column[kept] + across) / columns
+        return _directions(np.arccos(cosine), phi), chances / self.areas[row[kept], 0]
+
     def packed(self, share: float) -> Packed:
         """For shaders/surroundings.glsl.
 
         share : of the lights that are drawn from it.
         """
         rows, columns, _ = self.picture.shape
-        theta = np.pi * (np.arange(rows) + 0.5) / rows
-        areas = np.sin(theta) * (np.pi / rows) * (2.0 * np.pi / columns)
-        total = float((self.picture.sum(axis=(1, 2)) * areas).sum())
+        total = float((self.picture.sum(axis=2) * self.areas).sum())
         four = np.concatenate([self.picture, np.zeros((rows, columns, 1), np.float32)], axis=2)
         cosine = np.cos(_SUN_RADIUS) if self.sun.any() else 2.0
         return Packed(

@@ -39,7 +39,7 @@ class Attempt:
     Attributes
     ----------
     coefficients, order_0, scale, expansion, grid : of the table.
-    measured : the error last measured, see `tables.error.worst`.
+    measured : the error last measured, see `tables.build.error.worst`.
     """
 
     def __init__(
@@ -56,11 +56,13 @@ class Attempt:
         double = expansion.basis == "taylor" or tolerance < DOUBLE_BELOW
         margin = math.ceil(FULL_REACH * math.sqrt(2.0) / min(grid.steps)) + 2
         outer = (grid.last[0] + margin, grid.last[1] + margin)
+        self._tick = _Ticks(tell)
         self._spectra = Spectra(patches, outer, double, self._tick)
         self._checks = [expansion.extrema(interval) for interval in range(expansion.intervals)]
-        self._transforms = expansion.intervals * expansion.series_terms * self._spectra.count
-        self._total = self._transforms + sum(map(len, self._checks)) * self._spectra.count
-        self._tell, self._done, self.grid = tell, 0, grid
+        transforms = expansion.intervals * expansion.series_terms * self._spectra.count
+        self._tick.transforms = transforms
+        self._tick.total = transforms + sum(map(len, self._checks)) * self._spectra.count
+        self.grid = grid
         self.measured: dict[str, float] = {}
         self._parts: list[Parts] = []
         self._trims: tuple[int, ...] | None = None
@@ -76,7 +78,7 @@ class Attempt:
         """The larger of both errors, with some taps left out."""
         if trims != self._trims:
             self._meter = ErrorMeter(self._spectra, replace(self.grid, trims=trims), self.expansion)
-            self._parts, self._done = [], self._transforms
+            self._parts, self._tick.done = [], self._tick.transforms
             for values, centre, kappas in zip(
                 self.coefficients, self.order_0, self._checks, strict=True
             ):
@@ -94,8 +96,15 @@ class Attempt:
             shares.append(float(alone[0, n] / max(alone[1, n], floor[n], 1e-30)))
         return max(shares)
 
-    def _tick(self) -> None:
-        """Tell of a transform."""
-        self._done = min(self._done + 1, self._total)
-        text = "transforming" if self._done <= self._transforms else "measuring the error"
-        self._tell(self._done, self._total, text)
+
+class _Ticks:
+    """Tells of transforms; apart from the attempt, or that would keep its arrays in a cycle."""
+
+    def __init__(self, tell: Progress) -> None:
+        self._tell = tell
+        self.done = self.transforms = self.total = 0
+
+    def __call__(self) -> None:
+        self.done = min(self.done + 1, self.total)
+        text = "transforming" if self.done <= self.transforms else "measuring the error"
+        self._tell(self.done, self.total, text)

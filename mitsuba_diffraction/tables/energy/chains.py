@@ -68,7 +68,7 @@ class Chains:
         )
         y_squared = np.maximum(1.0 - (0.5 * g * width) ** 2, 0.0)
         radius = np.sqrt(x_o**2 + y_squared)
-        lobe = self.orders.table.sigma, self.gain.wavenumber
+        lobe = self.orders.sigma, self.gain.wavenumber
         share, cos_o, pole = lobe_means(*lobe, radius)
         least = math.cos(LAST_ANGLE) if steepest else float(lobes(*lobe)[2][-1])
         cos_i = np.sqrt(np.maximum(1.0 - x**2 - y_squared, least**2))

@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import map_coordinates
 
 from ...optics import blend, boundary, fresnel
-from ..table import DiffractionTable
+from ...optics.blend import RoughnessTable
 
 Real = NDArray[np.float64]
 
@@ -37,14 +37,14 @@ class Gain:
 
     Attributes
     ----------
-    table : whose roughness the small-slope model follows.
+    roughness : of the table; the small-slope model follows it.
     model : "kirchhoff" or "small_slope".
     index : n + ik over that of the medium above, or that under a film; None for R = 1.
     wavenumber : 2π/λ, rad/µm.
     height_scale : factor on the table's heights.
     """
 
-    table: DiffractionTable
+    roughness: RoughnessTable
     model: str
     index: complex | fresnel.Filmed | None
     wavenumber: float
@@ -68,7 +68,7 @@ class Gain:
             return fresnel.reflectance(cos_half, index)
         wi = np.stack([sin_i, np.zeros_like(sin_i), cos_i], axis=-1)
         wo = np.stack([x, y, cos_o], axis=-1)
-        variance = self.table.roughness.at(self.wavenumber * np.hypot(x + sin_i, y))
+        variance = self.roughness.at(self.wavenumber * np.hypot(x + sin_i, y))
         s = blend.weight(self.wavenumber * w * self.height_scale, variance, self.index)
         power = boundary.unpolarised(blend.jones(wi, wo, self.index, s))
         return np.asarray((2.0 * cos_i * cos_o / one_plus_dot) ** 2 * power)

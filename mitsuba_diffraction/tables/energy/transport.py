@@ -50,7 +50,9 @@ class Orders:
     """A table's orders, sorted for one height scale; `transport` sums over them."""
 
     def __init__(self, table: DiffractionTable, height_scale: float = 1.0) -> None:
-        self.table, self.height_scale = table, height_scale
+        # not the table, which may keep these
+        self.sigma, self.roughness = table.sigma, table.roughness
+        self.height_scale = height_scale
         self.grating: Grating | None = None
         if (found := grating_of(table)) is not None:
             self.grating, bins = found
@@ -83,7 +85,7 @@ class Orders:
     def gain(self, wavelength: float, model: str, index: complex | Filmed | None) -> Gain:
         """G of a model and material at a wavelength (nm)."""
         k = float(wavenumber(wavelength))
-        return Gain(self.table, model, index, k, self.height_scale)
+        return Gain(self.roughness, model, index, k, self.height_scale)
 
     def of_gain(
         self,
@@ -189,7 +191,7 @@ class _Row:
     ) -> None:
         self.mixture, self.k, self.phi = orders.mixture, k, phi
         self.nodes, self.weights = orders.nodes, orders.weights
-        self.sigma = orders.table.sigma
+        self.sigma = orders.sigma
         self.sin, self.cos = math.sin(theta), math.cos(theta)
         self._table, self._faded = table, faded
 

@@ -186,7 +186,7 @@ def test_a_gratings_grid_interpolates_between_its_nodes():
 @pytest.mark.parametrize("material", MATERIALS)
 def test_the_tabulated_gain_is_the_gain(tables, material):
     model, index = MATERIALS[material]
-    gain = Gain(tables["rough"], model, index, 2 * np.pi / 0.55, 1.0)
+    gain = Gain(tables["rough"].roughness, model, index, 2 * np.pi / 0.55, 1.0)
     theta = np.radians([0.0, 33.0, 71.0])
     rng = np.random.default_rng(0)
     cos_o, turn = rng.uniform(0.05, 1.0, 300), rng.uniform(-np.pi, np.pi, 300)

@@ -1,4 +1,4 @@
-// `flss`: the thesis' uniform sampling of the whole spectrum (methods/full_spectrum.py).
+// `flss`: the thesis' uniform sampling of the whole spectrum.
 
 vec3 diffracted(vec2 uv, float z, float cos_half, int light)
 {
