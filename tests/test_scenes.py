@@ -183,10 +183,6 @@ def test_colours_move_with_the_lamp() -> None:
 
 
 @pytest.mark.usefixtures("variant")
-def test_a_patch_of_the_user_replaces_the_default(tmp_path: Path) -> None:
-    from mitsuba_diffraction.heights import gratings
-
-    field = gratings.sinusoidal(period=1.0, depth=0.2)
-    np.save(tmp_path / "patch.npy", field.heights)
-    own = {"patch": str(tmp_path / "patch.npy"), "pixel_size": str(field.pixel_size[0])}
+def test_a_patch_of_the_user_replaces_the_default(gentle: dict[str, str]) -> None:
+    own = {name: gentle[name] for name in ("patch", "pixel_size")}
     assert np.isfinite(_render("plate", **own)).all()

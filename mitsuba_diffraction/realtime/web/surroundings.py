@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -66,6 +66,9 @@ def _lobes(material: Material) -> Packed:
     """In fewer digits: whatever they are, densities are those that directions are drawn with."""
     factor = height_scale(material) * coat_index(material)
     packed = pack_lobes(cached_colours(material.table), factor)
-    fewer = {"lobe_places": np.float16, "lobe_densities": shortened}
+    fewer: dict[str, Callable[[Any], Any]] = {
+        "lobe_places": np.float16,
+        "lobe_densities": shortened,
+    }
     textures = [replace(t, data=fewer[t.name](t.data)) for t in packed.textures]
     return replace(packed, textures=tuple(textures))
