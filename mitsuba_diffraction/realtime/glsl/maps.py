@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -81,13 +81,15 @@ def colour_map(texture: Any, light: Spectrum) -> Map:
         width = height = 1
     uv, to_uv = _centres(texture, width, height)
     found = _lit(texture, uv, light) if mi.is_spectral else evaluated(texture, uv, np.zeros(3))
-    some = slice(None, None, max(len(uv) // _SOME, 1))
-    known = {"spectra": evaluated(texture, uv[some], _LAM), "colours": found[some]}
-    known = known if mi.is_spectral else {}
     if width * height == 1:
-        return Map(found[0].astype(float), **known)
-    clamped = _clamps(lambda uv: evaluated(texture, uv, np.full(4, 550.0)), to_uv)
-    return Map(np.ones(3), found.reshape(height, width, 3), to_uv, clamped=clamped, **known)
+        whole = Map(found[0].astype(float))
+    else:
+        clamped = _clamps(lambda uv: evaluated(texture, uv, np.full(4, 550.0)), to_uv)
+        whole = Map(np.ones(3), found.reshape(height, width, 3), to_uv, clamped=clamped)
+    if not mi.is_spectral:
+        return whole
+    some = slice(None, None, max(len(uv) // _SOME, 1))
+    return replace(whole, spectra=evaluated(texture, uv[some], _LAM), colours=found[some])
 
 
 def _weights(light: Spectrum) -> Array:
