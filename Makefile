@@ -92,14 +92,14 @@ energy: setup  ## measure what energy conservation takes: docs/energy.md
 	    $(RUN) info --energy --json out/energy/$$name.json out/energy/$$name.exr || exit 1; done
 	@$(PYTHON3) -m docs.make.figures.energy $(SURFACES:%=out/energy/%.json)
 
-# scene, width, height, samples of the path tracer, frames; what is measured is kept until it is removed
-REALTIME := snake:40:25:16384:448 xenopeltis:32:20:24576:448 cd:36:26:49152:448 \
-    material_ball:30:27:24576:384 scales:36:24:20480:384
+# scene, width, height, samples of the path tracer, frames, samples a frame along either side of a pixel
+REALTIME := scales:36:24:20480:384:4 snake:40:25:16384:448:4 xenopeltis:32:20:24576:448:4 \
+    cd:36:26:49152:448:4 material_ball:30:27:24576:384:4
 realtime: setup  ## compare the shaders with the path tracer: docs/realtime.md
 	@for scene in $(REALTIME); do \
 	    set -- $$(echo $$scene | tr : ' '); made=out/compare/$$1; \
 	    if [ -e $$made/compare.json ]; then echo "$$made is kept: remove it to measure again"; \
-	    else $(RUN) compare scenes/$$1.xml --method lut spectral -s $$4 --frames $$5 --supersampling 4 \
+	    else $(RUN) compare scenes/$$1.xml --method lut spectral -s $$4 --frames $$5 --supersampling $$6 \
 	        -D resx=$$2 -D resy=$$3 -o $$made; fi || exit 1; done
 	@$(PYTHON3) -m docs.make.figures.realtime $(foreach s,$(REALTIME),out/compare/$(firstword $(subst :, ,$s)))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 Spectrum = tuple[Array, Array]
 
 _CHEQUERS = 512  # texels along either side of two by two
+_LAM = np.linspace(380.0, 740.0, 36)  # nm
+_SOME = 256  # texels whose spectra are known
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,8 @@ class Map:
     picture : (rows, columns, channels), row 0 at v = 0, and `to_uv` (3, 3) that leads into it.
     attribute : name of a mesh attribute.
     clamped : whether the picture's edges go on beyond it, which else repeats.
+    spectra : of some texels of a colour, over `_LAM`, (n, 36).
+    colours : theirs under the light that the picture is for, (n, 3).
     """
 
     value: Array
@@ -38,6 +42,18 @@ class Map:
     to_uv: Array = field(default_factory=lambda: np.eye(3))
     attribute: str | None = None
     clamped: bool = False
+    spectra: NDArray[np.floating] | None = None
+    colours: NDArray[np.floating] | None = None
+
+    def under(self, wavelengths: Array, spectrum: Array) -> Array:
+        """Colours as rows times this matrix (3, 3) are those under another light.
+
+        The best for the texels that are known: three numbers do not say all of a spectrum.
+        """
+        if self.spectra is None or self.colours is None or spectrum.ndim > 1:
+            return np.eye(3)
+        apart = self.spectra @ _weights((wavelengths, spectrum)) - self.colours
+        return np.eye(3) + np.linalg.lstsq(self.colours, apart, rcond=1e-3)[0]
 
 
 def raw_picture(bsdf: Any, name: str, channels: int, scale: float, shift: float = 0.0) -> Map:
@@ -66,20 +82,28 @@ def colour_map(texture: Any, light: Spectrum) -> Map:
     uv, to_uv = _centres(texture, width, height)
     found = _lit(texture, uv, light) if mi.is_spectral else evaluated(texture, uv, np.zeros(3))
     if width * height == 1:
-        return Map(found[0].astype(float))
-    clamped = _clamps(lambda uv: evaluated(texture, uv, np.full(4, 550.0)), to_uv)
-    return Map(np.ones(3), found.reshape(height, width, 3), to_uv, clamped=clamped)
+        whole = Map(found[0].astype(float))
+    else:
+        clamped = _clamps(lambda uv: evaluated(texture, uv, np.full(4, 550.0)), to_uv)
+        whole = Map(np.ones(3), found.reshape(height, width, 3), to_uv, clamped=clamped)
+    if not mi.is_spectral:
+        return whole
+    some = slice(None, None, max(len(uv) // _SOME, 1))
+    return replace(whole, spectra=evaluated(texture, uv[some], _LAM), colours=found[some])
+
+
+def _weights(light: Spectrum) -> Array:
+    """From reflectances over `_LAM` to their colours under a light, (36, 3)."""
+    weights = linear_srgb(response(_LAM)) * np.interp(_LAM, *light)[:, None]
+    return np.asarray(weights / weights.sum(axis=0))
 
 
 def _lit(texture: Any, uv: Array, light: Spectrum) -> NDArray[np.float32]:
     """A texture's values (points, 3) under a light, over the light's own, in linear sRGB."""
-    lam = np.linspace(380.0, 740.0, 36)
-    weights = linear_srgb(response(lam)) * np.interp(lam, *light)[:, None]
-    weights /= weights.sum(axis=0)
-    total = np.zeros((len(uv), 3), np.float32)
-    for start in range(0, len(lam), 4):
+    weights, total = _weights(light).astype(np.float32), np.zeros((len(uv), 3), np.float32)
+    for start in range(0, len(_LAM), 4):
         four = slice(start, start + 4)
-        total += evaluated(texture, uv, lam[four]) @ weights[four].astype(np.float32)
+        total += evaluated(texture, uv, _LAM[four]) @ weights[four]
     return total
 
 

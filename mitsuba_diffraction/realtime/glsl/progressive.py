@@ -112,7 +112,7 @@ class ProgressiveLight:
             return
         uniforms = self._map.draw(light, self._places, (float(beside[0]), float(beside[1])))
         uniforms["light_density"] = light.density
-        definitions = light_definitions(1, False) | {"SHADOWED": ""}
+        definitions = light_definitions(1, False) | {"SHADOWED": "", "PIGMENT_IN_LIGHT": ""}
         if self._looks_up:
             definitions["WEIGHTED"] = ""
         extras = [_WithMap(extra, self._map.texture) for extra in self._stage.extras]

@@ -288,6 +288,9 @@ class Renderer:
             if extras is not None:
                 unit = extras[n].use(program, unit)
             self.use_responses(program, unit, lights)
+            if "pigment_in_light" in program:
+                turned = surface.material.pigment.under(lights[0].wavelengths, lights[0].spectrum)
+                set_uniforms(program, {"pigment_in_light": tuple(turned.ravel().tolist())})
             if surface.material.bsdf is not None:
                 factor = scale if scale is not None else height_scale(surface.material)
                 set_uniforms(program, {"height_scale": factor})

@@ -253,6 +253,36 @@ def test_lights_from_emitters_bring_what_the_emitters_bring(some_variant: str) -
         assert found == pytest.approx(expected, rel=0.02), part["type"]
 
 
+def test_pigments_have_another_colour_in_each_light(
+    gl: Any, some_variant: str, table_file: Path
+) -> None:
+    """Red in bluish light: three colours' products are off by a tenth."""
+    if "spectral" not in some_variant:
+        pytest.skip("without spectra there are three colours only")
+    bluish = {"type": "irregular", "wavelengths": "380, 550, 720", "values": "3, 1.2, 0.6"}
+    red = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.4, 0.03, 0.01]}}
+    T = mi.ScalarTransform4f
+    scene = plate_scene(
+        table_file,
+        lamp={"type": "directional", "direction": [0.3, 0.4, -1.0], "irradiance": bluish},
+        other={"type": "point", "position": [0.0, 9.0, 0.5], "intensity": 3.0},
+        plate={"type": "rectangle", "to_world": T().scale(4.0), "bsdf": red},
+        wall={
+            "type": "rectangle", "bsdf": diffuse(0.0),
+            "to_world": T().translate([0, 5, 0]).rotate([1, 0, 0], 90).scale(9.0),
+        },
+    )  # fmt: skip
+    renderer = Renderer(scene, context=gl)
+    light = renderer.progressive(size=(40, 10))
+    light.advance(256)
+    found = light.image[5, 20, :3]
+    expected = truth(renderer, 64)[15:25, 70:90].mean(axis=(0, 1))
+    light.release()
+    renderer.release()
+    assert found[0] == pytest.approx(expected[0], rel=0.05)  # how often the light is drawn
+    assert found / found[0] == pytest.approx(expected / expected[0], rel=0.02, abs=0.002)
+
+
 def test_lobes_and_lights_share_what_surrounds_a_scene(
     gl: Any, some_variant: str, table_file: Path
 ) -> None:

@@ -31,6 +31,9 @@ uniform mat3 bump_uv;
 uniform sampler2D normal_map;
 uniform mat3 normal_uv;
 #endif
+#ifdef PIGMENT_IN_LIGHT
+uniform mat3 pigment_in_light;    // from a pigment's colour to that under this light
+#endif
 #ifdef WEIGHTED
 uniform float light_density;      // as `lights.Light.density`
 #endif
@@ -136,6 +139,9 @@ void main()
     of_axis = within(of_axis, vec2(textureSize(axis_map, 0)));
 #endif
     rotation = texture(axis_map, of_axis).rg;
+#endif
+#ifdef PIGMENT_IN_LIGHT
+    pigment = pigment_in_light * pigment;
 #endif
     float turned = length(rotation);
     rotation = turned > 1e-6 ? rotation / turned : vec2(1.0, 0.0);
