@@ -168,7 +168,7 @@ def pack_relief(material: Material) -> Packed:
         if relief is None or relief.picture is None:
             continue
         smooth = name == "normal"  # bumps are read texel by texel
-        picture = as_half(_four(relief.picture)) if smooth else relief.picture
+        picture = as_half(_four(relief.picture) if smooth else relief.picture)
         definition = {"bump": "BUMPED", "normal": "NORMAL_MAPPED"}[name]
         packed |= Packed(
             (Texture(f"{name}_map", picture, smooth=smooth),),

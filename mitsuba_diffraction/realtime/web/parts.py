@@ -14,8 +14,6 @@ from ..glsl.textures import Packed, Texture
 from .sections import Section, Sections, packed_array, packed_file
 from .tables import as_columns
 
-_LEVELS = 256  # of numbers that a byte stands for
-
 
 def packed_parts(
     packed: Packed, sections: Sections, done: Mapping[str, Section] | None = None
@@ -41,11 +39,8 @@ def _texture(texture: Texture, sections: Sections, done: Section | None) -> dict
     entry["kind"] = {1: "bytes", 2: "half", 4: "single"}[data.dtype.itemsize]
     if data.dtype == np.uint32:
         entry["kind"] = "words"
-    elif entry["kind"] == "single" and len(levels := np.unique(data)) <= _LEVELS:
-        entry["levels"] = levels.tolist()  # as of pictures of eight bits
-        data = np.searchsorted(levels, data).astype(np.uint8)
     if done is None:
-        done = packed_array(as_columns(data, channels))
+        done = packed_array(as_columns(data, channels), differences=entry["kind"] == "bytes")
     entry["section"] = sections.add(done)
     return entry
 

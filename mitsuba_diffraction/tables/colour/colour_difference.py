@@ -33,7 +33,10 @@ def power_colour_difference(
 
 
 def _pairs(count: int) -> tuple[NDArray[np.float64], ...]:
-    """u, v, z of random pairs of directions away from the specular one, and w² to divide by."""
+    """u, v, z of random pairs of directions away from the specular one, and w² to divide by.
+
+    Half of them in the planes of the axes, out of which gratings with one period send nothing.
+    """
     rng = np.random.default_rng(2)
     radius, turn = (
         np.sqrt(rng.uniform(0, 0.95, (2, _PAIRS))),
@@ -41,7 +44,9 @@ def _pairs(count: int) -> tuple[NDArray[np.float64], ...]:
     )
     x, y = radius * np.cos(turn), radius * np.sin(turn)
     z = np.sqrt(1.0 - radius**2)
-    return x.sum(axis=0), y.sum(axis=0), z.sum(axis=0), z.sum(axis=0) ** -2 / z[0]
+    u, v = x.sum(axis=0), y.sum(axis=0)
+    u[::4] = v[1::4] = 0.0
+    return u, v, z.sum(axis=0), z.sum(axis=0) ** -2 / z[0]
 
 
 def _loss(

@@ -18,7 +18,7 @@ const float LOWEST = 1e-6;  // cosine of what is seen or lit, so that all is fin
 vec3 albedo(vec3 w, vec2 rotation)
 {
     vec3 found = flat_reflectance(w.z);
-#ifdef BENEATH
+#if defined(BENEATH) && !defined(GLANCE)
     found *= reflected_ratio(in_patch(w, rotation), w.z);
 #endif
     return min(found, 1.0);

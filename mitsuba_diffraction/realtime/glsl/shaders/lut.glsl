@@ -79,9 +79,14 @@ vec3 other_orders(vec2 uv, float squared_radius, float z)
     uint azimuths = pair.y & 0xffffu;
     int start = interval * bins + int(pair.x);
     vec4 a = vec4(0.0), b = vec4(0.0), c = vec4(0.0), d = vec4(0.0);
+    int next = start + int(azimuths) + 1;  // a ring repeats its first bin at its end
+#ifdef GLANCE  // the nearest alone: a picture that is gone at once
+    float count = float(share > 0.5 ? pair.y >> 16 : azimuths);
+    add_bin(2 * ((share > 0.5 ? next : start) + int(turn * count + 0.5)), 1.0, a, b, c, d);
+#else
     add_azimuth(start, float(azimuths), turn, 1.0 - share, a, b, c, d);
-    start += int(azimuths) + 1;  // a ring repeats its first bin at its end
-    add_azimuth(start, float(pair.y >> 16), turn, share, a, b, c, d);
+    add_azimuth(next, float(pair.y >> 16), turn, share, a, b, c, d);
+#endif
     vec4 first = vec4(1.0, t, t2, t3);
     vec3 sum = vec3(dot(a, first) + b.x * t4,
                     dot(vec4(b.yzw, c.x), first) + c.y * t4,

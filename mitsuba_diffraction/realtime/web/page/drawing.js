@@ -91,8 +91,7 @@ async function uploadTexture(gl, data, entry) {
     }[entry.kind];
     const words = [gl.RED_INTEGER, gl.RG_INTEGER, gl.RGBA_INTEGER];
     const format = (entry.kind === "words" ? words : [gl.RED, gl.RG, gl.RGBA])[n];
-    let numbers = content.subarray(0, width * height * channels);
-    if (entry.levels) numbers = Float32Array.from(numbers, (level) => entry.levels[level]);
+    const numbers = content.subarray(0, width * height * channels);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     gl.texImage2D(gl.TEXTURE_2D, 0, internal[n], width, height, 0, format, type, numbers);
   }
@@ -186,7 +185,7 @@ class Drawing {
       this.tables[method] = tables;
     }
     await progress(`Compiling ${method}`);
-    for (const surface of this.surfaces) for (const light of lit) this.program(surface, method, light);
+    for (const surface of this.surfaces) for (const light of Object.values(lit)) this.program(surface, method, light);
   }
 
   // Compiled once for each of: a surface's source, definitions of its light, main function.

@@ -52,7 +52,7 @@ class BrdfMap {
     gl.enable(gl.DEPTH_TEST);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    drawing.drawSurfaces({ ...view, lit: viewer.lit[1] }, "picked");
+    drawing.drawSurfaces({ ...view, lit: viewer.lit.one }, "picked");
     const read = (n) => {
       const found = new Float32Array(4);
       gl.readBuffer(gl.COLOR_ATTACHMENT0 + n);
@@ -81,7 +81,7 @@ class BrdfMap {
   draw({ wi, wo, surface, light }) {
     const { viewer, gl } = this;
     const { drawing } = viewer;
-    const program = drawing.program(surface, viewer.drawn, viewer.lit[1], "map");
+    const program = drawing.program(surface, viewer.drawn, viewer.lit.one, "map");
     if (viewer.drawn === "spectral") drawing.setResponses([light]);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.drawn);
     program.use();

@@ -9,7 +9,7 @@ const POOR = 0.3;   // below this, rather fewer triangles
 const STILL = 200;  // ms after the last change
 const SMOOTH = 8;   // lights before their mean is shown
 const LIGHT = { few: (n, sky) => `#define LIGHTS_LIT ${n}\n${sky ? "#define SKY\n" : ""}`, one: "#define LIGHTS_LIT 1\n" };
-const WEIGHTED = "#define WEIGHTED\n", LOOKED_UP = "#define LOOKED_UP\n";
+const WEIGHTED = "#define WEIGHTED\n", LOOKED_UP = "#define LOOKED_UP\n", GLANCE = "#define GLANCE\n";
 const MONOCHROME = "#define MONOCHROME\n";
 // of a light that casts no shadow
 const UNSHADOWED = { light_axis: [0, 0, 0], light_cone: [0, 0], shadow_matrix: new Float32Array(16), shadow_planes: new Float32Array(16), shadow_bias: 0, shadow_steepest: 0 };
@@ -68,8 +68,10 @@ class Viewer {
   get lit() {
     const { lights, sky } = this.lights.few;
     const one = this.wavelength === null ? "" : MONOCHROME;
-    const found = [LIGHT.few(lights.length, sky.some((x) => x)) + one, LIGHT.one + one];
-    return this.looksUp ? [found[0], LIGHT.one + WEIGHTED, LIGHT.one + LOOKED_UP] : found;
+    const few = LIGHT.few(lights.length, sky.some((x) => x)) + one, glance = few + GLANCE;
+    return this.looksUp
+      ? { glance, few, one: LIGHT.one + WEIGHTED, lookup: LIGHT.one + LOOKED_UP }
+      : { glance, few, one: LIGHT.one + one };
   }
 
   // Something that is drawn is another now.
@@ -122,7 +124,7 @@ class Viewer {
     Object.assign(view.uniforms, { sky: colour ? monochrome(sky, colour) : sky, ...lightUniforms(chosen, colour), ...shadow });
     if (lookup) view.uniforms.sequence = drawnNumbers(this.count);
     else view.uniforms.light_density = chosen[0]?.density ?? 0;
-    const lit = this.lit[lookup ? 2 : one ? 1 : 0], bright = lookup || !(one && looksUp);
+    const lit = this.lit[lookup ? "lookup" : one ? "one" : moving ? "glance" : "few"], bright = lookup || !(one && looksUp);
     this.sample = { ...view, method, width, height, preview, moving, detail, lit, around, looksUp: looksUp && one, lookup, bright, row: 0, time: 0 };
   }
 
