@@ -92,15 +92,16 @@ energy: setup  ## measure what energy conservation takes: docs/energy.md
 	    $(RUN) info --energy --json out/energy/$$name.json out/energy/$$name.exr || exit 1; done
 	@$(PYTHON3) -m docs.make.figures.energy $(SURFACES:%=out/energy/%.json)
 
-COMPARE := $(RUN) compare
-WHOLE := --method lut spectral -s 8192 --full-spp 256 --frames 1024 --supersampling 3
+# scene, width, height, samples of the path tracer, frames; what is measured is kept until it is removed
+REALTIME := snake:40:25:16384:448 xenopeltis:32:20:24576:448 cd:36:26:49152:448 \
+    material_ball:30:27:24576:384 scales:36:24:20480:384
 realtime: setup  ## compare the shaders with the path tracer: docs/realtime.md
-	@$(COMPARE) scenes/snake.xml $(WHOLE) -D resx=144 -D resy=90 -o out/compare/snake
-	@$(COMPARE) scenes/xenopeltis.xml $(WHOLE) -D resx=144 -D resy=90 -o out/compare/xenopeltis
-	@$(COMPARE) scenes/cd.xml $(WHOLE) -D resx=120 -D resy=88 -o out/compare/cd
-	@$(COMPARE) scenes/material_ball.xml $(WHOLE) -D resx=96 -D resy=88 -o out/compare/material_ball
-	@$(COMPARE) scenes/scales.xml $(WHOLE) -D resx=120 -D resy=80 -o out/compare/scales
-	@$(PYTHON3) -m docs.make.figures.realtime $(addprefix out/compare/,snake xenopeltis cd material_ball scales)
+	@for scene in $(REALTIME); do \
+	    set -- $$(echo $$scene | tr : ' '); made=out/compare/$$1; \
+	    if [ -e $$made/compare.json ]; then echo "$$made is kept: remove it to measure again"; \
+	    else $(RUN) compare scenes/$$1.xml --method lut spectral -s $$4 --frames $$5 --supersampling 4 \
+	        -D resx=$$2 -D resy=$$3 -o $$made; fi || exit 1; done
+	@$(PYTHON3) -m docs.make.figures.realtime $(foreach s,$(REALTIME),out/compare/$(firstword $(subst :, ,$s)))
 
 lint: setup  ## check style, types and the layers of imports
 	@$(PYTHON3) -m ruff check

@@ -1,8 +1,8 @@
 """The commands that README and docs show run, in their order, on small patches and pictures.
 
 What is not run here: `make`, `pip` and `apt`, which set up what runs these tests; `view`, which
-opens a window; `bench`, `tradeoff` and `compare`, which take long at their smallest, and are run
-smaller still by their own tests. test_docs.py checks what these would be given.
+opens a window; `bench`, `tradeoff`, `compare` and `plan`, which take long at their smallest, and
+are run smaller still by their own tests. test_docs.py checks what these would be given.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tests.clone import small_clone
 from tests.instruments import nanoscope
 from tests.test_docs import PAGES, blocks, spans, typed
 
-NOT_RUN = {"view", "bench", "tradeoff", "compare"}
+NOT_RUN = {"view", "bench", "tradeoff", "compare", "plan", "--plan"}
 
 # as small as commands may be asked to be; the last option of a name counts
 SMALL = {
@@ -29,7 +29,6 @@ SMALL = {
     "brdf-map": ["--resolution", "24", "--step", "50", "--samples", "1"],
     "evaluate": ["--step", "50", "--angle-step", "2", "--windows", "2", "--coherence-width", "10"],
     "sweep": ["--coherence-width", "10", "--resolution", "12", "--step", "100", "--no-compiled"],
-    "plan": ["--paths", "128"],
     "export-viewer": ["--method", "spectral"],
     "export-shader": ["--coherence-width", "4", "--tolerance", "0.05"],
     "survey": ["--coherence-width", "4", "--tolerance", "0.05", "--resolution", "16"],
@@ -68,7 +67,7 @@ def commands(page: str) -> list[list[str]]:
     return [
         words
         for words in lines
-        if (Path(words[0]).name == "mitsuba-diffraction" and words[1] not in NOT_RUN)
+        if (Path(words[0]).name == "mitsuba-diffraction" and NOT_RUN.isdisjoint(words))
         or (words[1:3] == ["-m", "scenes.make"] and len(words) > 4)
     ]
 

@@ -52,10 +52,10 @@ def test_two_patches_share_the_snake_s_skin(gentle: dict[str, str]) -> None:
     import mitsuba as mi
 
     given = SMALL | {name: gentle[name] for name in ("patch", "pixel_size")}
-    skin = {"skin": "skin_two.xml", "belly_patch": gentle["patch"]}
+    skin = {"skin": "skin_two.xml", "second_patch": gentle["patch"]}
     scene = mi.load_file(str(SCENES / "snake.xml"), **given, **skin)
     values = mi.traverse(scene)
-    (name,) = (name for name, _ in values if name.endswith("weight_back.data"))
+    (name,) = (name for name, _ in values if name.endswith("weight_first.data"))
     weight = values[name]
     assert np.array(weight)[[0, 32, -1], 0, 0] == pytest.approx([0.0, 1.0, 0.0])
 
@@ -69,6 +69,19 @@ def gentle(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     file = tmp_path_factory.mktemp("patch") / "gentle.npy"
     np.save(file, field.heights)
     return {"patch": str(file), "pixel_size": str(field.pixel_size[0]), "coherence_width": "10"}
+
+
+@pytest.mark.parametrize("name", ["film", "spectrometer", "scales_macro", "snake"])
+@pytest.mark.usefixtures("variant")
+def test_it_renders_with_a_gentle_patch(name: str, gentle: dict[str, str]) -> None:
+    tiny = {"spp": "2", "resx": "24", "resy": "20"}
+    given = tiny | {key: gentle[key] for key in ("patch", "pixel_size")}
+    if name == "snake":
+        given |= {"skin": "skin_two.xml", "second_patch": gentle["patch"]}
+    image = _render(name, **given)
+    assert image.shape == (20, 24, 3)
+    assert np.isfinite(image).all()
+    assert image.max() > 0.0
 
 
 @pytest.mark.parametrize("name", [*STUDIO, "plate", *LARGE])
@@ -170,10 +183,6 @@ def test_colours_move_with_the_lamp() -> None:
 
 
 @pytest.mark.usefixtures("variant")
-def test_a_patch_of_the_user_replaces_the_default(tmp_path: Path) -> None:
-    from mitsuba_diffraction.heights import gratings
-
-    field = gratings.sinusoidal(period=1.0, depth=0.2)
-    np.save(tmp_path / "patch.npy", field.heights)
-    own = {"patch": str(tmp_path / "patch.npy"), "pixel_size": str(field.pixel_size[0])}
+def test_a_patch_of_the_user_replaces_the_default(gentle: dict[str, str]) -> None:
+    own = {name: gentle[name] for name in ("patch", "pixel_size")}
     assert np.isfinite(_render("plate", **own)).all()

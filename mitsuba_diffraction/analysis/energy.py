@@ -10,13 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..tables.energy.conservation import Index, albedos, most_kept
-from ..tables.store.energy import Energy
+from ..tables.energy.links import Medium
+from ..tables.energy.sides import Sides
+from ..tables.store.energy import Energy, SidesEnergy
 from ..tables.table import DiffractionTable
 
 #: Polar angles (degrees) and wavelengths (nm) looked at, at `AZIMUTHS` azimuths each.
 ANGLES, WAVELENGTHS, AZIMUTHS = (0.0, 30.0, 45.0, 60.0, 70.0, 75.0, 80.0), (450.0, 550.0, 650.0), 24
 #: Angles that are told of one by one.
 SHOWN = (0.0, 45.0, 60.0, 75.0)
+#: And those at which R + T is.
+PASSED = (0.0, 30.0, 45.0, 60.0, 75.0)
 #: What is taken beyond this share is warned of.
 MUCH = 0.05
 
@@ -83,6 +87,30 @@ def _of_material(table: DiffractionTable, model: str, index: Index) -> dict[str,
         most = np.stack([part for part in parts if part is not None])
         result["reciprocity lets be kept"] = round(float(most.min()), 3)
         result["kept over that"] = _range(kept / np.minimum(raw, 1.0) / most)
+    return result
+
+
+def sides_summary(table: DiffractionTable) -> dict[str, Any]:
+    """R + T of a lossless dielectric of index 1.5 and of a thin sheet of it, as it is and scaled.
+
+    Least and largest of 24 azimuths at 450, 550 and 650 nm, of light from above and from below.
+    """
+    theta = np.asarray(np.radians(PASSED), np.float64)
+    phi: NDArray[np.float64] = (np.arange(AZIMUTHS, dtype=float) + 0.3) * (2.0 * np.pi / AZIMUTHS)
+    result: dict[str, Any] = {}
+    for name, thin in (("dielectric 1.5, both sides", False), ("sheet 1.5", True)):
+        medium = Medium(1.5, "small_slope", thin)
+        scale = SidesEnergy(table, medium, table.wavelength_range).at(1.0) or None
+        model = Sides(table, 1.0, medium)
+        pairs = [model.sums(scale, theta, phi, wavelength) for wavelength in WAVELENGTHS]
+        sums = np.stack(pairs)  # (wavelengths, raw or scaled, sides, angles, azimuths)
+        result[name] = {
+            f"{kind}, from {side}": {
+                f"{angle:g}°": _range(sums[:, n, m, i]) for i, angle in enumerate(PASSED)
+            }
+            for m, side in enumerate(("above", "below"))
+            for n, kind in enumerate(("R + T", "R + T, conserved"))
+        }
     return result
 
 

@@ -38,7 +38,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     parser.add_argument(
         "--energy", action="store_true",
         help="of a table: what it reflects and what energy conservation takes, made of three "
-        "materials",
+        "materials; and R + T of a dielectric and of a thin sheet, as it is and conserved",
     )  # fmt: skip
     parser.add_argument(
         "--picture", metavar="OUT", type=path_ending_in(".png", ".pdf", ".svg"),
@@ -109,11 +109,13 @@ def _table(file: Path) -> dict[str, Any]:
 
 
 def _energy(file: Path) -> dict[str, Any]:
-    from ..analysis.energy import energy_summary, energy_warnings
+    from ..analysis.energy import energy_summary, energy_warnings, sides_summary
     from ..tables import DiffractionTable
 
-    found = energy_summary(DiffractionTable.load(file))
-    return {"energy": found, "warnings": energy_warnings(found)}
+    table = DiffractionTable.load(file)
+    found = energy_summary(table)
+    both = sides_summary(table)
+    return {"energy": found, "both sides": both, "warnings": energy_warnings(found)}
 
 
 def _plot_albedo(file: Path, output: Path) -> None:

@@ -5,7 +5,7 @@ Contents
 connect  to workers that are started here, or to a running cluster: `md.cluster.connect`
 render   a scene, on workers: `md.cluster.render`
 build    the table of a wide scan, its windows on workers: `md.cluster.build`
-film     frames after frames, each from tasks that workers do in any order
+frames   frames after frames, each from tasks that workers do in any order
 tasks    what a worker does, and what it gives back
 files    a scene with the files that it names, and copies of them where they are missing
 kept     sums of passes on disk, until their picture is written

@@ -8,6 +8,8 @@ registration    both are registered in every variant
 dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives
 parameters      read from Mitsuba's Properties, checked
+properties      words, flags and numbers from them, refused by name
+materials       what the surface is made of: indices, coat, film, model
 changing        a parameter that changes and what it refuses; what `dr.freeze` must know of a BSDF
 sources         from what a scene names to a table, built once
 attributes      whether a mesh has what its BSDF reads

@@ -105,11 +105,13 @@ transmission : boolean [false]
     that normals point to has ext_ior, the other one int_ior, which is at least 1.01 times that.
     Component 0 is what is reflected, 1 what goes through. Orders that change the tangential part by
     more than 2/λ are left out. It excludes coat, film, nested BSDF and shadowing. energy_conserving
-    divides all by the largest R + T within 75° of the normal, at a few directions and wavelengths:
-    a second's work, in steps of 0.01 of height_scale and eta.
+    makes R + T 1, since a dielectric loses no light: order 0 is multiplied by c(ωi) c(ωo), c on the
+    directions of both sides, and where that is not enough all is scaled likewise; a few seconds'
+    work, kept in the cache, in steps of 0.01 of eta.
 thin : boolean [false]
     Light goes through a sheet, whose other side is flat; both sides have ext_ior. What that side
-    sends back is summed as between two mirrors; light beyond the sheet's critical angle is lost.
+    sends back is summed as between two mirrors. Light beyond the sheet's critical angle is lost,
+    unless energy_conserving puts it back, into order 0.
 model : string [small_slope]
     `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
     where the surface is rough at the scale of an order; polarised variants have its Mueller
@@ -410,13 +412,14 @@ class Diffraction(mi.BSDF):
         changing = (self._scale, self.orientation, self.fresnel)
         refused = [line for line in [one.settle() for one in changing] if line]
         refused += self._optical_refusal()
+        largest = dr.slice(dr.max(dr.detach(self.height_scale)))
+        differentiable = dr.grad_enabled(self.height_scale)
+        lowest = self._varying.range()[0] if self._varying else None
         if self._energy is not None:
-            largest = dr.slice(dr.max(dr.detach(self.height_scale)))
             beneath = self.nested is not None and isinstance(self.layering, Transmission)
-            lowest = self._varying.range()[0] if self._varying else None
-            self._energy.update(largest, dr.grad_enabled(self.height_scale), beneath, lowest)
-        if self.through is not None:
-            self.through.update(self.height_scale)
+            self._energy.update(largest, differentiable, beneath, lowest)
+        if self.through is not None and self.through.balance is not None:
+            self.through.balance.update(largest, differentiable, lowest)
         held = arrays_within(
             self.power,
             self._energy,
@@ -474,7 +477,7 @@ class Diffraction(mi.BSDF):
     def energy_conserving(self) -> bool:
         """Whether it takes what it would reflect too much."""
         if self.through is not None:
-            return self.through.conserving is not None
+            return self.through.balance is not None
         return self._energy is not None and self._energy.conserving
 
     def energy_scale(self, height_scale: float) -> tuple[NDArray[np.float32], bool] | None:
@@ -493,8 +496,9 @@ class Diffraction(mi.BSDF):
         return self._energy.ratio(height_scale) if beneath and self._energy is not None else None
 
     @property
-    def _takes(self) -> bool:
-        return self._energy is not None and self._energy.takes
+    def _takes(self) -> int:
+        balance = self._energy if self.through is None else self.through.balance
+        return 0 if balance is None else balance.takes
 
     def to_string(self) -> str:
         """All parameters, for people."""

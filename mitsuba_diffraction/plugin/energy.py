@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -75,8 +76,8 @@ class EnergyModel:
         self._energy = Energy(table, model, self._indices, (low, high))
         self._kirchhoff = self._fades = kirchhoff
         self._warned = False
-        self._scale = _Lookup()
-        self._reflected = _Lookup()
+        self._scale = Lookup()
+        self._reflected = Lookup()
 
     def update(
         self,
@@ -98,7 +99,7 @@ class EnergyModel:
             nodes = self._energy.between(lowest, height_scale)
         found = [self._energy.at(node) for node in nodes]
         if self.conserving:
-            scales = _scales_of(found)
+            scales = scales_of([one.scale for one in found])
             self._warn(found)
             self._fades = self._kirchhoff and (scales is None or scales[0].grating is None)
             self._scale.update(scales, nodes, height_scale, lowest is not None)
@@ -126,7 +127,7 @@ class EnergyModel:
         """s for who knows no wavelengths, (polar + 1, azimuthal): their mean as the eye has it."""
         nodes = self._energy.nodes(height_scale)
         found = [self._energy.at(node) for node in nodes]
-        scales = _scales_of(found)
+        scales = scales_of([one.scale for one in found])
         if scales is None:
             return None
         scales = [one if one.grating is None else one.on(FINE) for one in scales]
@@ -187,7 +188,7 @@ class EnergyModel:
         return DirectionalTable(albedo.wavelengths, values.astype(np.float32))
 
 
-class _Lookup:
+class Lookup:
     """A function of direction and channel in the variant's memory, bilinear in (θ, φ)."""
 
     def __init__(self) -> None:
@@ -352,13 +353,13 @@ def _complex(number: Float) -> complex:
     return complex(plain(number))
 
 
-def _scales_of(found: list[Conservation]) -> list[DirectionalTable] | None:
+def scales_of(found: Sequence[DirectionalTable | None]) -> list[DirectionalTable] | None:
     """s of each, 1 where there is none; nothing if there is none at all."""
-    made = next((one.scale for one in found if one.scale is not None), None)
+    made = next((one for one in found if one is not None), None)
     if made is None:
         return None
     ones = replace(made, values=np.ones_like(made.values))
-    return [ones if one.scale is None else one.scale for one in found]
+    return [one or ones for one in found]
 
 
 def _between(

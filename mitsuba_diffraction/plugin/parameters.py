@@ -22,13 +22,22 @@ from .coat import UnderCoat
 from .film import UnderFilm
 from .height_scale import Varying
 from .layers import LAYERINGS, Blend, Layering, Transmission
-from .materials import DEFAULT_WAVELENGTH, boundary_of, coat_of, material_of, passing_of, under_film
+from .materials import (
+    DEFAULT_WAVELENGTH,
+    boundary_of,
+    coat_of,
+    material_of,
+    passing_of,
+    under_film,
+    warn_of_film,
+)
 from .orientation import Constant, Orientation, Textured
 from .pair import SHADOWINGS
 from .places import TILINGS, Places
 from .properties import choice, flag, kind_of, number
 from .reflectance import Conductor, Dielectric, Perfect, Reflectance
 from .roles import BSDF, Properties
+from .sides import SidesModel
 from .sources import (
     TableProvider,
     from_cache,
@@ -158,14 +167,18 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     flat: Reflectance | UnderCoat | UnderFilm = reflectance
     if coat is not None and not isinstance(material, Perfect):
         flat = UnderCoat(material, coat)
+    warn_of_film(reflectance, table, largest)
     boundary = boundary_of(props, reflectance, table)
     conserving, through = flag(props, "energy_conserving", True), None
+    places = _places(props, table)
     if passing is not None:
         thin = flag(props, "thin", False)
-        through = Through(passing, boundary, thin, table if conserving else None)
+        mean = table if places is None else table.averaged
+        balance = SidesModel(mean, passing, str(boundary), thin, wavelength) if conserving else None
+        through = Through(passing, boundary, thin, balance)
     return Parameters(
         table=table,
-        places=_places(props, table),
+        places=places,
         heights=heights,
         reflectance=flat,
         coat=coat,

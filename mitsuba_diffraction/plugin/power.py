@@ -39,8 +39,11 @@ class PowerModel(Protocol):
     def wavenumbers(self, si: Interaction) -> list[Float]:
         """2π/λ of each channel, rad/µm."""
 
-    def flat(self, pair: Pair, si: Interaction) -> Colour:
+    def flat(self, pair: Pair | Place, si: Interaction) -> Colour:
         """What `power` is of a flat surface."""
+
+    def zeroth(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
+        """What of `power` is order 0's, in ensembles."""
 
     def draw(
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
@@ -129,7 +132,13 @@ class SpectralPower:
         """See `PowerModel.wavenumbers`."""
         return [dr.rcp(wavelength) * (2e3 * dr.pi) for wavelength in self._wavelengths(si)]
 
-    def flat(self, pair: Pair, si: Interaction) -> Colour:
+    def zeroth(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
+        """See `PowerModel.zeroth`."""
+        scaled_w = pair.w * height_scale
+        powers = [self.device.order_0(k * scaled_w) for k in self.wavenumbers(si)]
+        return self.flat(pair, si) * mi.UnpolarizedSpectrum(powers)
+
+    def flat(self, pair: Pair | Place, si: Interaction) -> Colour:
         """See `PowerModel.flat`: exp(−σ²k²|(u, v)|²)/λ²."""
         apart = -(self._sigma**2) * dr.squared_norm(pair.uv)
         squares = [dr.square(k) for k in self.wavenumbers(si)]

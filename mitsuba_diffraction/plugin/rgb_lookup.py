@@ -56,15 +56,13 @@ class ColourLookup:
 
     def colour(self, uv: Vector2f, z: Float) -> Colour:
         """RGB in 1/µm², mi.Color3f, signed. z must not be beyond the table's."""
-        squared_radius = dr.squared_norm(uv)
-        colours = self._other_orders(uv, squared_radius, z)
-        order_0 = self._zeroth_order(dr.sqrt(dr.maximum(squared_radius, 1e-14)), z)
-        return mi.Color3f(*(a + b for a, b in zip(colours, order_0, strict=True)))
+        others = self._other_orders(uv, dr.squared_norm(uv), z)
+        return mi.Color3f(*others) + self.zeroth(uv, z)
 
-    def flat(self, uv: Vector2f) -> Colour:
-        """That of a flat surface: of order 0 where no phase tells heights apart, z = 0."""
+    def zeroth(self, uv: Vector2f, z: Float) -> Colour:
+        """That of order 0."""
         radius = dr.sqrt(dr.maximum(dr.squared_norm(uv), 1e-14))
-        return mi.Color3f(*self._zeroth_order(radius, mi.Float(0.0)))
+        return mi.Color3f(*self._zeroth_order(radius, z))
 
     def _other_orders(self, uv: Vector2f, squared_radius: Float, z: Float) -> list[Float]:
         offset, interval = series_interval(self.expansion, z)

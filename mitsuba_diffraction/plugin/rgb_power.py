@@ -69,9 +69,13 @@ class RGBPower:
         """See `PowerModel.wavenumbers`; of the wavelength that is a channel's mean."""
         return self._wavenumbers
 
-    def flat(self, pair: Pair, si: Interaction) -> Colour:
-        """See `PowerModel.flat`."""
-        return self._lookup.flat(pair.uv)
+    def flat(self, pair: Pair | Place, si: Interaction) -> Colour:
+        """See `PowerModel.flat`: of order 0 where no phase tells heights apart."""
+        return self._lookup.zeroth(pair.uv, mi.Float(0.0))
+
+    def zeroth(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
+        """See `PowerModel.zeroth`."""
+        return self._lookup.zeroth(pair.uv, pair.w * height_scale)
 
     def _density(self, uv: Vector2f, share: Float, band: Index) -> Float:
         """Density of `draw` per du dv."""

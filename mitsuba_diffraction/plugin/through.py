@@ -13,17 +13,15 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from ..tables.energy.sides import largest_sum
-from ..tables.table import DiffractionTable
 from .boundary import LEVEL, Boundary, Jones, Kirchhoff, SmallSlope, mueller, turn, turned
 from .coat import CoatedPair, transmittances
 from .crossing import Crossing, Sides, Turned
-from .film import plain
 from .fresnel import root, squared
 from .pair import Pair, Place, from_patch
 from .reflectance import Dielectric, Inside
 from .roles import (
     BSDF,
+    Colour,
     Context,
     Float,
     Interaction,
@@ -35,6 +33,7 @@ from .roles import (
     Vector3f,
 )
 from .sampling import EVEN, direction_of, with_even_share
+from .sides import SidesModel
 
 _LEAST_SHARE = 0.1
 #: Of a dielectric over the medium above it.
@@ -49,7 +48,7 @@ class Through:
     material : of the surface.
     boundary : of light from above; the one of light from within follows.
     thin : whether below is beyond the flat side of a sheet.
-    conserving : the table, of which no direction within 75° of the normal is to gain energy.
+    balance : what makes both sides add up to 1, if anything.
     """
 
     def __init__(
@@ -57,29 +56,15 @@ class Through:
         material: Dielectric,
         boundary: Boundary,
         thin: bool,
-        conserving: DiffractionTable | None,
+        balance: SidesModel | None,
     ) -> None:
-        self.material, self.thin, self.conserving = material, thin, conserving
-        self._kept = mi.Float(1.0)
+        self.material, self.thin, self.balance = material, thin, balance
         self.boundary = boundary
         within = Inside(material, thin)
         self.below: Boundary = (
             boundary.of(within) if isinstance(boundary, SmallSlope) else Kirchhoff(within)
         )
         self.mirror = Kirchhoff(material)
-
-    def update(self, height_scale: Float) -> None:
-        """Divide by the largest R + T at this height scale and index, if that is above 1."""
-        if self.conserving is None:
-            return
-        scale, index = plain(dr.max(height_scale)), plain(self.material.eta)
-        state = max(round(scale, 2), 0.01), round(index, 2)
-        known: dict[object, float] = self.conserving.__dict__.setdefault("_sums", {})
-        key = *state, str(self.boundary), self.thin
-        if key not in known:
-            known[key] = largest_sum(self.conserving, *state, str(self.boundary), self.thin)
-        self._kept = mi.Float(1.0 / max(known[key], 1.0))
-        dr.make_opaque(self._kept)
 
     def flags(self) -> list[int]:
         """Of reflection and of transmission."""
@@ -98,22 +83,29 @@ class Through:
         share = self._share(cos_i, si, active, reflects, passes)
         rotation = bsdf.orientation.rotation(si, active)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
+        scales: list[Colour] = []
+        if self.balance is not None and self.balance.takes:
+            k, scale = bsdf.power.wavenumbers(si), bsdf.scale_at(si, active)
+            scales = self.balance.products((si.wi, wo), rotation, k, scale)
+        change = scales[0] if scales else None
         if reflects:
             for front in (True, False):
                 lit = active & ((cos_i > 0.0) == front) & (cos_i * cos_o > 0.0)
-                found, one = self._reflected(bsdf, ctx, si, wo, rotation, lit, front)
+                found, one = self._reflected(bsdf, ctx, si, wo, rotation, lit, front, change)
                 value = dr.select(lit, found, value)
                 density = dr.select(lit, share * one, density)
         if passes:
             lit = active & (cos_i * cos_o < 0.0)
             crossing = Crossing(si, wo, rotation, lit, self.material.eta, self.thin)
-            found = self._passed(bsdf, ctx, si, crossing) * dr.abs(cos_o)
+            found = self._passed(bsdf, ctx, si, crossing, change) * dr.abs(cos_o)
             value = dr.select(lit, found, value)
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
             scale = bsdf.scale_at(si, active)
             orders = bsdf.power.density(crossing, scale, si) * dr.square(out)
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
-        return value if self.conserving is None else value * self._kept, density
+        if len(scales) > 1:
+            value *= mi.Spectrum(scales[1])
+        return value, density
 
     def sample(
         self,
@@ -174,31 +166,37 @@ class Through:
         rotation: Rotation,
         lit: Mask,
         front: bool,
+        change: Colour | None,
     ) -> tuple[Spectrum, Float]:
         """Value and density of light that stays on one side."""
         n, scale = self.material.eta, bsdf.scale_at(si, lit)
         if front:
             pair = Pair(si, wo, rotation, lit)
-            value = bsdf.lobe(ctx, si, pair, self.boundary, lit)
+            power = _changed(bsdf, si, pair, scale, change)
+            value = bsdf.lobe(ctx, si, pair, self.boundary, lit, power)
             if self.thin:
-                value += self._returned(bsdf, si, pair, scale)
+                value += self._returned(bsdf, si, pair, scale, change)
             density = bsdf.power.density(pair, scale, si)
             return value, with_even_share(density)
         if self.thin:
             outer = Turned(si, wo, rotation, lit, mi.Float(1.0))
             pair = CoatedPair(outer, n)
-            value = bsdf.lobe(ctx, si, pair, self.below, lit)
-            value += bsdf.face(ctx, si, outer, self.mirror, lit)
+            power = _changed(bsdf, si, pair, scale, change)
+            value = bsdf.lobe(ctx, si, pair, self.below, lit, power)
+            face = bsdf.face(ctx, si, outer, self.mirror, lit)
+            value += face if change is None else mi.Spectrum(change) * face
             density = bsdf.power.density(outer, scale * n, si)
             return value, with_even_share(density)
         inner = Turned(si, wo, rotation, lit, n)
         lit &= inner.reached
-        power = bsdf.power.power(inner.place, scale, si)
+        power = _changed(bsdf, si, inner.place, scale, change)
         value = bsdf.lobe(ctx, si, inner, self.below, lit, power) * dr.square(n)
         density = bsdf.power.density(inner, scale * n, si) * dr.square(n)
         return value, with_even_share(density)
 
-    def _returned(self, bsdf: BSDF, si: Interaction, pair: Pair, scale: Float) -> Spectrum:
+    def _returned(
+        self, bsdf: BSDF, si: Interaction, pair: Pair, scale: Float, change: Colour | None
+    ) -> Spectrum:
         """f·cosθo of what the flat side of a sheet sends back through the structure."""
         n = self.material.eta
         ends, kept = [], []
@@ -208,14 +206,21 @@ class Through:
             # T² R/(1 − R²) of each polarisation
             kept.append(0.5 * sum(t * (1.0 - t) * dr.rcp(2.0 - t) for t in passed))
         place = Place(pair.uv, dr.sqrt(dr.fma(ends[0], ends[0], dr.square(ends[1]))))
-        power = bsdf.power.power(place, scale, si)
+        power = _changed(bsdf, si, place, scale, change)
         factor = bsdf.area_factor * dr.safe_sqrt(kept[0] * kept[1]) * pair.cos_o
         return mi.depolarizer(power * factor)
 
-    def _passed(self, bsdf: BSDF, ctx: Context, si: Interaction, crossing: Crossing) -> Spectrum:
+    def _passed(
+        self,
+        bsdf: BSDF,
+        ctx: Context,
+        si: Interaction,
+        crossing: Crossing,
+        change: Colour | None,
+    ) -> Spectrum:
         """BSDF of light that goes through, as the mode of transport has it."""
         place, scale = crossing.place, bsdf.scale_at(si, crossing.active)
-        power = bsdf.power.power(place, scale, si)
+        power = _changed(bsdf, si, place, scale, change)
         factor = self._factor(ctx, si, crossing, self._matrices(bsdf, si, crossing, scale))
         outside = bsdf.area_factor * crossing.n * dr.rcp(dr.square(place.w) * crossing.q0)
         outside *= dr.rcp(-crossing.inside.z)
@@ -282,6 +287,17 @@ class Through:
         if self.thin:
             flat = 2.0 * flat * dr.rcp(1.0 + flat)
         return dr.clip(flat, _LEAST_SHARE, 1.0 - _LEAST_SHARE)
+
+
+def _changed(
+    bsdf: BSDF, si: Interaction, place: Pair | Place, scale: Float, change: Colour | None
+) -> Colour:
+    """⟨|P|²⟩ as `PowerModel.power` has it, with order 0 multiplied by `change`."""
+    power = bsdf.power.power(place, scale, si)
+    if change is None:
+        return power
+    # of speckle, which may be dark, the ensemble's order 0 is not all there
+    return power + (change - 1.0) * dr.minimum(bsdf.power.zeroth(place, scale, si), power)
 
 
 def _asked(ctx: Context) -> tuple[bool, bool]:

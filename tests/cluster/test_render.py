@@ -19,7 +19,7 @@ import pytest
 distributed = pytest.importorskip("distributed")
 
 from mitsuba_diffraction import DiffractionError, cluster  # noqa: E402
-from mitsuba_diffraction.cluster import film as film_module  # noqa: E402
+from mitsuba_diffraction.cluster import frames as frames_module  # noqa: E402
 from mitsuba_diffraction.cluster import workers as workers_module  # noqa: E402
 from mitsuba_diffraction.cluster.frames import Film, Wanted  # noqa: E402
 from mitsuba_diffraction.cluster.kept import Kept  # noqa: E402
@@ -183,7 +183,7 @@ def test_files_that_a_worker_lacks_come_by_content(client, scene, expected, monk
     def without_files(task, contents=None):
         return run_task(task) if contents else Lacking((task.files.files[0][1],))
 
-    monkeypatch.setattr(film_module, "run_task", without_files)
+    monkeypatch.setattr(frames_module, "run_task", without_files)
     np.testing.assert_array_equal(np.array(rendered(client, scene).bitmap), expected)
 
 

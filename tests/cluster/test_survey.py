@@ -17,18 +17,12 @@ OPTIONS = (
     "--treatments", "treatments.toml", "--threads", 1, "-o", "out",
 )  # fmt: skip
 TREATMENTS = """
-["elaphe-65um.png"]
-pixel_size = 0.0488
-max_height = 0.375
-crop = 8
 ["elaphe-small*.png"]
 pixel_size = 0.0488
 max_height = 0.375
 ["*.bmp"]
 pixel_size = 0.025
 max_height = 0.25
-["*.di"]
-crop = 8
 ["*.npy"]
 pixel_size = 0.05
 """
@@ -44,7 +38,8 @@ def scans(tmp_path, monkeypatch):
         np.save(f"{name}.npy", field.heights)
     whole = (tmp_path / "disc.npy").read_bytes()
     (tmp_path / "damaged.npy").write_bytes(whole[: len(whole) // 2])
-    measured = [path for path in AFM.glob("*") if path.suffix != ".md"]
+    # the larger ones take a minute; tests/heights and tests/thesis read them
+    measured = AFM.glob("*100px.*")
     return [*sorted(measured), *(tmp_path / f"{name}.npy" for name in (*made, "damaged"))]
 
 
@@ -69,5 +64,3 @@ def test_a_survey_on_two_workers_and_what_is_new_in_the_next(client, scans, run,
     assert [name for name, row in rows.items() if row["reason"]] == ["damaged.npy"]
     if AFM.is_dir():
         assert float(rows["blazed-one-period-100px.bmp"]["period_1_um"]) == pytest.approx(2.5)
-        assert float(rows["elaphe-65um.png"]["period_1_um"]) == pytest.approx(1.1, abs=0.15)
-        assert abs(float(rows["elaphe-65um.png"]["direction_1_deg"])) < 3.0

@@ -26,8 +26,8 @@ FINE_TAYLOR = [("chebyshev", 1e-3), ("taylor", 1e-4)]
 #: Name: (coherence width in µm, pairs of directions, what to ask for).
 SURFACES = {
     # the defaults; finer tables of all its pixels take ten seconds: a quarter does for those
-    "elaphe": (65.0, 100, [("svd", 1e-3)]),
-    "elaphe, a quarter": (32.5, 100, FINE_CHEBYSHEV),
+    "elaphe": (65.0, 40, [("svd", 1e-3)]),
+    "elaphe, a quarter": (32.5, 60, FINE_CHEBYSHEV),
     "blazed along x": (20.0, 200, FINE_CHEBYSHEV),
     "blazed along y": (20.0, 200, FINE_TAYLOR),
     "oblong": (6.0, 200, [*FINE_CHEBYSHEV, *FINE_TAYLOR]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import mitsuba as mi
@@ -50,6 +51,21 @@ def test_films_that_are_none_leave_the_surface_bare(some_variant, material, mode
         filmed = evaluated(load(model=model, **material, **film), wi, wo, lam)
         # of sums that cancel, in single precision
         assert filmed == pytest.approx(bare, rel=5e-5, abs=2e-6 * bare.max())
+
+
+@pytest.mark.parametrize(
+    ("depth", "thickness", "warned"),
+    [(0.08, 700.0, True), (0.05, 700.0, False), (0.08, 400.0, False)],
+)
+def test_where_first_order_does_not_follow_the_fringes_it_says_so(
+    some_variant, depth, thickness, warned
+):
+    grating = md.gratings.sinusoidal(2.5, depth, periods=4, pixels_per_period=28)
+    lacquer = METAL | {"film_ior": 1.5, "film_thickness": thickness}
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        load(grating, **lacquer)
+    assert any("film_thickness=700 nm on a metal" in str(one.message) for one in heard) == warned
 
 
 def test_reciprocity(some_variant):

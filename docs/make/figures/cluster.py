@@ -60,7 +60,7 @@ def simulate(workers: int, tasks: int, costs: Costs, ahead: int = 3, seed: int =
     """Seconds until the last sum is added up.
 
     Scheduler and client do one thing at a time, a worker one task. The client gives out a task for
-    each that it has taken in, `ahead` for every worker at first, as `cluster.film` does.
+    each that it has taken in, `ahead` for every worker at first, as `cluster.frames` does.
     """
     rng = np.random.default_rng(seed)
     scheduler = client = 0.0

@@ -81,9 +81,9 @@ PICTURES = (
     ),
     _scene(
         "snake_two", "A snake with two patches",
-        "The corn snake's relief on the back, the sunbeam snake's on flanks and belly "
-        "(`diffraction_mix`).",
-        "-D skin=skin_two.xml -D resx=480 -D resy=300 -s 32", "snake",
+        "The sunbeam snake's relief, and rings of a wider one, whose colours stay close to the "
+        "window's mirror image (`diffraction_mix`).",
+        "-D skin=skin_two.xml -D resx=480 -D resy=300 -s 64", "xenopeltis",
     ),
     Picture(
         "gallery", "turning", "The snake turns",

@@ -2,9 +2,9 @@
 
 Contents
 --------
-images   PNG, BMP, TIFF and EXR
-arrays   NPY
-text     grids of numbers
-afm      instrument files (extra `afm`)
-raw      what a reader takes out of a file
+images       PNG, BMP, TIFF and EXR
+arrays       NPY
+text         grids of numbers
+instruments  their files (extra `afm`)
+raw          what a reader takes out of a file
 """

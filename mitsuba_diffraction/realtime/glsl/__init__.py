@@ -13,6 +13,7 @@ lights       directions, points, spots, a smooth sky
 emitters     all emitters as a sequence of lights
 shadows      shadow maps
 surroundings  what comes from a direction: environments, flat lights, what stands in the way
+obstacles    how far it is to the nearest surface, on a grid
 lobes        directions that a surface sends light to
 stage        what progressive light needs of a scene from wherever it is seen
 progressive  frames with one light each, or what lobes meet, accumulated

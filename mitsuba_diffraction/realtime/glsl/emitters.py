@@ -199,14 +199,14 @@ class _Drawn:
     def _around(self, start: int) -> tuple[Array, Array, Array, Array]:
         """Irradiances, directions, densities and wavelengths of a block of an environment.
 
-        Half of them lead to a sun, if there is one: it brings most of the light, but the sky, which
-        brings all of it in the sun's shadow, needs more directions.
+        Three in four lead to a sun, if there is one: it brings more than that of the light, but the
+        sky, which brings all of it in the sun's shadow, needs more directions.
         """
         assert self._environment is not None
         sun, places, waves = self._of_sun(start)
         count = _BLOCK - len(sun)
         towards, densities = self._environment.drawn(start, count)
-        found, waves = spectra_along(self._emitter, towards)
+        found, waves = spectra_along(self._emitter, self._environment.beside_sun(towards))
         found = found * (_BLOCK / count / np.maximum(densities, 1e-12))[:, None, None]
         # the first few of a block lie all along it
         order = np.argsort(np.argsort(np.arange(_BLOCK) * _GOLDEN % 1.0))
@@ -214,14 +214,13 @@ class _Drawn:
         return values[order], places[order], np.where(order < count, -1.0, 0.0), waves
 
     def _of_sun(self, start: int) -> tuple[Array, Array, Array]:
-        """Irradiances and directions (n, 3) of half a block, none without a sun; wavelengths."""
+        """Irradiances and directions (n, 3) of a block's part, none without a sun; wavelengths."""
         assert self._environment is not None
         asked = 4 * _BLOCK if self._environment.sun.any() else 1
         values, places, _, waves = sampled_directions(self._emitter, self._middle, asked, 4 * start)
         inside = np.flatnonzero(self._environment.in_sun(places) & values.any(axis=(1, 2)))
-        kept = inside[
-            np.linspace(0, len(inside) - 1, _BLOCK // 2 if len(inside) else 0).astype(int)
-        ]
+        count = 3 * _BLOCK // 4 if len(inside) else 0
+        kept = inside[np.linspace(0, len(inside) - 1, count).astype(int)]
         total = values[inside].sum(axis=(0, 1, 2)) / asked
         share = _BLOCK * total / max(float(values[kept].sum()), 1e-30)
         return values[kept] * share, places[kept], waves

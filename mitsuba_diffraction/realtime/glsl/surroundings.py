@@ -26,8 +26,8 @@ from .textures import Packed, Texture, Uniform, as_half
 
 Array = NDArray[np.float64]
 
-_SKY = (128, 256)  # rows and columns of an environment that is no picture
-_LARGEST = (512, 1024)  # of one that is
+_SKY = (128, 256)  # rows and columns of an environment that is no picture, and the fewest of one
+_LARGEST = (512, 1024)  # the most
 _SUN_RADIUS = np.radians(0.2679)  # as Mitsuba has it
 _AROUND_SUN = np.radians(0.6)  # within this, a sky's sun is left to the lights
 _FLATS = 12
@@ -70,16 +70,14 @@ class Environment:
         rows, columns = _SKY
         if "data" in parameters:
             shape = parameters["data"].shape
-            rows, columns = (min(int(n), m) for n, m in zip(shape[:2], _LARGEST, strict=True))
+            rows, columns = np.clip(shape[:2], _SKY, _LARGEST).tolist()
         theta = np.pi * (np.arange(rows)[:, None] + 0.5) / rows
         phi = 2.0 * np.pi * (np.arange(columns) + 0.5) / columns
         directions = _directions(theta, phi)
         sun, radiance = np.zeros(3), np.zeros(3)
         if "sun_direction" in parameters:
             sun = np.array(parameters["sun_direction"], float).ravel()
-            # the sky right there is that beside it
-            aside = sun + np.tan(1.5 * _AROUND_SUN) * frame_along(sun)[0]
-            directions[directions @ sun > np.cos(_AROUND_SUN)] = aside / np.linalg.norm(aside)
+            directions = _beside(sun, directions)
             radiance = radiance_along(emitter, _disc(sun, _SUN_RADIUS)).mean(axis=0)
         with np.errstate(invalid="ignore"):
             picture = radiance_along(emitter, directions.reshape(-1, 3))
@@ -124,6 +122,10 @@ class Environment:
         cosine = edges[row[kept]] + down * np.diff(edges)[row[kept]]
         phi = 2.0 * np.pi * (column[kept] + across) / columns
         return _directions(np.arccos(cosine), phi), chances / self.areas[row[kept], 0]
+
+    def beside_sun(self, directions: Array) -> Array:
+        """Unit vectors (n, 3), those that lead to the sun turned aside: to the sky's own light."""
+        return _beside(self.sun, directions)
 
     def packed(self, share: float) -> Packed:
         """For shaders/surroundings.glsl.
@@ -189,6 +191,15 @@ def _directions(theta: Any, phi: Any) -> Array:
     """Unit vectors (..., 3) by angles from the z axis and around it."""
     x, y = np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi)
     return np.stack(np.broadcast_arrays(x, y, np.cos(theta)), axis=-1)
+
+
+def _beside(sun: Array, directions: Array) -> Array:
+    """Directions (..., 3), those that lead to a sun, if there is one, turned aside."""
+    if not sun.any():
+        return directions
+    aside = sun + np.tan(1.5 * _AROUND_SUN) * frame_along(sun)[0]
+    inside = directions @ sun > np.cos(_AROUND_SUN)
+    return np.where(inside[..., None], aside / np.linalg.norm(aside), directions)
 
 
 def _disc(axis: Array, radius: float) -> Array:

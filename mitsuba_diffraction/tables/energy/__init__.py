@@ -9,5 +9,6 @@ grating        orders on one line, and a grid with its nodes where they come up
 chains         the scale of a grating, solved exactly between few directions
 grid           the grid of directions
 powers         powers of the orders as series in κ
-sides          R + T of a dielectric, which both models make too large
+links          what becomes of one order's light between the sides of a dielectric
+sides          R + T of a dielectric, and the scale of directions that makes it 1
 """

@@ -223,12 +223,16 @@ def _orders(table: DiffractionTable, height_scale: float) -> Orders:
 
 def _scaled(transport: Transport, aim: Array) -> Array:
     """s of one wavelength, at the grid's directions alone."""
+    return np.ones_like(aim) if aim.max() < TARGET else scaled(transport, aim, FINE.theta[:, None])
+
+
+def scaled(
+    transport: Callable[[Array], Array], aim: Array, theta: Real, sweeps: int = SWEEPS
+) -> Array:
+    """s on a grid, whose sums s Ms are `aim`; theta : polar angles, rad, that broadcast to it."""
     s = np.ones_like(aim)
-    if aim.max() < TARGET:
-        return s
-    degrees = np.degrees(FINE.theta[:, None])
-    largest = np.interp(degrees, (70.0, 80.0), (LARGEST, 1.0)).astype(np.float32)
-    for _ in range(SWEEPS):
+    largest = np.interp(np.degrees(theta), (70.0, 80.0), (LARGEST, 1.0)).astype(np.float32)
+    for _ in range(sweeps):
         s = s * np.sqrt(aim / np.maximum(s * transport(s), 1e-6))
         s = np.minimum(s, largest)
     return s
@@ -260,7 +264,7 @@ class _Maps:
         def one(gain: Gain) -> Transport:
             return self.orders.of_gain(theta, phi, gain, grid, faded)
 
-        return _parallel(one, self.gains(wavelengths))
+        return parallel(one, self.gains(wavelengths))
 
     def gains(self, wavelengths: Real) -> list[Gain]:
         """G at several wavelengths (nm), each made once."""
@@ -279,8 +283,8 @@ class _Maps:
             [Chains(self.orders, grating, gain) for gain in self.gains(at)]
             for at in (wavelengths, middle if len(middle) else wavelengths)
         )
-        s = np.stack(_parallel(lambda one: one.scale(units, TARGET, LARGEST), pages))
-        sums = _parallel(lambda one: one.sums(units), between)
+        s = np.stack(parallel(lambda one: one.scale(units, TARGET, LARGEST), pages))
+        sums = parallel(lambda one: one.sums(units), between)
         for turn in range(TURNS + 1):
             means = 0.5 * (s + np.append(s[1:], s[-1:], axis=0))
             much = np.stack(
@@ -321,7 +325,8 @@ def _of_both_pages(much: Array, pages: int) -> Array:
     return np.concatenate([much[:1], np.maximum(much[1:], much[:-1]), much[-1:]])
 
 
-def _parallel(one: Callable[[Any], Any], arguments: list[Any]) -> list[Any]:
+def parallel(one: Callable[[Any], Any], arguments: list[Any]) -> list[Any]:
+    """Results for all arguments, by as many threads as there are processors."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return list(pool.map(one, arguments))
 

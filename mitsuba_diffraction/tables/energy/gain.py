@@ -120,14 +120,21 @@ def _spline(theta: Real) -> Real:
 
 def read(table: Real, cos_o: Real, turn: Real) -> Real:
     """One θi's table at (cosθo, φo − φi), bilinear."""
-    row = np.arccos(np.minimum(cos_o, 1.0)) * ((POLAR_FINE - 1) / (0.5 * np.pi))
-    column = (np.cos(turn) + 1.0) * (0.5 * (AZIMUTH_FINE - 1))
-    i = np.clip(row.astype(np.int32), 0, POLAR_FINE - 2)
-    j = np.clip(column.astype(np.int32), 0, AZIMUTH_FINE - 2)
+    return bilinear(
+        table, np.arccos(np.minimum(cos_o, 1.0)) * ((POLAR_FINE - 1) / (0.5 * np.pi)), turn
+    )
+
+
+def bilinear(table: Real, row: Real, turn: Real) -> Real:
+    """A table at rows and at azimuths (rad), whose cosines its columns have evenly; broadcast."""
+    last, columns = len(table) - 2, table.shape[1]
+    column = (np.cos(turn) + 1.0) * (0.5 * (columns - 1))
+    i = np.clip(row.astype(np.int32), 0, last)
+    j = np.clip(column.astype(np.int32), 0, columns - 2)
     s, t = row - i, column - j
-    flat, index = table.ravel(), i * AZIMUTH_FINE + j
+    flat, index = table.ravel(), i * columns + j
     low = flat.take(index) * (1.0 - t) + flat.take(index + 1) * t
-    index = index + AZIMUTH_FINE
+    index = index + columns
     return np.asarray(
         low * (1.0 - s) + (flat.take(index) * (1.0 - t) + flat.take(index + 1) * t) * s
     )

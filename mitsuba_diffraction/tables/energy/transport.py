@@ -17,6 +17,8 @@ a spike of the albedo then, as narrow as the lobe. Hence three sums:
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -96,28 +98,38 @@ class Orders:
         faded: bool = False,
     ) -> Transport:
         """As `transport`."""
-        rows = self._rows(gain, theta, phi, faded)
+
+        def rows(theta: Real, phi: Real) -> list[Row]:
+            return [
+                _Reflected(self, gain.wavenumber, float(angle), phi, table, faded)
+                for angle, table in zip(theta, gain.tables(theta), strict=True)
+            ]
+
+        return self.of_rows(rows, theta, phi, grid)
+
+    def of_rows(
+        self,
+        rows_at: Callable[[Real, Real], Sequence[Row]],
+        theta: Real,
+        phi: Real,
+        grid: DirectionGrid | GratingGrid,
+    ) -> Transport:
+        """As `transport`, of the rows at polar angles and azimuths."""
+        rows = rows_at(theta, phi)
+        mirrored = np.array([row.mirrored for row in rows])[:, None]
         return Transport(
             glossy=np.array([row.glossy() for row in rows])[:, None],
-            mirror=grid.interpolation(theta[:, None], phi + math.pi),
-            weak=self._weak(theta, phi, gain, grid, faded) if self.has_weak else None,
+            mirror=grid.interpolation(mirrored, phi + math.pi),
+            weak=self._weak(rows_at, theta, phi, grid) if self.has_weak else None,
             strong=_strong_of(rows, grid) if len(self.mixture.frequency) else None,
         )
 
-    def _rows(self, gain: Gain, theta: Real, phi: Real, faded: bool) -> list[_Row]:
-        tables = gain.tables(theta)
-        return [
-            _Row(self, gain.wavenumber, float(angle), phi, table, faded)
-            for angle, table in zip(theta, tables, strict=True)
-        ]
-
     def _weak(
         self,
+        rows_at: Callable[[Real, Real], Sequence[Row]],
         theta: Real,
         phi: Real,
-        gain: Gain,
         grid: DirectionGrid | GratingGrid,
-        faded: bool,
     ) -> Weak:
         """The weak orders' part: smooth, so that a grid of half as many angles will do."""
         assert isinstance(grid, DirectionGrid)  # a grating has none
@@ -125,7 +137,7 @@ class Orders:
         x, y, cos_o = self.nodes
         turned = half.phi[:, None] + np.arctan2(y, x)
         return Weak(
-            np.stack([row.weak() for row in self._rows(gain, half.theta, half.phi, faded)]),
+            np.stack([row.weak() for row in rows_at(half.theta, half.phi)]),
             grid.interpolation(np.broadcast_to(np.arccos(cos_o), turned.shape), turned),
             half.interpolation(theta[:, None], phi),
         )
@@ -177,53 +189,64 @@ class Transport:
         return np.asarray(result, np.float32)
 
 
-def _strong_of(rows: list[_Row], grid: DirectionGrid | GratingGrid) -> Strong:
+def _strong_of(rows: Sequence[Row], grid: DirectionGrid | GratingGrid) -> Strong:
     found = [row.strong() for row in rows]
     shares, theta, phi = (np.stack(part) for part in zip(*found, strict=True))
     return Strong(shares.astype(np.float32), grid.interpolation(theta, phi))
 
 
-class _Row:
-    """The sums at one polar angle of incidence and all azimuths."""
+class Row(ABC):
+    """The sums at one polar angle of incidence and all azimuths.
 
-    def __init__(
-        self, orders: Orders, k: float, theta: float, phi: Real, table: Real, faded: bool
-    ) -> None:
-        self.mixture, self.k, self.phi = orders.mixture, k, phi
+    k : wavenumber where the light goes to, rad/µm.
+    sin : of the angle of incidence, as the light would have it there.
+    mirrored : polar angle of order 0.
+    """
+
+    def __init__(self, orders: Orders, k: float, sin: float, mirrored: float, phi: Real) -> None:
+        self.mixture, self.phi = orders.mixture, phi
+        self.k, self.sin, self.mirrored = k, sin, mirrored
         self.nodes, self.weights = orders.nodes, orders.weights
         self.sigma = orders.sigma
-        self.sin, self.cos = math.sin(theta), math.cos(theta)
-        self._table, self._faded = table, faded
+
+    @abstractmethod
+    def kappa(self, cos_o: Real) -> Real:
+        """κ of light that leaves at cosθo, rad/µm."""
+
+    @abstractmethod
+    def gain(self, cos_o: Real, turn: Real) -> Real:
+        """G at cosθo and φo − φi."""
 
     def glossy(self) -> float:
         """Order 0: its power times the mean of G over the visible part of its lobe."""
-        k, sin_i, cos_i = self.k, self.sin, self.cos
+        k, sin_i = self.k, self.sin
         width = 1.0 / (self.sigma * k)  # in direction cosines
         low, high = max(sin_i - _LOBE * width, 0.0), min(sin_i + _LOBE * width, 1.0)
+        if low >= 1.0:
+            return 0.0
         # In cosθo instead of sinθo: d(sinθo)/cosθo = d(cosθo)/sinθo has no pole at the horizon
         edges = math.sqrt(1.0 - high**2), math.sqrt(1.0 - low**2)
         if low == 0.0 or edges[1] - edges[0] < 1e-12:
-            mirrored = self._gain(np.array([cos_i]), np.array([math.pi]))[0]
-            return float(self.mixture.order_0(np.array([2.0 * k * cos_i]))[0] * mirrored)
+            cosine = np.array([math.cos(self.mirrored)])
+            power = self.mixture.order_0(self.kappa(cosine))
+            return float(power[0] * self.gain(cosine, np.array([math.pi]))[0])
         nodes = (np.arange(_LOBE_NODES) + 0.5) / _LOBE_NODES
         cos_o = edges[0] + nodes * (edges[1] - edges[0])
         sin_o = np.sqrt(1.0 - cos_o**2)
         radial = np.exp(-(((sin_o - sin_i) / width) ** 2)) / (math.sqrt(math.pi) * width)
         radial *= (edges[1] - edges[0]) / _LOBE_NODES * cos_o / sin_o
         turn = math.pi - np.arcsin(np.clip(width * _HERMITE[0][:, None] / sin_o, -1.0, 1.0))
-        mean = _HERMITE[1] @ self._gain(cos_o + 0.0 * turn, turn) / math.sqrt(math.pi)
-        power = self.mixture.order_0(k * (cos_i + cos_o))
+        mean = _HERMITE[1] @ self.gain(cos_o + 0.0 * turn, turn) / math.sqrt(math.pi)
+        power = self.mixture.order_0(self.kappa(cos_o))
         return float(np.sum(radial * power * mean))
 
     def weak(self) -> Array:
         """Shares (p, n) of the quadrature's directions."""
         mixture, k = self.mixture, self.k
         x, y, cos_o = self.nodes
-        gain = self._gain(cos_o, np.arctan2(y, x))
+        gain = self.gain(cos_o, np.arctan2(y, x))
         factor = (k**2 * self.weights * cos_o * gain).astype(np.float32)
-        position = np.minimum(
-            k * (self.cos + cos_o) / mixture.kappa_step, len(mixture.density) - 1.001
-        )
+        position = np.minimum(self.kappa(cos_o) / mixture.kappa_step, len(mixture.density) - 1.001)
         lower = position.astype(np.int32)
         upper_share = (position - lower).astype(np.float32)
         layer = mixture.density[0].size
@@ -248,17 +271,29 @@ class _Row:
         y = mixture.frequency[:, 1] / k - self.sin * np.sin(self.phi)[:, None]
         radius, azimuth = np.hypot(x, y), np.arctan2(y, x)
         share, cos_o, pole = lobe_means(self.sigma, k, radius)
-        w = np.where(share > 0.0, self.cos + np.sqrt(np.maximum(1.0 - radius**2, 0.0)), 1.0)
-        power = mixture.strong_at(k * w)
+        power = mixture.strong_at(self.kappa(np.sqrt(np.maximum(1.0 - radius**2, 0.0))))
         turn = azimuth - self.phi[:, None]
-        gain = self._gain(cos_o, turn)
+        gain = self.gain(cos_o, turn)
         near = cos_o * pole > 1.001
         end = np.full(np.count_nonzero(near), LEAST_COSINE)
-        at_horizon = self._gain(end, turn[near]) * LEAST_COSINE
+        at_horizon = self.gain(end, turn[near]) * LEAST_COSINE
         gain[near] = over_lobe(gain[near], at_horizon, cos_o[near], pole[near])
         return power * gain * share, np.arccos(cos_o), azimuth
 
-    def _gain(self, cos_o: Real, turn: Real) -> Real:
+
+class _Reflected(Row):
+    """Of light that stays above the surface."""
+
+    def __init__(
+        self, orders: Orders, k: float, theta: float, phi: Real, table: Real, faded: bool
+    ) -> None:
+        super().__init__(orders, k, math.sin(theta), theta, phi)
+        self.cos, self._table, self._faded = math.cos(theta), table, faded
+
+    def kappa(self, cos_o: Real) -> Real:
+        return np.asarray(self.k * (self.cos + cos_o))
+
+    def gain(self, cos_o: Real, turn: Real) -> Real:
         """G, faded or not."""
         one_plus_dot = 1.0 + self.cos * cos_o + self.sin * np.sqrt(1.0 - cos_o**2) * np.cos(turn)
         kirchhoff = (one_plus_dot / (self.cos + cos_o)) ** 2 / (self.cos * cos_o)

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.fresnel import Filmed
-from ..energy import chains, gain, grating, transport
+from ..energy import chains, gain, grating, links, sides, transport
 from ..energy import conservation as made
 from ..energy.conservation import Conservation, DirectionalTable, Index, conservation
 from ..energy.grating import Grating
 from ..energy.grid import LAST_ANGLE
+from ..energy.links import Medium
 from ..sampling.order_mixture import MOST_STRONG, STRONG
 from ..table import DiffractionTable
 from .store import Record, kept, key_of
@@ -41,24 +42,30 @@ _SETTINGS = (
     transport.LEAST_WEAK, STRONG, MOST_STRONG, LAST_ANGLE,
 )  # fmt: skip
 
+_SIDES = (
+    *_SETTINGS, str(sides.GRID), sides.WAVELENGTHS, sides.SWEEPS, sides.LEAST, sides.MOST,
+    sides.TOLERATED, sides.ENOUGH, sides.STRONGEST, sides.FAINT, sides.CERTAIN, sides.FALL,
+    sides.BETWEEN, sides.MARGIN, links.POLAR, links.AZIMUTHS, links.FARTHEST,
+)  # fmt: skip
+
 _known: weakref.WeakKeyDictionary[DiffractionTable, dict[str, Conservation]] = (
+    weakref.WeakKeyDictionary()
+)
+_known_sides: weakref.WeakKeyDictionary[DiffractionTable, dict[str, list[DirectionalTable]]] = (
     weakref.WeakKeyDictionary()
 )
 
 
 @dataclass(frozen=True)
-class Energy:
-    """Of a table, a model and a material; what it holds at height scales is made when asked for.
+class _HeightScales:
+    """Height scales of a table for which something is made when asked for.
 
     Attributes
     ----------
-    table, model, index, wavelength_range : as in `tables.energy.conservation`.
+    table : the table.
     """
 
     table: DiffractionTable
-    model: str
-    index: Index
-    wavelength_range: tuple[float, float]
 
     def nodes(self, height_scale: float, *, interval: bool = False) -> tuple[float, float]:
         """The two height scales around one, for which something is made; equal at a node.
@@ -94,6 +101,20 @@ class Energy:
         last = min(math.ceil(high * steps) / steps, most)
         return np.linspace(first, last, 1 + max(1, math.ceil((last - first) * steps))).tolist()
 
+
+@dataclass(frozen=True)
+class Energy(_HeightScales):
+    """Of a table, a model and a material.
+
+    Attributes
+    ----------
+    model, index, wavelength_range : as in `tables.energy.conservation`.
+    """
+
+    model: str
+    index: Index
+    wavelength_range: tuple[float, float]
+
     def at(self, height_scale: float) -> Conservation:
         """From memory, from disk, or computed."""
         probes = np.geomspace(*self.wavelength_range, _PROBES)
@@ -112,6 +133,29 @@ class Energy:
         )
 
 
+@dataclass(frozen=True)
+class SidesEnergy(_HeightScales):
+    """Of a table and a dielectric that lets light through."""
+
+    medium: Medium
+    wavelength_range: tuple[float, float]
+
+    def at(self, height_scale: float) -> list[DirectionalTable]:
+        """`Sides.scale` from memory, from disk, or computed; empty where it is None."""
+        given = [str(self.medium), list(self.wavelength_range)]
+        return kept(
+            "sides",
+            key_of(_SIDES, self.table.digest(), height_scale, given),
+            _known_sides.setdefault(self.table, {}),
+            lambda: (
+                sides.Sides(self.table, height_scale, self.medium).scale(self.wavelength_range)
+                or []
+            ),
+            _packed,
+            _tables,
+        )
+
+
 def _rounded(index: NDArray[np.complex128] | Filmed) -> list[str]:
     """Single precision's noise makes no other material."""
     if isinstance(index, Filmed):
@@ -120,7 +164,15 @@ def _rounded(index: NDArray[np.complex128] | Filmed) -> list[str]:
 
 
 def _record(found: Conservation) -> Record:
-    tables = [found.albedo] if found.scale is None else [found.albedo, found.scale]
+    return _packed([found.albedo] if found.scale is None else [found.albedo, found.scale])
+
+
+def _conservation(record: Record) -> Conservation:
+    tables = _tables(record)
+    return Conservation(tables[0], tables[1] if len(tables) > 1 else None)
+
+
+def _packed(tables: list[DirectionalTable]) -> Record:
     document = [
         [table.wavelengths.tolist(), table.grating and [table.grating.axis, table.grating.spacing]]
         for table in tables
@@ -128,11 +180,11 @@ def _record(found: Conservation) -> Record:
     return Record(document, [table.values for table in tables])
 
 
-def _conservation(record: Record) -> Conservation:
+def _tables(record: Record) -> list[DirectionalTable]:
     tables = []
     for (wavelengths, line), values in zip(record.document, record.arrays, strict=True):
         if values.ndim != 3 or len(values) != len(wavelengths) or not np.isfinite(values).all():
             raise ValueError(f"values of shape {values.shape}")
         grating = Grating((line[0][0], line[0][1]), line[1]) if line else None
         tables.append(DirectionalTable(np.array(wavelengths, float), values, grating))
-    return Conservation(tables[0], tables[1] if len(tables) > 1 else None)
+    return tables

@@ -14,9 +14,11 @@ from tests.directions import polar
 @pytest.mark.parametrize("grating", passed.GRATINGS[:4], ids=str)
 def test_gratings_of_slope_up_to_a_tenth(grating):
     for azimuth in passed.AZIMUTHS:
-        assert passed.deviation(grating, 0.0, azimuth, "small_slope") < 0.002
-        for theta in passed.ANGLES[1:]:
-            assert passed.deviation(grating, theta, azimuth, "small_slope") < 0.03, (theta, azimuth)
+        # with energy conserved a direction is left between 0.99 and 0.999 of its light
+        for model, level in (("small_slope", 0.002), (passed.MODELS[-1], 0.01)):
+            assert passed.deviation(grating, 0.0, azimuth, model) < level
+            for theta in passed.ANGLES[1:]:
+                assert passed.deviation(grating, theta, azimuth, model) < 0.03, (theta, azimuth)
 
 
 def test_on_a_surface_without_symmetry_orders_are_on_their_own_side():
