@@ -155,6 +155,17 @@ def test_dragging_draws_less_and_rest_draws_all(opened: Tab) -> None:
     assert shares[2] < shares[3] < shares[4] < shares[5]
 
 
+def test_triangles_get_fewer_for_good_where_pictures_are_slow(opened: Tab) -> None:
+    details = opened.page.evaluate(
+        """() => [[5], [400, 5], [36]].map((times) => {
+            Object.assign(viewer, { share: 0.5, detail: 1, finest: 0 });
+            for (const ms of times) for (let n = 0; n < 20; ++n) viewer.adapt(ms);
+            return viewer.detail;
+        })"""
+    )
+    assert details == [0, 2, 1]
+
+
 def test_the_shadows_of_a_light_that_stands_still_are_drawn_once(opened: Tab) -> None:
     maps, moved = opened.page.evaluate(
         """async () => {

@@ -192,13 +192,13 @@ class Controls {
     element("save").addEventListener("click", () => this.save());
     element("fold").addEventListener("click", () => document.body.classList.toggle("folded"));
     if (matchMedia("(max-width: 560px)").matches) document.body.classList.add("folded");
-    if (matchMedia("(pointer: coarse)").matches) element("hint").textContent = "One finger: orbit · two: pan and zoom · +: light and colours";
+    if (matchMedia("(pointer: coarse)").matches) element("hint").textContent = "One finger turns · two pan and zoom · +: light";
     const losses = Object.entries(header.loss).map(
       ([method, [mean, most]]) => `${method}: ΔE2000 ${mean.toFixed(2)}, 99 % below ${most.toFixed(2)}`);
     const lines = [`Rounded tables: ${losses.join("; ")}.`];
     if (header.omissions.length) lines.push(`Not shown: ${header.omissions.join("; ")}.`);
     for (const [method, reason] of Object.entries(header.left_out)) lines.push(`Without ${method}: ${reason}.`);
-    lines.push("No light between surfaces; while something moves, few lights stand for all.");
+    lines.push("No light between surfaces; while something moves, few lights stand for all. Lights in the scene's place, a lamp that was moved and one wavelength are sets of points, which lobes do not look up.");
     element("about").textContent = lines.join(" ");
   }
 

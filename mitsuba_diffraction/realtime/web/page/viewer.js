@@ -2,7 +2,7 @@
 // pixels, and after that one light after another, or sample after sample, until it is smooth.
 
 const BUSY = 100;   // ms that a step may take before the page answers again
-const STEPS = 8;    // at most, of one sample: each draws all triangles anew
+const STEPS = 16;   // at most, of one sample: each draws all triangles anew
 const FLUENT = 35;  // ms that a picture should take while something moves
 const SMALLEST = 0.1; // share of either side
 const POOR = 0.3;   // below this, rather fewer triangles
