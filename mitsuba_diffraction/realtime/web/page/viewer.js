@@ -122,6 +122,8 @@ class Viewer {
     const view = this.viewed([spread(this.count, 0.7548776662) / width, spread(this.count, 0.569840291) / height]);
     const colour = this.colour();
     Object.assign(view.uniforms, { sky: colour ? monochrome(sky, colour) : sky, ...lightUniforms(chosen, colour), ...shadow });
+    const sun = around && lights.own.find(({ name }) => name.startsWith("sun of "));
+    if (sun) view.uniforms.sun = [...unit(sun.place), this.header.around.parts.uniforms.sun[3]]; // it may have been moved
     if (lookup) view.uniforms.sequence = drawnNumbers(this.count);
     else view.uniforms.light_density = chosen[0]?.density ?? 0;
     const lit = this.lit[lookup ? "lookup" : one ? "one" : moving ? "glance" : "few"], bright = lookup || !(one && looksUp);
