@@ -93,7 +93,7 @@ energy: setup  ## measure what energy conservation takes: docs/energy.md
 	@$(PYTHON3) -m docs.make.figures.energy $(SURFACES:%=out/energy/%.json)
 
 # scene, width, height, samples of the path tracer, frames, samples a frame along either side of a pixel
-REALTIME := scales:36:24:20480:384:4 snake:40:25:16384:448:4 xenopeltis:32:20:24576:448:4 \
+REALTIME := scales:36:24:16200:2048:2 snake:40:25:16384:448:4 xenopeltis:32:20:24576:448:4 \
     cd:36:26:49152:448:4 material_ball:30:27:24576:384:4
 realtime: setup  ## compare the shaders with the path tracer: docs/realtime.md
 	@for scene in $(REALTIME); do \
