@@ -25,13 +25,14 @@ rgb_power       the same in the RGB variants' colours
 rgb_lookup      a colour table inside a kernel
 places          where on the patch the window sits at a point of the surface
 energy          the bound of the albedo that conserves energy
+direction_lookup  a function of direction inside a kernel, as that bound is
 reflectance     of the surface itself: dielectric, conductor, mirror
 boundary        what the material makes of the light, with its polarisation
 fresnel         fields at an interface, or at both of a film
 coat            a clear coat over the structure
 film            a thin film that follows the heights
 through         both sides of a dielectric or of a thin sheet
-sides           what makes both of them add up to 1
+sides           what makes both sides add up to 1
 crossing        pairs of directions that are not both above
 layers          how much light reaches what lies beneath
 height_scale    how heights vary over the surface

@@ -8,7 +8,7 @@ import mitsuba as mi
 from ..tables.energy.links import Medium
 from ..tables.store.energy import SidesEnergy
 from ..tables.table import DiffractionTable
-from .energy import Lookup, scales_of
+from .direction_lookup import DirectionLookup, scales_of
 from .film import plain
 from .pair import in_patch
 from .reflectance import Dielectric
@@ -40,7 +40,7 @@ class SidesModel:
         own = wavelength, wavelength
         self._range = own if mi.is_monochromatic else table.wavelength_range
         # c above and below, s likewise
-        self._scales = [Lookup() for _ in range(4)]
+        self._scales = [DirectionLookup() for _ in range(4)]
         self._index = mi.Float(1.0)
 
     def update(self, height_scale: float, differentiable: bool, lowest: float | None) -> None:
@@ -77,7 +77,7 @@ class SidesModel:
         """
         ends = [(in_patch(one, rotation), mi.Frame3f.cos_theta(one)) for one in directions]
 
-        def product(above: Lookup, below: Lookup) -> Colour:
+        def product(above: DirectionLookup, below: DirectionLookup) -> Colour:
             result = mi.UnpolarizedSpectrum(1.0)
             for tangential, cosine in ends:
                 given = wavenumbers, height_scale

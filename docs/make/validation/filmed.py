@@ -195,11 +195,11 @@ Deviation of colours, Kirchhoff's model / the default:
 {table(header, rows)}
 
 The film's kernel is that of first-order perturbation of both faces, displaced alike, and as right
-on gentle slopes as the bare surface's. Of the lacquer the second order counts in oblique light: light
-that is diffracted twice meets the film's fringes at the order in between, and they are narrower in
-angle than the orders are apart. The deviation grows as the square of the heights, and with the
-angle; by wavelength it does not follow where an evanescent order meets a guided mode of the film.
-The plugin warns of such films."""
+on gentle slopes as the bare surface's. Of the lacquer the second order counts in oblique light:
+light that is diffracted twice meets the film's fringes at the order in between, and they are
+narrower in angle than the orders are apart. The deviation grows as the square of the heights, and
+with the angle; by wavelength it does not follow where an evanescent order meets a guided mode of
+the film. The plugin warns of such films."""
 
 
 def _cases() -> Iterator[tuple[Grating, float, float]]:
