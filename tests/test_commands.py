@@ -64,6 +64,8 @@ def commands(page: str) -> list[list[str]]:
     """Words of a page's commands that are run here: those of blocks, then those of sentences."""
     lines = [words for text in blocks(page, "sh") for words in typed(text)]
     lines += [words for span in spans(page) for words in typed(span) if len(words) > 2]
+    # FILE and TABLE stand for what the reader has
+    lines = [words for words in lines if not any(w.isalpha() and w.isupper() for w in words)]
     return [
         words
         for words in lines

@@ -25,6 +25,7 @@ rgb_power       the same in the RGB variants' colours
 rgb_lookup      a colour table inside a kernel
 places          where on the patch the window sits at a point of the surface
 energy          the bound of the albedo that conserves energy
+direction_lookup  tabulated functions of direction inside a kernel
 reflectance     of the surface itself: dielectric, conductor, mirror
 boundary        what the material makes of the light, with its polarisation
 fresnel         fields at an interface, or at both of a film

@@ -17,7 +17,10 @@ def compared(tmp_path):
         "flip": 0.0213, "relative_rmse": None,
     }  # fmt: skip
     noise = {"delta_e_mean": 0.28, "delta_e_99": 1.5}
-    whole = {"direct": found, "full": None, "noise": noise, "frame_ms": 250.0}
+    whole = {
+        "direct": found, "full": None, "noise": noise, "frame_ms": 250.0,
+        "plain_frame_ms": 125.0, "samples": 2048,
+    }  # fmt: skip
     entry = {
         "whole": whole, "diffracting": found, "both": {**found, "pixels": 900}, "frame_ms": 1234.5,
         "fragment_ns": 35.2, "look_up_ns": 12.3, "texture_bytes": 2.1e7,
@@ -25,6 +28,7 @@ def compared(tmp_path):
     document = {
         "scene": "scenes/plate.xml", "size": [64, 40], "driver": "abacus",
         "noise_delta_e_mean": 0.29, "whole_noise": noise, "frames": 512,
+        "spp": 4096, "clipped": 0.0104,
         "methods": {
             "lut": entry,
             "spectral": {**entry, "whole": {**whole, "direct": {**found, "delta_e_mean": 0.321}}},
@@ -55,6 +59,8 @@ def test_table_and_sheet_are_replaced(compared, page):
         in text
     )
     assert "All 64 × 40 pixels" in text
+    assert "512 frames of 4 samples a pixel, against 4096" in text
+    assert "1.0 % of the pixels are clipped" in text
     assert "25 % of the pixels" in text
     assert "stale" not in text
     with Image.open(page.parent / realtime.SHEET) as image:
