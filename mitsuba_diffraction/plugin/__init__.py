@@ -32,7 +32,6 @@ fresnel         fields at an interface, or at both of a film
 coat            a clear coat over the structure
 film            a thin film that follows the heights
 through         both sides of a dielectric or of a thin sheet
-direction_lookup  functions of direction, which energy and sides read
 sides           what makes both sides add up to 1
 crossing        pairs of directions that are not both above
 layers          how much light reaches what lies beneath
