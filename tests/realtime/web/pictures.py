@@ -1,4 +1,4 @@
-"""What a page draws, as numbers."""
+"""What a page and the desktop draw, as numbers."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import base64
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
+
+from mitsuba_diffraction import DiffractionError
 
 _READ = """async ([shadows, samples]) => {
     viewer.most = samples;  // the first one through the middles of pixels, as the desktop's
@@ -24,3 +27,20 @@ def picture(tab: Any, *, shadows: bool = False, samples: int = 1) -> NDArray[np.
     """Linear sRGB and coverage (height, width, 4), from the top row down."""
     text, width, height = tab.page.evaluate(_READ, [shadows, samples])
     return np.frombuffer(base64.b64decode(text), np.float32).reshape(height, width, 4)[::-1]
+
+
+def of_the_desktop(scene: Any, frames: int) -> NDArray[np.float32]:
+    """What `Renderer` draws of all direct light; skips the test where shaders do not run."""
+    pytest.importorskip("moderngl")
+    from mitsuba_diffraction.realtime.glsl import Renderer
+
+    try:
+        renderer = Renderer(scene)
+    except DiffractionError as error:
+        pytest.skip(str(error))
+    light = renderer.progressive("lut")
+    light.advance(frames)
+    found: NDArray[np.float32] = light.image
+    light.release()
+    renderer.release()
+    return found

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
 from tests.realtime.web.conftest import Tab
-from tests.realtime.web.pictures import picture
+from tests.realtime.web.pictures import of_the_desktop, picture
 
 SIZE = (240, 180)
 PHONE = (390, 844)
@@ -38,18 +37,7 @@ def opened(one: Tab) -> Iterator[Tab]:
 
 
 def test_all_light_is_that_of_the_desktop(scene: Any, page_file: Path, tab: Any) -> None:
-    pytest.importorskip("moderngl")
-    from mitsuba_diffraction.realtime.glsl import Renderer
-
-    try:
-        renderer = Renderer(scene)
-    except DiffractionError as error:
-        pytest.skip(str(error))
-    light = renderer.progressive("lut")
-    light.advance(16)
-    expected = light.image
-    light.release()
-    renderer.release()
+    expected = of_the_desktop(scene, 16)
     opened = tab()
     assert opened.open(page_file) == "ready"
     found = picture(opened, shadows=True, samples=16)

@@ -10,10 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.realtime.web.export import make_page
 from tests.realtime.web.conftest import SIZE, Tab
-from tests.realtime.web.pictures import picture
+from tests.realtime.web.pictures import of_the_desktop, picture
 
 SAMPLES = 16
 
@@ -79,19 +78,7 @@ def opened(room: Any, browser: Any, tmp_path_factory: pytest.TempPathFactory) ->
 @pytest.fixture(scope="module")
 def expected(room: Any) -> NDArray[np.float32]:
     """The desktop's picture of all direct light."""
-    pytest.importorskip("moderngl")
-    from mitsuba_diffraction.realtime.glsl import Renderer
-
-    try:
-        renderer = Renderer(room)
-    except DiffractionError as error:
-        pytest.skip(str(error))
-    light = renderer.progressive("lut")
-    light.advance(2 * SAMPLES)
-    found = light.image
-    light.release()
-    renderer.release()
-    return found
+    return of_the_desktop(room, 2 * SAMPLES)
 
 
 def test_lobes_mirror_lamp_and_sky_as_on_the_desktop(
