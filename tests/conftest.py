@@ -75,6 +75,16 @@ def ctrl_c() -> Iterator[None]:
     signal.signal(signal.SIGINT, before)
 
 
+@pytest.fixture(scope="module")
+def coarse() -> Iterator[None]:
+    """Energy conserved coarsely, for modules that do not ask how well it is."""
+    from tests.coarse import coarse_energy
+
+    with pytest.MonkeyPatch.context() as patch:
+        coarse_energy(patch.setattr)
+        yield
+
+
 @pytest.fixture(scope="session")
 def shared_afm() -> Path:
     """Folder of measured patches kept outside the project; tests that need it skip without it."""

@@ -37,7 +37,7 @@ SMALL = {
 pytestmark = [
     # heights as coarse and steep as the stand-ins' are worth a warning
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-    pytest.mark.usefixtures("some_variant"),
+    pytest.mark.usefixtures("coarse", "some_variant"),
 ]
 
 
