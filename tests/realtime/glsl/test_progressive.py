@@ -132,7 +132,7 @@ def test_the_penumbra_of_a_disc_is_the_analytic_one(
 def test_shadows_have_neither_acne_nor_leaks(
     gl: Any, some_variant: str, table_file: Path, light: dict[str, Any]
 ) -> None:
-    """A log and a thin wall on a plate, as the path tracer has them."""
+    """A log, which is open, a thin wall and a ball on a plate, as the path tracer has them."""
     T = mi.ScalarTransform4f
     if light["type"] == "spot":
         light = {**light, "to_world": T().look_at([-3, -2, 3], [0, 0, 0], [0, 0, 1])}
@@ -151,6 +151,7 @@ def test_shadows_have_neither_acne_nor_leaks(
             "to_world": T().translate([-0.6, 0.3, 0.5]).rotate([1, 0, 0], 90).scale([0.6, 0.5, 1]),
             "bsdf": {"type": "twosided", "bsdf": diffuse()},
         },
+        ball={"type": "sphere", "center": [-1.6, -0.4, 0.35], "radius": 0.35, "bsdf": diffuse()},
     )
     renderer = Renderer(scene, context=gl)
     drawn = renderer.progressive(size=(160, 40))
@@ -168,6 +169,48 @@ def test_shadows_have_neither_acne_nor_leaks(
     # where light grazes the log's thin wall, a texel holds both of its sides; there it is dim
     assert found[dark].max() < 0.03 * expected.max()
     assert (found[dark] > 1e-3 * expected.max()).mean() < 0.05
+
+
+def test_light_outside_a_room_stays_outside(gl: Any, some_variant: str, table_file: Path) -> None:
+    """The camera and a lamp are within a ball, the sun beyond it."""
+    sun = {"type": "directional", "direction": [0.3, 0.4, -1.0], "irradiance": 50.0}
+    lamp = {"type": "point", "position": [0.5, -2.0, 2.0], "intensity": 3.0}
+    for emitter, lit in ((sun, 0.0), (lamp, 1.0)):
+        room = {"type": "sphere", "radius": 20.0, "bsdf": {"type": "twosided", "bsdf": diffuse()}}
+        renderer = Renderer(plate_scene(table_file, emitter=emitter, room=room), context=gl)
+        light = renderer.progressive(size=(40, 10))
+        light.advance(4)
+        found = light.image[..., 1].mean()
+        expected = truth(renderer, 64)[..., 1].mean()
+        light.release()
+        renderer.release()
+        assert found == pytest.approx(expected, rel=0.05)
+        assert (found > 0.0) == (lit > 0.0)
+
+
+@pytest.mark.parametrize("high", [0.15, 1.0], ids=["low", "high"])
+def test_steep_bumps_shade_themselves_as_in_the_path_tracer(
+    gl: Any, some_variant: str, table_file: Path, high: float
+) -> None:
+    """Without the facets' shadows, low light is half as bright again."""
+    bumps = np.random.default_rng(1).uniform(0.0, 0.4, (32, 32, 1)).astype(np.float32)
+    bumpy = {
+        "type": "bumpmap",
+        "texture": {"type": "bitmap", "raw": True, "bitmap": mi.Bitmap(bumps)},
+        "bsdf": diffuse(),
+    }
+    scene = plate_scene(
+        table_file,
+        plate={"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(4.0), "bsdf": bumpy},
+        lamp={"type": "directional", "direction": [1.0, 0.4, -high], "irradiance": 3.0},
+    )
+    renderer = Renderer(scene, context=gl)
+    light = renderer.progressive(size=(320, 80))
+    light.advance(16)
+    found, expected = light.image[..., 1].mean(), truth(renderer, 64)[..., 1].mean()
+    light.release()
+    renderer.release()
+    assert found == pytest.approx(expected, rel=0.01)
 
 
 def irradiance(lights: list[Any], normal: NDArray[np.float64]) -> NDArray[np.float64]:
