@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import DiffractionError
 from .source import fragment_parts, plain_source, vertex_source
-from .textures import PAGE, Packed, Texture, Uniform
+from .texels import PAGE, Packed, Texture, Uniform
 
 #: OpenGL 3.3.
 REQUIRED = 330

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...plugin.changing import children
 from .packing import pack_conductor
-from .textures import Packed, Texture
+from .texels import Packed, Texture
 
 _COSINES = 64
 _KINDS = ("RoughPlastic", "SmoothPlastic", "RoughConductor", "SmoothConductor")

@@ -17,7 +17,7 @@ from ...tables.table import DiffractionTable
 from .gloss import Gloss
 from .maps import Map, Spectrum, axis_map, colour_map, evaluated, raw_picture
 from .packing import pack_beneath, pack_conductor, pack_energy, pack_roughness
-from .textures import Packed, Texture, Uniform, as_half
+from .texels import Packed, Texture, Uniform, as_half
 
 Array = NDArray[np.float64]
 

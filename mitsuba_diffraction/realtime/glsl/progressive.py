@@ -22,7 +22,7 @@ from .context import Target, compile_plain, require_moderngl, set_uniforms
 from .lights import Light, light_definitions
 from .shadows import SIZE, ShadowMap
 from .stage import Drawing, Joined, Stage
-from .textures import Uniform
+from .texels import Uniform
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .casters import Casters, Seen
 from .context import require_moderngl
 from .lights import Light
-from .textures import Uniform
+from .texels import Uniform
 
 Array = NDArray[np.float64]
 

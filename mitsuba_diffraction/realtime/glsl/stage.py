@@ -19,7 +19,7 @@ from .obstacles import pack_obstacles
 from .prepared import vertex_array
 from .scene import RealtimeScene
 from .surroundings import flat_shapes, pack_flats
-from .textures import Packed, Uniform
+from .texels import Packed, Uniform
 
 
 class Drawing(Protocol):
