@@ -117,7 +117,7 @@ class Film:
         preview: bool = False,
         threads: int = 0,
     ) -> None:
-        check_workers(client, variant)
+        self._seen = set(check_workers(client, variant))
         self.report = Report()
         self._client, self._kept, self._warn = client, Kept(keep), warn
         self._scene = load_scene(scene, frames[0].values)
@@ -178,12 +178,19 @@ class Film:
                     return
         finally:
             sums.cancel()
+            self._count_workers()
             self.report.seconds = time.perf_counter() - start
             if len(self.report.where) > 1:
                 self._warn(
                     "sums of different processors or numbers of threads were mixed, and may "
                     f"differ in their last bits: {'; '.join(sorted(self.report.where))}"
                 )
+
+    def _count_workers(self) -> int:
+        there = set(workers_of(self._client))
+        self._seen |= there
+        self.report.lost = len(self._seen - there)
+        return len(there)
 
     def forget(self, frame: int) -> None:
         """Remove what was kept of a frame."""
@@ -203,7 +210,6 @@ class _InOrder:
         self._done = 0
         self._contents: dict[str, Any] = {}
         self._counted = (-math.inf, 1)
-        self._seen: set[str] = set()
 
     def of(self, task: Task) -> Sums | None:
         """The sums of a task; None once asked to stop."""
@@ -280,8 +286,5 @@ class _InOrder:
         """How many there are, asked for every other second."""
         now = time.perf_counter()
         if now - self._counted[0] > _COUNTED:
-            there = set(workers_of(self._film._client))
-            self._counted = now, len(there)
-            self._seen |= there
-            self._film.report.lost = len(self._seen - there)
+            self._counted = now, self._film._count_workers()
         return int(self._counted[1])

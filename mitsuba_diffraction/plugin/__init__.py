@@ -34,6 +34,7 @@ film            a thin film that follows the heights
 through         both sides of a dielectric or of a thin sheet
 sides           what makes both sides add up to 1
 crossing        pairs of directions that are not both above
+crossing_jones  what the material makes of light that crosses, with its polarisation
 layers          how much light reaches what lies beneath
 height_scale    how heights vary over the surface
 orientation     how the patch is turned in the tangent plane

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -145,12 +146,20 @@ def start():
         process.wait()
 
 
+def free_port():
+    """A port that stays free while a scheduler starts: none that the system gives to others."""
+    for port in range(20_000 + os.getpid() % 10_000, 32_000):
+        with socket.socket() as free, contextlib.suppress(OSError):
+            free.bind(("127.0.0.1", port))
+            return port
+    raise AssertionError("all ports are taken")
+
+
 def test_a_scheduler_that_is_killed_and_started_again_changes_nothing(
-    scene, expected, start, tmp_path
+    scene, expected, start, tmp_path, monkeypatch
 ):
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    monkeypatch.setattr(frames_module, "_COUNTED", 0.0)  # or a quick restart would not be seen
+    port = free_port()
     address = f"tcp://127.0.0.1:{port}"
 
     def start_all():
@@ -174,8 +183,8 @@ def test_a_scheduler_that_is_killed_and_started_again_changes_nothing(
         (result,) = job.render(passes.Stop(), disturb)
     np.testing.assert_array_equal(np.array(result.bitmap), expected)
     assert len(killed) >= 4
-    assert job.report.tasks == 12  # none of those that were kept a second time
-    assert job.report.retries > 0
+    # none of those that were kept a second time; whether one was under way is chance
+    assert job.report.tasks == 12
     assert job.report.lost == 1
 
 
@@ -184,7 +193,10 @@ def test_files_that_a_worker_lacks_come_by_content(client, scene, expected, monk
         return run_task(task) if contents else Lacking((task.files.files[0][1],))
 
     monkeypatch.setattr(frames_module, "run_task", without_files)
-    np.testing.assert_array_equal(np.array(rendered(client, scene).bitmap), expected)
+    job = film(client, scene, [Wanted({}, SPP, 3)], scene.parent / "passes")
+    (result,) = job.render(passes.Stop(), lambda *_: None)
+    np.testing.assert_array_equal(np.array(result.bitmap), expected)
+    assert job.report.tasks == job.report.retries == 12
 
 
 def test_a_copy_of_a_scene_is_the_scene(scene, expected, monkeypatch, tmp_path):

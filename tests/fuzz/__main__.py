@@ -37,8 +37,9 @@ _SHARES = {
     "tables": 0.1, "documents": 0.1, "heights": 0.1, "texts": 0.05, "cache": 0.1, "scenes": 0.05,
     "commands": 0.25, "surfaces": 0.25,
 }  # fmt: skip
-#: Seconds of the processor, and by the clock of a busy machine, that a case may take.
-_BUSY, _HANG = 10, 60
+#: Seconds of the processor, and by the clock of a busy machine, that a case may take; most take
+#: less than one, and some where kernels are compiled on a slow machine.
+_BUSY, _HANG = 40, 300
 _SHOWN = 300  # characters of a failure
 
 

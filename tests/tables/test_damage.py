@@ -7,7 +7,7 @@ import json
 import multiprocessing
 import os
 import random
-import time
+import tracemalloc
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -17,7 +17,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from mitsuba_diffraction import DiffractionTable
+from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.tables.exr import ATTRIBUTE, CHECKSUM, _checksum
 from tests.directions import rough_patch
 from tests.tables import looked_up
@@ -25,6 +25,10 @@ from tests.tables import looked_up
 #: Tables and files of each kind; `MITSUBA_DIFFRACTION_DAMAGE=10000` for as many as one likes.
 TRIALS = int(os.environ.get("MITSUBA_DIFFRACTION_DAMAGE", "80"))
 PATCH = rough_patch((20, 24), (0.08, 0.09), 0.15)
+#: Seconds after which a child counts as hung; it takes a few where it compiles on a busy machine.
+HANGS = 120
+#: Bytes: ten times what any takes, and a thousandth of what the damaged ones claim.
+MUCH = 1e6
 KINDS = {
     "svd": {},
     "patch": {"coherence": "patch"},
@@ -50,8 +54,8 @@ def file(request, tmp_path_factory) -> Path:
 def used() -> Iterator[Callable[[Path], tuple[str, dict] | None]]:
     """`looked_up.use` in a process of its own, which damage may end, already started."""
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as child:
-        child.submit(looked_up.start).result(timeout=120)
-        yield lambda path: child.submit(looked_up.use, path).result(timeout=20)
+        child.submit(looked_up.start).result(timeout=HANGS)
+        yield lambda path: child.submit(looked_up.use, path).result(timeout=HANGS)
 
 
 class Contents:
@@ -82,6 +86,17 @@ class Contents:
         headers[0] |= {ATTRIBUTE: text, CHECKSUM: _checksum(text, ordered)}
         parts = [OpenEXR.Part(*one) for one in zip(headers, self.parts, strict=True)]
         OpenEXR.File(parts).write(str(path))
+
+
+def taken_until_refused(path: Path) -> int:
+    """Bytes that are taken at most until a table is refused."""
+    tracemalloc.start()
+    try:
+        with pytest.raises(DiffractionError):
+            DiffractionTable.load(path)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
 
 
 def _place(channel: str) -> tuple[int, bool, int]:
@@ -170,13 +185,11 @@ def test_a_bit_that_is_flipped_anywhere_is_noticed(file, tmp_path, used):
         lambda d: d["source"].update(warnings="one"),
     ],
 )
-def test_what_would_read_outside_or_fill_memory_is_refused_at_once(file, tmp_path, used, change):
+def test_what_would_read_outside_or_fill_memory_is_refused_at_once(file, tmp_path, change):
     contents = Contents(file)
     change(contents.document)
     contents.write(tmp_path / "changed.exr")
-    start = time.perf_counter()
-    assert used(tmp_path / "changed.exr") is None
-    assert time.perf_counter() - start < 2.0
+    assert taken_until_refused(tmp_path / "changed.exr") < MUCH
 
 
 def test_nests_of_brackets_and_long_numbers_are_refused(file, tmp_path, used):
@@ -189,7 +202,7 @@ def test_nests_of_brackets_and_long_numbers_are_refused(file, tmp_path, used):
             assert used(tmp_path / "changed.exr") is None
 
 
-def test_a_small_file_that_claims_gigabytes_is_refused_before_they_are_taken(tmp_path, used):
+def test_a_small_file_that_claims_gigabytes_is_refused_before_they_are_taken(tmp_path):
     table = DiffractionTable.build(PATCH, coherence_width=1.8)
     table.save(tmp_path / "table.exr")
     contents = Contents(tmp_path / "table.exr")
@@ -199,6 +212,4 @@ def test_a_small_file_that_claims_gigabytes_is_refused_before_they_are_taken(tmp
     contents.parts[0] = dict.fromkeys(contents.parts[0], np.zeros(shape, np.float16))
     contents.write(tmp_path / "large.exr")
     assert (tmp_path / "large.exr").stat().st_size < 5e5
-    start = time.perf_counter()
-    assert used(tmp_path / "large.exr") is None
-    assert time.perf_counter() - start < 2.0
+    assert taken_until_refused(tmp_path / "large.exr") < MUCH

@@ -21,6 +21,7 @@ filmed           solutions of gratings under a film
 passed           orders that go through a dielectric
 model            what the package says of the same surfaces
 compare          how far apart they are
+second_order     what the second order in slope would bring
 limits           up to which slopes that is little
 closed_forms     ideal gratings
 roughness        random surfaces of known mean diffraction

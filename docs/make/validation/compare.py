@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -98,13 +98,8 @@ def compare(
     trusted = (solutions or shipped(material)).trusted()
     rows = trusted.rows
     found, lights = np.full(len(rows), np.nan), np.full((len(rows), 2), np.nan)
-    unique, inverse = np.unique(rows[KEY], return_inverse=True)
-    starts = np.argsort(inverse.ravel(), kind="stable")
-    ends = np.cumsum(np.bincount(inverse.ravel()))
-    for key, members in zip(unique, np.split(starts, ends[:-1]), strict=True):
-        profile, period, depth, theta, wavelength = (_decimal(value) for value in key)
-        grating = Grating(PROFILES[int(profile)], period, depth)
-        orders, _ = order_sines(period, wavelength, theta)
+    for grating, theta, wavelength, members in scans_of(rows):
+        orders, _ = order_sines(grating.period, wavelength, theta)
         efficiencies = order_efficiencies(grating, material, theta, wavelength, model, coat)
         place = np.searchsorted(orders, rows["order"][members])
         found[members] = efficiencies[place]
@@ -112,6 +107,18 @@ def compare(
             share = order_shares(grating, material, theta, wavelength, model)
             lights[members] = (efficiencies[:, None] * share)[place]
     return Comparison(material, trusted, found, lights)
+
+
+def scans_of(
+    rows: NDArray[np.void],
+) -> Iterator[tuple[Grating, float, float, NDArray[np.intp]]]:
+    """Every solution's grating, angle in degrees and wavelength in nm, and which rows it has."""
+    unique, inverse = np.unique(rows[KEY], return_inverse=True)
+    starts = np.argsort(inverse.ravel(), kind="stable")
+    ends = np.cumsum(np.bincount(inverse.ravel()))
+    for key, members in zip(unique, np.split(starts, ends[:-1]), strict=True):
+        profile, period, depth, theta, wavelength = (_decimal(value) for value in key)
+        yield Grating(PROFILES[int(profile)], period, depth), theta, wavelength, members
 
 
 def gratings_of(comparison: Comparison, profile: str) -> list[Grating]:

@@ -11,7 +11,17 @@ from matplotlib.figure import Figure
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.progress import Progress, silent
 
-from . import coated, filmed, models, passed, patch_sections, plots, sections, statistics
+from . import (
+    coated,
+    filmed,
+    models,
+    passed,
+    patch_sections,
+    plots,
+    second_order,
+    sections,
+    statistics,
+)
 from .cases import FEW_WAVELENGTHS, MATERIALS, PROBE_GRATING, Grating
 from .compare import Comparison, compare
 from .patches import KINDS
@@ -25,7 +35,7 @@ _DPI = 100
 
 
 def write_report(folder: Path, *, quick: bool = False, progress: Progress | None = None) -> Path:
-    """Write validation.md and images/validation_*.png into a folder; about a minute.
+    """Write validation.md and images/validation_*.png into a folder; about two minutes.
 
     Parameters
     ----------
@@ -77,6 +87,7 @@ def write_report(folder: Path, *, quick: bool = False, progress: Progress | None
         patch_sections.section(
             [c for material in models.MATERIALS for c in patch_sections.compared(material, kinds)]
         ),
+        second_order.section(quick=quick),
         sections.slopes(kirchhoff, default),
         sections.edges(kirchhoff, default),
         coated.section(coated.GRATINGS[:1] if quick else coated.GRATINGS),

@@ -38,7 +38,7 @@ def compared(material: str, kinds: Sequence[str] = KINDS) -> list[PatchCompariso
     return [
         _compare(solution)
         for solution in solved(material)[0]
-        if solution.case.surface.kind in kinds and _is_here(solution.case)
+        if solution.case.surface.kind in kinds and is_here(solution.case)
     ]
 
 
@@ -139,7 +139,7 @@ def agreements() -> list[PatchAgreement]:
     second = {solution.case: solution for solution in solved("keratin", "coupled_wave")[0]}
     found = []
     for first in solved("keratin")[0]:
-        if first.case not in second or not _is_here(first.case):
+        if first.case not in second or not is_here(first.case):
             continue
         field, other = cell(first.case.surface), second[first.case]
         powers, others = (
@@ -160,7 +160,8 @@ def _numbers(solution: Solved) -> list[tuple[int, int]]:
     return [(int(mx), int(my)) for mx, my in solution.rows[["mx", "my"]]]
 
 
-def _is_here(case: PatchCase) -> bool:
+def is_here(case: PatchCase) -> bool:
+    """Whether a case's surface can be had: the measured patch may be missing."""
     return case.surface.kind != "elaphe" or MEASURED.is_file()
 
 

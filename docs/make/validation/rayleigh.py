@@ -59,12 +59,12 @@ def solve(
     DiffractionError
         If heights are beyond what the series of exp(iγh) can sum.
     """
-    waves = _Waves(field, index, wavelength, wi, harmonics)
+    waves = Waves(field, index, wavelength, wi, harmonics)
     into = waves.incident
     down = waves.below * [-1, -1, -1]
-    tests = _axes(down, index)
-    reflected = waves.coupling(tests, down, _axes(waves.above, 1.0), waves.above)
-    incident = waves.coupling(tests, down, _axes(into, 1.0), into)
+    tests = axes(down, index)
+    reflected = waves.coupling(tests, down, axes(waves.above, 1.0), waves.above)
+    incident = waves.coupling(tests, down, axes(into, 1.0), into)
     found = _solved(reflected, -incident)
     out, mean = waves.above, waves.k * float(field.heights.mean())
     return _orders(waves, wi, found, mean, out, np.where(out[:, 2].imag == 0, out[:, 2].real, 0.0))
@@ -82,15 +82,15 @@ def through(
     From equations of its own: with test waves that go up in the air, whose product with all that is
     reflected carries nothing. That both powers add up to 1 is thus no matter of course.
     """
-    waves = _Waves(field, index, wavelength, wi, harmonics)
+    waves = Waves(field, index, wavelength, wi, harmonics)
     up, down = waves.above * [-1, -1, 1], waves.below * [1, 1, -1]
-    tests = _axes(up, 1.0)
-    matrix = waves.coupling(tests, up, _axes(down, index), down)
+    tests = axes(up, 1.0)
+    matrix = waves.coupling(tests, up, axes(down, index), down)
     # the light meets its own test wave alone: γ is 0, and the flux that of a level plane
     right = np.zeros((2 * len(up), 2), complex)
     zeroth, into = waves.zeroth, waves.incident[0]
     for row, test in enumerate(tests[:, zeroth]):
-        for column, e in enumerate(_axes(waves.incident, 1.0)[:, 0]):
+        for column, e in enumerate(axes(waves.incident, 1.0)[:, 0]):
             flux = np.cross(e, np.cross(up[zeroth], test)) - np.cross(test, np.cross(into, e))
             right[row * len(up) + zeroth, column] = flux[2]
     found = _solved(matrix, right)
@@ -111,7 +111,7 @@ def transmitted(
     return float(np.sum(boundary.unpolarised(orders.jones) * cosines) / wi[2])
 
 
-class _Waves:
+class Waves:
     """The plane waves of a period, κ in units of 2π/λ, in vacuum (above) and the material (below).
 
     Both go up; `incident` (1, 3) goes down.
@@ -140,20 +140,31 @@ class _Waves:
         incident one.
         """
         columns = self.orders if len(waves) > 1 else self.orders[self.zeroth : self.zeroth + 1]
-        total = waves[None, :, :] + to[:, None, :]
         weight = self._spectra.over_gamma(
-            total[..., 2], columns[None, :, :] - self.orders[:, None, :]
+            waves[:, 2] + to[:, None, 2], columns[None, :, :] - self.orders[:, None, :]
         )
-        blocks = []
-        for e_test in tests:
-            h_test = np.cross(to, e_test)
-            row = []
-            for e in fields:
-                h = np.cross(waves, e)
-                flux = np.cross(e[None], h_test[:, None]) - np.cross(e_test[:, None], h[None])
-                row.append(np.sum(total * flux, axis=2) * weight)
-            blocks.append(row)
-        return np.asarray(np.block(blocks))
+        # (rows, columns, 2, 2), in blocks of s and p
+        blocks = weight[..., None, None] * fluxes(
+            tests[:, :, None], to[:, None], fields[:, None], waves[None]
+        )
+        shape = 2 * len(to), 2 * len(waves)
+        return np.asarray(blocks.transpose(2, 0, 3, 1).reshape(shape))
+
+
+def fluxes(tests: Complex, to: Complex, fields: Complex, waves: Complex) -> Complex:
+    """(κ+κ')·(e×(κ'×e') − e'×(κ×e)) of test waves κ' and waves κ, (..., 2, 2): tests first.
+
+    tests, fields : (2, ..., 3) their s and p fields; to, waves : (..., 3); all of them broadcast.
+    """
+    total = waves + to
+    found = [
+        np.sum(
+            total * (np.cross(e, np.cross(to, e_test)) - np.cross(e_test, np.cross(waves, e))), -1
+        )
+        for e_test in tests
+        for e in fields
+    ]
+    return np.stack(found, axis=-1).reshape(*found[0].shape, 2, 2)
 
 
 def _solved(matrix: Complex, right: Complex) -> Complex:
@@ -163,7 +174,7 @@ def _solved(matrix: Complex, right: Complex) -> Complex:
     return np.asarray(found)
 
 
-def _axes(vector: Complex, index: complex) -> Complex:
+def axes(vector: Complex, index: complex) -> Complex:
     """Electric fields s and p of plane waves κ (n, 3) in a medium, (2, n, 3): s = ẑ×κ̂, p = κ̂×s."""
     x, y = vector[:, 0].real, vector[:, 1].real
     length = np.hypot(x, y)
@@ -209,7 +220,7 @@ class _Spectra:
 
 
 def _orders(
-    waves: _Waves, wi: Real, found: Complex, mean: float, out: Complex, travels: Real
+    waves: Waves, wi: Real, found: Complex, mean: float, out: Complex, travels: Real
 ) -> Orders:
     """Of the amplitudes (2n, 2), those that travel, about `boundary.polarisation_axes`.
 
@@ -219,9 +230,9 @@ def _orders(
     kept = travels > HORIZON
     wo = out[kept].real
     both = np.moveaxis(found.reshape(2, len(out), 2), 1, 0)[kept]
-    axes = _axes(out[kept], 1.0)[0].real
-    basis = _axes(waves.incident, 1.0)[0].real[0]
+    s_solved = axes(out[kept], 1.0)[0].real
+    basis = axes(waves.incident, 1.0)[0].real[0]
     s_in, s_out = boundary.polarisation_axes(wi, wo)
-    turned = boundary.turn(s_out, axes, wo) @ both @ boundary.turn(basis, s_in, -wi)
+    turned = boundary.turn(s_out, s_solved, wo) @ both @ boundary.turn(basis, s_in, -wi)
     phase = np.exp(-1j * mean * (wi[2] + travels[kept] * np.sign(wo[:, 2])))
     return Orders(waves.orders[kept], wo, phase[:, None, None] * turned)

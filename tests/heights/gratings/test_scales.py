@@ -162,8 +162,9 @@ def test_heights_are_proportional_to_depth(species):
 def test_a_full_patch_is_quick():
     began = time.process_time()
     elaphe_like()
-    # 2 s of processor time on the slowest machine tried; the limit leaves room for a slower one
-    assert time.process_time() - began < 6
+    # 2 s of processor time on the slowest machine tried, twice that where two threads share a core;
+    # an algorithm of another order would take minutes
+    assert time.process_time() - began < 30
 
 
 # --- side by side with the measured patch; seeds scatter by the figures given

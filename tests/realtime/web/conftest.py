@@ -19,6 +19,14 @@ FLAGS = (
     "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
 )  # fmt: skip
 SIZE = (96, 64)
+#: Milliseconds that a page may take for anything: shaders are compiled in software.
+PATIENCE = 180_000
+#: As soon as there is a viewer, it draws no more than a test asks for.
+ONE_SAMPLE = """Object.defineProperty(window, "viewer", { configurable: true, set(viewer) {
+    viewer.most = 1;
+    Object.defineProperty(window, "viewer", { value: viewer });
+} });
+"""
 
 
 @pytest.fixture(scope="session")
@@ -101,13 +109,13 @@ class Tab:
 
     def __init__(self, browser: Any, size: tuple[int, int], script: str = "") -> None:
         self.page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+        self.page.set_default_timeout(PATIENCE)
         self.said: list[str] = []
         self.asked: list[str] = []
         self.page.on("console", lambda message: self._heard(message.text))
         self.page.on("pageerror", lambda error: self.said.append(str(error)))
         self.page.on("request", lambda request: self.asked.append(request.url))
-        if script:
-            self.page.add_init_script(script)
+        self.page.add_init_script(ONE_SAMPLE + script)
 
     def _heard(self, text: str) -> None:
         # frames are timed on purpose, which drivers in software remark upon
@@ -122,7 +130,7 @@ class Tab:
     @staticmethod
     def state(frame: Any) -> str:
         """Wait until a page has loaded or given up."""
-        frame.wait_for_function("document.documentElement.dataset.state", timeout=60_000)
+        frame.wait_for_function("document.documentElement.dataset.state", timeout=PATIENCE)
         return str(frame.evaluate("document.documentElement.dataset.state"))
 
 

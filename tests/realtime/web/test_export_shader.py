@@ -20,6 +20,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.realtime.glsl.export import export_shader, make_shader
+from tests.realtime.web.conftest import PATIENCE
 
 THREE = "three@0.187.0"
 SITE = "http://shader.test/"
@@ -129,6 +130,7 @@ def exported(sphere: Any, three: Path) -> Path:
 def opened(browser: Any, exported: Path) -> Iterator[Any]:
     """The page of the material, served from the folder without a server."""
     page = browser.new_page()
+    page.set_default_timeout(PATIENCE)
     said: list[str] = []
     page.on("pageerror", lambda error: said.append(str(error)))
     page.on("console", lambda message: said.append(message.text))
@@ -141,7 +143,7 @@ def opened(browser: Any, exported: Path) -> Iterator[Any]:
 
     page.route(f"{SITE}**", answer)
     page.goto(SITE)
-    page.wait_for_function("document.documentElement.dataset.state", timeout=60_000)
+    page.wait_for_function("document.documentElement.dataset.state")
     yield page
     page.close()
     assert [line for line in said if "GPU stall" not in line] == []
@@ -149,7 +151,7 @@ def opened(browser: Any, exported: Path) -> Iterator[Any]:
 
 def test_the_example_shows_colours(opened: Any) -> None:
     opened.goto(f"{SITE}out/example.html")
-    opened.wait_for_function("document.documentElement.dataset.state", timeout=60_000)
+    opened.wait_for_function("document.documentElement.dataset.state")
     with Image.open(io.BytesIO(opened.screenshot())) as shot:
         pixels = np.asarray(shot.convert("RGB"), float)
     # neither grey nor one colour: red here, blue there

@@ -1,0 +1,203 @@
+"""What the second order of the small-slope approximation would bring, on periodic surfaces.
+
+Voronovich 1994 (Waves in Random Media 4, 337) adds to the first order's boundary matrix B what the
+second term of perturbation lacks. With B₂ that term's kernel, ĥ and a spectra of the heights and of
+exp(−iQh), Q = q + q0, and u all waves in between, evanescent ones too, an order has the amplitude
+
+    R(k) = 2 q0/Q · [B (a(k−k0) + iQ/2 (ha)(k−k0))
+                     + i/4 Σ_u B₂(k,k0;u) (ĥ(k−u) a(u−k0) + a(k−u) ĥ(u−k0))].
+
+Its mean over the phases of Gaussian heights would be cheap, a factor of two directions:
+
+    R(k) = 2 q0/Q · a(k−k0) [B (1 + Q²σ²/2) + Q/4 Σ_u B₂(k,k0;u) (|ĥ(k−u)|² + |ĥ(u−k0)|²)].
+
+B and B₂ are from `rayleigh`'s equations: R = −2i q0 B ĥ + q0 Σ_u B₂ ĥ ĥ. Lengths over 2π/λ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mitsuba_diffraction import HeightField
+
+from .cases import index_of
+from .compare import GRAZING, scans_of
+from .crossed import is_crossed
+from .markdown import percent, table
+from .model import in_plane
+from .models import MATERIALS
+from .patch_sections import is_here
+from .patch_solutions import solved
+from .patches import KINDS, cell, patch_index
+from .rayleigh import Complex, Real, Waves, axes, fluxes
+from .solutions import shipped
+
+#: The first order, with the mean of the second, and with all of it.
+MODELS = ("first", "mean", "second")
+
+#: Waves in between, of gratings and of cells.
+_HARMONICS = (201, 1999)
+#: Steepest gratings, depth over period.
+_DEEPEST = 0.13
+_GROUPS = {
+    "sinusoid": "sinusoids in any mount",
+    "crossed": "crossed grating",
+    "elaphe": "cuts of scales",
+    "elaphe_like": "cuts of scales",
+    "cd_pits": "CD's pits",
+}
+
+
+def section(*, quick: bool = False) -> str:
+    """The table; half a minute, `quick` for tests."""
+    cases: list[Case] = []
+    for material in MATERIALS:
+        cases += cases_of_cells(material, KINDS[:1] if quick else KINDS)
+        cases += [] if quick else cases_of_gratings(material)
+    rows = []
+    for group in dict.fromkeys(case.group for case in cases):
+        same = [case for case in cases if case.group == group]
+        row = [group, str(len(same))]
+        for model in MODELS:
+            errors = [case.deviation[model] for case in same]
+            row.append(f"{percent(float(np.mean(errors)))}, {percent(max(errors))}")
+        for model in MODELS:
+            light = [case.light[model] for case in same]
+            row.append(f"{min(light):.3f}–{max(light):.3f}")
+        rows.append(row)
+    names = ("first order", "and the mean", "second order")
+    header = ["surface", "cases", *names, *(f"light, {name}" for name in names)]
+    return f"""## What the second order would bring
+
+Small slope alone, not blended, in the second order (Voronovich 1994), summed by brute force
+(docs/make/validation/second_order.py): deviation of colours, mean and worst of the cases, and all
+reflected light over the rigorous. *And the mean* is the first order times what Gaussian heights of
+that spectrum would make of the second on average. Gratings by profile are those above, of a
+depth/period up to {_DEEPEST:g}.
+
+{table(header, rows)}
+
+What the first order misses on scales and on a CD is thus mostly the second, and most of that is no
+mean: light that is diffracted twice interferes with light that is diffracted once, and where hills
+are made pits the sign of that changes. A power spectrum does not tell hills from pits. It takes the
+sum over all waves in between, for every order of every pair of directions, which no table of powers
+has. The mean alone, a smooth factor of two directions that tables could afford, puts the reflected
+light right where walls are gentle, but hardly the colours, and makes some worse: of a sinusoid's
+order the rest takes about as much away. It is therefore not in the model. On vertical walls the
+sums depend on where they end."""
+
+
+def amplitudes(
+    field: HeightField,
+    index: complex,
+    wavelength: float,
+    wi: Real,
+    wo: Real,
+    orders: NDArray[np.int64],
+) -> dict[str, Complex]:
+    """Amplitudes (n, 2, 2) of orders (n, 2) along wo, by each of `MODELS`; columns are s and p."""
+    waves = Waves(field, index, wavelength, wi, _HARMONICS[int(is_crossed(field))])
+    first, second = coefficients(waves, index, orders)
+    heights = (field.heights - field.heights.mean()) * waves.k
+    into, out = waves.orders, orders[:, None] - waves.orders
+    before, after = _at(heights, into), _at(heights, out)
+    found = {name: np.empty_like(first) for name in MODELS}
+    for n, kappa in enumerate(wi[2] + wo[:, 2]):
+        screen = 2 * wi[2] / kappa * np.exp(-1j * kappa * heights)
+        amplitude, moment = (_at(part, orders[n]) for part in (screen, heights * screen))
+        variances = np.abs(after[n]) ** 2 + np.abs(before) ** 2
+        pairs = after[n] * _at(screen, into) + before * _at(screen, out[n])
+        mean, whole = (np.tensordot(part, second[n], axes=1) for part in (variances, pairs))
+        mean += 2 * kappa * np.mean(heights**2) * first[n]
+        found["first"][n] = amplitude * first[n]
+        found["mean"][n] = amplitude * (first[n] + 0.25 * kappa * mean)
+        found["second"][n] = (amplitude + 0.5j * kappa * moment) * first[n] + 0.25j * whole
+    return found
+
+
+def coefficients(
+    waves: Waves, index: complex, orders: NDArray[np.int64]
+) -> tuple[Complex, Complex]:
+    """B (n, 2, 2) and B₂ (n, waves, 2, 2) of orders (n, 2), between `rayleigh.axes`."""
+    down, above, came = waves.below * [-1, -1, -1], waves.above, waves.incident
+    tests, fields, zeroth = axes(down, index), axes(above, 1.0), [waves.zeroth]
+    rows = [int((waves.orders == order).all(axis=1).argmax()) for order in orders]
+    lit = fluxes(tests, down, axes(came, 1.0), came)
+    back = fluxes(tests, down, fields[:, zeroth], above[zeroth])
+    gamma, gamma_lit, gamma_back = (
+        (down + wave)[:, 2, None, None] for wave in (above, came, above[zeroth])
+    )
+    inverse = gamma * np.linalg.inv(fluxes(tests, down, fields, above))
+    flat = -(inverse @ (lit / gamma_lit))[zeroth]
+    once = -1j * inverse @ (lit + back @ flat)
+    level = -0.5 * (gamma_lit * lit + gamma_back * (back @ flat))[rows, None]
+    between = fluxes(tests[:, rows, None], down[rows, None], fields[:, None], above)
+    q0 = above[waves.zeroth, 2].real
+    return 0.5j / q0 * once[rows], -inverse[rows, None] @ (1j * between @ once + level) / q0
+
+
+def _at(function: NDArray[np.inexact], orders: NDArray[np.int64]) -> Complex:
+    """Fourier coefficients of orders (..., 2) of a function on pixels (ny, nx)."""
+    ny, nx = function.shape
+    inside = (2 * np.abs(orders) < [nx, ny]).all(axis=-1)
+    spectrum = np.fft.fft2(function) / function.size
+    return np.where(inside, spectrum[orders[..., 1] % ny, orders[..., 0] % nx], 0.0)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One solution: deviation of colours of each of `MODELS`, and all light over the rigorous."""
+
+    group: str
+    deviation: dict[str, float]
+    light: dict[str, float]
+
+
+def cases_of_cells(material: str, kinds: Sequence[str] = KINDS) -> Iterator[Case]:
+    """The kept solutions of cells of these kinds."""
+    for one in solved(material)[0]:
+        surface = one.case.surface
+        if surface.kind in kinds and is_here(one.case):
+            field, index = cell(surface), patch_index(material, one.case.wavelength)
+            orders = np.stack([one.rows["mx"], one.rows["my"]], axis=1).astype(np.int64)
+            light = field, index, one.case.wavelength, one.wi, one.wo(field), orders
+            group = f"{material}, {_GROUPS[surface.kind]}, slope {surface.slope:.2g}"
+            yield _case(group, light, one.efficiency(field))
+
+
+def cases_of_gratings(material: str) -> Iterator[Case]:
+    """The kept solutions of gratings."""
+    solutions = shipped(material).trusted()
+    for grating, theta, wavelength, members in scans_of(solutions.rows):
+        if grating.depth <= _DEEPEST * grating.period:
+            numbers = solutions.rows["order"][members].astype(np.int64)
+            sine = np.sin(np.radians(theta))
+            wi, wo = in_plane(sine), in_plane(numbers * wavelength / 1e3 / grating.period - sine)
+            orders = np.stack([numbers, 0 * numbers], axis=1)
+            light = grating.heights(), index_of(material, wavelength), wavelength, wi, wo, orders
+            yield _case(f"{material}, {grating.profile}", light, solutions.mean[members])
+
+
+def _case(
+    group: str,
+    light: tuple[HeightField, complex, float, Real, Real, NDArray[np.int64]],
+    truth: Real,
+) -> Case:
+    wi, wo, orders = light[3:]
+    keep = orders.any(axis=1) & (wo[:, 2] >= np.cos(np.radians(GRAZING)))
+    powers = {
+        name: 0.5 * np.sum(np.abs(found) ** 2, axis=(1, 2)) * wo[:, 2] / wi[2]
+        for name, found in amplitudes(*light).items()
+    }
+    return Case(
+        group,
+        {
+            name: float(np.abs(p - truth)[keep].sum() / truth[keep].sum())
+            for name, p in powers.items()
+        },
+        {name: float(p.sum() / truth.sum()) for name, p in powers.items()},
+    )
