@@ -171,6 +171,9 @@ void main()
 #ifdef PIGMENT_IN_LIGHT
     pigment = pigment_in_light * pigment;
 #endif
+#ifdef PRINCIPLED
+    base_colour = pigment;
+#endif
     float turned = length(rotation);
     rotation = turned > 1e-6 ? rotation / turned : vec2(1.0, 0.0);
 
