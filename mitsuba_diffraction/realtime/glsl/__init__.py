@@ -12,6 +12,7 @@ gloss        what plain BSDFs mirror
 lights       directions, points, spots, a smooth sky
 emitters     all emitters as a sequence of lights
 shadows      shadow maps
+casters      what casts shadows
 surroundings  what comes from a direction: environments, flat lights, what stands in the way
 obstacles    how far it is to the nearest surface, on a grid
 lobes        directions that a surface sends light to
@@ -20,7 +21,7 @@ progressive  frames with one light each, or what lobes meet, accumulated
 camera       sensors
 packing      tables as textures
 thesis       the methods of the thesis as textures
-textures     what a shader reads, as plain NumPy
+texels       textures, uniforms and definitions that a shader reads; numbers packed in texels
 source       the shaders' text
 context      OpenGL without a window: programs, textures, pictures to draw into
 prepared     a method's tables and programs

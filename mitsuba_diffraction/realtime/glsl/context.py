@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import DiffractionError
 from .source import fragment_parts, plain_source, vertex_source
-from .textures import PAGE, Packed, Texture, Uniform
+from .texels import PAGE, Packed, Texture, Uniform
 
 #: OpenGL 3.3.
 REQUIRED = 330
@@ -235,9 +235,9 @@ class Bindings:
         """Set them in a program; returns the next free texture unit."""
         set_uniforms(program, self.uniforms)
         for name, texture in self.textures.items():
-            if name in program:
+            if (sampler := program.get(name, None)) is not None:
                 texture.use(first_unit)
-                program[name].value = first_unit
+                sampler.value = first_unit
                 first_unit += 1
         return first_unit
 
@@ -250,11 +250,10 @@ class Bindings:
 def set_uniforms(program: Any, uniforms: Mapping[str, Uniform]) -> None:
     """Set those that the program reads: compilers remove the others, and cut arrays short."""
     for name, value in uniforms.items():
-        if name not in program:
+        found = program.get(name, None)  # a program's `in` looks through all names
+        if found is None:
             continue
         if isinstance(value, np.ndarray):
-            program[name].write(
-                np.ascontiguousarray(value[: program[name].array_length], np.float32)
-            )
+            found.write(np.ascontiguousarray(value[: found.array_length], np.float32))
         else:
-            program[name].value = value
+            found.value = value

@@ -22,7 +22,7 @@ from .materials import Material, height_scale, pack_conservation, pack_surface
 from .packing import pack_colours, pack_powers, pack_responses
 from .preprocess import global_names, renamed, resolved
 from .source import shader_file
-from .textures import PAGE, Packed, Texture
+from .texels import PAGE, Packed, Texture
 
 #: Methods that other programs can have, and the functions that they become.
 EXPORTED = {"lut": "diffraction", "spectral": "diffraction_spectral"}

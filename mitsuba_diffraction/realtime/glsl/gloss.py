@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from ...plugin.changing import children
 from .packing import pack_conductor
-from .textures import Packed, Texture
+from .texels import Packed, Texture
 
 _COSINES = 64
-_KINDS = ("RoughPlastic", "SmoothPlastic", "RoughConductor", "SmoothConductor")
+_KINDS = ("RoughPlastic", "SmoothPlastic", "RoughConductor", "SmoothConductor", "Principled")
+#: Parts of the principled BSDF that are not drawn.
+_LEFT_OUT = ("spec_trans", "anisotropic", "sheen", "flatness", "clearcoat", "spec_tint")
 
 
 @dataclass(frozen=True)
@@ -25,14 +27,16 @@ class Gloss:
     bsdf : of Mitsuba.
     alpha : roughness; 0 of a smooth face.
     ggx : whether facets are distributed as GGX, else as Beckmann.
-    through : (n,) what it lets through at cosines even from 0 to 1, None of a metal: the base has
-        the BRDF ρ/π times those of both directions.
+    through : (n,) what it lets through at cosines even from 0 to 1, None of a metal and the
+        principled BSDF: the base has the BRDF ρ/π times those of both directions.
+    omissions : what of it is not drawn, in a few words each.
     """
 
     bsdf: Any
     alpha: float
     ggx: bool
     through: NDArray[np.float64] | None
+    omissions: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, bsdf: Any) -> Gloss | None:
@@ -41,6 +45,10 @@ class Gloss:
 
         if bsdf.class_name() not in _KINDS:
             return None
+        if bsdf.class_name() == "Principled":
+            left_out = (name.replace("_", " ") for name in _LEFT_OUT if _mean(bsdf, name) > 0.0)
+            alpha = max(_mean(bsdf, "roughness") ** 2, 1e-3)  # as Mitsuba has it
+            return cls(bsdf, alpha, True, None, tuple(f"the {part}" for part in left_out))
         parameters = mi.traverse(bsdf)
         alpha = next((parameters[n] for n in ("alpha", "alpha.value") if n in parameters), 0.0)
         if bsdf.class_name().startswith("Rough") and not np.any(alpha):
@@ -53,7 +61,8 @@ class Gloss:
     @property
     def pigment(self) -> Any:
         """The texture of the diffuse base, None of a metal."""
-        return children(self.bsdf).get("diffuse_reflectance")
+        found = children(self.bsdf)
+        return found.get("diffuse_reflectance", found.get("base_color"))
 
     def packed(self, spectra: Any) -> Packed:
         """For shaders/gloss.glsl.
@@ -66,6 +75,8 @@ class Gloss:
         if self.alpha == 0.0:
             definitions["MIRROR"] = ""
         found = Packed((), {"gloss_alpha": self.alpha}, definitions)
+        if self.bsdf.class_name() == "Principled":
+            return found | _principled(self.bsdf)
         parts = children(self.bsdf)
         if self.through is None:
             return found | pack_conductor(*spectra(parts["eta"], parts["k"]))
@@ -75,6 +86,28 @@ class Gloss:
             (Texture("through", rows),), {"eta": eta}, {"SURFACE_KIND": "1", "THROUGH": ""}
         )
         return found | face
+
+
+def _mean(bsdf: Any, name: str) -> float:
+    """Of one of its textures."""
+    return float(np.array(children(bsdf)[name].mean()).ravel()[0])
+
+
+def _principled(bsdf: Any) -> Packed:
+    """Of the principled BSDF what is not its roughness alone."""
+    import mitsuba as mi
+
+    parameters = mi.traverse(bsdf)
+    if "eta" in parameters:
+        eta = float(np.array(parameters["eta"]).ravel()[0])
+    else:
+        specular = float(np.array(parameters["specular"]).ravel()[0])
+        eta = 2.0 / (1.0 - np.sqrt(0.08 * specular)) - 1.0  # as Mitsuba has it
+    return Packed(
+        (),
+        {"eta": eta, "metallic": _mean(bsdf, "metallic"), "roughness": _mean(bsdf, "roughness")},
+        {"SURFACE_KIND": "1", "PRINCIPLED": ""},
+    )
 
 
 def _through(bsdf: Any) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from scipy.integrate import cumulative_trapezoid
 from ...tables.colour.polar import LARGEST_RADIUS
 from ...tables.colour.proposals import IMPORTANCE, brightness
 from ...tables.colour.table import ColourTable
-from .textures import Packed, Texture, listed
+from .texels import Packed, Texture, listed
 
 _RINGS, _AZIMUTHS, _PLACES = 128, 1024, 1 << 16
 _INNERMOST = 0.5  # radius of the innermost cell, in standard deviations of a lobe in the green

@@ -17,7 +17,7 @@ from ...tables.table import DiffractionTable
 from .gloss import Gloss
 from .maps import Map, Spectrum, axis_map, colour_map, evaluated, raw_picture
 from .packing import pack_beneath, pack_conductor, pack_energy, pack_roughness
-from .textures import Packed, Texture, Uniform, as_half
+from .texels import Packed, Texture, Uniform, as_half
 
 Array = NDArray[np.float64]
 
@@ -92,6 +92,7 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
         return Material(
             _diffuse(bsdf, omissions, name, light), two_sided, bumps=bumps, normals=normals
         )
+    omissions += [f"{part} of {name}" for part in gloss.omissions]
     pigment = Map(np.zeros(3)) if gloss.pigment is None else colour_map(gloss.pigment, light)
     return Material(pigment, two_sided, gloss=gloss, bumps=bumps, normals=normals)
 
@@ -136,7 +137,7 @@ def pack_surface(material: Material) -> Packed:
     bsdf, gloss = material.bsdf, material.gloss
     if bsdf is not None and bsdf.nested is None:
         pass
-    elif gloss is None or gloss.through is not None:
+    elif gloss is None or gloss.pigment is not None:
         definitions["PIGMENTED"] = ""
     if gloss is not None:
         return packed | gloss.packed(_spectra)

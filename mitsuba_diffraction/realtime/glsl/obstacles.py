@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from .textures import Packed, listed
+from .texels import Packed, listed
 
 Array = NDArray[np.floating]
 

@@ -21,7 +21,7 @@ from ...tables.energy.grid import SHARE
 from ...tables.energy.powers import order_0_power, power_series
 from ...tables.packing import Record, cells_of, functions_at
 from ...tables.table import DiffractionTable
-from .textures import Packed, Texture, as_half, listed, paired, texels
+from .texels import Packed, Texture, as_half, listed, paired, texels
 
 #: First and last wavenumber of the loops over wavelengths, rad/µm.
 WAVENUMBERS = (2e3 * math.pi / VISIBLE[1], 2e3 * math.pi / VISIBLE[0])

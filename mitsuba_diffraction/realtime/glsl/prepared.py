@@ -13,7 +13,7 @@ from .materials import Material
 from .packing import area_factor, pack_colours, pack_powers
 from .scene import VERTEX, RealtimeScene
 from .source import METHODS, THESIS_METHODS
-from .textures import Packed, Uniform
+from .texels import Packed, Uniform
 from .thesis import pack_method, thesis_method
 
 

@@ -22,7 +22,7 @@ from .context import Target, compile_plain, require_moderngl, set_uniforms
 from .lights import Light, light_definitions
 from .shadows import SIZE, ShadowMap
 from .stage import Drawing, Joined, Stage
-from .textures import Uniform
+from .texels import Uniform
 
 Array = NDArray[np.float64]
 
@@ -84,7 +84,7 @@ class ProgressiveLight:
         """
         if camera is not None:
             self._camera, self._surface = camera, surface
-            self._places = self._stage.casters.seen(camera)
+            self._seen = self._stage.casters.seen(camera)
         for target in self._sums:
             target.frame.clear(0.0, 0.0, 0.0, 0.0)
         self._counts = [0, 0]
@@ -108,17 +108,16 @@ class ProgressiveLight:
     def _light(self, camera: Camera, beside: Array) -> None:
         """One light with its shadows."""
         light = next(self._lights)
-        if not len(self._places):
+        if not len(self._seen.places):
             return
-        uniforms = self._map.draw(light, self._places, (float(beside[0]), float(beside[1])))
+        uniforms, each = self._map.draw(light, self._seen, (float(beside[0]), float(beside[1])))
         uniforms["light_density"] = light.density
         definitions = light_definitions(1, False) | {"SHADOWED": "", "PIGMENT_IN_LIGHT": ""}
         if self._looks_up:
             definitions["WEIGHTED"] = ""
-        extras = [_WithMap(extra, self._map.texture) for extra in self._stage.extras]
         self._renderer.draw_light(
-            self._frame.frame, self._method, camera, light, definitions, uniforms, extras,
-            **self._surface,
+            self._frame.frame, self._method, camera, light, definitions, uniforms,
+            self._extras(each), **self._surface,
         )  # fmt: skip
 
     def _look_up(self, camera: Camera, numbers: Array) -> None:
@@ -126,8 +125,19 @@ class ProgressiveLight:
         self._renderer.draw_light(
             self._frame.frame, self._method, camera, _WHITE,
             light_definitions(1, False) | {"LOOKED_UP": ""},
-            {"sequence": tuple(numbers.tolist())}, self._stage.extras, **self._surface,
+            {"sequence": tuple(numbers.tolist())}, self._extras(), **self._surface,
         )  # fmt: skip
+
+    def _extras(self, in_map: Sequence[dict[str, Uniform]] = ()) -> list[_Framed]:
+        """Of each surface; in_map : what it is in the shadow map, if one was drawn."""
+        bodies: list[dict[str, Uniform]] = [{"solid": solid} for solid in self._seen.solid]
+        texture = self._map.texture if in_map else None
+        return [
+            _Framed(extra, {**body, **own}, texture)
+            for extra, body, own in zip(
+                self._stage.extras, bodies, in_map or [{}] * len(bodies), strict=True
+            )
+        ]
 
     def _accumulate(self, target: Target) -> None:
         moderngl = require_moderngl()
@@ -174,18 +184,20 @@ class ProgressiveLight:
             thing.release()
 
 
-class _WithMap:
-    """A surface's extras and a light's shadow map."""
+class _Framed:
+    """A surface's extras, what it is in this frame, and the light's shadow map, if there is one."""
 
-    def __init__(self, extra: Joined, texture: Any) -> None:
-        self._extra, self._texture = extra, texture
+    def __init__(self, extra: Joined, own: dict[str, Uniform], shadow_map: Any) -> None:
+        self._extra, self._own, self._map = extra, own, shadow_map
         self.definitions = extra.definitions
 
     def use(self, program: Any, first_unit: int = 0) -> int:
         """As of `Bindings`."""
         first_unit = self._extra.use(program, first_unit)
-        if "shadow_map" in program:
-            self._texture.use(first_unit)
-            program["shadow_map"].value = first_unit
+        set_uniforms(program, self._own)
+        sampler = program.get("shadow_map", None)
+        if self._map is not None and sampler is not None:
+            self._map.use(first_unit)
+            sampler.value = first_unit
             first_unit += 1
         return first_unit

@@ -36,7 +36,7 @@ from .scene import RealtimeScene, load, read_scene
 from .shadows import SIZE
 from .source import LIGHTS
 from .stage import Stage
-from .textures import Uniform
+from .texels import Uniform
 
 Image = NDArray[np.float32]
 

@@ -1,90 +1,31 @@
 """A shadow map: how far a light without extent sees the scene, in each direction.
 
-The map covers what the camera sees, not all of the scene: `VisiblePlaces` finds that out once for a
+The map covers what the camera sees, not all of the scene: `Casters.seen` finds that out once for a
 camera. Lights far away see in parallel, points in perspective. Each map lies a part of a texel
 beside the last one, so that the edges of shadows average over frames.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from .camera import Camera
-from .context import Target, compile_plain, require_moderngl, set_uniforms
+from .casters import Casters, Seen
+from .context import require_moderngl
 from .lights import Light
-from .prepared import vertex_array
-from .textures import Uniform
+from .texels import Uniform
 
 Array = NDArray[np.float64]
 
 #: Texels along either side.
 SIZE = 1024
 
-_BIAS = 0.75  # texels, in the scene: neighbours on a curved surface stand out by less
+# texels, in the scene: neighbours on a curved surface stand out by less. What is lit is not in the
+# map where it is of what faces away, but for its edges
+_BIAS = {"all": 0.75, "away": 0.05, "none": 0.05}
 _STEEPEST = 16.0  # texels of depth to one across: surfaces more edge-on than 4° are hardly lit
 _MARGIN = 1.02  # of the map around what is seen
 _WIDEST = 0.1  # cosine from its axis, of what a point sees in one perspective
-_GLANCES = 192  # pixels along the longer side, to find out what is seen
-
-
-class Casters:
-    """The scene's triangles, drawn by their places alone.
-
-    Parameters
-    ----------
-    context : of moderngl.
-    buffers : each surface's vertices.
-    low, high : (3,) corners of a box around all of them.
-    emitting : vertices of what emits light, which stands in the way of light from far away.
-    """
-
-    def __init__(
-        self,
-        context: Any,
-        buffers: Sequence[Any],
-        low: Array,
-        high: Array,
-        emitting: Sequence[Any] = (),
-    ) -> None:
-        self.context = context
-        self.program = compile_plain(context, "surface.vert", "position.frag")
-        self._arrays = [vertex_array(context, self.program, buffer) for buffer in buffers]
-        self._emitting = [vertex_array(context, self.program, buffer) for buffer in emitting]
-        self.low, self.high = low, high
-        self.corners = np.array([[(low, high)[n >> i & 1][i] for i in range(3)] for n in range(8)])
-
-    def draw(self, matrix: Array, *, from_far: bool = False) -> None:
-        """Into the framebuffer in use, from the scene to clip space by a matrix (4, 4).
-
-        from_far : with what emits light.
-        """
-        moderngl = require_moderngl()
-        self.context.enable_only(moderngl.DEPTH_TEST)
-        set_uniforms(self.program, {"view_projection": tuple(matrix.T.ravel().tolist())})
-        for array in (*self._arrays, *(self._emitting if from_far else ())):
-            array.render(moderngl.TRIANGLES)
-
-    def seen(self, camera: Camera) -> Array:
-        """(n, 3) places that a camera sees, on a coarse grid of pixels."""
-        longest = max(camera.size)
-        width, height = (max(1, round(_GLANCES * n / longest)) for n in camera.size)
-        target = Target(self.context, width, height)
-        target.frame.use()
-        target.frame.clear(0.0, 0.0, 0.0, 0.0)
-        self.draw(camera.view_projection(self.low, self.high))
-        found = np.frombuffer(target.frame.read(components=4, dtype="f4"), np.float32)
-        target.release()
-        found = found.reshape(-1, 4).astype(float)
-        return np.asarray(found[found[:, 3] > 0.0, :3], np.float64)
-
-    def release(self) -> None:
-        """Free the graphics card's memory."""
-        for thing in (*self._arrays, *self._emitting, self.program):
-            thing.release()
 
 
 class ShadowMap:
@@ -105,34 +46,36 @@ class ShadowMap:
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._frame = context.framebuffer(depth_attachment=self.texture)
 
-    def draw(self, light: Light, places: Array, beside: tuple[float, float]) -> dict[str, Uniform]:
-        """Draw what a light sees; what shaders/shadow.glsl reads of it.
+    def draw(
+        self, light: Light, seen: Seen, beside: tuple[float, float]
+    ) -> tuple[dict[str, Uniform], list[dict[str, Uniform]]]:
+        """Draw what a light sees; what shaders/shadow.glsl reads of it, and of each surface in it.
 
         Parameters
         ----------
         light : without extent.
-        places : (n, 3) that the map must cover.
+        seen : what the map must cover.
         beside : 0 to 1, parts of a texel by which the map is shifted.
         """
         if light.place[3] == 0.0:
             corners = self.casters.corners
-            matrix, scale = parallel_view(light.place[:3], places, corners, self.size, beside)
+            matrix, scale = parallel_view(light.place[:3], seen.outline, corners, self.size, beside)
         else:
-            matrix, scale = self._perspective(light.place[:3], places, beside)
+            matrix, scale = self._perspective(light.place[:3], seen.places, beside)
         self._frame.use()
         self._frame.clear(depth=1.0)
-        self.casters.draw(matrix, from_far=light.place[3] == 0.0)
+        drawn = self.casters.draw_map(matrix, light, seen)
         cone = (0.0, 0.0)
         if light.cone is not None:
             cone = light.cone[0], 1.0 / max(light.cone[0] - light.cone[1], 1e-6)
-        return {
+        shared: dict[str, Uniform] = {
             "light_axis": tuple(float(x) for x in light.axis),
             "light_cone": cone,
             "shadow_matrix": tuple(matrix.T.ravel().tolist()),
             "shadow_planes": tuple(np.linalg.inv(matrix).ravel().tolist()),
-            "shadow_bias": _BIAS * scale,
             "shadow_steepest": _STEEPEST * scale,
         }
+        return shared, [{"shadow_bias": _BIAS[part] * scale} for part in drawn]
 
     def _perspective(
         self, eye: Array, places: Array, beside: tuple[float, float]

@@ -132,7 +132,7 @@ def _cylinder() -> Triangles:
         normal = np.stack([np.cos(phi), np.sin(phi), 0.0 * phi], axis=1)
         return p, normal, np.stack([-np.sin(phi), np.cos(phi), 0.0 * phi], axis=1)
 
-    return _grid(8, _SEGMENTS, point)
+    return _grid(1, _SEGMENTS, point)
 
 
 _ANALYTIC = {"Rectangle": _rectangle, "Sphere": _sphere, "Disk": _disk, "Cylinder": _cylinder}

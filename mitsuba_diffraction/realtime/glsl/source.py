@@ -8,7 +8,7 @@ from importlib import resources
 from typing import Literal
 
 from ...errors import DiffractionError
-from .textures import PAGE
+from .texels import PAGE
 
 Dialect = Literal["desktop", "web"]
 

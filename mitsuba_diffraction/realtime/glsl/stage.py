@@ -9,6 +9,7 @@ import numpy as np
 
 from ...tables.store.cache import cached_colours
 from .camera import Camera
+from .casters import Casters
 from .context import Bindings, Target, compile_plain, require_moderngl, set_uniforms
 from .emitters import Emitters
 from .lights import Light
@@ -17,9 +18,8 @@ from .materials import coat_index, height_scale
 from .obstacles import pack_obstacles
 from .prepared import vertex_array
 from .scene import RealtimeScene
-from .shadows import Casters
 from .surroundings import flat_shapes, pack_flats
-from .textures import Packed, Uniform
+from .texels import Packed, Uniform
 
 
 class Drawing(Protocol):
@@ -98,7 +98,8 @@ class Stage:
         vertices = [self._kept(context.buffer(one.vertices.tobytes())) for one in scene.emitting]
         self._glowing = [self._kept(vertex_array(context, self._glow, v)) for v in vertices]
         self._radiances = [tuple(float(x) for x in one.radiance) for one in scene.emitting]
-        self.casters = self._kept(Casters(context, buffers, scene.low, scene.high, vertices))
+        places = [surface.vertices for surface in scene.surfaces]
+        self.casters = self._kept(Casters(context, places, buffers, vertices))
 
     def _with_lobes(self, around: list[Bindings]) -> list[Joined]:
         """Of each surface, what surrounds it and where it sends light."""

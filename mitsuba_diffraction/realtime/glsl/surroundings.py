@@ -22,7 +22,7 @@ from ...errors import DiffractionError
 from ...plugin.names import name_of
 from .lights import emitted_radiance, radiance_along
 from .shadows import frame_along
-from .textures import Packed, Texture, Uniform, as_half
+from .texels import Packed, Texture, Uniform, as_half
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from ...thesis.methods.method import Method
 from ...thesis.methods.nmm import SPECULAR_WAVELENGTH
 from .packing import area_factor
 from .source import THESIS_METHODS
-from .textures import Packed, as_half, listed, texels
+from .texels import Packed, as_half, listed, texels
 
 #: As in the thesis: terms of the series, bins read along each axis, and nm.
 TERMS, TAPS, STEP = 37, 3, 5.0

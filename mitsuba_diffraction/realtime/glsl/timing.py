@@ -13,7 +13,7 @@ from .lights import light_definitions
 from .prepared import vertex_array
 from .renderer import Renderer
 from .source import LIGHTS
-from .textures import Packed, Texture, Uniform
+from .texels import Packed, Texture, Uniform
 
 #: Width and height of the pictures that are timed, the same for all methods.
 SIDE = 256

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.colour import encode_srgb
-from ..glsl.textures import Packed, Texture
+from ..glsl.texels import Packed, Texture
 from .sections import Section, Sections, packed_array, packed_file
 from .tables import as_columns
 

@@ -28,7 +28,7 @@ from ..glsl.source import (
     shader_file,
     vertex_source,
 )
-from ..glsl.textures import Packed
+from ..glsl.texels import Packed
 from .geometry import packed_mesh, sections_of
 from .light import packed_light
 from .parts import packed_parts

@@ -16,7 +16,7 @@ from ..glsl.scene import RealtimeScene
 from ..glsl.source import plain_source, vertex_source
 from ..glsl.stage import pack_solid, pack_surroundings
 from ..glsl.surroundings import flat_shapes
-from ..glsl.textures import Packed, shortened
+from ..glsl.texels import Packed, shortened
 from .geometry import packed_mesh, sections_of
 from .parts import packed_parts
 from .sections import Sections

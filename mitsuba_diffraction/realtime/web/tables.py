@@ -16,7 +16,7 @@ from ...tables.energy.powers import power_series
 from ...tables.store.cache import cached_colours
 from ...tables.table import DiffractionTable
 from ..glsl.packing import pack_colours, pack_powers
-from ..glsl.textures import Packed, shortened
+from ..glsl.texels import Packed, shortened
 from .sections import Section, packed_array
 
 #: What a page can draw with.

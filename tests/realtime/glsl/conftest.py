@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
 from mitsuba_diffraction.realtime.glsl.context import Bindings, compile_program, headless_context
-from mitsuba_diffraction.realtime.glsl.textures import Packed, Texture
+from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 
 
 @pytest.fixture(scope="session")

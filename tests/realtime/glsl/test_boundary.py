@@ -19,7 +19,7 @@ from mitsuba_diffraction.realtime.glsl.packing import (
     pack_responses,
     pack_roughness,
 )
-from mitsuba_diffraction.realtime.glsl.textures import Packed, Texture
+from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from tests.directions import as_single, uniform_directions
 from tests.realtime.glsl.conftest import probed

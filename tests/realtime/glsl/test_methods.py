@@ -33,7 +33,7 @@ from mitsuba_diffraction.realtime.glsl.source import (
     fragment_source,
     vertex_source,
 )
-from mitsuba_diffraction.realtime.glsl.textures import (
+from mitsuba_diffraction.realtime.glsl.texels import (
     PAGE,
     Packed,
     half_error,

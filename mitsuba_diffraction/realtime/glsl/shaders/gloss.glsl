@@ -28,6 +28,19 @@ float unshadowed(float cosine)
 #endif
 }
 
+#ifdef PRINCIPLED
+vec3 base_colour;                 // of the fragment
+
+// A dielectric's facets, and a metal's by Schlick (Burley 2012).
+vec3 facet_reflectance(float cosine)
+{
+    vec3 metal = mix(base_colour, vec3(1.0), fifth_power(1.0 - cosine));
+    return mix(reflectance(cosine), metal, metallic);
+}
+#else
+vec3 facet_reflectance(float cosine) { return reflectance(cosine); }
+#endif
+
 // f·cosθ, wi towards the eye.
 vec3 gloss(vec3 wi, vec3 wo)
 {
@@ -35,7 +48,7 @@ vec3 gloss(vec3 wi, vec3 wo)
     return reflectance(wi.z);  // along the one direction that is mirrored
 #else
     vec3 h = normalize(wi + wo);
-    return reflectance(dot(wi, h)) * (microfacets(h.z) * unshadowed(wi.z) * unshadowed(wo.z)
-                                      / (4.0 * wi.z));
+    return facet_reflectance(dot(wi, h)) * (microfacets(h.z) * unshadowed(wi.z) * unshadowed(wo.z)
+                                            / (4.0 * wi.z));
 #endif
 }

@@ -40,11 +40,31 @@ float passed(float cosine)
 
 #endif
 
+#ifdef PRINCIPLED
+
+uniform float metallic;           // share of a metal
+uniform float roughness;
+
+float fifth_power(float x) { return x * x * x * x * x; }
+
+// The base of the principled BSDF over a diffuse one, with what rough ones throw back (Burley 2012).
+float burley(vec3 wi, vec3 wo)
+{
+    float there = fifth_power(1.0 - wo.z), back = fifth_power(1.0 - wi.z);
+    float thrown = roughness * (1.0 + dot(wi, wo));  // 2 r cos²θ of the half vector
+    return (1.0 - 0.5 * there) * (1.0 - 0.5 * back)
+        + thrown * (there + back + there * back * (thrown - 1.0));
+}
+
+#endif
+
 // Share of the light that reaches what lies beneath and comes back.
 vec3 transmission(vec3 wi, vec3 wo, vec2 rotation)
 {
 #if defined(THROUGH)
     return vec3(passed(wi.z) * passed(wo.z));
+#elif defined(PRINCIPLED)
+    return vec3((1.0 - metallic) * burley(wi, wo));
 #elif !defined(DIFFRACTING)
     return vec3(1.0);
 #elif defined(THESIS)

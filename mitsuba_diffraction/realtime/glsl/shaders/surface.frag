@@ -37,6 +37,9 @@ uniform mat3 pigment_in_light;    // from a pigment's colour to that under this 
 #ifdef WEIGHTED
 uniform float light_density;      // as `lights.Light.density`
 #endif
+#if defined(SHADOWED) || defined(LOOKED_UP)
+uniform bool solid;               // a closed body, seen from outside: rays that lead in are lost
+#endif
 
 uniform float exposure;           // factor, for a display
 
@@ -57,6 +60,30 @@ vec3 lobes(vec3 wi, vec3 wo, vec2 rotation, int light)
 #endif
 }
 
+#endif
+
+#if defined(BUMPED) || defined(NORMAL_MAPPED)
+#define TURNED
+
+// A normal that is turned from the surface's own, so that it faces the eye: its facet's other slope,
+// as of Mitsuba's `flip_invalid_normals`.
+vec3 facing(vec3 turned, vec3 n, vec3 towards_eye)
+{
+    if (dot(towards_eye, n) * dot(towards_eye, turned) > 0.0) return turned;
+    return 2.0 * dot(turned, n) * n - turned;
+}
+
+// What a facet turned from the surface's normal keeps of light from a direction: the share that
+// rough facets as steep as it would (Estevez et al. 2019, Mitsuba's `use_shadowing_function`).
+float kept_by_facet(vec3 turned, vec3 n, vec3 direction)
+{
+    float slope = dot(turned, n), height = dot(direction, n);
+    float roughness = min(0.125 * (1.0 / max(slope * slope, 1e-8) - 1.0), 1.0);
+    float steepness = 1.0 / max(height * height, 1e-8) - 1.0;
+    return 2.0 / (1.0 + sqrt(1.0 + roughness * steepness));
+}
+#else
+float kept_by_facet(vec3 turned, vec3 n, vec3 direction) { return 1.0; }
 #endif
 
 #ifdef BUMPED
@@ -114,11 +141,12 @@ void main()
     vec3 mapped = texture(normal_map, (normal_uv * vec3(v_texcoord, 1.0)).xy).xyz;
     n = normalize(mapped.x * s + mapped.y * t + mapped.z * n);
 #endif
-#if defined(BUMPED) || defined(NORMAL_MAPPED)
+    vec3 towards_eye = dot(view_axis, view_axis) > 0.0 ? view_axis : normalize(eye - v_position);
+#ifdef TURNED
+    n = facing(n, smooth_normal, towards_eye);
     s = normalize(s - n * dot(n, s));
     t = cross(n, s);
 #endif
-    vec3 towards_eye = dot(view_axis, view_axis) > 0.0 ? view_axis : normalize(eye - v_position);
     vec3 wi = vec3(dot(towards_eye, s), dot(towards_eye, t), dot(towards_eye, n));
     float side = two_sided && wi.z < 0.0 ? -1.0 : 1.0;
     bool seen = side * wi.z > 0.0;
@@ -143,12 +171,16 @@ void main()
 #ifdef PIGMENT_IN_LIGHT
     pigment = pigment_in_light * pigment;
 #endif
+#ifdef PRINCIPLED
+    base_colour = pigment;
+#endif
     float turned = length(rotation);
     rotation = turned > 1e-6 ? rotation / turned : vec2(1.0, 0.0);
 
 #if defined(SHADOWED) || defined(LOOKED_UP)
     vec3 flat_normal = cross(dFdx(v_position), dFdy(v_position));
     flat_normal *= inversesqrt(max(dot(flat_normal, flat_normal), 1e-30));
+    if (dot(flat_normal, towards_eye) < 0.0) flat_normal = -flat_normal;
 #endif
 
     vec3 radiance = vec3(0.0);
@@ -156,19 +188,20 @@ void main()
 #ifdef LOBES
     vec3 wo = lobe_direction(wi, rotation, drawn_numbers());
     vec3 direction = wo.x * s + wo.y * t + side * wo.z * n;
-    if (seen && wo.z > LOWEST && side * dot(direction, smooth_normal) > 0.0) {
+    if (seen && wo.z > LOWEST && side * dot(direction, smooth_normal) > 0.0
+        && !(solid && dot(direction, flat_normal) <= 0.0)) {
         float distance;
         vec4 light = arriving(v_position, direction, distance);
         float density = lobe_density(wi, wo, rotation);
 #ifdef OBSTACLES
-        vec3 above = dot(flat_normal, towards_eye) < 0.0 ? -flat_normal : flat_normal;
-        if (hidden(v_position, above, direction, distance)) light = vec4(0.0);
+        if (hidden(v_position, flat_normal, direction, distance)) light = vec4(0.0);
 #endif
 #ifdef MIRROR
         light.w = 0.0;
 #endif
         if (density > 0.0 && light.rgb != vec3(0.0))
-            radiance = light.rgb * lobes(wi, wo, rotation, 0) / (density + light.w);
+            radiance = light.rgb * lobes(wi, wo, rotation, 0)
+                * (kept_by_facet(n, smooth_normal, direction) / (density + light.w));
     }
 #endif
 #else
@@ -197,9 +230,11 @@ void main()
 #endif
         added += share * lobes(wi, wo, rotation, i);
 #endif
-        float falloff = light_place[i].w > 0.0 ? 1.0 / square : 1.0;
+        float falloff = kept_by_facet(n, smooth_normal, direction);
+        if (light_place[i].w > 0.0) falloff /= square;
 #ifdef SHADOWED
         if (i == 0) falloff *= emitted(direction) * reached(v_position, flat_normal);
+        if (solid && dot(flat_normal, direction) <= 0.0) lit = false;
 #endif
         radiance += lit ? falloff * added : vec3(0.0);
     }
