@@ -19,6 +19,7 @@ from .camera import Camera
 from .context import Target, compile_plain, require_moderngl, set_uniforms
 from .lights import Light
 from .prepared import vertex_array
+from .scene import Surface
 
 Array = NDArray[np.float64]
 
@@ -82,9 +83,10 @@ class Casters:
     Parameters
     ----------
     context : of moderngl.
-    surfaces : each one's vertices (n, …), which begin with a place.
-    buffers : the same in the graphics card's memory.
-    emitting : of what emits light, which stands in the way of light from far away.
+    surfaces : of the scene.
+    buffers : their vertices in the graphics card's memory.
+    emitting : those of what emits light and reflects none, which stands in the way of light from
+        far away only.
 
     Attributes
     ----------
@@ -95,7 +97,7 @@ class Casters:
     def __init__(
         self,
         context: Any,
-        surfaces: Sequence[NDArray[np.float32]],
+        surfaces: Sequence[Surface],
         buffers: Sequence[Any],
         emitting: Sequence[Any] = (),
     ) -> None:
@@ -103,7 +105,8 @@ class Casters:
         self.program = compile_plain(context, "surface.vert", "position.frag")
         self._arrays = [vertex_array(context, self.program, buffer) for buffer in buffers]
         self._emitting = [vertex_array(context, self.program, buffer) for buffer in emitting]
-        triangles = [v[:, :3].reshape(-1, 3, 3).astype(np.float64) for v in surfaces]
+        triangles = [s.vertices[:, :3].reshape(-1, 3, 3).astype(np.float64) for s in surfaces]
+        self._shapes = [int(s.shape.ptr) for s in surfaces]
         hulls = np.concatenate([outline(t.reshape(-1, 3)) for t in triangles])
         self.solids = [Solid.of(t, hulls) for t in triangles]
         self.low, self.high = hulls.min(axis=0), hulls.max(axis=0)
@@ -128,8 +131,8 @@ class Casters:
         moderngl = require_moderngl()
         set_uniforms(self.program, {"view_projection": tuple(matrix.T.ravel().tolist())})
         drawn = [
-            _needed(solid, light, outside)
-            for solid, outside in zip(self.solids, seen.solid, strict=True)
+            "none" if shape == light.shape else _needed(solid, light, outside)
+            for solid, outside, shape in zip(self.solids, seen.solid, self._shapes, strict=True)
         ]
         for array, solid, part in zip(self._arrays, self.solids, drawn, strict=True):
             if part == "none":
