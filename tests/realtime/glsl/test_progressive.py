@@ -392,6 +392,33 @@ def test_lobes_and_lights_share_what_surrounds_a_scene(
         assert found[pixels].mean(axis=0) == pytest.approx(mean, abs=0.04 * mean.max()), number
 
 
+def test_a_mirror_on_a_wide_plate_sees_nothing_beneath_it(
+    gl: Any, some_variant: str, table_file: Path
+) -> None:
+    """It sees the plate alone, which is not lit twice."""
+    T = mi.ScalarTransform4f
+    scene = plate_scene(
+        table_file,
+        plate={"type": "rectangle", "to_world": T().scale(400.0), "bsdf": diffuse()},
+        room={"type": "constant", "radiance": {"type": "rgb", "value": 0.5}},
+        mirror={
+            "type": "rectangle",
+            "to_world": T().translate([0.0, 0.0, 0.25]).rotate([1, 0, 0], 90).scale([1, 0.25, 1]),
+            "bsdf": {"type": "conductor", "material": "Au"},
+        },
+    )
+    renderer = Renderer(scene, context=gl)
+    light = renderer.progressive(size=(160, 40))
+    light.advance(8)
+    found = light.image[..., 1]
+    light.release()
+    expected = truth(renderer, 16)[..., 1]
+    renderer.release()
+    dark = expected == 0.0
+    assert dark.sum() > 50
+    assert found[dark].max() == 0.0
+
+
 @pytest.mark.parametrize("shape", ["disk", "sphere"])
 def test_a_lamp_may_reflect_other_light(
     gl: Any, some_variant: str, table_file: Path, shape: str
