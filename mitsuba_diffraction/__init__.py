@@ -44,13 +44,12 @@ from .errors import DiffractionError, DiffractionWarning  # noqa: E402
 from .heights import HeightField, gratings  # noqa: E402
 from .plugin import registration as _registration  # noqa: E402, F401  registers the plugin
 from .plugin.dictionary import bsdf_dict  # noqa: E402
-from .realtime import glsl, web  # noqa: E402
 from .tables import DiffractionTable  # noqa: E402
 
 if TYPE_CHECKING:
     from . import cluster
     from .analysis import design, maps, tradeoff
-    from .realtime import comparison
+    from .realtime import comparison, glsl, web
     from .thesis import evaluation
 
 __version__ = version(__name__)
@@ -72,14 +71,16 @@ __all__ = [
     "web",
 ]
 
-# Imported when first asked for: renders need neither, nor Matplotlib, which they load.
+# Imported when first asked for: renders need none, nor Matplotlib, which some load.
 _ON_DEMAND = {
     "cluster": "cluster",
     "comparison": "realtime.comparison",
     "design": "analysis.design",
     "evaluation": "thesis.evaluation",
+    "glsl": "realtime.glsl",
     "maps": "analysis.maps",
     "tradeoff": "analysis.tradeoff",
+    "web": "realtime.web",
 }
 
 

@@ -44,7 +44,11 @@ def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 _BUSY = {
     "deadline": None,
     "print_blob": True,
-    "suppress_health_check": [hypothesis.HealthCheck.too_slow],
+    # folders of a test may hold the files of all of its cases
+    "suppress_health_check": [
+        hypothesis.HealthCheck.too_slow,
+        hypothesis.HealthCheck.function_scoped_fixture,
+    ],
 }
 hypothesis.settings.register_profile("search", **_BUSY)
 hypothesis.settings.register_profile("tests", **_BUSY, derandomize=True, database=None)
@@ -73,6 +77,16 @@ def ctrl_c() -> Iterator[None]:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture(scope="module")
+def coarse() -> Iterator[None]:
+    """Energy conserved coarsely, for modules that do not ask how well it is."""
+    from tests.coarse import coarse_energy
+
+    with pytest.MonkeyPatch.context() as patch:
+        coarse_energy(patch.setattr)
+        yield
 
 
 @pytest.fixture(scope="session")

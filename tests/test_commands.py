@@ -37,7 +37,7 @@ SMALL = {
 pytestmark = [
     # heights as coarse and steep as the stand-ins' are worth a warning
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-    pytest.mark.usefixtures("some_variant"),
+    pytest.mark.usefixtures("coarse", "some_variant"),
 ]
 
 
@@ -108,6 +108,8 @@ def without_size(rest: list[str]) -> list[str]:
 
 @pytest.mark.parametrize("page", [page for page in PAGES if commands(page)])
 def test_the_commands_of_a_page_run(page, tree, monkeypatch):
+    # of height scales that a page may be asked for, two
+    monkeypatch.setattr("mitsuba_diffraction.realtime.web.scene.OCTAVES", (-1.0, 0.0))
     monkeypatch.chdir(tree)
     for words in commands(page):
         run(words)

@@ -20,6 +20,8 @@ from mitsuba_diffraction.scene.parameters import parameters_of
 from scenes.make.__main__ import build_parser as meshes_parser
 from tests.clone import small_clone
 
+pytestmark = pytest.mark.usefixtures("coarse")
+
 ROOT = Path(__file__).parents[1]
 DENOISER = importlib.util.find_spec("pyoidn") is not None
 PACKAGE = Path(md.__file__).parent

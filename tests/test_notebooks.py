@@ -89,9 +89,16 @@ SAYS: dict[str, Callable[[str], None]] = {"recover_grating_depth": depth_is_foun
 
 #: What takes long and changes nothing that is tested, and what stands for it here.
 SMALLER = {
+    "first_render": {
+        "phi=0, resolution=150)": "phi=0, resolution=150, step=20)",
+        "--resolution 150 -o": "--resolution 150 --step 20 -o",
+        "resolution=100, step=10": "resolution=40, step=40",
+    },
     "shaders_against_path_tracing": {"spp=512": "spp=64", "spp=128": "spp=16"},
     "speed_and_accuracy": {
-        "measure_depths(6)": "measure_depths(4)",
+        "pixels=240": "pixels=160",
+        "measure_depths(6)": "measure_depths(3)",
+        "t in (1e-2, 1e-3, 1e-5)": "t in (1e-2, 1e-3)",
         "lanes=1 << 16, rounds=3": "lanes=1 << 12, rounds=1",
         "spp=64": "spp=16",
     },
@@ -99,12 +106,14 @@ SMALLER = {
 
 
 def smaller(path: Path, folder: Path) -> Path:
-    """A copy of a notebook with fewer samples, depths and rounds."""
+    """A copy of a notebook with fewer samples, depths and rounds, and energy conserved coarsely."""
     notebook = read(path)
     for old, new in SMALLER.get(path.stem, {}).items():
         assert old in code(notebook), old
         for cell in notebook.cells:
             cell.source = cell.source.replace(old, new)
+    first = next(cell for cell in notebook.cells if cell.cell_type == "code")
+    first.source = f"from tests.coarse import coarse_energy\ncoarse_energy()\n{first.source}"
     nbformat.write(notebook, folder / path.name)
     return folder / path.name
 

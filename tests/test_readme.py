@@ -12,6 +12,8 @@ from PIL import Image
 
 import mitsuba_diffraction as md
 
+pytestmark = pytest.mark.usefixtures("coarse")
+
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
 
 

@@ -27,7 +27,10 @@ STUDIO = (
 SMALL = {"spp": "4", "resx": "48", "resy": "40"}
 
 # the look-alikes are as steep as the real scales, which the package says every time
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+    pytest.mark.usefixtures("coarse"),
+]
 
 
 def _render(name: str, **parameters: str) -> np.ndarray:

@@ -32,17 +32,12 @@ def energy_summary(table: DiffractionTable) -> dict[str, Any]:
     650 nm, not at the directions for which the scale was made. Of gratings there is a bound beside
     it: what any reciprocal BRDF of the same orders must take of some direction.
     """
-    return {
-        name: _of_material(table, model, index) for name, (model, index) in _materials().items()
-    }
-
-
-def _materials() -> dict[str, tuple[str, Index]]:
-    return {
+    materials: dict[str, tuple[str, Index]] = {
         "dielectric 1.5": ("small_slope", lambda wavelengths: np.full(len(wavelengths), 1.5 + 0j)),
         "aluminium": ("small_slope", _aluminium),
         "none (R = 1)": ("kirchhoff", lambda wavelengths: None),
     }
+    return {name: _of_material(table, *material) for name, material in materials.items()}
 
 
 def _aluminium(wavelengths: NDArray[np.float64]) -> NDArray[np.complex128]:

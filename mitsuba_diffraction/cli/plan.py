@@ -234,8 +234,6 @@ def say_outside(planned: Planned, samples: int) -> None:
 
 def check_plan_options(args: argparse.Namespace) -> None:
     """Refuse options of a plan without one; a usage error."""
-    from .plan import PATHS, TOLERANCE
-
     for name, default in (("paths", PATHS), ("plan_tolerance", TOLERANCE)):
         if args.plan is None and getattr(args, name) != default:
             option = name.replace("_", "-")

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.analysis.bench import colours, figures
+from mitsuba_diffraction.analysis.bench import colours, figures, variance
 from mitsuba_diffraction.analysis.bench.contenders import ratio, rounds_of
 from mitsuba_diffraction.analysis.bench.figures import Goal, Plan, Row, Section
 from mitsuba_diffraction.cli import main
@@ -25,7 +25,7 @@ TINY = Plan(
     slow_lanes=32,
     rounds=2,
     resolution=12,
-    spp=1,
+    spp=2,
     reference_spp=2,
     map_resolution=8,
 )
@@ -33,9 +33,11 @@ SCENES = Path(__file__).parents[2] / "scenes"
 
 
 @pytest.fixture(scope="module", autouse=True)
-def tiny():
+def tiny(coarse):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figures, "QUICK", TINY)
+        # as many as the other pictures have: another number is another kernel
+        patch.setattr(variance, "_FIREFLY_SPP", TINY.spp)
         patch.setattr(colours, "MATERIALS", {"none": colours.MATERIALS["none"]})
         yield
 

@@ -13,6 +13,8 @@ from PIL import Image
 
 from mitsuba_diffraction.analysis.maps.files import ATTRIBUTE
 
+pytestmark = pytest.mark.usefixtures("coarse")
+
 # A map of the grating of `heights` that takes half a second.
 QUICK = ["--pixel-size", "0.08", "--coherence-width", "6", "--resolution", "32", "--step", "47"]
 

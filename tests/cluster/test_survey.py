@@ -9,6 +9,7 @@ import pytest
 
 from mitsuba_diffraction import gratings
 from tests.cli.conftest import run  # noqa: F401
+from tests.coarse import coarse_energy
 from tests.conftest import ROOT
 
 AFM = ROOT.parent / "shared" / "afm"
@@ -24,7 +25,7 @@ max_height = 0.375
 pixel_size = 0.025
 max_height = 0.25
 ["*.npy"]
-pixel_size = 0.05
+pixel_size = 0.0833
 """
 
 
@@ -33,7 +34,7 @@ def scans(tmp_path, monkeypatch):
     """Look-alikes, a damaged file, and what is measured, where it is kept."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "treatments.toml").write_text(TREATMENTS)
-    made = {"elaphe": gratings.elaphe_like(8.0, 160), "disc": gratings.cd(8.0, 160)}
+    made = {"elaphe": gratings.elaphe_like(8.0, 96), "disc": gratings.cd(8.0, 96)}
     for name, field in made.items():
         np.save(f"{name}.npy", field.heights)
     whole = (tmp_path / "disc.npy").read_bytes()
@@ -44,6 +45,7 @@ def scans(tmp_path, monkeypatch):
 
 
 def test_a_survey_on_two_workers_and_what_is_new_in_the_next(client, scans, run, tmp_path):  # noqa: F811
+    client.run(coarse_energy)
     command = "survey", *OPTIONS, "--scheduler", client.scheduler.address
     ran = run(*command, *scans[:-2], scans[-1])
     assert ran.code == 0, ran

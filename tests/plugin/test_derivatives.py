@@ -14,7 +14,10 @@ from tests.directions import Array, uniform_directions
 from tests.lanes import interaction, lanes, spectra, vectors
 
 # a steep grating bends light further than the model likes; that is not the point here
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+    pytest.mark.usefixtures("coarse"),
+]
 
 GRATING = md.gratings.sinusoidal(1.6, 0.25, periods=3, pixels_per_period=20)
 WAVELENGTHS = [[420.0, 500.0, 580.0, 680.0]]

@@ -23,7 +23,10 @@ from tests.plugin.plates import (
 )
 
 # coarse pixels keep the tables small; that is not the point here
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+    pytest.mark.usefixtures("coarse"),
+]
 
 
 @pytest.mark.parametrize("name", ["llvm_ad_rgb", "llvm_ad_mono", "cuda_ad_rgb"])

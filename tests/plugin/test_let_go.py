@@ -19,7 +19,10 @@ from tests.directions import rough_patch
 from tests.plugin.plates import diffraction, grey, plate, rendered, scene
 
 # coarse pixels keep the tables small; that is not the point here
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+    pytest.mark.usefixtures("coarse"),
+]
 LOADED = ("scalar_spectral", "llvm_ad_spectral", "llvm_ad_rgb", "llvm_ad_mono")
 GLASS = {"material": None, "energy_conserving": True}
 KINDS = {

@@ -17,7 +17,10 @@ from tests.directions import polar, rough_patch
 from tests.lanes import interaction, lanes, spectra, vectors
 from tests.plugin import gentle
 
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning"),
+    pytest.mark.usefixtures("coarse"),
+]
 
 #: nm; so far apart that dispersion sends each elsewhere.
 WAVELENGTHS = [400.0, 480.0, 560.0, 700.0]

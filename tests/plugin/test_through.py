@@ -157,7 +157,7 @@ def test_of_gentle_surfaces_both_sides_add_up_to_all_light(some_variant, kind):
 
 @pytest.mark.parametrize(("kind", "theta"), [("dielectric", 60.0), ("sheet", 70.0)])
 def test_conserved_both_sides_add_up_to_all_light(some_variant, kind, theta, monkeypatch):
-    monkeypatch.setattr(sides, "WAVELENGTHS", 3)  # one of them near 550 nm
+    monkeypatch.setattr(sides, "WAVELENGTHS", (3, 3))  # one of them near 550 nm
     grating = md.gratings.sinusoidal(2.5, 0.08, periods=8, pixels_per_period=28)
     common = {"field": grating, "coherence_width": 20.0, **SIDES[kind]}
     raw, conserved = (sampled(both(energy_conserving=e, **common), theta)[0] for e in (False, True))

@@ -68,7 +68,8 @@ def save_exr(
         linear = brdf_map.linear
         channels |= {name: linear[..., n] for n, name in enumerate("RGB")}
         if brdf_map.spectrum is not None:
-            names = (_band_name(w) for w in brdf_map.bands.wavelengths())
+            wavelengths = brdf_map.bands.wavelengths()
+            names = (f"T.{f'{w:.6g}'.replace('.', ',')}nm" for w in wavelengths)
             channels |= dict(zip(names, brdf_map.spectrum, strict=True))
     document = {
         "quantity": "f cosθo" if brdf_map.cosine else "f",
@@ -94,7 +95,3 @@ def save_exr(
             OpenEXR.File(header, pixels).write(str(temporary))
         except RuntimeError as error:  # what OpenEXR makes of a full disk
             raise OSError(None, f"OpenEXR: {' '.join(str(error).split())}") from error
-
-
-def _band_name(wavelength: float) -> str:
-    return f"T.{wavelength:.6g}nm".replace(".", ",").replace("T,", "T.")

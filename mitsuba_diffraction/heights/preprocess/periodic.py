@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal.windows import tukey
 
 from ..field import HeightField
 from .edges import seam_share
@@ -59,6 +58,8 @@ def periodic_taper(field: HeightField) -> HeightField:
     A tenth of the patch on each side is faded; it turns flat there and so reflects more like a
     mirror.
     """
+    from scipy.signal.windows import tukey  # half of what importing the package would take
+
     mean = field.heights.mean()
     # every other sample of a window of 2n + 1: taken at the pixels' centres, near 0 at both ends
     rows, columns = (tukey(2 * n + 1, 2 * TAPER_SHARE)[1::2] for n in field.shape)

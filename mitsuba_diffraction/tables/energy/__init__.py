@@ -10,5 +10,8 @@ chains         the scale of a grating, solved exactly between few directions
 grid           the grid of directions
 powers         powers of the orders as series in κ
 links          what becomes of one order's light between the sides of a dielectric
+sums           R + T as a linear map of weights, and the scales that bring it near 1
+sheet          the same of a sheet that is a grating, chain by chain
+between        R + T amid the nodes of a scale, and the scale lowered where that is above 1
 sides          R + T of a dielectric, and the scale of directions that makes it 1
 """

@@ -17,11 +17,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .gain import LEAST_COSINE, Gain, over_lobe
+from .gain import LEAST_COSINE, over_lobe
 from .grating import NODES, Grating, fractions
 from .grid import LAST_ANGLE
 from .transport import Orders, lobe_means, lobes
@@ -32,6 +33,22 @@ Array = NDArray[np.float32]
 SWEEPS = 40
 #: Nodes and parts of cells, from a whole ξ, where orders come up.
 SPIKES = (0.0, 0.25, 0.75, NODES - 1.0)
+
+
+class OrderGain(Protocol):
+    """G of one wavelength: `gain.Gain`, or `sheet.LinkGain`."""
+
+    @property
+    def wavenumber(self) -> float: ...
+
+    @property
+    def model(self) -> str: ...
+
+    def at(self, cos_i: Real, cos_o: Real, turn: Real) -> Real:
+        """G at cosines and the azimuth between them."""
+
+    def width(self, cos_i: Real, cos_o: Real) -> Real:
+        """κ over the wavenumber."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +64,7 @@ class Chains:
 
     orders: Orders
     grating: Grating
-    gain: Gain
+    gain: OrderGain
 
     def shares(self, first: Real, second: Real, last: int, steepest: bool = False) -> Real:
         """M (..., last + 1, last + 3), from ξ = (k + first, last − k + second), any one shape.
@@ -72,26 +89,21 @@ class Chains:
         share, cos_o, pole = lobe_means(*lobe, radius)
         least = math.cos(LAST_ANGLE) if steepest else float(lobes(*lobe)[2][-1])
         cos_i = np.sqrt(np.maximum(1.0 - x**2 - y_squared, least**2))
-        w = cos_i + np.sqrt(np.maximum(1.0 - radius**2, 0.0))
+        w = self.gain.width(cos_i, np.sqrt(np.maximum(1.0 - radius**2, 0.0)))
         power = self._powers(np.rint(last - k - o).astype(int), self.grating.spacing / g * w)
         across = np.hypot(x, np.sqrt(y_squared)) * radius
         turn = (x * x_o - y_squared) / np.maximum(across, 1e-12)
         turn = np.arccos(np.clip(turn, -1.0, 1.0))
-        gain = self._gain(cos_i, cos_o, turn)
+        gain = self.gain.at(cos_i, cos_o, turn)
         end = np.full_like(cos_o, LEAST_COSINE)
-        gain = over_lobe(gain, self._gain(cos_i, end, turn) * LEAST_COSINE, cos_o, pole)
+        gain = over_lobe(gain, self.gain.at(cos_i, end, turn) * LEAST_COSINE, cos_o, pole)
         return np.asarray(power * share * gain)
-
-    def _gain(self, cos_i: Real, cos_o: Real, turn: Real) -> Real:
-        sines = np.sqrt(np.maximum((1.0 - cos_i**2) * (1.0 - cos_o**2), 0.0))
-        dot, w = 1.0 + cos_i * cos_o + sines * np.cos(turn), cos_i + cos_o
-        return self.gain.between(cos_i, cos_o, turn) * (dot / w) ** 2 / (cos_i * cos_o)
 
     def _powers(self, number: NDArray[np.int_], kappa: Real) -> Real:
         """|a_m|² at κ, broadcast."""
         mixture, axis = self.orders.mixture, np.array(self.grating.axis)
         numbers = np.rint(mixture.frequency @ axis / self.grating.spacing).astype(int)
-        most = max(int(np.abs(numbers).max()), int(np.abs(number).max()))
+        most = max(int(np.abs(numbers).max(initial=0)), int(np.abs(number).max()))
         table = np.zeros((len(mixture.central), 2 * most + 1))
         table[:, numbers + most] = mixture.powers
         table[:, most] = mixture.central
@@ -111,7 +123,7 @@ class Chains:
             shares = self.shares(first, second, last)
             aim = np.minimum(shares.sum(axis=-1), target)
             total = aim.sum(axis=-1)
-            aim *= _balance(total, total.T)[..., None]
+            aim *= balance(total, total.T)[..., None]
             s = scaled(shares, aim, largest)
             self._lower_horizon(s, last, target)
             put(values, s, last)
@@ -127,7 +139,7 @@ class Chains:
             np.minimum(self.shares(*ends, last).sum(axis=-1), 1.0).sum(axis=-1)
             for ends in ((first, second), (second, first))
         ]
-        return _balance(*totals)
+        return balance(*totals)
 
     def _lower_horizon(self, s: Real, last: int, target: float) -> None:
         """Nodes at the horizon are met by light that comes yet closer to it."""
@@ -166,7 +178,7 @@ class Chains:
         return np.append(amid, SPIKES if self.gain.model == "kirchhoff" else [])
 
 
-def _balance(total: Real, other: Real) -> Real:
+def balance(total: Real, other: Real) -> Real:
     """What may be kept of a half's sum, where the other half's may be less."""
     return np.asarray(np.minimum(1.0, other / np.maximum(total, 1e-12)))
 

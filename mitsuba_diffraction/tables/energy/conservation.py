@@ -227,7 +227,10 @@ def _scaled(transport: Transport, aim: Array) -> Array:
 
 
 def scaled(
-    transport: Callable[[Array], Array], aim: Array, theta: Real, sweeps: int = SWEEPS
+    transport: Callable[[Any], Any],
+    aim: NDArray[np.floating[Any]],
+    theta: Real,
+    sweeps: int = SWEEPS,
 ) -> Array:
     """s on a grid, whose sums s Ms are `aim`; theta : polar angles, rad, that broadcast to it."""
     s = np.ones_like(aim)
@@ -293,7 +296,7 @@ class _Maps:
                     for one, m, mean in zip(between, sums, means, strict=False)
                 ]
             )
-            much = _of_both_pages(much, len(s))
+            much = of_both_pages(much, len(s))
             s /= much if turn == TURNS else np.sqrt(much)
         return DirectionalTable(wavelengths, s, grating)
 
@@ -312,13 +315,13 @@ class _Maps:
             for n, transport in enumerate(transports):
                 mean = 0.5 * (s[n] + s[min(n + 1, len(s) - 1)])
                 found = (here(mean) * transport(mean)).reshape(grid.polar, parts, -1, parts)
-                much[n] = _largest_around(np.maximum(found.max(axis=(1, 3)) / CEILING, 1.0))
-            much = _of_both_pages(much, len(s))
+                much[n] = largest_around(np.maximum(found.max(axis=(1, 3)) / CEILING, 1.0))
+            much = of_both_pages(much, len(s))
             s /= 1.0 + PEAKS * (much - 1.0) if turn == GENTLE else np.sqrt(much)
         return DirectionalTable(scale.wavelengths, s)
 
 
-def _of_both_pages(much: Array, pages: int) -> Array:
+def of_both_pages(much: Array, pages: int) -> Array:
     """From between the wavelengths to them, each the larger of what is to its sides."""
     if pages == 1:
         return much
@@ -345,7 +348,7 @@ def _between(grid: DirectionGrid, parts: int) -> tuple[Real, Real]:
     return theta.ravel(), phi
 
 
-def _largest_around(cells: Array) -> Array:
+def largest_around(cells: Array) -> Array:
     """From cells (polar, azimuthal) to vertices, each the largest of the cells around it."""
     rows = np.concatenate([cells[:1], np.maximum(cells[1:], cells[:-1]), cells[-1:]])
     rows[0] = rows[0].max()  # all cells of the first row meet at the normal

@@ -85,6 +85,16 @@ class Gain:
         at = np.stack(np.broadcast_arrays(*places, column))
         return np.asarray(map_coordinates(self._fine, at, order=1, mode="nearest"))
 
+    def at(self, cos_i: Real, cos_o: Real, turn: Real) -> Real:
+        """G likewise."""
+        sines = np.sqrt(np.maximum((1.0 - cos_i**2) * (1.0 - cos_o**2), 0.0))
+        dot, w = 1.0 + cos_i * cos_o + sines * np.cos(turn), self.width(cos_i, cos_o)
+        return self.between(cos_i, cos_o, turn) * (dot / w) ** 2 / (cos_i * cos_o)
+
+    def width(self, cos_i: Real, cos_o: Real) -> Real:
+        """κ over the wavenumber and the height scale."""
+        return cos_i + cos_o
+
     @cached_property
     def _fine(self) -> Real:
         return self.tables(np.linspace(0.0, 0.5 * np.pi, POLAR_FINE))

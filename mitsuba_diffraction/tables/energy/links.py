@@ -11,6 +11,7 @@ at κ = k w: N, mean power of Jones matrices, as in `optics.boundary` and `optic
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +19,11 @@ from numpy.typing import NDArray
 
 from ...optics import blend, boundary, coat, fresnel, through
 from ..table import DiffractionTable
-from .gain import LEAST_COSINE, bilinear
+from .gain import LEAST_COSINE
 
 Real = NDArray[np.float64]
+#: Of `Link.tables`, at rows of the last axis but one and at azimuths (rad).
+Read = Callable[[Real, Real], Real]
 
 #: Of `Medium.angle`, and of cosines of azimuths.
 POLAR, AZIMUTHS = 91, 33
@@ -101,11 +104,11 @@ class Link:
         q_i, q_o = self._normals(cos_i, cos_o)
         return np.asarray(q_i + q_o if self.came == self.left else np.abs(q_i - q_o))
 
-    def gain(self, table: Real, w: Real, cos_i: float, cos_o: Real, turn: Real) -> Real:
-        """G of one θi's `tables`."""
+    def gain(self, read: Read, w: Real, cos_i: Real | float, cos_o: Real, turn: Real) -> Real:
+        """G, from θi's `tables`."""
         q_i, q_o = self._normals(cos_i, cos_o)
         row = self.medium.angle(self.left, cos_o) * ((POLAR - 1) / (0.5 * np.pi))
-        return bilinear(table, row, turn) / (q_i * q_o * w**2) * self._reached(cos_i, cos_o, turn)
+        return read(row, turn) / (q_i * q_o * w**2) * self._reached(cos_i, cos_o, turn)
 
     def tables(
         self, parts: Real, theta: Real, k: float, table: DiffractionTable, scale: float
@@ -160,7 +163,7 @@ class Link:
         total = one + other + 2.0 * np.sqrt(one * other) * cos_turn
         return np.maximum(total, 0.0)
 
-    def _reached(self, cos_i: float, cos_o: Real, turn: Real) -> NDArray[np.bool_]:
+    def _reached(self, cos_i: Real | float, cos_o: Real, turn: Real) -> NDArray[np.bool_]:
         return np.asarray(self._squared(cos_i, cos_o, np.cos(turn)) < FARTHEST**2)
 
     def _at(self, theta: Real) -> tuple[Real, Real, Real]:
@@ -190,7 +193,7 @@ class Returned(Link):
         deeper = [np.sqrt(n * n - 1.0 + cosine**2) - cosine for cosine in (cos_i, cos_o)]
         return np.hypot(*deeper)
 
-    def gain(self, table: Real, w: Real, cos_i: float, cos_o: Real, turn: Real) -> Real:
+    def gain(self, read: Read, w: Real, cos_i: Real | float, cos_o: Real, turn: Real) -> Real:
         one, other = self._kept(np.asarray(cos_i)), self._kept(cos_o)
         return np.sqrt(one * other) * self._reached(cos_i, cos_o, turn)
 

@@ -17,38 +17,36 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import maximum_filter, minimum_filter
 
 from ...optics.geometry import wavenumber
 from ..sampling.order_mixture import OrderMixture
 from ..table import DiffractionTable
-from .conservation import DirectionalTable, parallel, scaled
+from . import between, sheet
+from .chains import Chains, put
+from .conservation import DirectionalTable, parallel
+from .gain import bilinear
+from .grating import NODES, Grating, GratingGrid, fractions
 from .grid import DirectionGrid, Interpolation
 from .links import Link, Medium
+from .sheet import ChainSides, LinkGain
+from .sums import LinkedSums, solved
 from .transport import Orders, Row, Transport
 
 Real = NDArray[np.float64]
 Array = NDArray[np.float32]
 
-#: Directions of s on either side, and wavelengths; in variants of one wavelength there is one.
-GRID, WAVELENGTHS = DirectionGrid(48, 48), 6
-#: Light that goes to and fro beyond the critical angle takes more of them than reflection does.
-SWEEPS = 30
-#: R + T is left as it is between these, and brought between them elsewhere; it is left altogether
-#: if it is nowhere above the last.
-LEAST, MOST, TOLERATED = 0.99, 0.999, 1.001
-#: Least that order 0 must leave for s not to be needed; by how much order 0 may change; and below
-#: what share it is not changed.
-ENOUGH, STRONGEST, FAINT = 0.98, 2.0, 1e-4
-#: Beyond this angle (rad) ever less is brought back, by so much a radian: part of a lobe is below
-#: the horizon.
-CERTAIN, FALL = np.radians(75.5), 1.0
-#: Where it differs between neighbours, this share of that is kept free below `MOST`, at most so
-#: much: for what lies between them.
-BETWEEN, MARGIN = 0.25, 0.006
+#: Directions on either side, of a sheet and of a dielectric, whose critical angle is all but one of
+#: the latter; and wavelengths. In variants of one there is one.
+SHEET, DENSE, WAVELENGTHS = DirectionGrid(48, 96), DirectionGrid(60, 96), (6, 12)
+#: The more of few orders, all of them strong. Chains of directions are solved of gratings whose
+#: orders are further apart than this, in 1/σ.
+FEW_ORDERS, NARROW = 24, 25.0
+#: Between the nodes of other grids R + T is looked at up to this angle, rad.
+LOOKED_AT = np.radians(80.0)
 
 
 @dataclass(frozen=True)
@@ -68,7 +66,7 @@ class SideGrid(DirectionGrid):
 
 
 @dataclass(frozen=True)
-class BothSides:
+class BothSides(LinkedSums):
     """From weights (2, polar + 1, azimuthal) of directions to R + T (2, t, p).
 
     Attributes
@@ -82,16 +80,11 @@ class BothSides:
         return self._sums(lambda link, weights: link(weights), s)
 
     def zeroth(self, s: Array) -> Array:
-        """Order 0 alone."""
         return self._sums(lambda link, weights: link.glossy * link.mirror(weights), s)
 
     def _sums(self, of_link: Callable[[Transport, Array], Array | Real], s: Array) -> Array:
         sums = [sum(of_link(link, s[left]) for left, link in side) for side in self.parts]
         return np.asarray(np.stack(sums), np.float32)
-
-    def changed(self, c: Array, here: Array) -> Callable[[Array], Array]:
-        """R + T from weights, with order 0 scaled by c on the grids and at the directions."""
-        return lambda s: self(s) - self.zeroth(s) + here * self.zeroth(c * s)
 
 
 class Sides:
@@ -104,8 +97,10 @@ class Sides:
         self._flat = copy.copy(self._orders)
         self._flat.mixture, self._flat.has_weak = _level(self._orders.mixture), False
         self._links = medium.links()
-        self._grids = [SideGrid(GRID.polar, GRID.azimuthal, medium, side) for side in (0, 1)]
-        self._ones = np.ones((2, GRID.polar + 1, GRID.azimuthal), np.float32)
+        self._grid = SHEET if medium.thin else DENSE
+        shape = self._grid.polar, self._grid.azimuthal
+        self._grids = [SideGrid(*shape, medium, side) for side in (0, 1)]
+        self._ones = np.ones((2, shape[0] + 1, shape[1]), np.float32)
         self._parts: dict[tuple[Link, bytes], Real] = {}
 
     def scale(self, wavelength_range: tuple[float, float]) -> list[DirectionalTable] | None:
@@ -114,33 +109,74 @@ class Sides:
         A second or two. Their polar angles are `Medium.angle`.
         """
         low, high = wavelength_range
-        wavelengths = np.geomspace(low, high, WAVELENGTHS if high > low else 1)
-        found = np.stack(parallel(self._scale_at, wavelengths.tolist()), axis=1)
+        few = len(self._orders.mixture.frequency) <= FEW_ORDERS
+        count = WAVELENGTHS[few and not self._orders.has_weak] if high > low else 1
+        wavelengths = np.geomspace(low, high, count)
+        grating = self._grating
+        at = partial(self._scale_of_chains, grating) if grating else self._scale_at
+        found = np.stack(parallel(at, wavelengths.tolist()), axis=1)
         if np.all(found == 1.0):
             return None
         needed = found if np.any(found[2:] != 1.0) else found[:2]
-        return [DirectionalTable(wavelengths, values) for values in needed]
+        middle = np.sqrt(wavelengths[1:] * wavelengths[:-1]) if count > 1 else wavelengths
+        amid = partial(self._amid, grating)
+        needed = between.lowered(needed, parallel(amid, middle.tolist()))
+        return [DirectionalTable(wavelengths, values, grating) for values in needed]
+
+    def _amid(self, grating: Grating | None, wavelength: float) -> between.Excess:
+        if grating is not None:
+            return between.on_chains(self._by_length(grating, wavelength, np.arange(NODES) + 0.5))
+        halves = [replace(grid, polar=2 * self._grid.polar).angles[1::2] for grid in self._grids]
+        rows = int(np.sum(np.any(np.stack(halves) <= LOOKED_AT, axis=0)))
+        phi = self._grid.phi + np.pi / self._grid.azimuthal
+        transport = self.transport([angles[:rows] for angles in halves], phi, wavelength)
+        return between.on_grid(transport, rows)
 
     def _scale_at(self, wavelength: float) -> Array:
         """(4, polar + 1, azimuthal)."""
         theta = [grid.angles for grid in self._grids]
-        transport = self.transport(theta, GRID.phi, wavelength)
-        sums, angle = transport(self._ones), np.stack(theta)[..., None]
-        c, s = self._ones, self._ones
-        if not _near_1(sums, angle, LEAST):
-            zeroth = transport.zeroth(self._ones)
-            wanted = _aims(sums, angle) - (sums - zeroth)
-            wanted = np.clip(wanted, zeroth / STRONGEST, zeroth * STRONGEST)
-            c = scaled(transport.zeroth, wanted, angle, SWEEPS)
-            c = np.where(zeroth > FAINT, c, np.float32(1.0))
-            changed = transport.changed(c, c)
-            sums = changed(self._ones)
-            if not _near_1(sums, angle, ENOUGH):
-                aim = _aims(sums, angle)
-                s = scaled(changed, aim, angle, SWEEPS)
-                # Where there is no such scale, light is lost rather than gained
-                s = s * np.minimum(1.0, aim / np.maximum(s * changed(s), 1e-6))
-        return np.concatenate([c, s])
+        transport = self.transport(theta, self._grid.phi, wavelength)
+        return solved(transport, self._ones, np.stack(theta)[..., None])
+
+    @property
+    def _grating(self) -> Grating | None:
+        """Whose chains are solved, if lobes are narrow against the nodes of its grid."""
+        grating = self._orders.grating
+        narrow = grating is not None and grating.spacing * self._orders.sigma > NARROW
+        return grating if self._medium.thin and narrow else None
+
+    def _scale_of_chains(self, grating: Grating, wavelength: float) -> Array:
+        """(4, rows, rows) at the nodes of a `GratingGrid`."""
+        found = self._by_length(grating, wavelength, np.arange(NODES))
+        values = np.ones((4, NODES * len(found), NODES * len(found)), np.float32)
+        for last, sums in enumerate(found):
+            ones = np.ones((2, *sums.angle.shape))
+            for page, scale in zip(values, solved(sums, ones, sums.angle), strict=True):
+                put(page, scale, last)
+        return values
+
+    def _by_length(
+        self, grating: Grating, wavelength: float, places: ArrayLike
+    ) -> list[ChainSides]:
+        """All chains from 1 direction of either side on, at places among the nodes."""
+        chains, f = self._chains(grating, wavelength), fractions(places)
+        first, second = np.broadcast_arrays(f[:, None], f)
+        units = grating.units(self._table.wavelength_range[0])
+        return [ChainSides(chains, first, second, last) for last in range(units + 1)]
+
+    def _chains(self, grating: Grating, wavelength: float) -> list[list[tuple[int, Chains]]]:
+        """Those of every link, of either side."""
+        k = float(wavenumber(wavelength))
+        theta = np.linspace(0.0, 0.5 * np.pi, sheet.POLAR)
+        chains: list[list[tuple[int, Chains]]] = [[], []]
+        for link in self._links:
+            orders = self._flat if link.flat else self._orders
+            table = link.tables(
+                self._parts_of(link, theta), theta, k, self._table, self._height_scale
+            )
+            gain = LinkGain(link, table, k, orders.mixture.kappa_step / k)
+            chains[link.came].append((link.left, Chains(orders, grating, gain)))
+        return chains
 
     def sums(
         self, scale: Sequence[DirectionalTable] | None, theta: Real, phi: Real, wavelength: float
@@ -149,19 +185,16 @@ class Sides:
 
         Exact sums at these angles (rad), not the grid's; nm.
         """
-        transport = self.transport([theta, theta], phi, wavelength)
-        raw = transport(self._ones)
+        raw = self.transport([theta, theta], phi, wavelength)(self._ones)
         if scale is None:
             return raw, raw
         pages = [one.page(wavelength) for one in scale]
-        here = [
-            self._grids[n % 2].interpolation(theta[:, None], phi)(page)
-            for n, page in enumerate(pages)
-        ]
+        here = [self.at(one, n % 2, theta[:, None], phi, wavelength) for n, one in enumerate(scale)]
+        transport = self.transport([theta, theta], phi, wavelength, scale[0].grating)
         changed = transport.changed(np.stack(pages[:2]), np.stack(here[:2]))
         if len(pages) == 2:
-            return raw, changed(self._ones)
-        return raw, np.stack(here[2:]) * changed(np.stack(pages[2:]))
+            return raw, np.asarray(changed(np.ones_like(pages[:2])), np.float32)
+        return raw, np.asarray(np.stack(here[2:]) * changed(np.stack(pages[2:])), np.float32)
 
     def at(
         self,
@@ -172,14 +205,29 @@ class Sides:
         wavelength: float,
     ) -> Array:
         """One of `scale` at directions on its side: angles (rad) of any one shape."""
+        if table.grating is not None:
+            return table.at(theta, phi, wavelength)
         return self._grids[side].interpolation(theta, phi)(table.page(wavelength))
 
-    def transport(self, theta: Sequence[Real], phi: Real, wavelength: float) -> BothSides:
-        """From weights on the grids to R + T at polar angles of either side, and azimuths, rad."""
+    def transport(
+        self,
+        theta: Sequence[Real],
+        phi: Real,
+        wavelength: float,
+        grating: Grating | None = None,
+    ) -> BothSides:
+        """From weights on the grids to R + T at polar angles of either side, and azimuths, rad.
+
+        grating : that the weights are on the grid of.
+        """
         k = float(wavenumber(wavelength))
         parts: list[list[tuple[int, Transport]]] = [[], []]
         for link in self._links:
-            orders, grid = self._flat if link.flat else self._orders, self._grids[link.left]
+            orders = self._flat if link.flat else self._orders
+            grid: SideGrid | GratingGrid = self._grids[link.left]
+            if grating is not None:
+                units = grating.units(self._table.wavelength_range[0])
+                grid = GratingGrid(grating, (units + 1) * NODES, wavelength)
 
             def rows(at: Real, phi: Real, link: Link = link, orders: Orders = orders) -> list[Row]:
                 tables = link.tables(
@@ -222,24 +270,7 @@ class _Linked(Row):
 
     def gain(self, cos_o: Real, turn: Real) -> Real:
         w = self.kappa(cos_o) / self._per_w
-        return self._link.gain(self._table, w, self._cos, cos_o, turn)
-
-
-def _near_1(sums: Array, angle: Real, least: float) -> bool:
-    return bool(np.all((sums >= least) & (sums <= TOLERATED) | (angle > CERTAIN)))
-
-
-def _aims(sums: Array, angle: Real) -> Array:
-    """What R + T is to be."""
-    most = MOST - np.minimum(BETWEEN * _variation(sums), MARGIN)
-    least = LEAST - FALL * np.maximum(angle - CERTAIN, 0.0)
-    return np.asarray(np.clip(sums, least.astype(np.float32), most), np.float32)
-
-
-def _variation(sums: Array) -> Array:
-    """Largest less least of a direction and those around it."""
-    around = {"size": (1, 3, 3), "mode": ["nearest", "nearest", "wrap"]}
-    return np.asarray(maximum_filter(sums, **around) - minimum_filter(sums, **around))
+        return self._link.gain(partial(bilinear, self._table), w, self._cos, cos_o, turn)
 
 
 def _level(mixture: OrderMixture) -> OrderMixture:

@@ -133,7 +133,7 @@ class Orders:
     ) -> Weak:
         """The weak orders' part: smooth, so that a grid of half as many angles will do."""
         assert isinstance(grid, DirectionGrid)  # a grating has none
-        half = DirectionGrid(grid.polar // 2, grid.azimuthal // 2)
+        half = DirectionGrid(min(grid.polar // 2, 24), min(grid.azimuthal // 2, 30))
         x, y, cos_o = self.nodes
         turned = half.phi[:, None] + np.arctan2(y, x)
         return Weak(

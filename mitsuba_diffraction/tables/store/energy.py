@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.fresnel import Filmed
-from ..energy import chains, gain, grating, links, sides, transport
+from ..energy import between, chains, gain, grating, links, sheet, sides, sums, transport
 from ..energy import conservation as made
 from ..energy.conservation import Conservation, DirectionalTable, Index, conservation
 from ..energy.grating import Grating
@@ -21,7 +21,7 @@ from ..table import DiffractionTable
 from .store import Record, kept, key_of
 
 #: Raised whenever the computation changes.
-VERSION = 5
+VERSION = 6
 
 #: Height scales are n/steps: this phase (rad) changes at most in between. The power of an order
 #: bends by a fiftieth then, and by less at grazing angles, where there is most to take.
@@ -43,9 +43,11 @@ _SETTINGS = (
 )  # fmt: skip
 
 _SIDES = (
-    *_SETTINGS, str(sides.GRID), sides.WAVELENGTHS, sides.SWEEPS, sides.LEAST, sides.MOST,
-    sides.TOLERATED, sides.ENOUGH, sides.STRONGEST, sides.FAINT, sides.CERTAIN, sides.FALL,
-    sides.BETWEEN, sides.MARGIN, links.POLAR, links.AZIMUTHS, links.FARTHEST,
+    *_SETTINGS, str(sides.SHEET), str(sides.DENSE), sides.WAVELENGTHS, sides.FEW_ORDERS,
+    sides.NARROW, sides.LOOKED_AT, sums.SWEEPS, sums.LEAST, sums.MOST, sums.TOLERATED, sums.ENOUGH,
+    sums.STRONGEST, sums.FAINT, sums.FALL, sums.BETWEEN, sums.MARGIN, sums.LinkedSums.certain,
+    between.CEILING, between.GENTLE, between.MOST, sheet.ChainSides.certain, sheet.POLAR,
+    links.POLAR, links.AZIMUTHS, links.FARTHEST,
 )  # fmt: skip
 
 _known: weakref.WeakKeyDictionary[DiffractionTable, dict[str, Conservation]] = (

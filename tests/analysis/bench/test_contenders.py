@@ -20,6 +20,8 @@ from mitsuba_diffraction.analysis.bench.figures import Plan
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.tables.window import base_bin, first_tap
 
+pytestmark = pytest.mark.usefixtures("coarse")
+
 
 @pytest.fixture(scope="module")
 def factories(tmp_path_factory):

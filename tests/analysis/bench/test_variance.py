@@ -11,6 +11,8 @@ import mitsuba as mi  # isort: skip
 import drjit as dr  # isort: skip
 import numpy as np  # isort: skip
 
+pytestmark = pytest.mark.usefixtures("coarse")
+
 
 def drawn(bsdf, count=1 << 14):
     """Cosines of the directions drawn, their densities, and the weights at 550 nm."""

@@ -24,6 +24,8 @@ from mitsuba_diffraction.analysis.survey.treatments import treatment_for
 from mitsuba_diffraction.optics.colour import response
 from tests.cli.conftest import run
 
+pytestmark = pytest.mark.usefixtures("coarse")
+
 __all__ = ["run"]
 
 PERIOD, PIXEL = 1.6, 0.1

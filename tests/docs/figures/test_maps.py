@@ -10,7 +10,7 @@ from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.analysis.maps import Light
 
 
-@pytest.mark.usefixtures("variant")
+@pytest.mark.usefixtures("coarse", "variant")
 def test_there_is_a_map_for_each_patch_and_light():
     x = np.arange(32) * 0.0625
     fields = [

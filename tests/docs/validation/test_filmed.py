@@ -38,3 +38,10 @@ def test_gratings_of_slope_up_to_a_tenth(stack):
     assert found.max() < 0.1
     assert found[0].max() < 0.005  # of slope 0.03: first order is exact as heights go to 0
     assert np.median(found / filmed.deviations(stack, "kirchhoff")) < 0.3
+
+
+def test_of_thick_films_the_mean_of_the_second_order_is_most_of_it():
+    lacquer = STACKS[4]
+    first, dressed = (filmed.deviations(lacquer, model) for model in ("small_slope", filmed.MEAN))
+    assert first.max() > 0.15
+    assert dressed.max() < 0.1

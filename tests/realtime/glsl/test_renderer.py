@@ -22,6 +22,8 @@ from mitsuba_diffraction.realtime.glsl.renderer import Renderer
 from mitsuba_diffraction.tables.energy.conservation import FINE
 from tests.lanes import interaction, spectra, vectors
 
+pytestmark = pytest.mark.usefixtures("coarse")
+
 mi = pytest.importorskip("mitsuba")
 
 #: Towards the eye, in the plate's frame; and where a vertex has its colour.
