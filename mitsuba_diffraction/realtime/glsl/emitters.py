@@ -64,8 +64,7 @@ class Emitters:
 
     Attributes
     ----------
-    names : of the emitters that are drawn from.
-    probabilities : (n,) of each.
+    probabilities : (n,) of each emitter that is drawn from.
     environment : what lies around the scene.
     omissions : emitters of other kinds, in a few words each.
 
@@ -77,7 +76,6 @@ class Emitters:
 
     def __init__(self, scene: Any, middle: Array) -> None:
         self.omissions: list[str] = []
-        self.names: list[str] = []
         self._drawn: list[_Drawn] = []
         self._scene = scene  # area lights look their shapes up in it
         self._middle = middle
@@ -89,7 +87,6 @@ class Emitters:
                 self.omissions.append(f"{name_of(emitter)} ({emitter.class_name()})")
             elif (brings := drawn.irradiance()) > 0.0:
                 self._drawn.append(drawn)
-                self.names.append(name_of(emitter))
                 brought.append(brings)
         if not brought:
             raise DiffractionError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -53,7 +54,13 @@ class Map:
         if self.spectra is None or self.colours is None or spectrum.ndim > 1:
             return np.eye(3)
         apart = self.spectra @ _weights((wavelengths, spectrum)) - self.colours
-        return np.eye(3) + np.linalg.lstsq(self.colours, apart, rcond=1e-3)[0]
+        return np.eye(3) + self._fit @ apart
+
+    @cached_property
+    def _fit(self) -> Array:
+        """From numbers (n, k) at the texels that are known to the least squares' matrix (3, k)."""
+        assert self.colours is not None
+        return np.asarray(np.linalg.pinv(self.colours.astype(float), rcond=1e-3))
 
 
 def raw_picture(bsdf: Any, name: str, channels: int, scale: float, shift: float = 0.0) -> Map:
@@ -92,9 +99,14 @@ def colour_map(texture: Any, light: Spectrum) -> Map:
     return replace(whole, spectra=evaluated(texture, uv[some], _LAM), colours=found[some])
 
 
+@cache
+def _daylight_weights() -> Array:
+    return np.asarray(linear_srgb(response(_LAM)))
+
+
 def _weights(light: Spectrum) -> Array:
     """From reflectances over `_LAM` to their colours under a light, (36, 3)."""
-    weights = linear_srgb(response(_LAM)) * np.interp(_LAM, *light)[:, None]
+    weights = _daylight_weights() * np.interp(_LAM, *light)[:, None]
     return np.asarray(weights / weights.sum(axis=0))
 
 

@@ -10,6 +10,7 @@ frame, so their edges become smooth as the light does.
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -88,6 +89,7 @@ class ProgressiveLight:
         for target in self._sums:
             target.frame.clear(0.0, 0.0, 0.0, 0.0)
         self._counts = [0, 0]
+        self._drawn: Counter[tuple[str, bool]] = Counter()  # frames of each
         emitters = self._stage.emitters
         self._lights = itertools.cycle(self._fixed) if self._fixed else emitters.lights()
 
@@ -95,19 +97,22 @@ class ProgressiveLight:
         """Add this many frames."""
         for _ in range(frames):
             kind = self.frames % 2 if self._looks_up else 0
-            places = (0.5 + (self._counts[kind] + 1) * _STEPS) % 1.0
+            light = next(self._lights) if kind == 0 else _WHITE
+            # each emitter has all places in turn, a sky and its sun too: else glints come by chance
+            drawn = light.name, light.density != 0.0
+            self._drawn[drawn] += 1
+            places = (0.5 + self._drawn[drawn] * _STEPS) % 1.0
             camera = self._camera.sampled(places[:2] - 0.5, places[2:4])
             self._stage.draw_behind(self._frame.frame, camera, bright=kind == 1)
             if kind == 0:
-                self._light(camera, places[4:6])
+                self._light(light, camera, places[4:6])
             else:
                 self._look_up(camera, places[6:8])
             self._accumulate(self._sums[kind])
             self._counts[kind] += 1
 
-    def _light(self, camera: Camera, beside: Array) -> None:
+    def _light(self, light: Light, camera: Camera, beside: Array) -> None:
         """One light with its shadows."""
-        light = next(self._lights)
         if not len(self._seen.places):
             return
         uniforms, each = self._map.draw(light, self._seen, (float(beside[0]), float(beside[1])))

@@ -59,12 +59,10 @@ class Glow:
     ----------
     vertices : as of a surface.
     radiance : (3,) linear sRGB, the mean.
-    shape : of Mitsuba.
     """
 
     vertices: NDArray[np.float32]
     radiance: Array
-    shape: Any
 
 
 @dataclass(frozen=True)
@@ -178,7 +176,7 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
         vertices = _vertices(triangles, material, shape)
         radiance = emitted_radiance(shape) if shape.is_emitter() else None
         if radiance is not None and material.black:
-            emitting.append(Glow(vertices, radiance, shape))
+            emitting.append(Glow(vertices, radiance))
             continue
         exact = len(omissions) == before
         surfaces.append(Surface(name, vertices, material, shape, exact, radiance))

@@ -41,17 +41,29 @@ def triangles_of(shape: Any) -> Triangles | None:
         import mitsuba as mi
 
         to_world = np.array(mi.traverse(shape)["to_world"].matrix, np.float64).reshape(4, 4)
-        return _placed(maker(), to_world, flipped="flip_normals = 1" in str(shape))
+        return _placed(maker(), to_world, *a_normal(shape))
     return _of_mesh(shape) if shape.is_mesh() else None
 
 
-def _placed(local: Triangles, to_world: Array, flipped: bool) -> Triangles:
+def a_normal(shape: Any) -> tuple[Array, Array]:
+    """A place on a shape and its normal there, (3,) each: which way `flip_normals` has it."""
+    import mitsuba as mi
+
+    found = shape.sample_position(0.0, mi.Point2f(0.3, 0.4))
+    place, normal = (np.array(x, np.float64).reshape(3, -1)[:, 0] for x in (found.p, found.n))
+    return place, normal
+
+
+def _placed(local: Triangles, to_world: Array, place: Array, normal: Array) -> Triangles:
+    """In the world, with normals on the side that this one at a place is on."""
     linear = to_world[:3, :3]
+    positions = local.positions @ linear.T + to_world[:3, 3]
     normals = local.normals @ np.linalg.inv(linear)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    nearest = ((positions - place) ** 2).sum(axis=1).argmin()
     return Triangles(
-        positions=local.positions @ linear.T + to_world[:3, 3],
-        normals=-normals if flipped else normals,
+        positions=positions,
+        normals=-normals if normals[nearest] @ normal < 0.0 else normals,
         tangents=local.tangents @ linear.T,
         texcoords=local.texcoords,
     )

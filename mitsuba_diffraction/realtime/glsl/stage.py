@@ -150,7 +150,7 @@ def pack_surroundings(scene: RealtimeScene, emitters: Emitters, flats: Sequence[
     """The environment, and shapes that directions meet exactly, for shaders/surroundings.glsl."""
     extent = float(np.ptp([scene.low, scene.high]))
     packed = pack_flats(flats, emitters.share_of)
-    packed |= Packed((), {"least_distance": 1e-4 * extent})
+    packed |= Packed((), {"least_distance": 1e-6 * extent})
     environment = emitters.environment
     if environment is not None:
         packed |= environment.packed(emitters.share_of(environment.emitter))

@@ -22,6 +22,7 @@ from ...errors import DiffractionError
 from ...plugin.names import name_of
 from .lights import emitted_radiance, radiance_along
 from .shadows import frame_along
+from .shapes import a_normal
 from .texels import Packed, Texture, Uniform, as_half
 
 Array = NDArray[np.float64]
@@ -173,7 +174,7 @@ def pack_flats(shapes: Sequence[Any], share_of: Callable[[Any], float]) -> Packe
         to_world = np.array(mi.traverse(shape)["to_world"].matrix, np.float64).reshape(4, 4)
         to_local = np.linalg.inv(to_world)
         to_local[2] /= np.linalg.norm(to_local[2, :3])
-        if "flip_normals = 1" in str(shape):
+        if to_local[2, :3] @ a_normal(shape)[1] < 0.0:
             to_local[2] *= -1.0
         rows[:3, number] = to_local[:3]
         if shape.is_emitter():

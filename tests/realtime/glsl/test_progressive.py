@@ -132,8 +132,9 @@ def test_the_penumbra_of_a_disc_is_the_analytic_one(
 def test_shadows_have_neither_acne_nor_leaks(
     gl: Any, some_variant: str, table_file: Path, light: dict[str, Any]
 ) -> None:
-    """A log, which is open, a thin wall and a ball on a plate, as the path tracer has them."""
+    """A log, which is open, a thin wall and a box over a plate, as the path tracer has them."""
     T = mi.ScalarTransform4f
+    box = T().translate([-1.6, -0.4, 0.4]).rotate([0, 0, 1], 30).rotate([1, 0, 0], 20).scale(0.25)
     if light["type"] == "spot":
         light = {**light, "to_world": T().look_at([-3, -2, 3], [0, 0, 0], [0, 0, 1])}
     scene = plate_scene(
@@ -151,7 +152,7 @@ def test_shadows_have_neither_acne_nor_leaks(
             "to_world": T().translate([-0.6, 0.3, 0.5]).rotate([1, 0, 0], 90).scale([0.6, 0.5, 1]),
             "bsdf": {"type": "twosided", "bsdf": diffuse()},
         },
-        ball={"type": "sphere", "center": [-1.6, -0.4, 0.35], "radius": 0.35, "bsdf": diffuse()},
+        box={"type": "cube", "to_world": box, "bsdf": diffuse()},
     )
     renderer = Renderer(scene, context=gl)
     drawn = renderer.progressive(size=(160, 40))
@@ -172,11 +173,13 @@ def test_shadows_have_neither_acne_nor_leaks(
 
 
 def test_light_outside_a_room_stays_outside(gl: Any, some_variant: str, table_file: Path) -> None:
-    """The camera and a lamp are within a ball, the sun beyond it."""
+    """The camera and a lamp are within a cube, the sun beyond it."""
     sun = {"type": "directional", "direction": [0.3, 0.4, -1.0], "irradiance": 50.0}
     lamp = {"type": "point", "position": [0.5, -2.0, 2.0], "intensity": 3.0}
     for emitter, lit in ((sun, 0.0), (lamp, 1.0)):
-        room = {"type": "sphere", "radius": 20.0, "bsdf": {"type": "twosided", "bsdf": diffuse()}}
+        wide = mi.ScalarTransform4f().scale(20.0)
+        walls = {"type": "twosided", "bsdf": diffuse()}
+        room = {"type": "cube", "to_world": wide, "bsdf": walls}
         renderer = Renderer(plate_scene(table_file, emitter=emitter, room=room), context=gl)
         light = renderer.progressive(size=(40, 10))
         light.advance(4)
@@ -392,7 +395,34 @@ def test_lobes_and_lights_share_what_surrounds_a_scene(
         assert found[pixels].mean(axis=0) == pytest.approx(mean, abs=0.04 * mean.max()), number
 
 
-@pytest.mark.parametrize("shape", ["disk", "sphere"])
+def test_a_mirror_on_a_wide_plate_sees_nothing_beneath_it(
+    gl: Any, some_variant: str, table_file: Path
+) -> None:
+    """It sees the plate alone, which is not lit twice."""
+    T = mi.ScalarTransform4f
+    scene = plate_scene(
+        table_file,
+        plate={"type": "rectangle", "to_world": T().scale(400.0), "bsdf": diffuse()},
+        room={"type": "constant", "radiance": {"type": "rgb", "value": 0.5}},
+        mirror={
+            "type": "rectangle",
+            "to_world": T().translate([0.0, 0.0, 0.25]).rotate([1, 0, 0], 90).scale([1, 0.25, 1]),
+            "bsdf": {"type": "conductor", "material": "Au"},
+        },
+    )
+    renderer = Renderer(scene, context=gl)
+    light = renderer.progressive(size=(160, 40))
+    light.advance(8)
+    found = light.image[..., 1]
+    light.release()
+    expected = truth(renderer, 16)[..., 1]
+    renderer.release()
+    dark = expected == 0.0
+    assert dark.sum() > 50
+    assert found[dark].max() == 0.0
+
+
+@pytest.mark.parametrize("shape", ["disk", "cube"])
 def test_a_lamp_may_reflect_other_light(
     gl: Any, some_variant: str, table_file: Path, shape: str
 ) -> None:

@@ -2,7 +2,7 @@
 // them; see surroundings.py.
 
 uniform vec2 sequence;            // of the frame: what is drawn
-uniform float least_distance;     // of what a surface sees: it does not see itself
+uniform float least_distance;     // from a plane: a surface does not see itself
 
 #ifdef ENVIRONMENT
 uniform sampler2D environment;    // radiance, linear sRGB: around the z axis, and from it
@@ -49,7 +49,7 @@ vec4 arriving(vec3 position, vec3 direction, out float nearest)
         float t = -from.z / (abs(along.z) > 1e-12 ? along.z : 1e-12);
         vec2 at = from.xy + t * along.xy;
         float out_of_it = i < DISKS ? dot(at, at) : max(abs(at.x), abs(at.y));
-        if (out_of_it <= 1.0 && t > least_distance && t < nearest) {
+        if (out_of_it <= 1.0 && abs(from.z) > least_distance && t > 0.0 && t < nearest) {
             nearest = t;
             found = vec4(flat_light[i].rgb, flat_light[i].w * t * t / max(-along.z, 1e-6));
             if (along.z > 0.0) found = vec4(0.0);
