@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from mitsuba_diffraction.tables.energy import conservation, sides, transport
+from mitsuba_diffraction.tables.energy import conservation, sides, sums, transport
 from mitsuba_diffraction.tables.energy.grid import DirectionGrid
 from mitsuba_diffraction.tables.store import energy as kept
 
@@ -15,9 +15,10 @@ from mitsuba_diffraction.tables.store import energy as kept
 def coarse_energy(set_value: Callable[[object, str, object], object] = setattr) -> None:
     """From now on, or for as long as a monkeypatch's `setattr` lasts."""
     set_value(conservation, "FINE_WAVELENGTHS", 3)
-    set_value(sides, "GRID", DirectionGrid(24, 24))
-    set_value(sides, "WAVELENGTHS", 2)
-    set_value(sides, "SWEEPS", 8)
+    for name in ("SHEET", "DENSE"):
+        set_value(sides, name, DirectionGrid(24, 24))
+    set_value(sides, "WAVELENGTHS", (2, 2))
+    set_value(sums, "SWEEPS", 8)
     set_value(transport, "RINGS", 16)
     set_value(transport, "STEPS", 36)
     # others have what the cache keeps in full
