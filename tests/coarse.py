@@ -17,7 +17,7 @@ def coarse_energy(set_value: Callable[[object, str, object], object] = setattr) 
     set_value(conservation, "FINE_WAVELENGTHS", 3)
     for name in ("SHEET", "DENSE"):
         set_value(sides, name, DirectionGrid(24, 24))
-    set_value(sides, "WAVELENGTHS", (2, 2))
+    set_value(sides, "WAVELENGTHS", (2, 2, 2))
     set_value(sums, "SWEEPS", 8)
     set_value(transport, "RINGS", 16)
     set_value(transport, "STEPS", 36)

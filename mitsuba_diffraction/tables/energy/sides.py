@@ -41,9 +41,9 @@ Array = NDArray[np.float32]
 
 #: Directions on either side, of a sheet and of a dielectric, whose critical angle is all but one of
 #: the latter; and wavelengths. In variants of one there is one.
-SHEET, DENSE, WAVELENGTHS = DirectionGrid(48, 96), DirectionGrid(60, 96), (6, 12)
-#: The more of few orders, all of them strong. Chains of directions are solved of gratings whose
-#: orders are further apart than this, in 1/σ.
+SHEET, DENSE, WAVELENGTHS = DirectionGrid(48, 96), DirectionGrid(60, 96), (6, 8, 12)
+#: More of few orders, all of them strong, of a dielectric and of a sheet. Chains of directions,
+#: which need no more, are solved of gratings whose orders are further apart than this, in 1/σ.
 FEW_ORDERS, NARROW = 24, 25.0
 #: Between the nodes of other grids R + T is looked at up to this angle, rad.
 LOOKED_AT = np.radians(80.0)
@@ -109,10 +109,11 @@ class Sides:
         A second or two. Their polar angles are `Medium.angle`.
         """
         low, high = wavelength_range
-        few = len(self._orders.mixture.frequency) <= FEW_ORDERS
-        count = WAVELENGTHS[few and not self._orders.has_weak] if high > low else 1
-        wavelengths = np.geomspace(low, high, count)
         grating = self._grating
+        few = len(self._orders.mixture.frequency) <= FEW_ORDERS and not self._orders.has_weak
+        kind = 1 + self._medium.thin if few and grating is None else 0
+        count = WAVELENGTHS[kind] if high > low else 1
+        wavelengths = np.geomspace(low, high, count)
         at = partial(self._scale_of_chains, grating) if grating else self._scale_at
         found = np.stack(parallel(at, wavelengths.tolist()), axis=1)
         if np.all(found == 1.0):
