@@ -1,6 +1,6 @@
 """Conservation of energy at few wavelengths and directions, for what does not ask how good it is.
 
-It is a second's work for each table, material and film: a third of all that loading takes.
+It is seconds of work for each table, material and film, and a fraction of that here.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from mitsuba_diffraction.tables.store import energy as kept
 def coarse_energy(set_value: Callable[[object, str, object], object] = setattr) -> None:
     """From now on, or for as long as a monkeypatch's `setattr` lasts."""
     set_value(conservation, "FINE_WAVELENGTHS", 3)
-    for name in ("SHEET", "DENSE"):
-        set_value(sides, name, DirectionGrid(24, 24))
-    set_value(sides, "WAVELENGTHS", (2, 2, 2))
+    set_value(sides, "SHEET", DirectionGrid(24, 24))
+    set_value(sides, "DENSE", DirectionGrid(24, 24))
+    set_value(sides, "WAVELENGTHS", (2, 2, 3))
     set_value(sums, "SWEEPS", 8)
     set_value(transport, "RINGS", 16)
     set_value(transport, "STEPS", 36)

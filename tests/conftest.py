@@ -44,7 +44,11 @@ def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 _BUSY = {
     "deadline": None,
     "print_blob": True,
-    "suppress_health_check": [hypothesis.HealthCheck.too_slow],
+    # folders of a test may hold the files of all of its cases
+    "suppress_health_check": [
+        hypothesis.HealthCheck.too_slow,
+        hypothesis.HealthCheck.function_scoped_fixture,
+    ],
 }
 hypothesis.settings.register_profile("search", **_BUSY)
 hypothesis.settings.register_profile("tests", **_BUSY, derandomize=True, database=None)

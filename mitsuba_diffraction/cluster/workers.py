@@ -46,12 +46,16 @@ def connect(
     distributed = require_dask()
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # ours are the words
     if count is not None:
+        import dask
+
         with _ctrl_c_ignored():  # by the processes that are started: it is for the client
             cluster = distributed.LocalCluster(
                 n_workers=count, threads_per_worker=1, processes=True,
                 dashboard_address=":0", silence_logs=logging.CRITICAL,
             )  # fmt: skip
-        with cluster, distributed.Client(cluster) as client:
+        # a worker that died is started again, and not given up if that takes more than 15 s
+        patient = dask.config.set({"distributed.deploy.lost-worker-timeout": "10 minutes"})
+        with patient, cluster, distributed.Client(cluster) as client:
             client.register_plugin(_apart(distributed))
             yield client
         return

@@ -50,7 +50,7 @@ def test_two_workers_of_which_one_is_killed_build_the_same_table(client, scan, a
     assert table.error == alone.error
     assert table.source == alone.source
     assert work.tasks > 10
-    client.wait_for_workers(2, timeout=60)
+    client.wait_for_workers(2, timeout=300)
 
 
 def test_workers_are_sent_the_part_of_the_scan_that_their_windows_lie_in(scan, monkeypatch):

@@ -100,7 +100,7 @@ def test_a_killed_worker_and_late_ones_change_nothing(client, scene, expected):
     result = rendered(client, scene, progress=disturb)
     assert happened
     np.testing.assert_array_equal(np.array(result.bitmap), expected)
-    client.wait_for_workers(4, timeout=60)
+    client.wait_for_workers(4, timeout=300)
     np.testing.assert_array_equal(np.array(rendered(client, scene).bitmap), expected)
     client.cluster.scale(2)
 
@@ -159,6 +159,7 @@ def test_a_scheduler_that_is_killed_and_started_again_changes_nothing(
     scene, expected, start, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(frames_module, "_COUNTED", 0.0)  # or a quick restart would not be seen
+    monkeypatch.setattr(workers_module, "_PATIENCE", 300.0)  # of a busy machine
     port = free_port()
     address = f"tcp://127.0.0.1:{port}"
 
@@ -178,7 +179,7 @@ def test_a_scheduler_that_is_killed_and_started_again_changes_nothing(
             killed.extend((tmp_path / "passes").iterdir())
             start_all()
 
-    with cluster.connect(scheduler=address, patience=60) as mine:
+    with cluster.connect(scheduler=address, patience=300) as mine:
         job = film(mine, scene, [Wanted({}, SPP, 3)], tmp_path / "passes")
         (result,) = job.render(passes.Stop(), disturb)
     np.testing.assert_array_equal(np.array(result.bitmap), expected)

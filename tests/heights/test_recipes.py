@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mitsuba_diffraction.errors import DiffractionError
@@ -174,10 +174,7 @@ keys = st.sampled_from(["source", "generator", "arguments", "seeds", "output", "
                         *LOAD_KEYS, *RECIPE_SETTINGS])  # fmt: skip
 
 
-@settings(
-    max_examples=200,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+@settings(max_examples=200)
 @given(st.dictionaries(keys, values, max_size=5))
 def test_random_recipes_load_or_are_one_clear_line(folder, content):
     path = write(folder, "\n".join(f"{key} = {value}" for key, value in content.items()))

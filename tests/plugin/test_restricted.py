@@ -15,7 +15,10 @@ from tests.lanes import evaluated, interaction, lanes, refusal, vectors
 #: Of coarse pixels: small tables. The plugin warns of that, and this is not about that.
 PATCH = rough_patch((64, 64), (0.3, 0.3), 0.2)
 
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning"),
+    pytest.mark.usefixtures("coarse"),
+]
 
 
 def build(coherence):

@@ -19,12 +19,16 @@ from .camera import Camera
 from .context import Target, compile_plain, require_moderngl, set_uniforms
 from .lights import Light
 from .prepared import vertex_array
+from .scene import Surface
 
 Array = NDArray[np.float64]
 
 _GLANCES = 192  # pixels along the longer side, to find out what is seen
 _SAME = 1e-6  # of the scene's extent: places nearer to each other are one
 _BITS = 21  # of a coordinate, in that unit
+# texels by which a map's depth may lie before a surface that is lit, at least and at most, and over
+# the slope of its normals: within a texel neighbours stand out by as much
+_BIAS, _BENT = (0.05, 0.75), 8.0
 
 
 @dataclass(frozen=True)
@@ -54,18 +58,24 @@ class Solid:
         right, 0 if it is open.
     plane : (4,) a normal and an offset: all of the scene is on this side of the plane that the
         surface lies in; None of others.
+    bias : texels by which it may seem to shade itself.
     """
 
     low: Array
     high: Array
     winding: int
     plane: Array | None
+    bias: float
 
     @classmethod
-    def of(cls, triangles: Array, corners: Array) -> Solid:
-        """That of triangles (n, 3, 3) in a scene whose places (m, 3) are these or lie between."""
+    def of(cls, triangles: Array, normals: Array, corners: Array) -> Solid:
+        """That of triangles (n, 3, 3) in a scene whose places (m, 3) are these or lie between.
+
+        normals : (n, 3, 3) that they are shaded with.
+        """
         low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
-        return cls(low, high, _winding(triangles), _plane(triangles, corners))
+        bias = float(np.clip(_BENT * _bend(triangles, normals), *_BIAS))
+        return cls(low, high, _winding(triangles), _plane(triangles, corners), bias)
 
     def encloses(self, place: Array) -> bool:
         """Whether a place may lie within it."""
@@ -82,9 +92,10 @@ class Casters:
     Parameters
     ----------
     context : of moderngl.
-    surfaces : each one's vertices (n, …), which begin with a place.
-    buffers : the same in the graphics card's memory.
-    emitting : of what emits light, which stands in the way of light from far away.
+    surfaces : of the scene.
+    buffers : their vertices in the graphics card's memory.
+    emitting : those of what emits light and reflects none, which stands in the way of light from
+        far away only.
 
     Attributes
     ----------
@@ -95,7 +106,7 @@ class Casters:
     def __init__(
         self,
         context: Any,
-        surfaces: Sequence[NDArray[np.float32]],
+        surfaces: Sequence[Surface],
         buffers: Sequence[Any],
         emitting: Sequence[Any] = (),
     ) -> None:
@@ -103,9 +114,11 @@ class Casters:
         self.program = compile_plain(context, "surface.vert", "position.frag")
         self._arrays = [vertex_array(context, self.program, buffer) for buffer in buffers]
         self._emitting = [vertex_array(context, self.program, buffer) for buffer in emitting]
-        triangles = [v[:, :3].reshape(-1, 3, 3).astype(np.float64) for v in surfaces]
+        vertices = [s.vertices[:, :6].reshape(-1, 3, 6).astype(np.float64) for s in surfaces]
+        triangles = [v[..., :3] for v in vertices]
+        self._shapes = [int(s.shape.ptr) for s in surfaces]
         hulls = np.concatenate([outline(t.reshape(-1, 3)) for t in triangles])
-        self.solids = [Solid.of(t, hulls) for t in triangles]
+        self.solids = [Solid.of(v[..., :3], v[..., 3:], hulls) for v in vertices]
         self.low, self.high = hulls.min(axis=0), hulls.max(axis=0)
         box = self.low, self.high
         self.corners = np.array([[box[n >> i & 1][i] for i in range(3)] for n in range(8)])
@@ -118,18 +131,18 @@ class Casters:
         for array in self._arrays:
             array.render(moderngl.TRIANGLES)
 
-    def draw_map(self, matrix: Array, light: Light, seen: Seen) -> list[str]:
+    def draw_map(self, matrix: Array, light: Light, seen: Seen) -> list[float]:
         """What a shadow map holds, into the framebuffer in use.
 
         Returns
         -------
-        Of each surface, whether "all" of it was drawn, what faces "away" from the light, or "none".
+        Of each surface, texels by which what the map holds of it may shade what is lit.
         """
         moderngl = require_moderngl()
         set_uniforms(self.program, {"view_projection": tuple(matrix.T.ravel().tolist())})
         drawn = [
-            _needed(solid, light, outside)
-            for solid, outside in zip(self.solids, seen.solid, strict=True)
+            "none" if shape == light.shape else _needed(solid, light, outside)
+            for solid, outside, shape in zip(self.solids, seen.solid, self._shapes, strict=True)
         ]
         for array, solid, part in zip(self._arrays, self.solids, drawn, strict=True):
             if part == "none":
@@ -143,7 +156,10 @@ class Casters:
         if light.place[3] == 0.0:
             for array in self._emitting:
                 array.render(moderngl.TRIANGLES)
-        return drawn
+        return [
+            solid.bias if part == "all" else _BIAS[0]
+            for solid, part in zip(self.solids, drawn, strict=True)
+        ]
 
     def seen(self, camera: Camera) -> Seen:
         """What a camera sees."""
@@ -175,10 +191,20 @@ def outline(places: Array) -> Array:
 
 
 def _needed(solid: Solid, light: Light, from_outside: bool) -> str:
+    """Whether a map needs "all" of its triangles, those that face "away" from the light, "none"."""
     if solid.hides_nothing(light):
         return "none"
     inside = light.place[3] > 0.0 and solid.encloses(light.place[:3])
     return "away" if from_outside and not inside else "all"
+
+
+def _bend(triangles: Array, normals: Array) -> float:
+    """Slope by which the normals turn within a triangle, that of the most bent but 1 in 1000."""
+    flat = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    along = np.abs(np.einsum("ni,nci->nc", flat, normals))
+    across = np.linalg.norm(np.cross(flat[:, None], normals), axis=2)
+    slopes = across / np.maximum(along, 1e-30)
+    return float(np.quantile(slopes[along.min(axis=1) > 0.0].ravel(), 0.999, method="higher"))
 
 
 def _winding(triangles: Array) -> int:

@@ -186,13 +186,15 @@ class _Drawn:
             points = np.pad(places, [(0, 0), (0, 1)], constant_values=1.0)
             shape = self._emitter.get_shape()
             density = np.full(_BLOCK, 1.0 / _area(shape) if is_flat(shape) else 0.0)
+            address = int(shape.ptr)
         else:
             values, places, density, waves = self._around(start)
             points, normals = np.pad(places, [(0, 0), (0, 1)]), np.zeros((_BLOCK, 3))
+            address = 0
         return [
             Light(
                 name, point, waves, value[:, 0] if value.shape[1] == 1 else value, normal,
-                density=float(of_place),
+                density=float(of_place), shape=address,
             )
             for point, value, normal, of_place in zip(points, values, normals, density, strict=True)
         ]  # fmt: skip

@@ -35,6 +35,7 @@ class Light:
         whose intensity falls with the cosine.
     density : with which a place was drawn on an area light, per area; −1 for a direction drawn from
         an environment's picture, 0 for what is drawn in no other way (`surroundings`).
+    shape : address of the shape that an area light belongs to; 0 of others.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Light:
     axis: Array = field(default_factory=lambda: np.zeros(3))
     cone: tuple[float, float] | None = None
     density: float = 0.0
+    shape: int = 0
 
     @property
     def colour(self) -> Array:
@@ -69,7 +71,8 @@ class Lighting:
     @property
     def mean_spectrum(self) -> tuple[Array, Array]:
         """Of all lights, relative to D65; that itself where only three colours are known."""
-        spectra = [light.spectrum / light.colour.sum() for light in self.lights]
+        bright = [(light, light.colour.sum()) for light in self.lights]
+        spectra = [light.spectrum / total for light, total in bright if total > 0.0]
         if not spectra or spectra[0].ndim > 1:
             return np.array([360.0, 830.0]), np.ones(2)
         return self.lights[0].wavelengths, np.mean(spectra, axis=0)

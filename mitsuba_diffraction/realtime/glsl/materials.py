@@ -50,6 +50,13 @@ class Material:
     normals: Map | None = None
 
     @property
+    def black(self) -> bool:
+        """Whether it reflects nothing."""
+        own = self.bsdf is None and self.gloss is None
+        plain = self.pigment.picture is None and self.pigment.attribute is None
+        return own and plain and not self.pigment.value.any()
+
+    @property
     def table(self) -> DiffractionTable:
         """The diffraction table."""
         table: DiffractionTable = self.bsdf.table
@@ -160,6 +167,13 @@ def pack_surface(material: Material) -> Packed:
     if isinstance(bsdf.boundary, SmallSlope):
         packed |= pack_roughness(material.table.roughness)
     return packed | _reflectance(surface)
+
+
+def pack_emission(radiance: Array | None) -> Packed:
+    """What a surface emits, (3,) linear sRGB; None of most."""
+    if radiance is None:
+        return Packed()
+    return Packed((), {"emission": tuple(radiance.tolist())}, {"EMITTING": ""})
 
 
 def pack_relief(material: Material) -> Packed:

@@ -26,6 +26,7 @@ from .materials import (
     conservation_at,
     height_scale,
     pack_conservation,
+    pack_emission,
     pack_relief,
     pack_surface,
 )
@@ -86,7 +87,10 @@ class Renderer:
         self.bindings = [
             Bindings(
                 self.context,
-                pack_surface(s.material) | pack_relief(s.material) | pack_conservation(s.material),
+                pack_surface(s.material)
+                | pack_relief(s.material)
+                | pack_conservation(s.material)
+                | pack_emission(s.radiance),
             )
             for s in self.scene.surfaces
         ]

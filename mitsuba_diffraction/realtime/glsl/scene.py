@@ -40,6 +40,7 @@ class Surface:
     material : how it reflects.
     shape : of Mitsuba.
     exact : whether all of its material is shown.
+    radiance : (3,) linear sRGB that it emits as well, the mean; None of most.
     """
 
     name: str
@@ -47,11 +48,12 @@ class Surface:
     material: Material
     shape: Any
     exact: bool
+    radiance: Array | None = None
 
 
 @dataclass(frozen=True)
 class Glow:
-    """A shape that emits light.
+    """A shape that emits light and reflects none.
 
     Attributes
     ----------
@@ -74,7 +76,7 @@ class RealtimeScene:
     surfaces, camera, lighting : in world space.
     low, high : (3,) corners of a box around all surfaces.
     omissions : what is not shown, or shown otherwise, in a few words each.
-    emitting : shapes that emit light, and their colours; they reflect none.
+    emitting : shapes that emit light and reflect none.
     of_light : of the omissions, what progressive light does show.
     """
 
@@ -86,6 +88,11 @@ class RealtimeScene:
     omissions: tuple[str, ...]
     emitting: tuple[Glow, ...] = ()
     of_light: tuple[str, ...] = ()
+
+    @property
+    def glows(self) -> bool:
+        """Whether anything in it emits light."""
+        return bool(self.emitting) or any(s.radiance is not None for s in self.surfaces)
 
     @property
     def diffracting(self) -> tuple[Surface, ...]:
@@ -152,7 +159,7 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
     if not 0 <= sensor < len(sensors):
         raise DiffractionError(f"sensor={sensor}: the scene has {len(sensors)} sensors")
     camera, omissions = read_camera(sensors[sensor])
-    shown, emitting = [], []
+    shown = []
     for number, shape in enumerate(scene.shapes()):
         name = name_of(shape, number)
         check_attributes(shape, number)
@@ -160,20 +167,21 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
         if triangles is None:
             omissions.append(f"{name} ({shape.class_name()})")
             continue
-        if shape.is_emitter():
-            black = _vertices(triangles, Material(Map(np.zeros(3))), shape)
-            emitting.append(Glow(black, emitted_radiance(shape), shape))
-            continue
         _check_texcoords(shape, name)
         shown.append((name, shape, triangles))
     middle = _middle([t for _, shape, t in shown if diffracts(shape.bsdf())])
     lighting = read_lights(scene, middle, LIGHTS)
-    surfaces = []
+    surfaces, emitting = [], []
     for name, shape, triangles in shown:
         before = len(omissions)
         material = read_material(shape.bsdf(), omissions, name, lighting.mean_spectrum)
         vertices = _vertices(triangles, material, shape)
-        surfaces.append(Surface(name, vertices, material, shape, len(omissions) == before))
+        radiance = emitted_radiance(shape) if shape.is_emitter() else None
+        if radiance is not None and material.black:
+            emitting.append(Glow(vertices, radiance, shape))
+            continue
+        exact = len(omissions) == before
+        surfaces.append(Surface(name, vertices, material, shape, exact, radiance))
     low, high = box_of([s.vertices[:, :3] for s in surfaces])
     lens = ("the lens (shown as a pinhole)",) if camera.lens > 0.0 else ()
     of_light = (*lens, *lighting.omissions)

@@ -20,9 +20,6 @@ Array = NDArray[np.float64]
 #: Texels along either side.
 SIZE = 1024
 
-# texels, in the scene: neighbours on a curved surface stand out by less. What is lit is not in the
-# map where it is of what faces away, but for its edges
-_BIAS = {"all": 0.75, "away": 0.05, "none": 0.05}
 _STEEPEST = 16.0  # texels of depth to one across: surfaces more edge-on than 4° are hardly lit
 _MARGIN = 1.02  # of the map around what is seen
 _WIDEST = 0.1  # cosine from its axis, of what a point sees in one perspective
@@ -75,7 +72,7 @@ class ShadowMap:
             "shadow_planes": tuple(np.linalg.inv(matrix).ravel().tolist()),
             "shadow_steepest": _STEEPEST * scale,
         }
-        return shared, [{"shadow_bias": _BIAS[part] * scale} for part in drawn]
+        return shared, [{"shadow_bias": bias * scale} for bias in drawn]
 
     def _perspective(
         self, eye: Array, places: Array, beside: tuple[float, float]

@@ -81,7 +81,7 @@ class Stage:
             )  # fmt: skip
             self._triangle = self._kept(self._context.vertex_array(self._background, []))
         self.extras = self._with_lobes(around)
-        self.looks_up = bool(self._glowing) or self._background is not None
+        self.looks_up = self._scene.glows or self._background is not None
 
     def _kept(self, thing: Any) -> Any:
         self._owned.append(thing)
@@ -98,8 +98,7 @@ class Stage:
         vertices = [self._kept(context.buffer(one.vertices.tobytes())) for one in scene.emitting]
         self._glowing = [self._kept(vertex_array(context, self._glow, v)) for v in vertices]
         self._radiances = [tuple(float(x) for x in one.radiance) for one in scene.emitting]
-        places = [surface.vertices for surface in scene.surfaces]
-        self.casters = self._kept(Casters(context, places, buffers, vertices))
+        self.casters = self._kept(Casters(context, scene.surfaces, buffers, vertices))
 
     def _with_lobes(self, around: list[Bindings]) -> list[Joined]:
         """Of each surface, what surrounds it and where it sends light."""
@@ -164,7 +163,7 @@ def pack_solid(scene: RealtimeScene, flats: Sequence[Any]) -> Packed:
     solid = [
         surface.vertices[:, :3].reshape(-1, 3, 3)
         for surface in scene.surfaces
-        if surface.shape.ptr not in exact
+        if surface.shape.ptr not in exact and surface.radiance is None
     ]
     return pack_obstacles(np.concatenate(solid)) if solid else Packed()
 

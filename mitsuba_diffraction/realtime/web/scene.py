@@ -17,6 +17,7 @@ from ..glsl.materials import (
     Material,
     height_scale,
     pack_conservation,
+    pack_emission,
     pack_relief,
     pack_surface,
 )
@@ -96,12 +97,13 @@ def web_scene(
         progress(number, len(scene.surfaces), f"packing {surface.name}")
         material = surface.material
         # at all height scales that the slider offers
-        common = pack_surface(material) | pack_relief(material)
+        common = pack_surface(material) | pack_relief(material) | pack_emission(surface.radiance)
         common |= pack_conservation(material, [2.0**n for n in OCTAVES])
         entry: dict[str, Any] = {
             "name": surface.name,
             "mesh": sections_of(packed_mesh(surface.vertices), sections.add),
             "parts": packed_parts(common, sections),
+            "emits": surface.radiance is not None,
         }
         if material.bsdf is not None:
             entry["height_scale"] = height_scale(material)

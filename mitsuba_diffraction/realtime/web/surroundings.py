@@ -38,7 +38,7 @@ def packed_surroundings(
     JSON, None where there is neither; definitions.
     """
     environment = None if emitters is None else emitters.environment
-    if emitters is None or not (scene.emitting or environment):
+    if emitters is None or not (scene.glows or environment):
         return None, {}
     flats = flat_shapes(mitsuba_scene)
     packed, solid = pack_surroundings(scene, emitters, flats), pack_solid(scene, flats)

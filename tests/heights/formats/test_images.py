@@ -9,7 +9,7 @@ import zlib
 import numpy as np
 import OpenEXR
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
@@ -221,7 +221,7 @@ def test_signalling_not_a_numbers_are_one_clear_line(tmp_path):
     assert "\n" not in str(caught.value)
 
 
-@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=80)
 @given(st.sampled_from(HEADS), st.binary(max_size=200), st.sampled_from([".png", ".exr", ".x"]))
 def test_random_bytes_are_one_clear_line(tmp_path, head, tail, suffix):
     path = tmp_path / f"a{suffix}"
@@ -245,7 +245,7 @@ def samples(tmp_path_factory):
     return folder
 
 
-@settings(max_examples=80, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=80)
 @given(st.data())
 def test_damaged_files_load_or_are_one_clear_line(samples, tmp_path, data):
     name = data.draw(st.sampled_from(["a.png", "a.bmp", "a.tif", "a.exr", "a.npy"]))

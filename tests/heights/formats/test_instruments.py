@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
@@ -176,7 +176,7 @@ HEADS = [
 ]
 
 
-@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30)
 @given(st.sampled_from(HEADS), st.binary(max_size=300))
 def test_random_bytes_are_one_clear_line(tmp_path, head, tail):
     path = tmp_path / "a.spm"
@@ -187,7 +187,7 @@ def test_random_bytes_are_one_clear_line(tmp_path, head, tail):
         assert "\n" not in str(error)
 
 
-@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30)
 @given(st.data())
 def test_damaged_headers_load_or_are_one_clear_line(tmp_path, data):
     content = bytearray(nanoscope(COUNTS))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mitsuba_diffraction.errors import DiffractionError
@@ -108,7 +108,7 @@ def test_binary_data_is_no_text(tmp_path):
 cells = st.sampled_from(["1", "0.5", "-2e3", "nan", "", "1,5", "x", "1e999", "0x1", "٣", "1_0"])
 
 
-@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60)
 @given(
     st.one_of(
         st.text(max_size=100),

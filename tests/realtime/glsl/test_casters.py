@@ -14,9 +14,10 @@ from mitsuba_diffraction.realtime.glsl.shapes import triangles_of
 
 
 def solid_of(**shape: Any) -> Solid:
-    triangles = triangles_of(mi.load_dict(shape)).positions.reshape(-1, 3, 3)
+    found = triangles_of(mi.load_dict(shape))
+    triangles, normals = (x.reshape(-1, 3, 3) for x in (found.positions, found.normals))
     around = np.array([[-9.0, -9.0, 0.0], [9.0, 9.0, 6.0]])
-    return Solid.of(triangles, np.concatenate([around, triangles.reshape(-1, 3)]))
+    return Solid.of(triangles, normals, np.concatenate([around, triangles.reshape(-1, 3)]))
 
 
 def light(*place: float) -> Light:
@@ -44,6 +45,14 @@ def test_a_plane_below_everything_hides_nothing_from_above(some_variant: str) ->
         assert ground.hides_nothing(light(*place)) is nothing, place
     shelf = mi.ScalarTransform4f().translate([0.0, 0.0, 3.0])
     assert not solid_of(type="rectangle", to_world=shelf).hides_nothing(light(0.0, 0.0, 1.0, 0.0))
+
+
+def test_what_is_more_bent_needs_more_bias(some_variant: str) -> None:
+    flat, smooth = solid_of(type="rectangle").bias, solid_of(type="cylinder").bias
+    assert 0.0 < flat < smooth < 0.1
+    triangle = np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])
+    bent = np.array([[[0.0, 0.0, 1.0], [0.3, 0.0, 1.0], [0.0, 0.0, 1.0]]])
+    assert Solid.of(triangle, bent, triangle[0]).bias > 0.5
 
 
 def test_an_outline_reaches_as_far_as_what_it_is_of() -> None:

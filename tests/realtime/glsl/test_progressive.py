@@ -392,6 +392,34 @@ def test_lobes_and_lights_share_what_surrounds_a_scene(
         assert found[pixels].mean(axis=0) == pytest.approx(mean, abs=0.04 * mean.max()), number
 
 
+@pytest.mark.parametrize("shape", ["disk", "sphere"])
+def test_a_lamp_may_reflect_other_light(
+    gl: Any, some_variant: str, table_file: Path, shape: str
+) -> None:
+    """A painted lamp under another one: seen, lit by it, and lighting the plate."""
+    paint = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.7, 0.3, 0.1]}}
+    glow = {"type": "area", "radiance": {"type": "rgb", "value": [0.1, 0.2, 0.5]}}
+    above = mi.ScalarTransform4f().translate([0.0, 1.0, 0.6]).rotate([1, 0, 0], 60).scale(0.5)
+    scene = plate_scene(
+        table_file,
+        lamp={"type": "point", "position": [0.5, -2.0, 4.0], "intensity": 20.0},
+        painted={"type": shape, "to_world": above, "bsdf": paint, "emitter": glow},
+    )
+    renderer = Renderer(scene, context=gl)
+    light = renderer.progressive(size=(160, 40))
+    light.advance(512)
+    found, expected = light.image[..., :3], truth(renderer, 256)
+    light.release()
+    shapes = seen(direct_light(scene, renderer.camera), renderer.lights)["shape"]
+    renderer.release()
+    numbers = np.unique(shapes[shapes >= 0])
+    assert len(numbers) == 2
+    for number in numbers:
+        pixels = shapes == number
+        mean = expected[pixels].mean(axis=0)
+        assert found[pixels].mean(axis=0) == pytest.approx(mean, rel=0.02), number
+
+
 def test_what_is_in_focus_stays_where_it_is(some_variant: str) -> None:
     view = np.array(mi.ScalarTransform4f().look_at([1, -4, 3], [0, 0, 0], [0, 0, 1]).matrix, float)
     camera = Camera(view, 40.0, (64, 48), lens=0.3, focus=3.0)

@@ -31,6 +31,9 @@ uniform mat3 bump_uv;
 uniform sampler2D normal_map;
 uniform mat3 normal_uv;
 #endif
+#ifdef EMITTING
+uniform vec3 emission;            // radiance, on the side that the normal points to
+#endif
 #ifdef PIGMENT_IN_LIGHT
 uniform mat3 pigment_in_light;    // from a pigment's colour to that under this light
 #endif
@@ -203,6 +206,9 @@ void main()
             radiance = light.rgb * lobes(wi, wo, rotation, 0)
                 * (kept_by_facet(n, smooth_normal, direction) / (density + light.w));
     }
+#endif
+#ifdef EMITTING
+    if (dot(v_normal, towards_eye) > 0.0) radiance += emission;
 #endif
 #else
     for (int i = 0; i < LIGHTS_LIT; ++i) {

@@ -192,7 +192,7 @@ class Controls {
     element("save").addEventListener("click", () => this.save());
     element("fold").addEventListener("click", () => document.body.classList.toggle("folded"));
     if (matchMedia("(max-width: 560px)").matches) document.body.classList.add("folded");
-    if (matchMedia("(pointer: coarse)").matches) element("hint").textContent = "One finger turns · two pan and zoom · +: light";
+    if (matchMedia("(pointer: coarse)").matches) element("hint").textContent = "One finger turns · two pan and zoom · + for the light";
     const losses = Object.entries(header.loss).map(
       ([method, [mean, most]]) => `${method}: ΔE2000 ${mean.toFixed(2)}, 99 % below ${most.toFixed(2)}`);
     const lines = [`Rounded tables: ${losses.join("; ")}.`];

@@ -27,13 +27,14 @@ class Surroundings {
 
   // Behind the scene the environment, and what emits light; dark, that only covers.
   draw(view, drawing) {
-    const { gl } = this, { uniforms, matrix, bright, width, height } = view;
+    const { gl } = this, { uniforms, matrix, up, bright, width, height } = view;
     if (bright && this.background) {
       gl.disable(gl.DEPTH_TEST);
       this.background.use();
       this.part.use(this.background);
       this.background.set({
         ...uniforms, from_clip: columnMajor(invertible(matrix)), picture_size: [width, height],
+        horizon: up, // a ground ends somewhere, and beyond it the sky begins
       });
       drawing.triangle();
       gl.enable(gl.DEPTH_TEST);

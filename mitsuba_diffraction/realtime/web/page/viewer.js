@@ -114,7 +114,8 @@ class Viewer {
     const width = Math.max(1, Math.round(drawing.width * share));
     const height = Math.max(1, Math.round(drawing.height * share));
     // what emits light stands in the way of light from far away only
-    const casters = around && chosen[0]?.place[3] === 0 ? [...drawing.surfaces, ...drawing.around.glowing] : drawing.surfaces;
+    const far = around && chosen[0]?.place[3] === 0;
+    const casters = far ? [...drawing.surfaces, ...drawing.around.glowing] : drawing.surfaces.filter(({ emits }) => !emits);
     const shadow = this.shadows && chosen.length && !lookup ? drawing.shadows[moving ? "coarse" : "fine"].draw(chosen[0], casters, detail, one ? this.count : 0) : UNSHADOWED;
     // the quick method stands for the other
     const method = moving && this.wavelength === null && drawing.tables.lut ? "lut" : this.drawn;
@@ -135,7 +136,7 @@ class Viewer {
     const matrix = this.camera.projection(this.drawing.width / this.drawing.height, this.free, jitter, this.lift);
     const uniforms = { view_projection: columnMajor(matrix), eye: this.camera.eye, view_axis: [0, 0, 0], exposure: 1 };
     if (this.wavelength !== null) uniforms.wavenumber = (2e3 * Math.PI) / this.wavelength;
-    return { matrix, method: this.drawn, heights: this.heights, uniforms };
+    return { matrix, up: this.camera.up, method: this.drawn, heights: this.heights, uniforms };
   }
 
   // Linear sRGB of the one wavelength, as bright as the light; null of all.
