@@ -157,16 +157,21 @@ def test_of_gentle_surfaces_both_sides_add_up_to_all_light(some_variant, kind):
 
 
 @pytest.mark.parametrize(
-    ("kind", "theta", "period", "width"),
-    # chains of directions are solved of the last, whose orders are far apart
-    [("dielectric", 60.0, 2.5, 20.0), ("sheet", 70.0, 2.5, 20.0), ("sheet", 70.0, 1.1, 25.0)],
+    ("kind", "theta", "lengths", "width"),
+    # chains of directions are solved of the last, whose lobes are narrow
+    [
+        ("dielectric", 60.0, (2.5, 0.08), 20.0),
+        ("sheet", 70.0, (2.5, 0.08), 20.0),
+        ("sheet", 70.0, (1.1, 0.055), 40.0),
+    ],
 )
 def test_conserved_both_sides_add_up_to_all_light(
-    some_variant, kind, theta, period, width, monkeypatch
+    some_variant, kind, theta, lengths, width, monkeypatch
 ):
-    monkeypatch.setattr(sides, "WAVELENGTHS", (3, 3, 3))  # one of them near 550 nm
+    monkeypatch.setattr(sides, "WAVELENGTHS", (3, 3))  # one of them near 550 nm
+    period, depth = lengths
     size = {"periods": math.ceil(width / period), "pixels_per_period": math.ceil(period / 0.0895)}
-    grating = md.gratings.sinusoidal(period, 0.04 * period, **size)
+    grating = md.gratings.sinusoidal(period, depth, **size)
     common = {"field": grating, "coherence_width": width, **SIDES[kind]}
     raw, conserved = (sampled(both(energy_conserving=e, **common), theta)[0] for e in (False, True))
     error = 3 * raw.std() / np.sqrt(len(raw))

@@ -84,7 +84,7 @@ def test_angles_of_directions_within_are_even_and_invertible():
     [(False, 20.0), (True, 20.0), (True, 65.0)],
 )
 def test_scaled_both_sides_add_up_to_all_light(thin, width, monkeypatch):
-    monkeypatch.setattr(made, "WAVELENGTHS", (2, 2, 2))
+    monkeypatch.setattr(made, "WAVELENGTHS", (2, 2))
     surface = Sides(table(0.08, width), 1.0, Medium(1.5, "small_slope", thin))
     scale = surface.scale((500.0, 560.0))
     assert scale is not None
