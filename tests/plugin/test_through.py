@@ -162,7 +162,7 @@ def test_of_gentle_surfaces_both_sides_add_up_to_all_light(some_variant, kind):
     [
         ("dielectric", 60.0, (2.5, 0.08), 20.0),
         ("sheet", 70.0, (2.5, 0.08), 20.0),
-        ("sheet", 70.0, (1.1, 0.055), 40.0),
+        ("sheet", 75.0, (1.1, 0.06), 40.0),
     ],
 )
 def test_conserved_both_sides_add_up_to_all_light(
@@ -176,7 +176,7 @@ def test_conserved_both_sides_add_up_to_all_light(
     raw, conserved = (sampled(both(energy_conserving=e, **common), theta)[0] for e in (False, True))
     error = 3 * raw.std() / np.sqrt(len(raw))
     # first order gains light, and a sheet loses what is beyond its critical angle
-    assert raw.mean() > 1.0 + error if kind == "dielectric" else raw.mean() < 0.98 - error
+    assert raw.mean() > 1.0 + error if kind == "dielectric" else raw.mean() < 0.99 - error
     assert 0.98 - error < conserved.mean() < 1.001 + error
 
 
