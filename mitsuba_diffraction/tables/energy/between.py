@@ -24,6 +24,8 @@ Excess = Callable[[Array], Array]
 #: What R + T is brought below; how often by the root of what is too much, before by all of it; and
 #: by how much at most at a time.
 CEILING, GENTLE, MOST = 0.9995, 2, 1.5
+#: And up to which polar angle of a `DirectionGrid`, rad.
+LOOKED_AT = float(np.radians(80.0))
 
 
 def lowered(values: Array, excesses: Sequence[Excess]) -> Array:
@@ -67,7 +69,9 @@ def on_chains(chains: Sequence[ChainSides]) -> Excess:
         cells = np.ones_like(here[:2])
         for last, sums in enumerate(chains):
             own = np.stack([np.stack(list(_cells(one, last)), axis=-1) for one in here])
-            for page, found in zip(cells, _excess(sums, own, own), strict=True):
+            certain = sums.angle <= LinkedSums.certain  # cells are wide in angle beyond
+            much = np.where(certain, _excess(sums, own, own), np.float32(1.0))
+            for page, found in zip(cells, much, strict=True):
                 put(page, found, last)
         found = np.ones_like(cells)
         for rows in (slice(None, -1), slice(1, None)):

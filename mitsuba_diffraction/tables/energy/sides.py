@@ -42,11 +42,10 @@ Array = NDArray[np.float32]
 #: Directions on either side, of a sheet and of a dielectric, whose critical angle is all but one of
 #: the latter; and wavelengths. In variants of one there is one.
 SHEET, DENSE, WAVELENGTHS = DirectionGrid(48, 96), DirectionGrid(60, 96), (6, 12)
-#: The more of few orders, all of them strong. Chains of directions are solved of gratings whose
-#: orders are further apart than this, in 1/σ.
-FEW_ORDERS, NARROW = 24, 25.0
-#: Between the nodes of other grids R + T is looked at up to this angle, rad.
-LOOKED_AT = np.radians(80.0)
+#: More of few orders, all of them strong. Chains of directions are solved of gratings whose orders
+#: are further apart than the first of these, in 1/σ, and the shortest waves' horizon further off
+#: than the second: lobes are narrow at 75°, too.
+FEW_ORDERS, NARROW = 24, (25.0, 150.0)
 
 
 @dataclass(frozen=True)
@@ -109,10 +108,10 @@ class Sides:
         A second or two. Their polar angles are `Medium.angle`.
         """
         low, high = wavelength_range
-        few = len(self._orders.mixture.frequency) <= FEW_ORDERS
-        count = WAVELENGTHS[few and not self._orders.has_weak] if high > low else 1
-        wavelengths = np.geomspace(low, high, count)
         grating = self._grating
+        few = len(self._orders.mixture.frequency) <= FEW_ORDERS and not self._orders.has_weak
+        count = WAVELENGTHS[few] if high > low else 1
+        wavelengths = np.geomspace(low, high, count)
         at = partial(self._scale_of_chains, grating) if grating else self._scale_at
         found = np.stack(parallel(at, wavelengths.tolist()), axis=1)
         if np.all(found == 1.0):
@@ -127,7 +126,7 @@ class Sides:
         if grating is not None:
             return between.on_chains(self._by_length(grating, wavelength, np.arange(NODES) + 0.5))
         halves = [replace(grid, polar=2 * self._grid.polar).angles[1::2] for grid in self._grids]
-        rows = int(np.sum(np.any(np.stack(halves) <= LOOKED_AT, axis=0)))
+        rows = int(np.sum(np.any(np.stack(halves) <= between.LOOKED_AT, axis=0)))
         phi = self._grid.phi + np.pi / self._grid.azimuthal
         transport = self.transport([angles[:rows] for angles in halves], phi, wavelength)
         return between.on_grid(transport, rows)
@@ -142,8 +141,11 @@ class Sides:
     def _grating(self) -> Grating | None:
         """Whose chains are solved, if lobes are narrow against the nodes of its grid."""
         grating = self._orders.grating
-        narrow = grating is not None and grating.spacing * self._orders.sigma > NARROW
-        return grating if self._medium.thin and narrow else None
+        if grating is None or not self._medium.thin:
+            return None
+        k = float(wavenumber(self._table.wavelength_range[0]))
+        widths = np.array([grating.spacing, k]) * self._orders.sigma
+        return grating if np.all(widths > NARROW) else None
 
     def _scale_of_chains(self, grating: Grating, wavelength: float) -> Array:
         """(4, rows, rows) at the nodes of a `GratingGrid`."""

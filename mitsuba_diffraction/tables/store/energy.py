@@ -44,10 +44,10 @@ _SETTINGS = (
 
 _SIDES = (
     *_SETTINGS, str(sides.SHEET), str(sides.DENSE), sides.WAVELENGTHS, sides.FEW_ORDERS,
-    sides.NARROW, sides.LOOKED_AT, sums.SWEEPS, sums.LEAST, sums.MOST, sums.TOLERATED, sums.ENOUGH,
+    sides.NARROW, sums.SWEEPS, sums.LEAST, sums.MOST, sums.TOLERATED, sums.ENOUGH,
     sums.STRONGEST, sums.FAINT, sums.FALL, sums.BETWEEN, sums.MARGIN, sums.LinkedSums.certain,
-    between.CEILING, between.GENTLE, between.MOST, sheet.ChainSides.certain, sheet.POLAR,
-    links.POLAR, links.AZIMUTHS, links.FARTHEST,
+    between.CEILING, between.GENTLE, between.MOST, between.LOOKED_AT, sheet.ChainSides.certain,
+    sheet.POLAR, links.POLAR, links.AZIMUTHS, links.FARTHEST,
 )  # fmt: skip
 
 _known: weakref.WeakKeyDictionary[DiffractionTable, dict[str, Conservation]] = (
