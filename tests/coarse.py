@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.tables.energy import conservation, sides, sums, transport
 from mitsuba_diffraction.tables.energy.grid import DirectionGrid
 from mitsuba_diffraction.tables.store import energy as kept
@@ -21,6 +22,16 @@ def coarse_energy(set_value: Callable[[object, str, object], object] = setattr) 
     set_value(sums, "SWEEPS", 8)
     set_value(transport, "RINGS", 16)
     set_value(transport, "STEPS", 36)
-    # others have what the cache keeps in full
+    # others have what tables and the cache keep in full
+    set_value(conservation, "_orders", _orders)
     for name in ("_SETTINGS", "_SIDES"):
         set_value(kept, name, ("coarse", *getattr(kept, name)))
+
+
+def _orders(table: DiffractionTable, height_scale: float) -> transport.Orders:
+    """As `conservation` keeps them, apart from its own."""
+    last = table.__dict__.setdefault("_coarse_orders", {})
+    if height_scale not in last:
+        last.clear()
+        last[height_scale] = transport.Orders(table, height_scale)
+    return last[height_scale]
