@@ -26,7 +26,6 @@ def connect(
     count: int | None = None,
     scheduler: str | None = None,
     *,
-    dashboard: bool = True,
     patience: float = 10.0,
 ) -> Iterator[Any]:
     """A `distributed.Client`: of `count` processes started here, or of a running cluster.
