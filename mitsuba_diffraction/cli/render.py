@@ -206,7 +206,7 @@ def _written(
     result: Result, args: argparse.Namespace, exr: Path | None, png: Path, variant: str
 ) -> list[Path]:
     """Write the picture, with warnings of what it lacks; the files."""
-    from ..scene.pictures import colours_of, count_bad, write_exr, write_png
+    from ..scene.passes import colours_of, count_bad, write_exr, write_png
 
     bad = count_bad(result.bitmap)
     if bad:
@@ -236,8 +236,7 @@ def _say_written(result: Result, written: list[Path], seconds: float, variant: s
 
 def _check_colours(scene: Any, sensor: Any, args: argparse.Namespace, output: Path) -> None:
     """Refuse a film that will hold nothing for a PNG, before the work is done."""
-    from ..scene.passes import integrator_of
-    from ..scene.pictures import colours_of
+    from ..scene.passes import colours_of, integrator_of
 
     film = sensor.film()
     film.prepare(integrator_of(scene).aov_names())

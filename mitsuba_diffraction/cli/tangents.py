@@ -12,7 +12,7 @@ from .console import Bar, mitsuba_warnings, say_warning
 from .report import check_writable, save_report
 
 if TYPE_CHECKING:
-    from ..scene.orientation.report import TangentReport
+    from ..scene.orientation.tangents import TangentReport
 
 _GUIDES = ("smooth", "x", "y", "z", "body")
 _NAMED = 6  # singular points that are named
@@ -53,10 +53,9 @@ def add_parser(subparsers: options.Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the mesh, say where its field is singular, and return the exit code."""
     check_writable(args.output)
-    from ..scene.orientation.breaks import BREAK
     from ..scene.orientation.directions import direction_field, turned
     from ..scene.orientation.files import load_mesh, write_ply
-    from ..scene.orientation.tangents import check_tangents
+    from ..scene.orientation.tangents import BREAK, check_tangents
     from ..scene.orientation.trimesh import oriented_mesh, vertex_normals
 
     with Bar(args) as bar, mitsuba_warnings():

@@ -16,8 +16,7 @@ from ..errors import DiffractionError, DiffractionWarning
 from ..progress import Progress
 from .load import load_scene, preview_samples, sensor_of, shrink
 from .parameters import files_of
-from .passes import Stop, render_passes
-from .pictures import colours_of, count_bad, write_exr, write_png
+from .passes import Stop, colours_of, count_bad, render_passes, write_exr, write_png
 
 #: Suffixes of films, and what Pillow needs to know about each.
 FILMS: dict[str, dict[str, Any]] = {

@@ -21,12 +21,7 @@ _LONGEST = 1024
 
 
 def check_parameters(scene: Path, given: Mapping[str, str]) -> None:
-    """Refuse parameters that the scene does not have.
-
-    Parameters
-    ----------
-    scene : an XML file.
-    given : the parameters from the command line.
+    """Refuse parameters given on the command line that the scene, an XML file, does not have.
 
     Raises
     ------
@@ -56,29 +51,17 @@ def parameters_of(
 ) -> dict[str, str | None] | None:
     """Names of a scene's parameters and their defaults, includes and all.
 
-    Parameters
-    ----------
-    scene : an XML file.
-    given : values that are set, which may occur in the names of included files.
+    A default is `None` where the scene uses a parameter without giving one, and so is the result as
+    a whole if a file is missing or no XML.
 
-    Returns
-    -------
-    dict
-        By name; `None` where the scene uses a parameter without giving a default. The result as a
-        whole is `None` if a file is missing or no XML.
+    given : values that are set, which may occur in the names of included files.
     """
     found: dict[str, str | None] = {}
     return found if _collect(scene, dict(given or {}), found, 0) else None
 
 
 def files_of(scene: Path, given: Mapping[str, str] | None = None) -> list[Path]:
-    """The scene, its includes, and every file that one of them or a recipe among those names.
-
-    Parameters
-    ----------
-    scene : an XML file.
-    given : values that are set.
-    """
+    """The scene, its includes, and every file that one of them or a recipe among those names."""
     from ..heights.read import is_recipe
     from ..heights.recipes import Recipe
 

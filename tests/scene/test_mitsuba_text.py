@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mitsuba_diffraction.cli.console import mitsuba_warnings
-from mitsuba_diffraction.scene.mitsuba_text import plain_text
+from mitsuba_diffraction.scene.load import plain_text
 
 # as Mitsuba 3.9.1 throws them
 CASES = {

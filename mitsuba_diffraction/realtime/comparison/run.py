@@ -13,8 +13,7 @@ import numpy as np
 
 from ...errors import DiffractionError, DiffractionWarning
 from ...progress import Progress, silent
-from ...scene.passes import Stop, render_passes
-from ...scene.pictures import write_exr
+from ...scene.passes import Stop, render_passes, write_exr
 from ..glsl.context import clock_of
 from ..glsl.source import THESIS_METHODS
 from ..glsl.timing import fragment_times
