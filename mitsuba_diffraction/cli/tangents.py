@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from . import options
-from .arguments import number_between, path_ending_in
 from .console import Bar, mitsuba_warnings, say_warning
+from .options import number_between
 from .report import check_writable, save_report
 
 if TYPE_CHECKING:
@@ -28,10 +28,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "is no torus every field has singular points, around which the patch turns.",
     )  # fmt: skip
     parser.add_argument("mesh", metavar="MESH", type=Path, help="what to read")
-    parser.add_argument(
-        "-o", "--output", metavar="OUT", type=path_ending_in(".ply"), required=True,
-        help="PLY to write",
-    )  # fmt: skip
+    options.add_output(parser, "PLY to write", ".ply", required=True)
     parser.add_argument(
         "--along", choices=_GUIDES, default="smooth",
         help="smooth: the field that turns least; x, y, z: that axis, laid onto the surface; body: "

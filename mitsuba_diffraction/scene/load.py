@@ -46,14 +46,9 @@ _TAKEN = ("path", "parallel", "optimize")
 def set_variant(name: str | None) -> str:
     """Set a Mitsuba variant that works here, and return its name.
 
-    Parameters
-    ----------
     name : a variant; `None` takes cuda_ad_spectral where a GPU answers, else llvm_ad_spectral.
 
-    Raises
-    ------
-    DiffractionError
-        If there is no such variant, or no device or LLVM for it.
+    Raises a DiffractionError if there is no such variant, or no device or LLVM for it.
     """
     import drjit as dr
     import mitsuba as mi
@@ -81,10 +76,7 @@ def set_variant(name: str | None) -> str:
 def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
     """Load an XML scene in the variant that is set.
 
-    Raises
-    ------
-    DiffractionError
-        If the file or anything that it refers to is missing or wrong.
+    Raises a DiffractionError if the file or anything that it refers to is missing or wrong.
     """
     import mitsuba as mi
 
@@ -156,10 +148,7 @@ def preview_samples(sensor: Any, preview: bool) -> int:
 def sensor_of(scene: Any, index: int) -> Any:
     """One of the scene's sensors.
 
-    Raises
-    ------
-    DiffractionError
-        If there is none with that index.
+    Raises a DiffractionError if there is none with that index.
     """
     sensors = scene.sensors()
     if not sensors:

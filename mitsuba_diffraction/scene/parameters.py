@@ -19,14 +19,14 @@ _DEEPEST = 15
 # Of a path, in characters: longer texts name no file, and asking would be an error.
 _LONGEST = 1024
 
+Numbers = tuple[float, ...]
+
 
 def check_parameters(scene: Path, given: Mapping[str, str]) -> None:
     """Refuse parameters given on the command line that the scene, an XML file, does not have.
 
-    Raises
-    ------
-    DiffractionError
-        If one is unknown; the text names those of the scene and its includes, with defaults.
+    Raises a DiffractionError if one is unknown; the text names those of the scene and its includes,
+    with defaults.
     """
     known = parameters_of(scene, given)
     if known is None:
@@ -122,9 +122,6 @@ def _with_values(text: str, given: Mapping[str, str], defaults: Mapping[str, str
     return _REFERENCE.sub(value, text)
 
 
-Numbers = tuple[float, ...]
-
-
 @dataclass(frozen=True)
 class Change:
     """A parameter that goes from one value to another; both have as many numbers."""
@@ -142,10 +139,7 @@ class Change:
 def change_of(text: str) -> Change:
     """KEY=FROM:TO, where FROM and TO are numbers, or lists of them with commas between.
 
-    Raises
-    ------
-    DiffractionError
-        If it is none.
+    Raises a DiffractionError if it is none.
     """
     name, equals, values = text.partition("=")
     start, colon, end = values.partition(":")
@@ -177,18 +171,13 @@ def values_of_frames(
 ) -> list[dict[str, str]]:
     """Parameters of the scene for each of `count` frames.
 
-    Parameters
-    ----------
-    scene : XML file.
     given : parameters that stay.
     changes : from the first frame to the last, both ends included.
     turns : names of angles in degrees that turn once around, beginning where the scene has them;
         the last frame is one step before the first, so that a film of them closes.
 
-    Raises
-    ------
-    DiffractionError
-        If an angle to be turned has no value to begin with, or one that is no number.
+    Raises a DiffractionError if an angle to be turned has no value to begin with, or one that is no
+    number.
     """
     around = []
     for name in turns:

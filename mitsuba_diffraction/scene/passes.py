@@ -24,6 +24,13 @@ from .load import error_of
 # Pixel formats that a screen can show, and what becomes of them in a PNG.
 _SHOWN_AS = {"RGB": "RGB", "RGBA": "RGBA", "XYZ": "RGB", "XYZA": "RGBA", "Y": "Y", "YA": "YA"}
 
+#: Passes that a task of a cluster renders, at most; their sum is what is added to the picture.
+GROUP = 8
+
+# Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
+# wavefronts exhaust the memory. Fixed, so that a seed gives the same picture on every machine.
+_SAMPLES = {"llvm": 2**21, "cuda": 2**24}
+
 
 def colours_of(bitmap: Any) -> Any | None:
     """The part of a film's bitmap that a screen can show; `None` if there is none.
@@ -50,10 +57,7 @@ def write_png(
 ) -> None:
     """Write 8 bits per channel: times 2^exposure, sRGB transfer, what is beyond [0, 1] clipped.
 
-    Parameters
-    ----------
     colours : what `colours_of` returns; its alpha is premultiplied, that of the PNG is not.
-    path : the file.
     exposure : stops.
     metadata : text to store with it, ASCII.
     """
@@ -91,14 +95,6 @@ def _write(bitmap: Any, path: Path) -> None:
             raise DiffractionError(
                 f"cannot write '{path}': {reason}; nothing was left behind"
             ) from error
-
-
-#: Passes that a task of a cluster renders, at most; their sum is what is added to the picture.
-GROUP = 8
-
-# Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
-# wavefronts exhaust the memory. Fixed, so that a seed gives the same picture on every machine.
-_SAMPLES = {"llvm": 2**21, "cuda": 2**24}
 
 
 @dataclass(frozen=True)
@@ -182,10 +178,7 @@ def groups_of(passes: Sequence[Pass]) -> list[Sequence[Pass]]:
 def render_pass(scene: Any, sensor: Any, one: Pass) -> NDArray[np.float64]:
     """The film's raw storage after one pass: filter-weighted sums beside the sums of the weights.
 
-    Raises
-    ------
-    DiffractionError
-        If Mitsuba refuses or fails to render.
+    Raises a DiffractionError if Mitsuba refuses or fails to render.
     """
     integrator, film = integrator_of(scene), sensor.film()
     try:
@@ -213,10 +206,7 @@ def developed(scene: Any, sensor: Any, total: NDArray[np.float64], spp: int) -> 
 def integrator_of(scene: Any) -> Any:
     """The scene's integrator.
 
-    Raises
-    ------
-    DiffractionError
-        If there is none.
+    Raises a DiffractionError if there is none.
     """
     integrator = scene.integrator()
     if integrator is None:
@@ -247,8 +237,6 @@ def render_passes(
     added up in double precision and put back into the film, which then divides and converts to
     its own format. Averages of finished pictures would differ where pixels share samples.
 
-    Parameters
-    ----------
     scene, sensor : of the variant that is set.
     spp : samples per pixel; stratified samplers round it up, and the result says to what.
     seed : whole number from 0; each pass gets its own, derived from it.
@@ -256,10 +244,7 @@ def render_passes(
     stop : asked, it ends the rendering after the current pass.
     progress : called as progress(samples done, samples in all, what is being done).
 
-    Raises
-    ------
-    DiffractionError
-        If Mitsuba refuses or fails to render.
+    Raises a DiffractionError if Mitsuba refuses or fails to render.
     """
     integrator_of(scene)
     progress(0, spp, "compiling")

@@ -26,6 +26,12 @@ _UNREAD = (RuntimeError, ValueError, MemoryError)
 
 KINDS = {".ply": "ply", ".obj": "obj", ".serialized": "serialized"}
 
+_CODES = {
+    "char": "b", "int8": "b", "uchar": "B", "uint8": "B", "short": "h", "int16": "h",
+    "ushort": "H", "uint16": "H", "int": "i", "int32": "i", "uint": "I", "uint32": "I",
+    "float": "f", "float32": "f", "double": "d", "float64": "d",
+}  # fmt: skip
+
 
 def load_mesh(
     path: str | os.PathLike[str],
@@ -160,13 +166,6 @@ def write_ply(
 def _need_variant() -> None:
     if mi.variant() is None:
         mi.set_variant("scalar_rgb")
-
-
-_CODES = {
-    "char": "b", "int8": "b", "uchar": "B", "uint8": "B", "short": "h", "int16": "h",
-    "ushort": "H", "uint16": "H", "int": "i", "int32": "i", "uint": "I", "uint32": "I",
-    "float": "f", "float32": "f", "double": "d", "float64": "d",
-}  # fmt: skip
 
 
 def triangulated_ply(data: bytes) -> bytes | None:

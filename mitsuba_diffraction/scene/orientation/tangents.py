@@ -33,6 +33,12 @@ BREAK = 60.0
 # longer than this many of its own edges, or than this share of the mesh, is a line.
 _EDGES, _SHARE = 4.0, 0.2
 
+MOST_TURNING = 0.05  # of the surface, on which the direction may turn too fast
+LONG = 0.05  # of the mesh's size: breaks that are longer in all are seen
+TURN = 30.0  # degrees between neighbours from which on a seam shows
+
+FLAT = 1e-3  # of the typical ratio of texture area to surface area: as good as none
+
 
 def _turning(orientation: Floats) -> Bools:
     """(m, 3) whether a field turns by over 60° on the way from corner n to corner n + 1.
@@ -96,11 +102,6 @@ def _shares(corners: Floats, crossed: Bools, middles: Floats) -> Floats:
     # from both middles half-way to each other
     meeting[both] = total[both] / 2
     return np.asarray(np.linalg.norm(middles - meeting[owner], axis=1))
-
-
-MOST_TURNING = 0.05  # of the surface, on which the direction may turn too fast
-LONG = 0.05  # of the mesh's size: breaks that are longer in all are seen
-TURN = 30.0  # degrees between neighbours from which on a seam shows
 
 
 @dataclass(frozen=True)
@@ -211,9 +212,6 @@ class TangentReport:
             "usable": self.usable,
             "problems": self.problems(),
         }
-
-
-FLAT = 1e-3  # of the typical ratio of texture area to surface area: as good as none
 
 
 def check_tangents(

@@ -24,6 +24,25 @@ from .session import Session
 #: Width at most, and samples per pixel.
 WIDTH, SPP = 160, 64
 
+Picture = tuple[NDArray[np.float64], bool]
+
+Load = Callable[[], Any]
+
+#: A planned table that is not smaller than this share of the whole one is not worth it.
+WORTH = 0.8
+
+#: A picture that differs by more than the tolerance is planned anew with a smaller share outside.
+ATTEMPTS, TIGHTER = 3, 0.3
+
+#: No further one is drafted if a third of the light outside leaves more than this of the error.
+HELPS = 0.8
+
+#: Share of its terms that a table with a larger tolerance keeps at least.
+FEWEST_TERMS = 0.5
+
+#: A plan is refused where this many times its tolerance lies outside: paths differ from the last.
+MOST_OUTSIDE = 3.0
+
 
 @dataclass(frozen=True)
 class Difference:
@@ -38,9 +57,6 @@ class Difference:
     spp: int
 
 
-Picture = tuple[NDArray[np.float64], bool]
-
-
 def difference(
     whole: Picture,
     tables: Mapping[str, DiffractionTable],
@@ -50,12 +66,9 @@ def difference(
 ) -> Difference:
     """Render with planned tables, with the random numbers and directions of the whole ones.
 
-    Parameters
-    ----------
     whole, tables : `small_picture` of the scene with whole tables, and those by key.
     load : loads the scene anew, in the variant that is set.
     plan : what it is to be loaded with.
-    sensor : the sensor of a scene.
     """
     like = {key: tables[key] for key in plan.limits()}
     session = Session(limits=plan.limits(), sample_like=like)
@@ -100,20 +113,6 @@ def small_picture(scene: Any, sensor: Any) -> Picture:
     return np.array(converted, np.float64), True
 
 
-Load = Callable[[], Any]
-
-#: A planned table that is not smaller than this share of the whole one is not worth it.
-WORTH = 0.8
-#: A picture that differs by more than the tolerance is planned anew with a smaller share outside.
-ATTEMPTS, TIGHTER = 3, 0.3
-#: No further one is drafted if a third of the light outside leaves more than this of the error.
-HELPS = 0.8
-#: Share of its terms that a table with a larger tolerance keeps at least.
-FEWEST_TERMS = 0.5
-#: A plan is refused where this many times its tolerance lies outside: paths differ from the last.
-MOST_OUTSIDE = 3.0
-
-
 @dataclass(frozen=True)
 class RecordedScene:
     """A scene in a recording session, and what its tables were asked."""
@@ -135,20 +134,12 @@ def record_scene(
 ) -> RecordedScene:
     """Load a scene with whole tables, or with those of a plan, and trace paths through it.
 
-    Parameters
-    ----------
-    load : loads the scene in the variant that is set.
-    sensor : the sensor of a scene.
-    paths : how many.
     plan : whose tables to load it with.
     seed : of the paths.
     timing : build tables anew, and take the time.
 
-    Raises
-    ------
-    DiffractionError
-        If no surface diffracts or one lets light through, if no path meets one, or if the plan is
-        for others.
+    Raises a DiffractionError if no surface diffracts or one lets light through, if no path meets
+    one, or if the plan is for others.
     """
     session = Session(limits=plan.limits() if plan else {}, recording=True, timing=timing)
     with session:
@@ -226,8 +217,6 @@ def draft_plan(
 def worthwhile(plan: Plan, planned: dict[str, DiffractionTable]) -> Plan:
     """The plan without what is not worth it, and with what the rest saves.
 
-    Parameters
-    ----------
     planned : its tables by key; those that are missing stay whole.
     """
     tables = {}
@@ -246,10 +235,7 @@ def worthwhile(plan: Plan, planned: dict[str, DiffractionTable]) -> Plan:
 def load_planned(load: Load, plan: Plan, *, timing: bool = False) -> tuple[Any, Session]:
     """Load a scene with the tables of a plan.
 
-    Raises
-    ------
-    DiffractionError
-        If none of the plan's tables is one of the scene's.
+    Raises a DiffractionError if none of the plan's tables is one of the scene's.
     """
     session = Session(limits=plan.limits(), timing=timing)
     with session:
@@ -276,10 +262,8 @@ def _check_match(session: Session, plan: Plan) -> None:
 def check_light(loaded: RecordedScene, plan: Plan) -> dict[str, float]:
     """Share of each table's light that a scene looks up outside its plan.
 
-    Raises
-    ------
-    DiffractionError
-        If it is several times what the plan was to leave out: camera or lights are others.
+    Raises a DiffractionError if it is several times what the plan was to leave out: camera or
+    lights are others.
     """
     shares = {}
     for key, asked in loaded.statistics.items():

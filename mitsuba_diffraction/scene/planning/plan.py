@@ -24,6 +24,12 @@ MOST_TOLERANCE = 1e-2
 #: A frequency beyond the last that was asked for: a path not traced may go a little farther.
 ROOM = 1.02
 
+#: Raised whenever an older file would mean something else.
+VERSION = 2
+_KIND = "mitsuba-diffraction plan"
+
+_REMEDY = "make one with 'mitsuba-diffraction plan SCENE -o plan.json'"
+
 
 @dataclass(frozen=True)
 class LookupStatistics:
@@ -93,8 +99,6 @@ def domain_for(
     Diffraction is but a part of that light: the table's own relative error may be larger than the
     picture's by that factor.
 
-    Parameters
-    ----------
     asked : what is asked of the table.
     table : the table of everything, as the scene would have it.
     height_scale : largest of the surfaces'.
@@ -153,8 +157,6 @@ def lobes_in_a_pixel(turn: float, sigma: float) -> float:
     Where ωi turns by δ in the surface's frame, so does ωo: (u, v) moves by up to 2δ, and a lobe is
     1/(kσ) wide.
 
-    Parameters
-    ----------
     turn : δ between two places in a pixel, in direction cosines.
     sigma : of the window, µm.
     """
@@ -174,11 +176,6 @@ def wavelengths_needed(asked: LookupStatistics, share: float = 1e-3) -> dict[str
     largest = max(float(np.abs(colours[0]).max()), 1e-30)
     lost = delta_e(colours[0][None] / largest, colours[1][None] / largest, exposure=1.0)
     return {"range_nm": [low, high], "lost_colour": float(lost[0])}
-
-
-#: Raised whenever an older file would mean something else.
-VERSION = 2
-_KIND = "mitsuba-diffraction plan"
 
 
 @dataclass(frozen=True)
@@ -222,10 +219,7 @@ class Plan:
     def load(cls, path: str | os.PathLike[str]) -> Plan:
         """Read what `save` wrote.
 
-        Raises
-        ------
-        DiffractionError
-            If the file is missing, no plan, damaged, or of another version.
+        Raises a DiffractionError if the file is missing, no plan, damaged, or of another version.
         """
         try:
             document = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -249,9 +243,6 @@ class Plan:
             )
         except (LookupError, TypeError, ValueError, OverflowError, AttributeError) as error:
             raise DiffractionError(f"'{path}' is a damaged plan ({error!r}); {_REMEDY}") from error
-
-
-_REMEDY = "make one with 'mitsuba-diffraction plan SCENE -o plan.json'"
 
 
 def _table(document: dict[str, Any]) -> PlannedTable:
