@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ..atomic import atomic_path
 from ..scene.parameters import files_of
-from ..tables.store.store import cache_folder, key_of
+from ..tables.store import cache_folder, key_of
 
 
 @dataclass(frozen=True)

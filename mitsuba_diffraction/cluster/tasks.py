@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError, one_line
 from ..scene.load import load_scene, sensor_of, set_variant, shrink
 from ..scene.passes import Pass, integrator_of, render_pass
-from ..tables.store.store import key_of
+from ..tables.store import key_of
 from .files import SceneFiles
 
 _PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit")

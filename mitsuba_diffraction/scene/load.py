@@ -17,8 +17,8 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning, one_line
-from ..plugin.attributes import check_attributes
 from ..plugin.names import name_of
+from ..plugin.textures import check_attributes
 from .parameters import check_parameters
 
 _SOURCE_LINE = re.compile(r"\[[\w./]+\.(?:cpp|h|py):\d+\]\s*")

@@ -24,8 +24,7 @@ from ...heights.spectra import dominant_periods
 from ...scene.load import error_of
 from ...settings import TableSettings
 from ...tables.build.build import build_with
-from ...tables.store.cache import cached_table
-from ...tables.store.store import key_of
+from ...tables.store import cached_table, key_of
 from ..maps import brdf_map
 from .iridescence import colours_of, iridescence
 from .treatments import Treatment

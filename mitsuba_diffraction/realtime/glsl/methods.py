@@ -12,7 +12,7 @@ from ...heights.field import HeightField
 from ...optics.geometry import sigma_of
 from ...settings import TableSettings
 from ...tables.build.build import build_with
-from ...tables.store.cache import cached_colours, cached_table
+from ...tables.store import cached_colours, cached_table
 from ...tables.table import DiffractionTable
 from ...thesis.methods import FullSpectrum, OrdersOnly, Repeated, make
 from ...thesis.methods.method import Method

@@ -18,7 +18,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...tables.store.cache import cached_colours
+from ...tables.store import cached_colours
 from .camera import Camera
 from .context import Bindings, Target, compile_plain, require_moderngl, set_uniforms
 from .emitters import Emitters

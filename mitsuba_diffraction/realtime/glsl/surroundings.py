@@ -23,7 +23,7 @@ from scipy.ndimage import distance_transform_edt
 
 from ...errors import DiffractionError
 from ...plugin.names import name_of
-from ...tables.colour.polar import LARGEST_RADIUS
+from ...tables.colour.build import LARGEST_RADIUS
 from ...tables.colour.proposals import IMPORTANCE, brightness
 from ...tables.colour.table import ColourTable
 from .lights import emitted_radiance, radiance_along

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.colour import linear_srgb, response
-from ...tables.store.cache import cached_colours
+from ...tables.store import cached_colours
 from ..glsl.emitters import Emitters
 from ..glsl.lights import Light
 from ..glsl.materials import Material, coat_index, height_scale

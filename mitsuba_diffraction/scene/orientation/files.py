@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError, one_line
-from ...plugin.attributes import ORIENTATION
+from ...plugin.textures import ORIENTATION
 from .trimesh import TriangleMesh
 
 Floats = NDArray[np.float64]
