@@ -1,4 +1,4 @@
-"""Progress bars fit the terminal; Ctrl-C and SIGTERM end a command at once, leaving nothing behind."""
+"""Progress bars fit the terminal; Ctrl-C and SIGTERM end a command at once and leave nothing."""
 
 from __future__ import annotations
 
