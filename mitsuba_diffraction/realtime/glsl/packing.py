@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...optics.blend import NODES_PER_OCTAVE, RoughnessTable
-from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, response
+from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
 from ...optics.fresnel import reflectance
 from ...optics.geometry import wavenumber
 from ...tables.colour.build import VISIBLE
@@ -237,14 +237,16 @@ def pack_conductor(
     rows[:-1, :, 1] = np.interp(lam, wavelengths, eta)[:, None]
     rows[:-1, :, 2] = np.interp(lam, wavelengths, k)[:, None]
     fine = np.arange(360.0, 830.5, 1.0)
-    weights = linear_srgb(response(fine))
-    rows[-1, :, :3] = over(fine).T @ (weights / weights.sum(axis=0))
+    weights, found = linear_srgb(response(fine)), over(fine)
+    rows[-1, :, :3] = found.T @ (weights / weights.sum(axis=0))
+    tint = metal_tint(fine, found[:, -1], rows[-1, -1, :3])
     return Packed(
         (Texture("reflectances", rows),),
         {
             "wavenumbers": WAVENUMBERS,
             "channel_eta": tuple(np.interp(RGB_WAVELENGTHS, wavelengths, eta).tolist()),
             "channel_k": tuple(np.interp(RGB_WAVELENGTHS, wavelengths, k).tolist()),
+            **{f"tint_{n}": tuple(column) for n, column in enumerate(tint.T.tolist())},
         },
         {"SURFACE_KIND": "2"},
     )
