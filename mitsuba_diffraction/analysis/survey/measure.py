@@ -21,7 +21,7 @@ from ...heights.load import load_heights
 from ...heights.read import is_recipe
 from ...heights.recipes import Recipe
 from ...heights.spectra import dominant_periods
-from ...scene.mitsuba_text import error_of
+from ...scene.load import error_of
 from ...settings import TableSettings
 from ...tables.build.build import build_with
 from ...tables.store import cached_table, key_of

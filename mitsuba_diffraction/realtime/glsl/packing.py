@@ -81,10 +81,7 @@ def _with_next(values: NDArray[np.floating]) -> NDArray[np.floating]:
 def pack_powers(table: DiffractionTable) -> Packed:
     """A table of powers, for `spectral`; one of amplitudes is turned into one.
 
-    Raises
-    ------
-    DiffractionError
-        For a coherent sum (`coherence="patch"`), whose orders interfere.
+    Raises a DiffractionError for a coherent sum (`coherence="patch"`), whose orders interfere.
     """
     if table.grid.coherent:
         raise DiffractionError(
@@ -187,8 +184,6 @@ def _grid(pages: int) -> dict[str, str]:
 def pack_responses(lights: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Packed:
     """What each light's wavelengths add to linear sRGB, for `spectral`.
 
-    Parameters
-    ----------
     lights : of each, wavelengths (n,) in nm and its spectrum relative to D65 of luminance 1 there,
         (n,) or, from a renderer that knows three colours only, (n, 3). Without lights there is
         one that is dark.
@@ -219,8 +214,6 @@ def pack_conductor(
 ) -> Packed:
     """A conductor's reflectance over angle and wavelength, and in linear sRGB under daylight.
 
-    Parameters
-    ----------
     wavelengths : (n,) nm.
     eta, k : (n,), the complex index of refraction η + ik.
     """
