@@ -50,9 +50,8 @@ def run(args: argparse.Namespace) -> int:
         _check_scenes(args.scenes)
     from tqdm import tqdm
 
-    from ..analysis.bench import figures
-    from ..analysis.bench.machine import describe_machine
-    from ..analysis.bench.run import sections
+    from ..analysis.bench import figures, sections
+    from ..analysis.bench.figures import describe_machine
 
     chosen = figures.QUICK if args.quick else figures.FULL
     machine = describe_machine()

@@ -58,8 +58,7 @@ def run(args: argparse.Namespace) -> int:
     """Measure, write and recommend, and return the exit code."""
     options.check_own_patch(args)
     check_writable(args.output / "tradeoff.json", make_folder=True)
-    from ..analysis.bench.figures import PIXEL
-    from ..analysis.bench.machine import describe_machine
+    from ..analysis.bench.figures import PIXEL, describe_machine
     from ..analysis.tradeoff import (
         Budget,
         measure,
@@ -68,9 +67,8 @@ def run(args: argparse.Namespace) -> int:
         recommended,
         settings,
     )
-    from ..analysis.tradeoff.plot import draw_depths, draw_trade
-    from ..analysis.tradeoff.report import lines, plain, save_csv
-    from ..analysis.tradeoff.sample import Sample
+    from ..analysis.tradeoff.accuracy import Sample
+    from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain, save_csv
     from ..heights import gratings
     from ..scene.load import set_variant
 

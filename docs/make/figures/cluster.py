@@ -23,9 +23,8 @@ from typing import Any
 
 import numpy as np
 
-from mitsuba_diffraction.cluster.files import SceneFiles
-from mitsuba_diffraction.cluster.kept import Kept
-from mitsuba_diffraction.cluster.tasks import Sums, Task
+from mitsuba_diffraction.cluster.frames import Kept
+from mitsuba_diffraction.cluster.tasks import SceneFiles, Sums, Task
 from mitsuba_diffraction.cluster.workers import require_dask
 
 from . import markers

@@ -15,14 +15,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mitsuba_diffraction.analysis.maps.light import Light
+from mitsuba_diffraction.analysis.maps.result import Light
 from mitsuba_diffraction.errors import DiffractionWarning
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.gratings import blazed, elaphe_like
 from mitsuba_diffraction.thesis.methods import NAMES, OrdersOnly, make, make_all
-from mitsuba_diffraction.thesis.methods.maps import method_map
-from mitsuba_diffraction.thesis.sweeps.compiled import Compiled, time_compiled
-from mitsuba_diffraction.thesis.sweeps.run import Step, compared, timed_map
+from mitsuba_diffraction.thesis.methods.make import method_map
+from mitsuba_diffraction.thesis.sweeps import Compiled, Step, compared, time_compiled, timed_map
 
 from . import markers
 from .program import SHOWN, add_measured, exit_code, measured_patch

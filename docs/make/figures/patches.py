@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from mitsuba_diffraction.analysis.pictures.patches import patches_figure
+from mitsuba_diffraction.analysis.pictures import patches_figure
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.heights.gratings import cd, dvd, elaphe_like, xenopeltis_like
 

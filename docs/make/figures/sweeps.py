@@ -15,8 +15,8 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from mitsuba_diffraction.analysis.maps.light import Light
 from mitsuba_diffraction.analysis.maps.picture import contact_sheet
+from mitsuba_diffraction.analysis.maps.result import Light
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionWarning
 from mitsuba_diffraction.heights.gratings import blazed, elaphe_like

@@ -14,7 +14,7 @@ from ...tables.store.cache import cached_table
 from ...tables.table import DiffractionTable
 from ...thesis.methods import FullSpectrum, OrdersOnly, Repeated, make
 from ...thesis.methods.method import Method
-from ...thesis.methods.nmm import SPECULAR_WAVELENGTH
+from ...thesis.methods.periodic import SPECULAR_WAVELENGTH
 from .packing import area_factor
 from .source import THESIS_METHODS
 from .texels import Packed, as_half, listed, texels

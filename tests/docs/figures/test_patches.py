@@ -5,7 +5,7 @@ from __future__ import annotations
 from PIL import Image
 
 from docs.make.figures import patches
-from mitsuba_diffraction.analysis.pictures.patches import colour_field, patches_figure
+from mitsuba_diffraction.analysis.pictures import colour_field, patches_figure
 from mitsuba_diffraction.heights.gratings import cd, elaphe_like
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import mitsuba_diffraction as md  # before Mitsuba: it chooses Dr.Jit's LLVM
-from mitsuba_diffraction.analysis.bench.variance import draws_by_cosine
+from mitsuba_diffraction.analysis.bench.scenes import draws_by_cosine
 
 import mitsuba as mi  # isort: skip
 import drjit as dr  # isort: skip

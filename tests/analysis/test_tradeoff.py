@@ -12,11 +12,14 @@ import pytest
 from docs.make.figures import tradeoff as page
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.analysis import tradeoff
-from mitsuba_diffraction.analysis.tradeoff.depth import TERMS, taylor_error
+from mitsuba_diffraction.analysis.tradeoff.accuracy import (
+    TERMS,
+    Sample,
+    measure_wavelengths,
+    taylor_error,
+)
 from mitsuba_diffraction.analysis.tradeoff.measuring import Measured, Setting, rows, settings
 from mitsuba_diffraction.analysis.tradeoff.report import Budget, recommended
-from mitsuba_diffraction.analysis.tradeoff.sample import Sample
-from mitsuba_diffraction.analysis.tradeoff.wavelengths import measure_wavelengths
 from tests.directions import rough_patch
 
 PATCH = rough_patch((48, 48), (0.1, 0.1), 0.25)

@@ -11,16 +11,16 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction import DiffractionError, HeightField, gratings
+from mitsuba_diffraction.analysis import survey as module
 from mitsuba_diffraction.analysis.maps import Bands, BrdfMap, Light
 from mitsuba_diffraction.analysis.survey import (
     Treatment,
     colours_of,
     iridescence,
     run_survey,
+    treatment_for,
     treatments_of,
 )
-from mitsuba_diffraction.analysis.survey import run as module
-from mitsuba_diffraction.analysis.survey.treatments import treatment_for
 from mitsuba_diffraction.optics.colour import response
 from tests.cli.conftest import run
 

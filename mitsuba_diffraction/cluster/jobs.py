@@ -1,4 +1,4 @@
-"""Independent jobs, here or on workers: one by one as they are done, or in their order."""
+"""Independent jobs, here or on workers, as they are done or in their order: scans, windows."""
 
 from __future__ import annotations
 
@@ -10,11 +10,62 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from ..errors import DiffractionError, one_line
+from ..errors import DiffractionError
+from ..heights.field import HeightField
+from ..progress import Progress
 from ..scene.passes import Stop
-from .files import SceneFiles
-from .tasks import Failed, Lacking, check_versions, versions, worker_address
-from .workers import outcome, wait_for_scheduler, workers_of
+from ..settings import TableSettings
+from ..tables.build.build import build_with
+from ..tables.table import DiffractionTable
+from .tasks import Failed, Lacking, SceneFiles, check_versions, failure, versions
+from .workers import check_workers, outcome, wait_for_scheduler, workers_of
+
+
+def build(
+    heights: HeightField | Sequence[HeightField],
+    *,
+    client: Any,
+    progress: Progress | None = None,
+    **settings: Any,
+) -> DiffractionTable:
+    """Build the table of a wide scan on the workers of a Dask cluster.
+
+    Workers are sent some windows at a time, and send sums of their powers back, which the client
+    adds up in the order of the windows: the table is, to the last bit, that of
+    `DiffractionTable.build` on such a processor, with any number of workers.
+
+    Parameters
+    ----------
+    heights : one scan or several.
+    client : `distributed.Client`; workers have one Dask thread each (`cluster.connect`).
+    progress : called as progress(done, total, text).
+    settings : of `DiffractionTable.build`, `windows` among them. A scan that is no wider than a
+        window is built here.
+
+    Raises
+    ------
+    DiffractionError
+        If there are no `windows`, a worker is of no use, or the table cannot be built.
+    """
+    return build_on_workers(heights, TableSettings(**settings), client, progress)[0]
+
+
+def build_on_workers(
+    heights: HeightField | Sequence[HeightField],
+    settings: TableSettings,
+    client: Any,
+    progress: Progress | None = None,
+) -> tuple[DiffractionTable, OrderedMap]:
+    """`build`, with what it cost."""
+    if settings.windows is None:
+        raise DiffractionError(
+            "workers build tables of windows: set windows=auto (--windows auto), or do without "
+            "workers"
+        )
+    check_workers(client, None)
+    run = OrderedMap(client)
+    return build_with(heights, settings, progress, run), run
+
 
 _POLL = 0.02  # seconds
 #: Arguments that are with the scheduler for every worker: one is worked at, the other is there.
@@ -154,9 +205,5 @@ def _done(content: bytes) -> tuple[Any, float] | Failed:
         wanted, work, argument = pickle.loads(content)
         check_versions(wanted)  # of a worker that has come late
         return work(argument), time.perf_counter() - start
-    except DiffractionError as error:
-        return Failed(str(error), worker_address())
-    except Exception as error:  # a worker must answer, and its traceback is of no use elsewhere
-        return Failed(
-            f"unexpected {type(error).__name__}: {one_line(str(error))}", worker_address()
-        )
+    except Exception as error:
+        return failure(error)

@@ -31,7 +31,7 @@ def test_an_exr_has_the_largest_y_on_top_and_says_what_it_is(tmp_path):
     np.testing.assert_array_equal(channels["T.383,5nm"].pixels[::-1], result.spectrum[0])
     row = np.unravel_index(channels["G"].pixels.argmax(), (64, 64))[0]
     assert centres(64)[::-1][row] == pytest.approx(light.mirror[1], abs=0.02)
-    document = json.loads(file.header()[maps.files.ATTRIBUTE])
+    document = json.loads(file.header()[maps.picture.ATTRIBUTE])
     assert document["theta"] == 50.0
     assert document["source"] == "here"
     assert document["unit"] == "1/sr"

@@ -11,10 +11,8 @@ from mitsuba_diffraction.analysis.maps.picture import contact_sheet
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.thesis import methods
 from mitsuba_diffraction.thesis.methods import Gain
-from mitsuba_diffraction.thesis.methods.maps import method_map
-from mitsuba_diffraction.thesis.sweeps import sweep
-from mitsuba_diffraction.thesis.sweeps.compiled import time_compiled
-from mitsuba_diffraction.thesis.sweeps.run import truncated
+from mitsuba_diffraction.thesis.methods.make import method_map
+from mitsuba_diffraction.thesis.sweeps import sweep, time_compiled, truncated
 
 SETTINGS = {"coherence_width": 20.0, "resolution": 24, "samples": 4, "wavelength_range": (400, 700)}
 

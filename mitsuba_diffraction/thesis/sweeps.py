@@ -1,23 +1,28 @@
-"""Running a sweep: maps for every value, how long each took, how far each is from the reference."""
+"""The thesis' sweeps: one parameter of a BRDF map after the other, compared and timed.
+
+Maps for every value, how long each took, how far each is from the reference; and the default
+look-up against `flss`, both compiled: the same map, timed side by side (Dr.Jit).
+"""
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...analysis.maps.light import Light
-from ...analysis.maps.result import BrdfMap
-from ...errors import DiffractionError
-from ...heights.field import HeightField
-from ...optics.colour import delta_e
-from ...progress import Progress
-from ...tables.table import DiffractionTable
-from ...thesis.methods.maps import method_map
-from ..methods import NAMES, FullSpectrum, Gain, Method, make, make_all
+from ..analysis.maps.result import BrdfMap, Light
+from ..errors import DiffractionError
+from ..heights.field import HeightField
+from ..optics.colour import delta_e
+from ..progress import Progress
+from ..tables.table import DiffractionTable
+from .methods import NAMES, FullSpectrum, Gain, Method, make, make_all
+from .methods.make import method_map
 
 _MOST_VALUES = 24
 # Pixels of the reference this much darker than the brightest away from the mirror are unlit.
@@ -108,13 +113,13 @@ def sweep(
     if gain is not None and ("rainbow" in chosen or method == "rainbow"):
         raise DiffractionError("method 'rainbow' has no relative reflectance; leave it out")
     made = _made(kind, chosen, heights, light, method, progress, settings)
-    done: list[tuple[Any, BrdfMap, float]] = []
-    for value, (one, where, step) in zip(chosen, made, strict=True):
-        found, seconds = timed_map(
-            one, where, step=step, resolution=resolution, samples=samples, gain=gain,
-            progress=progress,
-        )  # fmt: skip
-        done.append((value, found, seconds))
+    common: dict[str, Any] = {
+        "resolution": resolution, "samples": samples, "gain": gain, "progress": progress,
+    }  # fmt: skip
+    done = [
+        (value, *timed_map(one, where, step=step, **common))
+        for value, (one, where, step) in zip(chosen, made, strict=True)
+    ]
     return _all_compared(kind, chosen, done)
 
 
@@ -136,11 +141,6 @@ def _made(
         return make(method, heights, progress=progress, **(settings | more))
 
     if kind == "method":
-        for name in values:
-            if name not in NAMES:
-                raise DiffractionError(
-                    f"method='{name}' is unknown; choose one of {', '.join(NAMES)}"
-                )
         # one coherence for all: what differs then is the method
         alike = {"coherence": "patch"} | settings
         all_ = make_all(values, heights, progress=progress, **alike)
@@ -238,3 +238,87 @@ def _distance(base: BrdfMap, other: BrdfMap) -> tuple[float, float, float, float
     blue = [share[2] / share[0] if share[0] > 0.0 else np.nan for share in shares]
     high = float(np.nanpercentile(apart, 95.0))
     return float(np.nanmean(apart)), high, float(np.nanmean(own)), float(blue[1] / blue[0])
+
+
+#: Each is timed so often, in turns; the first of them only warms up.
+_ROUNDS = 3
+# What Mitsuba's spectral variants span, nm.
+_RANGE = (360.0, 830.0)
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """Seconds of one map, the smallest of the rounds."""
+
+    spectral: float  # the package's own look-up, at every wavelength
+    colours: float  # as in RGB variants: one look-up in the table of the whole spectrum's colours
+    flss: float  # the thesis' loop over wavelengths, terms and taps, an image a term
+
+    @property
+    def ratio(self) -> float:
+        """How many times faster than `flss` the default is, wavelength by wavelength."""
+        return self.flss / self.spectral
+
+    @property
+    def colour_ratio(self) -> float:
+        """How many times faster than `flss` the default's colours are."""
+        return self.flss / self.colours
+
+
+def time_compiled(
+    heights: HeightField,
+    light: Light,
+    *,
+    resolution: int,
+    samples: int,
+    step: float = 5.0,
+    coherence_width: float = 65.0,
+    tolerance: float = 1e-3,
+    progress: Progress | None = None,
+) -> Compiled:
+    """Evaluate one map of the whole spectrum in three ways; tables are not in the times.
+
+    The variants llvm_ad_spectral and llvm_ad_rgb (or those for a GPU, if the one that is set is)
+    are set in turn, the spectral one last.
+
+    Raises
+    ------
+    DiffractionError
+        If a parameter is out of range or a table cannot be built.
+    """
+    import mitsuba as mi
+
+    from ..analysis.bench.contenders import saved_bsdf, thesis_bsdf
+
+    common: dict[str, Any] = {
+        "coherence_width": coherence_width, "tolerance": tolerance, "wavelength_range": _RANGE,
+    }  # fmt: skip
+    backend = "cuda" if (mi.variant() or "").startswith("cuda") else "llvm"
+
+    def seconds(bsdfs: dict[str, Any]) -> dict[str, float]:
+        from ..analysis.maps import brdf_map
+
+        best = dict.fromkeys(bsdfs, float("inf"))
+        for n in range(_ROUNDS):
+            for name, bsdf in bsdfs.items():
+                start = time.perf_counter()
+                brdf_map(
+                    bsdf, light.theta, light.phi, step=step, resolution=resolution,
+                    samples=samples, progress=progress,
+                )  # fmt: skip
+                if n > 0:
+                    best[name] = min(best[name], time.perf_counter() - start)
+        return best
+
+    with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder:
+        own, flss = Path(folder) / "own.exr", Path(folder) / "flss.exr"
+        DiffractionTable.build(heights, progress=progress, **common).save(own)
+        full = make("flss", heights, progress=progress, **common)
+        assert isinstance(full, FullSpectrum)
+        full.table.save(flss)
+        mi.set_variant(f"{backend}_ad_rgb")
+        raw: dict[str, Any] = {"material": "none", "energy_conserving": False}
+        best = seconds({"colours": saved_bsdf(own, **raw)})
+        mi.set_variant(f"{backend}_ad_spectral")
+        best |= seconds({"spectral": saved_bsdf(own, **raw), "flss": thesis_bsdf(flss, **raw)})
+    return Compiled(best["spectral"], best["colours"], best["flss"])
