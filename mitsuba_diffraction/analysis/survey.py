@@ -45,8 +45,7 @@ from ..scene.mitsuba_text import error_of
 from ..scene.passes import Stop
 from ..settings import RECIPE_SETTINGS, TableSettings, checked
 from ..tables.build.build import build_with
-from ..tables.store.cache import cached_table
-from ..tables.store.store import key_of
+from ..tables.store import cached_table, key_of
 from .maps import brdf_map
 from .maps.result import colours_of, iridescence
 

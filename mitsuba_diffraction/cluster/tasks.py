@@ -27,7 +27,7 @@ from ..errors import DiffractionError, one_line
 from ..scene.load import load_scene, sensor_of, set_variant, shrink
 from ..scene.parameters import files_of
 from ..scene.passes import Pass, integrator_of, render_pass
-from ..tables.store.store import cache_folder, key_of
+from ..tables.store import cache_folder, key_of
 
 _PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit")
 

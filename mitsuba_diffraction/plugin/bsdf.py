@@ -198,13 +198,11 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..tables.energy.conservation import DirectionalTable
-from .attributes import PLACED
 from .boundary import Boundary, Kirchhoff
 from .changing import Bounded, arrays_within, marks
 from .coat import CoatedPair
 from .energy import EnergyModel
 from .film import UnderFilm
-from .height_scale import LEAST_SCALE, Varying
 from .layers import Transmission
 from .llvm import require_loaded_llvm
 from .pair import Pair, from_patch, in_patch, vcavity
@@ -226,6 +224,7 @@ from .roles import (
 )
 from .sampling import EVEN, direction_of, with_even_share
 from .sources import TableProvider, from_cache
+from .textures import LEAST_SCALE, PLACED, VaryingHeightScale
 
 #: The component of a context that asks for all of them.
 _ALL = 0xFFFFFFFF
@@ -267,11 +266,11 @@ class Diffraction(mi.BSDF):
         self.m_flags = functools.reduce(operator.or_, components)
         self.parameters_changed([])
 
-    def _set_height_scale(self, given: float | Varying, optical: float) -> None:
+    def _set_height_scale(self, given: float | VaryingHeightScale, optical: float) -> None:
         """A bounded number; or factors that vary, of which `height_scale` is the largest."""
-        if isinstance(given, Varying):
-            self._scale: Varying | Bounded = given
-            self._varying: Varying | None = given
+        if isinstance(given, VaryingHeightScale):
+            self._scale: VaryingHeightScale | Bounded = given
+            self._varying: VaryingHeightScale | None = given
             self.height_scale: Float = mi.Float(given.high)
             return
         most = self.table.height_scale_max / optical

@@ -21,8 +21,7 @@ from ..heights.recipes import Recipe
 from ..settings import MAX_HEIGHT_SCALE, TableSettings
 from ..tables.build.build import build_with
 from ..tables.exr import is_table
-from ..tables.store.cache import cached_table, loaded_table
-from ..tables.store.store import key_of
+from ..tables.store import cached_table, key_of, loaded_table
 from ..tables.table import DiffractionTable
 from .dictionary import HeightData
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
-from ..plugin.attributes import check_attributes
 from ..plugin.names import name_of
+from ..plugin.textures import check_attributes
 from .mitsuba_text import error_of
 from .parameters import check_parameters
 

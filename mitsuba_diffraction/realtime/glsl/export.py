@@ -16,7 +16,7 @@ import OpenEXR
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError
-from ...tables.store.cache import cached_colours
+from ...tables.store import cached_colours
 from .maps import Map
 from .materials import Material, height_scale, pack_conservation, pack_surface
 from .packing import pack_colours, pack_powers, pack_responses

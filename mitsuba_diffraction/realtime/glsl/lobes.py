@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from ...tables.colour.polar import LARGEST_RADIUS
+from ...tables.colour.build import LARGEST_RADIUS
 from ...tables.colour.proposals import IMPORTANCE, brightness
 from ...tables.colour.table import ColourTable
 from .texels import Packed, Texture, listed

@@ -7,7 +7,7 @@ from typing import Any
 
 from ...errors import DiffractionError
 from ...optics.geometry import sigma_of
-from ...tables.store.cache import cached_colours
+from ...tables.store import cached_colours
 from .context import Bindings, compile_program
 from .materials import Material
 from .packing import area_factor, pack_colours, pack_powers

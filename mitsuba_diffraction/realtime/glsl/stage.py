@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...tables.store.cache import cached_colours
+from ...tables.store import cached_colours
 from .camera import Camera
 from .casters import Casters
 from .context import Bindings, Target, compile_plain, require_moderngl, set_uniforms

@@ -10,7 +10,7 @@ from ...errors import DiffractionError
 from ...heights.field import HeightField
 from ...settings import TableSettings
 from ...tables.build.build import build_with
-from ...tables.store.cache import cached_table
+from ...tables.store import cached_table
 from ...tables.table import DiffractionTable
 from ...thesis.methods import FullSpectrum, OrdersOnly, Repeated, make
 from ...thesis.methods.method import Method

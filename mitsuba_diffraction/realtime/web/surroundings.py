@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...tables.store.cache import cached_colours
+from ...tables.store import cached_colours
 from ..glsl.emitters import Emitters
 from ..glsl.lobes import pack_lobes
 from ..glsl.materials import Material, coat_index, height_scale

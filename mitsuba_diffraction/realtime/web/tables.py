@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ...optics.geometry import wavenumber
 from ...progress import Progress
-from ...tables.colour.colour_difference import colour_difference, power_colour_difference
+from ...tables.colour.table import colour_difference, power_colour_difference
 from ...tables.energy.powers import power_series
-from ...tables.store.cache import cached_colours
+from ...tables.store import cached_colours
 from ...tables.table import DiffractionTable
 from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.texels import Packed, shortened

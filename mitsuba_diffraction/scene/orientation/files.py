@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError, one_line
-from ...plugin.attributes import ORIENTATION
+from ...plugin.textures import ORIENTATION
 from .polygons import triangulated_ply
 from .trimesh import TriangleMesh
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from ...plugin.attributes import ORIENTATION
+from ...plugin.textures import ORIENTATION
 from .breaks import BREAK
 
 MOST_TURNING = 0.05  # of the surface, on which the direction may turn too fast

@@ -37,7 +37,7 @@ class Plan:
     scene: str  # name of the file, for people
     tolerance: float  # relative error of the picture that it was made for
     paths: int  # that were traced
-    # by the key of the whole table (`tables.store.cache.table_key`): heights and parameters
+    # by the key of the whole table (`tables.store.table_key`): heights and parameters
     tables: Mapping[str, PlannedTable] = field(default_factory=dict)
 
     def limits(self) -> dict[str, dict[str, Any]]:

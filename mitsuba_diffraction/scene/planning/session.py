@@ -34,7 +34,7 @@ from ...plugin.roles import (
 )
 from ...plugin.sampling import share_sampler
 from ...settings import TableSettings
-from ...tables.store.cache import cached_table, table_key
+from ...tables.store import cached_table, table_key
 from ...tables.table import DiffractionTable
 
 _one_at_a_time = threading.Lock()

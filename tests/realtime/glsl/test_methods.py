@@ -42,10 +42,9 @@ from mitsuba_diffraction.realtime.glsl.texels import (
     shortened,
 )
 from mitsuba_diffraction.realtime.glsl.thesis import pack_method, thesis_method
-from mitsuba_diffraction.tables.colour.colour_difference import colour_difference
-from mitsuba_diffraction.tables.colour.table import ColourTable
+from mitsuba_diffraction.tables import store
+from mitsuba_diffraction.tables.colour.table import ColourTable, colour_difference
 from mitsuba_diffraction.tables.energy.conservation import FINE, DirectionalTable
-from mitsuba_diffraction.tables.store import cache
 from mitsuba_diffraction.thesis.methods import make
 from tests.realtime.glsl.conftest import probed
 
@@ -297,7 +296,7 @@ def test_the_documents_tables_are_built_once(
         raise AssertionError("built again")
 
     monkeypatch.setattr("mitsuba_diffraction.realtime.glsl.thesis.build_with", build)
-    monkeypatch.setattr(cache, "_tables", {})  # as in the next process
+    monkeypatch.setattr(store, "_tables", {})  # as in the next process
     second = thesis_method("flss", patch, table)
     np.testing.assert_array_equal(second.table.coefficients, first.table.coefficients)
     with pytest.raises(AssertionError, match="built again"):

@@ -1,5 +1,5 @@
 // `lut`: the colours of daylight, summed over all wavelengths beforehand; the twin of
-// plugin/rgb_lookup.py. Rings even in ln r with azimuths of their own, a series of five terms in z.
+// plugin/rgb.py. Rings even in ln r with azimuths of their own, a series of five terms in z.
 
 #ifdef FLOAT_TEXTURES            // the same in textures that every loader knows
 uniform sampler2D colours;      // four texels a bin

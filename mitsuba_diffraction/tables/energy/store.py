@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.fresnel import Filmed
-from ..energy import between, chains, gain, grating, links, sheet, sides, sums, transport
-from ..energy import conservation as made
-from ..energy.conservation import Conservation, DirectionalTable, Index, conservation
-from ..energy.grating import Grating
-from ..energy.grid import LAST_ANGLE
-from ..energy.links import Medium
-from ..sampling.order_mixture import MOST_STRONG, STRONG
+from ..sampling import MOST_STRONG, STRONG
+from ..store import Record, kept, key_of
 from ..table import DiffractionTable
-from .store import Record, kept, key_of
+from . import between, chains, gain, grating, links, sheet, sides, sums, transport
+from . import conservation as made
+from .conservation import Conservation, DirectionalTable, Index, conservation
+from .grating import Grating
+from .grid import LAST_ANGLE
+from .links import Medium
 
 #: Raised whenever the computation changes.
 VERSION = 6

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionWarning
-from mitsuba_diffraction.tables.store import store
-from mitsuba_diffraction.tables.store.store import Record, cache_folder, kept
+from mitsuba_diffraction.tables import store
+from mitsuba_diffraction.tables.store import Record, cache_folder, kept
 
 VALUES = np.linspace(0.0, 1.0, 37, dtype=np.float32).reshape(1, 37)
 KEY = "3" * 64
@@ -118,7 +118,7 @@ def test_the_folder_is_the_variable_s_or_the_user_s(monkeypatch):
 MANY = """
 import os, sys, time
 import numpy as np
-from mitsuba_diffraction.tables.store.store import Record, kept
+from mitsuba_diffraction.tables.store import Record, kept
 
 def make():
     with open(sys.argv[1], "a") as file:

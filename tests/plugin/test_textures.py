@@ -6,7 +6,7 @@ import mitsuba as mi
 import pytest
 
 from mitsuba_diffraction import DiffractionError, bsdf_dict
-from mitsuba_diffraction.plugin.attributes import check_attributes
+from mitsuba_diffraction.plugin.textures import check_attributes
 from mitsuba_diffraction.realtime.glsl.scene import read_scene
 from tests.directions import rough_patch
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.tables.energy import store
 from mitsuba_diffraction.tables.energy.conservation import Conservation, DirectionalTable
-from mitsuba_diffraction.tables.store import energy as store
-from mitsuba_diffraction.tables.store.energy import Energy
-from mitsuba_diffraction.tables.store.store import VARIABLE
+from mitsuba_diffraction.tables.energy.store import Energy
+from mitsuba_diffraction.tables.store import VARIABLE
 
 
 @pytest.fixture
