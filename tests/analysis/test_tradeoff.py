@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from docs.make.figures import tradeoff as page
+from docs.make.figures import tables
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.analysis import tradeoff
 from mitsuba_diffraction.analysis.tradeoff.accuracy import (
@@ -122,7 +122,7 @@ def test_pages_show_what_was_measured(measured, tmp_path):
     file.write_text("<!-- begin settings -->\nstale\n<!-- end settings -->\n", "utf-8")
     images = tmp_path / "images"
     images.mkdir()
-    assert page.main([str(measured), "-o", str(file), "--images", str(images)]) == 0
+    assert tables.main(["tradeoff", str(measured), "-o", str(file), "--images", str(images)]) == 0
     text = file.read_text("utf-8")
     assert "| coarse | 1.0e-02 |" in text
     assert "refused: too deep" in text
@@ -131,7 +131,7 @@ def test_pages_show_what_was_measured(measured, tmp_path):
 
 
 def test_a_folder_without_measurements_is_refused(tmp_path, capsys):
-    assert page.main([str(tmp_path), "-o", str(tmp_path / "page.md")]) == 1
+    assert tables.main(["tradeoff", str(tmp_path), "-o", str(tmp_path / "page.md")]) == 1
     assert "is not what tradeoff writes" in capsys.readouterr().err
 
 
