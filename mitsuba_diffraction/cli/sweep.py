@@ -127,7 +127,7 @@ def _compiled(
     if args.kind != "method" or not args.compiled:
         return []
     from ..scene.load import set_variant
-    from ..thesis.sweeps.compiled import time_compiled
+    from ..thesis.sweeps import time_compiled
 
     variant = set_variant(None)
     tables = {k: settings[k] for k in ("coherence_width", "tolerance") if k in settings}
