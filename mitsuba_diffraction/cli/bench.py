@@ -53,9 +53,8 @@ def bench(args: argparse.Namespace) -> int:
         _check_scenes(args.scenes)
     from tqdm import tqdm
 
-    from ..analysis.bench import figures
-    from ..analysis.bench.machine import describe_machine
-    from ..analysis.bench.run import sections
+    from ..analysis.bench import figures, sections
+    from ..analysis.bench.figures import describe_machine
 
     chosen = figures.QUICK if args.quick else figures.FULL
     machine = describe_machine()
@@ -132,8 +131,7 @@ def tradeoff(args: argparse.Namespace) -> int:
     """Measure, write and recommend, and return the exit code."""
     options.check_own_patch(args)
     check_writable(args.output / "tradeoff.json", make_folder=True)
-    from ..analysis.bench.figures import PIXEL
-    from ..analysis.bench.machine import describe_machine
+    from ..analysis.bench.figures import PIXEL, describe_machine
     from ..analysis.tradeoff import (
         Budget,
         measure,
@@ -142,9 +140,8 @@ def tradeoff(args: argparse.Namespace) -> int:
         recommended,
         settings,
     )
-    from ..analysis.tradeoff.plot import draw_depths, draw_trade
-    from ..analysis.tradeoff.report import lines, plain, save_csv
-    from ..analysis.tradeoff.sample import Sample
+    from ..analysis.tradeoff.accuracy import Sample
+    from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain, save_csv
     from ..heights import gratings
 
     side, pairs, lanes, rounds, depths = _QUICK if args.quick else _FULL

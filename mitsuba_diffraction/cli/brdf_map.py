@@ -196,7 +196,7 @@ def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -
     """The same by a method of the thesis."""
     from ..analysis.maps import Light, check_map
     from ..thesis.methods import make
-    from ..thesis.methods.maps import method_map
+    from ..thesis.methods.make import method_map
 
     light, samples, single = Light(args.theta, args.phi), args.samples or 1, args.wavelength
     check_map(bands, args.resolution, args.samples, spectral=False)

@@ -80,11 +80,11 @@ def run(args: argparse.Namespace) -> int:
     from ..atomic import atomic_path
     from ..heights.spectra import dominant_periods
     from ..thesis.evaluation import Beam, measure
-    from ..thesis.evaluation.beam import check_axes
     from ..thesis.evaluation.plot import figure, save_csv, save_npz
+    from ..thesis.evaluation.ridge import check_axes
     from ..thesis.methods import make
     from ..thesis.methods.method import trapezoid_rule
-    from ..thesis.methods.period import check_period
+    from ..thesis.methods.periodic import check_period
 
     start = time.perf_counter()
     output = args.output or Path(f"{args.source.stem}-evaluation.png")

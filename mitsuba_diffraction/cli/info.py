@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
-    from ..heights.formats.raw import existing_file
+    from ..heights.formats import existing_file
     from ..heights.read import is_recipe
     from ..tables.exr import is_table
 
@@ -118,7 +118,7 @@ def _energy(file: Path) -> dict[str, Any]:
 
 
 def _plot_albedo(file: Path, output: Path) -> None:
-    from ..analysis.pictures.albedo import albedo_figure
+    from ..analysis.pictures import albedo_figure
     from ..atomic import atomic_path
     from ..tables import DiffractionTable
 
@@ -127,7 +127,7 @@ def _plot_albedo(file: Path, output: Path) -> None:
 
 
 def _draw(args: argparse.Namespace) -> None:
-    from ..analysis.pictures.patches import patches_figure
+    from ..analysis.pictures import patches_figure
     from ..atomic import atomic_path
     from ..heights.load import load_heights
     from ..heights.read import is_recipe

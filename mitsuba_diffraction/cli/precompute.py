@@ -66,9 +66,9 @@ def run(args: argparse.Namespace) -> int:
 def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, Any]:
     """One table, of a recipe or of one or several files, and what is in it."""
     from ..heights.load import load_heights
-    from ..heights.preprocess.edges import edge_lines
     from ..heights.read import is_recipe
     from ..heights.recipes import Recipe
+    from ..heights.validity import edge_lines
     from ..settings import TableSettings
 
     start = time.perf_counter()
@@ -127,7 +127,7 @@ def _built(
 
     if settings.windows is None or not on_workers(args):
         return build_with(fields, settings, bar), {}
-    from ..cluster.build import build_on_workers
+    from ..cluster.jobs import build_on_workers
 
     with client_of(args) as client:
         table, work = build_on_workers(fields, settings, client, bar)

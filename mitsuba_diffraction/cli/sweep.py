@@ -126,7 +126,7 @@ def _compiled(
 ) -> list[str]:
     if args.kind != "method" or not args.compiled:
         return []
-    from ..thesis.sweeps.compiled import time_compiled
+    from ..thesis.sweeps import time_compiled
 
     variant = set_variant(None)
     tables = {k: settings[k] for k in ("coherence_width", "tolerance") if k in settings}

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import DiffractionError, DiffractionWarning
 from ..heights import gratings
 from ..heights.field import HeightField
-from ..heights.formats.raw import existing_file
+from ..heights.formats import existing_file
 from ..heights.load import load_heights
 from ..heights.read import LoadOptions, is_recipe, treat
 from ..heights.recipes import Recipe

@@ -22,7 +22,7 @@ from ...tables.build.coefficients import half_scale
 from ...tables.colour.table import power_colour_difference
 from ...tables.table import DiffractionTable, q_limit_of
 from ..bench.contenders import Queries, kernel_seconds, ratio, rounds_of, saved_bsdf
-from .sample import Sample
+from .accuracy import Sample
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from ...tables.store import cached_colours, cached_table
 from ...tables.table import DiffractionTable
 from ...thesis.methods import FullSpectrum, OrdersOnly, Repeated, make
 from ...thesis.methods.method import Method
-from ...thesis.methods.nmm import SPECULAR_WAVELENGTH
+from ...thesis.methods.periodic import SPECULAR_WAVELENGTH
 from .context import Bindings, compile_program
 from .materials import Material
 from .packing import area_factor, pack_colours, pack_powers

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...optics.blend import NODES_PER_OCTAVE, RoughnessTable
-from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, response
+from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
 from ...optics.fresnel import reflectance
 from ...optics.geometry import wavenumber
 from ...tables.colour.build import VISIBLE
@@ -232,13 +232,16 @@ def pack_conductor(
     rows[:-1, :, 0] = over(lam)
     rows[:-1, :, 1] = np.interp(lam, wavelengths, eta)[:, None]
     rows[:-1, :, 2] = np.interp(lam, wavelengths, k)[:, None]
-    rows[-1, :, :3] = over(_LAM).T @ _daylight_weights()
+    found = over(_LAM)
+    rows[-1, :, :3] = found.T @ _daylight_weights()
+    tint = metal_tint(_LAM, found[:, -1], rows[-1, -1, :3])
     return Packed(
         (Texture("reflectances", rows),),
         {
             "wavenumbers": WAVENUMBERS,
             "channel_eta": tuple(np.interp(RGB_WAVELENGTHS, wavelengths, eta).tolist()),
             "channel_k": tuple(np.interp(RGB_WAVELENGTHS, wavelengths, k).tolist()),
+            **{f"tint_{n}": tuple(column) for n, column in enumerate(tint.T.tolist())},
         },
         {"SURFACE_KIND": "2"},
     )
