@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import HeightField
+from mitsuba_diffraction.optics.second_order import Perturbation
 
 from .cases import index_of
 from .compare import GRAZING, scans_of
@@ -33,7 +34,7 @@ from .models import MATERIALS
 from .patch_sections import is_here
 from .patch_solutions import solved
 from .patches import KINDS, cell, patch_index
-from .rayleigh import Complex, Real, Waves, axes, fluxes
+from .rayleigh import Complex, Real, Waves
 from .solutions import shipped
 
 #: The first order, with the mean of the second, and with all of it.
@@ -122,22 +123,11 @@ def amplitudes(
 def coefficients(
     waves: Waves, index: complex, orders: NDArray[np.int64]
 ) -> tuple[Complex, Complex]:
-    """B (n, 2, 2) and B₂ (n, waves, 2, 2) of orders (n, 2), between `rayleigh.axes`."""
-    down, above, came = waves.below * [-1, -1, -1], waves.above, waves.incident
-    tests, fields, zeroth = axes(down, index), axes(above, 1.0), [waves.zeroth]
+    """B (n, 2, 2) and B₂ (n, waves, 2, 2) of orders (n, 2), between `second_order.axes`."""
     rows = [int((waves.orders == order).all(axis=1).argmax()) for order in orders]
-    lit = fluxes(tests, down, axes(came, 1.0), came)
-    back = fluxes(tests, down, fields[:, zeroth], above[zeroth])
-    gamma, gamma_lit, gamma_back = (
-        (down + wave)[:, 2, None, None] for wave in (above, came, above[zeroth])
-    )
-    inverse = gamma * np.linalg.inv(fluxes(tests, down, fields, above))
-    flat = -(inverse @ (lit / gamma_lit))[zeroth]
-    once = -1j * inverse @ (lit + back @ flat)
-    level = -0.5 * (gamma_lit * lit + gamma_back * (back @ flat))[rows, None]
-    between = fluxes(tests[:, rows, None], down[rows, None], fields[:, None], above)
-    q0 = above[waves.zeroth, 2].real
-    return 0.5j / q0 * once[rows], -inverse[rows, None] @ (1j * between @ once + level) / q0
+    tangential = waves.above[:, :2].real
+    light = Perturbation(-waves.incident[0].real, index)
+    return light.first(tangential[rows]), light.second(tangential[rows][:, None], tangential)
 
 
 def _at(function: NDArray[np.inexact], orders: NDArray[np.int64]) -> Complex:
