@@ -13,5 +13,6 @@ coefficients    of the series, from transforms of the heights
 half_precision  these as half floats
 error           the one error measure of the project
 coarse          what a table of a restricted domain has everywhere else
+slope_ratios    what tells hills from pits, for the second order
 describe        what a table remembers of its heights
 """
