@@ -119,12 +119,12 @@ model : string [small_slope]
     index, and of layering `thesis`.
 second_order : boolean [false]
     Multiplies orders by what light diffracted twice makes of them (Voronovich 1994, the second
-    order of small slope as a factor of directions and of the heights' slopes): on a CD's pits it
-    takes the error of oblique light from a fifth to a tenth, on scales by a quarter
-    (docs/validation.md). For unpolarised light that a bare dielectric reflects, in ensembles;
-    windows, tables and recipes have it too (`precompute --second-order`). Order 0 and directions
-    drawn are as without it, and so is the light that goes on to what lies beneath; c follows the
-    index in steps of 0.01.
+    order of small slope as a factor of directions and of the heights' slopes). Of light from 60° it
+    takes the error of colours on a CD's pits from a third to a tenth, on scales by a tenth to a
+    quarter, at normal incidence nothing (docs/validation.md). For unpolarised light that a bare
+    dielectric reflects, in ensembles; a table must hold what it takes (`precompute
+    --second-order`). Order 0, the directions drawn and the light that goes on to what lies beneath
+    are as without it. Coefficients follow the index in steps of 0.01.
 energy_conserving : boolean [true]
     Where the model reflects more than it gets, multiplies it by s(ωi) s(ωo), a scale of directions
     found for this table, model, material and each wavelength, so that no more is reflected than

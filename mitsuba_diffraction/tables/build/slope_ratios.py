@@ -22,6 +22,8 @@ from .describe import sections
 
 #: Width of a cell, nodes of κ and the first of them, in units of `q_limit`.
 CELL, STEP, FIRST = 1 / 20, 1 / 6, 1 / 24
+#: Least light in a cell that has an r: less is single precision's.
+LEAST = 1e-12
 #: Of r times its gate: more adds `second_order.LIMIT` in any case.
 MOST = 100.0
 
@@ -50,7 +52,7 @@ def slope_ratios(patches: Sequence[HeightField], settings: TableSettings) -> Slo
             squares = along(q, np.stack(products, axis=-1)) * a.conj()[:, None]
             found += within @ np.column_stack([np.abs(a) ** 2, squares])
     power = sums[..., :1].real
-    ratios = np.divide(sums[..., 1:], power, out=np.zeros_like(sums[..., 1:]), where=power > 0.0)
+    ratios = np.divide(sums[..., 1:], power, out=np.zeros_like(sums[..., 1:]), where=power > LEAST)
     ratios *= np.mean(gates)
     ratios /= np.maximum(1.0, np.abs(ratios) / MOST)
     values = np.moveaxis(ratios, -1, 1).reshape(len(nodes), 2, *shape)
