@@ -48,11 +48,11 @@ package: setup .venv/browser  ## build wheel and sdist, and test them in an empt
 bench: setup  ## measure speed and noise: docs/benchmarks.md
 	@mkdir -p out
 	@$(RUN) bench $(MEASURED) --json out/bench.json
-	@$(PYTHON3) -m docs.make.figures.speed out/bench.json
+	@$(PYTHON3) -m docs.make.figures.tables speed out/bench.json
 
 # a measured patch beside the look-alikes: make figures MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"
 figures: setup  ## make the pictures in docs/images
-	@$(PYTHON3) -m docs.make.figures -o docs/images $(if $(MEASURED),--measured $(MEASURED))
+	@$(PYTHON3) -m docs.make.figures.pictures -o docs/images $(if $(MEASURED),--measured $(MEASURED))
 
 gallery: setup  ## make docs/gallery.md and the pictures of docs/meshes.md
 	@$(PYTHON3) -m docs.make.figures.gallery -o docs
@@ -68,12 +68,12 @@ methods: setup  ## measure the methods: docs/methods.md
 
 tradeoff: setup  ## measure accuracy against speed and memory: docs/accuracy.md
 	@$(RUN) tradeoff $(MEASURED) -o out/tradeoff
-	@$(PYTHON3) -m docs.make.figures.tradeoff out/tradeoff
+	@$(PYTHON3) -m docs.make.figures.tables tradeoff out/tradeoff
 
 plan: setup  ## plan the snake's scene: docs/benchmarks.md and docs/plan.md
 	@mkdir -p out
 	@$(RUN) plan scenes/snake.xml --json out/plan.json
-	@$(PYTHON3) -m docs.make.figures.plan out/plan.json
+	@$(PYTHON3) -m docs.make.figures.tables plan out/plan.json
 
 parameters: setup  ## make docs/parameters.md from the plugin's docstring
 	@$(PYTHON3) -m docs.make.figures.parameters -o docs/parameters.md
@@ -90,7 +90,7 @@ energy: setup  ## measure what energy conservation takes: docs/energy.md
 	@for name in $(SURFACES); do \
 	    $(RUN) precompute precompute/$$name.toml -o out/energy/$$name.exr && \
 	    $(RUN) info --energy --json out/energy/$$name.json out/energy/$$name.exr || exit 1; done
-	@$(PYTHON3) -m docs.make.figures.energy $(SURFACES:%=out/energy/%.json)
+	@$(PYTHON3) -m docs.make.figures.tables energy $(SURFACES:%=out/energy/%.json)
 
 # scene, width, height, samples of the path tracer, frames, samples a frame along either side of a pixel
 REALTIME := scales:36:24:16200:2048:2 snake:40:25:97200:3072:5 xenopeltis:32:20:96100:3072:3 \

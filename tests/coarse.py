@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.tables.energy import conservation, sides, sums, transport
+from mitsuba_diffraction.tables.energy import store as kept
 from mitsuba_diffraction.tables.energy.grid import DirectionGrid
-from mitsuba_diffraction.tables.store import energy as kept
 
 
 def coarse_energy(set_value: Callable[[object, str, object], object] = setattr) -> None:

@@ -13,7 +13,7 @@ import hypothesis
 import pytest
 
 import mitsuba_diffraction  # noqa: F401 - first of all: it chooses the LLVM that Dr.Jit loads
-from mitsuba_diffraction.tables.store.store import VARIABLE
+from mitsuba_diffraction.tables.store import VARIABLE
 
 ROOT = Path(__file__).resolve().parent.parent
 

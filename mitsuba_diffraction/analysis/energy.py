@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..tables.energy.conservation import Index, albedos, most_kept
 from ..tables.energy.links import Medium
 from ..tables.energy.sides import Sides
-from ..tables.store.energy import Energy, SidesEnergy
+from ..tables.energy.store import Energy, SidesEnergy
 from ..tables.table import DiffractionTable
 
 #: Polar angles (degrees) and wavelengths (nm) looked at, at `AZIMUTHS` azimuths each.

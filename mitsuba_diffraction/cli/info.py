@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from ..errors import DiffractionError
 from ..settings import TableSettings
 from . import options
-from .arguments import path_ending_in
 from .console import Bar, mitsuba_warnings
+from .options import path_ending_in
 from .report import lines_of, plain, save_report
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
-    from ..heights.formats.raw import existing_file
+    from ..heights.formats import existing_file
     from ..heights.read import is_recipe
     from ..tables.exr import is_table
 
@@ -119,7 +119,7 @@ def _energy(file: Path) -> dict[str, Any]:
 
 
 def _plot_albedo(file: Path, output: Path) -> None:
-    from ..analysis.pictures.albedo import albedo_figure
+    from ..analysis.pictures import albedo_figure
     from ..atomic import atomic_path
     from ..tables import DiffractionTable
 
@@ -128,7 +128,7 @@ def _plot_albedo(file: Path, output: Path) -> None:
 
 
 def _draw(args: argparse.Namespace) -> None:
-    from ..analysis.pictures.patches import patches_figure
+    from ..analysis.pictures import patches_figure
     from ..atomic import atomic_path
     from ..heights.load import load_heights
     from ..heights.read import is_recipe

@@ -1,24 +1,89 @@
-"""Frames from the tasks of many workers: submitted, kept, added up in order, developed."""
+"""Frames from the tasks of many workers: submitted, kept on disk, added up in order, developed."""
 
 from __future__ import annotations
 
+import contextlib
+import json
 import math
+import os
+import tempfile
 import time
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..errors import DiffractionError
-from ..progress import Progress
-from ..scene.load import load_scene, preview_samples, sensor_of, shrink
+from ..atomic import atomic_path
+from ..errors import DiffractionError, DiffractionWarning
+from ..progress import Progress, silent
+from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink
 from ..scene.passes import Result, Stop, developed, groups_of, passes_of
-from .files import SceneFiles
-from .kept import Kept
-from .tasks import Failed, Sums, Task, film_of, run_task, versions
+from .tasks import Failed, SceneFiles, Sums, Task, film_of, run_task, versions
 from .workers import check_workers, memory_warnings, outcome, wait_for_scheduler, workers_of
+
+
+def render(
+    scene: str | os.PathLike[str],
+    *,
+    client: Any,
+    parameters: Mapping[str, str] | None = None,
+    spp: int | None = None,
+    seed: int = 0,
+    variant: str | None = None,
+    sensor: int = 0,
+    preview: bool = False,
+    threads: int = 0,
+    keep: str | os.PathLike[str] | None = None,
+    progress: Progress = silent,
+) -> Result:
+    """Render a scene on the workers of a Dask cluster.
+
+    The picture is, bit for bit, that of one process with as many Dr.Jit threads on such a
+    processor: tasks are the same groups of passes, added up in the order of their seeds.
+
+    Parameters
+    ----------
+    scene : XML file.
+    client : `distributed.Client`; workers have one Dask thread each (`cluster.connect`).
+    parameters : of the scene, as -D sets them.
+    spp : samples per pixel; by default the scene's.
+    seed : whole number from 0.
+    variant : of Mitsuba; by default as `render` chooses it here.
+    sensor : its number.
+    preview : half the width and height, and at most 16 samples unless `spp` is given.
+    threads : of Dr.Jit in every worker; 0 for one a core.
+    keep : folder where finished passes wait for the picture, and where a later call with the same
+        arguments finds them; by default a temporary one.
+    progress : called as progress(tasks done, tasks in all, text).
+
+    Returns
+    -------
+    `scene.passes.Result`, with the picture as a `mi.Bitmap`.
+
+    Raises
+    ------
+    DiffractionError
+        If a worker is of no use, or a task fails: with frame, passes and worker.
+    """
+
+    def warn(line: str) -> None:
+        warnings.warn(line, DiffractionWarning, stacklevel=2)
+
+    name = set_variant(variant)
+    with tempfile.TemporaryDirectory() as temporary, Stop() as stop:
+        film = Film(
+            client, Path(scene), [Wanted(dict(parameters or {}), spp, seed)], name,
+            keep=Path(keep or Path(temporary) / "passes"), warn=warn, sensor=sensor,
+            preview=preview, threads=threads,
+        )  # fmt: skip
+        for result in film.render(stop, progress):
+            film.forget(0)
+            return result
+    raise DiffractionError("interrupted: finished passes are kept where `keep` says")
+
 
 #: Tasks that are with the scheduler for every worker: one is worked at, others wait.
 AHEAD = 3
@@ -288,3 +353,40 @@ class _InOrder:
         if now - self._counted[0] > _COUNTED:
             self._counted = now, self._film._count_workers()
         return int(self._counted[1])
+
+
+class Kept:
+    """A folder of sums; it is made when the first comes and removed when it is empty."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __contains__(self, task: Task) -> bool:
+        return self._file(task).is_file()
+
+    def write(self, task: Task, sums: Sums) -> None:
+        """Keep a sum, in one piece or not at all."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        about = {k: v for k, v in asdict(sums).items() if k != "raw"}
+        with atomic_path(self._file(task)) as temporary:
+            np.savez(temporary, raw=sums.raw, about=np.array(json.dumps(about)))
+
+    def read(self, task: Task) -> Sums | None:
+        """What was kept; None if there is nothing, or it is damaged, which is removed."""
+        try:
+            with open(self._file(task), "rb") as stream, np.load(stream) as file:
+                return Sums(raw=file["raw"], **json.loads(str(file["about"])))
+        except FileNotFoundError:
+            return None
+        except Exception:  # any that zip files, arrays and JSON raise
+            self._file(task).unlink(missing_ok=True)
+            return None
+
+    def forget(self, task: Task) -> None:
+        """Remove a sum whose picture is written."""
+        self._file(task).unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # others are in it
+            self.folder.rmdir()
+
+    def _file(self, task: Task) -> Path:
+        return self.folder / f"{task.key[:32]}.npz"

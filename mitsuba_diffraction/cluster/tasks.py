@@ -1,26 +1,33 @@
-"""What a worker does: some passes of one frame, and the sum of their films."""
+"""What a worker does: some passes of one frame, and the sum of their films.
+
+A scene's files are known by content: used where they lie, or copied to where a worker lacks them.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 import resource
+import tempfile
 import time
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line
 from ..scene.load import load_scene, sensor_of, set_variant, shrink
+from ..scene.parameters import files_of
 from ..scene.passes import Pass, integrator_of, render_pass
-from ..tables.store.store import key_of
-from .files import SceneFiles
+from ..tables.store import cache_folder, key_of
 
 _PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit")
 
@@ -113,12 +120,16 @@ def run_task(task: Task, contents: Mapping[str, bytes] | None = None) -> Sums | 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the client has loaded the scene, and said them
             return _sums(task)
-    except DiffractionError as error:
-        return Failed(str(error), worker_address())
-    except Exception as error:  # a worker must answer, and its traceback is of no use elsewhere
-        return Failed(
-            f"unexpected {type(error).__name__}: {one_line(str(error))}", worker_address()
-        )
+    except Exception as error:
+        return failure(error)
+
+
+def failure(error: Exception) -> Failed:
+    """What a worker answers of an error, whose traceback is of no use elsewhere."""
+    text = str(error)
+    if not isinstance(error, DiffractionError):
+        text = f"unexpected {type(error).__name__}: {one_line(text)}"
+    return Failed(text, worker_address())
 
 
 def _sums(task: Task) -> Sums:
@@ -200,3 +211,83 @@ def worker_address() -> str:
         return str(get_worker().address)
     except ValueError:
         return "this process"
+
+
+@dataclass(frozen=True)
+class SceneFiles:
+    """A scene, its values, and the files that both name.
+
+    Attributes
+    ----------
+    scene : absolute path of the XML file, on the client.
+    values : parameters by name, sorted.
+    files : absolute paths on the client, with the SHA-256 of their contents.
+    """
+
+    scene: str
+    values: tuple[tuple[str, str], ...]
+    files: tuple[tuple[str, str], ...]
+
+    @classmethod
+    def of(cls, scene: Path, values: Mapping[str, str]) -> SceneFiles:
+        """Those of an XML file, read now."""
+        absolute = Path(os.path.abspath(scene))
+        found = {os.path.abspath(path) for path in files_of(absolute, values)}
+        files = tuple((path, _digest(path, *_stamp(path))) for path in sorted(found))
+        return cls(str(absolute), tuple(sorted(values.items())), files)
+
+    @property
+    def digest(self) -> str:
+        """Changes when the scene, a value or a file does; not with the folder all lie in."""
+        root = os.path.dirname(self.scene)
+        contents = [(os.path.relpath(path, root), digest) for path, digest in self.files]
+        return key_of(os.path.basename(self.scene), self.values, contents)
+
+    def missing(self) -> list[str]:
+        """Digests of the files that this machine has neither in place nor copied."""
+        return sorted({digest for path, digest in self.files if not self._found(path, digest)})
+
+    def keep(self, contents: Mapping[str, bytes]) -> None:
+        """Write the copies that are missing; `contents` by digest."""
+        for path, digest in self.files:
+            if digest in contents and not self._found(path, digest):
+                copy = self._copy(path)
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                with atomic_path(copy) as temporary:
+                    temporary.write_bytes(contents[digest])
+
+    def here(self) -> tuple[Path, dict[str, str]]:
+        """The scene and its values on this machine: in place, or copies of all."""
+        if all(_has(path, digest) for path, digest in self.files):
+            return Path(self.scene), dict(self.values)
+        for path, digest in self.files:  # paths are relative to the scene: copies lie together
+            if not _has(str(self._copy(path)), digest):
+                self.keep({digest: Path(path).read_bytes()})
+        absolute = {path: str(self._copy(path)) for path, _ in self.files}
+        return self._copy(self.scene), {k: absolute.get(v, v) for k, v in self.values}
+
+    def _found(self, path: str, digest: str) -> bool:
+        return _has(path, digest) or _has(str(self._copy(path)), digest)
+
+    def _copy(self, path: str) -> Path:
+        folder = cache_folder() or Path(tempfile.gettempdir()) / "mitsuba_diffraction"
+        return folder / "scenes" / self.digest[:32] / path.lstrip("/")
+
+
+def _has(path: str, digest: str) -> bool:
+    try:
+        return _digest(path, *_stamp(path)) == digest
+    except OSError:
+        return False
+
+
+def _stamp(path: str) -> tuple[int, int]:
+    status = os.stat(path)
+    return status.st_mtime_ns, status.st_size
+
+
+@lru_cache(4096)
+def _digest(path: str, *stamp: int) -> str:
+    """SHA-256 of a file, read anew only when its time or size has changed."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

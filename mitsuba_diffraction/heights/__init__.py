@@ -5,7 +5,7 @@ Contents
 HeightField  heights in µm on a grid that tiles the plane (in `field`)
 load         from any file to a `HeightField`
 read         `LoadOptions`; which reader, which units, which treatment
-formats      the readers, one for each kind of file
+formats      the readers, by kind of file
 recipes      TOML files that say where heights come from and what is made of them
 preprocess   treatments of heights: crop, fill, level, clip, make periodic
 gratings     height fields that are made, not measured

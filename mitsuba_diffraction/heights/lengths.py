@@ -45,32 +45,30 @@ def pixel_size_of(value: PixelSize | None, where: str = "pixel_size") -> tuple[f
         f"{where}: expected one length or a pair (dx, dy) in µm, each from {SHORTEST_PIXEL:g} "
         f"to {LONGEST_PIXEL:g}, or 'auto'"
     )
-    numbers_ = numbers_of(value)
-    if numbers_ is None or len(numbers_) not in (1, 2):
+    lengths = numbers_of(value) or ()
+    known = len(lengths) in (1, 2)
+    if not known or min(lengths) < SHORTEST_PIXEL or max(lengths) > LONGEST_PIXEL:
         raise DiffractionError(f"{expected}; got {quoted(value)}")
-    for number in numbers_:
-        if not SHORTEST_PIXEL <= number <= LONGEST_PIXEL:  # also refuses NaN
-            raise DiffractionError(f"{expected}; got {quoted(value)}")
-    return numbers_[0], numbers_[-1]
+    return lengths[0], lengths[-1]
 
 
-def height_of(value: Height | None, where: str = "max_height") -> float | None:
+def height_of(value: Height | None) -> float | None:
     """Height in µm, above 0, from a number or a numeric string; `None` and "auto" give `None`.
 
     Raises
     ------
     DiffractionError
-        If it is no such height; `where` names the parameter.
+        If it is no such height.
     """
     if is_auto(value):
         return None
-    numbers_ = numbers_of(value)
-    if numbers_ is None or len(numbers_) != 1 or not 0 < numbers_[0] <= LONGEST_HEIGHT:
+    lengths = numbers_of(value) or ()
+    if len(lengths) != 1 or not 0 < lengths[0] <= LONGEST_HEIGHT:
         raise DiffractionError(
-            f"{where}: expected a height in µm above 0, at most {LONGEST_HEIGHT:g}, or 'auto'; "
-            f"got {quoted(value)}"
+            "max_height: expected a height in µm above 0, at most "
+            f"{LONGEST_HEIGHT:g}, or 'auto'; got {quoted(value)}"
         )
-    return numbers_[0]
+    return lengths[0]
 
 
 def micrometres_of(unit: str) -> float | None:
@@ -78,25 +76,25 @@ def micrometres_of(unit: str) -> float | None:
     return UNITS.get(unicodedata.normalize("NFKC", unit.strip()))
 
 
-def height_unit_of(value: str | None, where: str = "height_unit") -> str | None:
+def height_unit_of(value: str | None) -> str | None:
     """A unit of length; `None` and "auto" give `None`: the file has to know.
 
     Raises
     ------
     DiffractionError
-        If it is no unit; `where` names the parameter.
+        If it is no unit.
     """
     if is_auto(value):
         return None
     if not isinstance(value, str) or micrometres_of(value) is None:
         raise DiffractionError(
-            f"{where}: expected a unit of length, m, cm, mm, µm, um, nm, pm or Å, or 'auto'; got "
-            f"{quoted(value)}"
+            "height_unit: expected a unit of length, m, cm, mm, µm, um, nm, pm or Å, or 'auto'; "
+            f"got {quoted(value)}"
         )
     return value.strip()
 
 
-def crop_of(value: Crop | None, where: str = "crop") -> tuple[float, float] | None:
+def crop_of(value: Crop | None) -> tuple[float, float] | None:
     """Size (width, height) in µm from a number, a pair, "20" or "20, 10".
 
     `None` and "none" give `None`: all of the patch.
@@ -104,17 +102,17 @@ def crop_of(value: Crop | None, where: str = "crop") -> tuple[float, float] | No
     Raises
     ------
     DiffractionError
-        If it is none of these; `where` names the parameter.
+        If it is none of these.
     """
     if value is None or (isinstance(value, str) and value.strip() == "none"):
         return None
-    numbers_ = numbers_of(value)
-    if numbers_ is None or len(numbers_) not in (1, 2) or min(numbers_) <= 0:
+    lengths = numbers_of(value) or ()
+    if len(lengths) not in (1, 2) or min(lengths) <= 0:
         raise DiffractionError(
-            f"{where}: expected a width or a pair (width, height) in µm, above 0, or 'none'; "
+            "crop: expected a width or a pair (width, height) in µm, above 0, or 'none'; "
             f"got {quoted(value)}"
         )
-    return numbers_[0], numbers_[-1]
+    return lengths[0], lengths[-1]
 
 
 def is_auto(value: object) -> bool:

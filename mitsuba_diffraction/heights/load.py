@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 from .field import HeightField
-from .formats.raw import existing_file
+from .formats import existing_file
 from .lengths import Crop, Height, PixelSize
 from .read import LoadOptions, kind_of, read_heights, treat
 from .recipes import Recipe

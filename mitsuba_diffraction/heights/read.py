@@ -15,27 +15,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import DiffractionError, DiffractionWarning
+from . import preprocess
 from .field import HeightField
-from .formats.arrays import read_npy
+from .formats import RawHeights, existing_file
+from .formats.grids import read_npy, read_text
 from .formats.images import is_park_tiff, read_exr, read_image
 from .formats.instruments import read_instrument
-from .formats.raw import RawHeights, existing_file
-from .formats.text import read_text
-from .lengths import (
-    crop_of,
-    height_of,
-    height_unit_of,
-    micrometres_of,
-    pixel_size_of,
-)
-from .preprocess.edges import crop, crop_line, middle, plane_rise
-from .preprocess.levelling import clip_outliers, level_lines, level_plane
-from .preprocess.missing import METHODS as FILLS
-from .preprocess.missing import fill_missing
-from .preprocess.periodic import periodic_smooth, periodic_taper
+from .lengths import crop_of, height_of, height_unit_of, micrometres_of, pixel_size_of
 
-LEVELS = ("none", "plane", "lines")
-PERIODICS = ("none", "smooth", "taper")
+LEVELS = {"plane": preprocess.level_plane, "lines": preprocess.level_lines}
+PERIODICS = {"smooth": preprocess.periodic_smooth, "taper": preprocess.periodic_taper}
 
 
 @dataclass(frozen=True)
@@ -111,10 +100,10 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "height_unit": height_unit_of,
     "channel": _channel,
     "crop": crop_of,
-    "fill": partial(_choice, name="fill", choices=("none", *FILLS)),
-    "level": partial(_choice, name="level", choices=LEVELS),
+    "fill": partial(_choice, name="fill", choices=("none", *preprocess.FILLS)),
+    "level": partial(_choice, name="level", choices=("none", *LEVELS)),
     "clip": _sigmas,
-    "periodic": partial(_choice, name="periodic", choices=PERIODICS),
+    "periodic": partial(_choice, name="periodic", choices=("none", *PERIODICS)),
 }
 
 # What files begin with. Content decides before the suffix does, so a misnamed file still loads.
@@ -142,7 +131,7 @@ def read_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightFi
     raw, measured = _read(file, options.channel)
     field = _settle(raw, file, options)
     if measured and options.level in (None, "none"):
-        rise = plane_rise(field)  # seams repeat it
+        rise = preprocess.plane_rise(field)  # seams repeat it
         line = f"not levelled: the best plane rises {rise:.3g} µm across the patch"
         field = field.changed(field.heights, line)
     return treat(field, replace(options, crop=None))  # cropped before gaps were filled
@@ -194,13 +183,13 @@ def _settle(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
     notes = (*raw.notes, *overrides)
     if options.crop is not None:
         before = (values.shape[0], values.shape[1])
-        values = values[middle(before, pixel_size, options.crop, shown)]
+        values = values[preprocess.middle(before, pixel_size, options.crop, shown)]
         if values.shape != before:
             after = (values.shape[0], values.shape[1])
-            notes = (*notes, crop_line(before, after, pixel_size))
+            notes = (*notes, preprocess.crop_line(before, after, pixel_size))
     heights = np.ascontiguousarray(values, dtype=np.float64)
     method = None if options.fill == "none" else options.fill
-    heights, note = fill_missing(heights, method, shown)
+    heights, note = preprocess.fill_missing(heights, method, shown)
     if heights.base is None and heights is not raw.values:
         heights.setflags(write=False)  # ours alone: HeightField need not copy it
     history = (*notes, note) if note else notes
@@ -287,11 +276,11 @@ def _missing_lengths(shown: str, height: bool, pixel: bool) -> DiffractionError:
 def treat(field: HeightField, options: LoadOptions) -> HeightField:
     """Crop, level, clip and make periodic: dust stands out from a level surface only."""
     if options.crop is not None:
-        field = crop(field, options.crop)
+        field = preprocess.crop(field, options.crop)
     if options.level not in (None, "none"):
-        field = {"plane": level_plane, "lines": level_lines}[options.level](field)
+        field = LEVELS[options.level](field)
     if options.clip is not None:
-        field = clip_outliers(field, options.clip)
+        field = preprocess.clip_outliers(field, options.clip)
     if options.periodic not in (None, "none"):
-        field = {"smooth": periodic_smooth, "taper": periodic_taper}[options.periodic](field)
+        field = PERIODICS[options.periodic](field)
     return field

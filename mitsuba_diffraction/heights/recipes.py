@@ -26,7 +26,7 @@ from ..errors import DiffractionError
 from ..settings import RECIPE_SETTINGS, checked
 from . import gratings
 from .field import HeightField
-from .formats.raw import existing_file, first_line
+from .formats import existing_file, first_line
 from .read import LoadOptions, is_recipe, read_heights, treat
 
 LOAD_KEYS = tuple(option.name for option in fields(LoadOptions))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from .field import HeightField
-from .preprocess.edges import edge_lines
+from .preprocess import level_plane, plane_of, plane_rise, seams_of
 
 #: RMS slopes up to which the default model's colours are within 5 % and 20 % of rigorous solutions,
 #: for sinusoids of keratin and aluminium in light up to 60° from the normal: docs/validation.md has
@@ -23,6 +23,18 @@ IMPOSSIBLE_SLOPE = 10.0
 #: Pixels in µm beyond which at most a tenth of the directions is known at 380 nm; scans have some
 #: nm to a few hundred.
 COARSEST_PIXEL = 2.0
+
+#: A plane that rises by λ/8 tilts the reflected wave by λ/4, Rayleigh's limit of what can be left
+#: alone: a flat patch then sends 19 % of its mirror light, 1 − sinc²(1/4), into other orders.
+QUARTER_WAVE = 8.0
+#: Below this share of the RMS height a best plane is what any rough patch has by chance.
+CHANCE = 0.5
+#: What levelling leaves of a ramp in 8-bit grey is 0.4 % of its RMS height: a patch of which no
+#: more is left is one facet, a whole period of a blazed grating, and its seams are the steps.
+FACET = 0.01
+#: Share of the mean-square slope from which on seams are said. For gentle heights it is their share
+#: of the light outside the mirror direction, weighted with the square of the angle's sine.
+SEAM_SHARE = 0.1
 
 # No window narrower than this has directions to speak of, µm: a wavelength and a half.
 _NARROWEST = 1.0
@@ -81,6 +93,66 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
     if field.cut_out:
         lines += edge_lines(field, shortest)
     return lines
+
+
+def edge_lines(field: HeightField, shortest: float) -> list[str]:
+    """What to say of a patch whose opposite edges need not meet: tilt, then the seams that stay.
+
+    Parameters
+    ----------
+    field : the patch.
+    shortest : shortest wavelength, µm.
+
+    Returns
+    -------
+    list of str
+        At most one line on the tilt and one on the seams.
+    """
+    if field.range == 0:
+        return []
+    level = level_plane(field)
+    if level.rms_height < FACET * field.rms_height:
+        return []
+    lines = []
+    judged, once = field, ""
+    if _tilted(field, level, shortest):
+        slope_x, slope_y = plane_of(field)
+        turn = math.degrees(2 * math.atan(math.hypot(slope_x, slope_y)))
+        lines.append(
+            f"{field.name}: not levelled: the best plane rises {plane_rise(field):.3g} µm across "
+            f"the patch and turns the mirror direction by {turn:.2g}°; try level=plane "
+            "(--level plane)"
+        )
+        judged, once = level, " even once levelled"
+    seams = seams_of(judged)
+    foreign = [seam for seam in seams if seam.foreign]
+    slope = sum(seam.slope for seam in foreign)
+    inside = sum(seam.inside for seam in seams)
+    if slope > SEAM_SHARE * (slope + inside):
+        worst = max(foreign, key=lambda seam: seam.slope)
+        share = slope / (slope + inside)
+        times = f"{worst.step / worst.largest:.2g} times" if worst.largest > 0 else "unlike"
+        lines.append(
+            f"{field.name}: opposite edges differ by {worst.step:.3g} µm RMS{once}, {times} the "
+            f"largest step between neighbours inside: the patch tiles the surface, and its seams, "
+            f"{share:.0%} of the mean-square slope, diffract as a grating of their own; try "
+            "periodic=smooth (--periodic smooth)"
+        )
+    return lines
+
+
+def _tilted(field: HeightField, level: HeightField, shortest: float) -> bool:
+    """Whether the best plane is a tilt that matters, along one axis at least.
+
+    A tilt raises one edge over the opposite one by what it rises. The plane that fits a few
+    periods of a grating does not: their edges meet, or differ by a step as inside.
+    """
+    least = max(shortest / QUARTER_WAVE, CHANCE * level.rms_height)
+    for slope, length, seam in zip(plane_of(field), field.extent, seams_of(field), strict=True):
+        rise = slope * length
+        if abs(rise) > least and abs(seam.rise - rise) < 0.5 * abs(seam.rise) and seam.foreign:
+            return True
+    return False
 
 
 def units_warning(field: HeightField) -> str:

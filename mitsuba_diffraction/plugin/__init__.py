@@ -12,17 +12,15 @@ properties      words, flags and numbers from them, refused by name
 materials       what the surface is made of: indices, coat, film, model
 changing        a parameter that changes and what it refuses; what `dr.freeze` must know of a BSDF
 sources         from what a scene names to a table, built once
-attributes      whether a mesh has what its BSDF reads
+textures        height scale and orientation that vary; whether a mesh has what its BSDF reads
 names           what messages call an element of a scene
 roles           what arguments are, one name a role
 pair            a pair of directions in the patch's frame, and how V-shaped grooves shadow it
-power           the diffracted power at single wavelengths; asks the next two
-lookup          a table inside a kernel: `DeviceTable`
+power           the diffracted power at single wavelengths
+lookup          a table inside a kernel: `DeviceTable`, and the weights of its terms at a κ
 sampling        directions drawn where the orders are
-series          weights of the terms at a κ
 restricted      a planned table, and its coarse cells beyond
-rgb_power       the same in the RGB variants' colours
-rgb_lookup      a colour table inside a kernel
+rgb             power and look-up in the RGB variants' colours
 places          where on the patch the window sits at a point of the surface
 energy          the bound of the albedo that conserves energy
 direction_lookup  tabulated functions of direction inside a kernel
@@ -37,7 +35,5 @@ sides           what makes both sides add up to 1
 crossing        pairs of directions that are not both above
 crossing_jones  what the material makes of light that crosses, with its polarisation
 layers          how much light reaches what lies beneath
-height_scale    how heights vary over the surface
-orientation     how the patch is turned in the tangent plane
 memory          arrays in the variant's memory, and reading them
 """

@@ -206,18 +206,17 @@ from numpy.typing import NDArray
 
 from ..errors import DiffractionError
 from ..tables.energy.conservation import DirectionalTable
-from .attributes import PLACED
 from .boundary import Boundary, Kirchhoff
 from .changing import Bounded, arrays_within, marks
 from .coat import CoatedPair
 from .energy import EnergyModel
 from .film import UnderFilm
-from .height_scale import LEAST_SCALE, Varying
 from .layers import Transmission
 from .llvm import require_loaded_llvm
 from .pair import Pair, from_patch, in_patch, vcavity
 from .parameters import read_parameters
 from .power import power_model
+from .reflectance import tinted
 from .roles import (
     BSDF,
     Callback,
@@ -234,6 +233,7 @@ from .roles import (
 )
 from .sampling import EVEN, direction_of, with_even_share
 from .sources import TableProvider, from_cache
+from .textures import LEAST_SCALE, PLACED, VaryingHeightScale
 
 #: The component of a context that asks for all of them.
 _ALL = 0xFFFFFFFF
@@ -276,11 +276,11 @@ class Diffraction(mi.BSDF):
         self.m_flags = functools.reduce(operator.or_, components)
         self.parameters_changed([])
 
-    def _set_height_scale(self, given: float | Varying, optical: float) -> None:
+    def _set_height_scale(self, given: float | VaryingHeightScale, optical: float) -> None:
         """A bounded number; or factors that vary, of which `height_scale` is the largest."""
-        if isinstance(given, Varying):
-            self._scale: Varying | Bounded = given
-            self._varying: Varying | None = given
+        if isinstance(given, VaryingHeightScale):
+            self._scale: VaryingHeightScale | Bounded = given
+            self._varying: VaryingHeightScale | None = given
             self.height_scale: Float = mi.Float(given.high)
             return
         most = self.table.height_scale_max / optical
@@ -455,6 +455,7 @@ class Diffraction(mi.BSDF):
             self._takes,
             getattr(self.boundary.material, "reflects_all", False),  # other kernels
             getattr(self.boundary.material, "channels", None),
+            getattr(self.boundary.material, "tint", None) is None,
         )
         if refused:
             raise DiffractionError("; ".join(refused))
@@ -584,7 +585,7 @@ class Diffraction(mi.BSDF):
         power = outside * power
         if self._energy is not None and self._energy.takes:
             power *= self._energy.factor(pair, wavenumbers, scale)
-        return dr.select(active, mi.Spectrum(power) * factor, 0.0)
+        return dr.select(active, tinted(mi.Spectrum(power) * factor, boundary.material), 0.0)
 
     def face(
         self, ctx: Context, si: Interaction, pair: Pair, mirror: Boundary, active: Mask

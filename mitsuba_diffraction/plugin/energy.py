@@ -21,7 +21,7 @@ from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS, response
 from ..tables.energy.conservation import FINE, Conservation, DirectionalTable
 from ..tables.energy.gain import GRAZING
-from ..tables.store.energy import Energy
+from ..tables.energy.store import Energy
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, Kirchhoff
 from .direction_lookup import DirectionLookup, alike, between, scales_of

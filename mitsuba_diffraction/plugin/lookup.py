@@ -1,7 +1,10 @@
 """Reading a table inside a Dr.Jit kernel: a few gathers, no Fourier transform.
 
-The twin of `tables.lookup`, which says what is summed. All terms of one bin are contiguous and
-aligned, so that one packet load fetches them: this alignment alone is worth a factor of two.
+The twin of `tables.lookup`, which says what is summed, and of `tables.expansion`. All terms of one
+bin are contiguous and aligned, so that one packet load fetches them: this alignment alone is worth
+a factor of two. They are multiplied with a series in κ: Chebyshev's and Taylor's weights follow
+from a recurrence; the functions of basis "svd" have none, and are tabulated, as parabolas on equal
+cells of κ.
 """
 
 from __future__ import annotations
@@ -14,13 +17,119 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
-from ..tables.packing import Record
+from ..tables.expansion import Expansion
+from ..tables.packing import Record, cells_of, functions_at
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
-from .memory import index_between, packet_size, read_packets, upload
+from .memory import PACKET, index_between, packet_size, read_packets, read_record, upload
 from .places import Window
 from .roles import Float, Index, Mask, Packet, Rotation
-from .series import inner, series_of
+
+#: A parabola through three points on a cell of phase h leaves max|f'''| h³/192 (Chebyshev nodes);
+#: this share of the tolerance is what the cells may add.
+_CELLS_SHARE = 0.02
+
+
+class Recurrence:
+    """Weights of Chebyshev's and Taylor's series."""
+
+    def __init__(self, table: DiffractionTable) -> None:
+        self._expansion = table.expansion
+        self._record = Record.aligned(*table.order_0.shape[1:])
+        self._order_0 = upload(mi.Float, self._record.pack(table.order_0.astype(np.float32)))
+
+    def at(self, kappa: Float) -> tuple[Index, list[Float], list[Float]]:
+        """Interval, weights of a bin's terms, and order 0: its power, or the parts of a_0."""
+        offset, interval = series_interval(self._expansion, kappa)
+        weights = series_weights(self._expansion, self._record.stored, offset, interval, kappa)
+        values = read_record(self._order_0, interval, self._record.numbers)
+        centre = [inner(part, weights) for part in self._record.split(values)]
+        factored = mi.Mask(True) if self._expansion.basis == "taylor" else interval == 0
+        centre[0] += dr.select(factored, mi.Float(1.0), 0.0)
+        return interval, weights, centre
+
+
+class Tabulated:
+    """Weights of basis "svd", and order 0, from tables over κ."""
+
+    def __init__(self, table: DiffractionTable) -> None:
+        expansion = table.expansion
+        self._expansion = expansion
+        self._components = table.order_0.shape[1]
+        self._missing = Record.aligned(1, expansion.terms).stored - expansion.terms
+        self._cells = cells_of(expansion, (192.0 * _CELLS_SHARE * table.tolerance) ** (1 / 3))
+        # Chebyshev's three nodes of every cell, and the parabola a + t (b + t c) through them
+        t = 0.5 + 0.5 * np.cos(np.pi * (np.arange(3) + 0.5) / 3)
+        start = np.arange(expansion.intervals * self._cells)
+        kappa = expansion.length / self._cells * (start[:, None] + t)
+        kappa = np.clip(kappa, 0.0, np.nextafter(expansion.kappa_max, 0.0))
+        parabola = np.linalg.inv(t[:, None] ** np.arange(3))
+        # one record a cell, so that few packets fetch all of it
+        both = np.concatenate([functions_at(expansion, kappa), table.order_0_at(kappa)], axis=-1)
+        numbers = np.einsum("pn,cnt->cpt", parabola, both).reshape(len(start), 1, -1)
+        self._record = Record.of(1, numbers.shape[2], unit=PACKET)
+        self._parabolas = upload(mi.Float, self._record.pack(numbers.astype(np.float32)))
+
+    def at(self, kappa: Float) -> tuple[Index, list[Float], list[Float]]:
+        """Interval, weights of a bin's terms, and order 0: its power, or the parts of a_0."""
+        last = self._expansion.intervals * self._cells - 1.0
+        position = kappa * (self._cells / self._expansion.length)
+        lower = index_between(dr.floor(position), 0.0, last)
+        t = dr.clip(position - lower, 0.0, 1.0)
+        cell = mi.UInt32(lower)
+        values = read_record(self._parabolas, cell, self._record.numbers)
+        count = self._expansion.terms + self._components
+        a, b, c = (values[n * count : (n + 1) * count] for n in range(3))
+        found = [dr.fma(dr.fma(z, t, y), t, x) for x, y, z in zip(a, b, c, strict=True)]
+        weights, centre = found[: -self._components], found[-self._components :]
+        offset = dr.minimum(kappa * (1.0 / self._expansion.length), 1.0)
+        factor = offset if self._expansion.kind == "amplitude" else dr.square(offset)
+        interval = mi.UInt32(0)
+        if self._expansion.intervals > 1:
+            interval = cell // self._cells
+            factor = dr.select(interval == 0, factor, 1.0)
+        weights = [w * factor for w in weights]
+        return interval, weights + [mi.Float(0.0)] * self._missing, centre
+
+
+def series_of(table: DiffractionTable) -> Recurrence | Tabulated:
+    """How this table's series is evaluated."""
+    return Recurrence(table) if table.expansion.functions is None else Tabulated(table)
+
+
+def series_interval(expansion: Expansion, kappa: Float) -> tuple[Float, Index]:
+    """Where in its interval κ lies (0 … 1), and the interval."""
+    position = kappa * (1.0 / expansion.length)
+    lower = index_between(dr.floor(position), 0.0, expansion.intervals - 1.0)
+    return position - lower, mi.UInt32(lower)
+
+
+def series_weights(
+    expansion: Expansion, terms: int, offset: Float, interval: Index, kappa: Float
+) -> list[Float]:
+    """What each term of a Chebyshev or Taylor series is multiplied with; `offset` is 0 … 1."""
+    if expansion.basis == "taylor":
+        x = kappa * expansion.half_range
+        weights = [x]
+        for n in range(2, terms + 1):
+            weights.append(weights[-1] * x * (1.0 / n))
+        return weights
+    t = dr.clip(dr.fma(2.0, offset, -1.0), -1.0, 1.0)
+    factor = offset if expansion.kind == "amplitude" else dr.square(offset)
+    scale = dr.select(interval == 0, factor, 1.0)
+    weights = [scale, scale * t]  # Tₙ(t) by their recurrence, the factor carried along
+    while len(weights) < terms:
+        weights.append(dr.fma(2.0 * t, weights[-1], -weights[-2]))
+    return weights[:terms]
+
+
+def inner(terms: Sequence[Float], weights: Sequence[Float]) -> Float:
+    """Σ terms·weights."""
+    total = terms[0] * weights[0]
+    for term, weight in zip(terms[1:], weights[1:], strict=True):
+        total = dr.fma(term, weight, total)
+    return total
+
 
 #: Look-ups of more taps run through their rows in a loop instead of one long program.
 _UNROLLED_TAPS = 36

@@ -33,7 +33,6 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
-from .attributes import is_attribute, is_bitmap, require_raw
 from .changing import Bounded, arrays_within
 from .memory import index_between
 from .roles import (
@@ -50,6 +49,7 @@ from .roles import (
     Vector2f,
     Vector3f,
 )
+from .textures import is_attribute, is_bitmap, require_raw
 
 _PREFIX = "weight_"
 #: A sum of such weights is far from the largest number there is.

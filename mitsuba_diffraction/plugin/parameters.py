@@ -21,7 +21,6 @@ from ..tables.table import DiffractionTable
 from .boundary import Boundary, SmallSlope
 from .coat import UnderCoat
 from .film import UnderFilm
-from .height_scale import Varying
 from .layers import LAYERINGS, Blend, Layering, Transmission
 from .materials import (
     DEFAULT_WAVELENGTH,
@@ -32,7 +31,6 @@ from .materials import (
     under_film,
     warn_of_film,
 )
-from .orientation import Constant, Orientation, Textured
 from .pair import SHADOWINGS
 from .places import TILINGS, Places
 from .properties import choice, flag, kind_of, number
@@ -48,6 +46,7 @@ from .sources import (
     table_of_file,
     table_of_heights,
 )
+from .textures import ConstantOrientation, Orientation, OrientationTexture, VaryingHeightScale
 from .through import Through
 
 SOURCES = ("heightfield", "table", "data")
@@ -116,7 +115,7 @@ class Parameters:
     coat: Dielectric | None
     boundary: Boundary
     orientation: Orientation
-    height_scale: float | Varying
+    height_scale: float | VaryingHeightScale
     energy_conserving: bool
     vcavity: bool
     layering: Layering
@@ -160,7 +159,7 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     # κ grows by the coat's index, or in a dielectric by its own, as if heights did
     medium = coat or passing
     optical = 1.0 if medium is None else float(dr.slice(medium.eta))
-    largest = height_scale.high if isinstance(height_scale, Varying) else height_scale
+    largest = height_scale.high if isinstance(height_scale, VaryingHeightScale) else height_scale
     table, heights = _table(props, largest * optical, provider)
     wavelength = _wavelength(props, table)
     reflectance = under_film(props, material, wavelength, table.wavelength_range[0])
@@ -213,11 +212,11 @@ def _ratios(table: DiffractionTable) -> SlopeRatios:
     return table.slope_ratios
 
 
-def _height_scale(props: Properties) -> float | Varying:
+def _height_scale(props: Properties) -> float | VaryingHeightScale:
     given = dict(props.objects()).get("height_scale")
     most = number(props, "height_scale_max", math.nan) if "height_scale_max" in props else None
     if isinstance(given, mi.Texture):
-        return Varying(given, most)
+        return VaryingHeightScale(given, most)
     if most is not None:
         raise DiffractionError("height_scale_max is for a height_scale that is a texture")
     factor = number(props, "height_scale", 1.0)
@@ -337,8 +336,8 @@ def _orientation(props: Properties) -> Orientation:
                 f"orientation={kind_of(texture)} must be degrees, or a raw texture or mesh "
                 "attribute whose first two channels are (cos, sin)"
             )
-        return Textured(texture)
-    return Constant(number(props, "orientation", 0.0))
+        return OrientationTexture(texture)
+    return ConstantOrientation(number(props, "orientation", 0.0))
 
 
 def _layering(

@@ -17,7 +17,7 @@ from .crossing import Crossing
 from .pair import Pair, Place
 from .places import Places, Window
 from .restricted import device_table
-from .rgb_power import rgb_power
+from .rgb import rgb_power
 from .roles import Colour, Float, Index, Interaction, Vector2f
 from .sampling import order_sampler
 

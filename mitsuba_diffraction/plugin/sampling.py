@@ -4,7 +4,7 @@ For one wavelength the density of ωo per solid angle is
 
     [p₀ (σ²/π) exp(−σ²|q|²) + (1 − p₀) P(cell of q) / area] · k² cosθo,   q = k (ωi + ωo)_xy,
 
-with p₀ the power of order 0 towards the mirror direction and P as in `tables.sampling.proposals`.
+with p₀ the power of order 0 towards the mirror direction and P as in `tables.sampling`.
 Dispersion is dealt with by drawing for one wavelength and using the mean of all wavelengths'
 densities. Frequencies beyond the horizon belong to no direction: samples that fall there carry
 nothing. A little of an even density over the hemisphere bounds the weights where the tables promise
@@ -21,7 +21,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..tables.sampling.proposals import BANDED, SHIFT, proposals
+from ..tables.sampling import BANDED, SHIFT, proposals
 from ..tables.table import DiffractionTable
 from .memory import float_of_bits, index_between, read, upload
 from .roles import Buffer, Float, Index, Vector2f, Vector3f

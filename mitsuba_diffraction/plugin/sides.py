@@ -6,7 +6,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..tables.energy.links import Medium
-from ..tables.store.energy import SidesEnergy
+from ..tables.energy.store import SidesEnergy
 from ..tables.table import DiffractionTable
 from .direction_lookup import DirectionLookup, scales_of
 from .film import plain

@@ -14,15 +14,14 @@ import numpy as np
 from ..errors import DiffractionError, DiffractionWarning
 from ..heights import gratings
 from ..heights.field import HeightField
-from ..heights.formats.raw import existing_file
+from ..heights.formats import existing_file
 from ..heights.load import load_heights
 from ..heights.read import LoadOptions, is_recipe, treat
 from ..heights.recipes import Recipe
 from ..settings import MAX_HEIGHT_SCALE, TableSettings
 from ..tables.build.build import build_with
 from ..tables.exr import is_table
-from ..tables.store.cache import cached_table, loaded_table
-from ..tables.store.store import key_of
+from ..tables.store import cached_table, key_of, loaded_table
 from ..tables.table import DiffractionTable
 from .dictionary import HeightData
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.analysis.bench import colours, figures, variance
+from mitsuba_diffraction.analysis.bench import evaluation, figures, scenes
 from mitsuba_diffraction.analysis.bench.contenders import ratio, rounds_of
 from mitsuba_diffraction.analysis.bench.figures import Goal, Plan, Row, Section
 from mitsuba_diffraction.cli import main
@@ -37,8 +37,8 @@ def tiny(coarse):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(figures, "QUICK", TINY)
         # as many as the other pictures have: another number is another kernel
-        patch.setattr(variance, "_FIREFLY_SPP", TINY.spp)
-        patch.setattr(colours, "MATERIALS", {"none": colours.MATERIALS["none"]})
+        patch.setattr(scenes, "_FIREFLY_SPP", TINY.spp)
+        patch.setattr(evaluation, "MATERIALS", {"none": evaluation.MATERIALS["none"]})
         yield
 
 

@@ -11,7 +11,7 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction.analysis.maps.files import ATTRIBUTE
+from mitsuba_diffraction.analysis.maps.picture import ATTRIBUTE
 
 pytestmark = pytest.mark.usefixtures("coarse")
 

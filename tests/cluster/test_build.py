@@ -13,9 +13,8 @@ import pytest
 distributed = pytest.importorskip("distributed")
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, cluster  # noqa: E402
-from mitsuba_diffraction.cluster import each as each_module  # noqa: E402
-from mitsuba_diffraction.cluster.build import build_on_workers  # noqa: E402
-from mitsuba_diffraction.cluster.each import OrderedMap  # noqa: E402
+from mitsuba_diffraction.cluster import jobs as jobs_module  # noqa: E402
+from mitsuba_diffraction.cluster.jobs import OrderedMap, build_on_workers  # noqa: E402
 from mitsuba_diffraction.settings import TableSettings  # noqa: E402
 from mitsuba_diffraction.tables.build import windows as windows_module  # noqa: E402
 from mitsuba_diffraction.tables.build.windows import Windows  # noqa: E402
@@ -116,7 +115,7 @@ def test_an_error_on_a_worker_is_one_line_with_its_name():
 
 
 def test_a_late_worker_with_another_version_is_named(monkeypatch):
-    monkeypatch.setattr(each_module, "versions", lambda: ("0.1", "0.1", "0.1"))
+    monkeypatch.setattr(jobs_module, "versions", lambda: ("0.1", "0.1", "0.1"))
     with pytest.raises(DiffractionError, match=r"^worker this process: it has .* the client 0\.1"):
         list(OrderedMap(_Workers(1))(abs, [1]))
 

@@ -22,8 +22,7 @@ distributed = pytest.importorskip("distributed")
 from mitsuba_diffraction import DiffractionError, cluster  # noqa: E402
 from mitsuba_diffraction.cluster import frames as frames_module  # noqa: E402
 from mitsuba_diffraction.cluster import workers as workers_module  # noqa: E402
-from mitsuba_diffraction.cluster.frames import Film, Wanted  # noqa: E402
-from mitsuba_diffraction.cluster.kept import Kept  # noqa: E402
+from mitsuba_diffraction.cluster.frames import Film, Kept, Wanted  # noqa: E402
 from mitsuba_diffraction.cluster.tasks import Lacking, run_task  # noqa: E402
 from mitsuba_diffraction.scene import passes  # noqa: E402
 from mitsuba_diffraction.scene.load import load_scene, set_variant  # noqa: E402

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 import mitsuba_diffraction as md
+from mitsuba_diffraction.tables import store
+from mitsuba_diffraction.tables.energy import store as energy
 from mitsuba_diffraction.tables.energy.conservation import Conservation, DirectionalTable
-from mitsuba_diffraction.tables.store import cache, energy
-from mitsuba_diffraction.tables.store.store import VARIABLE, Record, kept
+from mitsuba_diffraction.tables.store import VARIABLE, Record, kept
 from tests.directions import rough_patch
 from tests.fuzz.damage import damaged
 
@@ -38,7 +39,7 @@ def _table() -> md.DiffractionTable:
 
 @functools.cache
 def _colours() -> Any:
-    return cache.ColourTable.build(_table())
+    return store.ColourTable.build(_table())
 
 
 def _conservation() -> Conservation:
@@ -47,8 +48,8 @@ def _conservation() -> Conservation:
 
 
 KINDS = {
-    "table": Kind(_table, cache._table_record, cache._table_of),
-    "colours": Kind(_colours, cache.colour_record, cache.colours_of),
+    "table": Kind(_table, store._table_record, store._table_of),
+    "colours": Kind(_colours, store.colour_record, store.colours_of),
     "energy": Kind(_conservation, energy._record, energy._conservation),
 }
 

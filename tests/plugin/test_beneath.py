@@ -9,7 +9,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics import fresnel
 from mitsuba_diffraction.tables.energy.conservation import DirectionalTable
-from mitsuba_diffraction.tables.store.energy import Energy
+from mitsuba_diffraction.tables.energy.store import Energy
 from tests.directions import polar
 from tests.lanes import evaluated, interaction, lanes, spectra, vectors
 from tests.plugin.gentle import load, pairs

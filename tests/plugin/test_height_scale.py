@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.plugin.attributes import check_attributes
+from mitsuba_diffraction.plugin.textures import check_attributes
 from tests.directions import polar
 from tests.lanes import refusal, vectors
 from tests.plugin.gentle import load, pairs

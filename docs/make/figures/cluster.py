@@ -23,13 +23,12 @@ from typing import Any
 
 import numpy as np
 
-from mitsuba_diffraction.cluster.files import SceneFiles
-from mitsuba_diffraction.cluster.kept import Kept
-from mitsuba_diffraction.cluster.tasks import Sums, Task
+from mitsuba_diffraction.cluster.frames import Kept
+from mitsuba_diffraction.cluster.tasks import SceneFiles, Sums, Task
 from mitsuba_diffraction.cluster.workers import require_dask
 
-from . import markers
-from .program import exit_code
+from . import pages
+from .pages import exit_code
 
 FRAMES = 16
 WORKERS = (1, 2, 10, 30, 100, 300, 1000)
@@ -150,7 +149,7 @@ def scaling(costs: Costs) -> str:
         seconds = simulate(workers, TASKS, costs)
         ideal = TASKS * costs.work / workers
         rows.append((f"{workers:,}", f"{seconds / 3600:.3g} h", f"{ideal / seconds:.0%}"))
-    return markers.table(("workers", f"{TASKS:,} tasks take", "of the ideal"), rows)
+    return pages.table(("workers", f"{TASKS:,} tasks take", "of the ideal"), rows)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -183,7 +182,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             f"client, {1e3 * transfer:.3g} ms a sum."
         )
         print(film, times, scaling(costs), sep="\n\n")
-        markers.update(args.output, {"film": film, "times": times, "scaling": scaling(costs)})
+        pages.update(args.output, {"film": film, "times": times, "scaling": scaling(costs)})
 
     return exit_code("cluster", work)
 

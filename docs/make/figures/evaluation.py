@@ -3,7 +3,7 @@
     python -m docs.make.figures.evaluation -o docs/evaluation.md \\
         --measured elaphe.png --pixel-size 0.0488 --max-height 0.375
 
-The picture goes to `images/evaluation.png` beside the page, the numbers between its markers.
+The picture goes to `images/evaluation.png` beside the page, the numbers between its pages.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ from mitsuba_diffraction.thesis.evaluation import (
 from mitsuba_diffraction.thesis.evaluation.plot import draw
 from mitsuba_diffraction.thesis.methods import FullSpectrum, make, make_all
 
-from . import markers
-from .program import SHOWN, add_measured, exit_code, measured_patch
+from . import pages
+from .pages import SHOWN, add_measured, exit_code, measured_patch
 
 METHODS = ("default", "flss", "nmm", "pq", "pq-sinc")
 
@@ -158,7 +158,7 @@ def period_table(patches: Sequence[Periods]) -> str:
         fits = (patch.by_method[name].fit for name in names)
         cells = [f"{1e3 * fit.period:.5g} ({_short(fit.residual)}°)" for fit in fits]
         rows.append((patch.name, made, *cells))
-    return markers.table(header, rows)
+    return pages.table(header, rows)
 
 
 def difference_table(patches: Sequence[Periods]) -> str:
@@ -174,7 +174,7 @@ def difference_table(patches: Sequence[Periods]) -> str:
             expected = response.beam.grating_angles(response.wavelengths, patch.given, 1)
             cells.append(f"{_short(float(np.nanmax(np.abs(ridge.angles - expected))))}°")
         rows.append((patch.name, f"{1e3 * patch.given:.4g}", *cells))
-    return markers.table(("patch", "period, nm", *(SHOWN.get(name, name) for name in names)), rows)
+    return pages.table(("patch", "period, nm", *(SHOWN.get(name, name) for name in names)), rows)
 
 
 def window_table(patches: Sequence[Periods]) -> str:
@@ -192,7 +192,7 @@ def window_table(patches: Sequence[Periods]) -> str:
         "patch", "ensemble", f"{count} single windows", "smallest – largest",
         "procedure of the thesis",
     )  # fmt: skip
-    return markers.table(header, rows)
+    return pages.table(header, rows)
 
 
 def _short(value: float) -> str:
@@ -227,7 +227,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                     patch, given, wavelengths=wavelengths, angles=angles, windows=args.windows
                 )
             )
-        markers.update(
+        pages.update(
             args.output,
             {
                 "periods": period_table(results),

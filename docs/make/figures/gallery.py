@@ -24,9 +24,8 @@ from mitsuba_diffraction.cli import main as program
 from mitsuba_diffraction.errors import DiffractionError
 from scenes.make.__main__ import main as meshes
 
-from . import markers
-from .jpeg import write_jpeg
-from .program import exit_code
+from . import pages
+from .pages import exit_code, write_jpeg
 
 FOLDER = Path("images", "gallery")  # beside the pages
 _MOST = 250_000  # bytes of a picture
@@ -40,7 +39,7 @@ class Picture:
 
     Attributes
     ----------
-    page : the page's name, and that of its markers.
+    page : the page's name, and that of its pages.
     name : of the picture's file.
     title, text : what it shows.
     commands : what makes it, the last one writing it; files are made in `out`.
@@ -274,9 +273,9 @@ def main(argv: Sequence[str] | None = None) -> int:
                 start = time.perf_counter()
                 make(picture, args.output / picture.file, args.scenes)
                 print(f"{picture.name}: {time.perf_counter() - start:.1f} s", flush=True)
-        markers.update(args.output / "gallery.md", {"gallery": shown("gallery")})
+        pages.update(args.output / "gallery.md", {"gallery": shown("gallery")})
         parts = {name: shown(name) for name in ("meshes", "meshes-field")}
-        markers.update(args.output / "meshes.md", parts)
+        pages.update(args.output / "meshes.md", parts)
 
     return exit_code("gallery", work)
 

@@ -15,17 +15,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mitsuba_diffraction.analysis.maps.light import Light
+from mitsuba_diffraction.analysis.maps.result import Light
 from mitsuba_diffraction.errors import DiffractionWarning
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.gratings import blazed, elaphe_like
 from mitsuba_diffraction.thesis.methods import NAMES, OrdersOnly, make, make_all
-from mitsuba_diffraction.thesis.methods.maps import method_map
-from mitsuba_diffraction.thesis.sweeps.compiled import Compiled, time_compiled
-from mitsuba_diffraction.thesis.sweeps.run import Step, compared, timed_map
+from mitsuba_diffraction.thesis.methods.make import method_map
+from mitsuba_diffraction.thesis.sweeps import Compiled, Step, compared, time_compiled, timed_map
 
-from . import markers
-from .program import SHOWN, add_measured, exit_code, measured_patch
+from . import pages
+from .pages import SHOWN, add_measured, exit_code, measured_patch
 
 #: What each method leaves out.
 APPROXIMATES = {
@@ -111,7 +110,7 @@ def table(measured: Measured) -> str:
         f"1/{compiled.ratio:.0f} of the time of `flss`, and as the RGB variants do it, without a "
         f"wavelength loop, 1/{compiled.colour_ratio:.0f}."
     )
-    return f"{markers.table(header, rows)}\n\n{note}"
+    return f"{pages.table(header, rows)}\n\n{note}"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -139,7 +138,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 coherence_width=8.0 if args.small else 65.0,
             )  # fmt: skip
         text = table(measured)
-        markers.update(args.output, {"methods": text})
+        pages.update(args.output, {"methods": text})
 
     return exit_code("methods", work)
 

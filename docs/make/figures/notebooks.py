@@ -18,7 +18,7 @@ from typing import Any
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 
-from .program import exit_code
+from .pages import exit_code
 
 ROOT = Path(__file__).resolve().parents[3]
 

@@ -17,8 +17,8 @@ from pathlib import Path
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 
-from . import markers
-from .program import exit_code
+from . import pages
+from .pages import exit_code
 
 #: Read, not imported: that would take a variant of Mitsuba.
 PLUGIN = Path(__file__).resolve().parents[3] / "mitsuba_diffraction/plugin/bsdf.py"
@@ -98,7 +98,7 @@ def page(text: str) -> str:
         "largest y.",
     ]
     for heading, entries in groups(text).items():
-        sections += [f"## {heading}", markers.table(_HEADER, [_row(entry) for entry in entries])]
+        sections += [f"## {heading}", pages.table(_HEADER, [_row(entry) for entry in entries])]
     sections += [
         "## The model",
         _prose(f"The model is {model}"),

@@ -13,11 +13,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from mitsuba_diffraction.realtime.comparison.table import markdown, plain_number
+from mitsuba_diffraction.realtime.comparison.report import markdown, plain_number
 
-from . import markers
-from .jpeg import write_jpeg
-from .program import exit_code, from_json
+from . import pages
+from .pages import exit_code, from_json, write_jpeg
 
 PAGE = Path("docs", "realtime.md")
 #: Beside the page; the picture that it shows is that of the default method.
@@ -49,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         folder = args.sheet or args.compared[0]
         text += _of_sheet(folder) if args.sheet else ""
         write_jpeg(folder / f"{_METHOD}.png", sheet, width=_WIDTH)
-        markers.update(args.output, {"realtime": text})
+        pages.update(args.output, {"realtime": text})
 
     return exit_code("realtime", work)
 

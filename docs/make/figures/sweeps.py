@@ -3,7 +3,7 @@
     python -m docs.make.figures.sweeps -o docs/sweeps.md \\
         --measured elaphe.png --pixel-size 0.0488 --max-height 0.375
 
-Sheets go to `images/sweep-KIND.png` beside the page, the numbers between its markers.
+Sheets go to `images/sweep-KIND.png` beside the page, the numbers between its pages.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
-from mitsuba_diffraction.analysis.maps.light import Light
 from mitsuba_diffraction.analysis.maps.picture import contact_sheet
+from mitsuba_diffraction.analysis.maps.result import Light
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionWarning
 from mitsuba_diffraction.heights.gratings import blazed, elaphe_like
 from mitsuba_diffraction.thesis.sweeps import SWEEPS, Sweep, sweep
 
-from . import markers
-from .program import SHOWN, add_measured, exit_code, measured_patch
+from . import pages
+from .pages import SHOWN, add_measured, exit_code, measured_patch
 
 _LIGHT = Light(30.0)
 
@@ -41,7 +41,7 @@ def numbers(result: Sweep) -> str:
         time = [f"{step.seconds / result.steps[0].seconds:.2g}"] if timed else []
         rows.append((SHOWN.get(step.label, step.label), *cells, *time))
     header = ("value", "mean ΔE", "95th percentile")
-    return markers.table((*header, "time (first = 1)") if timed else header, rows)
+    return pages.table((*header, "time (first = 1)") if timed else header, rows)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -75,7 +75,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             )
             with atomic_path(args.output.parent / "images" / f"sweep-{kind}.png") as path:
                 sheet.savefig(path, format="png")
-        markers.update(args.output, parts)
+        pages.update(args.output, parts)
 
     return exit_code("sweeps", work)
 

@@ -25,8 +25,8 @@ from scipy.ndimage import zoom
 from mitsuba_diffraction import DiffractionTable, gratings
 from mitsuba_diffraction.tables.build.spectrum import NEAR
 
-from . import markers
-from .program import exit_code
+from . import pages
+from .pages import exit_code
 
 EXTENT, MADE = 328.0, 2048  # µm and points a side of the look-alike
 #: Coherence windows of 40 µm: the whole scan is eight of them wide, which tables just read.
@@ -122,7 +122,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         text = report(whole, windowed, args.pixels)
         print(text, json.dumps(agreement(windowed.table, whole.table)), sep="\n")
         if args.output:
-            markers.update(args.output, {"wide": text})
+            pages.update(args.output, {"wide": text})
 
     return exit_code("wide", work)
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction import HeightField, gratings
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.heights.preprocess.periodic import periodic_smooth
+from mitsuba_diffraction.heights.preprocess import periodic_smooth
 
 from .cases import ALUMINIUM, KERATIN
 

@@ -1,4 +1,9 @@
-"""Building tables: time and memory, each table in a process of its own."""
+"""Building tables: time and memory, each table in a process of its own.
+
+That process is `python -m ...build HEIGHTS.npy PIXEL_SIZE ARGUMENTS`, the last being those of
+`DiffractionTable.build` as JSON; or `... HEIGHTS.npy PIXEL_SIZE make SIDE`, which makes the
+heights.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +11,19 @@ import json
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...errors import DiffractionError
+from ...heights import HeightField, gratings
 from ...progress import Progress
-from .figures import PIXEL, Goal, Plan, Row, Section
+from ...tables import DiffractionTable
+from .figures import PIXEL, Goal, Plan, Row, Section, peak_memory
 
 _COLUMNS = ("s", "s of all cores", "GB at most", "GB above the import", "error/tolerance")
 #: Side of the patch: seconds and GB that its table may take at the default tolerance.
@@ -99,7 +109,7 @@ def _child(*arguments: str) -> str:
     """What the child process prints; it finds the package where this one did."""
     paths = os.pathsep.join(path for path in sys.path if path)
     result = subprocess.run(
-        [sys.executable, "-m", f"{__package__}.build_child", *arguments],
+        [sys.executable, "-m", f"{__package__}.build", *arguments],
         env={**os.environ, "PYTHONPATH": paths},
         stdin=subprocess.DEVNULL,
         capture_output=True,
@@ -110,3 +120,31 @@ def _child(*arguments: str) -> str:
         last = (result.stderr.strip().splitlines() or ["no message"])[-1]
         raise DiffractionError(f"building a table in a child process failed: {last}")
     return result.stdout
+
+
+def build(heights: str, pixel_size: float, arguments: str) -> None:
+    """Build the table of the heights in a file, and print time, memory and the table's summary."""
+    imported = peak_memory()
+    patch = HeightField(np.load(heights), pixel_size, name="elaphe_like")
+    start, start_cpu = time.perf_counter(), time.process_time()
+    table = DiffractionTable.build(patch, **json.loads(arguments))
+    report = {
+        "seconds": time.perf_counter() - start,
+        "cpu_seconds": time.process_time() - start_cpu,
+        "peak_bytes": peak_memory(),
+        "imported_bytes": imported,
+        "table": {k: v for k, v in table.summary().items() if k != "source"},
+    }
+    print(json.dumps(report))
+
+
+def make(heights: str, pixel_size: float, side: int) -> None:
+    """Write the heights of a patch with so many pixels a side."""
+    np.save(heights, gratings.elaphe_like(side * pixel_size, side).heights)
+
+
+if __name__ == "__main__":
+    if sys.argv[3] == "make":
+        make(sys.argv[1], float(sys.argv[2]), int(sys.argv[4]))
+    else:
+        build(sys.argv[1], float(sys.argv[2]), sys.argv[3])

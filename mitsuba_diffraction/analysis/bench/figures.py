@@ -1,8 +1,13 @@
-"""How much is measured, and figures with goals: rows as text and plain data; two runs compared."""
+"""How much is measured, on which machine; rows with goals as text and data; two runs compared."""
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
+import os
+import platform
+import resource
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -159,3 +164,39 @@ def _numbers(run: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str, str], flo
         for row in section["rows"]:
             for column, value in row["values"].items():
                 yield (name, row["name"], column), value
+
+
+_PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit", "numpy", "scipy")
+
+
+def describe_machine() -> dict[str, Any]:
+    """Processor, cores, load of the last minute, memory, and versions of all that computes."""
+    import drjit as dr
+
+    from ...cluster.tasks import processor
+    from ...plugin.llvm import loaded_llvm_version
+
+    llvm = loaded_llvm_version()
+    return {
+        "processor": processor(),
+        "cores": len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count(),
+        "threads of Dr.Jit": dr.thread_count(),
+        "load": round(os.getloadavg()[0], 2),
+        "memory": f"{os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 1e9:.1f} GB",
+        "system": platform.platform(),
+        "python": platform.python_version(),
+        **{name: importlib.metadata.version(name) for name in _PACKAGES},
+        "llvm": ".".join(map(str, llvm)) if llvm else None,
+    }
+
+
+def peak_memory() -> int:
+    """Most bytes that this process has had in memory at once."""
+    status = Path("/proc/self/status")
+    if status.is_file():
+        # ru_maxrss of a child starts at what its parent had when it was started; this does not
+        for line in status.read_text(encoding="ascii", errors="replace").splitlines():
+            if line.startswith("VmHWM:"):
+                return 1024 * int(line.split()[1])
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else 1024 * peak

@@ -1,7 +1,11 @@
-"""Scenes to measure with: a furnace, a snake under a bright window, the snake of `scenes`."""
+"""Scenes to measure with; noise beside drawing directions by the cosine; time of whole pictures."""
 
 from __future__ import annotations
 
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +14,12 @@ import mitsuba as mi
 import numpy as np
 
 from ...errors import DiffractionError
-from .contenders import Tables
+from ...plugin.power import PowerModel
+from ...plugin.sampling import EVEN
+from ...progress import Progress
+from ..maps.result import Light
+from .contenders import Tables, ratio, rounds_of
+from .figures import SEED, Goal, Plan, Row, Section
 
 
 def furnace(bsdf: Any, resolution: int) -> Any:
@@ -156,3 +165,192 @@ def _window_map(rows: int = 128) -> np.ndarray[Any, np.dtype[np.float32]]:
     top, left = int(35 * degree), int(200 * degree)
     light[top : top + int(20 * degree), left : left + int(20 * degree)] = 30.0
     return light
+
+
+#: Angle of incidence in degrees: relative standard deviation that one sample may have.
+_GOALS = {0.0: 0.6, 45.0: 0.8, 75.0: 1.2}
+_AZIMUTHS = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)
+_WAVELENGTHS = (450.0, 550.0, 650.0)
+
+#: Samples a pixel of the rendering in which bright pixels are looked for.
+_FIREFLY_SPP = 64
+
+
+def measure_noise(plan: Plan, tables: Tables, progress: Progress) -> Section:
+    """Relative standard deviation of one sample's estimate of the directional albedo."""
+    ours = tables.bsdf("default", material="none", energy_conserving=False)
+    cosine = draws_by_cosine(tables.bsdf("default", material="none", energy_conserving=False))
+    columns = ("least", "median", "most", "largest weight", "by the cosine")
+    rows = []
+    for n, (theta, goal) in enumerate(_GOALS.items()):
+        progress(n, len(_GOALS), "noise")
+        found = [
+            _deviation(ours, theta, phi, wavelength, plan.lanes)
+            for phi in _AZIMUTHS
+            for wavelength in _WAVELENGTHS
+        ]
+        deviations = [deviation for deviation, _ in found]
+        values = (
+            min(deviations),
+            float(np.median(deviations)),
+            max(deviations),
+            max(weight for _, weight in found),
+            _deviation(cosine, theta, 0.0, 550.0, plan.lanes)[0],
+        )
+        rows.append(
+            Row(
+                f"{theta:g}°",
+                dict(zip(columns, values, strict=True)),
+                [Goal(f"at most {goal:g}", max(deviations) <= goal)],
+                {"standard deviations": deviations},
+            )
+        )
+    progress(len(_GOALS), len(_GOALS), "noise")
+    title = (
+        "noise: relative standard deviation of one sample's albedo, R = 1, raw Kirchhoff, "
+        f"{len(_AZIMUTHS)} azimuths of the light and {len(_WAVELENGTHS)} wavelengths from "
+        f"{_WAVELENGTHS[0]:g} to {_WAVELENGTHS[-1]:g} nm"
+    )
+    return Section(title, columns, rows)
+
+
+def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> Section:
+    """Variance × time of pictures, against drawing by the cosine; and pixels far too bright."""
+    size = plan.resolution
+    columns = ("variance × time, ratio", "variance, ratio", "time, ratio", "brightest pixel, ratio")
+
+    def bsdf() -> Any:
+        return tables.bsdf("default", material="none")
+
+    cases: dict[str, Callable[[Any], Any]] = {
+        "white furnace": lambda b: furnace(b, size // 2),
+        "snake under a window": lambda b: snake(b, scenes, size // 2, size // 3, window()),
+    }
+    rows = []
+    for n, (name, make) in enumerate(cases.items()):
+        progress(n, len(cases), name)
+        ours, cosine = make(bsdf()), make(draws_by_cosine(bsdf()))
+        pixels = pixels_of(ours, ours.shapes()[0])
+        variance, seconds = _variance_and_time(ours, pixels, plan)
+        cosine_variance, cosine_seconds = _variance_and_time(cosine, pixels, plan)
+        ratio = cosine_variance * cosine_seconds / (variance * seconds)
+        brightest = _brightest(ours, pixels, plan)
+        values = (ratio, cosine_variance / variance, cosine_seconds / seconds, brightest)
+        goals = [Goal("at least 100×", ratio >= 100.0)]
+        if name.startswith("snake"):
+            goals.append(Goal("brightest within 5×", brightest <= 5.0))
+        rows.append(Row(name, dict(zip(columns, values, strict=True)), goals))
+    progress(len(cases), len(cases), "efficiency")
+    title = (
+        "efficiency: drawing by the cosine over our own, path integrator, material=none, variance "
+        f"of the body's pixels; their brightest at {_FIREFLY_SPP} samples a pixel over that at "
+        f"{plan.reference_spp}"
+    )
+    return Section(title, columns, rows)
+
+
+def draws_by_cosine(bsdf: Any) -> Any:
+    """The same plugin, whose directions are drawn from the cosine lobe instead of the orders."""
+
+    def draw(si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
+        even = mi.warp.square_to_uniform_hemisphere(sample2)
+        return dr.select(sample1 < EVEN, even, mi.warp.square_to_cosine_hemisphere(sample2))
+
+    bsdf._draw, bsdf.power = draw, _ByCosine(bsdf.power)
+    return bsdf
+
+
+class _ByCosine:
+    """A power model with another density."""
+
+    def __init__(self, power: PowerModel) -> None:
+        self.power, self.wavenumbers, self.flat = power.power, power.wavenumbers, power.flat
+
+    def density(self, pair: Any, height_scale: Any, si: Any) -> Any:
+        return mi.warp.square_to_cosine_hemisphere_pdf(pair.outer.wo)
+
+    def both(self, pair: Any, height_scale: Any, drawing_scale: Any, si: Any) -> Any:
+        return self.power(pair, height_scale, si), self.density(pair, drawing_scale, si)
+
+
+def _deviation(
+    bsdf: Any, theta: float, phi: float, wavelength: float, lanes: int
+) -> tuple[float, float]:
+    """Relative standard deviation of the weights, and the largest of them."""
+    si = dr.zeros(mi.SurfaceInteraction3f, lanes)
+    si.wi = mi.Vector3f(*(float(c) for c in Light(theta, phi).direction))
+    si.wavelengths = mi.Spectrum(wavelength)
+    random = mi.PCG32(size=lanes, initstate=SEED)
+    numbers = [random.next_float32() for _ in range(3)]
+    _, weight = bsdf.sample(mi.BSDFContext(), si, numbers[0], mi.Point2f(numbers[1], numbers[2]))
+    weights = np.array(weight[0], float)
+    return float(weights.std() / weights.mean()), float(weights.max())
+
+
+def _variance_and_time(scene: Any, pixels: Any, plan: Plan) -> tuple[float, float]:
+    """Mean over the pixels of the luminance's variance between renderings, and seconds for one."""
+    pictures, seconds = [], []
+    for seed in range(-1, 2 * plan.rounds):  # the first compiles
+        start = time.perf_counter()
+        picture = mi.render(scene, spp=plan.spp, seed=seed + 1)
+        dr.eval(picture)
+        dr.sync_thread()
+        if seed >= 0:
+            seconds.append(time.perf_counter() - start)
+            pictures.append(_luminance(picture)[pixels])
+    return float(np.var(pictures, axis=0, ddof=1).mean()), float(np.median(seconds))
+
+
+def _brightest(scene: Any, pixels: Any, plan: Plan) -> float:
+    """Brightest pixel of a fast rendering over the brightest of a converged one."""
+
+    def brightest(spp: int, seeds: Sequence[int]) -> float:
+        mean = np.mean([_luminance(mi.render(scene, spp=spp, seed=s)) for s in seeds], axis=0)
+        return float(mean[pixels].max())
+
+    passes = max(1, plan.reference_spp // 256)
+    converged = brightest(plan.reference_spp // passes, range(1000, 1000 + passes))
+    return brightest(_FIREFLY_SPP, [SEED]) / converged
+
+
+def _luminance(picture: Any) -> Any:
+    rgb = np.array(picture)[..., :3]
+    return rgb @ np.array([0.2126, 0.7152, 0.0722])
+
+
+_COLUMNS = ("ms", "ns/sample", "× roughconductor")
+_SKIN, _ROUGH = "the skin diffracts, pigment beneath", "the skin is roughconductor, Al"
+
+
+def measure_snake(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> Section:
+    """Time to render the snake's scene as it is, and with `roughconductor` for its skin."""
+    size = {"resx": str(2 * plan.resolution), "resy": str(5 * plan.resolution // 4)}
+    made = {name: snake_scene(scenes, tables, **size) for name in (_SKIN, _ROUGH)}
+    rough = mi.load_dict({"type": "twosided", "b": {"type": "roughconductor", "material": "Al"}})
+    skin_of(made[_ROUGH]).set_bsdf(rough)
+    covered = share_of(made[_SKIN], skin_of(made[_SKIN]))
+    calls = {name: partial(render_seconds, scene, plan) for name, scene in made.items()}
+    rounds = max(3, plan.rounds // 2)
+    seconds = rounds_of(calls, rounds, lambda done, total: progress(done, total, "snake"))
+    rows = []
+    samples = int(size["resx"]) * int(size["resy"]) * plan.spp
+    for name, taken in seconds.items():
+        median = statistics.median(taken)
+        to_rough = ratio(taken, seconds[_ROUGH])
+        values = (1e3 * median, 1e9 * median / samples, to_rough)
+        goals = [Goal("at most 2.5×", to_rough <= 2.5)] if name == _SKIN else []
+        rows.append(Row(name, dict(zip(_COLUMNS, values, strict=True)), goals, {"seconds": taken}))
+    title = (
+        f"snake: {mi.variant()}, scenes/snake.xml, {size['resx']} × {size['resy']} pixels, "
+        f"{100 * covered:.0f} % of them snake, {plan.spp} samples per pixel; medians of {rounds} "
+        "rounds"
+    )
+    return Section(title, _COLUMNS, rows)
+
+
+def render_seconds(scene: Any, plan: Plan) -> float:
+    """How long one picture takes, compiling included where it is the first."""
+    start = time.perf_counter()
+    dr.eval(mi.render(scene, spp=plan.spp))
+    dr.sync_thread()
+    return time.perf_counter() - start

@@ -15,9 +15,7 @@ save_exr   a map as linear numbers
 from __future__ import annotations
 
 from .evaluate import brdf_map, check_map
-from .files import save_exr, save_png
-from .light import Bands, Light
-from .picture import draw
-from .result import BrdfMap
+from .picture import draw, save_exr, save_png
+from .result import Bands, BrdfMap, Light
 
 __all__ = ["Bands", "BrdfMap", "Light", "brdf_map", "check_map", "draw", "save_exr", "save_png"]

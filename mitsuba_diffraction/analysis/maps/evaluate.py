@@ -17,8 +17,7 @@ from ...plugin.memory import upload
 from ...progress import Progress
 from ...tables.build.spectrum import NEAR
 from . import hemisphere
-from .light import Bands, Light
-from .result import BrdfMap
+from .result import Bands, BrdfMap, Light
 
 # Pixels at a time: enough for a GPU, and their sums stay within some tens of megabytes.
 _PIXELS = 1 << 20

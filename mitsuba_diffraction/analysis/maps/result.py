@@ -1,4 +1,4 @@
-"""A BRDF map: what was computed, and how bright to show it (NumPy only)."""
+"""A BRDF map: its light, what was computed, how bright to show it, and how iridescent it is."""
 
 from __future__ import annotations
 
@@ -8,8 +8,119 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import DiffractionError
 from ...optics.colour import encode_srgb, linear_srgb
-from .light import Bands, Light
+from ...optics.geometry import check_angles
+
+
+@dataclass(frozen=True)
+class Light:
+    """Direction to the light.
+
+    Parameters
+    ----------
+    theta : degrees from the normal, 0 to below 90.
+    phi : degrees from the patch's x axis towards its y axis, −360 to 360.
+
+    Raises
+    ------
+    DiffractionError
+        If an angle is out of range.
+    """
+
+    theta: float = 0.0
+    phi: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_angles(self.theta, self.phi)
+
+    @property
+    def direction(self) -> NDArray[np.float64]:
+        """ωi, unit vector (3,) towards the light."""
+        theta, phi = math.radians(self.theta), math.radians(self.phi)
+        sin = math.sin(theta)
+        return np.array([sin * math.cos(phi), sin * math.sin(phi), math.cos(theta)])
+
+    @property
+    def mirror(self) -> NDArray[np.float64]:
+        """Unit vector (3,) in which a flat mirror reflects it."""
+        return self.direction * [-1.0, -1.0, 1.0]
+
+    def __str__(self) -> str:
+        return f"θ = {self.theta:g}°, φ = {self.phi:g}°"
+
+
+#: nm. A finer step than this shows nothing: even a tenth of it moves no order by a pixel.
+FINEST_STEP = 0.1
+
+
+@dataclass(frozen=True)
+class Bands:
+    """A range of wavelengths, cut into equal bands no wider than a step.
+
+    Parameters
+    ----------
+    low, high : nm, above 0. Equal ones make a single wavelength.
+    step : nm.
+
+    Raises
+    ------
+    DiffractionError
+        If the range is empty or the step does not fit it.
+    """
+
+    low: float
+    high: float
+    step: float = 5.0
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.low <= self.high and math.isfinite(self.high)):
+            raise DiffractionError(
+                f"wavelength range {self.low:g} to {self.high:g} nm is none; give the shortest "
+                "first, both above 0, e.g. 380 780"
+            )
+        if self.is_single:
+            return
+        if not FINEST_STEP <= self.step <= self.high - self.low:
+            raise DiffractionError(
+                f"step={self.step:g} nm does not fit the range of {self.low:g} to {self.high:g} nm;"
+                f" it must be from {FINEST_STEP:g} to {self.high - self.low:g} nm"
+            )
+
+    @classmethod
+    def of(
+        cls, wavelength_range: tuple[float, float], step: float, wavelength: float | None
+    ) -> Bands:
+        """A range in steps, or the one wavelength if it is not `None`."""
+        if wavelength is not None:
+            return cls(wavelength, wavelength)
+        return cls(*wavelength_range, step)
+
+    @property
+    def is_single(self) -> bool:
+        """Whether this is one wavelength instead of a range."""
+        return self.low == self.high
+
+    @property
+    def count(self) -> int:
+        """Number of bands."""
+        # a range that is a whole number of steps must not get one more by rounding
+        return 1 if self.is_single else math.ceil((self.high - self.low) / self.step - 1e-9)
+
+    @property
+    def width(self) -> float:
+        """Of one band, nm."""
+        return (self.high - self.low) / self.count
+
+    def wavelengths(self, offset: float = 0.5) -> NDArray[np.float64]:
+        """One wavelength in each band, (count,) in nm, at `offset` (0 to 1) of its width."""
+        return self.low + (np.arange(self.count, dtype=np.float64) + offset) * self.width
+
+    def __str__(self) -> str:
+        if self.is_single:
+            return f"{self.low:g} nm"
+        return f"{self.low:g}–{self.high:g} nm in steps of {self.width:.4g} nm"
+
 
 Image = NDArray[np.float32]
 
@@ -115,3 +226,78 @@ class BrdfMap:
         centres = (np.arange(n) + 0.5) * (2.0 / n) - 1.0
         x, y, _ = self.light.mirror
         return np.hypot(centres[None, :] - x, centres[:, None] - y) > self.lobe + 2.0 / n
+
+
+#: Names of sextants of hue, from red on, each 60° wide in HSV; and of what has next to none.
+HUES = ("red", "yellow", "green", "cyan", "blue", "magenta")
+#: Saturation below which a colour counts as grey.
+GREY = 0.1
+# Of the brightest direction's luminance: what is below has no colour to speak of.
+_DARK = 1e-9
+
+Reals = NDArray[np.float64]
+
+
+def iridescence(brdf_map: BrdfMap) -> float:
+    """How much colour changes with the view direction.
+
+    The root mean square distance of the chromaticity from its mean, in the CIE 1976 u'v' diagram
+    (CIE 15:2018, 8.1), over the hemisphere of view directions (by projected solid angle), weighted
+    by luminance Y:
+
+        I = √(Σ Y |c − c̄|² / Σ Y),   c = (u', v'),   c̄ = Σ Y c / Σ Y
+
+    It is 0 for what has one colour in all directions, white or a pigment's, however bright; the
+    pure colours of the spectrum between 450 and 650 nm, alike bright, have 0.25. The mirror's lobe
+    counts as all other light: colours that gloss outshines are of little weight.
+    """
+    xyz = _xyz(brdf_map, _seen(brdf_map))
+    weight = xyz[:, 1]
+    if not weight.sum() > 0.0:
+        return 0.0
+    chromaticity = _chromaticity(xyz)
+    mean = np.average(chromaticity, axis=0, weights=weight)
+    squares = np.sum(np.square(chromaticity - mean), axis=1)
+    return float(np.sqrt(np.average(squares, weights=weight)))
+
+
+def colours_of(brdf_map: BrdfMap) -> dict[str, float]:
+    """Shares of the luminance away from the mirror's lobe, by hue; they add up to 1, or are all 0.
+
+    Hue is that of linear sRGB, clipped to the display's gamut, in sextants of HSV around the
+    primaries and their mixtures; "grey" has a saturation below `GREY`.
+    """
+    from matplotlib.colors import rgb_to_hsv
+
+    names = (*HUES, "grey")
+    away = _seen(brdf_map) & brdf_map.away_from_mirror()
+    weight = _xyz(brdf_map, away)[:, 1]
+    if not weight.sum() > 0.0:
+        return dict.fromkeys(names, 0.0)
+    linear = brdf_map.linear[away].astype(np.float64)
+    shown = np.clip(linear, 0.0, None)
+    brightest = shown.max(axis=1, keepdims=True)
+    hsv = rgb_to_hsv(np.divide(shown, brightest, out=np.zeros_like(shown), where=brightest > 0))
+    sextant = np.floor(hsv[:, 0] * 6.0 + 0.5).astype(int) % 6
+    sextant[hsv[:, 1] < GREY] = 6
+    total = np.bincount(sextant, weight, minlength=7)
+    return dict(zip(names, (total / total.sum()).tolist(), strict=True))
+
+
+def _seen(brdf_map: BrdfMap) -> NDArray[np.bool_]:
+    lit = brdf_map.luminance > _DARK * brdf_map.luminance.max()
+    return np.asarray((brdf_map.coverage > 0.0) & lit)
+
+
+def _xyz(brdf_map: BrdfMap, directions: NDArray[np.bool_]) -> Reals:
+    """X, Y, Z (n, 3) of some directions."""
+    if brdf_map.xyz is None:
+        raise ValueError("a map of a single wavelength has no colours")
+    return np.asarray(brdf_map.xyz[directions], np.float64)
+
+
+def _chromaticity(xyz: Reals) -> Reals:
+    """u', v' of CIE 1976: 4X and 9Y over X + 15Y + 3Z."""
+    weights = np.array([1.0, 15.0, 3.0])
+    whole = np.maximum(xyz @ weights, 1e-300)
+    return np.stack([4.0 * xyz[:, 0] / whole, 9.0 * xyz[:, 1] / whole], axis=-1)

@@ -14,11 +14,9 @@ Budget, recommended   the cheapest setting within a budget
 
 from __future__ import annotations
 
-from .depth import measure_depths
+from .accuracy import lit_pairs, measure_depths, measure_wavelengths
 from .measuring import Measured, Setting, measure, settings
 from .report import Budget, recommended
-from .sample import lit_pairs
-from .wavelengths import measure_wavelengths
 
 __all__ = [
     "Budget",

@@ -18,11 +18,11 @@ from ...errors import DiffractionError
 from ...heights.field import HeightField
 from ...plugin.memory import upload
 from ...progress import Progress, silent
-from ...tables.build.half_precision import half_scale
-from ...tables.colour.colour_difference import power_colour_difference
+from ...tables.build.coefficients import half_scale
+from ...tables.colour.table import power_colour_difference
 from ...tables.table import DiffractionTable, q_limit_of
 from ..bench.contenders import Queries, kernel_seconds, ratio, rounds_of, saved_bsdf
-from .sample import Sample
+from .accuracy import Sample
 
 
 @dataclass(frozen=True)

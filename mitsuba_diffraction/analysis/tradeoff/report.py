@@ -1,4 +1,4 @@
-"""What was measured of all settings, as text, plain data and CSV; which one to take."""
+"""What was measured of all settings, as text, plain data, CSV and plots; which one to take."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...atomic import atomic_path
 from ...errors import DiffractionError
-from .depth import Depths
+from .accuracy import Depths, Spectral
 from .measuring import Measured, rows
-from .wavelengths import Spectral
 
 _ALIKE = 1.1  # times differ by as much from one run to the next
 
@@ -140,3 +141,80 @@ def lines(
         f"recommended{f' ({asked})' if asked else ''}: {said}: error {best.error:.1e}, "
         f"{best.relative:.1f} × roughconductor, {best.megabytes:.1f} MB"
     )
+
+
+_MARKS = "osD^vP*Xp<>h"
+
+
+def draw_trade(results: Sequence[Measured], path: Path, title: str) -> None:
+    """Error against time, the area of a mark for its memory, and the best of all at each error."""
+    shown = [one for one in results if not one.refused and one.setting.group != "coherence"]
+    axes = _axes(5.0)
+    groups = list(dict.fromkeys(one.setting.group for one in shown))
+    for n, group in enumerate(groups):
+        mine = [one for one in shown if one.setting.group == group]
+        axes.scatter(
+            [one.relative for one in mine], [one.error for one in mine],
+            s=[12 + 6 * one.megabytes for one in mine], marker=_MARKS[n % len(_MARKS)],
+            color=f"C{n % 10}", alpha=0.75, label=group, edgecolors="black", linewidths=0.4,
+            zorder=3,
+        )  # fmt: skip
+    front = _front(shown)
+    axes.step(
+        [one.relative for one in front], [one.error for one in front], where="post", color="0.5",
+        lw=1.0, label="nothing faster is as exact",
+    )  # fmt: skip
+    default = shown[0]
+    axes.annotate(
+        "default", (default.relative, default.error), (12, 10), textcoords="offset points",
+        fontsize=8, arrowprops={"arrowstyle": "-", "lw": 0.6},
+    )  # fmt: skip
+    axes.set(xlabel="time of eval (roughconductor, Al = 1)")
+    axes.set(ylabel="relative error of the diffracted power")
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter("{x:g}")
+    axes.set_title(f"{title}; area of a mark: memory", fontsize=9)
+    legend = axes.legend(fontsize=7, ncols=2)
+    for handle in legend.legend_handles:
+        if handle is not None and hasattr(handle, "set_sizes"):
+            handle.set_sizes([36.0])
+    _save(axes, path)
+
+
+def draw_depths(depths: Depths, path: Path) -> None:
+    """Where Taylor's series breaks down, beside those that do not."""
+    axes = _axes(4.2)
+    for n, (name, errors) in enumerate(depths.errors.items()):
+        axes.plot(
+            depths.depth, np.clip(errors, 1e-8, 10.0), marker=_MARKS[n], ms=4, lw=1.2, label=name
+        )
+    axes.axhline(1e-3, color="0.4", lw=0.8, ls="--", label="the tolerance that is asked for")
+    axes.set(ylim=(1e-8, 20.0), xlabel="depth of the surface, peak to valley (µm)")
+    axes.set(ylabel="relative error of the orders (cut at 10)")
+    axes.set_title("light of 380 nm, normal; a line that ends is refused from there on", fontsize=9)
+    axes.legend(fontsize=7)
+    _save(axes, path)
+
+
+def _front(results: Sequence[Measured]) -> list[Measured]:
+    """Settings that nothing is both faster and more exact than, fastest first."""
+    front: list[Measured] = []
+    for one in sorted(results, key=lambda one: one.relative):
+        if not front or one.error < front[-1].error:
+            front.append(one)
+    return front
+
+
+def _axes(height: float) -> Any:
+    """Both logarithmic, in a figure of that height in inches."""
+    from matplotlib.figure import Figure  # not for those who draw nothing
+
+    axes = Figure(figsize=(7.6, height), layout="constrained").add_subplot()
+    axes.set(xscale="log", yscale="log")
+    axes.grid(alpha=0.3)
+    return axes
+
+
+def _save(axes: Any, path: Path) -> None:
+    with atomic_path(path) as temporary:
+        axes.figure.savefig(temporary, dpi=130, format="png")

@@ -1,10 +1,84 @@
-"""Readers of height files, by kind.
+"""Readers of height files, by kind, and what they take out of a file: `RawHeights`.
 
 Contents
 --------
 images       PNG, BMP, TIFF and EXR
-arrays       NPY
-text         grids of numbers
+grids        grids of numbers: NPY, TXT, CSV
 instruments  their files (extra `afm`)
-raw          what a reader takes out of a file
 """
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from ...errors import DiffractionError
+
+
+@dataclass
+class RawHeights:
+    """Heights as one file holds them.
+
+    Attributes
+    ----------
+    values
+        Shape (ny, nx), y upwards (`values[0]` is y = 0). In `unit`, or in [0, 1] if `relative`;
+        points without data are NaN.
+    pixel_size
+        (dx, dy) in µm if the file says so.
+    relative
+        The values are fractions of a full scale that the file does not know.
+    notes
+        One line per choice that the reader made.
+    unit
+        µm in one unit of the values; `None` if the file does not say, or says no length.
+    stated
+        That unit as the file states it; "" if the values are in µm because files of this kind are.
+    """
+
+    values: npt.NDArray[np.floating]
+    pixel_size: tuple[float, float] | None = None
+    relative: bool = False
+    notes: tuple[str, ...] = ()
+    unit: float | None = 1.0
+    stated: str = ""
+
+
+def existing_file(path: str | os.PathLike[str]) -> Path:
+    """Path of a file that is there, is a file, can be opened and has content.
+
+    Raises
+    ------
+    DiffractionError
+        Otherwise, with what is wrong.
+    """
+    shown = repr(os.fspath(path))
+    try:
+        file = Path(path)
+        if file.is_dir():
+            raise DiffractionError(f"{shown} is a folder, not a height field; name a file in it")
+        if file.exists() and not file.is_file():  # opening a pipe would wait for its writer
+            raise DiffractionError(f"{shown} is a pipe or a device; write what it gives to a file")
+        with file.open("rb") as stream:
+            first = stream.read(1)
+    except DiffractionError:
+        raise
+    except FileNotFoundError as error:
+        raise DiffractionError(f"{shown} does not exist; check the path") from error
+    except OSError as error:
+        raise DiffractionError(f"cannot read {shown}: {error.strerror}") from error
+    except ValueError as error:  # a null character in the name
+        raise DiffractionError(f"cannot read {shown}: {error}") from error
+    if not first:
+        raise DiffractionError(f"{shown} is empty (0 bytes)")
+    return file
+
+
+def first_line(error: BaseException) -> str:
+    """The first line of an exception's text, for quoting a library inside a one-line message."""
+    lines = str(error).strip().splitlines()
+    return lines[0][:200] if lines else type(error).__name__

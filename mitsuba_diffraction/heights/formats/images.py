@@ -16,7 +16,7 @@ from PIL import Image, UnidentifiedImageError
 from ...errors import DiffractionError
 from ...streams import without_chatter
 from ..field import check_pixel_count
-from .raw import RawHeights, first_line
+from . import RawHeights, first_line
 
 # Full scale of Pillow's integer modes, and how people call the colour ones.
 _FULL_SCALE = {"1": 1, "L": 255, "I;16": 65535, "I;16L": 65535, "I;16B": 65535, "I;16N": 65535}

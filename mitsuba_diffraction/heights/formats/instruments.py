@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import DiffractionError, DiffractionWarning
 from ..field import check_pixel_count
-from .raw import RawHeights, first_line
+from . import RawHeights, first_line
 
 # Signals that instruments record in nanometres beside the topography.
 _NOT_HEIGHT = re.compile(

@@ -27,8 +27,8 @@ import numpy.typing as npt
 
 from ..field import HeightField
 from ..lengths import Counts, Lengths, count_pair, length_pair, number_between, seed_of
+from .fingers import ramp
 from .noise import FloatArray, grain, rounded
-from .sheets import ramp
 
 _SHORTEST_RUN, _LONGEST_RUN = 3, 11  # channel bits
 # λ of P(n) = λ⁻ⁿ: the root above 1 of Σ λ⁻ⁿ = 1 over n = 3..11; 2 to the capacity, 0.5418 bit

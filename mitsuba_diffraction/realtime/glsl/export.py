@@ -16,12 +16,11 @@ import OpenEXR
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError
-from ...tables.store.cache import cached_colours
+from ...tables.store import cached_colours
 from .maps import Map
 from .materials import Material, height_scale, pack_conservation, pack_surface
 from .packing import pack_colours, pack_powers, pack_responses
-from .preprocess import global_names, renamed, resolved
-from .source import shader_file
+from .source import global_names, renamed, resolved, shader_file
 from .texels import PAGE, Packed, Texture
 
 #: Methods that other programs can have, and the functions that they become.

@@ -2,17 +2,15 @@
 
 Contents
 --------
-build           tries until the tolerance is met: `build_table`
-attempt         one try, and its error
-choose          how many terms and intervals a tolerance takes
-checks          what cannot be built
-windows         a wide scan cut into overlapping ones, averaged
-powers          the mean power of several patches, by batches, on workers if given
-spectrum        DFT of exp(iκh) at some κ, cropped to the orders that light can reach
-coefficients    of the series, from transforms of the heights
-half_precision  these as half floats
-error           the one error measure of the project
-coarse          what a table of a restricted domain has everywhere else
-slope_ratios    what tells hills from pits, for the second order
-describe        what a table remembers of its heights
+build         tries until the tolerance is met: `build_table`
+choose        how many terms and intervals a tolerance takes
+checks        what cannot be built
+windows       a wide scan cut into overlapping ones, averaged
+powers        the mean power of several patches, by batches, on workers if given
+spectrum      DFT of exp(iκh) at some κ, cropped to the orders that light can reach
+coefficients  of the series, from transforms of the heights; as half floats
+error         the one error measure of the project
+coarse        what a table of a restricted domain has everywhere else
+slope_ratios  what tells hills from pits, for the second order
+describe      what a table remembers of its heights
 """

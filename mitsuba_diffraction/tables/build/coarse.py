@@ -28,9 +28,8 @@ from ..packing import Grid
 from ..table import DiffractionTable, q_limit_of
 from ..window import taps_for
 from .choose import svd_expansion
-from .coefficients import series_of
+from .coefficients import half_scale, series_of
 from .describe import roughness_of
-from .half_precision import half_scale
 from .powers import Spectra
 from .windows import shape_of
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from ...heights.field import HeightField
-from ...heights.preprocess.levelling import plane_of
+from ...heights.preprocess import plane_of
 from ...optics.blend import ScaleRoughness
 from ...optics.geometry import sigma_of, wavenumber
 from ...settings import TableSettings

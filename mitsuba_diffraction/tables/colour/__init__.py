@@ -2,9 +2,7 @@
 
 Contents
 --------
-table               `ColourTable`
-build               how it is summed
-proposals           densities to draw directions from, by brightness
-polar               its grid
-colour_difference   how much colours change from one table to another
+table       `ColourTable`; how much colours change from one to another
+build       how it is summed, on a polar grid
+proposals   densities to draw directions from, by brightness
 """

@@ -14,4 +14,5 @@ sums           R + T as a linear map of weights, and the scales that bring it ne
 sheet          the same of a sheet that is a grating, chain by chain
 between        R + T amid the nodes of a scale, and the scale lowered where that is above 1
 sides          R + T of a dielectric, and the scale of directions that makes it 1
+store          what conserves energy, in the cache
 """

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...optics.geometry import wavenumber
-from ..sampling.order_mixture import PER_PERIOD, OrderMixture
+from ..sampling import PER_PERIOD, OrderMixture
 from ..table import DiffractionTable
 from .grid import Interpolation
 

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...optics.geometry import wavenumber
-from ..sampling.order_mixture import OrderMixture
+from ..sampling import OrderMixture
 from ..table import DiffractionTable
 from . import between, sheet
 from .chains import Chains, put

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from ...optics.fresnel import Filmed
 from ...optics.geometry import wavenumber
-from ..sampling.order_mixture import OrderMixture, order_mixture
+from ..sampling import OrderMixture, order_mixture
 from ..table import DiffractionTable
 from .gain import LEAST_COSINE, Gain, fade, over_lobe, read
 from .grating import Grating, GratingGrid, grating_of, orders_of

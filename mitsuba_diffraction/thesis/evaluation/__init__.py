@@ -16,8 +16,7 @@ thesis_fit      the procedure behind the thesis' published periods
 
 from __future__ import annotations
 
-from .beam import Beam, Response, measure
-from .ridge import Fit, Ridge, find_period, fit_period, ridge_of
+from .ridge import Beam, Fit, Response, Ridge, find_period, fit_period, measure, ridge_of
 from .windows import thesis_fit, window_fits
 
 #: The name that `thesis_fit` had before.

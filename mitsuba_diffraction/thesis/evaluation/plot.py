@@ -13,8 +13,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from ...atomic import atomic_path
-from .beam import Response
-from .ridge import Fit, Ridge
+from .ridge import Fit, Response, Ridge
 
 #: The picture spans this many powers of ten below its brightest point.
 DECADES = 5.0

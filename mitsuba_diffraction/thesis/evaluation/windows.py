@@ -17,9 +17,8 @@ from ...errors import DiffractionError
 from ...optics.geometry import diffraction_coordinates, wavenumber
 from ...progress import Progress
 from ...tables.table import DiffractionTable
-from ..methods.gain import Gain
-from .beam import Array, Beam, Response, measure
-from .ridge import Fit, fit_period, ridge_of
+from ..methods.method import Gain
+from .ridge import Array, Beam, Fit, Response, fit_period, measure, ridge_of
 
 MOST_WINDOWS = 4096
 

@@ -14,20 +14,15 @@ OrdersOnly         nmm: only the wavelengths whose orders reach the view directi
 Repeated           pq: the patch repeated, with linear or sinc interpolation
 Rainbow            rainbow: the grating equation alone
 Gain               the thesis' gain factor C
-method_map         a method over the hemisphere (in `maps`)
+method_map         a method over the hemisphere
 estimate_periods   the period of a patch, with its confidence
 """
 
 from __future__ import annotations
 
-from .gain import Gain
-from .make import NAMES, make, make_all
-from .maps import method_map
-from .method import FullSpectrum, Method
-from .nmm import OrdersOnly
-from .period import Period, estimate_periods
-from .pq import Repeated
-from .rainbow import Rainbow
+from .make import NAMES, make, make_all, method_map
+from .method import FullSpectrum, Gain, Method
+from .periodic import OrdersOnly, Period, Rainbow, Repeated, estimate_periods
 
 __all__ = [
     "NAMES",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from docs.make.figures import cluster, markers
+from docs.make.figures import cluster, pages
 from tests.conftest import ROOT
 
 COSTS = cluster.Costs(work=10.0, spread=1.0, scheduler=0.001, client=0.1, transfer=0.05)
@@ -30,4 +30,4 @@ def test_a_slow_scheduler_is_what_breaks_first_then():
 def test_the_page_has_the_places_for_the_figures():
     page = (ROOT / "docs" / "cluster.md").read_text("utf-8")
     for name in ("film", "times", "scaling"):
-        assert markers.part(page, name)
+        assert pages.part(page, name)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from docs.make.figures import evaluation, markers
+from docs.make.figures import evaluation, pages
 from mitsuba_diffraction import DiffractionError
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -20,7 +20,7 @@ def test_the_page_is_made_by_one_command(tmp_path, capsys):
     code = evaluation.main(["-o", str(page), "--small", "--windows", "2", "--angle-step", "0.1"])
     assert code == 0, capsys.readouterr().err
     text = page.read_text(encoding="utf-8")
-    periods = markers.part(text, "periods").splitlines()
+    periods = pages.part(text, "periods").splitlines()
     assert len(periods) == 4  # head, rule, blazed, sinusoidal
     for line, made in zip(periods[2:], (2500.0, 1600.0), strict=True):
         cells = [cell.split("(")[0].strip() for cell in line.strip("| ").split("|")]
@@ -28,7 +28,7 @@ def test_the_page_is_made_by_one_command(tmp_path, capsys):
         assert exact == pytest.approx([made] * 4, rel=1e-3)
         # knows its wavelengths to half a step of 5 nm, 0.7 %
         assert nmm == pytest.approx(made, rel=7e-3)
-    assert "blazed grating" in markers.part(text, "windows")
+    assert "blazed grating" in pages.part(text, "windows")
     with Image.open(tmp_path / "images" / "evaluation.png") as image:
         assert min(image.size) > 300
 
@@ -37,14 +37,14 @@ def test_a_page_without_markers_is_one_line(tmp_path, capsys):
     page = tmp_path / "a.md"
     page.write_text("nothing", encoding="utf-8")
     with pytest.raises(DiffractionError, match="expected '<!-- begin x -->'"):
-        markers.update(page, {"x": "y"})
+        pages.update(page, {"x": "y"})
     assert page.read_text(encoding="utf-8") == "nothing"
 
 
 def test_a_part_is_replaced_and_all_else_stays():
     text = "a\n<!-- begin t -->\nold\n<!-- end t -->\nb\n"
-    new = markers.replaced(text, "t", "new\n")
+    new = pages.replaced(text, "t", "new\n")
     assert new == "a\n<!-- begin t -->\nnew\n<!-- end t -->\nb\n"
-    assert markers.part(new, "t") == "new"
+    assert pages.part(new, "t") == "new"
     with pytest.raises(DiffractionError):
-        markers.replaced(text + text, "t", "new")
+        pages.replaced(text + text, "t", "new")

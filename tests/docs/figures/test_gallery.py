@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from docs.make.figures import gallery
-from docs.make.figures.jpeg import write_jpeg
+from docs.make.figures.pages import write_jpeg
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.scene.parameters import parameters_of

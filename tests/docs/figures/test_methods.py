@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from docs.make.figures import markers, methods
+from docs.make.figures import methods, pages
 from mitsuba_diffraction.cli.options import METHODS
 
 
@@ -11,7 +11,7 @@ def test_the_table_is_made_by_one_command(tmp_path, capsys, some_variant):
     page.write_text("<!-- begin methods -->\n<!-- end methods -->\n", encoding="utf-8")
     code = methods.main(["-o", str(page), "--small", "--resolution", "12"])
     assert code == 0, capsys.readouterr().err
-    text = markers.part(page.read_text(encoding="utf-8"), "methods")
+    text = pages.part(page.read_text(encoding="utf-8"), "methods")
     rows = {line.split("|")[1].strip(): line.split("|") for line in text.splitlines()[2:9]}
     assert set(rows) == {
         *(f"`{n}`" for n in METHODS), "nmm, lobes",

@@ -58,14 +58,15 @@ def test_the_defaults_are_those_of_the_code(some_variant, patch):
 
 
 def test_the_choices_are_those_of_the_code(some_variant):
+    from mitsuba_diffraction.heights import preprocess
     from mitsuba_diffraction.heights import read as options
     from mitsuba_diffraction.plugin import parameters as code
     from mitsuba_diffraction.tables.expansion import BASES
 
     choices = {
-        "fill": ("none", *options.FILLS),
-        "level": options.LEVELS,
-        "periodic": options.PERIODICS,
+        "fill": ("none", *preprocess.FILLS),
+        "level": ("none", *options.LEVELS),
+        "periodic": ("none", *options.PERIODICS),
         "shadowing": code.SHADOWINGS,
         "layering": code.LAYERINGS,
         "basis": (*BASES, "auto"),

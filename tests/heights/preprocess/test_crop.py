@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.heights.preprocess.edges import crop
+from mitsuba_diffraction.heights.preprocess import crop
 from mitsuba_diffraction.heights.recipes import Recipe
 
 HEIGHTS = np.arange(48.0).reshape(6, 8) * 0.001

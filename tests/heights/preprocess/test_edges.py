@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.heights.preprocess.edges import edge_lines
+from mitsuba_diffraction.heights.validity import edge_lines
 from tests.directions import rough_patch
 
 SHORTEST = 0.36

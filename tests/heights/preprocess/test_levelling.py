@@ -7,12 +7,7 @@ import pytest
 
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.heights.preprocess.levelling import (
-    clip_outliers,
-    level_lines,
-    level_plane,
-    plane_of,
-)
+from mitsuba_diffraction.heights.preprocess import clip_outliers, level_lines, level_plane, plane_of
 
 RNG = np.random.default_rng(11)
 

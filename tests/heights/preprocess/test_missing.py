@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.heights.preprocess.missing import METHODS, fill_missing
+from mitsuba_diffraction.heights.preprocess import FILLS, fill_missing
 
 
 def gaps(heights, seed=0):
@@ -19,7 +19,7 @@ def gaps(heights, seed=0):
     return np.where(lost, np.nan, heights)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", FILLS)
 def test_measured_points_stay_and_gaps_stay_within_their_range(method):
     whole = np.random.default_rng(3).random((40, 50))
     holed = gaps(whole)

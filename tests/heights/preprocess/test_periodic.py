@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.heights.preprocess.edges import seam_share
-from mitsuba_diffraction.heights.preprocess.periodic import (
+from mitsuba_diffraction.heights.preprocess import (
     periodic_smooth,
     periodic_taper,
+    seam_share,
     seam_step,
 )
 

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from mitsuba_diffraction.plugin.llvm import find
-from mitsuba_diffraction.plugin.llvm.find import Library
+from mitsuba_diffraction.plugin import llvm
+from mitsuba_diffraction.plugin.llvm import Library
 
-HERE = [Library.at(path) for path in find.in_folders()]
+HERE = [Library.at(path) for path in llvm.in_folders()]
 
 
 def installed(version: int) -> Path:
@@ -25,7 +25,7 @@ def installed(version: int) -> Path:
 
 def only(monkeypatch: pytest.MonkeyPatch, *files: Path) -> None:
     """Make these the only libraries of the machine."""
-    monkeypatch.setattr(find, "in_folders", lambda: iter(files))
+    monkeypatch.setattr(llvm, "in_folders", lambda: iter(files))
 
 
 def python(code: str, **variables: str) -> subprocess.CompletedProcess[str]:

@@ -10,7 +10,7 @@ import pytest
 
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.plugin import llvm
-from mitsuba_diffraction.plugin.llvm.find import VARIABLE, Library
+from mitsuba_diffraction.plugin.llvm import VARIABLE, Library
 from tests.plugin.llvm.machine import installed, only, python
 
 
@@ -42,7 +42,7 @@ package = types.ModuleType("mitsuba_diffraction")
 package.__path__ = importlib.util.find_spec("mitsuba_diffraction").submodule_search_locations
 sys.modules["mitsuba_diffraction"] = package
 os.environ.pop("DRJIT_LIBLLVM_PATH", None)
-from mitsuba_diffraction.plugin.llvm import choose, find
+from mitsuba_diffraction.plugin import llvm
 """
 
 
@@ -53,7 +53,7 @@ def test_choice_goes_by_names_alone():
 {BEGUN}
 events = []
 sys.addaudithook(lambda event, _: events.append(event))
-assert choose.select_llvm() is not None
+assert llvm.select_llvm() is not None
 print(*{{"numpy", "drjit", "subprocess"}} & set(sys.modules))
 print(*set(events) & {{"ctypes.dlopen", "open", "os.fork", "os.posix_spawn", "subprocess.Popen"}})
 """

@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from mitsuba_diffraction.plugin import llvm
-from mitsuba_diffraction.plugin.llvm import find
-from mitsuba_diffraction.plugin.llvm.find import VARIABLE, Library
+from mitsuba_diffraction.plugin.llvm import VARIABLE, Library
 from tests.plugin.llvm.machine import only
 
 
@@ -62,4 +61,4 @@ def test_bare_name_is_looked_up_as_the_loader_does(tmp_path: Path, monkeypatch: 
     (tmp_path / "libLLVM-15.so.1").touch()
     only(monkeypatch, tmp_path / "libLLVM-15.so.1")
     monkeypatch.setenv(VARIABLE, "libLLVM-15.so.1")
-    assert find.named_library() == Library(tmp_path / "libLLVM-15.so.1", 15)
+    assert llvm.named_library() == Library(tmp_path / "libLLVM-15.so.1", 15)

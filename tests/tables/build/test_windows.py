@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.heights import field as field_module
-from mitsuba_diffraction.heights.preprocess import edges, levelling
+from mitsuba_diffraction.heights import preprocess, validity
 from mitsuba_diffraction.tables.build import windows as module
 from mitsuba_diffraction.tables.build.windows import Windows
 
@@ -145,11 +145,10 @@ def test_large_fields_have_the_same_statistics_in_parts(monkeypatch, tmp_path):
     np.testing.assert_array_equal(parts.heights, heights)
     assert parts.rms_slope == pytest.approx(whole.rms_slope, rel=1e-12)
     assert parts.rms_height == pytest.approx(whole.rms_height, rel=1e-12)
-    for one in (edges, levelling):
-        monkeypatch.setattr(one, "LARGE", 1)
+    monkeypatch.setattr(preprocess, "LARGE", 1)
     level = parts.treated(level="plane")
     assert "RMS change" in level.history[-1]
-    lines = edges.edge_lines(parts, 0.4)
+    lines = validity.edge_lines(parts, 0.4)
     monkeypatch.undo()
     assert level.history == whole.treated(level="plane").history
-    assert lines == edges.edge_lines(whole, 0.4)
+    assert lines == validity.edge_lines(whole, 0.4)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.thesis import methods
 from mitsuba_diffraction.thesis.methods import Gain
-from mitsuba_diffraction.thesis.methods.pq import copies
+from mitsuba_diffraction.thesis.methods.periodic import copies
 from tests.directions import lit_pairs, polar
 
 

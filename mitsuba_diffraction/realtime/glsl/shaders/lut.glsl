@@ -1,5 +1,5 @@
 // `lut`: the colours of daylight, summed over all wavelengths beforehand; the twin of
-// plugin/rgb_lookup.py. Rings even in ln r with azimuths of their own, a series of five terms in z.
+// plugin/rgb.py. Rings even in ln r with azimuths of their own, a series of five terms in z.
 
 #ifdef FLOAT_TEXTURES            // the same in textures that every loader knows
 uniform sampler2D colours;      // four texels a bin
@@ -124,7 +124,7 @@ vec3 diffracted(vec2 uv, float z, float cos_half, int light)
 {
     float squared_radius = dot(uv, uv);
     vec3 colour = other_orders(uv, squared_radius, z) + order_0(sqrt(squared_radius), z);
-    colour *= boundary(cos_half, sqrt(squared_radius), z);
+    colour = tinted(colour * boundary(cos_half, sqrt(squared_radius), z));
 #ifdef COATED
     colour += face_reflected * order_0(sqrt(squared_radius), 0.0);
 #endif

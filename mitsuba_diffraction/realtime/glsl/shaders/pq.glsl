@@ -1,4 +1,4 @@
-// `pq`: the thesis' repeated patch (thesis/methods/pq.py, linear interpolation); REPEATED makes
+// `pq`: the thesis' repeated patch (thesis/methods/periodic.py, linear interpolation); REPEATED makes
 // the window of taylor.glsl that of whole copies.
 
 vec3 diffracted(vec2 uv, float z, float cos_half, int light)

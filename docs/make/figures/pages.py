@@ -1,0 +1,197 @@
+"""What the programs of this folder share: parts of pages, renderings as JPEG, measurements, errors.
+
+Generated parts of Markdown files stand between `<!-- begin NAME -->` and its end.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import json
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from PIL import Image
+
+from mitsuba_diffraction.atomic import atomic_path
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.heights.field import HeightField
+
+Made = TypeVar("Made")
+
+#: What the command line calls a method that the library has under another name.
+SHOWN = {"default": "spectral"}
+# JPEG's default blurs single sparkling pixels; at 90 they stay, in a quarter of a PNG's size.
+_QUALITIES = (90, 86, 82, 78, 74, 70, 64, 58)
+
+
+def replaced(text: str, name: str, content: str) -> str:
+    """The text with the part of that name replaced; the markers stay.
+
+    Raises
+    ------
+    DiffractionError
+        If the markers are missing, twice there, or the wrong way round.
+    """
+    begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
+    if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
+        raise DiffractionError(f"expected '{begin}' and then '{end}', once each")
+    head, rest = text.split(begin)
+    tail = rest.split(end)[1]
+    return f"{head}{begin}\n{content.strip()}\n{end}{tail}"
+
+
+def part(text: str, name: str) -> str:
+    """What stands between the markers of that name.
+
+    Raises
+    ------
+    DiffractionError
+        If they are missing.
+    """
+    begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
+    if begin not in text or end not in text:
+        raise DiffractionError(f"expected '{begin}' and '{end}'")
+    return text.split(begin)[1].split(end)[0].strip()
+
+
+def update(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
+    """Replace parts of a file by name.
+
+    Raises
+    ------
+    DiffractionError
+        If the file or a marker is missing, or it cannot be written.
+    """
+    file = Path(path)
+    text = _read(file)
+    for name, content in parts.items():
+        try:
+            text = replaced(text, name, content)
+        except DiffractionError as error:
+            raise DiffractionError(f"'{file}': {error}") from error
+    with atomic_path(file) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def update_present(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
+    """Replace those parts that a file has markers for.
+
+    Raises
+    ------
+    DiffractionError
+        If it has none, or as in `update`.
+    """
+    text = _read(Path(path))
+    present = {name: part for name, part in parts.items() if f"<!-- begin {name} -->" in text}
+    if not present:
+        raise DiffractionError(
+            f"'{path}' has none of the markers {', '.join(f'<!-- begin {n} -->' for n in parts)}"
+        )
+    update(path, present)
+
+
+def _read(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8")
+    except OSError as error:
+        raise DiffractionError(f"cannot read '{file}': {error.strerror}") from error
+
+
+def table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    """A Markdown table."""
+    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
+
+
+def write_jpeg(
+    source: Path, target: Path, *, width: int | None = None, most: int | None = None
+) -> None:
+    """Write a picture as JPEG.
+
+    Parameters
+    ----------
+    source : a picture that Pillow reads.
+    target : the JPEG.
+    width : of the result in pixels; None keeps it.
+    most : size in bytes that is not exceeded, at the price of quality.
+
+    Raises
+    ------
+    DiffractionError
+        If the source cannot be read, or the target not be written or made so small.
+    """
+    try:
+        with Image.open(source) as opened:
+            image = opened.convert("RGB")
+        if width is not None:
+            size = (width, round(width * image.height / image.width))
+            image = image.resize(size, Image.Resampling.LANCZOS)
+        for quality in _QUALITIES:
+            buffer = io.BytesIO()
+            image.save(buffer, format="JPEG", quality=quality, subsampling=0, optimize=True)
+            if most is None or buffer.tell() <= most:
+                break
+        else:
+            raise DiffractionError(
+                f"'{target}' would have {buffer.tell()} bytes, more than {most}; render it smaller "
+                "or with more samples"
+            )
+        with atomic_path(target) as path:
+            path.write_bytes(buffer.getvalue())
+    except OSError as error:
+        raise DiffractionError(f"cannot make '{target}' of '{source}': {error}") from error
+
+
+def add_measured(parser: argparse.ArgumentParser, what: str) -> None:
+    """Declare the options that name a measured patch; `what` says what becomes of it."""
+    parser.add_argument("--measured", metavar="FILE", help=what)
+    parser.add_argument("--pixel-size", metavar="DX", help="of the measured patch, µm")
+    parser.add_argument("--max-height", metavar="H", help="of the measured patch, µm")
+
+
+def measured_patch(args: argparse.Namespace) -> HeightField | None:
+    """The patch that these options name, or None.
+
+    Raises
+    ------
+    DiffractionError
+        If it cannot be read.
+    """
+    if args.measured is None:
+        return None
+    return HeightField.load(args.measured, pixel_size=args.pixel_size, max_height=args.max_height)
+
+
+def from_json(file: Path, make: Callable[[Any], Made], *, writer: str, remedy: str) -> Made:
+    """What `make` makes of a measurement in JSON.
+
+    Parameters
+    ----------
+    make : takes the document; what it misses there shows that this is another file.
+    writer, remedy : the command that writes such files, and what to do if this is none.
+
+    Raises
+    ------
+    DiffractionError
+        If the file is missing or something else.
+    """
+    try:
+        return make(json.loads(file.read_text(encoding="utf-8")))
+    except (OSError, ValueError, LookupError, TypeError, StopIteration) as error:
+        raise DiffractionError(
+            f"'{file}' is not what {writer} writes ({error}); {remedy}"
+        ) from error
+
+
+def exit_code(name: str, work: Callable[[], None]) -> int:
+    """Run `work`; 0, or 1 after an error, which is printed in one line."""
+    try:
+        work()
+    except DiffractionError as error:
+        print(f"{name}: error: {error}", file=sys.stderr)
+        return 1
+    return 0

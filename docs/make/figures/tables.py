@@ -1,0 +1,319 @@
+"""Tables of docs/benchmarks.md, accuracy.md, plan.md and energy.md, from what commands measured.
+
+mitsuba-diffraction bench --json out/bench.json
+python -m docs.make.figures.tables speed out/bench.json
+
+Likewise `tradeoff` of the folder that `tradeoff -o` writes, `plan` of `plan --json`, and `energy`
+of what `info --energy --json` found of each surface.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from mitsuba_diffraction.atomic import atomic_path
+from mitsuba_diffraction.errors import DiffractionError
+
+from . import pages
+from .pages import exit_code, from_json
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One line of the table.
+
+    Attributes
+    ----------
+    section, row : how the section's title and the row's name begin.
+    words : what is said of it.
+    column : of the row.
+    pattern : how the number is written.
+    goal : which of the row's goals is for this number.
+    """
+
+    section: str
+    row: str
+    words: str
+    column: str
+    pattern: str
+    goal: int | None = None
+
+
+_ROUGH, _DEFAULT = "× roughconductor", "diffraction, the defaults"
+_EFFICIENCY, _DELTA = "variance × time, ratio", "mean ΔE2000"
+FIGURES = (
+    Figure("build", "1332²", "table of 1332² pixels", "s", "{:.1f} s", 0),
+    Figure("build", "1332²", "its memory, Python's included", "GB at most", "{:.2f} GB", 1),
+    Figure("build", "4096²", "table of 4096² pixels", "s", "{:.0f} s", 0),
+    Figure("build", "4096²", "its memory", "GB at most", "{:.2f} GB", 1),
+    Figure("build", "8192²", "table of 8192² pixels", "s", "{:.0f} s", 0),
+    Figure("build", "8192²", "its memory", "GB at most", "{:.2f} GB", 1),
+    Figure("eval", _DEFAULT, "`eval` / `roughconductor` (Al)", _ROUGH, "{:.1f}", 0),
+    Figure("eval", "diffraction, tolerance 1e-2", "the same, tolerance 1e-2", _ROUGH, "{:.1f}", 0),
+    Figure("eval", "principled, metal", "`principled` / `roughconductor`", _ROUGH, "{:.1f}"),
+    Figure("eval", "measured", "`measured` / `roughconductor`", _ROUGH, "{:.0f}"),
+    Figure("eval", _DEFAULT, "`eval` / bare gathers of its memory", "× gathers", "{:.2f}", 1),
+    Figure("eval", "thesis", "the thesis' look-up / `eval`", "× defaults", "{:.0f}", 0),
+    Figure("sample", _DEFAULT, "`sample` / `roughconductor` (Al)", _ROUGH, "{:.1f}"),
+    Figure("snake", "the skin", "the snake's scene / with `roughconductor`", _ROUGH, "{:.1f}", 0),
+    Figure("noise", "0°", "noise of one sample, light from 0°", "most", "{:.2f}", 0),
+    Figure("noise", "45°", "from 45°", "most", "{:.2f}", 0),
+    Figure("noise", "75°", "from 75°", "most", "{:.2f}", 0),
+    Figure("efficiency", "white", "variance × time in a white furnace, cosine sampling's / ours",
+           _EFFICIENCY, "{:.0f}", 0),
+    Figure("efficiency", "snake", "the same, snake under a window", _EFFICIENCY, "{:.0f}", 0),
+    Figure("efficiency", "snake", "its brightest pixel, 64 samples / converged",
+           "brightest pixel, ratio", "{:.1f}", 1),
+    Figure("colours", "map, diel", "RGB variants, ΔE2000 of a dielectric", _DELTA, "{:.2f}", 0),
+    Figure("colours", "map, alu", "of aluminium's", _DELTA, "{:.2f}"),
+    Figure("colours", "map, gold", "of gold's", _DELTA, "{:.1f}"),
+    Figure("colours", "snake in the sun, pig", "of the snake in the sun", _DELTA, "{:.2f}", 0),
+    Figure("colour table", "", "`eval`, RGB / spectral", "× spectral", "{:.2f}", 2),
+)  # fmt: skip
+
+
+def speed(measured: dict[str, Any], name: str = "") -> dict[str, str]:
+    """What was measured on which machine, and the goals.
+
+    Parameters
+    ----------
+    measured : what `bench --json` wrote.
+
+    Raises
+    ------
+    DiffractionError
+        If a part was not measured.
+    """
+    machine = measured["machine"]
+    head = f"Measured by `make bench` on {machine['cores']} cores ({machine['processor']})"
+    versions = f"Mitsuba {machine['mitsuba']}, version {machine['mitsuba_diffraction']}"
+    table = pages.table(("", "figure", "goal"), tuple(_goals(measured["sections"])))
+    return {"speed": f"{head}, {versions}.\n\n{table}"}
+
+
+def _goals(sections: list[dict[str, Any]]) -> Iterator[tuple[str, str, str]]:
+    for figure in FIGURES:
+        row = _measured(sections, figure.section, figure.row)
+        goal = ""
+        if figure.goal is not None:
+            said = row["goals"][figure.goal]
+            goal = said["goal"] if said["met"] else f"**missed:** {said['goal']}"
+        yield figure.words, figure.pattern.format(row["values"][figure.column]), goal
+
+
+def _measured(sections: list[dict[str, Any]], title: str, name: str) -> dict[str, Any]:
+    for section in sections:
+        if section["title"].startswith(f"{title}:"):
+            for row in section["rows"]:
+                if row["name"].startswith(name):
+                    return dict(row)
+    raise DiffractionError(
+        f"nothing was measured of '{title}: {name}'; run bench in full: without --only or --quick"
+    )
+
+
+_SETTINGS = (
+    "setting", "error", "ΔE2000, mean (99 %)", "`eval` / `roughconductor`", "taps × numbers", "MB",
+    "built in, s",
+)  # fmt: skip
+
+
+def tradeoff(measured: dict[str, Any], name: str = "") -> dict[str, str]:
+    """Errors, times and sizes by setting; sums over the spectrum.
+
+    Parameters
+    ----------
+    measured : the content of `tradeoff.json`.
+    """
+    settings = measured["settings"]
+    machine = measured["machine"]
+    where = f"{measured['patch']}; {machine['cores']} cores ({machine['processor']})"
+    return {
+        "settings": f"{pages.table(_SETTINGS, tuple(_settings(settings)))}\n\n{where}.",
+        "spectral": _spectral(measured["spectral"]),
+    }
+
+
+def _settings(records: Sequence[dict[str, Any]]) -> Iterator[tuple[str, ...]]:
+    for record in records:
+        if record["refused"]:
+            yield record["setting"], f"refused: {record['refused']}", "", "", "", "", ""
+            continue
+        yield (
+            record["setting"],
+            f"{record['error']:.1e}",
+            f"{record['delta_e']:.3f} ({record['delta_e_99']:.2f})",
+            f"{record['relative']:.2f}",
+            f"{record['taps']} × {record['terms']} ({record['precision']})",
+            f"{record['megabytes']:.1f}",
+            f"{record['seconds']:.1f}",
+        )
+
+
+def _spectral(spectral: dict[str, Any]) -> str:
+    steps, counts = spectral["steps"], spectral["counts"]
+    by_step = pages.table(
+        ("step of a sum", *(f"{float(step):g} nm" for step in steps)),
+        [("ΔE2000, mean", *(f"{error:.2f}" for error in steps.values()))],
+    )
+    by_count = pages.table(
+        ("wavelengths of a ray", *counts),
+        [("noise of its luminance", *(f"{noise:.2f}" for noise in counts.values()))],
+    )
+    return f"{by_step}\n\n{by_count}"
+
+
+_PICTURE = "picture, planned against whole, same random numbers"
+
+
+def plan(report: dict[str, Any], name: str = "") -> dict[str, str]:
+    """`planned` in a sentence, `plan` in full.
+
+    Parameters
+    ----------
+    report : what `plan --json` wrote.
+    """
+    table, picture = report["tables"][0], report[_PICTURE]
+    whole, planned = table["whole"], table["planned"]
+    asked, needs = table["asked for"], table["needs"]
+    frequency = asked["frequency (rad/µm)"]["light can probe"]
+    kappa = asked["kappa (rad/µm)"]["the table has"]
+    rows = [
+        ("frequencies, rad/µm", f"up to {frequency:.1f}", _frequencies(needs)),
+        ("κ, rad/µm", f"up to {kappa:.1f}", f"up to {needs['kappa (rad/µm)']:.1f}"),
+        ("series in κ, terms", str(whole["terms"]), str(planned["terms"])),
+        ("table", *(f"{one['memory_mb']:.2g} MB" for one in (whole, planned))),
+        (
+            "densities for sampling",
+            *(f"{one['sampling_memory_mb']:.2g} MB" for one in (whole, planned)),
+        ),
+    ]
+    shift, mean = picture["mean difference / mean (XYZ)"], picture["delta E 2000, mean"]
+    change = (
+        f"and the picture changes by {shift:.0e} of its mean (XYZ; ΔE2000 {mean:.2f}, 99 % "
+        f"{picture['delta E 2000, 99 %']:.2f})"
+    )
+    less = table["times less memory"]
+    return {
+        "planned": f"The snake's table shrinks from {whole['memory_mb']:.1f} to "
+        f"{planned['memory_mb']:.1f} MB, to 1/{less:.1f}, {change}.",
+        "plan": f"{pages.table(('', 'whole table', 'planned'), rows)}\n\n"
+        f"{less:.1f} times less memory, {change}.",
+    }
+
+
+def _frequencies(needs: dict[str, Any]) -> str:
+    for name, value in needs.items():
+        if name.startswith("frequency"):
+            return f"up to {' and '.join(f'{v:.1f}' for v in value)} along x and y"
+    raise KeyError("frequency")
+
+
+_ENERGY = (
+    "table", "material", "albedo", "conserved", "taken at 0, 45, 60, 75°", "kept", "within 1 %",
+    "where above 1", "0.97–1.001", "reciprocal",
+)  # fmt: skip
+
+
+def energy(report: dict[str, Any], name: str) -> dict[str, str]:
+    """A row for each material, from what `info --energy --json` wrote of one table."""
+    rows = [_row(name, material, found) for material, found in report["energy"].items()]
+    return {"energy": pages.table(_ENERGY, rows)}
+
+
+def _row(name: str, material: str, found: dict[str, Any]) -> tuple[str, ...]:
+    above = found.get("conserved where raw is above 1")
+    within = found.get("between 0.97 and 1.001 there")
+    most = found.get("reciprocity lets be kept")
+    taken = ", ".join(f"{100 * max(share, 0.0):.1f}" for share in found["taken at"].values())
+    return (
+        name,
+        material,
+        _range(found["albedo"]),
+        _range(found["albedo, conserved"]),
+        f"{taken} %",
+        _range(found["conserved over raw where that is at most 1"]),
+        f"{100 * found['within 1 % there']:.0f} %",
+        "–" if above is None else _range(above),
+        "–" if within is None else f"{100 * within:.0f} %",
+        "–" if most is None else f"{most:.3f}",
+    )
+
+
+def _range(ends: Sequence[float]) -> str:
+    return f"{ends[0]:.3f}–{ends[1]:.3f}"
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one command measured.
+
+    Attributes
+    ----------
+    tables : Markdown by the name of its markers, from a document and the name of its file.
+    pages : those that have the markers.
+    writer, remedy : the command that writes such documents, and what to do about another file.
+    pictures : that lie beside a document named as the part is, in a folder.
+    """
+
+    tables: Callable[[dict[str, Any], str], dict[str, str]]
+    pages: tuple[str, ...]
+    writer: str
+    remedy: str
+    pictures: tuple[str, ...] = ()
+
+
+PARTS = {
+    "speed": Part(speed, ("docs/benchmarks.md",), "bench --json", "run make bench"),
+    "tradeoff": Part(tradeoff, ("docs/accuracy.md",), "tradeoff", "run make tradeoff",
+                     ("tradeoff.png", "depth.png")),
+    "plan": Part(plan, ("docs/benchmarks.md", "docs/plan.md"), "plan --json", "run make plan"),
+    "energy": Part(energy, ("docs/energy.md",), "info --energy --json", "run make energy"),
+}  # fmt: skip
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Write the tables of one part into its pages, and return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.tables")
+    parser.add_argument("part", choices=tuple(PARTS))
+    parser.add_argument("measured", metavar="FILE", type=Path, nargs="+", help="JSON, or a folder")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", type=Path, nargs="+",
+        help="pages, each with some of the markers; default: those in docs",
+    )  # fmt: skip
+    parser.add_argument("--images", metavar="FOLDER", type=Path, default=Path("docs/images"))
+    args = parser.parse_args(argv)
+    part = PARTS[args.part]
+
+    def work() -> None:
+        found: dict[str, str] = {}
+        for given in args.measured:
+            file = given / f"{args.part}.json" if part.pictures else given
+            made = from_json(
+                file, partial(part.tables, name=file.stem), writer=part.writer, remedy=part.remedy
+            )
+            for name, text in made.items():  # a table goes on with the rows of the next file
+                found[name] = f"{found[name]}\n{_rows_of(text)}" if name in found else text
+        for page in args.output or map(Path, part.pages):
+            pages.update_present(page, found)
+        for name in part.pictures:
+            with atomic_path(args.images / name) as temporary:
+                shutil.copyfile(args.measured[0] / name, temporary)
+
+    return exit_code(args.part, work)
+
+
+def _rows_of(table: str) -> str:
+    """A table without its head."""
+    return table.split("\n", 2)[2]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,402 @@
+"""Surveys: many scans, each with its table, map, statistics, gratings and colours, in one table.
+
+What is new is measured, here or on workers; then the table of all rows and contact sheets are
+written. A TOML file of patterns says how files are read and treated:
+
+    ["snakes/*.png"]
+    pixel_size = 0.0488
+    max_height = 0.375
+    level = "plane"
+
+Patterns are matched with the whole path and with the file's name; of several that match, later ones
+override. Keys are those of recipes.
+"""
+
+from __future__ import annotations
+
+import csv
+import fnmatch
+import io
+import json
+import math
+import os
+import tempfile
+import time
+import tomllib
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..atomic import atomic_path
+from ..cluster.jobs import each
+from ..cluster.tasks import Failed, Lacking, SceneFiles
+from ..errors import DiffractionError, DiffractionWarning, one_line, quoted
+from ..heights.field import HeightField
+from ..heights.load import load_heights
+from ..heights.read import LoadOptions, is_recipe
+from ..heights.recipes import LOAD_KEYS, Recipe
+from ..heights.spectra import dominant_periods
+from ..progress import Progress, silent
+from ..scene.load import error_of
+from ..scene.passes import Stop
+from ..settings import RECIPE_SETTINGS, TableSettings, checked
+from ..tables.build.build import build_with
+from ..tables.store import cached_table, key_of
+from .maps import brdf_map
+from .maps.result import colours_of, iridescence
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Treatment:
+    """How one file is read, and what its table is built with."""
+
+    options: LoadOptions = field(default_factory=LoadOptions)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def updated(self, other: Treatment) -> Treatment:
+        """This one, with what `other` sets in its place."""
+        return Treatment(self.options.updated(other.options), {**self.settings, **other.settings})
+
+
+def treatments_of(
+    path: str | os.PathLike[str] | None,
+) -> Sequence[tuple[str, Treatment]]:
+    """The patterns of a file, in its order; none without one.
+
+    Raises
+    ------
+    DiffractionError
+        If the file cannot be read, or a pattern has an option that does not fit.
+    """
+    if path is None:
+        return []
+    try:
+        content = tomllib.loads(Path(path).read_text("utf-8"))
+    except (OSError, ValueError) as error:
+        raise DiffractionError(f"cannot read '{path}': {one_line(str(error))}") from error
+    return [(pattern, _treatment(f"'{path}': [{pattern!r}]", v)) for pattern, v in content.items()]
+
+
+def treatment_for(file: Path, treatments: Sequence[tuple[str, Treatment]]) -> Treatment:
+    """What the patterns that match a file say of it."""
+    result = Treatment()
+    for pattern, treatment in treatments:
+        if fnmatch.fnmatch(str(file), pattern) or fnmatch.fnmatch(file.name, pattern):
+            result = result.updated(treatment)
+    return result
+
+
+def _treatment(where: str, values: Any) -> Treatment:
+    if not isinstance(values, dict):
+        raise DiffractionError(f"{where}: expected a pattern in brackets with options below it")
+    unknown = set(values) - {*LOAD_KEYS, *RECIPE_SETTINGS}
+    if unknown:
+        raise DiffractionError(
+            f"{where}: unknown key {min(unknown)!r}; known are "
+            f"{', '.join((*LOAD_KEYS, *RECIPE_SETTINGS))}"
+        )
+    try:
+        return Treatment(
+            LoadOptions.of(**{k: v for k, v in values.items() if k in LOAD_KEYS}),
+            {k: checked(k, v) for k, v in values.items() if k in RECIPE_SETTINGS},
+        )
+    except DiffractionError as error:
+        raise DiffractionError(f"{where}: {error}") from error
+
+
+#: Raised whenever rows would differ.
+VERSION = 2
+#: Gratings in a row.
+PERIODS = 3
+
+
+@dataclass(frozen=True)
+class Job:
+    """A scan to measure.
+
+    Attributes
+    ----------
+    files : the scan, or a recipe with its sources.
+    treatment : how it is read.
+    theta : of the light, degrees; its azimuth is across the grooves of the strongest grating.
+    resolution : pixels of the map a side.
+    variant, threads : of Mitsuba and Dr.Jit.
+    """
+
+    files: SceneFiles
+    treatment: Treatment
+    theta: float
+    resolution: int
+    variant: str
+    threads: int
+
+    @property
+    def key(self) -> str:
+        """Changes when the row may."""
+        treatment = [self.treatment.options.given(), dict(self.treatment.settings)]
+        own = (VERSION, self.theta, self.resolution, self.variant.partition("_")[2])
+        return key_of("survey", self.files.digest, treatment, *own)[:32]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a scan gave: a row of plain numbers and texts, and files by suffix."""
+
+    row: dict[str, Any]
+    files: dict[str, bytes]
+
+
+def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured | Lacking:
+    """Measure one scan in this process; what is wrong with it is its row's `reason`."""
+    job.files.keep(contents or {})
+    lacking = job.files.missing()
+    if lacking:
+        return Lacking(tuple(lacking))
+    start = time.perf_counter()
+    row: dict[str, Any] = {"reason": ""}
+    files: dict[str, bytes] = {}
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DiffractionWarning)  # they are the table's, in the row
+            files = _measured(job, row)
+    except DiffractionError as error:
+        row["reason"] = str(error)
+    except Exception as error:  # one scan must not end a survey of a thousand
+        row["reason"] = f"unexpected {type(error).__name__}: {one_line(str(error))}"
+    row["seconds"] = round(time.perf_counter() - start, 2)
+    return Measured(row, files)
+
+
+def _measured(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
+    import drjit as dr
+    import mitsuba as mi
+
+    from ..scene.load import set_variant
+
+    set_variant(job.variant)
+    if job.variant.startswith("llvm") and job.threads and dr.thread_count() != job.threads:
+        dr.set_thread_count(job.threads)
+    path, _ = job.files.here()
+    fields, settings = _heights(path, job.treatment)
+    for name in ("range", "rms_height", "rms_slope"):
+        row[f"{name}_um" if name != "rms_slope" else name] = getattr(fields[0], name)
+    (ny, nx), (width, height) = fields[0].shape, fields[0].extent
+    row |= {"patches": len(fields), "pixels_x": nx, "pixels_y": ny}
+    row |= {"width_um": width, "height_um": height}
+    gratings = dominant_periods(fields[0], PERIODS)
+    for n, one in enumerate(gratings, 1):
+        row |= {f"period_{n}_um": one.period, f"direction_{n}_deg": one.direction}
+        row[f"share_{n}"] = one.share
+    digest = key_of("survey", *(field.digest() for field in fields))
+    table = cached_table(digest, settings, lambda: build_with(fields, settings))
+    row |= {"orders_x": table.coefficients.shape[2], "orders_y": table.coefficients.shape[1]}
+    row |= {"table_mb": table.nbytes / 1e6, "table_error": table.largest_error}
+    if "windows" in table.source:
+        row["windows"] = table.source["windows"]["number"]
+        row["standard_error"] = table.source["windows"]["standard_error"]["colours"]
+    row["warnings"] = "; ".join(table.source.get("warnings", ()))
+    phi = gratings[0].direction if gratings else 0.0
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "table.exr"
+        table.save(file)
+        # ideal reflection: what the structure does, whatever it is made of
+        try:
+            bsdf = mi.load_dict({"type": "diffraction", "table": str(file), "material": "none"})
+        except RuntimeError as error:
+            raise error_of("cannot map it", error) from error
+        made = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
+        content = file.read_bytes()
+    row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
+    row["iridescence"] = iridescence(made)
+    row |= {f"share_{name}": share for name, share in colours_of(made).items()}
+    row["diffracted"] = _beside_mirror(made)
+    return {".exr": content, ".png": _png(made)}
+
+
+def _heights(path: Path, treatment: Treatment) -> tuple[list[HeightField], TableSettings]:
+    """The patches of a scan or a recipe, and its table's settings."""
+    if is_recipe(path):
+        recipe = Recipe.load(path)
+        settings = {**recipe.table, **treatment.settings}
+        return recipe.fields(treatment.options), TableSettings(**settings)
+    return [load_heights(path, treatment.options)], TableSettings(**treatment.settings)
+
+
+def _beside_mirror(made: Any) -> float:
+    """Share of the luminous power that leaves the mirror's lobe."""
+    luminance = made.luminance
+    return float(luminance[made.away_from_mirror()].sum() / max(luminance.sum(), 1e-30))
+
+
+def _png(made: Any) -> bytes:
+    """The map as a picture, the largest y first."""
+    from PIL import Image
+
+    stream = io.BytesIO()
+    shown = np.round(255.0 * made.srgb(made.exposure())[::-1]).astype(np.uint8)
+    Image.fromarray(shown, "RGBA").save(stream, "PNG")
+    return stream.getvalue()
+
+
+#: Names of the files in a survey's folder.
+TABLE, SHEET, SCANS = "survey.csv", "sheet", "scans"
+_COLUMNS, _ROWS = 6, 8  # of a contact sheet
+
+
+def run_survey(
+    files: Sequence[Path],
+    folder: Path,
+    *,
+    treatments: Sequence[tuple[str, Treatment]] = (),
+    own: Treatment | None = None,
+    variant: str = "llvm_ad_rgb",
+    theta: float = 30.0,
+    resolution: int = 160,
+    threads: int = 0,
+    client: Any = None,
+    stop: Stop | None = None,
+    progress: Progress = silent,
+) -> list[dict[str, Any]]:
+    """Measure every scan that is not in the folder yet, and write what is known of all.
+
+    The folder holds `survey.csv`, a row for each scan; contact sheets of their maps; and in `scans`
+    a table (.exr), a map (.png) and a row (.json) of each, found again by the content of the scan
+    and how it is treated.
+
+    Parameters
+    ----------
+    files : scans of any format, or recipes.
+    folder : is made if it is missing.
+    treatments, own : by patterns (`treatments_of`), and for all, which takes precedence.
+    variant : of Mitsuba, in RGB or spectral.
+    theta : of the light, degrees from the normal, across the grooves of the strongest grating.
+    resolution : pixels of a map a side.
+    threads : of Dr.Jit, in workers; 0 for one a core.
+    client : `distributed.Client`, or None to do all in this process.
+    stop, progress : as in `scene.passes.render_passes`; progress counts scans.
+
+    Returns
+    -------
+    The rows, in the order of the files; those that failed have a `reason`. A run that was stopped
+    has rows for what is done.
+
+    Raises
+    ------
+    DiffractionError
+        If there are no files, or the folder cannot be written.
+    """
+    if not files:
+        raise DiffractionError("there is no scan to survey; name files")
+    scans = folder / SCANS
+    scans.mkdir(parents=True, exist_ok=True)
+    rows: dict[int, dict[str, Any]] = {}
+    jobs: dict[int, Job] = {}
+    for n, file in enumerate(files):
+        try:
+            job = Job(_files_of(file), treatment_for(file, treatments).updated(own or Treatment()),
+                      theta, resolution, variant, threads)  # fmt: skip
+        except DiffractionError as error:
+            rows[n] = {"reason": str(error)}
+            continue
+        known = _known(scans, job)
+        if known is None:
+            jobs[n] = job
+        else:
+            rows[n] = known
+    todo = list(jobs)
+    progress(0, len(todo), "scans")
+    found = each(client, measure, [jobs[n] for n in todo], stop or Stop())
+    for done, (which, result) in enumerate(found, 1):
+        n = todo[which]
+        if isinstance(result, Failed):
+            rows[n] = {"reason": f"{result.text} {result.worker}".strip()}
+        else:
+            rows[n] = _keep(scans, files[n], jobs[n], result)
+        progress(done, len(todo), "scans")
+    named = [{"file": str(files[n]), **rows[n]} for n in sorted(rows)]
+    _write_table(folder / TABLE, named)
+    _write_sheets(folder, named)
+    return named
+
+
+def _files_of(file: Path) -> SceneFiles:
+    if not file.is_file():
+        raise DiffractionError(f"{quoted(str(file))} does not exist, or is no file; check the path")
+    found = SceneFiles.of(file, {})
+    if is_recipe(file):
+        Recipe.load(file)
+    return found
+
+
+def _known(scans: Path, job: Job) -> dict[str, Any] | None:
+    """The row that an earlier run has kept, with its files."""
+    try:
+        (path,) = scans.glob(f"*-{job.key}.json")
+        row: dict[str, Any] = json.loads(path.read_text("utf-8"))
+    except ValueError:  # none, or damaged
+        return None
+    there = row["reason"] or all(path.with_suffix(s).is_file() for s in (".exr", ".png"))
+    return row if there else None
+
+
+def _keep(scans: Path, file: Path, job: Job, result: Measured) -> dict[str, Any]:
+    """Write a scan's files, the row last; what nobody expected to fail is tried again next time."""
+    stem = f"{file.stem[:60]}-{job.key}"
+    row = dict(result.row)
+    for suffix, content in result.files.items():
+        with atomic_path(scans / f"{stem}{suffix}") as temporary:
+            temporary.write_bytes(content)
+        row[{".exr": "table", ".png": "map"}[suffix]] = f"{SCANS}/{stem}{suffix}"
+    if not row["reason"].startswith("unexpected"):
+        with atomic_path(scans / f"{stem}.json") as temporary:
+            temporary.write_text(json.dumps(row), "utf-8")
+    return row
+
+
+def _write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
+    names = ["file", "reason", *(n for n in columns if n not in ("file", "reason"))]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, names, restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    with atomic_path(path) as temporary:
+        temporary.write_text(text.getvalue(), "utf-8")
+
+
+def _write_sheets(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Pages of maps, with what makes them and how iridescent they are."""
+    each_page = _COLUMNS * _ROWS
+    shown = [row for row in rows if not row["reason"]]
+    for page in range(math.ceil(len(shown) / each_page)):
+        mine = shown[page * each_page : (page + 1) * each_page]
+        name = SHEET if len(shown) <= each_page else f"{SHEET}-{page + 1:03d}"
+        with atomic_path(folder / f"{name}.png") as temporary:
+            _sheet(folder, mine).savefig(temporary, format="png")
+
+
+def _sheet(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Figure:
+    from matplotlib.figure import Figure
+    from PIL import Image
+
+    lines = math.ceil(len(rows) / _COLUMNS)
+    figure = Figure(figsize=(2.2 * _COLUMNS, 2.7 * lines), dpi=100, layout="constrained")
+    for axes, row in zip(figure.subplots(lines, _COLUMNS, squeeze=False).flat, rows, strict=False):
+        with Image.open(folder / row["map"]) as picture:
+            axes.imshow(picture)
+        period = row.get("period_1_um")
+        title = "" if period is None else f"{period:.3g} µm at {row['direction_1_deg']:.0f}°, "
+        axes.set_title(
+            f"{Path(row['file']).name[:34]}\n{title}iridescence {row['iridescence']:.2g}",
+            fontsize=6,
+        )
+    for axes in figure.axes:
+        axes.set_axis_off()
+    return figure

@@ -1,0 +1,209 @@
+"""Independent jobs, here or on workers, as they are done or in their order: scans, windows."""
+
+from __future__ import annotations
+
+import pickle
+import time
+import warnings
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+from ..errors import DiffractionError
+from ..heights.field import HeightField
+from ..progress import Progress
+from ..scene.passes import Stop
+from ..settings import TableSettings
+from ..tables.build.build import build_with
+from ..tables.table import DiffractionTable
+from .tasks import Failed, Lacking, SceneFiles, check_versions, failure, versions
+from .workers import check_workers, outcome, wait_for_scheduler, workers_of
+
+
+def build(
+    heights: HeightField | Sequence[HeightField],
+    *,
+    client: Any,
+    progress: Progress | None = None,
+    **settings: Any,
+) -> DiffractionTable:
+    """Build the table of a wide scan on the workers of a Dask cluster.
+
+    Workers are sent some windows at a time, and send sums of their powers back, which the client
+    adds up in the order of the windows: the table is, to the last bit, that of
+    `DiffractionTable.build` on such a processor, with any number of workers.
+
+    Parameters
+    ----------
+    heights : one scan or several.
+    client : `distributed.Client`; workers have one Dask thread each (`cluster.connect`).
+    progress : called as progress(done, total, text).
+    settings : of `DiffractionTable.build`, `windows` among them. A scan that is no wider than a
+        window is built here.
+
+    Raises
+    ------
+    DiffractionError
+        If there are no `windows`, a worker is of no use, or the table cannot be built.
+    """
+    return build_on_workers(heights, TableSettings(**settings), client, progress)[0]
+
+
+def build_on_workers(
+    heights: HeightField | Sequence[HeightField],
+    settings: TableSettings,
+    client: Any,
+    progress: Progress | None = None,
+) -> tuple[DiffractionTable, OrderedMap]:
+    """`build`, with what it cost."""
+    if settings.windows is None:
+        raise DiffractionError(
+            "workers build tables of windows: set windows=auto (--windows auto), or do without "
+            "workers"
+        )
+    check_workers(client, None)
+    run = OrderedMap(client)
+    return build_with(heights, settings, progress, run), run
+
+
+_POLL = 0.02  # seconds
+#: Arguments that are with the scheduler for every worker: one is worked at, the other is there.
+_AHEAD = 2
+
+
+class HasFiles(Protocol):
+    """A job that needs files."""
+
+    @property
+    def files(self) -> SceneFiles:
+        """These, by content."""
+
+
+def each(
+    client: Any, work: Callable[..., Any], jobs: Sequence[HasFiles], stop: Stop
+) -> Iterator[tuple[int, Any]]:
+    """Do `work(job, contents)` for each, and give its number with what came of it.
+
+    Parameters
+    ----------
+    client : `distributed.Client`, or None to do all here.
+    work : gives `Lacking` for files that it needs by content.
+    jobs : any.
+    stop : asked, it ends what has not begun.
+
+    Returns
+    -------
+    Numbers and results; `Failed` where a worker died of a job, again and again.
+
+    Raises
+    ------
+    DiffractionError
+        If the scheduler is gone, and does not come back.
+    """
+    if client is None:
+        for n, job in enumerate(jobs):
+            if stop.asked:
+                return
+            yield n, work(job)
+        return
+    waiting = {client.submit(work, job, pure=False): n for n, job in enumerate(jobs)}
+    try:
+        while waiting and not stop.asked:
+            for future in [future for future in waiting if future.done()]:
+                n, found = waiting.pop(future), outcome(future)
+                if found is None:
+                    wait_for_scheduler(client, stop)
+                    waiting[client.submit(work, jobs[n], pure=False)] = n
+                elif isinstance(found, Lacking):
+                    again = client.submit(work, jobs[n], _contents(jobs[n], found), pure=False)
+                    waiting[again] = n
+                else:
+                    yield n, found
+            time.sleep(_POLL)
+    finally:
+        for future in waiting:
+            future.cancel()
+
+
+def _contents(job: HasFiles, lacking: Lacking) -> Mapping[str, bytes]:
+    wanted = set(lacking.digests)
+    return {d: Path(path).read_bytes() for path, d in job.files.files if d in wanted}
+
+
+class OrderedMap:
+    """`map` on workers: results in the order of the arguments, of which few are under way at once.
+
+    Attributes
+    ----------
+    tasks, retries : that were done, and given out again when the scheduler was lost.
+    bytes : that went to workers.
+    busy : seconds of all workers' work.
+    """
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        self.tasks = self.retries = self.bytes = 0
+        self.busy = 0.0
+
+    def summary(self) -> dict[str, Any]:
+        """What it cost, as plain data."""
+        names = "tasks", "retries", "bytes", "busy"
+        return {name: getattr(self, name) for name in names}
+
+    def __call__(self, work: Callable[[Any], Any], arguments: Iterable[Any]) -> Iterator[Any]:
+        """Results of `work` for each of the arguments.
+
+        Raises
+        ------
+        DiffractionError
+            Naming the worker, if one fails; or if the scheduler is gone.
+        """
+        waiting: deque[tuple[Any, Any]] = deque()
+        left = iter(arguments)
+        try:
+            while True:
+                while len(waiting) < _AHEAD * max(1, len(workers_of(self._client))):
+                    try:
+                        call = work, next(left)
+                    except StopIteration:
+                        break
+                    waiting.append((call, self._submitted(call)))
+                if not waiting:
+                    return
+                yield self._result(waiting)
+        finally:
+            for _, future in waiting:
+                future.cancel()
+
+    def _result(self, waiting: deque[tuple[Any, Any]]) -> Any:
+        while (found := outcome(waiting[0][1])) is None:
+            wait_for_scheduler(self._client)
+            self.retries += len(waiting)
+            for n, (call, _) in enumerate(waiting):
+                waiting[n] = call, self._submitted(call)
+        if isinstance(found, Failed):
+            raise DiffractionError(f"worker {found.worker}: {found.text}")
+        waiting.popleft()
+        result, seconds = found
+        self.tasks += 1
+        self.busy += seconds
+        return result
+
+    def _submitted(self, call: tuple[Any, Any]) -> Any:
+        content = pickle.dumps((versions(), *call), protocol=5)
+        self.bytes += len(content)
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Sending large graph")  # it is sent once
+            return self._client.submit(_done, content, pure=False)
+
+
+def _done(content: bytes) -> tuple[Any, float] | Failed:
+    """A call's result and its seconds."""
+    start = time.perf_counter()
+    try:
+        wanted, work, argument = pickle.loads(content)
+        check_versions(wanted)  # of a worker that has come late
+        return work(argument), time.perf_counter() - start
+    except Exception as error:
+        return failure(error)

@@ -1,0 +1,409 @@
+"""Treatments of heights before a table is made of them: crop, fill, level, clip, make periodic.
+
+Each but filling takes a `HeightField` and gives a new one, with a line in its `history` that says
+what changed.
+
+References
+----------
+L. Moisan, Periodic plus smooth image decomposition, Journal of Mathematical Imaging and Vision 39,
+161-179 (2011).
+F. J. Harris, On the use of windows for harmonic analysis with the discrete Fourier transform,
+Proceedings of the IEEE 66, 51-83 (1978): the Tukey (cosine-tapered) window.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage, sparse
+from scipy.sparse import linalg
+
+from ..errors import DiffractionError
+from .field import LARGE, ROWS, FloatArray, HeightField
+
+Size = tuple[float, float]
+
+FILLS = ("nearest", "harmonic")
+
+# Above this share the filling, not the sample, would decide the picture.
+LARGEST_SHARE = 0.5
+# Makes the median absolute deviation of normally distributed heights their standard deviation:
+# 1/Φ⁻¹(3/4) (Hampel, Journal of the American Statistical Association 69, 1974).
+_MAD_TO_SIGMA = 1.4826
+#: An edge of the surface's own, as gratings have, is found inside the patch, too.
+OWN_STEP = 2.0
+# Width of the taper on each side, as a share of the patch: Tukey's α is twice this.
+TAPER_SHARE = 0.1
+
+
+def middle(shape: tuple[int, int], pixel_size: Size, size: Size, name: str) -> tuple[slice, slice]:
+    """Rows and columns of the middle of a patch.
+
+    Parameters
+    ----------
+    shape : (ny, nx).
+    pixel_size : (dx, dy), µm.
+    size : (width, height) that is wanted, µm, met to half a pixel.
+    name : what to call the patch in errors.
+
+    Raises
+    ------
+    DiffractionError
+        If that is more than there is, or less than two pixels.
+    """
+    slices = []
+    for count, pixel, length in zip(shape, pixel_size[::-1], size[::-1], strict=True):
+        kept = round(length / pixel)
+        if not 2 <= kept <= count:
+            (ny, nx), (dx, dy) = shape, pixel_size
+            raise DiffractionError(
+                f"{name}: crop to {size[0]:g} x {size[1]:g} µm is "
+                f"{'larger than the patch' if kept > count else 'less than two pixels'}: it is "
+                f"{nx * dx:.4g} x {ny * dy:.4g} µm with pixels of {dx:.4g} x {dy:.4g} µm"
+            )
+        start = (count - kept) // 2
+        slices.append(slice(start, start + kept))
+    return slices[0], slices[1]
+
+
+def crop_line(before: tuple[int, int], after: tuple[int, int], pixel_size: Size) -> str:
+    """What to say of a crop between shapes (ny, nx)."""
+    (dx, dy), (ny, nx) = pixel_size, after
+    return (
+        f"cropped to the middle {nx * dx:.4g} x {ny * dy:.4g} µm of "
+        f"{before[1] * dx:.4g} x {before[0] * dy:.4g} µm ({nx} x {ny} of "
+        f"{before[1]} x {before[0]} pixels)"
+    )
+
+
+def crop(field: HeightField, size: Size) -> HeightField:
+    """The central region of `size` = (width, height) in µm; its edges need not meet any more.
+
+    Raises
+    ------
+    DiffractionError
+        If that is more than there is, or less than two pixels.
+    """
+    rows, columns = middle(field.shape, field.pixel_size, size, field.name)
+    heights = field.heights[rows, columns]
+    if heights.shape == field.shape:
+        return field
+    line = crop_line(field.shape, (heights.shape[0], heights.shape[1]), field.pixel_size)
+    return field.changed(heights, line, cut_out=True)
+
+
+def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[FloatArray, str]:
+    """Replace NaN by heights made from the points around.
+
+    Parameters
+    ----------
+    heights
+        Shape (ny, nx); points without data are NaN.
+    method
+        "nearest": the height of a nearest measured point. "harmonic": the membrane spanned over
+        each gap, ∇²h = 0 with the measured border and free edges of the patch. `None` refuses.
+    name
+        What to call the patch in errors.
+
+    Returns
+    -------
+    FloatArray, str
+        The filled heights, and a line that says how many points were filled; "" if none were.
+
+    Raises
+    ------
+    DiffractionError
+        If points are missing and `method` is `None`, or more than half of them are.
+    """
+    missing = np.isnan(heights)
+    count = int(np.count_nonzero(missing))
+    if count == 0 or np.isinf(heights).any():  # which HeightField refuses, and no gap continues
+        return heights, ""
+    share = f"{count} of {heights.size} points ({count / heights.size:.2g} of all)"
+    if count == heights.size:
+        raise DiffractionError(f"{name}: no height is a finite number; the patch is empty")
+    if method is None:
+        raise DiffractionError(
+            f"{name}: {share} have no height (NaN or masked); choose how to fill them with fill, "
+            f"one of {', '.join(FILLS)}, or keep the middle without them with crop"
+        )
+    if count > LARGEST_SHARE * heights.size:
+        raise DiffractionError(f"{name}: {share} have no height, too many to fill; crop the patch")
+    filled = _nearest(heights, missing)
+    if method == "harmonic":
+        filled = _harmonic(filled, missing)
+    return filled, f"{share} had no height and were filled, method {method}"
+
+
+def _nearest(heights: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
+    """Height of the nearest measured point, by the exact Euclidean distance transform."""
+    rows, columns = ndimage.distance_transform_edt(
+        missing, return_distances=False, return_indices=True
+    )
+    filled: FloatArray = heights[rows, columns]
+    return filled
+
+
+def _harmonic(start: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
+    """Solve Laplace's equation on the missing points by conjugate gradients, from `start`.
+
+    The five-point Laplacian with free edges is symmetric and, with a measured point anywhere,
+    positive definite; iterations grow with the width of the gaps, not with their number.
+    """
+    rows, columns = np.nonzero(missing)
+    ny, nx = missing.shape
+    count = rows.size
+    index = np.full(missing.shape, -1)
+    index[missing] = np.arange(count)
+    degree, measured = np.zeros(count), np.zeros(count)
+    links = []  # pairs of neighbouring missing points
+    for down, right in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+        r, c = rows + down, columns + right
+        inside = np.nonzero((r >= 0) & (r < ny) & (c >= 0) & (c < nx))[0]
+        degree[inside] += 1
+        r, c = r[inside], c[inside]
+        known = ~missing[r, c]
+        measured[inside[known]] += start[r[known], c[known]]
+        links.append((inside[~known], index[r[~known], c[~known]]))
+    at, neighbour = (np.concatenate(ends) for ends in zip(*links, strict=True))
+    adjacency = sparse.coo_array((np.ones(at.size), (at, neighbour)), shape=(count, count))
+    laplacian = (sparse.diags_array(degree) - adjacency).tocsr()
+    if not np.any(laplacian @ start[missing] - measured):
+        return start  # solved, which conjugate gradients divide by
+    # Heights come as float32 at best, 1e-7 of their size; solving far below that gains nothing.
+    solution, failed = linalg.cg(
+        laplacian, measured, x0=start[missing], rtol=1e-9, maxiter=10 * (ny + nx)
+    )
+    if failed:
+        raise DiffractionError("fill: the gaps are too wide for 'harmonic'; use 'nearest'")
+    filled = start.copy()
+    filled[missing] = solution
+    return filled
+
+
+def plane_of(field: HeightField) -> tuple[float, float]:
+    """Slopes (∂h/∂x, ∂h/∂y) of the plane that fits the heights best, by least squares.
+
+    On a full grid the centred coordinates are orthogonal, so each slope is a plain projection.
+    """
+    x, y = _centred(field)
+    slope_x = float(field.heights.mean(axis=0) @ x / (x @ x))
+    slope_y = float(field.heights.mean(axis=1) @ y / (y @ y))
+    return slope_x, slope_y
+
+
+def plane_rise(field: HeightField) -> float:
+    """How much the best plane rises across the patch, µm."""
+    slope_x, slope_y = plane_of(field)
+    return math.hypot(slope_x * field.extent[0], slope_y * field.extent[1])
+
+
+def level_plane(field: HeightField) -> HeightField:
+    """Subtract the least-squares plane; the mean height stays."""
+    heights, tilt_x, tilt_y = _without_plane(field)
+    what = f"plane removed: it rose {tilt_x:.3g} µm along x and {tilt_y:.3g} µm along y"
+    return field.changed(heights, what + rms_change(field, heights))
+
+
+def level_lines(field: HeightField) -> HeightField:
+    """Subtract each row's median (scan lines run along x), then the plane that is left.
+
+    What is alike along a whole row is lost with the offsets: ridges parallel to x, above all.
+    """
+    medians = np.median(field.heights, axis=1)
+    aligned = HeightField(
+        field.heights - (medians - medians.mean())[:, None], field.pixel_size, name=field.name
+    )
+    heights, tilt_x, tilt_y = _without_plane(aligned)
+    what = (
+        f"scan lines aligned by their medians, which scattered by {medians.std():.3g} µm RMS, and "
+        f"the plane removed, which rose {tilt_x:.3g} µm along x and {tilt_y:.3g} µm along y"
+    )
+    return field.changed(heights, what + rms_change(field, heights))
+
+
+def clip_outliers(field: HeightField, sigmas: float) -> HeightField:
+    """Cut off heights further than `sigmas` robust standard deviations from the median.
+
+    The deviation is 1.4826 times the median absolute deviation, which dust does not move.
+
+    Raises
+    ------
+    DiffractionError
+        If `sigmas` is not at least 1, or more than half of the heights are equal, so that there is
+        no deviation to measure outliers by.
+    """
+    if not 1 <= sigmas < math.inf:
+        raise DiffractionError(
+            f"clip: expected how many standard deviations to keep, at least 1, got {sigmas!r}"
+        )
+    middle = float(np.median(field.heights))
+    sigma = _MAD_TO_SIGMA * float(np.median(np.abs(field.heights - middle)))
+    if sigma == 0 and field.range > 0:
+        raise DiffractionError(
+            f"{field.name}: clip cannot tell outliers, as more than half of the heights are equal; "
+            "leave clip out"
+        )
+    heights = np.clip(field.heights, middle - sigmas * sigma, middle + sigmas * sigma)
+    moved = np.abs(heights - field.heights)
+    points = np.count_nonzero(moved)
+    limit = f"{sigmas:g} robust standard deviations of {sigma:.3g} µm"
+    what = (
+        f"{points} of {heights.size} points clipped to {limit}, "
+        f"the furthest by {moved.max():.3g} µm"
+        if points
+        else f"nothing to clip: all points are within {limit}"
+    )
+    return field.changed(heights, what + rms_change(field, heights))
+
+
+def rms_change(field: HeightField, heights: FloatArray) -> str:
+    """The end of a history line: RMS change of height, not counting an offset."""
+    if heights.size <= LARGE:
+        change = float((heights - field.heights).std())
+    else:  # in parts, without a copy
+        starts = range(0, len(heights), ROWS)
+        rows = [slice(start, start + ROWS) for start in starts]
+        mean = float(heights.mean()) - float(field.heights.mean())
+        squares = sum(float(np.square(heights[r] - field.heights[r] - mean).sum()) for r in rows)
+        change = math.sqrt(squares / heights.size)
+    return f"; RMS change {change:.3g} µm"
+
+
+def _without_plane(field: HeightField) -> tuple[FloatArray, float, float]:
+    """Heights without the best plane, and its rise across the patch along x and y in µm."""
+    (x, y), (slope_x, slope_y) = _centred(field), plane_of(field)
+    heights = field.heights - slope_x * x
+    heights -= (slope_y * y)[:, None]
+    heights.setflags(write=False)  # so that a HeightField need not copy it
+    return heights, slope_x * field.extent[0], slope_y * field.extent[1]
+
+
+def _centred(field: HeightField) -> tuple[FloatArray, ...]:
+    """Coordinates (nx,) and (ny,) in µm, 0 in the middle."""
+    return tuple(
+        (np.arange(count, dtype=np.float64) - (count - 1) / 2) * pixel
+        for count, pixel in zip(field.shape[::-1], field.pixel_size, strict=True)
+    )
+
+
+def periodic_smooth(field: HeightField) -> HeightField:
+    """Keep the periodic component of the heights and drop the smooth one (Moisan 2011).
+
+    The smooth component s explains the steps at the seams and is as smooth as can be inside: its
+    periodic Laplacian is v, the steps placed on the border pixels (Moisan's equation 11), so
+    ŝ = v̂ / (Laplacian's eigenvalues), with mean 0. Differences along x and y are weighted by
+    1/dx² and 1/dy², so that pixels need not be square.
+    """
+    h = field.heights
+    ny, nx = field.shape
+    dx, dy = field.pixel_size
+    wx, wy = dy / dx, dx / dy  # only their ratio matters
+    v = np.zeros_like(h)
+    step_y = wy * (h[-1] - h[0])
+    v[0] += step_y
+    v[-1] -= step_y
+    step_x = wx * (h[:, -1] - h[:, 0])
+    v[:, 0] += step_x
+    v[:, -1] -= step_x
+    along_y = 2 * np.cos(2 * np.pi * np.fft.fftfreq(ny)) - 2
+    along_x = 2 * np.cos(2 * np.pi * np.fft.rfftfreq(nx)) - 2
+    eigenvalues = wy * along_y[:, None] + wx * along_x
+    eigenvalues[0, 0] = 1  # the mean, which v does not have
+    spectrum = np.fft.rfft2(v) / eigenvalues
+    spectrum[0, 0] = 0
+    smooth = np.fft.irfft2(spectrum, s=(ny, nx))
+    return _reported(field, h - smooth, "made periodic by dropping its smooth component")
+
+
+def periodic_taper(field: HeightField) -> HeightField:
+    """Let the heights fade to their mean along the borders with a Tukey window.
+
+    A tenth of the patch on each side is faded; it turns flat there and so reflects more like a
+    mirror.
+    """
+    from scipy.signal.windows import tukey  # half of what importing the package would take
+
+    mean = field.heights.mean()
+    # every other sample of a window of 2n + 1: taken at the pixels' centres, near 0 at both ends
+    rows, columns = (tukey(2 * n + 1, 2 * TAPER_SHARE)[1::2] for n in field.shape)
+    window = rows[:, None] * columns
+    heights = mean + (field.heights - mean) * window
+    return _reported(
+        field, heights, f"tapered to its mean height over {TAPER_SHARE:.0%} along each border"
+    )
+
+
+def seam_step(field: HeightField) -> float:
+    """RMS step of height across the seams, µm: last row to first row, last column to first."""
+    h = field.heights
+    steps = np.concatenate([h[0] - h[-1], h[:, 0] - h[:, -1]])
+    return float(np.sqrt(np.mean(steps**2)))
+
+
+def _reported(field: HeightField, heights: FloatArray, what: str) -> HeightField:
+    after = HeightField(heights, field.pixel_size)
+    line = (
+        f"{what}: RMS step at the seams {seam_step(field):.3g} -> {seam_step(after):.3g} µm, "
+        f"{seam_share(field):.2g} -> {seam_share(after):.2g} of the mean-square slope"
+    )
+    return field.changed(after.heights, line + rms_change(field, heights))
+
+
+@dataclass(frozen=True)
+class Seam:
+    """Steps along one axis, µm: RMS over the seam, and the largest RMS over a line inside.
+
+    `rise` is the mean of last minus first; `slope` and `inside` are sums of squared slopes over
+    the seam and between neighbours.
+    """
+
+    step: float
+    largest: float
+    rise: float
+    slope: float
+    inside: float
+
+    @property
+    def foreign(self) -> bool:
+        """Whether the surface has no such step inside."""
+        return self.step > OWN_STEP * self.largest
+
+
+def seam_share(field: HeightField) -> float:
+    """Share of the mean-square slope, seams included, that the steps at the seams are.
+
+    A patch that fits itself has about (1/nx + 1/ny)/2, a flat one 0.
+    """
+    seams = seams_of(field)
+    slope, inside = (sum(getattr(s, name) for s in seams) for name in ("slope", "inside"))
+    return float(slope / (slope + inside)) if slope > 0 else 0.0
+
+
+def seams_of(field: HeightField) -> tuple[Seam, Seam]:
+    """The seams across which x goes on, and y."""
+    dx, dy = field.pixel_size
+    return seam_along(field.heights.T, dx), seam_along(field.heights, dy)
+
+
+def seam_along(h: FloatArray, pixel: float) -> Seam:
+    """The seam between the last and the first row."""
+    rows = len(h) if h.size <= LARGE else ROWS
+    within = np.concatenate(
+        [
+            np.mean(np.diff(h[start : start + rows + 1], axis=0) ** 2, axis=1)
+            for start in range(0, len(h) - 1, rows)
+        ]
+    )
+    across = float(np.mean((h[-1] - h[0]) ** 2))
+    lines = h.shape[1] / pixel**2
+    return Seam(
+        step=math.sqrt(across),
+        largest=math.sqrt(float(within.max())),
+        rise=float(np.mean(h[-1] - h[0])),
+        slope=across * lines,
+        inside=float(within.sum()) * lines,
+    )

@@ -1,0 +1,231 @@
+"""An LLVM that Dr.Jit survives, chosen before Dr.Jit loads one.
+
+Dr.Jit 1.5 loads LLVM while `drjit` is imported, and keeps it: the file that DRJIT_LIBLLVM_PATH
+names, else the loader's `libLLVM.so`, else the highest-numbered libLLVM*.so.* of the system's
+library folder. It refuses version 14 and older itself; 15 and 16 load, and end the whole process
+at the first kernel with a minimum or maximum ("Cannot select ... fminimum"). So the choice is made
+here, on import of the package (`select_llvm`), and later use checks what was loaded
+(`require_llvm`, `require_loaded_llvm`).
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import DiffractionError
+
+#: Environment variable through which Dr.Jit is told what to load.
+VARIABLE = "DRJIT_LIBLLVM_PATH"
+
+#: The first whose x86 backend compiles Dr.Jit's minimum and maximum (tried: not 14, 15 or 16).
+OLDEST = 17
+#: What the tests run on, and so the first choice; they run kernels on every other that there is.
+TESTED = 19
+
+# libLLVM-19.so.1, libLLVM.so.19.1, libLLVM-14.0.6.so.1, libLLVM.dylib; not libLLVM-C.dylib,
+# libLLVMPolly.so or the private libLLVM.so.19.1-rust-1.86.0
+_FILE = re.compile(r"libLLVM(-\d+(\.\d+)*)?(\.so(\.\d+)*|(\.\d+)*\.dylib)|LLVM-C\.dll", re.I)
+_VERSION_IN_NAME = re.compile(r"libLLVM(?:-|\.so\.|\.)(\d\d)(?!\d)", re.I)
+# /usr/lib/llvm-19/lib, /opt/homebrew/Cellar/llvm@19/19.1.7/lib, /usr/lib64/llvm19/lib
+_VERSION_IN_FOLDER = re.compile(r"/llvm(?:@\d+/|[-@/])?(\d\d)[./]", re.I)
+
+
+@dataclass(frozen=True)
+class Library:
+    """A shared library of LLVM; `version` is its major version, None if its path does not tell."""
+
+    path: Path
+    version: int | None
+
+    @classmethod
+    def at(cls, path: str | os.PathLike[str]) -> Library:
+        """The library at `path`, links followed, since only the real file's name is telling."""
+        real = Path(path).resolve()
+        found = _VERSION_IN_NAME.match(real.name) or _VERSION_IN_FOLDER.search(real.as_posix())
+        return cls(real, int(found[1]) if found else None)
+
+    def __str__(self) -> str:
+        return f"{self.version or 'unknown version'} ({self.path})"
+
+
+def find_llvm() -> list[Library]:
+    """All of them, the one to prefer first: 19, then the newest, then those of no known version."""
+    named = named_library()
+    files = [*([named.path] if named else []), *in_folders()]
+    return sorted({Library.at(file) for file in files if file.is_file()}, key=_preference)
+
+
+def named_library() -> Library | None:
+    """What the environment variable names; a bare file name is the loader's to find."""
+    value = os.environ.get(VARIABLE)
+    if not value:
+        return None
+    if Path(value).name == value and not Path(value).is_file():
+        for file in in_folders():
+            if file.name == value:
+                return Library.at(file)
+    return Library.at(value)
+
+
+def _preference(library: Library) -> tuple[bool, int, str]:
+    return library.version != TESTED, -(library.version or 0), str(library.path)
+
+
+def in_folders() -> Iterator[Path]:
+    """Libraries where systems and package managers put them; takes a few milliseconds."""
+    for folder in _folders():
+        try:
+            entries = list(os.scandir(folder))
+        except OSError:
+            continue  # most systems have only a few of these folders
+        yield from (Path(entry.path) for entry in entries if _FILE.fullmatch(entry.name))
+
+
+def _folders() -> Iterator[Path]:
+    """Folders with libraries for this process's architecture."""
+    prefix = Path(sys.prefix)  # conda installs LLVM beside Python
+    if sys.platform == "win32":
+        programs = os.environ.get("PROGRAMFILES", r"C:\Program Files")
+        yield from (prefix / "Library" / "bin", Path(programs) / "LLVM" / "bin")
+        searched = os.environ.get("PATH", "")
+    elif sys.platform == "darwin":
+        yield prefix / "lib"
+        for pattern in ("homebrew/opt/llvm*/lib", "local/libexec/llvm-*/lib"):
+            yield from Path("/opt").glob(pattern)
+        yield from Path("/usr/local/opt").glob("llvm*/lib")
+        searched = os.environ.get("DYLD_LIBRARY_PATH", "")
+    else:
+        yield prefix / "lib"
+        usr = Path("/usr")
+        yield from (usr / "lib" / f"{platform.machine()}-linux-gnu", usr / "lib64", usr / "lib")
+        for pattern in ("lib/llvm-*/lib", "lib64/llvm*/lib", "lib/llvm/*/lib64"):
+            yield from usr.glob(pattern)
+        yield usr / "local" / "lib"
+        searched = os.environ.get("LD_LIBRARY_PATH", "")
+    yield from (Path(folder) for folder in searched.split(os.pathsep) if folder)
+
+
+def select_llvm() -> Library | None:
+    """Point DRJIT_LIBLLVM_PATH to the best library, unless it is set or it is too late.
+
+    Returns what was chosen. Nothing is said if there is none: other backends do without LLVM, and
+    `require_llvm` has the words.
+    """
+    if "drjit" in sys.modules or os.environ.get(VARIABLE):
+        return None
+    library = _best()
+    if library is not None:
+        os.environ[VARIABLE] = str(library.path)
+    return library
+
+
+def loaded_llvm_version() -> tuple[int, int, int] | None:
+    """(major, minor, patch) of the LLVM that Dr.Jit runs on; None if it has none, or none yet."""
+    if "drjit" not in sys.modules:
+        return None
+    from drjit.detail import llvm_version
+
+    major, minor, patch = llvm_version()
+    return (major, minor, patch) if major > 0 else None
+
+
+def require_llvm() -> None:
+    """Make sure that this process can compile with LLVM.
+
+    Raises
+    ------
+    DiffractionError
+        If it cannot: what there is, what would do, and how to get it.
+    """
+    named = named_library()
+    if "drjit" in sys.modules:
+        _require_loaded(named)
+    elif named is not None:
+        if fault := _fault_of(named):
+            raise DiffractionError(_bad_choice(named, fault))
+    elif _best() is None:
+        raise DiffractionError(_nothing_usable())
+
+
+def require_loaded_llvm() -> None:
+    """`require_llvm` where Mitsuba's current variant compiles with LLVM; nothing elsewhere."""
+    import mitsuba as mi
+
+    if (mi.variant() or "").startswith("llvm"):
+        _require_loaded(named_library())
+
+
+def _require_loaded(named: Library | None) -> None:
+    version = loaded_llvm_version()
+    if version is not None and version[0] >= OLDEST:
+        return
+    if named is not None and (version is None or named.version in (None, version[0])):
+        fault = _too_old(version[0]) if version else _fault_of(named)
+        raise DiffractionError(_bad_choice(named, fault or "Dr.Jit cannot load it"))
+    if version is None:
+        raise DiffractionError(
+            f"Dr.Jit has found no LLVM; {_start_again()}" if _best() else _nothing_usable()
+        )
+    number = ".".join(map(str, version))
+    raise DiffractionError(
+        f"Dr.Jit has loaded LLVM {number}, which would end the process; {_start_again()}"
+    )
+
+
+def _best(apart_from: Library | None = None) -> Library | None:
+    libraries = (library for library in find_llvm() if library != apart_from)
+    return next((library for library in libraries if _fault_of(library) is None), None)
+
+
+def _fault_of(library: Library) -> str | None:
+    """Why Dr.Jit cannot work with it, as a clause, or None; a version untold may do."""
+    if not library.path.is_file():
+        return "there is no such file"
+    if library.version is not None and library.version < OLDEST:
+        return _too_old(library.version)
+    return None
+
+
+# ------------------------------------------------------------------------------- messages
+
+
+def _too_old(version: int) -> str:
+    return f"LLVM {version} cannot compile the kernels of Dr.Jit"
+
+
+def _bad_choice(named: Library, fault: str) -> str:
+    best = _best(apart_from=named)
+    remedy = f"set it to {best.path}, or unset it" if best else f"unset it, and {_install()}"
+    return f'{VARIABLE}="{os.environ.get(VARIABLE)}": {fault}; {remedy}'
+
+
+def _start_again() -> str:
+    best = _best()
+    if best is None:
+        return _install()
+    return (
+        "import mitsuba_diffraction before mitsuba and drjit, "
+        f"or start again with {VARIABLE}={best.path}"
+    )
+
+
+def _nothing_usable() -> str:
+    found = ", ".join(str(library) for library in find_llvm()) or "none"
+    return (
+        f"there is no LLVM that Dr.Jit can use; found: {found}; usable: {OLDEST} or newer, best "
+        f"{TESTED}; {_install()}"
+    )
+
+
+def _install() -> str:
+    if sys.platform == "darwin":
+        return f"brew install llvm@{TESTED}"
+    if sys.platform == "win32":
+        return f"install LLVM {TESTED}, and set {VARIABLE} to its LLVM-C.dll"
+    return f"apt install libllvm{TESTED}, or set {VARIABLE} to one elsewhere"

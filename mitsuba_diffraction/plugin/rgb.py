@@ -1,0 +1,247 @@
+"""RGB variants: the diffracted power in daylight's colours, and directions drawn by brightness.
+
+`ColourLookup` is the twin of `ColourTable.colour`, which says what is interpolated: one packet load
+fetches all terms of all colours of a bin. For the density of ωo per solid angle see
+`tables.colour.proposals`; (u, v) → ωo has the Jacobian dωo = du dv / cosθo.
+"""
+
+from __future__ import annotations
+
+import math
+import weakref
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ..optics.colour import RGB_WAVELENGTHS
+from ..optics.geometry import wavenumber
+from ..tables.colour.proposals import BANDED, BANDS, LOBES, colour_proposals
+from ..tables.colour.table import PACKET, TERMS, ColourTable
+from ..tables.store import cached_colours
+from ..tables.table import DiffractionTable
+from .crossing import Crossing
+from .lookup import series_interval, series_weights
+from .memory import index_between, read, read_record, upload
+from .pair import Pair, Place
+from .roles import Buffer, Colour, Float, Index, Interaction, Vector2f
+from .sampling import BELOW_ONE, invert, order_0_share
+
+
+class PolarCoordinates:
+    """Where (u, v) lies between the rings and azimuths of a colour table."""
+
+    def __init__(self, table: ColourTable) -> None:
+        grid = table.grid
+        self.rings, self.step, self.smallest = grid.rings, grid.step, grid.smallest
+        starts = [grid.start(n) for n in range(grid.rings)]
+        self._starts = upload(mi.UInt32, np.array([*starts, grid.bins], np.uint32))
+
+    def ring(self, squared_radius: Float) -> Float:
+        """Position among the rings; below 0 inside the smallest."""
+        smallest = self.smallest**2
+        logarithm = dr.log(dr.maximum(squared_radius, 0.25 * smallest) * (1.0 / smallest))
+        return logarithm * (0.5 / self.step)
+
+    def turn(self, uv: Vector2f) -> Float:
+        """Azimuth in turns, 0 … 1."""
+        turn = dr.atan2(uv.y, uv.x) * (0.5 / dr.pi)
+        return dr.select(turn < 0.0, turn + 1.0, turn)
+
+    def start(self, ring: Index) -> Index:
+        """Index of a ring's first bin."""
+        return read(mi.UInt32, self._starts, ring)
+
+
+class ColourLookup:
+    """A colour table in the memory of the current variant."""
+
+    def __init__(self, table: ColourTable) -> None:
+        self.expansion = table.expansion
+        self.coordinates = PolarCoordinates(table)
+        self._bins = table.grid.bins
+        self._inverse_scale = 1.0 / table.scale
+        self._radius_end = table.radius_end
+        self._radii, self._zs = table.order_0.shape[:2]
+        self._coefficients = upload(mi.Float16, table.coefficients)
+        self._order_0 = upload(mi.Float, table.order_0)
+
+    def colour(self, uv: Vector2f, z: Float) -> Colour:
+        """RGB in 1/µm², mi.Color3f, signed. z must not be beyond the table's."""
+        others = self._other_orders(uv, dr.squared_norm(uv), z)
+        return mi.Color3f(*others) + self.zeroth(uv, z)
+
+    def zeroth(self, uv: Vector2f, z: Float) -> Colour:
+        """That of order 0."""
+        radius = dr.sqrt(dr.maximum(dr.squared_norm(uv), 1e-14))
+        return mi.Color3f(*self._zeroth_order(radius, z))
+
+    def _other_orders(self, uv: Vector2f, squared_radius: Float, z: Float) -> list[Float]:
+        offset, interval = series_interval(self.expansion, z)
+        weights = series_weights(self.expansion, TERMS, offset, interval, z)
+        coordinates = self.coordinates
+        ring, t = _split(coordinates.ring(squared_radius), coordinates.rings)
+        turn = coordinates.turn(uv)
+        starts = [coordinates.start(ring + n) for n in range(3)]
+        total = [mi.Float(0.0)] * (3 * TERMS)
+        for n, of_ring in ((0, 1.0 - t), (1, t)):
+            count = starts[n + 1] - starts[n]  # one more than there are azimuths
+            azimuth, a = _split(turn * (mi.Float(count) - 1.0), count)
+            bin_ = interval * self._bins + starts[n] + azimuth
+            for m, share in ((0, of_ring * (1.0 - a)), (1, of_ring * a)):
+                packet = read_record(self._coefficients, bin_ + m, PACKET)
+                total = [dr.fma(p, share, s) for p, s in zip(packet, total, strict=False)]
+        colours = []
+        for c in range(3):
+            value = total[c * TERMS] * weights[0]
+            for term in range(1, TERMS):
+                value = dr.fma(total[c * TERMS + term], weights[term], value)
+            colours.append(value * self._inverse_scale)
+        return colours
+
+    def _zeroth_order(self, radius: Float, z: Float) -> list[Float]:
+        """Order 0's colour, 0 beyond its lobe."""
+        inside = radius < self._radius_end
+        at_radius = radius * ((self._radii - 1) / self._radius_end)
+        row, s = _split(dr.select(inside, at_radius, 0.0), self._radii)
+        column, t = _split(z * ((self._zs - 1) / self.expansion.kappa_max), self._zs)
+        result = [mi.Float(0.0)] * 3
+        for n, of_radius in ((0, 1.0 - s), (1, s)):
+            for m, of_z in ((0, 1.0 - t), (1, t)):
+                packet = read_record(self._order_0, (row + n) * self._zs + column + m, 4)
+                share = dr.select(inside, of_radius * of_z, 0.0)
+                result = [dr.fma(p, share, r) for p, r in zip(packet, result, strict=False)]
+        return result
+
+
+def _split(position: Float, count: Index | int) -> tuple[Index, Float]:
+    """The lower of the two whole numbers around a position, at most count − 2, and the rest."""
+    clipped = dr.maximum(position, 0.0)
+    lower = dr.minimum(mi.UInt32(clipped), count - 2)
+    return lower, dr.minimum(clipped - mi.Float(lower), 1.0)
+
+
+_models: weakref.WeakKeyDictionary[DiffractionTable, dict[str, RGBPower]] = (
+    weakref.WeakKeyDictionary()
+)
+
+
+class RGBPower:
+    """The `power.PowerModel` of variants without wavelengths, which are summed."""
+
+    def __init__(self, table: ColourTable) -> None:
+        self._lookup = ColourLookup(table)
+        self._coordinates = self._lookup.coordinates
+        self._z_max = table.z_max
+        found = colour_proposals(table)
+        self._rings, self._bins = found.rings.shape[1], table.grid.bins
+        self._most = max(table.grid.counts)
+        self._ring_sums = upload(mi.Float, found.rings)
+        self._azimuth_sums = upload(mi.Float, found.azimuths)
+        self._occupied = upload(mi.Float, found.occupied.astype("float32"))
+        self._zs = len(found.order_0)
+        self._order_0 = upload(mi.Float, found.order_0)
+        self._wavenumbers = [mi.Float(k) for k in wavenumber(RGB_WAVELENGTHS).tolist()]
+        # 1/(2·variance) of the lobes in (u, v)
+        self._sharpness = [(2.0 * math.pi * table.sigma / lam) ** 2 for lam in LOBES]
+
+    def power(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
+        """See `PowerModel.power`."""
+        return self._lookup.colour(pair.uv, pair.w * height_scale)
+
+    def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
+        """See `PowerModel.density`."""
+        strategy = self._strategy(pair.cos_i, dr.detach(height_scale))
+        return self._density(pair.uv, *strategy) * pair.cos_o
+
+    def both(
+        self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
+    ) -> tuple[Colour, Float]:
+        """See `PowerModel.both`."""
+        density = self.density(pair.outer, drawing_scale, si)
+        return self.power(pair, height_scale, si), density
+
+    def wavenumbers(self, si: Interaction) -> list[Float]:
+        """See `PowerModel.wavenumbers`; of the wavelength that is a channel's mean."""
+        return self._wavenumbers
+
+    def flat(self, pair: Pair | Place, si: Interaction) -> Colour:
+        """See `PowerModel.flat`: of order 0 where no phase tells heights apart."""
+        return self._lookup.zeroth(pair.uv, mi.Float(0.0))
+
+    def zeroth(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
+        """See `PowerModel.zeroth`."""
+        return self._lookup.zeroth(pair.uv, pair.w * height_scale)
+
+    def _density(self, uv: Vector2f, share: Float, band: Index) -> Float:
+        """Density of `draw` per du dv."""
+        squared_radius = dr.squared_norm(uv)
+        glossy = mi.Float(0.0)
+        for sharpness in self._sharpness:
+            lobe = dr.exp(-sharpness * squared_radius) * (sharpness / dr.pi)
+            glossy += lobe * (1.0 / len(self._sharpness))
+        position = self._coordinates.ring(squared_radius)
+        inside = (position >= 0.0) & (position < self._rings - 1.0)
+        position = dr.select(inside, position, 0.0)
+        ring = dr.minimum(mi.UInt32(position), self._rings - 2)
+        start, count = self._ring(ring)
+        azimuth = dr.minimum(mi.UInt32(self._coordinates.turn(uv) * mi.Float(count)), count - 1)
+        cell = self._difference(self._ring_sums, band * self._rings + ring) * self._difference(
+            self._azimuth_sums, band * self._bins + start + azimuth
+        )
+        # A cell is step·2π/count wide in ln r and φ, and r² d(ln r) dφ = du dv
+        area = squared_radius * (self._coordinates.step * 2.0 * dr.pi)
+        cell = dr.select(inside, cell * mi.Float(count) / dr.select(inside, area, 1.0), 0.0)
+        return dr.lerp(cell, glossy, share)
+
+    def draw(
+        self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
+    ) -> Vector2f:
+        """See `PowerModel.draw`."""
+        share, band = self._strategy(cos_i, height_scale)
+        lobe = dr.clip(sample1 / share * len(self._sharpness), 0, len(self._sharpness) - 1)
+        lobe = mi.UInt32(lobe)
+        sample2 = dr.minimum(sample2, BELOW_ONE)
+        width = mi.Float(0.0)
+        for n, sharpness in enumerate(self._sharpness):
+            width = dr.select(lobe == n, math.sqrt(0.5 / sharpness), width)
+        glossy = mi.warp.square_to_std_normal(sample2) * width
+        ring, t = invert(
+            self._ring_sums, band * self._rings, self._rings - 1, self._rings, sample2.y
+        )
+        start, count = self._ring(ring)
+        azimuth, a = invert(
+            self._azimuth_sums, band * self._bins + start, count, self._most, sample2.x
+        )
+        coordinates = self._coordinates
+        radius = coordinates.smallest * dr.exp((mi.Float(ring) + t) * coordinates.step)
+        sin, cos = dr.sincos((mi.Float(azimuth) + a) * (2.0 * dr.pi) / mi.Float(count))
+        return dr.select(
+            sample1 < share, mi.Vector2f(glossy), mi.Vector2f(radius * cos, radius * sin)
+        )
+
+    def _strategy(self, cos_i: Float, height_scale: Float) -> tuple[Float, Index]:
+        """Share of the samples that order 0 gets, and the band of the other orders."""
+        bands = BANDS / (BANDED * self._z_max)
+        band = mi.UInt32(index_between(height_scale * (cos_i + 0.5) * bands, 0.0, BANDS - 1.0))
+        position = 2.0 * height_scale * cos_i * ((self._zs - 1) / self._z_max)
+        z = index_between(position, 0.0, self._zs - 1.0)
+        brightness = read(mi.Float, self._order_0, mi.UInt32(z + 0.5))
+        share = order_0_share(brightness, cos_i)
+        return dr.select(read(mi.Float, self._occupied, band) > 0.0, share, 1.0), band
+
+    def _ring(self, ring: Index) -> tuple[Index, Index]:
+        """First bin of a ring, and its azimuths."""
+        start = self._coordinates.start(ring)
+        return start, self._coordinates.start(ring + 1) - start - 1
+
+    def _difference(self, sums: Buffer, index: Index) -> Float:
+        return read(mi.Float, sums, index + 1) - read(mi.Float, sums, index)
+
+
+def rgb_power(table: DiffractionTable) -> RGBPower:
+    """The colours in the current variant's memory, shared by all BSDFs of the table."""
+    variants = _models.setdefault(table, {})
+    if mi.variant() not in variants:
+        variants[mi.variant()] = RGBPower(cached_colours(table))
+    return variants[mi.variant()]

@@ -1,0 +1,236 @@
+"""What varies over a surface: height scale and orientation, from textures and mesh attributes.
+
+A BSDF cannot see whether the shape has the attributes that it reads: `check_attributes` does.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ..errors import DiffractionError
+from .changing import Bounded
+from .memory import index_between
+from .names import name_of
+from .roles import Callback, Float, Interaction, Mask, Rotation, Texture
+
+#: What `meshes.write_ply` calls a field of directions.
+ORIENTATION = "vertex_orientation"
+
+#: Of the plugin's `to_string`, where its windows follow places.
+PLACED = "coherence = surface"
+
+_MADE = "make it with 'mitsuba-diffraction tangents MESH -o FIELD.ply', and use that file"
+_READ = re.compile(r'MeshAttribute\[\s*name = "([^"]+)"')
+
+
+def check_attributes(shape: Any, number: int | None = None) -> None:
+    """Refuse a shape whose BSDF reads what it lacks: a mesh attribute, or where on it one is.
+
+    Mitsuba's kernels would go on with zeros, which turn no patch and colour nothing, and with UV
+    coordinates of each triangle.
+
+    Parameters
+    ----------
+    shape : `mi.Shape` of the variant that is set.
+    number : its place among the scene's shapes, counted from 0, to name one without an id.
+
+    Raises
+    ------
+    DiffractionError
+        Which names the attribute, and how to get one of directions.
+    """
+    if PLACED in str(shape.bsdf()) and shape.is_mesh() and not shape.has_vertex_texcoords():
+        raise DiffractionError(
+            f"{name_of(shape, number)} has no UV coordinates, from which coherence='surface' has "
+            "places on the surface; unwrap it, or use coherence='ensemble'"
+        )
+    for name in dict.fromkeys(_READ.findall(str(shape.bsdf()))):
+        if np.all(shape.has_attribute(name)):
+            continue
+        if not shape.is_mesh():
+            remedy = "only meshes have any: leave the texture out, or use a mesh"
+        else:
+            added = "add it to the mesh's file, or correct the name"
+            remedy = _MADE if name == ORIENTATION else added
+        raise DiffractionError(
+            f"{name_of(shape, number)} has no attribute {name}, which its BSDF reads; {remedy}"
+        )
+
+
+def is_bitmap(texture: Texture) -> bool:
+    """Whether it is a picture, whose numbers can be looked at."""
+    return str(texture).startswith("BitmapTexture[")
+
+
+def is_attribute(texture: Texture) -> bool:
+    """Whether it is a mesh attribute, which has values on that mesh only."""
+    return str(texture).startswith("MeshAttribute[")
+
+
+def require_raw(texture: Texture, parameter: str, meaning: str) -> None:
+    """Refuse a picture whose numbers Mitsuba would take for colours.
+
+    Raises
+    ------
+    DiffractionError
+        With the remedy.
+    """
+    if is_bitmap(texture) and "raw = 1" not in str(texture):
+        raise DiffractionError(
+            f"{parameter}: the bitmap is not raw, so that Mitsuba takes {meaning} for colours; "
+            'add <boolean name="raw" value="true"/> to the texture ("raw": True in Python)'
+        )
+
+
+#: Flatter would be lost in single precision.
+LEAST_SCALE = 1e-30
+
+
+class VaryingHeightScale:
+    """A texture's or mesh attribute's number at each point, from 0 to `high`.
+
+    Parameters
+    ----------
+    texture : of one channel; a bitmap is raw.
+    most : the largest factor, which mesh attributes and procedural textures must be given; None
+        for a bitmap's own.
+
+    Attributes
+    ----------
+    high : the largest factor; what is larger is taken for it.
+    """
+
+    def __init__(self, texture: Texture, most: float | None) -> None:
+        self.texture, self._is_bitmap = texture, is_bitmap(texture)
+        if not self._is_bitmap and most is None:
+            raise DiffractionError(
+                "height_scale of a texture that is no bitmap, or of a mesh attribute, needs "
+                "height_scale_max, the largest factor that it has"
+            )
+        require_raw(texture, "height_scale", "factors")
+        self.high = self.range()[1] if most is None else most
+        if not 0.0 < self.high <= 1e3:  # also refuses NaN
+            given = "its largest factor" if most is None else "height_scale_max"
+            raise DiffractionError(
+                f"height_scale: {given}, {self.high:g}, must be above 0 and at most 1000"
+            )
+        if refused := self.settle():
+            raise DiffractionError(refused)
+
+    def range(self) -> tuple[float, float]:
+        """The least and the largest factor there are, as far as is known."""
+        if not self._is_bitmap:
+            return 0.0, self.high
+        values = np.array(mi.traverse(self.texture)["data"], float)
+        return float(values.min()), float(values.max())
+
+    def at(self, si: Interaction, active: Mask) -> Float:
+        """The factor at points of the surface."""
+        return index_between(self.texture.eval_1(si, active), LEAST_SCALE, self.high)
+
+    def settle(self) -> str | None:
+        """See `Bounded.settle`."""
+        low, high = self.range()
+        if low >= 0.0 and high <= self.high * (1.0 + 1e-6):
+            return None
+        return (
+            f"height_scale: the bitmap's factors go from {low:g} to {high:g}; they must be between "
+            f"0 and {self.high:g}"
+        )
+
+    def traverse(self, callback: Callback) -> None:
+        """Expose the texture."""
+        callback.put("height_scale", self.texture, mi.ParamFlags.Differentiable)
+
+    def __str__(self) -> str:
+        return " ".join(str(self.texture).split())
+
+
+#: Degrees; much larger ones leave no digits of the angle in single precision.
+MOST_DEGREES = 36_000.0
+
+
+class ConstantOrientation:
+    """The same angle everywhere, degrees from the first tangent to the patch's x axis."""
+
+    def __init__(self, degrees: float) -> None:
+        self._angle = Bounded("orientation", degrees, -MOST_DEGREES, MOST_DEGREES, _refusal)
+        self.degrees = self._angle.value
+        self.traverse, self.settle = self._angle.traverse, self._angle.settle
+
+    def rotation(self, si: Interaction, active: Mask) -> Rotation:
+        """(cos, sin) of the angle."""
+        sin, cos = dr.sincos(dr.deg2rad(self.degrees))
+        return cos, sin
+
+    def __str__(self) -> str:
+        return f"{dr.slice(self.degrees):g}°"
+
+
+def _refusal(degrees: float) -> str:
+    return f"orientation={degrees:g} must be between -{MOST_DEGREES:g} and {MOST_DEGREES:g} degrees"
+
+
+class OrientationTexture:
+    """(cos, sin) of the angle in the first two channels of a raw texture or mesh attribute.
+
+    Two channels instead of an angle, so that interpolation has no seam at 360°. They need not be of
+    unit length; where both are 0 the patch is not turned.
+    """
+
+    def __init__(self, texture: Texture) -> None:
+        self.texture = texture
+        _check(texture)
+
+    def rotation(self, si: Interaction, active: Mask) -> Rotation:
+        """(cos, sin) of the angle at the surface point."""
+        value = self.texture.eval_3(si, active)
+        length = dr.sqrt(dr.square(value.x) + dr.square(value.y))
+        turned = length > 1e-6
+        scale = dr.rcp(dr.select(turned, length, 1.0))
+        return dr.select(turned, value.x * scale, 1.0), dr.select(turned, value.y * scale, 0.0)
+
+    def traverse(self, callback: Callback) -> None:
+        """Expose the texture."""
+        callback.put("orientation", self.texture, mi.ParamFlags.Differentiable)
+
+    def settle(self) -> None:
+        """The texture looks after itself."""
+
+    def __str__(self) -> str:
+        return " ".join(str(self.texture).split())
+
+
+def _check(texture: Texture) -> None:
+    """Refuse a texture whose values are not the directions that somebody saved.
+
+    Raises
+    ------
+    DiffractionError
+        If it has one channel, is taken for colours, or cannot hold negative numbers.
+    """
+    if not is_bitmap(texture):
+        return  # attributes of meshes are checked where there is a mesh
+    data = np.array(mi.traverse(texture)["data"])
+    if data.shape[-1] < 3:
+        raise DiffractionError(
+            f"orientation: the bitmap has {data.shape[-1]} channel, but directions take three: "
+            "cos, sin, and one that is not read"
+        )
+    require_raw(texture, "orientation", "(cos, sin)")
+    levels, lengths = data[..., :2] * 65535.0, np.hypot(data[..., 0], data[..., 1])
+    within = levels.min() >= 0.0 and levels.max() <= 65535.5
+    from_integers = within and np.all(np.abs(levels - np.rint(levels)) < 0.02)
+    if from_integers and np.any((lengths > 0.0) & (np.abs(lengths - 1.0) > 0.02)):
+        raise DiffractionError(
+            "orientation: the bitmap comes from a picture of 8 or 16 bits, which cannot hold "
+            "negative numbers; save (cos, sin) in a float format, as EXR"
+        )
+
+
+Orientation = ConstantOrientation | OrientationTexture

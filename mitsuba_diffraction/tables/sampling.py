@@ -1,0 +1,439 @@
+"""Where a surface sends its light: densities in spatial frequency to draw directions from (NumPy).
+
+(α, β) → ωo has the Jacobian dωo = dα dβ / (k² cosθo), so that a density proportional to the window
+sum over (α, β) is almost the BRDF times cosθo. `Proposals` cuts the plane of frequencies into
+square cells about one lobe of the window wide; each holds the power of all orders but order 0 that
+falls into it. The power depends on κ, which varies with the direction drawn: a few bands of κ have
+densities of their own. Order 0 is a Gaussian with a weight known exactly, and needs no cells.
+
+`OrderMixture` is the same for integrals: a few strong orders one by one, all others as a smooth
+density.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse, special
+
+from .build.coarse import cell_powers
+from .table import DiffractionTable
+from .window import apply_window, tap_matrix
+
+#: An order whose power ever exceeds this is summed on its own, if it is among the strongest.
+STRONG, MOST_STRONG = 2e-3, 96
+#: Samples of an order's power over one period in κ (that of a squared Bessel function).
+PER_PERIOD = 16
+FEWEST_KAPPAS, MOST_KAPPAS = 16, 160
+
+_FADED = 12.0  # exp(−12) = 6e-6 of a Gaussian's peak is nothing
+#: Bins closer than this (in 1/σ) are joined: together they are hardly wider than one lobe.
+_JOINED = 1.0
+_PARTS = 8  # a side of a cell that the edge of a table's domain crosses
+
+
+@dataclass(frozen=True)
+class OrderMixture:
+    """Powers as functions of κ = 0, step, 2·step, … (κ already divided by the height scale).
+
+    Attributes
+    ----------
+    kappa_step : rad/µm.
+    frequency : (n, 2) of the strong orders, rad/µm.
+    powers : (kappas, n) of the strong orders.
+    central : (kappas,), power of order 0.
+    density : (kappas, ny, nx), power of all others per (rad/µm)², smoothed; q = 0 in the middle.
+    pitch : rad/µm between samples of the density.
+    uncertainty : rad/µm, how far a strong order's power may lie from its frequency.
+    """
+
+    kappa_step: float
+    frequency: NDArray[np.float64]
+    powers: NDArray[np.float32]
+    central: NDArray[np.float64]
+    density: NDArray[np.float32]
+    pitch: float
+    uncertainty: float
+
+    def order_0(self, kappa: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Power of order 0 at κ, shape of κ."""
+        return np.interp(kappa, self.kappa_step * np.arange(len(self.central)), self.central)
+
+    def strong(self, kappa: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Powers of the strong orders at κ of shape (m,), shape (n, m)."""
+        position = np.clip(kappa / self.kappa_step, 0.0, len(self.powers) - 1.001)
+        lower = position.astype(int)
+        share = (position - lower).astype(np.float32)
+        return (self.powers[lower].T * (1.0 - share)) + self.powers[lower + 1].T * share
+
+    def strong_at(self, kappa: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Powers of the strong orders, each at its own κ, shape of κ (..., n)."""
+        position = np.clip(kappa / self.kappa_step, 0.0, len(self.powers) - 1.001)
+        lower = position.astype(int)
+        share = (position - lower).astype(np.float32)
+        order = np.arange(self.powers.shape[1])
+        low, high = self.powers[lower, order], self.powers[lower + 1, order]
+        return np.asarray(low * (1.0 - share) + high * share)
+
+
+def order_mixture(table: DiffractionTable, height_scale: float, smoothing: float) -> OrderMixture:
+    """Sort a table's orders.
+
+    Parameters
+    ----------
+    table : the diffraction table.
+    height_scale : factor on its heights.
+    smoothing : standard deviation of the density's smoothing, rad/µm, the lobe's own included.
+    """
+    expansion = table.expansion
+    kappa_max = table.q_limit * height_scale
+    periods = kappa_max * expansion.half_range / math.pi
+    count = int(np.clip(math.ceil(PER_PERIOD * periods), FEWEST_KAPPAS, MOST_KAPPAS)) + 1
+    longest = expansion if table.coarse is None else table.coarse.expansion
+    kappas = np.linspace(0.0, min(kappa_max, longest.kappa_max), count)
+    own = 1.0 / (math.sqrt(2.0) * table.sigma)  # standard deviation of one lobe
+    all_smooth = own >= smoothing
+    smoothing = max(smoothing, own)
+    axes = [_Axis(table, axis) for axis in (0, 1)]
+    pitch = 0.5 * smoothing
+    half = math.ceil(table.q_limit / pitch) + 1
+    grid = pitch * (np.arange(2 * half, dtype=float) - half + 0.5)
+    splats = [_splat(axis.frequency, grid, smoothing) for axis in axes]
+    density = np.empty((count, 2 * half, 2 * half), np.float32)
+    central = np.empty(count)
+    powers = np.empty((count, 0), np.float32)
+    strongest = np.zeros((len(axes[1].frequency), len(axes[0].frequency)), np.float32)
+    kept = []
+    powers_at: _Powers | _PlannedPowers = _Powers(table, axes)
+    if table.coarse is not None:
+        powers_at = _PlannedPowers(table, table.coarse, axes, grid, smoothing)
+    for n, kappa in enumerate(kappas):
+        power, central[n], around = powers_at(float(kappa))
+        if all_smooth:  # order 0 then is as wide as any other
+            power[len(power) // 2, power.shape[1] // 2] += central[n]
+            central[n] = 0.0
+        np.maximum(strongest, power, out=strongest)
+        density[n] = (splats[0] @ (splats[1] @ power).T).T + around
+        kept.append(power if power.nbytes * count < 400e6 else None)
+    chosen = _choose(strongest) if not all_smooth else np.zeros((0, 2), int)
+    rows, columns = chosen.T
+    if len(chosen):
+        powers = np.empty((count, len(chosen)), np.float32)
+        for n, kappa in enumerate(kappas):
+            held = kept[n]
+            power = held if held is not None else powers_at(float(kappa))[0]
+            powers[n] = power[rows, columns]
+            chosen_splats = splats[1][:, rows].multiply(powers[n]) @ splats[0][:, columns].T
+            density[n] -= chosen_splats.toarray()
+    np.maximum(density, 0.0, out=density)
+    frequency = np.stack([axes[0].frequency[columns], axes[1].frequency[rows]], axis=1)
+    return OrderMixture(
+        kappa_step=float(kappas[1]) / height_scale,
+        frequency=frequency,
+        powers=powers,
+        central=central,
+        density=density,
+        pitch=pitch,
+        uncertainty=max(axis.uncertainty for axis in axes),
+    )
+
+
+class _Axis:
+    """Where the powers along one axis are: at the bins, at bins joined, or between them."""
+
+    def __init__(self, table: DiffractionTable, axis: int) -> None:
+        last, spacing = table.grid.last[axis], table.spacing[axis]
+        step = table.grid.steps[axis]
+        bins = np.arange(-last, last + 1)
+        if table.grid.coherent:
+            # The window's power is as smooth as a lobe: sampled densely, its sum is its integral
+            density = max(1, math.ceil(step / 0.8))
+            positions = np.arange(-last * density, last * density + 1) / density
+            self.frequency = positions * spacing
+            self.matrix = tap_matrix(positions, -last, len(bins), table.grid.exponents[axis], None)
+            self.weight = step / density / math.sqrt(math.pi)
+            self.uncertainty = 0.5 * spacing / density
+            return
+        joined = max(1, round(_JOINED / step))
+        joined += (joined + 1) % 2  # odd: order 0 stays in the middle of its own
+        group = np.rint(bins / joined).astype(int)
+        first = group[0]
+        self.frequency = np.arange(first, group[-1] + 1) * joined * spacing
+        self.matrix = np.zeros((len(self.frequency), len(bins)), np.float32)
+        self.matrix[group - first, np.arange(len(bins))] = 1.0
+        self.weight = 1.0
+        self.uncertainty = 0.5 * (joined - 1) * spacing
+
+
+class _Powers:
+    """Powers at any κ; keeps the coefficients of the last interval in single precision."""
+
+    def __init__(self, table: DiffractionTable, axes: list[_Axis]) -> None:
+        self._table, self._axes = table, axes
+        self._interval = -1
+        self._coefficients: NDArray[np.float32] = np.zeros((0, 0), np.float32)
+
+    def __call__(self, kappa: float) -> tuple[NDArray[np.float32], float, Any]:
+        """Powers (ny, nx) of all orders but order 0, that of order 0, and the density besides."""
+        table, axes = self._table, self._axes
+        expansion = table.expansion
+        interval = int(expansion.interval(kappa))
+        _, ny, nx, components, terms = table.coefficients.shape
+        if interval != self._interval:
+            flat = table.coefficients[interval].reshape(-1, terms)
+            self._interval, self._coefficients = interval, flat.astype(np.float32)
+        scaled = (expansion.weights(kappa) / table.scale).astype(np.float32)
+        parts = (self._coefficients @ scaled).reshape(ny, nx, components)
+        centre = table.order_0_at(kappa)
+        if table.grid.coherent:
+            amplitude = parts[..., 0] + 1j * parts[..., 1]
+            amplitude[table.grid.last[1], table.grid.last[0]] = complex(*centre)
+            field = (axes[0].matrix @ (axes[1].matrix @ amplitude).T).T
+            return (
+                np.abs(field).astype(np.float32) ** 2 * (axes[0].weight * axes[1].weight),
+                0.0,
+                0.0,
+            )
+        if expansion.kind == "power":
+            power, order_0 = np.maximum(parts[..., 0], 0.0), max(float(centre[0]), 0.0)
+        else:
+            power, order_0 = np.sum(parts**2, axis=-1), float(np.sum(centre**2))
+        if len(axes[0].frequency) < nx:
+            power = power @ axes[0].matrix.T
+        if len(axes[1].frequency) < ny:
+            power = axes[1].matrix @ power
+        return power, order_0, 0.0
+
+
+class _PlannedPowers:
+    """Powers of a planned table: its own orders in its domain, coarse cells as density beyond."""
+
+    def __init__(
+        self,
+        table: DiffractionTable,
+        coarse: DiffractionTable,
+        axes: list[_Axis],
+        grid: NDArray[np.floating],
+        smoothing: float,
+    ) -> None:
+        self._fine, self._coarse = _Powers(table, axes), coarse
+        self._kappa_max = table.expansion.kappa_max
+        nothing = np.zeros(coarse.grid.shape, np.float32)
+        _, middles = cell_powers(coarse, nothing)
+        self._splats = [_splat(middle, grid, smoothing) for middle in middles]
+        # Which orders the table itself has, and the share of each cell that it has not
+        x, y = (axis.frequency for axis in axes)
+        along_x, along_y = table.q_max
+        self._inside = (np.hypot(x / along_x, y[:, None] / along_y) <= 1.0).astype(np.float32)
+        within = (np.arange(_PARTS) + 0.5) / _PARTS - 0.5
+        x, y = (
+            (middle[:, None] + width * within).ravel()
+            for middle, width in zip(middles, coarse.spacing, strict=True)
+        )
+        outside = np.hypot(x / along_x, y[:, None] / along_y) > 1.0
+        shape = (len(middles[1]), _PARTS, len(middles[0]), _PARTS)
+        self._outside = outside.reshape(shape).mean(axis=(1, 3)).astype(np.float32)
+
+    def __call__(self, kappa: float) -> tuple[NDArray[np.float32], float, Any]:
+        """As `_Powers`."""
+        coarse = self._coarse
+        interval = int(coarse.expansion.interval(kappa))
+        scaled = (coarse.expansion.weights(kappa) / coarse.scale).astype(np.float32)
+        series = coarse.coefficients[interval, :, :, 0].astype(np.float32) @ scaled
+        cells, _ = cell_powers(coarse, series)
+        power, order_0, _ = self._fine(kappa)
+        power *= self._inside
+        if kappa <= self._kappa_max:
+            cells = cells * self._outside
+        else:
+            power[...], order_0 = 0.0, max(float(coarse.order_0_at(kappa)[0]), 0.0)
+        around = (self._splats[0] @ (self._splats[1] @ cells).T).T
+        return power, order_0, around.astype(np.float32)
+
+
+def _splat(
+    frequency: NDArray[np.floating], grid: NDArray[np.floating], deviation: float
+) -> sparse.csr_array:
+    """Gaussian weights from frequencies to a grid, (grid, frequencies), of integral 1."""
+    exponent = 0.5 * ((frequency - grid[:, None]) / deviation) ** 2
+    weights = np.exp(-exponent) / (math.sqrt(2.0 * math.pi) * deviation)
+    weights[exponent > _FADED] = 0.0
+    return sparse.csr_array(weights.astype(np.float32))
+
+
+def _choose(strongest: NDArray[np.float32]) -> NDArray[np.int64]:
+    """(row, column) of the orders worth a sum of their own, strongest first."""
+    flat = strongest.ravel()
+    many = min(MOST_STRONG, flat.size)
+    candidates = np.argpartition(flat, flat.size - many)[-many:]
+    candidates = candidates[flat[candidates] > STRONG]
+    candidates = candidates[np.argsort(-flat[candidates])]
+    return np.stack(np.unravel_index(candidates, strongest.shape), axis=1)
+
+
+#: Width of a cell in units of 1/σ: a lobe is then nearly even across it.
+CELL = 1.5
+#: Orders further apart, in units of 1/σ, are lobes with nothing between them: erfc(2) = 0.5 %.
+APART = 4.0
+#: Most cells in each direction; more memory would buy little.
+MOST_CELLS = 1024
+#: Bands of κ at most, up to 3/4 of κ_max: κ is at most k(cosθi + 1), and k(cosθi + 1/2) picks the
+#: band. Fewer where a large patch would have more levels than a core's cache holds: the look-up
+#: of the density takes half as long then, and the samples' noise grows by at most a twentieth.
+BANDS, BANDED = 6, 0.75
+FEWEST_BANDS, CACHED = 2, 1 << 20
+#: A level, a byte a cell, is the top of the cell's density in single precision, eight steps an
+#: octave; this far down. Directions are drawn by the levels, so that their density is exact; the
+#: rounding, 6 % at most, adds 0.1 % to the samples' variance.
+SHIFT = 20
+
+_KAPPAS = 4  # averaged in a band
+_ORDER_0_KAPPAS = 2048
+_SPREAD = 0.25  # half width of a band's average, as a share of κ_max: κ spreads over k
+
+
+@dataclass(frozen=True)
+class Proposals:
+    """Cumulative distributions over the cells, one set a band.
+
+    Attributes
+    ----------
+    origin : (x, y), lower corner of cell (0, 0), rad/µm.
+    cell : width of a cell along x and y, rad/µm.
+    lobes : along which axes a cell is one order's, and holds its lobe instead of an even density.
+    levels : (bands, ny, 4·n) of a cell's density, n ≥ nx / 4 (`density_of`); 0 is none.
+    units : (bands,) probability of a cell over its density; 0 where there is no power besides
+        order 0.
+    rows : (bands, ny + 1) cumulative probability of rows, from 0 to 1.
+    columns : (bands, ny, nx + 1) cumulative probability within a row, from 0 to 1.
+    order_0 : (κs,) power of order 0 over κ, even from 0 to the table's largest κ.
+    """
+
+    origin: tuple[float, float]
+    cell: tuple[float, float]
+    lobes: tuple[bool, bool]
+    levels: NDArray[np.uint8]
+    units: NDArray[np.float32]
+    rows: NDArray[np.float32]
+    columns: NDArray[np.float32]
+    order_0: NDArray[np.float32]
+
+
+def proposals(table: DiffractionTable) -> Proposals:
+    """Tabulate the densities of all bands."""
+    axes = (_axis(table, 0), _axis(table, 1))
+    (cell_x, nx, _), (cell_y, ny, _) = axes
+    cell, counts = (cell_x, cell_y), (nx, ny)
+    origin = (-0.5 * cell_x * nx, -0.5 * cell_y * ny)
+    matrices = [_cell_matrix(table, n, origin[n], cell[n], counts[n]) for n in (0, 1)]
+    bands = min(max(CACHED // (nx * ny), FEWEST_BANDS), BANDS)
+    rows = np.zeros((bands, counts[1] + 1), np.float32)
+    columns = np.zeros((bands, counts[1], counts[0] + 1), np.float32)
+    levels = np.zeros((bands, counts[1], -(-counts[0] // 4) * 4), np.uint8)
+    units = np.zeros(bands, np.float32)
+    for band in range(bands):
+        found = _levels(_cell_power(table, matrices, BANDED * (band + 0.5) / bands))
+        levels[band, :, : counts[0]] = found
+        power = density_of(found)
+        of_row = power.sum(axis=1)
+        if of_row.sum() > 0.0:
+            units[band] = 1.0 / of_row.sum()
+            rows[band] = _cumulative(of_row)
+            columns[band] = _cumulative(power)
+    lobes = (axes[0][2], axes[1][2])
+    return Proposals(origin, cell, lobes, levels, units, rows, columns, _order_0(table))
+
+
+def _axis(table: DiffractionTable, axis: int) -> tuple[float, int, bool]:
+    """Width of the cells along an axis, how many, and whether each is one order's."""
+    spacing, last = table.spacing[axis], table.grid.last[axis]
+    edge = min(table.q_max[axis], last * spacing) + 2.0 / table.sigma
+    if spacing * table.sigma > APART:
+        return spacing, 2 * math.ceil(edge / spacing) + 1, True
+    cell = max(CELL / table.sigma, 2.0 * edge / MOST_CELLS)
+    return cell, math.ceil(2.0 * edge / cell), False
+
+
+def _levels(power: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Levels of the cells' powers, 255 for the largest, down to 2⁻³⁰ of it."""
+    most = power.max(initial=0.0)
+    if most == 0.0:
+        return np.zeros(power.shape, np.uint8)
+    largest = float(density_of(np.uint8(255)))
+    bits = (power * (largest / most)).astype(np.float32).view(np.uint32)
+    found = ((bits >> (SHIFT - 1)) + 1) >> 1
+    return np.where(found < 8, 0, np.minimum(found, 255)).astype(np.uint8)  # normal numbers only
+
+
+def density_of(levels: NDArray[np.uint8] | np.uint8) -> NDArray[np.float64]:
+    """What levels mean, in no particular unit."""
+    return (np.asarray(levels, np.uint32) << SHIFT).view(np.float32).astype(float)
+
+
+def _order_0(table: DiffractionTable) -> NDArray[np.float32]:
+    """Power of order 0 at κs close enough together for a share of the samples."""
+    kappas = np.linspace(0.0, table.expansion.kappa_max, _ORDER_0_KAPPAS)
+    parts = table.order_0_at(kappas)
+    power = parts[:, 0] if parts.shape[1] == 1 else np.sum(np.square(parts), axis=1)
+    return np.clip(power, 0.0, 1.0).astype(np.float32)
+
+
+def _cell_power(
+    table: DiffractionTable, matrices: list[sparse.csr_array], centre: float
+) -> NDArray[np.float64]:
+    """Mean window sum in each cell (ny, nx) around a share of κ_max, without order 0."""
+    expansion = table.expansion
+    shares = centre + _SPREAD * np.linspace(-0.75, 0.75, _KAPPAS)
+    kappas = np.clip(shares, 0.02, 1.0) * expansion.kappa_max
+    intervals = expansion.interval(kappas)
+    weights = expansion.weights(kappas) / table.scale
+    total: NDArray[np.float64] = np.zeros(())
+    for interval in np.unique(intervals):
+        mine = weights[intervals == interval]
+        coefficients = table.coefficients[interval].astype(np.float32)
+        if expansion.kind == "power":  # linear: the mean of the weights does
+            power = coefficients[:, :, 0] @ mine.sum(axis=0).astype(np.float32)
+            total = total + apply_window(matrices, np.maximum(power, 0.0))
+            continue
+        for weight in mine.astype(np.float32):
+            parts = coefficients @ weight
+            if table.grid.coherent:
+                amplitude = parts[..., 0] + 1j * parts[..., 1]
+                total = total + np.abs(apply_window(matrices, amplitude)) ** 2
+            else:
+                total = total + apply_window(matrices, np.sum(parts**2, axis=2))
+    return np.asarray(total, float)
+
+
+def _cell_matrix(
+    table: DiffractionTable, axis: int, origin: float, cell: float, count: int
+) -> sparse.csr_array:
+    """Sparse (cells, bins): the window around a bin, integrated over a cell.
+
+    Amplitudes are taken at the cell's centre instead: their square is what is wanted.
+    """
+    last, spacing = table.grid.last[axis], table.spacing[axis]
+    frequency = spacing * np.arange(-last, last + 1)
+    lower = origin + cell * np.arange(count)
+    if table.grid.coherent:
+        distance = lower[:, None] + 0.5 * cell - frequency
+        weights = np.exp(-0.5 * (table.sigma * distance) ** 2)
+    else:
+        low = special.erf(table.sigma * (lower[:, None] - frequency))
+        high = special.erf(table.sigma * (lower[:, None] + cell - frequency))
+        weights = high - low
+    weights[weights < 1e-7] = 0.0
+    return sparse.csr_array(weights.astype(np.float32))
+
+
+def _cumulative(power: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Running sums along the last axis, from exactly 0 to exactly 1; 0 where there is none."""
+    sums = np.cumsum(power, axis=-1)
+    total = sums[..., -1:]
+    result = np.zeros((*power.shape[:-1], power.shape[-1] + 1), np.float32)
+    np.divide(sums, total, out=result[..., 1:], where=total > 0.0, casting="same_kind")
+    return result

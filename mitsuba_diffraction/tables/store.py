@@ -1,0 +1,309 @@
+"""The one cache: whatever is made once, in files that are found by what it is made of.
+
+A file is one line with what it is, its key and the SHA-256 of the rest; then JSON and arrays as
+they lie in memory. What is damaged, or stands under another's name, is made again. Tables and their
+colours are kept by what is below; what conserves energy by `tables.energy.store`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import hashlib
+import json
+import math
+import os
+import threading
+import warnings
+import weakref
+from collections.abc import Callable, Iterator, MutableMapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import platformdirs
+from numpy.typing import NDArray
+
+from ..atomic import atomic_path, remove_abandoned
+from ..errors import DiffractionError, DiffractionWarning, one_line
+from ..heights.validity import TEXTS_VERSION
+from ..settings import TableSettings
+from .build import coarse
+from .colour.build import PolarGrid
+from .colour.table import COLOUR_VERSION, ColourTable
+from .document import described, document_of, plain
+from .expansion import Expansion
+from .table import FORMAT_VERSION, DiffractionTable
+
+#: Environment variable that moves the cache, e.g. to a larger disk.
+VARIABLE = "MITSUBA_DIFFRACTION_CACHE"
+#: The files unused for longest go when all are larger than this together.
+MAX_BYTES = 4 << 30
+
+SUFFIX = ".cache"
+#: Also of files that earlier versions kept.
+_PATTERNS = (f"*{SUFFIX}", "*.exr", "*.npz", "albedo-*.npy")
+_MAGIC = "mitsuba_diffraction cache"
+#: Bytes that the first line is filled up to, and the second, a number; arrays begin at multiples of
+#: the last.
+_HEAD, _ALIGNMENT = 256, 64
+
+T = TypeVar("T")
+_making: dict[tuple[str, str], threading.Lock] = {}
+
+
+def cache_folder() -> Path | None:
+    """$MITSUBA_DIFFRACTION_CACHE, or the user's cache folder; None for a user without a home."""
+    own = os.environ.get(VARIABLE)
+    if own:
+        return Path(own)
+    try:
+        folder = platformdirs.user_cache_path("mitsuba_diffraction", appauthor=False)
+    except RuntimeError:
+        return None
+    return folder if folder.is_absolute() else None  # "~" as earlier versions leave it
+
+
+@dataclass(frozen=True)
+class Record:
+    """What a file holds.
+
+    Attributes
+    ----------
+    document : plain data, as JSON has it.
+    arrays : of any shape and type.
+    """
+
+    document: Any
+    arrays: Sequence[NDArray[Any]]
+
+
+def key_of(*parts: Any) -> str:
+    """A key: the SHA-256 of what something is made of, as JSON."""
+    return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def kept(
+    kind: str,
+    key: str,
+    memory: MutableMapping[str, T],
+    make: Callable[[], T],
+    pack: Callable[[T], Record],
+    unpack: Callable[[Record], T],
+) -> T:
+    """What is kept under a key, in memory or on disk; or made now, and kept.
+
+    Of several threads and processes that want one thing at a time, one makes it and the others
+    wait. A cache that cannot be written is no reason to fail: the thing is then made every time.
+
+    Parameters
+    ----------
+    kind : one word, of files for people.
+    key : of all that it is made of, see `key_of`.
+    memory : where this process keeps it.
+    make : makes it.
+    pack, unpack : to a record, and back; unpack raises ValueError for what does not fit.
+    """
+    found = memory.get(key)
+    if found is None:
+        with _making.setdefault((kind, key), threading.Lock()):
+            found = memory.get(key)
+            if found is None:
+                found = memory[key] = _from_disk(kind, key, make, pack, unpack)
+    return found
+
+
+def _from_disk(
+    kind: str,
+    key: str,
+    make: Callable[[], T],
+    pack: Callable[[T], Record],
+    unpack: Callable[[Record], T],
+) -> T:
+    folder = cache_folder()
+    if folder is None:
+        return make()
+    path, title = folder / f"{kind}-{key[:32]}{SUFFIX}", f"{_MAGIC} {kind} {key}"
+    found = _found(path, title, unpack)
+    if found is None:
+        with _locked(path):
+            found = _found(path, title, unpack)  # made by whoever was waited for
+            if found is None:
+                found = make()
+                _keep(path, title, pack(found))
+    return found
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Alone among all processes with this file; where there are no locks, not alone."""
+    lock = path.with_suffix(".lock")
+    with contextlib.ExitStack() as release:
+        with contextlib.suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            while True:
+                handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o600)
+                release.callback(os.close, handle)
+                fcntl.flock(handle, fcntl.LOCK_EX)
+                with contextlib.suppress(FileNotFoundError):
+                    if os.path.samestat(os.fstat(handle), os.stat(lock)):
+                        break  # else whoever had it has removed it
+            release.callback(lock.unlink, missing_ok=True)
+        yield
+
+
+def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
+    """What a file holds; None if there is none, and with a warning if it is damaged."""
+    try:
+        found = unpack(_read(path, title))
+        os.utime(path)  # recently used ones are kept longest
+        return found
+    except OSError:
+        return None
+    except (ValueError, LookupError, TypeError, MemoryError, RecursionError) as error:
+        warnings.warn(
+            f"'{path}' in the cache is damaged ({one_line(str(error))[:100]}) and made again",
+            DiffractionWarning,
+            stacklevel=2,
+        )
+        with contextlib.suppress(OSError):
+            path.unlink()
+        return None
+
+
+def _read(path: Path, title: str) -> Record:
+    content = np.fromfile(path, np.uint8)
+    if content[:_HEAD].tobytes() != _head(title, [content[_HEAD:]]):
+        raise ValueError("its checksum or its key is another's")
+    length = int(content[_HEAD : 2 * _HEAD].tobytes())
+    place = 2 * _HEAD + _aligned(length)
+    described = json.loads(content[2 * _HEAD : 2 * _HEAD + length].tobytes())
+    arrays = []
+    for kind, shape in described["arrays"]:
+        size = math.prod(shape) * np.dtype(kind).itemsize
+        arrays.append(content[place : place + size].view(kind).reshape(shape))
+        place += _aligned(size)
+    return Record(described["document"], arrays)
+
+
+def _keep(path: Path, title: str, record: Record) -> None:
+    arrays = [np.ascontiguousarray(array) for array in record.arrays]
+    described = [[array.dtype.str, array.shape] for array in arrays]
+    text = json.dumps({"document": record.document, "arrays": described}).encode()
+    texts = [np.frombuffer(t, np.uint8) for t in (str(len(text)).encode().ljust(_HEAD), text)]
+    blocks = [*texts, *(array.reshape(-1).view(np.uint8) for array in arrays)]
+    padded = [np.pad(block, (0, _aligned(block.size) - block.size)) for block in blocks]
+    try:
+        with atomic_path(path) as temporary, open(temporary, "wb") as file:
+            file.write(_head(title, padded))
+            for block in padded:
+                file.write(block.data)
+        _prune(path.parent)
+    except (DiffractionError, OSError):
+        return
+
+
+def _head(title: str, blocks: Sequence[NDArray[np.uint8]]) -> bytes:
+    """The first line, filled up."""
+    content = hashlib.sha256()
+    for block in blocks:
+        content.update(block.data)
+    return f"{title} {content.hexdigest()}".encode().ljust(_HEAD - 1) + b"\n"
+
+
+def _aligned(size: int) -> int:
+    """The least multiple of `_ALIGNMENT` that is not below a size."""
+    return -(-size // _ALIGNMENT) * _ALIGNMENT
+
+
+def _prune(folder: Path) -> None:
+    """Remove the files unused for longest until the folder is small enough."""
+    remove_abandoned(folder, r"\w+-\w+", SUFFIX)
+    found = {path for pattern in _PATTERNS for path in folder.glob(pattern)}
+    newest = sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
+    total = 0
+    for n, path in enumerate(newest):
+        total += path.stat().st_size
+        if total > MAX_BYTES and n > 0:
+            path.unlink(missing_ok=True)
+
+
+_tables: weakref.WeakValueDictionary[str, DiffractionTable] = weakref.WeakValueDictionary()
+_colours: weakref.WeakKeyDictionary[DiffractionTable, dict[str, ColourTable]] = (
+    weakref.WeakKeyDictionary()
+)
+_COLOUR_NUMBERS = ("scale", "radius_end", "sigma")
+
+
+def table_key(digest: str, settings: TableSettings) -> str:
+    """Name of the table of heights with this digest, built with these settings."""
+    cells: tuple[float, ...] = ()
+    if settings.q_max or settings.kappa_max:  # it goes on in cells that no setting tells of
+        cells = (coarse.CELL, coarse.FEWEST, coarse.STEP, coarse.TOLERANCE)
+    return key_of(FORMAT_VERSION, TEXTS_VERSION, digest, asdict(settings), cells)
+
+
+def cached_table(
+    digest: str, settings: TableSettings, build: Callable[[], DiffractionTable]
+) -> DiffractionTable:
+    """The table for heights with this digest, from memory, from disk, or built and kept."""
+    key = table_key(digest, settings)
+    return kept("table", key, _tables, build, _table_record, _table_of)
+
+
+def _table_record(table: DiffractionTable) -> Record:
+    document = json.loads(json.dumps(document_of(table), default=plain))
+    return Record(document, [part.coefficients for part in table.parts])
+
+
+def _table_of(record: Record) -> DiffractionTable:
+    found = described(record.document)
+    shapes = [part.shape for part in found.parts]
+    if [array.shape for array in record.arrays] != shapes:
+        raise ValueError(f"arrays of other shapes than {shapes}")
+    return found.table(record.arrays)
+
+
+def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:
+    """`DiffractionTable.load`, once for all that use the same file at the same time."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return DiffractionTable.load(path)  # which says what is wrong
+    key = f"{Path(path).resolve()} {status.st_mtime_ns} {status.st_size}"
+    table = _tables.get(key)
+    if table is None:
+        table = _tables.setdefault(key, DiffractionTable.load(path))
+    return table
+
+
+def cached_colours(table: DiffractionTable) -> ColourTable:
+    """The colours of a table, from memory, from disk, or summed and kept."""
+    key = key_of(COLOUR_VERSION, table.digest())
+    memory = _colours.setdefault(table, {})
+    return kept("colours", key, memory, lambda: ColourTable.build(table), colour_record, colours_of)
+
+
+def colour_record(colours: ColourTable) -> Record:
+    """What a file keeps of colours."""
+    document = {
+        "grid": asdict(colours.grid),
+        "expansion": asdict(colours.expansion),
+        **{name: getattr(colours, name) for name in _COLOUR_NUMBERS},
+    }
+    return Record(document, [colours.coefficients, colours.order_0])
+
+
+def colours_of(record: Record) -> ColourTable:
+    """What was made into such a record."""
+    document = record.document
+    grid = document["grid"]
+    coefficients, order_0 = record.arrays
+    return ColourTable(
+        grid=PolarGrid(grid["smallest"], grid["step"], tuple(grid["counts"])),
+        expansion=Expansion(**document["expansion"]),
+        coefficients=coefficients,
+        order_0=order_0,
+        **{name: document[name] for name in _COLOUR_NUMBERS},
+    )

@@ -1,0 +1,409 @@
+"""The thesis' methods that take a surface as periodic, `nmm` and `pq`, and rainbows.
+
+`nmm` evaluates only the wavelengths whose orders reach the view direction, `pq` repeats the patch
+without any other window, and `rainbow` has colours from the spacing of a grating alone. The period
+is estimated from the autocorrelation of the heights (NumPy only).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...errors import DiffractionError
+from ...heights.field import HeightField
+from ...optics.colour import response
+from ...optics.geometry import diffraction_coordinates, sigma_of, wavenumber
+from ...tables.build.spectrum import NEAR
+from ...tables.lookup import Kernel, weighted_sum
+from ...tables.table import DiffractionTable
+from .method import Array, FullSpectrum, Gain, Method, UniformMethod
+
+#: Below this confidence a patch counts as having no period: the ring-shaped autocorrelation of a
+#: random surface reaches 0.1 by chance, snake scales across their fingers 0.5 and more.
+LEAST_CONFIDENCE = 0.3
+
+_SHORTEST, _LONGEST = 1e-2, 1e3  # µm
+
+
+@dataclass(frozen=True)
+class Period:
+    """An estimate."""
+
+    axis: str  # "x" or "y"
+    length: float  # µm; NaN where the autocorrelation has no peak at all
+    # 0 to 1, how far the autocorrelation rises from its valley (or from 0, if that is higher) to
+    # its peak at `length`; 1 for an exact grating
+    confidence: float
+
+    @property
+    def found(self) -> bool:
+        """Whether it is worth using."""
+        return self.confidence >= LEAST_CONFIDENCE
+
+    def __str__(self) -> str:
+        if not np.isfinite(self.length):
+            return f"along {self.axis}: none"
+        return f"along {self.axis}: {self.length:.4g} µm, confidence {self.confidence:.2f}"
+
+
+def estimate_periods(field: HeightField) -> tuple[Period, Period]:
+    """Periods along x and along y.
+
+    The autocorrelation r of the heights, which tile the plane, is followed along each axis from lag
+    0 down to its first valley and up to the first peak that rises by `LEAST_CONFIDENCE`, or else to
+    the peak that rises most; a parabola through the peak and its neighbours gives the lag between
+    pixels. Lags up to half of the patch are looked at: its own length is a period of any tile.
+    """
+    centred = field.heights - field.heights.mean()
+    power = np.abs(np.fft.fft2(centred)) ** 2
+    # the mean over one axis of the 2D spectrum is the spectrum of lag 0 along that axis
+    correlations = (np.fft.ifft(power.mean(axis=0)).real, np.fft.ifft(power.mean(axis=1)).real)
+    periods = [
+        _first_peak(axis, correlation, pixel)
+        for axis, correlation, pixel in zip("xy", correlations, field.pixel_size, strict=True)
+    ]
+    return periods[0], periods[1]
+
+
+def main_period(field: HeightField) -> Period:
+    """The estimate with the greater confidence; x if they are alike."""
+    along_x, along_y = estimate_periods(field)
+    return along_y if along_y.confidence > along_x.confidence else along_x
+
+
+def required_period(field: HeightField, method: str, period: float | None) -> Period:
+    """The period that a method needs: the given one (along the main axis), or the estimate.
+
+    Raises
+    ------
+    DiffractionError
+        If `period` is out of range, or the patch has none.
+    """
+    estimate = main_period(field)
+    if period is not None:
+        return Period(estimate.axis, check_period(period), 1.0)
+    if estimate.found:
+        return estimate
+    both = "; ".join(str(p) for p in estimate_periods(field))
+    raise DiffractionError(
+        f"method '{method}' needs a period, and {field.name} has none that shows ({both}; "
+        f"at least {LEAST_CONFIDENCE:g} is needed); give period in µm, or choose another method"
+    )
+
+
+def check_period(period: float) -> float:
+    """Refuse a period that is none."""
+    if not _SHORTEST <= period <= _LONGEST:
+        raise DiffractionError(f"period={period} must be from {_SHORTEST:g} to {_LONGEST:g} µm")
+    return float(period)
+
+
+def _first_peak(axis: str, correlation: NDArray[np.float64], pixel: float) -> Period:
+    if correlation[0] <= 0.0:  # a flat patch
+        return Period(axis, np.nan, 0.0)
+    r = correlation / correlation[0]
+    half = r.size // 2
+    valley = 1.0
+    best = Period(axis, np.nan, 0.0)
+    for lag in range(1, half + 1):  # two periods of an odd number of pixels peak at half a lag more
+        valley = min(valley, r[lag])
+        before, after = r[lag - 1], r[(lag + 1) % r.size]
+        if not (r[lag] > before and r[lag] >= after - 1e-12):
+            continue
+        rise = float(min(r[lag] - max(valley, 0.0), 1.0))
+        if rise > best.confidence:
+            bend = before - 2.0 * r[lag] + after
+            shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+            best = Period(axis, float((lag + shift) * pixel), rise)
+        if best.found:
+            break
+    return best
+
+
+WEIGHTS = ("step", "lobe")
+
+#: nm, whose value the white around the mirror direction takes: where the eye sees best.
+SPECULAR_WAVELENGTH = 555.0
+
+
+class OrdersOnly(Method):
+    """`nmm`: S of `flss`, at the wavelengths λₙ = d·|u|/n (and d·|v|/n) alone.
+
+    For a direction pair with (u, v, w) = ωi + ωo (thesis, "NMM approach", with the period d
+    where one draft has the pixel size):
+
+    1. Where hypot(u, v) < ε the colour is white, as bright as at 555 nm: near the mirror direction
+       n_min…n_max holds too few wavelengths or none. ε = 3/(σ k(λ_max)) by default, where order
+       0's lobe ends at the longest wavelength.
+    2. Elsewhere, for n from n_min = ⌈d|u|/λ_max⌉ (at least 1) to n_max = ⌊d|u|/λ_min⌋, every
+       λₙ = d|u|/n adds f(λₙ)·s̄(λₙ)·Δλₙ; likewise for v where there is a period along y. A
+       wavelength that both reach is added twice, as in the thesis.
+
+    `weights` says what Δλₙ is. "step", the thesis' own, is the step of the full sum (5 nm) for
+    every wavelength alike: since the λₙ lie closer together, and their lobes are narrower, the
+    shorter they are, the sum is too blue, and red is lost: the known purple shift. "lobe" is
+    ∫exp(−σ²(k·u − 2πn/d)²)dλ = λₙ²/(2√π·σ·|u|), the width in wavelength of the lobe that a perfect
+    grating puts there; it is right where the lobe of one order does not reach the next.
+
+    Between orders, and wherever the surface is not periodic, light is missed: `brdf` and `relative`
+    are those of `flss` within half a step of a λₙ and around the mirror direction, and 0 elsewhere.
+
+    Parameters
+    ----------
+    full : the method to sample, its table above all.
+    periods : (dx, dy) in µm, `None` where there is none along an axis, not both.
+    weights : "step" or "lobe".
+    specular : ε, or `None` for the default.
+    """
+
+    def __init__(
+        self,
+        full: FullSpectrum,
+        periods: tuple[float | None, float | None],
+        *,
+        weights: str = "step",
+        specular: float | None = None,
+        name: str = "nmm",
+    ) -> None:
+        if weights not in WEIGHTS:
+            raise DiffractionError(
+                f"weights='{weights}' is unknown; choose one of {', '.join(WEIGHTS)}"
+            )
+        if periods[0] is None and periods[1] is None:
+            raise DiffractionError("method 'nmm' needs a period along x or y; give one in µm")
+        self.name, self.full, self.periods, self.weighting = name, full, periods, weights
+        self.sigma, self.wavelength_range = full.sigma, full.wavelength_range
+        longest = float(wavenumber(full.wavelength_range[1]))
+        self.specular = NEAR / (full.sigma * longest) if specular is None else specular
+        if not 0.0 <= self.specular < 2.0:
+            raise DiffractionError(f"specular={self.specular:g} must be at least 0 and below 2")
+        self._step = float(np.diff(full.wavelengths).max())
+
+    def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
+        """S as `flss` has it, at wavelengths that are taken, and 0 at others."""
+        taken = self._takes(wi, wo, wavelength)
+        result = np.zeros(len(wi))
+        result[taken] = self.full.window_sum(wi[taken], wo[taken], wavelength[taken])
+        return result
+
+    def special(self, wi: Array, wo: Array) -> tuple[NDArray[np.bool_], float]:
+        """White within ε of the mirror direction."""
+        u, v, _ = diffraction_coordinates(wi, wo)
+        return np.hypot(u, v) < self.specular, SPECULAR_WAVELENGTH
+
+    def samples(self, wi: Array, wo: Array) -> Iterator[tuple[Array, Array]]:
+        """λₙ and Δλₙ, order by order, first along x and then along y."""
+        u, v, _ = diffraction_coordinates(wi, wo)
+        for period, frequency in zip(self.periods, (u, v), strict=True):
+            if period is not None:
+                for _, wavelength, reached in _orders(period, frequency, self.wavelength_range):
+                    yield wavelength, np.where(reached, self._width(wavelength, frequency), 0.0)
+
+    def _takes(self, wi: Array, wo: Array, wavelength: Array) -> NDArray[np.bool_]:
+        """Whether a λₙ is within half a step, or the pair is close to the mirror direction."""
+        u, v, _ = diffraction_coordinates(wi, wo)
+        taken = np.hypot(u, v) < self.specular
+        for period, frequency in zip(self.periods, (u, v), strict=True):
+            if period is not None:
+                path = 1e3 * period * np.abs(frequency)
+                nearest = np.maximum(np.round(path / wavelength), 1.0)
+                taken |= np.abs(path / nearest - wavelength) <= 0.5 * self._step
+        return taken
+
+    def _width(self, wavelength: Array, frequency: Array) -> Array:
+        """Δλ in nm."""
+        if self.weighting == "step":
+            return np.full(len(wavelength), self._step)
+        slope = np.maximum(np.abs(frequency), 1e-12)
+        return 1e-3 * wavelength**2 / (2.0 * math.sqrt(math.pi) * self.sigma * slope)
+
+
+INTERPOLATIONS = ("linear", "sinc")
+
+
+def _orders(
+    period: float, frequency: Array, wavelength_range: tuple[float, float]
+) -> Iterator[tuple[int, Array, NDArray[np.bool_]]]:
+    """Orders n of a period in µm, their wavelengths λₙ (n,) in nm, and which are in the range."""
+    low, high = wavelength_range
+    path = 1e3 * period * np.abs(frequency)  # nm, of order 1
+    for n in range(1, math.floor(path.max(initial=0.0) / low) + 1):
+        wavelength = path / n
+        reached = (low <= wavelength) & (wavelength <= high)
+        yield n, np.where(reached, wavelength, high), reached
+
+
+class Repeated(UniformMethod):
+    """`pq`: light is coherent over a rectangle of whole patches.
+
+    With the patch's extents Lx, Ly and x = k·u·Lx/2π, y = k·v·Ly/2π in bins (thesis, "PQ
+    factors"; the sum over copies is a geometric series):
+
+        S = |B(x, y)|² · D(2πx; N₁)² · D(2πy; N₂)²,
+        D(t; N) = |sin(N t/2) / (N sin(t/2))|, and 1 where t is a multiple of 2π,
+
+    the stable form of the thesis' p + iq, with their N + 1 copies called N here. B is the
+    Fourier transform of exp(iκh) over one patch, from its DFT a_j about the patch's centre (without
+    that phase neighbours would cancel):
+
+    - "sinc": B = Σ_j a_j sinc(x − j_x) sinc(y − j_y), exact if all bins are summed; `taps` of them
+      nearest to (x, y) are, and order 0 always (the thesis takes 3);
+    - "linear": the same with (1 − |x − j_x|)(1 − |y − j_y|) for the two nearest bins along each
+      axis: wrong between bins, where a wide patch's B is not smooth.
+
+    The coherent area is N₁Lx·N₂Ly: f = (1 + ωi·ωo)²·N₁N₂LxLy·S/(λ²w²cosθi cosθo). Its lobes have
+    the side lobes of a rectangle, and a patch that does not tile the surface in truth gets false
+    orders, 2π/Lx apart. Colours are summed as in `flss`.
+
+    Parameters
+    ----------
+    table : of any series, with coherence="patch" and enough taps; the thesis' is Taylor's.
+    repeats : (N₁, N₂), at least 1 each.
+    interpolation : "linear" or "sinc".
+    taps : bins read along each axis for "sinc".
+    wavelength_range, step : nm.
+    """
+
+    def __init__(
+        self,
+        table: DiffractionTable,
+        repeats: tuple[int, int],
+        *,
+        interpolation: str = "linear",
+        taps: int = 8,
+        wavelength_range: tuple[float, float] = (380.0, 780.0),
+        step: float = 5.0,
+        name: str = "pq",
+    ) -> None:
+        if interpolation not in INTERPOLATIONS:
+            raise DiffractionError(
+                f"interpolation='{interpolation}' is unknown; choose one of "
+                f"{', '.join(INTERPOLATIONS)}"
+            )
+        if min(repeats) < 1 or max(repeats) > 10**6:
+            raise DiffractionError(f"repeats={repeats} must be from 1 to 1000000 along each axis")
+        if not table.grid.coherent:
+            raise DiffractionError("method 'pq' adds amplitudes: its table needs coherence='patch'")
+        self.name, self.table, self.repeats = name, table, repeats
+        self._kernel: Kernel = np.sinc if interpolation == "sinc" else _tent
+        wanted = taps if interpolation == "sinc" else 2
+        self._taps = (min(wanted, table.grid.taps[0]), min(wanted, table.grid.taps[1]))
+        if interpolation == "linear" and min(self._taps) < 2:
+            raise DiffractionError("method 'pq' needs a table of at least 2 taps")
+        extents = [2.0 * np.pi / spacing for spacing in table.spacing]
+        self.area = repeats[0] * extents[0] * repeats[1] * extents[1]
+        self.sigma = float(np.sqrt(self.area / (4.0 * np.pi)))
+        self._sum_over(wavelength_range, step)
+
+    def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
+        """|B|²·D₁²·D₂²."""
+        k = wavenumber(wavelength)
+        u, v, w = diffraction_coordinates(wi, wo)
+        amplitude = weighted_sum(
+            self.table, k * u, k * v, k * w, (self._kernel, self._kernel), self._taps
+        )
+        power = np.sum(amplitude**2, axis=1)
+        for frequency, spacing, n in zip((u, v), self.table.spacing, self.repeats, strict=True):
+            power = power * copies(k * frequency / spacing, n) ** 2
+        return power
+
+
+def copies(x: Array, n: int) -> Array:
+    """D = |sin(πnx)/(n sin(πx))| for positions x in bins, 1 at whole numbers.
+
+    x is reduced to the nearest whole number first, which keeps both sines exact.
+    """
+    fraction = x - np.round(x)
+    below = n * np.sin(np.pi * fraction)
+    small = np.abs(fraction) < 1e-9
+    return np.where(small, 1.0, np.abs(np.sin(np.pi * n * fraction) / np.where(small, 1.0, below)))
+
+
+def _tent(distance: Array) -> Array:
+    return np.maximum(0.0, 1.0 - np.abs(distance))
+
+
+class Rainbow(Method):
+    """`rainbow`: every order of the grating equation d·|u| = nλ is equally strong.
+
+    What many shaders do (after Guardado, GPU Gems 2004, chapter 8): heights do not enter, nor does
+    the direction along the grooves, nor any decay towards grazing angles. The light of a Lambertian
+    reflector, 1/π, is redistributed over the spectrum by a comb of lines of mean 1,
+
+        f(λ) = 1/π · (2√π σ/d) Σ_n exp(−σ²(k|u| − 2πn/d)²),
+
+    whose integral over wavelength, line by line, is
+
+        XYZ = 1/π · [Σ_{n≥1} s̄(λₙ)·λₙ²/(d|u|) + (2√π σ/d)·exp(−σ²k₅₅₅²u²)·white],  λₙ = d|u|/n.
+
+    The last summand is order 0, the white streak across the mirror direction.
+
+    Parameters
+    ----------
+    period : along x or y.
+    coherence_width : µm, 4σ: width of the lines.
+    wavelength_range : nm.
+    """
+
+    def __init__(
+        self,
+        period: Period,
+        *,
+        coherence_width: float = 65.0,
+        wavelength_range: tuple[float, float] = (380.0, 780.0),
+        name: str = "rainbow",
+    ) -> None:
+        self.name, self.period = name, period
+        self.sigma = sigma_of(coherence_width)
+        self.wavelength_range = wavelength_range
+        self._density = 2.0 * math.sqrt(math.pi) * self.sigma / period.length
+
+    def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
+        """The comb, (2√π σ/d) Σ_n exp(−σ²(k|u| − 2πn/d)²): mean 1 over frequency."""
+        line = self._frequency(wi, wo) * wavenumber(wavelength) * self.period.length / (2 * np.pi)
+        sharpness = (2.0 * np.pi * self.sigma / self.period.length) ** 2
+        # the nearest line on either side: others matter only where the window holds no period
+        reach = max(1, math.ceil(3.0 / math.sqrt(sharpness)))
+        offsets = np.round(line)[:, None] + np.arange(-reach, reach + 1)
+        lines = np.exp(-sharpness * (line[:, None] - offsets) ** 2)
+        return self._density * lines.sum(axis=1)
+
+    def samples(self, wi: Array, wo: Array) -> Iterator[tuple[Array, Array]]:
+        """λₙ and the gaps between them, λₙ²/(d|u|)."""
+        frequency = self._frequency(wi, wo)
+        for n, wavelength, reached in _orders(self.period.length, frequency, self.wavelength_range):
+            yield wavelength, np.where(reached, wavelength / n, 0.0)
+
+    def relative(
+        self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, gain: Gain | None = None
+    ) -> Array:
+        """Refused: there is no mirror that it would be relative to."""
+        raise self._refused()
+
+    def _xyz(self, wi: Array, wo: Array, gain: Gain | None) -> Array:
+        if gain is not None:
+            raise self._refused()
+        total = np.zeros((len(wi), 3))
+        for wavelength, gap in self.samples(wi, wo):
+            total += gap[:, None] * response(wavelength)
+        spread = self.sigma * float(wavenumber(SPECULAR_WAVELENGTH)) * self._frequency(wi, wo)
+        total += (self._density * np.exp(-(spread**2)))[:, None] * self._white()
+        return total / np.pi
+
+    def _scaled(self, wi: Array, wo: Array, wavelength: Array, gain: Gain | None) -> Array:
+        return self.window_sum(wi, wo, wavelength) / np.pi
+
+    def _frequency(self, wi: Array, wo: Array) -> NDArray[np.float64]:
+        u, v, _ = diffraction_coordinates(wi, wo)
+        return np.abs(u if self.period.axis == "x" else v)
+
+    def _refused(self) -> DiffractionError:
+        return DiffractionError(
+            "method 'rainbow' has no relative reflectance: it knows no mirror to compare with; "
+            "leave it out, or ask for the BRDF"
+        )

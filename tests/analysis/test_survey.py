@@ -1,0 +1,197 @@
+"""Surveys: rows tell what a scan is, a bad file is a row, and a second run does what is new."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from mitsuba_diffraction import DiffractionError, HeightField, gratings
+from mitsuba_diffraction.analysis import survey as module
+from mitsuba_diffraction.analysis.maps import Bands, BrdfMap, Light
+from mitsuba_diffraction.analysis.survey import (
+    Treatment,
+    colours_of,
+    iridescence,
+    run_survey,
+    treatment_for,
+    treatments_of,
+)
+from mitsuba_diffraction.optics.colour import response
+from tests.cli.conftest import run
+
+pytestmark = pytest.mark.usefixtures("coarse")
+
+__all__ = ["run"]
+
+PERIOD, PIXEL = 1.6, 0.1
+SMALL = {"coherence_width": 6.0, "tolerance": 0.05}
+
+
+@pytest.fixture
+def scans(tmp_path):
+    """A grating across x, one turned by 30°, and a file that is none."""
+    n = 160
+    x, y = PIXEL * np.arange(n), PIXEL * np.arange(n)[:, None]
+    turn = math.radians(30)
+    for name, phase in (("straight", x + 0 * y), ("turned", x * np.cos(turn) + y * np.sin(turn))):
+        np.save(tmp_path / f"{name}.npy", 0.03 * np.sin(2 * np.pi * phase / PERIOD))
+    (tmp_path / "broken.npy").write_bytes(b"\x93NUMPY and no more")
+    return [tmp_path / f"{name}.npy" for name in ("straight", "broken", "turned")]
+
+
+@pytest.fixture
+def survey(scans, tmp_path):
+    own = Treatment().updated(Treatment(settings=SMALL))
+    options = treatments_of(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'))
+
+    def call(files=scans):
+        return run_survey(
+            files, tmp_path / "out", treatments=options, own=own, resolution=32, theta=20.0
+        )
+
+    return call
+
+
+def _toml(folder, text):
+    path = folder / "treatments.toml"
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_rows_have_periods_to_a_percent_and_directions_to_a_degree(survey, tmp_path):
+    straight, broken, turned = survey()
+    assert broken["reason"].startswith("'")
+    assert "NPY" in broken["reason"]
+    for row, direction in ((straight, 0.0), (turned, 30.0)):
+        assert row["reason"] == ""
+        assert row["period_1_um"] == pytest.approx(PERIOD, rel=0.01)
+        assert row["direction_1_deg"] == pytest.approx(direction, abs=1.0)
+        assert row["share_1"] > 0.9
+        assert row["iridescence"] > 0.02
+        shares = [v for k, v in row.items() if k.startswith("share_") and not k[-1].isdigit()]
+        assert sum(shares) == pytest.approx(1.0)
+        with Image.open(tmp_path / "out" / row["map"]) as picture:
+            assert picture.size == (32, 32)
+    with (tmp_path / "out" / "survey.csv").open(encoding="utf-8") as file:
+        table = list(csv.DictReader(file))
+    assert [Path(row["file"]).stem for row in table] == ["straight", "broken", "turned"]
+    assert float(table[2]["period_1_um"]) == turned["period_1_um"]
+    assert (tmp_path / "out" / "sheet.png").is_file()
+
+
+def test_a_table_that_cannot_be_mapped_is_a_row_with_its_reason(scans, tmp_path):
+    own = Treatment(settings={**SMALL, "wavelength_range": (500.0, 600.0)})
+    options = treatments_of(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'))
+    (row,) = run_survey(scans[:1], tmp_path / "out", treatments=options, own=own, resolution=8)
+    assert row["reason"].startswith("cannot map it: ")
+    assert "starts at 500 nm" in row["reason"]
+
+
+def test_a_second_run_does_only_what_is_new(survey, scans, monkeypatch):
+    first = survey()
+    measured = []
+    measure = module.measure
+
+    def counted(job, contents=None):
+        measured.append(job.files.scene)
+        return measure(job, contents)
+
+    monkeypatch.setattr(module, "measure", counted)
+    assert survey() == first
+    assert measured == []
+    np.save(scans[2], np.load(scans[2]) * 0.5)
+    assert survey()[2]["range_um"] == pytest.approx(0.5 * first[2]["range_um"])
+    assert measured == [str(scans[2])]
+
+
+def test_the_command_writes_the_folder(run, scans, tmp_path):
+    ran = run(
+        "survey", *scans[:2], tmp_path / "none.npy", "-o", tmp_path / "out", "--pixel-size", PIXEL,
+        "--coherence-width", 6, "--tolerance", 0.05, "--resolution", 24,
+    )  # fmt: skip
+    assert ran.code == 0
+    assert "1 scans in survey.csv, 2 failed" in ran.out
+    assert "none.npy" in ran.err
+
+
+def test_treatments_are_those_of_all_patterns_that_match(tmp_path):
+    path = _toml(
+        tmp_path,
+        '["*.png"]\npixel_size = 0.1\nlevel = "plane"\n["b*"]\nlevel = "lines"\ntolerance = 0.1\n',
+    )
+    found = treatment_for(Path("in/b.png"), treatments_of(path))
+    assert found.options.pixel_size == (0.1, 0.1)
+    assert found.options.level == "lines"
+    assert found.settings == {"tolerance": 0.1}
+    assert treatment_for(Path("in/c.npy"), treatments_of(path)) == Treatment()
+
+
+@pytest.mark.parametrize("text", ["level = 1", '["*"]\nheight = 2', '["*"]\nlevel = "sea"', "["])
+def test_treatments_that_are_none_are_one_line(tmp_path, text):
+    with pytest.raises(DiffractionError, match=r"treatments\.toml"):
+        treatments_of(_toml(tmp_path, text))
+
+
+def test_a_disc_is_more_iridescent_than_a_scale_and_both_than_a_mirror(tmp_path):
+    made = {
+        "mirror": np.zeros((160, 160)), "scale": gratings.elaphe_like(20.0, 160).heights,
+        "disc": gratings.cd(20.0, 160).heights,
+    }  # fmt: skip
+    for name, heights in made.items():
+        np.save(tmp_path / f"{name}.npy", heights)
+    options = treatments_of(_toml(tmp_path, '["*.npy"]\npixel_size = 0.125\n'))
+    rows = run_survey(
+        [tmp_path / f"{name}.npy" for name in made], tmp_path / "out", treatments=options,
+        own=Treatment(settings={"coherence_width": 20.0, "tolerance": 0.05}), resolution=32,
+    )  # fmt: skip
+    assert [row["reason"] for row in rows] == ["", "", ""]
+    mirror, scale, disc = (row["iridescence"] for row in rows)
+    assert mirror < 0.2 * scale  # a lobe of 20 µm is wider in red light
+    assert scale < disc
+
+
+def _map(spectrum, n=32):
+    """A map whose directions reflect (n, n, bands) between 400 and 700 nm."""
+    bands = Bands(400.0, 700.0, 10.0)
+    xyz = spectrum @ response(bands.wavelengths()) * bands.width
+    centres = (np.arange(n) + 0.5) * 2 / n - 1
+    inside = (np.hypot(centres, centres[:, None]) < 1).astype(np.float32)
+    xyz = (xyz * inside[..., None]).astype(np.float32)
+    return BrdfMap(Light(), bands, inside, xyz, None, False, "D65", 1)
+
+
+def test_one_colour_is_not_iridescent_however_bright():
+    brightness = np.random.default_rng(1).uniform(0.1, 3.0, (32, 32, 1))
+    red = np.linspace(400, 700, 30) > 600
+    for spectrum in (np.ones(30), red.astype(float)):
+        assert iridescence(_map(brightness * spectrum)) < 1e-3
+    assert colours_of(_map(brightness * red))["red"] > 0.99
+    assert colours_of(_map(brightness * np.ones(30)))["grey"] > 0.99
+
+
+def test_a_rainbow_is_iridescent():
+    wavelength, place = np.linspace(400, 700, 30), np.linspace(430, 660, 32)[:, None]
+    spectrum = np.exp(-(((wavelength - place) / 15) ** 2))
+    rainbow = _map(np.broadcast_to(spectrum, (32, 32, 30)))
+    pale = _map(np.broadcast_to(spectrum + 1.0, (32, 32, 30)))
+    assert iridescence(rainbow) > 0.15
+    assert iridescence(pale) < 0.5 * iridescence(rainbow)
+    shares = colours_of(rainbow)
+    assert sum(share > 0.03 for share in shares.values()) >= 4
+
+
+def test_gratings_of_two_directions_are_both_found():
+    n = 256
+    x, y = PIXEL * np.arange(n), PIXEL * np.arange(n)[:, None]
+    heights = 0.03 * np.sin(2 * np.pi * x / 1.3) + 0.02 * np.sin(2 * np.pi * y / 2.1)
+    from mitsuba_diffraction.heights.spectra import dominant_periods
+
+    one, other = dominant_periods(HeightField(heights, PIXEL))
+    assert (one.period, other.period) == pytest.approx((1.3, 2.1), rel=0.01)
+    assert (one.direction, other.direction) == pytest.approx((0.0, 90.0), abs=1.0)
+    assert (one.share, other.share) == pytest.approx((9 / 13, 4 / 13), abs=0.02)

@@ -1,0 +1,160 @@
+"""The trade: errors against the integral, budgets kept, series that break down where stated."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from docs.make.figures import tables
+from mitsuba_diffraction import DiffractionError, DiffractionTable
+from mitsuba_diffraction.analysis import tradeoff
+from mitsuba_diffraction.analysis.tradeoff.accuracy import (
+    TERMS,
+    Sample,
+    measure_wavelengths,
+    taylor_error,
+)
+from mitsuba_diffraction.analysis.tradeoff.measuring import Measured, Setting, rows, settings
+from mitsuba_diffraction.analysis.tradeoff.report import Budget, recommended
+from tests.directions import rough_patch
+
+PATCH = rough_patch((48, 48), (0.1, 0.1), 0.25)
+WIDTH = 4.5
+
+
+def quiet(done: int, total: int, text: str) -> None:
+    """No progress."""
+
+
+@pytest.fixture(scope="module")
+def sample() -> Sample:
+    return Sample.of(PATCH, WIDTH, "ensemble", 120, quiet)
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
+def test_the_error_found_is_below_the_tolerance_that_was_asked_for(sample, tolerance):
+    table = DiffractionTable.build(PATCH, coherence_width=WIDTH, tolerance=tolerance)
+    error = max(sample.error(sample.looked_up(table)))
+    assert 0.0 < error <= tolerance
+
+
+def test_the_error_of_twice_the_power_is_one(sample):
+    assert sample.error(2.0 * sample.exact) == pytest.approx((1.0, 1.0), abs=1e-12)
+
+
+def result(name: str, error: float, relative: float, megabytes: float, **arguments) -> Measured:
+    return Measured(
+        Setting("tolerance", name, arguments), error=error, relative=relative, megabytes=megabytes
+    )
+
+
+RESULTS = [
+    result("coarse", 1e-2, 2.0, 4.0),
+    result("default", 1e-3, 3.0, 8.0),
+    result("fine", 1e-5, 5.0, 30.0),
+    result("unfit", 1e-9, 1.0, 1.0, tolerance=0.999),  # nobody can ask for it
+]
+
+
+@pytest.mark.parametrize(
+    ("budget", "expected"),
+    [
+        (Budget(tolerance=1e-3), "default"),
+        (Budget(tolerance=2e-2), "coarse"),
+        (Budget(tolerance=1e-4), "fine"),
+        (Budget(megabytes=10.0), "default"),
+        (Budget(relative=2.5), "coarse"),
+        (Budget(), "fine"),
+    ],
+)
+def test_the_recommended_setting_is_the_best_within_the_budget(budget, expected):
+    assert recommended(RESULTS, budget).setting.name == expected
+
+
+def test_a_budget_that_nothing_meets_is_refused_in_one_line():
+    with pytest.raises(DiffractionError, match="no setting stays within this budget") as caught:
+        recommended(RESULTS, Budget(tolerance=1e-5, megabytes=10.0))
+    assert "\n" not in str(caught.value)
+
+
+def test_settings_have_names_of_their_own():
+    for quick in (False, True):
+        names = [setting.name for setting in settings(quick)]
+        assert len(set(names)) == len(names)
+
+
+def test_taylor_s_series_holds_for_shallow_surfaces_and_not_for_deep_ones():
+    heights = PATCH.heights - PATCH.heights.min()
+    kappa = 30.0  # κH/2 = 3.75: 37 terms leave 3.75³⁷/37! = 1e-22 of it, rounding e^3.75·6e-8
+    assert taylor_error(heights - 0.5 * PATCH.range, kappa, TERMS) < 1e-4
+    # κH = 60: the largest term is e⁶⁰, of which single precision keeps seven digits
+    assert taylor_error(8.0 * heights, kappa, TERMS) > 1.0
+
+
+def test_fine_sums_are_better_than_coarse_ones_and_more_wavelengths_less_noisy(sample):
+    table = DiffractionTable.build(PATCH, coherence_width=WIDTH)
+    found = measure_wavelengths(table, sample.wi, sample.wo)
+    assert found.steps[2.0] < 0.1 < found.steps[40.0] + 0.1
+    assert found.counts[1] > found.counts[4] > found.counts[16]
+
+
+@pytest.fixture
+def measured(tmp_path: Path) -> Path:
+    """A folder as `tradeoff -o` leaves it."""
+    document = {
+        "patch": "a patch",
+        "machine": {"cores": 2, "processor": "Abacus"},
+        "settings": list(rows([*RESULTS, Measured(Setting("basis", "none"), refused="too deep")])),
+        "spectral": {"steps": {"5.0": 0.25}, "counts": {"4": 0.75}},
+    }
+    (tmp_path / "tradeoff.json").write_text(json.dumps(document), "utf-8")
+    for name in ("tradeoff.png", "depth.png"):
+        (tmp_path / name).write_bytes(b"picture")
+    return tmp_path
+
+
+def test_pages_show_what_was_measured(measured, tmp_path):
+    file = tmp_path / "page.md"
+    file.write_text("<!-- begin settings -->\nstale\n<!-- end settings -->\n", "utf-8")
+    images = tmp_path / "images"
+    images.mkdir()
+    assert tables.main(["tradeoff", str(measured), "-o", str(file), "--images", str(images)]) == 0
+    text = file.read_text("utf-8")
+    assert "| coarse | 1.0e-02 |" in text
+    assert "refused: too deep" in text
+    assert "stale" not in text
+    assert (images / "depth.png").read_bytes() == b"picture"
+
+
+def test_a_folder_without_measurements_is_refused(tmp_path, capsys):
+    assert tables.main(["tradeoff", str(tmp_path), "-o", str(tmp_path / "page.md")]) == 1
+    assert "is not what tradeoff writes" in capsys.readouterr().err
+
+
+def test_the_command_measures_and_recommends(tmp_path, monkeypatch, capsys):
+    from mitsuba_diffraction.cli import bench as command
+    from mitsuba_diffraction.cli.main import main
+
+    np.save(tmp_path / "heights.npy", PATCH.heights)
+    monkeypatch.setattr(command, "_QUICK", (48, 16, 256, 1, 1))
+    few = (Setting("default", "the defaults"), Setting("tolerance", "1e-2", {"tolerance": 1e-2}))
+    monkeypatch.setattr(tradeoff, "settings", lambda quick: iter(few))
+    heights = [str(tmp_path / "heights.npy"), "--pixel-size", "0.1"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        out = tmp_path / "out"
+        code = main(
+            ["tradeoff", *heights, "--quick", "--coherence-width", "4.5", "-o", str(out)]
+        )  # fmt: skip
+    assert code == 0
+    said = capsys.readouterr().out
+    assert "recommended (tolerance 0.001): " in said
+    document = json.loads((out / "tradeoff.json").read_text("utf-8"))
+    assert [record["setting"] for record in document["settings"]] == ["the defaults", "1e-2"]
+    assert all(0.0 < record["error"] <= 1e-2 for record in document["settings"])
+    assert (out / "tradeoff.csv").read_text("utf-8").startswith("group,setting,")
+    assert {"tradeoff.png", "depth.png"} <= {file.name for file in out.iterdir()}

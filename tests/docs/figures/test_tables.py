@@ -1,0 +1,145 @@
+"""The pages' figures are those that commands wrote, and nothing else."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from docs.make.figures import tables
+
+
+def bench(value: float = 2.0, *, met: bool = True) -> dict[str, Any]:
+    """As `bench --json` writes it, every number the same."""
+    machine = {"cores": 2, "processor": "Abacus", "mitsuba": "3.9.1", "mitsuba_diffraction": "0.1"}
+    # each figure looks for the first section and row that fit: give the numbers to all of them
+    values = {figure.column: value for figure in tables.FIGURES}
+    goals = [{"goal": f"goal {n}", "met": met} for n in range(3)]
+    sections = [
+        {
+            "title": f"{figure.section}: somehow",
+            "rows": [{"name": f"{figure.row} and more", "values": values, "goals": goals}],
+        }
+        for figure in tables.FIGURES
+    ]
+    return {"machine": machine, "sections": sections}
+
+
+def plan() -> dict[str, Any]:
+    """As `plan --json` writes it."""
+    one = {"memory_mb": 8.5, "sampling_memory_mb": 14.0, "terms": "1 x 8"}
+    return {
+        "tables": [
+            {
+                "asked for": {
+                    "frequency (rad/µm)": {"light can probe": 34.9},
+                    "kappa (rad/µm)": {"the table has": 52.4},
+                },
+                "needs": {"frequency (rad/µm), along x and y": [20.5, 6.5], "kappa (rad/µm)": 35.0},
+                "whole": one,
+                "planned": one | {"memory_mb": 1.0},
+                "times less memory": 8.5,
+            }
+        ],
+        "picture, planned against whole, same random numbers": {
+            "mean difference / mean (XYZ)": 6e-5,
+            "delta E 2000, mean": 0.01,
+            "delta E 2000, 99 %": 0.1,
+        },
+    }
+
+
+METAL = {
+    "model": "small_slope",
+    "albedo": [0.729, 1.409],
+    "albedo, conserved": [0.729, 0.996],
+    "taken, largest": 0.29,
+    "taken at": {"0°": -0.0001, "45°": 0.004, "60°": 0.093, "75°": 0.278},
+    "conserved over raw where that is at most 1": [0.975, 1.001],
+    "within 1 % there": 0.958,
+    "conserved where raw is above 1": [0.963, 0.996],
+    "between 0.97 and 1.001 there": 0.984,
+    "reciprocity lets be kept": 0.968,
+}
+GLASS = {
+    key: value
+    for key, value in METAL.items()
+    if "above 1" not in key and "there" not in key[-6:] and "reciprocity" not in key
+} | {"within 1 % there": 1.0}
+
+
+def page(folder: Path, name: str) -> Path:
+    file = folder / "page.md"
+    file.write_text(f"above\n<!-- begin {name} -->\nstale\n<!-- end {name} -->\nbelow\n", "utf-8")
+    return file
+
+
+def written(folder: Path, name: str, *documents: dict[str, Any]) -> str:
+    """What the page shows of documents."""
+    target, files = page(folder, name), []
+    for n, document in enumerate(documents):
+        files.append(folder / f"{name}{n}.json")
+        files[-1].write_text(json.dumps(document), "utf-8")
+    assert tables.main([name, *map(str, files), "-o", str(target)]) == 0
+    text = target.read_text("utf-8")
+    assert text.startswith("above\n")
+    assert text.endswith("below\n")
+    assert "stale" not in text
+    return text
+
+
+def test_speed_has_all_measured_numbers_and_goals(tmp_path):
+    text = written(tmp_path, "speed", bench())
+    assert "2 cores (Abacus)" in text
+    assert len([line for line in text.splitlines() if line.startswith("|")]) == 2 + len(
+        tables.FIGURES
+    )
+    assert "| `eval` / `roughconductor` (Al) | 2.0 | goal 0 |" in text
+
+
+def test_a_missed_goal_is_shown_as_missed():
+    assert "**missed:** goal 0" in tables.speed(bench(met=False))["speed"]
+
+
+def test_a_plan_has_what_was_measured(tmp_path):
+    text = written(tmp_path, "plan", plan())
+    assert "| table | 8.5 MB | 1 MB |" in text
+    assert "up to 20.5 and 6.5 along x and y" in text
+    assert "8.5 times less memory" in text
+
+
+def test_energy_has_rows_of_all_files(tmp_path):
+    found = {"energy": {"glass": GLASS, "metal": METAL}}
+    lines = written(tmp_path, "energy", found, found).splitlines()[2:-2]
+    head, _, glass, metal, *others = lines
+    assert head.startswith("| table | material |")
+    assert glass.startswith(
+        "| energy0 | glass | 0.729–1.409 | 0.729–0.996 | 0.0, 0.4, 9.3, 27.8 % |"
+    )
+    assert glass.endswith("| 100 % | – | – | – |")
+    assert metal.endswith("| 96 % | 0.963–0.996 | 98 % | 0.968 |")
+    assert others == [line.replace("energy0", "energy1") for line in (glass, metal)]
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [(name, content) for name in ("speed", "plan", "energy") for content in ("{", "[]", "{}")]
+    + [("speed", '{"machine": {}, "sections": []}'), ("plan", '{"tables": []}')],
+)
+def test_another_file_is_refused_in_one_line(tmp_path, capsys, name, content):
+    file, target = tmp_path / "other.json", page(tmp_path, name)
+    file.write_text(content, "utf-8")
+    assert tables.main([name, str(file), "-o", str(target)]) == 1
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert {"speed": "make bench", "plan": "make plan", "energy": "make energy"}[name] in said
+    assert "stale" in target.read_text("utf-8")
+
+
+def test_a_page_without_markers_is_refused(tmp_path, capsys):
+    file, target = tmp_path / "plan.json", page(tmp_path, "other")
+    file.write_text(json.dumps(plan()), "utf-8")
+    assert tables.main(["plan", str(file), "-o", str(target)]) == 1
+    assert "has none of the markers" in capsys.readouterr().err

@@ -1,0 +1,65 @@
+"""What a BSDF reads from its mesh is there, or is asked for in one line."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+import pytest
+
+from mitsuba_diffraction import DiffractionError, bsdf_dict
+from mitsuba_diffraction.plugin.textures import check_attributes
+from mitsuba_diffraction.realtime.glsl.scene import read_scene
+from tests.directions import rough_patch
+
+PATCH = rough_patch((30, 32), (0.08, 0.08), 0.03)
+ON_SURFACE = {"coherence": "surface", "uv_scale": 10.0, "coherence_width": 2.4}
+
+pytestmark = pytest.mark.usefixtures("variant")
+
+
+def plate(name: str):
+    """A triangle whose pigment is this attribute."""
+    props = mi.Properties()
+    texture = {"type": "mesh_attribute", "name": name}
+    props["bsdf"] = mi.load_dict({"type": "diffuse", "reflectance": texture})
+    mesh = mi.Mesh("plate", 3, 1, props=props)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = [0, 0, 0, 1, 0, 0, 1, 1, 0]
+    parameters["faces"] = [0, 1, 2]
+    parameters.update()
+    return mesh
+
+
+@pytest.mark.parametrize(
+    ("name", "remedy"),
+    [("vertex_orientation", "mitsuba-diffraction tangents"), ("face_color", "add it to the mesh")],
+)
+def test_an_attribute_that_is_missing_is_named_with_what_to_do(name, remedy):
+    with pytest.raises(DiffractionError, match=f"no attribute {name}.*{remedy}"):
+        check_attributes(plate(name))
+
+
+def test_one_that_is_there_is_read():
+    mesh = plate("vertex_color")
+    mesh.add_attribute("vertex_color", 3, [0.2] * 9)
+    check_attributes(mesh)
+
+
+def test_places_need_uv_coordinates():
+    mesh = plate("vertex_color")
+    mesh.set_bsdf(mi.load_dict(bsdf_dict(PATCH, **ON_SURFACE)))
+    with pytest.raises(DiffractionError, match="no UV coordinates, from which coherence='surface'"):
+        check_attributes(mesh)
+
+
+def test_the_realtime_renderer_asks_as_well():
+    sensor = {"type": "perspective", "film": {"type": "hdrfilm"}}
+    scene = mi.load_dict({"type": "scene", "plate": plate("vertex_orientation"), "s": sensor})
+    with pytest.raises(DiffractionError, match="no attribute vertex_orientation"):
+        read_scene(scene)
+
+
+def test_the_realtime_renderer_refuses_places():
+    sensor = {"type": "perspective", "film": {"type": "hdrfilm"}}
+    disk = {"type": "disk", "bsdf": bsdf_dict(PATCH, **ON_SURFACE)}
+    with pytest.raises(DiffractionError, match=r"coherence='surface' of .* path tracer"):
+        read_scene(mi.load_dict({"type": "scene", "disk": disk, "s": sensor}))

@@ -1,0 +1,132 @@
+"""Compact arrays, meshes and tables, undone as the page does it."""
+
+from __future__ import annotations
+
+import zlib
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+from numpy.typing import NDArray
+
+from mitsuba_diffraction.realtime.glsl.scene import VERTEX
+from mitsuba_diffraction.realtime.web.sections import (
+    Sections,
+    octahedral,
+    packed_array,
+    packed_file,
+    packed_mesh,
+)
+from mitsuba_diffraction.realtime.web.tables import rounded
+
+KINDS = {"Uint16Array": np.uint16, "Uint32Array": np.uint32, "Float32Array": np.float32}
+
+
+def undone(data: bytes, layout: dict[str, Any]) -> NDArray[Any]:
+    """What `restored` of data.js does."""
+    kind = np.dtype(KINDS[layout["kind"]])
+    rows, columns = layout["rows"], layout["columns"]
+    planes = np.frombuffer(zlib.decompress(data), np.uint8).reshape(columns * kind.itemsize, rows)
+    values = np.ascontiguousarray(planes.T).view(kind)
+    return np.cumsum(values, axis=0, dtype=kind) if layout["differences"] else values
+
+
+@given(
+    arrays.arrays(st.sampled_from([np.uint16, np.uint32]), st.tuples(*[st.integers(1, 9)] * 2)),
+    st.booleans(),
+)
+def test_arrays_come_back_as_they_were(values: NDArray[Any], differences: bool) -> None:
+    section = packed_array(values, differences=differences)
+    np.testing.assert_array_equal(undone(section.data, section.layout), values)
+
+
+def test_half_floats_are_stored_as_their_bits() -> None:
+    values = np.array([[1.0, -0.5], [65504.0, 6e-8]], np.float16)
+    section = packed_array(values)
+    np.testing.assert_array_equal(undone(section.data, section.layout), values.view(np.uint16))
+
+
+def test_sections_know_where_they_lie() -> None:
+    sections = Sections()
+    numbers = [sections.add(packed_file(text)) for text in (b"one", b"three", b"")]
+    data, layouts = sections.joined()
+    assert numbers == [0, 1, 2]
+    found = [data[a["start"] : a["start"] + a["length"]] for a in layouts]
+    assert found == [b"one", b"three", b""]
+    assert sections.nbytes == 8
+
+
+def directions_of(pairs: NDArray[np.int16]) -> NDArray[np.float64]:
+    """What `fromOctahedron` of mesh.js does."""
+    x, y = pairs.T / 32767
+    z = 1 - np.abs(x) - np.abs(y)
+    under = z < 0
+    x, y = (
+        np.where(under, (1 - np.abs(y)) * np.where(x < 0, -1, 1), x),
+        np.where(under, (1 - np.abs(x)) * np.where(y < 0, -1, 1), y),
+    )
+    d = np.stack([x, y, z], axis=1)
+    return d / np.linalg.norm(d, axis=1, keepdims=True)
+
+
+def test_directions_take_two_numbers() -> None:
+    d = np.random.default_rng(1).normal(size=(5000, 3))
+    d = np.concatenate([d, np.eye(3), -np.eye(3), [[0, 1, -1], [-1, 0, -1e-9]]])
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    found = directions_of(octahedral(3.0 * d))
+    # half a step in x and y moves z by a whole one: √6 halves, seen √3 larger from the middle of a
+    # face, which is that much closer than a corner
+    assert np.linalg.norm(found - d, axis=1).max() < 0.5 / 32767 * 6**0.5 * 3**0.5 * 1.01
+    assert (octahedral(np.zeros((1, 3))) == -32768).all()
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_triangles_come_back_within_sixteen_bits(flat: bool) -> None:
+    rng = np.random.default_rng(2)
+    corners = rng.integers(0, 40, (100, 3))
+    per_vertex = rng.normal(size=(40, 16)).astype(np.float32)
+    per_vertex[:, 11:14] = [0.2, 0.4, 0.6]  # one colour
+    vertices = per_vertex[corners.ravel()]
+    if flat:
+        vertices[:, 6:9] = np.repeat(rng.normal(size=(100, 3)), 3, axis=0)
+    mesh = packed_mesh(vertices)
+    assert len(mesh.columns) == len(np.unique(corners))
+    assert (mesh.tangents is not None) == flat
+    rows = mesh.columns[mesh.corners[:, 0]]
+    start = 0
+    for name, size in VERTEX:
+        expected = vertices[:, start : start + size]
+        start += size
+        if name in ("normal", "tangent"):
+            if name == "tangent" and flat:
+                assert mesh.tangents is not None
+                pairs = np.repeat(mesh.tangents, 3, axis=0)
+            else:
+                first = mesh.layout[name]["column"]
+                pairs = rows[:, first : first + 2].view(np.int16)
+            expected = expected / np.linalg.norm(expected, axis=1, keepdims=True)
+            np.testing.assert_allclose(directions_of(pairs), expected, atol=7e-5)
+        elif "value" in mesh.layout[name]:
+            assert name == "colour"
+            np.testing.assert_allclose(np.tile(mesh.layout[name]["value"], (300, 1)), expected)
+        else:
+            place = mesh.layout[name]
+            whole = rows[:, place["column"] : place["column"] + size]
+            found = place["low"] + np.array(place["step"]) * whole
+            assert (np.abs(found - expected) <= 0.51 * np.array(place["step"])).all()
+
+
+@given(st.integers(4, 10), st.integers(0, 2**32 - 1))
+def test_rounding_is_bounded_by_the_largest_number_of_a_row(bits: int, seed: int) -> None:
+    values = (
+        np.random.default_rng(seed).normal(size=(20, 8))
+        * 10.0 ** np.arange(-3.0, 2.0, 0.25)[:, None]
+    )
+    found = rounded(values, bits).astype(float)
+    largest = np.abs(values).max(axis=1, keepdims=True)
+    # half a step of 2^(1 - bits) of the largest; half floats hold the result exactly to 10 bits
+    assert (np.abs(found - values) <= largest * 2.0**-bits * 1.001).all()
+    np.testing.assert_array_equal(rounded(found, bits), found)

@@ -1,0 +1,71 @@
+"""What conserves energy at any height scale: between few nodes, each computed once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction.tables.energy import store
+from mitsuba_diffraction.tables.energy.conservation import Conservation, DirectionalTable
+from mitsuba_diffraction.tables.energy.store import Energy
+from mitsuba_diffraction.tables.store import VARIABLE
+
+
+@pytest.fixture
+def computed(monkeypatch, tmp_path):
+    """(height scale, index) of what was computed; instead of it, a constant."""
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+    made: list[tuple[float, complex]] = []
+
+    def instead(table, height_scale, model, index, wavelength_range) -> Conservation:
+        made.append((height_scale, complex(index(np.array([500.0]))[0])))
+        values = np.full((2, 3, 4), 1.0 + height_scale, np.float32)
+        found = DirectionalTable(np.array([400.0, 700.0]), values)
+        return Conservation(found, found if height_scale > 0.5 else None)
+
+    monkeypatch.setattr(store, "conservation", instead)
+    return made
+
+
+def energy(index: complex = 1.5, scale: float = 1.5) -> Energy:
+    field = md.gratings.sinusoidal(2.0, 0.1, periods=2, pixels_per_period=24)
+    table = md.DiffractionTable.build(field, coherence_width=4.0, height_scale_max=scale)
+    return Energy(table, "small_slope", lambda w: np.full(len(w), index), (400.0, 700.0))
+
+
+@pytest.mark.parametrize("most", [1.5, 1.43, 0.1])
+def test_two_nodes_are_around_each_height_scale(most):
+    surface = energy(scale=most)
+    for height_scale in most * np.linspace(0.01, 1.0, 23):
+        low, high = surface.nodes(height_scale)
+        assert low <= max(height_scale * (1 + 1e-5), 1e-3)
+        assert height_scale <= high * (1 + 1e-4)  # nodes catch what is that near
+        assert high <= most
+
+
+def test_one_node_does_at_the_scale_of_most_scenes():
+    assert energy().nodes(1.0) == (1.0, 1.0)
+    assert energy().nodes(float(np.float32(1.0 + 1e-6))) == (1.0, 1.0)
+
+
+@pytest.mark.parametrize("height_scale", [1.0, 1.5])
+def test_for_derivatives_there_are_always_two(height_scale):
+    low, high = energy().nodes(height_scale, interval=True)
+    assert low < high
+    assert low <= height_scale <= high
+
+
+@pytest.mark.parametrize("height_scale", [0.25, 1.0])
+def test_each_is_computed_once_and_kept_on_disk(computed, height_scale):
+    first = energy().at(height_scale)
+    again = energy().at(height_scale)  # of another table of the same content: from the disk
+    assert len(computed) == 1
+    assert np.array_equal(first.albedo.values, again.albedo.values)
+    assert (first.scale is None) == (again.scale is None) == (height_scale < 0.5)
+
+
+def test_another_material_is_computed_anew(computed):
+    for index in (1.5, 1.5000001, 1.6, 1.5 + 0.1j):  # the second is the first to rounding
+        energy(index).at(1.0)
+    assert [index for _, index in computed] == [1.5, 1.6, 1.5 + 0.1j]

@@ -1,0 +1,227 @@
+"""The cache: built once, found by content, kept small, and never a reason to fail."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import threading
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import (
+    DiffractionError,
+    DiffractionTable,
+    DiffractionWarning,
+    HeightField,
+)
+from mitsuba_diffraction.settings import TableSettings
+from mitsuba_diffraction.tables import store
+from tests.directions import rough_patch
+
+PATCH = rough_patch((20, 20), (0.08, 0.08), 0.1)
+ARGUMENTS = {"coherence_width": 1.6}
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """An empty cache, on disk and in memory."""
+    monkeypatch.setenv(store.VARIABLE, str(tmp_path / "cache"))
+    store._tables.clear()
+    return tmp_path / "cache"
+
+
+class Builder:
+    """Counts how often a table is built."""
+
+    def __init__(self, heights=PATCH, **arguments):
+        self.heights, self.arguments, self.built = heights, arguments or ARGUMENTS, 0
+
+    def __call__(self):
+        self.built += 1
+        return DiffractionTable.build(self.heights, **self.arguments)
+
+    def table(self):
+        settings = TableSettings(**self.arguments)
+        return store.cached_table(self.heights.digest(), settings, self)
+
+
+def test_a_table_is_built_once_and_shared_while_in_use():
+    build = Builder()
+    first, second = build.table(), build.table()
+    assert build.built == 1
+    assert first is second
+
+
+def test_a_later_process_reads_it_from_disk(folder):
+    build = Builder()
+    first = build.table()
+    (file,) = folder.iterdir()
+    assert file.suffix == ".cache"
+    store._tables.clear()  # as in a process of its own
+    second = build.table()
+    assert build.built == 1
+    assert second is not first
+    assert np.array_equal(first.coefficients, second.coefficients)
+
+
+def test_tables_with_texts_of_an_earlier_version_are_built_anew(monkeypatch):
+    build = Builder()
+    build.table()
+    store._tables.clear()
+    monkeypatch.setattr(store, "TEXTS_VERSION", store.TEXTS_VERSION + 1)
+    build.table()
+    assert build.built == 2
+
+
+def test_equal_content_is_found_whatever_it_is_called():
+    build = Builder()
+    build.table()
+    again = Builder(HeightField(PATCH.heights.copy(), PATCH.pixel_size, name="another name"))
+    again.table()
+    assert again.built == 0
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        Builder(HeightField(PATCH.heights + 1e-9, 0.08)),
+        Builder(HeightField(PATCH.heights, 0.08000001)),
+        Builder(coherence_width=1.7),
+        Builder(coherence_width=1.6, tolerance=1e-4),
+        Builder(coherence_width=1.6, coherence="patch"),
+    ],
+    ids=["heights", "pixel size", "coherence width", "tolerance", "coherence"],
+)
+def test_any_other_content_is_another_table(folder, other):
+    other.built = 0
+    Builder().table()
+    other.table()
+    assert other.built == 1
+    assert len(list(folder.iterdir())) == 2
+
+
+def test_tables_of_another_format_are_built_anew(monkeypatch):
+    build = Builder()
+    build.table()
+    store._tables.clear()
+    monkeypatch.setattr(store, "FORMAT_VERSION", 99)
+    build.table()
+    assert build.built == 2
+
+
+def test_cells_of_another_width_are_another_table(monkeypatch):
+    whole, planned = Builder(), Builder(**ARGUMENTS, q_max=20.0)
+    tables = [build.table() for build in (whole, planned)]
+    monkeypatch.setattr("mitsuba_diffraction.tables.build.coarse.FEWEST", 4)
+    again = [build.table() for build in (whole, planned)]
+    assert again[0] is tables[0]
+    assert (whole.built, planned.built) == (1, 2)
+    assert again[1].coarse.spacing > tables[1].coarse.spacing
+
+
+@pytest.mark.parametrize("content", [b"", b"half a table"])
+def test_a_damaged_file_is_replaced(folder, content):
+    build = Builder()
+    build.table()
+    (file,) = folder.iterdir()
+    file.write_bytes(content)
+    store._tables.clear()
+    with pytest.warns(DiffractionWarning, match="is damaged"):
+        build.table()
+    assert build.built == 2
+    store._tables.clear()
+    build.table()
+    assert build.built == 2
+
+
+def test_a_cache_that_cannot_be_written_is_no_reason_to_fail(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("no folder")
+    monkeypatch.setenv(store.VARIABLE, str(tmp_path / "file" / "cache"))
+    build = Builder()
+    first = build.table()
+    assert build.table() is first  # kept in memory all the same
+    store._tables.clear()
+    build.table()
+    assert build.built == 2
+
+
+def test_a_table_that_cannot_be_built_leaves_nothing(folder):
+    with pytest.raises(DiffractionError, match="taps=1 leave an error"):
+        Builder(coherence_width=1.6, taps=1).table()
+    assert list(folder.iterdir()) == []
+
+
+def test_the_oldest_tables_go_when_the_folder_is_full(folder, monkeypatch):
+    builders = [Builder(coherence_width=1.6 + 0.001 * n) for n in range(4)]  # of one size
+    files = []
+    for age, build in enumerate(builders[:3]):
+        build.table()
+        (new,) = set(folder.iterdir()) - set(files)
+        files.append(new)
+        os.utime(new, (1000 + age, 1000 + age))
+    store._tables.clear()
+    builders[0].table()  # found, which makes it the youngest
+    assert builders[0].built == 1
+    monkeypatch.setattr(store, "MAX_BYTES", int(3.5 * files[0].stat().st_size))
+    builders[3].table()
+    left = set(folder.iterdir())
+    assert files[1] not in left
+    assert {files[0], files[2]} < left
+    assert len(left) == 3
+
+
+def test_the_newest_table_stays_however_large(folder, monkeypatch):
+    monkeypatch.setattr(store, "MAX_BYTES", 1)
+    Builder().table()
+    Builder(coherence_width=1.7).table()
+    assert len(list(folder.iterdir())) == 1
+
+
+def test_other_files_in_the_folder_are_left_alone(folder, monkeypatch):
+    folder.mkdir()
+    (folder / "notes.txt").write_text("mine")
+    monkeypatch.setattr(store, "MAX_BYTES", 1)
+    Builder().table()
+    assert (folder / "notes.txt").read_text() == "mine"
+
+
+def test_threads_that_need_the_same_table_build_it_once():
+    build = Builder()
+    tables = []
+    threads = [
+        threading.Thread(target=lambda: tables.append(build.table()), daemon=True) for _ in range(4)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+    assert build.built == 1
+    assert len({id(table) for table in tables}) == 1
+
+
+def test_a_table_s_file_is_read_once_while_in_use(tmp_path):
+    file = tmp_path / "table.exr"
+    DiffractionTable.build(PATCH, **ARGUMENTS).save(file)
+    first = store.loaded_table(file)
+    assert store.loaded_table(str(file)) is first
+    DiffractionTable.build(PATCH, coherence_width=1.7).save(file)
+    assert store.loaded_table(file).coherence_width == 1.7
+    with pytest.raises(DiffractionError, match="there is no such file"):
+        store.loaded_table(tmp_path / "no.exr")
+
+
+def test_a_digest_is_of_what_is_looked_up_alone():
+    table = DiffractionTable.build(PATCH, **ARGUMENTS)
+    same = HeightField(PATCH.heights.copy(), PATCH.pixel_size, name="another name")
+    assert DiffractionTable.build(same, **ARGUMENTS).digest() == table.digest()
+    other = table.coefficients.copy()
+    other[0, 3, 3, 0, 0] += 1.0
+    for changed in (
+        dataclasses.replace(table, coefficients=other),
+        dataclasses.replace(table, order_0=table.order_0 + 1e-9),
+        dataclasses.replace(table, scale=2.0 * table.scale),
+        dataclasses.replace(table, coarse=table),
+        dataclasses.replace(table, roughness=dataclasses.replace(table.roughness, first=-3.0)),
+    ):
+        assert changed.digest() != table.digest()
