@@ -141,8 +141,8 @@ class Prepared:
             if key not in packed:
                 packed[key] = method_tables(method, surface.material)
         bound = {key: Bindings(context, found) for key, found in packed.items()}
-        # each surface's; what does not diffract is drawn by any of the programs
         first = next(iter(bound.values()))
+        # each surface's; what does not diffract is drawn by any of the programs
         self.tables = [
             first if s.material.bsdf is None else bound[id(s.material.table)]
             for s in scene.surfaces
