@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from .camera import Camera
+from .camera import Camera, box_corners
 from .context import Target, compile_plain, require_moderngl, set_uniforms
 from .lights import Light
 from .methods import vertex_array
@@ -110,8 +110,7 @@ class Casters:
         hulls = np.concatenate([outline(t.reshape(-1, 3)) for t in triangles])
         self.solids = [Solid.of(v[..., :3], v[..., 3:], hulls) for v in vertices]
         self.low, self.high = hulls.min(axis=0), hulls.max(axis=0)  # corners of a box around all
-        box = self.low, self.high
-        self.corners = np.array([[box[n >> i & 1][i] for i in range(3)] for n in range(8)])
+        self.corners = box_corners(self.low, self.high)
 
     def draw(self, matrix: Array) -> None:
         """All surfaces, from the scene to clip space by a matrix (4, 4)."""
