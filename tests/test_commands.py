@@ -109,7 +109,7 @@ def without_size(rest: list[str]) -> list[str]:
 @pytest.mark.parametrize("page", [page for page in PAGES if commands(page)])
 def test_the_commands_of_a_page_run(page, tree, monkeypatch):
     # of height scales that a page may be asked for, two
-    monkeypatch.setattr("mitsuba_diffraction.realtime.web.scene.OCTAVES", (-1.0, 0.0))
+    monkeypatch.setattr("mitsuba_diffraction.realtime.web.export.OCTAVES", (-1.0, 0.0))
     monkeypatch.chdir(tree)
     for words in commands(page):
         run(words)

@@ -41,7 +41,7 @@ from ..heights.read import LoadOptions, is_recipe
 from ..heights.recipes import LOAD_KEYS, Recipe
 from ..heights.spectra import dominant_periods
 from ..progress import Progress, silent
-from ..scene.mitsuba_text import error_of
+from ..scene.load import error_of
 from ..scene.passes import Stop
 from ..settings import RECIPE_SETTINGS, TableSettings, checked
 from ..tables.build.build import build_with

@@ -11,8 +11,8 @@ from typing import Any
 from ..errors import DiffractionError, DiffractionWarning
 from ..optics.colour import ILLUMINANTS
 from . import options
-from .arguments import number_between, path_ending_in
 from .console import Bar
+from .options import number_between
 from .report import check_outputs, save_report
 
 _KEPT = "that of the table or recipe, else "
@@ -36,14 +36,10 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "x = sin θ cos φ, y = sin θ sin φ, the normal in the middle. Writes linear numbers "
         "(EXR, 1/sr) and a picture with axes (PNG) beside them.",
     )  # fmt: skip
-    parser.add_argument(
-        "source", metavar="SOURCE", type=Path,
-        help="table, recipe (.toml), or heights of any format",
-    )  # fmt: skip
-    parser.add_argument(
-        "-o", "--output", metavar="OUT", type=path_ending_in(".exr", ".png"),
-        help="EXR, with a PNG beside it, or only a PNG; default: SOURCE's name with -map.exr in "
-        "the current folder",
+    options.add_source(parser, tables=True)
+    options.add_output(
+        parser, "EXR, with a PNG beside it, or only a PNG; default: SOURCE's name with -map.exr "
+        "in the current folder", ".exr", ".png",
     )  # fmt: skip
     options.add_mode(parser)
     _add_map_options(parser.add_argument_group("the map"))
@@ -121,10 +117,7 @@ def add_relative(group: argparse._ArgumentGroup) -> None:
 def gain_of(args: argparse.Namespace) -> Any:
     """The gain factor of --relative, or `None`.
 
-    Raises
-    ------
-    DiffractionError
-        If --int-ior is no number.
+    Raises a DiffractionError if --int-ior is no number.
     """
     from ..thesis.methods import Gain
 

@@ -1,4 +1,9 @@
-"""What the command line says on stderr: one line per error and per warning, and bars."""
+"""What the command line says on stderr, one line per error and per warning, and bars; Ctrl-C.
+
+Ctrl-C or SIGTERM ends a command at once, even while Mitsuba holds the main thread. Python runs its
+signal handlers on the main thread, between two of its own instructions. While a scene loads that
+thread is in C++ for seconds, so a second one waits for the signal as well.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +11,16 @@ import argparse
 import contextlib
 import os
 import re
+import signal
+import socket
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Iterator
 from types import TracebackType
 from typing import Any, Self
 
+from ..atomic import remove_temporaries
 from ..errors import DiffractionWarning, one_line, shortened
 
 PROGRAM = "mitsuba-diffraction"
@@ -25,6 +34,19 @@ _SAMPLE = re.compile(r"Invalid sample value: \[.*\]")
 _SAMPLES = (
     "some samples are below zero, as colours outside of sRGB are, or no numbers; they are kept"
 )
+
+# Of a terminal that reports no size, as in some containers and editors.
+_SIZE = 80, 24
+
+# Below it a bar would only flash by.
+_DELAY = 0.5  # seconds
+
+INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+TERMINATED = 143  # 128 + SIGTERM
+_CODES = {signal.SIGINT: INTERRUPTED, signal.SIGTERM: TERMINATED}
+
+#: Seconds in which the main thread may unwind by itself.
+GRACE = 1.0
 
 
 def say(text: str) -> None:
@@ -114,20 +136,10 @@ def _without_stamp(text: str) -> str:
     return _STAMP.sub("", text.strip())
 
 
-# Of a terminal that reports no size, as in some containers and editors.
-_SIZE = 80, 24
-
-# Below it a bar would only flash by.
-_DELAY = 0.5  # seconds
-
-
 class Bar:
     """A progress bar, or nothing if the user is not looking.
 
-    Parameters
-    ----------
     args : the parsed command line; `args.progress` is true, false, or `None` for "if a terminal".
-    unit : what is counted.
     delay : seconds before the bar is first drawn.
     """
 
@@ -184,3 +196,52 @@ def _size() -> tuple[int, int] | tuple[None, None]:
         if 0 in os.get_terminal_size(sys.stderr.fileno()):
             return _SIZE
     return None, None
+
+
+@contextlib.contextmanager
+def ended_at_once() -> Iterator[None]:
+    """Inside, a signal unwinds the main thread, or ends the process without its temporary files."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread may set handlers
+        return
+    reader, writer = socket.socketpair()
+    writer.setblocking(False)
+    left = threading.Event()
+    watcher = threading.Thread(target=_watch, args=(reader, left), daemon=True)
+    terminate = signal.signal(signal.SIGTERM, lambda *_: sys.exit(TERMINATED))
+    wakeup = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
+    watcher.start()
+    try:
+        yield
+    finally:
+        left.set()
+        signal.set_wakeup_fd(wakeup)
+        signal.signal(signal.SIGTERM, terminate)
+        writer.close()
+        watcher.join()
+        reader.close()
+
+
+def say_interrupted() -> None:
+    """What every interrupted command says last."""
+    say("interrupted; nothing half-written was left behind")
+
+
+def _watch(reader: socket.socket, left: threading.Event) -> None:
+    """Wait for signals; exit if the main thread has not left a while after one."""
+    before = 0
+    while received := reader.recv(1):
+        number = signal.Signals(received[0])
+        if number not in _CODES:
+            continue
+        if number == signal.SIGINT:
+            before += 1
+            # a rendering has a handler of its own, which keeps the picture so far
+            own = signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+            if own and before == 1:
+                continue
+        if not left.wait(GRACE):
+            remove_temporaries()
+            if number == signal.SIGINT:
+                say_interrupted()
+            os._exit(_CODES[number])

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from ..errors import DiffractionError, DiffractionWarning
 from ..settings import TableSettings
 from . import options
-from .arguments import path_ending_in, whole_number
 from .console import Bar, say_warning
+from .options import whole_number
 from .report import check_outputs, save_report
 
 if TYPE_CHECKING:
@@ -38,12 +38,10 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "the spectrum, and fit the period of the grating equation to it. Writes a picture, and "
         "the numbers as CSV (the ridge) and NPZ (everything) beside it.",
     )  # fmt: skip
-    parser.add_argument(
-        "source", metavar="SOURCE", type=Path, help="heights of any format, or a recipe (.toml)"
-    )
-    parser.add_argument(
-        "-o", "--output", metavar="OUT", type=path_ending_in(".png"),
-        help="picture; default: SOURCE's name with -evaluation.png in the current folder",
+    options.add_source(parser)
+    options.add_output(
+        parser, "picture; default: SOURCE's name with -evaluation.png in the current folder",
+        ".png",
     )  # fmt: skip
     _add_beam_options(parser.add_argument_group("the beam"))
     group = parser.add_argument_group("the model")
@@ -166,10 +164,7 @@ def _followed(
 ) -> tuple[Ridge, Fit | None, tuple[str, str]]:
     """The ridge that obeys the grating equation and its fit, or an empty one and none; and a line.
 
-    Raises
-    ------
-    DiffractionError
-        If there are too few maxima to look for one.
+    Raises a DiffractionError if there are too few maxima to look for one.
     """
     import numpy as np
 
@@ -193,14 +188,9 @@ def viewing_angles(
 ) -> Any:
     """Viewing angles in degrees, (A,); by default from the mirror direction to the horizon's side.
 
-    Parameters
-    ----------
     reach : mλ/d of the order's last colour, signed; the range ends a quarter beyond it.
 
-    Raises
-    ------
-    DiffractionError
-        If the range is empty or the step does not fit it.
+    Raises a DiffractionError if the range is empty or the step does not fit it.
     """
     import numpy as np
 

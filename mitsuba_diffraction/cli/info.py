@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from ..errors import DiffractionError
 from ..settings import TableSettings
 from . import options
-from .arguments import path_ending_in
 from .console import Bar, mitsuba_warnings
+from .options import path_ending_in
 from .report import lines_of, plain, save_report
 
 if TYPE_CHECKING:

@@ -1,8 +1,8 @@
 """Parser of the command line, and the boundary at which every error becomes one line.
 
-A sub-command is a module with `add_parser(subparsers)`, which sets the defaults `run` and `parser`,
-and `run(args) -> int`, the exit code. Modules import what they need (Mitsuba above all) in `run`,
-so that `--help` and `--version` answer at once.
+A sub-command is a function that declares its parser, by `options.add_command`, and one that runs it
+and returns the exit code. That one imports what it needs (Mitsuba above all), so that `--help` and
+`--version` answer at once.
 """
 
 from __future__ import annotations
@@ -20,28 +20,33 @@ from ..streams import own_program
 from . import (
     bench,
     brdf_map,
-    compare,
     evaluate,
-    export_shader,
-    export_viewer,
     info,
     plan,
     precompute,
+    realtime,
     render,
     survey,
     sweep,
     tangents,
-    tradeoff,
-    view,
 )
-from .console import PROGRAM, say_error, warnings_in_one_line
-from .interrupts import INTERRUPTED, ended_at_once, say_interrupted
+from .console import (
+    INTERRUPTED,
+    PROGRAM,
+    ended_at_once,
+    say_error,
+    say_interrupted,
+    warnings_in_one_line,
+)
 from .options import STDOUT
 from .report import check_writable
 
+#: What declares each sub-command, in the order of --help.
 COMMANDS = (
-    precompute, info, tangents, plan, render, brdf_map, evaluate, survey, sweep, tradeoff, compare,
-    view, export_viewer, export_shader, bench,
+    precompute.add_parser, info.add_parser, tangents.add_parser, plan.add_parser,
+    render.add_parser, brdf_map.add_parser, evaluate.add_parser, survey.add_parser,
+    sweep.add_parser, bench.add_tradeoff, realtime.add_compare, realtime.add_view,
+    realtime.add_export_viewer, realtime.add_export_shader, bench.add_bench,
 )  # fmt: skip
 
 FAILED = 1
@@ -78,8 +83,8 @@ def build_parser() -> argparse.ArgumentParser:
     subparsers = parser.add_subparsers(
         title="commands", metavar="COMMAND", dest="command", required=True
     )
-    for command in COMMANDS:
-        command.add_parser(subparsers)
+    for add_parser in COMMANDS:
+        add_parser(subparsers)
     for subparser in subparsers.choices.values():
         _add_common(subparser.add_argument_group("general"))
     return parser

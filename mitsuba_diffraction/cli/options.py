@@ -1,40 +1,41 @@
-"""Options that several commands share, each declared once.
+"""Options that several commands share, each declared once, and types of arguments.
 
-`add_…` functions declare them on a parser or a group; the functions beside them read what was
-given. Modules of the library are imported where values are read, so that --help answers at once.
+What does not fit is a usage error that quotes the value. `add_…` functions declare options on a
+parser or a group; the functions beside them read what was given. Modules of the library are
+imported where values are read, so that --help answers at once.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, quoted
+from ..scene.parameters import Change, change_of
 from ..settings import TableSettings, checked, described_setting
-from .arguments import definition, number_between, path_ending_in, whole_number
 
 if TYPE_CHECKING:
     from ..heights.field import HeightField
     from ..heights.read import LoadOptions
-    from ..settings import TableSettings
-
 
 Group = argparse._ActionsContainer
 Subparsers = argparse._SubParsersAction
 
 #: Default of --wavelength-range and of --step, nm.
 WAVELENGTH_RANGE, STEP = TableSettings.wavelength_range, 5.0
+
 #: `--json` without a file, which only `info` has: printed instead of the text.
 STDOUT = Path("-")
 
 #: Ways to add up a spectrum, by the name that every --method uses.
 METHODS = ("spectral", "flss", "nmm", "pq", "pq-sinc", "rainbow")
+
 #: What `thesis.methods` and earlier versions of the command line call some of them.
 _IN_LIBRARY = {"spectral": "default"}
 _IN_COMMANDS = {name: ours for ours, name in _IN_LIBRARY.items()}
-
 _HEIGHTS: dict[str, tuple[str, str]] = {
     "pixel_size": ("DX[,DY]", "µm between samples; overrides what the file states"),
     "max_height": (
@@ -52,11 +53,64 @@ _HEIGHTS: dict[str, tuple[str, str]] = {
     "clip": ("N", "clip heights beyond N robust standard deviations (dust)"),
     "periodic": ("METHOD", "smooth or taper: make the patch tile without seams; default: none"),
 }
-
 _TABLE = (
     "coherence_width", "coherence", "basis", "tolerance", "terms", "taps", "height_scale_max",
     "windows",
 )  # fmt: skip
+
+#: The settings of a table that the evaluators of the thesis take.
+TABLE_NAMES = ("coherence_width", "coherence", "tolerance", "terms")
+
+
+def path_ending_in(*suffixes: str) -> Callable[[str], Path]:
+    """A path whose suffix is one of those given."""
+
+    def path(text: str) -> Path:
+        result = Path(text)
+        if result.suffix.lower() not in suffixes:
+            expected = " or ".join(suffixes)
+            raise argparse.ArgumentTypeError(
+                f"expected a name ending in {expected}, got {quoted(text)}"
+            )
+        return result
+
+    return path
+
+
+def whole_number(least: int) -> Callable[[str], int]:
+    """A whole number that is at least `least` and fits 31 bits."""
+    return _number(int, least, 2**31 - 1, f"a whole number from {least}")
+
+
+def number_between(low: float, high: float) -> Callable[[str], float]:
+    """A number from `low` to `high`; NaN is none."""
+    return _number(float, low, high, f"a number from {low:g} to {high:g}")
+
+
+def _number(kind: Callable[[str], Any], low: float, high: float, what: str) -> Callable[[str], Any]:
+    def number(text: str) -> Any:
+        with contextlib.suppress(ValueError):
+            if low <= (value := kind(text)) <= high:
+                return value
+        raise argparse.ArgumentTypeError(f"expected {what}, got {quoted(text)}")
+
+    return number
+
+
+def definition(text: str) -> tuple[str, str]:
+    """KEY=VALUE."""
+    key, equals, value = text.partition("=")
+    if not (equals and key):
+        raise argparse.ArgumentTypeError(f"expected KEY=VALUE, got {quoted(text)}")
+    return key, value
+
+
+def change(text: str) -> Change:
+    """KEY=FROM:TO, a parameter of a scene that changes."""
+    try:
+        return change_of(text)
+    except DiffractionError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def add_command(
@@ -80,10 +134,7 @@ def add_heights(parser: argparse.ArgumentParser) -> None:
 def load_options(args: argparse.Namespace) -> LoadOptions:
     """How heights are read, as `HeightField.load` takes it.
 
-    Raises
-    ------
-    DiffractionError
-        If a value does not fit.
+    Raises a DiffractionError if a value does not fit.
     """
     from ..heights.read import LoadOptions
 
@@ -93,6 +144,21 @@ def load_options(args: argparse.Namespace) -> LoadOptions:
 def given_for_heights(args: argparse.Namespace) -> list[str]:
     """Options for reading heights that stand on the command line."""
     return [_option(name) for name in _HEIGHTS if getattr(args, name) is not None]
+
+
+def add_source(parser: argparse.ArgumentParser, *, tables: bool = False) -> None:
+    """What is evaluated; see `load_patch`. tables: whether a table will do."""
+    accepted = "table, recipe (.toml), or heights of any format"
+    parser.add_argument(
+        "source", metavar="SOURCE", type=Path,
+        help=accepted if tables else "heights of any format, or a recipe (.toml)",
+    )  # fmt: skip
+
+
+def add_output(parser: argparse.ArgumentParser, text: str, *suffixes: str, **more: Any) -> None:
+    """Where results go: a file with one of these suffixes, or else a folder."""
+    given = {"type": path_ending_in(*suffixes), "metavar": "OUT"} if suffixes else {"type": Path}
+    parser.add_argument("-o", "--output", help=text, **{"metavar": "FOLDER", **given, **more})
 
 
 def add_own_patch(parser: argparse.ArgumentParser) -> None:
@@ -136,10 +202,7 @@ def add_table(group: Group, names: Sequence[str] = _TABLE, **defaults: str) -> N
 def table_options(args: argparse.Namespace) -> dict[str, Any]:
     """The settings of a table that were given, by name.
 
-    Raises
-    ------
-    DiffractionError
-        If a value is not allowed.
+    Raises a DiffractionError if a value is not allowed.
     """
     given = {name: getattr(args, name, None) for name in (*_TABLE, "wavelength_range")}
     return {name: checked(name, value) for name, value in given.items() if value is not None}
@@ -280,17 +343,10 @@ def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 
 
-#: The settings of a table that the evaluators of the thesis take.
-TABLE_NAMES = ("coherence_width", "coherence", "tolerance", "terms")
-
-
 def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
     """Heights of `args.source`, and the settings of tables: a recipe's, overridden by options.
 
-    Raises
-    ------
-    DiffractionError
-        If the source is a table or no heights, or an option does not fit.
+    Raises a DiffractionError if the source is a table or no heights, or an option does not fit.
     """
     from ..heights.load import load_heights
     from ..heights.read import is_recipe

@@ -12,8 +12,8 @@ from ..errors import DiffractionError
 from ..progress import Progress
 from ..scene.load import sensor_of, set_variant
 from . import options
-from .arguments import number_between, path_ending_in, whole_number
 from .console import Bar, mitsuba_warnings, say, say_warning
+from .options import number_between, whole_number
 from .report import check_writable, lines_of, save_report
 
 if TYPE_CHECKING:
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 PATHS, TOLERANCE = 1 << 15, 1e-3
 _MOST_PATHS = 1 << 22  # lanes are counted in single precision
+
+#: `--plan` without a file.
+MAKE = Path()
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -35,10 +38,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     options.add_scene(parser)
     add_plan_options(parser)
-    parser.add_argument(
-        "-o", "--output", metavar="PLAN", type=path_ending_in(".json"),
-        help="write the plan, for `render --plan PLAN`",
-    )  # fmt: skip
+    options.add_output(parser, "write the plan, for `render --plan PLAN`", ".json", metavar="PLAN")
     options.add_json(parser)
 
 
@@ -57,10 +57,7 @@ def add_plan_options(parser: argparse.ArgumentParser) -> None:
 def planning_variant(asked: str | None) -> str:
     """The variant to trace paths in, which need wavelengths and many lanes; it is set.
 
-    Raises
-    ------
-    DiffractionError
-        If a plan would say nothing about the asked one.
+    Raises a DiffractionError if a plan would say nothing about the asked one.
     """
     from ..scene.load import set_variant
 
@@ -135,10 +132,6 @@ def plan_or_json(text: str) -> Path:
     return Path(text)
 
 
-#: `--plan` without a file.
-MAKE = Path()
-
-
 @dataclass(frozen=True)
 class Planned:
     """A scene with the tables of a plan that fits it."""
@@ -154,11 +147,8 @@ def load_by_plan(
 ) -> Planned | None:
     """A scene with the tables of a plan, or None where the variant has no use for one.
 
-    Raises
-    ------
-    DiffractionError
-        If the plan is for other surfaces, or for a light or a camera of which too much falls
-        outside.
+    Raises a DiffractionError if the plan is for other surfaces, or for a light or a camera of which
+    too much falls outside.
     """
     if "spectral" not in variant:
         say_warning(

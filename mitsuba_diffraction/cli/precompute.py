@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionWarning
 from . import options
-from .arguments import path_ending_in
 from .console import Bar
 from .report import check_outputs, save_report
 from .workers import add_workers, client_of, on_workers
@@ -36,10 +35,9 @@ def add_parser(subparsers: options.Subparsers) -> None:
         help="image, array, text, AFM file or recipe (.toml); several patches of one surface make "
         "one table of their mean powers, several recipes make a table each",
     )  # fmt: skip
-    parser.add_argument(
-        "-o", "--output", metavar="OUT", type=path_ending_in(".exr"),
-        help="the table; default: where the recipe says, or else SOURCE's name with .exr in the "
-        "current folder",
+    options.add_output(
+        parser, "the table; default: where the recipe says, or else SOURCE's name with .exr in "
+        "the current folder", ".exr",
     )  # fmt: skip
     options.add_heights(parser)
     group = parser.add_argument_group("the table")

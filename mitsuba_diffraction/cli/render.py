@@ -1,17 +1,24 @@
-"""`mitsuba-diffraction render`: from an XML scene to a picture."""
+"""`mitsuba-diffraction render`: from an XML scene to a picture.
+
+With --frames: which frames there are, why each is rendered, and the film of them.
+"""
 
 from __future__ import annotations
 
 import argparse
 import time
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
+from ..scene.frames import FILMS, MISSING, Frame, digest_of, render_frames, write_film, write_frame
+from ..scene.parameters import values_of_frames
 from . import options
-from .arguments import change, number_between, whole_number
-from .console import Bar, mitsuba_warnings, say, say_warning
-from .interrupts import INTERRUPTED
+from .console import INTERRUPTED, Bar, mitsuba_warnings, say, say_warning
+from .options import change, number_between, whole_number
 from .plan import (
     MAKE,
     add_plan_options,
@@ -37,11 +44,10 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "same settings, are kept, so an interrupted run goes on where it was.",
     )  # fmt: skip
     options.add_scene(parser)
-    parser.add_argument(
-        "-o", "--output", metavar="OUT", type=Path,
-        help="EXR, with a PNG beside it, or only a PNG; default: the scene's name with .exr in "
+    options.add_output(
+        parser, "EXR, with a PNG beside it, or only a PNG; default: the scene's name with .exr in "
         "the current folder. With --frames: a folder, or a film, .webp or .gif, whose frames go "
-        "into a folder of its name; default: the folder SCENE_frames",
+        "into a folder of its name; default: the folder SCENE_frames", metavar="OUT",
     )  # fmt: skip
     options.add_samples(parser, 1, None)
     options.add_exposure(parser, 0.0, "of the PNG, in stops: +1 doubles the light; default: 0")
@@ -92,10 +98,8 @@ def run(args: argparse.Namespace) -> int:
             args.parser.error(
                 "argument --plan: is for one picture; with --frames, camera and light may leave it"
             )
-        from .frames import run_frames
-
         args.fps = args.fps or 24.0
-        return run_frames(args)
+        return _run_frames(args)
     if moving or args.exr or args.fps:
         args.parser.error("--animate, --turn, --exr and --fps belong to --frames: say how many")
     return _on_workers(args) if on_workers(args) else _run_one(args)
@@ -117,7 +121,7 @@ def _outputs(args: argparse.Namespace) -> tuple[Path, Path, bool]:
 
 def _on_workers(args: argparse.Namespace) -> int:
     parameters = options.scene_parameters(args)
-    output, png, only_png = _outputs(args)
+    outputs = output, _, only_png = _outputs(args)
 
     from ..cluster.frames import Wanted
     from ..scene.load import set_variant
@@ -132,11 +136,8 @@ def _on_workers(args: argparse.Namespace) -> int:
             _check_colours(film.scene, film.sensor, args, output)
         with Bar(args, unit=" tasks", delay=0) as bar, Stop() as stop:
             for result in film.render(stop, bar):
-                written = _written(result, args, None if only_png else output, png, variant)
+                report = _finish(args, result, outputs, variant, start)
                 film.forget(0)
-                seconds = time.perf_counter() - start
-                _say_written(result, written, seconds, variant)
-                report = _report(args, result, written, seconds, variant)
                 save_report(args, report | {"workers": say_report(film)})
                 return 0
     say(f"interrupted; finished passes are kept in '{keep}': run the command again to go on")
@@ -145,7 +146,7 @@ def _on_workers(args: argparse.Namespace) -> int:
 
 def _run_one(args: argparse.Namespace) -> int:
     parameters = options.scene_parameters(args)
-    output, png, only_png = _outputs(args)
+    outputs = output, _, only_png = _outputs(args)
 
     from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink
     from ..scene.passes import Stop, render_passes
@@ -181,63 +182,53 @@ def _run_one(args: argparse.Namespace) -> int:
         if planned is not None:
             width, height = result.bitmap.size()
             say_outside(planned, width * height * result.spp)
-        written = _written(result, args, None if only_png else output, png, variant)
-    seconds = time.perf_counter() - start
-    _say_written(result, written, seconds, variant)
-    save_report(args, _report(args, result, written, seconds, variant))
+        report = _finish(args, result, outputs, variant, start)
+    save_report(args, report)
     if result.interrupted:
         say(f"interrupted; the picture has {result.spp} of {spp} samples per pixel")
         return INTERRUPTED
     return 0
 
 
-def _report(
-    args: argparse.Namespace, result: Result, written: list[Path], seconds: float, variant: str
-) -> dict[str, Any]:
-    """For --json."""
-    return {
-        "scene": args.scene, "files": written, "pixels": list(result.bitmap.size()),
-        "spp": result.spp, "seed": args.seed, "variant": variant,
-        "interrupted": result.interrupted, "seconds": seconds,
-    }  # fmt: skip
+def _finish(
+    args: argparse.Namespace, result: Result, outputs: tuple[Path, Path, bool], variant: str,
+    start: float,
+) -> dict[str, Any]:  # fmt: skip
+    """Write the picture, with warnings of what it lacks, and say so; the figures for --json."""
+    from ..scene.passes import colours_of, count_bad, write_exr, write_png
 
-
-def _written(
-    result: Result, args: argparse.Namespace, exr: Path | None, png: Path, variant: str
-) -> list[Path]:
-    """Write the picture, with warnings of what it lacks; the files."""
-    from ..scene.pictures import colours_of, count_bad, write_exr, write_png
-
+    output, png, only_png = outputs
     bad = count_bad(result.bitmap)
     if bad:
         say_warning(f"{bad} pixels are not finite (NaN or infinite); they are black in a PNG")
     written = []
-    if exr is not None:
+    if not only_png:
         origin = {"scene": str(args.scene), "variant": variant, "seed": args.seed}
-        write_exr(result.bitmap, exr, {**origin, "spp": result.spp})
-        written.append(exr)
+        write_exr(result.bitmap, output, {**origin, "spp": result.spp})
+        written.append(output)
     colours = colours_of(result.bitmap)
     if colours is None:
         say_warning("the film holds no colours that a PNG could show; only the EXR was written")
     else:
         write_png(colours, png, args.exposure)
         written.append(png)
-    return written
-
-
-def _say_written(result: Result, written: list[Path], seconds: float, variant: str) -> None:
     width, height = result.bitmap.size()
     samples = "1 sample" if result.spp == 1 else f"{result.spp} samples"
+    seconds = time.perf_counter() - start
     print(
         f"{' and '.join(map(str, written))}: {width} x {height} pixels, {samples} per pixel, "
         f"{seconds:.1f} s, {variant}"
     )
+    return {
+        "scene": args.scene, "files": written, "pixels": [width, height],
+        "spp": result.spp, "seed": args.seed, "variant": variant,
+        "interrupted": result.interrupted, "seconds": seconds,
+    }  # fmt: skip
 
 
 def _check_colours(scene: Any, sensor: Any, args: argparse.Namespace, output: Path) -> None:
     """Refuse a film that will hold nothing for a PNG, before the work is done."""
-    from ..scene.passes import integrator_of
-    from ..scene.pictures import colours_of
+    from ..scene.passes import colours_of, integrator_of
 
     film = sensor.film()
     film.prepare(integrator_of(scene).aov_names())
@@ -246,3 +237,133 @@ def _check_colours(scene: Any, sensor: Any, args: argparse.Namespace, output: Pa
             f"the film of '{args.scene}' holds no colours that a PNG could show; "
             f"name an EXR: -o {output.with_suffix('.exr')}"
         )
+
+
+def _run_frames(args: argparse.Namespace) -> int:
+    """Render the frames that are not there yet, then the film; return the exit code."""
+    folder, film = _folder_and_film(args)
+    check_writable(folder / "frame_0000.png", make_folder=True)
+    if film is not None:
+        check_writable(film)
+    frames = _frames(args, folder)
+    reasons = {frame.png: frame.outdated(args.exr) for frame in frames}
+    to_do = [frame for frame in frames if reasons[frame.png]]
+    _say_why(reasons)
+
+    from ..scene.load import set_variant
+
+    start = time.perf_counter()
+    done, workers = 0, None
+    if to_do and on_workers(args):
+        done, workers = _frames_on_workers(args, to_do, folder)
+    elif to_do:
+        variant = set_variant(args.mode)
+        with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
+            bar(0, 0, "loading")
+            for _ in render_frames(args.scene, to_do, variant, with_exr=args.exr, progress=bar):
+                done += 1
+    report = {"scene": args.scene, "frames": len(frames), "new": done,
+              "files": [frame.png for frame in frames if frame.png.exists()], "film": None,
+              "interrupted": done < len(to_do), "seconds": time.perf_counter() - start,
+              "workers": workers}  # fmt: skip
+    if done < len(to_do):
+        save_report(args, report)
+        there = len(frames) - len(to_do) + done
+        say(
+            f"interrupted; {there} of {len(frames)} frames are done, run the command again to "
+            "continue"
+        )
+        return INTERRUPTED
+    print(f"{folder}: {len(frames)} frames, {done} of them new, {report['seconds']:.1f} s")
+    if film is not None:
+        write_film([frame.png for frame in frames], film, args.fps)
+        print(f"{film}: {len(frames) / args.fps:.3g} s at {args.fps:g} frames a second")
+    save_report(args, report | {"film": film})
+    return 0
+
+
+def _frames_on_workers(
+    args: argparse.Namespace, to_do: Sequence[Frame], folder: Path
+) -> tuple[int, dict[str, Any]]:
+    """Render frames on workers; how many came before Ctrl-C, and what the workers did."""
+    from ..cluster.frames import Wanted
+    from ..scene.load import set_variant
+    from ..scene.passes import Stop
+
+    variant, done = set_variant(args.mode), 0
+    wanted = [Wanted(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]
+    with mitsuba_warnings(), client_of(args) as client:
+        film = film_of(args, client, wanted, variant, folder / "passes")
+        with Bar(args, unit=" tasks", delay=0) as bar, Stop() as stop:
+            for frame, result in zip(to_do, film.render(stop, bar), strict=False):
+                write_frame(frame, result.bitmap, args.scene, variant, args.exr)
+                film.forget(done)
+                done += 1
+        return done, say_report(film)
+
+
+def _say_why(reasons: Mapping[Path, tuple[str, str] | None]) -> None:
+    """Which frames are kept, and for what reason others are not."""
+    examples: dict[str, tuple[Path, str]] = {}
+    again: Counter[str] = Counter()
+    for path, reason in reasons.items():
+        if reason is not None and reason != MISSING:
+            again[reason[0]] += 1
+            examples.setdefault(reason[0], (path, reason[1]))
+    for name, number in again.items():
+        path, example = examples[name]
+        say(
+            f"{number} of {len(reasons)} frames are rendered again because of their {name}: of "
+            f"{path.name} {example}"
+        )
+    kept = sum(reason is None for reason in reasons.values())
+    if kept:
+        say(f"{kept} of {len(reasons)} frames are up to date")
+
+
+def _folder_and_film(args: argparse.Namespace) -> tuple[Path, Path | None]:
+    """The folder of the frames, and the film."""
+    output = args.output or Path(f"{args.scene.stem}_frames")
+    if output.suffix.lower() in FILMS:
+        return output.with_suffix(""), output
+    if output.suffix:
+        args.parser.error(
+            f"argument -o: with --frames it names a folder, or a film ending in "
+            f"{' or '.join(FILMS)}, not {str(output)!r}"
+        )
+    return output, None
+
+
+def _frames(args: argparse.Namespace, folder: Path) -> list[Frame]:
+    given = options.scene_parameters(args)
+    animated = [one.name for one in args.animate]
+    names = animated + args.turn
+    for name in names:
+        if names.count(name) > 1:
+            args.parser.error(f"{name!r} is set more than once; keep one --animate or --turn of it")
+    for name in animated:
+        if name in given:
+            args.parser.error(
+                f"argument -D: --animate {name}= sets its value in every frame; leave "
+                f"-D {name}={given[name]} out"
+            )
+    every = values_of_frames(args.scene, given, args.frames, args.animate, args.turn)
+    content = digest_of(args.scene, given)
+    return [
+        Frame(
+            folder / f"frame_{n:04d}.png",
+            values,
+            {
+                "scene": content,
+                **{f"-D {name}": value for name, value in sorted(values.items())},
+                "samples": args.spp or "the scene's",
+                "seed": args.seed + n,
+                "variant": args.mode or "the default",
+                "sensor": args.sensor,
+                "exposure": args.exposure,
+                "preview": args.preview,
+                "version": version("mitsuba_diffraction"),
+            },
+        )
+        for n, values in enumerate(every)
+    ]

@@ -59,10 +59,7 @@ def plain(value: Any) -> Any:
 def save_json(path: Path, data: Mapping[str, Any]) -> None:
     """Write `plain` data.
 
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be written.
+    Raises a DiffractionError if the file cannot be written.
     """
     with atomic_path(path) as temporary:
         text = json.dumps(plain(data), indent=1, ensure_ascii=False)
@@ -116,15 +113,10 @@ def _text(value: Any, joint: str = " x ") -> str:
 def check_writable(path: Path, *, make_folder: bool = False) -> None:
     """Refuse an output that could not be written, leaving nothing behind.
 
-    Parameters
-    ----------
     path : the file to come.
     make_folder : a missing folder will be made, so the nearest existing one has to be writable.
 
-    Raises
-    ------
-    DiffractionError
-        If the folder is missing or cannot be written, or `path` is a folder.
+    Raises a DiffractionError if the folder is missing or cannot be written, or `path` is a folder.
     """
     if path.is_dir():
         raise DiffractionError(f"cannot write '{path}': it is a folder; name a file in it")
@@ -148,10 +140,7 @@ def check_outputs(
 
     what : is written, in a word.
 
-    Raises
-    ------
-    DiffractionError
-        As in `check_writable`, or if a source would be overwritten.
+    Raises a DiffractionError as in `check_writable`, or if a source would be overwritten.
     """
     read = [source for source in sources if source.exists()]
     for path in outputs:

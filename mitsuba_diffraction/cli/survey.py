@@ -8,33 +8,26 @@ import os
 import time
 from pathlib import Path
 
-from .arguments import number_between, whole_number
-from .console import Bar, mitsuba_warnings, say
-from .interrupts import INTERRUPTED
-from .options import add_heights, add_json, add_mode, add_table, load_options, table_options
+from . import options
+from .console import INTERRUPTED, Bar, mitsuba_warnings, say
+from .options import number_between, whole_number
 from .report import check_writable, save_report
 from .workers import add_threads, add_workers, client_of, on_workers, worker_threads
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+def add_parser(subparsers: options.Subparsers) -> None:
     """Declare the sub-command."""
-    parser = subparsers.add_parser(
-        "survey",
-        help="measure many scans: tables, maps, gratings, colours",
-        description=(
-            "For each scan build its table, map its BRDF and measure its heights, the gratings in "
-            "it, the colours that it shows and how much they change with direction. Writes "
-            "survey.csv, contact sheets, and a table and a map of each scan. A scan that fails is "
-            "a row with its reason; a second run does only what is new."
-        ),
-    )
+    parser = options.add_command(
+        subparsers, "survey", run, "measure many scans: tables, maps, gratings, colours",
+        "For each scan build its table, map its BRDF and measure its heights, the gratings in "
+        "it, the colours that it shows and how much they change with direction. Writes "
+        "survey.csv, contact sheets, and a table and a map of each scan. A scan that fails is "
+        "a row with its reason; a second run does only what is new.",
+    )  # fmt: skip
     parser.add_argument(
         "files", metavar="FILE", type=Path, nargs="+", help="scans of any format, or recipes"
     )
-    parser.add_argument(
-        "-o", "--output", metavar="FOLDER", type=Path, default=Path("survey"),
-        help="default: survey",
-    )  # fmt: skip
+    options.add_output(parser, "default: survey", default=Path("survey"))
     parser.add_argument(
         "--treatments", metavar="FILE", type=Path,
         help='TOML: a table of options for each pattern of names, ["snakes/*.png"]; options on '
@@ -48,18 +41,17 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--resolution", metavar="N", type=whole_number(8), default=160,
         help="pixels of a map a side; default: 160",
     )  # fmt: skip
-    add_mode(parser)
-    add_heights(parser)
-    add_table(parser.add_argument_group("the tables"))
+    options.add_mode(parser)
+    options.add_heights(parser)
+    options.add_table(parser.add_argument_group("the tables"))
     add_workers(parser)
     add_threads(parser)
-    add_json(parser, "the rows")
-    parser.set_defaults(run=run, parser=parser)
+    options.add_json(parser, "the rows")
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure what is new, and return the exit code."""
-    own_options, settings = load_options(args), table_options(args)
+    own_options, settings = options.load_options(args), options.table_options(args)
     check_writable(args.output / "survey.csv", make_folder=True)
 
     from ..analysis.survey import Treatment, run_survey, treatments_of

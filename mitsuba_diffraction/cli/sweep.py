@@ -12,7 +12,6 @@ from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
 from . import options
-from .arguments import path_ending_in
 from .brdf_map import add_relative, gain_of
 from .console import Bar
 from .report import check_outputs, save_report
@@ -34,12 +33,10 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "compiled. Writes a picture, and the numbers as CSV beside it.",
     )  # fmt: skip
     parser.add_argument("kind", metavar="KIND", choices=KINDS, help=f"one of {', '.join(KINDS)}")
-    parser.add_argument(
-        "source", metavar="SOURCE", type=Path, help="heights of any format, or a recipe (.toml)"
-    )
-    parser.add_argument(
-        "-o", "--output", metavar="OUT", type=path_ending_in(".png"),
-        help="contact sheet; default: SOURCE's name with -KIND.png in the current folder",
+    options.add_source(parser)
+    options.add_output(
+        parser, "contact sheet; default: SOURCE's name with -KIND.png in the current folder",
+        ".png",
     )  # fmt: skip
     parser.add_argument(
         "--values", metavar="V", nargs="+", help="of the parameter; default: the thesis'"

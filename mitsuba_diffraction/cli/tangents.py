@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from . import options
-from .arguments import number_between, path_ending_in
 from .console import Bar, mitsuba_warnings, say_warning
+from .options import number_between
 from .report import check_writable, save_report
 
 if TYPE_CHECKING:
-    from ..scene.orientation.report import TangentReport
+    from ..scene.orientation.tangents import TangentReport
 
 _GUIDES = ("smooth", "x", "y", "z", "body")
 _NAMED = 6  # singular points that are named
@@ -28,10 +28,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "is no torus every field has singular points, around which the patch turns.",
     )  # fmt: skip
     parser.add_argument("mesh", metavar="MESH", type=Path, help="what to read")
-    parser.add_argument(
-        "-o", "--output", metavar="OUT", type=path_ending_in(".ply"), required=True,
-        help="PLY to write",
-    )  # fmt: skip
+    options.add_output(parser, "PLY to write", ".ply", required=True)
     parser.add_argument(
         "--along", choices=_GUIDES, default="smooth",
         help="smooth: the field that turns least; x, y, z: that axis, laid onto the surface; body: "
@@ -53,10 +50,9 @@ def add_parser(subparsers: options.Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the mesh, say where its field is singular, and return the exit code."""
     check_writable(args.output)
-    from ..scene.orientation.breaks import BREAK
     from ..scene.orientation.directions import direction_field, turned
     from ..scene.orientation.files import load_mesh, write_ply
-    from ..scene.orientation.tangents import check_tangents
+    from ..scene.orientation.tangents import BREAK, check_tangents
     from ..scene.orientation.trimesh import oriented_mesh, vertex_normals
 
     with Bar(args) as bar, mitsuba_warnings():

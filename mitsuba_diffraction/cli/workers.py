@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .arguments import whole_number
 from .console import say, say_warning
+from .options import whole_number
 
 if TYPE_CHECKING:
     from ..cluster.frames import Film, Wanted

@@ -75,6 +75,35 @@ def linear_srgb(xyz: NDArray[np.floating], illuminant: str = "D65") -> NDArray[n
     return xyz @ _matrix(illuminant).astype(xyz.dtype)
 
 
+def metal_tint(
+    wavelengths: ArrayLike, reflectance: ArrayLike, channels: ArrayLike
+) -> NDArray[np.float64]:
+    """T (3, 3), for colours of a metal: T @ (channels · colour) stands for ∫ R(λ) s̄(λ) P(λ) dλ.
+
+    A metal of a colour of its own weighs the wavelengths within a channel differently, so that one
+    reflectance a channel makes lines of light of the wrong hue. T is right for white light
+    (P = 1), and else of least squares over lines of one wavelength.
+
+    Parameters
+    ----------
+    wavelengths : (n,) nm, evenly over the visible.
+    reflectance : (n,) R there.
+    channels : (3,) what red, green and blue are multiplied with instead; where next to nothing is
+        reflected T is 1.
+    """
+    own = np.asarray(channels, np.float64)
+    if own.min() < 1e-9:
+        return np.eye(3)
+    lines = linear_srgb(response(wavelengths))  # s̄, (n, 3)
+    reflected = np.asarray(reflectance, np.float64)[:, None] * lines
+    white = lines.sum(axis=0)
+    inverse = np.linalg.inv(lines.T @ lines)
+    found = reflected.T @ lines @ inverse
+    multiplier = inverse @ white / (white @ inverse @ white)
+    found += np.outer(reflected.sum(axis=0) - found @ white, multiplier)
+    return np.asarray(found / own)
+
+
 def encode_srgb(linear: ArrayLike) -> NDArray[np.float64]:
     """What a display is sent, 0 to 1: clipped, with the transfer curve of sRGB."""
     import colour

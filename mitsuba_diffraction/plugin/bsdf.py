@@ -208,6 +208,7 @@ from .llvm import require_loaded_llvm
 from .pair import Pair, from_patch, in_patch, vcavity
 from .parameters import read_parameters
 from .power import power_model
+from .reflectance import tinted
 from .roles import (
     BSDF,
     Callback,
@@ -441,6 +442,7 @@ class Diffraction(mi.BSDF):
             self._takes,
             getattr(self.boundary.material, "reflects_all", False),  # other kernels
             getattr(self.boundary.material, "channels", None),
+            getattr(self.boundary.material, "tint", None) is None,
         )
         if refused:
             raise DiffractionError("; ".join(refused))
@@ -564,7 +566,7 @@ class Diffraction(mi.BSDF):
         power = outside * power
         if self._energy is not None and self._energy.takes:
             power *= self._energy.factor(pair, wavenumbers, scale)
-        return dr.select(active, mi.Spectrum(power) * factor, 0.0)
+        return dr.select(active, tinted(mi.Spectrum(power) * factor, boundary.material), 0.0)
 
     def face(
         self, ctx: Context, si: Interaction, pair: Pair, mirror: Boundary, active: Mask

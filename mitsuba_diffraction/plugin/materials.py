@@ -87,11 +87,6 @@ def passing_of(props: Properties, material: Reflectance) -> Dielectric | None:
             f"{name}=true lets light through, which the material '{material}' does not; give "
             "int_ior instead"
         )
-    if dr.slice(material.eta) < LEAST_INDEX:
-        raise DiffractionError(
-            f"{name}=true needs int_ior at least {LEAST_INDEX:g} times ext_ior; turn the surface "
-            "round where the denser medium is above"
-        )
     excluded = [
         *(f"{one}_ior" for one in ("coat", "film") if f"{one}_ior" in props),
         *("a nested BSDF" for _, value in props.objects() if isinstance(value, mi.BSDF)),
@@ -100,6 +95,11 @@ def passing_of(props: Properties, material: Reflectance) -> Dielectric | None:
     ]
     if excluded:
         raise DiffractionError(f"{name}=true and {excluded[0]} exclude each other; leave one out")
+    if dr.slice(material.eta) < LEAST_INDEX:
+        raise DiffractionError(
+            f"{name}=true needs int_ior at least {LEAST_INDEX:g} times ext_ior; turn the surface "
+            "round where the denser medium is above"
+        )
     return material
 
 

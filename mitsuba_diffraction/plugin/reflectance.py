@@ -5,17 +5,25 @@ from __future__ import annotations
 import difflib
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import DiffractionError
+from ..optics import fresnel
+from ..optics.colour import metal_tint
 from .changing import Bounded, children
-from .roles import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Texture
+from .roles import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Spectrum, Texture
 
 #: Ratios of refractive indices that are taken when one changes.
 INDICES = (1e-3, 1e3)
+
+Array = NDArray[Any]
+#: Wavelengths of a metal's spectrum that its colour is made of, nm.
+_VISIBLE = np.arange(380.0, 780.0)
 
 
 class Perfect:
@@ -113,6 +121,10 @@ class Conductor:
     def __init__(self, eta: Texture, k: Texture, name: str) -> None:
         self.eta, self.k, self.name = eta, k, name
         self.medium: Dielectric | None = None  #: what lies above, if not air
+        # of RGB's channels: the index over wavelengths, and as the channels have it
+        self._spectrum: tuple[Array, Array] | None = None
+        #: Columns of `optics.colour.metal_tint`, in RGB variants and of a tabulated material.
+        self.tint: list[Colour] | None = None
 
     @classmethod
     def of_material(cls, material: str, wavelength: float) -> Conductor:
@@ -123,7 +135,11 @@ class Conductor:
         objects = children(_load("conductor", material=material))
         if mi.is_monochromatic:
             objects = {name: _at(material, name, wavelength) for name in ("eta", "k")}
-        return cls(objects["eta"], objects["k"], material)
+        made = cls(objects["eta"], objects["k"], material)
+        if mi.is_rgb:
+            index = _tabulated(material, "eta", _VISIBLE) + 1j * _tabulated(material, "k", _VISIBLE)
+            made._spectrum = index, made._channels()
+        return made
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R for the cosine of the angle to the half vector, at si.wavelengths."""
@@ -137,19 +153,47 @@ class Conductor:
             eta, k = eta / self.medium.eta, k / self.medium.eta
         return [mi.Complex2f(n, x) for n, x in zip(eta, k, strict=True)]
 
+    def _channels(self) -> Array:
+        """n + ik of RGB's channels, without a medium."""
+        si = dr.zeros(mi.SurfaceInteraction3f)
+        eta, k = (np.array(dr.detach(one.eval(si, True))).ravel() for one in (self.eta, self.k))
+        return np.asarray(eta + 1j * k)
+
     def traverse(self, callback: Callback) -> None:
         """Expose both spectra."""
         callback.put("eta", self.eta, mi.ParamFlags.Differentiable)
         callback.put("k", self.k, mi.ParamFlags.Differentiable)
 
     def settle(self) -> None:
-        """The textures look after themselves."""
+        """The textures look after themselves; changed, they have no spectrum that is known."""
+        self.tint = None
+        if self._spectrum is None or not np.array_equal(self._channels(), self._spectrum[1]):
+            return
+        medium = 1.0 if self.medium is None else float(dr.slice(dr.detach(self.medium.eta)))
+        spectrum, channels = (fresnel.reflectance(1.0, one / medium) for one in self._spectrum)
+        self.tint = [mi.Color3f(one) for one in metal_tint(_VISIBLE, spectrum, channels).T.tolist()]
+        dr.make_opaque(self.tint)
 
     def __str__(self) -> str:
         return f"conductor[{self.name}]"
 
 
 Reflectance = Perfect | Dielectric | Conductor
+
+
+def tinted(value: Spectrum, material: object) -> Spectrum:
+    """Light of a metal, multiplied by its channels' reflectances, as its spectrum would have it."""
+    tint: list[Colour] | None = getattr(material, "tint", None)
+    if tint is None:
+        return value
+
+    def of_channels(channels: Colour) -> Colour:
+        red, green, blue = (column * one for column, one in zip(tint, channels, strict=True))
+        return red + green + blue
+
+    if not mi.is_polarized:
+        return of_channels(value)
+    return mi.Spectrum([[of_channels(value[i, j]) for j in range(4)] for i in range(4)])
 
 
 def _load(plugin: str, **parameters: float | str) -> BSDF:
@@ -191,6 +235,12 @@ def _conductors() -> list[str]:
 
 def _at(material: str, name: str, wavelength: float) -> Texture:
     """Part of a material's index at one wavelength, as a texture."""
+    value = float(_tabulated(material, name, wavelength))
+    return mi.load_dict({"type": "uniform", "value": value})
+
+
+def _tabulated(material: str, name: str, wavelengths: Array | float) -> Array:
+    """Part of a material's index, as Mitsuba has it tabulated."""
     file = str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd"))
     nodes, values = np.loadtxt(file).T
-    return mi.load_dict({"type": "uniform", "value": float(np.interp(wavelength, nodes, values))})
+    return np.asarray(np.interp(wavelengths, nodes, values))

@@ -16,8 +16,7 @@ from ..errors import DiffractionError, DiffractionWarning
 from ..progress import Progress
 from .load import load_scene, preview_samples, sensor_of, shrink
 from .parameters import files_of
-from .passes import Stop, render_passes
-from .pictures import colours_of, count_bad, write_exr, write_png
+from .passes import Stop, colours_of, count_bad, render_passes, write_exr, write_png
 
 #: Suffixes of films, and what Pillow needs to know about each.
 FILMS: dict[str, dict[str, Any]] = {
@@ -45,10 +44,7 @@ class Frame:
     def outdated(self, with_exr: bool) -> tuple[str, str] | None:
         """Why the frame has to be rendered, and an example; None if the file is this frame.
 
-        Raises
-        ------
-        DiffractionError
-            If the file there is something else.
+        Raises a DiffractionError if the file there is something else.
         """
         if not self.png.exists():
             return MISSING
@@ -69,19 +65,12 @@ def render_frames(
 ) -> Iterator[Frame]:
     """Render and write frame after frame, in the variant that is set; ends early after Ctrl-C.
 
-    Parameters
-    ----------
-    scene : XML file.
     frames : settings hold `samples` (a number, or a text for the scene's own), `seed`, `sensor`,
         `exposure` and `preview`.
-    variant : that is set.
     with_exr : write a linear EXR beside each PNG.
     progress : called as progress(samples done, samples in all, text).
 
-    Raises
-    ------
-    DiffractionError
-        If the scene fails, or its film holds no colours.
+    Raises a DiffractionError if the scene fails, or its film holds no colours.
     """
     loaded = None
     with Stop() as stop:
@@ -114,10 +103,7 @@ def render_frames(
 def write_frame(frame: Frame, bitmap: Any, scene: Path, variant: str, with_exr: bool) -> None:
     """Write a frame's files.
 
-    Raises
-    ------
-    DiffractionError
-        If its film holds no colours.
+    Raises a DiffractionError if its film holds no colours.
     """
     colours = colours_of(bitmap)
     if colours is None:
@@ -140,10 +126,7 @@ def write_frame(frame: Frame, bitmap: Any, scene: Path, variant: str, with_exr: 
 def write_film(frames: Sequence[Path], film: Path, fps: float) -> None:
     """Join PNG files to an endless film, by the suffix an animated WebP or GIF.
 
-    Raises
-    ------
-    DiffractionError
-        If Pillow cannot write such a file.
+    Raises a DiffractionError if Pillow cannot write such a file.
     """
     from PIL import Image
 

@@ -19,19 +19,14 @@ _DEEPEST = 15
 # Of a path, in characters: longer texts name no file, and asking would be an error.
 _LONGEST = 1024
 
+Numbers = tuple[float, ...]
+
 
 def check_parameters(scene: Path, given: Mapping[str, str]) -> None:
-    """Refuse parameters that the scene does not have.
+    """Refuse parameters given on the command line that the scene, an XML file, does not have.
 
-    Parameters
-    ----------
-    scene : an XML file.
-    given : the parameters from the command line.
-
-    Raises
-    ------
-    DiffractionError
-        If one is unknown; the text names those of the scene and its includes, with defaults.
+    Raises a DiffractionError if one is unknown; the text names those of the scene and its includes,
+    with defaults.
     """
     known = parameters_of(scene, given)
     if known is None:
@@ -56,29 +51,17 @@ def parameters_of(
 ) -> dict[str, str | None] | None:
     """Names of a scene's parameters and their defaults, includes and all.
 
-    Parameters
-    ----------
-    scene : an XML file.
-    given : values that are set, which may occur in the names of included files.
+    A default is `None` where the scene uses a parameter without giving one, and so is the result as
+    a whole if a file is missing or no XML.
 
-    Returns
-    -------
-    dict
-        By name; `None` where the scene uses a parameter without giving a default. The result as a
-        whole is `None` if a file is missing or no XML.
+    given : values that are set, which may occur in the names of included files.
     """
     found: dict[str, str | None] = {}
     return found if _collect(scene, dict(given or {}), found, 0) else None
 
 
 def files_of(scene: Path, given: Mapping[str, str] | None = None) -> list[Path]:
-    """The scene, its includes, and every file that one of them or a recipe among those names.
-
-    Parameters
-    ----------
-    scene : an XML file.
-    given : values that are set.
-    """
+    """The scene, its includes, and every file that one of them or a recipe among those names."""
     from ..heights.read import is_recipe
     from ..heights.recipes import Recipe
 
@@ -139,9 +122,6 @@ def _with_values(text: str, given: Mapping[str, str], defaults: Mapping[str, str
     return _REFERENCE.sub(value, text)
 
 
-Numbers = tuple[float, ...]
-
-
 @dataclass(frozen=True)
 class Change:
     """A parameter that goes from one value to another; both have as many numbers."""
@@ -159,10 +139,7 @@ class Change:
 def change_of(text: str) -> Change:
     """KEY=FROM:TO, where FROM and TO are numbers, or lists of them with commas between.
 
-    Raises
-    ------
-    DiffractionError
-        If it is none.
+    Raises a DiffractionError if it is none.
     """
     name, equals, values = text.partition("=")
     start, colon, end = values.partition(":")
@@ -194,18 +171,13 @@ def values_of_frames(
 ) -> list[dict[str, str]]:
     """Parameters of the scene for each of `count` frames.
 
-    Parameters
-    ----------
-    scene : XML file.
     given : parameters that stay.
     changes : from the first frame to the last, both ends included.
     turns : names of angles in degrees that turn once around, beginning where the scene has them;
         the last frame is one step before the first, so that a film of them closes.
 
-    Raises
-    ------
-    DiffractionError
-        If an angle to be turned has no value to begin with, or one that is no number.
+    Raises a DiffractionError if an angle to be turned has no value to begin with, or one that is no
+    number.
     """
     around = []
     for name in turns:

@@ -1,20 +1,28 @@
-"""Rendering in passes, so that there is progress to show and Ctrl-C keeps what is done."""
+"""Rendering in passes, so that there is progress to show and Ctrl-C keeps what is done.
+
+Pictures of it are EXR, linear, and PNG, for the eye.
+"""
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from types import FrameType
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DiffractionError
+from ..atomic import atomic_path
+from ..errors import DiffractionError, one_line
 from ..progress import Progress
-from .mitsuba_text import error_of
+from .load import error_of
+
+# Pixel formats that a screen can show, and what becomes of them in a PNG.
+_SHOWN_AS = {"RGB": "RGB", "RGBA": "RGBA", "XYZ": "RGB", "XYZA": "RGBA", "Y": "Y", "YA": "YA"}
 
 #: Passes that a task of a cluster renders, at most; their sum is what is added to the picture.
 GROUP = 8
@@ -22,6 +30,71 @@ GROUP = 8
 # Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
 # wavefronts exhaust the memory. Fixed, so that a seed gives the same picture on every machine.
 _SAMPLES = {"llvm": 2**21, "cuda": 2**24}
+
+
+def colours_of(bitmap: Any) -> Any | None:
+    """The part of a film's bitmap that a screen can show; `None` if there is none.
+
+    Beside colours a film may hold further channels (normals, depth, ...), and a spectral film
+    holds only bands.
+    """
+    parts = dict(bitmap.split())
+    root = parts.get("<root>")
+    if root is None or root.pixel_format().name not in _SHOWN_AS:
+        return None
+    return root
+
+
+def write_exr(bitmap: Any, path: Path, metadata: Mapping[str, str | int]) -> None:
+    """Write all channels, linear, in single precision, with metadata as EXR attributes."""
+    for key, value in metadata.items():
+        bitmap.metadata()[key] = value
+    _write(bitmap, path)
+
+
+def write_png(
+    colours: Any, path: Path, exposure: float = 0.0, metadata: Mapping[str, str] | None = None
+) -> None:
+    """Write 8 bits per channel: times 2^exposure, sRGB transfer, what is beyond [0, 1] clipped.
+
+    colours : what `colours_of` returns; its alpha is premultiplied, that of the PNG is not.
+    exposure : stops.
+    metadata : text to store with it, ASCII.
+    """
+    import mitsuba as mi
+
+    values = np.array(colours, dtype=np.float32)
+    has_alpha = colours.has_alpha()
+    light = values[..., :-1] if has_alpha else values
+    light *= np.float32(2.0**exposure)
+    np.nan_to_num(values, copy=False, nan=0.0)
+    exposed = mi.Bitmap(values, pixel_format=colours.pixel_format())
+    transform = mi.Bitmap.AlphaTransform
+    shown = exposed.convert(
+        getattr(mi.Bitmap.PixelFormat, _SHOWN_AS[colours.pixel_format().name]),
+        mi.Struct.Type.UInt8,
+        True,
+        transform.Unpremultiply if has_alpha else transform.Empty,
+    )
+    for key, value in (metadata or {}).items():
+        shown.metadata()[key] = value
+    _write(shown, path)
+
+
+def count_bad(bitmap: Any) -> int:
+    """How many pixels hold a NaN or an infinity."""
+    return int((~np.isfinite(np.array(bitmap))).any(axis=-1).sum())
+
+
+def _write(bitmap: Any, path: Path) -> None:
+    with atomic_path(path) as temporary:
+        try:
+            bitmap.write(str(temporary))
+        except RuntimeError as error:  # what Mitsuba makes of a full disk
+            reason = one_line(str(error)).rpartition(": ")[2]
+            raise DiffractionError(
+                f"cannot write '{path}': {reason}; nothing was left behind"
+            ) from error
 
 
 @dataclass(frozen=True)
@@ -84,10 +157,7 @@ class Pass:
 def passes_of(sensor: Any, spp: int, seed: int, variant: str) -> list[Pass]:
     """The passes that take `spp` samples per pixel, or the few more that a sampler rounds up to.
 
-    Parameters
-    ----------
-    sensor : its film and sampler.
-    spp, seed, variant : as in `render_passes`.
+    Parameters as in `render_passes`.
     """
     sampler, seeds = sensor.sampler(), np.random.SeedSequence(seed)
     size = samples_per_pass(spp, int(np.prod(sensor.film().crop_size())), variant)
@@ -108,10 +178,7 @@ def groups_of(passes: Sequence[Pass]) -> list[Sequence[Pass]]:
 def render_pass(scene: Any, sensor: Any, one: Pass) -> NDArray[np.float64]:
     """The film's raw storage after one pass: filter-weighted sums beside the sums of the weights.
 
-    Raises
-    ------
-    DiffractionError
-        If Mitsuba refuses or fails to render.
+    Raises a DiffractionError if Mitsuba refuses or fails to render.
     """
     integrator, film = integrator_of(scene), sensor.film()
     try:
@@ -139,10 +206,7 @@ def developed(scene: Any, sensor: Any, total: NDArray[np.float64], spp: int) -> 
 def integrator_of(scene: Any) -> Any:
     """The scene's integrator.
 
-    Raises
-    ------
-    DiffractionError
-        If there is none.
+    Raises a DiffractionError if there is none.
     """
     integrator = scene.integrator()
     if integrator is None:
@@ -173,8 +237,6 @@ def render_passes(
     added up in double precision and put back into the film, which then divides and converts to
     its own format. Averages of finished pictures would differ where pixels share samples.
 
-    Parameters
-    ----------
     scene, sensor : of the variant that is set.
     spp : samples per pixel; stratified samplers round it up, and the result says to what.
     seed : whole number from 0; each pass gets its own, derived from it.
@@ -182,10 +244,7 @@ def render_passes(
     stop : asked, it ends the rendering after the current pass.
     progress : called as progress(samples done, samples in all, what is being done).
 
-    Raises
-    ------
-    DiffractionError
-        If Mitsuba refuses or fails to render.
+    Raises a DiffractionError if Mitsuba refuses or fails to render.
     """
     integrator_of(scene)
     progress(0, spp, "compiling")

@@ -1,14 +1,16 @@
-"""Progress bars fit the terminal, whatever it says of itself."""
+"""Progress bars fit the terminal; Ctrl-C and SIGTERM end a command at once and leave nothing."""
 
 from __future__ import annotations
 
 import fcntl
 import os
 import pty
+import signal
 import struct
 import subprocess
 import sys
 import termios
+from pathlib import Path
 
 import pytest
 
@@ -18,6 +20,27 @@ from mitsuba_diffraction.cli import Bar
 with Bar(argparse.Namespace(progress=None), delay=0) as bar:
     for n in range(20):
         bar(n, 20, "working")
+"""
+
+ROOT = Path(__file__).parents[2]
+ENTRY = ROOT / "_mitsuba_diffraction.py"
+
+#: Seconds: far from the ten minutes that the main thread would take.
+SOON = 120
+
+# In C++, as far as Python can tell: no signal handler runs on the main thread meanwhile.
+STUCK = """
+import ctypes
+from mitsuba_diffraction.atomic import atomic_path
+import mitsuba_diffraction.cli.info as info
+
+def describe(*_):
+    with atomic_path("out.exr"):
+        print("stuck", flush=True)
+        ctypes.CDLL(None).sleep(600)
+    return {}
+
+info._describe = describe
 """
 
 
@@ -32,3 +55,87 @@ def test_a_bar_is_redrawn_in_one_line(columns):
     assert "working" in said
     assert "\n" not in said.strip()
     assert max(map(len, drawn)) <= (columns or 80)
+
+
+def started(code: str, folder: Path) -> subprocess.Popen[str]:
+    lines = ["import signal, sys", "from mitsuba_diffraction.cli import main", code]
+    lines += ["sys.exit(main(['info', 'x']))"]
+    return subprocess.Popen(
+        [sys.executable, "-c", "\n".join(lines)], cwd=folder, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_ends_what_holds_the_main_thread(tmp_path, number, code):
+    held = "import mitsuba_diffraction.cli.console as i; i.GRACE = 0.2\n" + STUCK.replace(
+        "ctypes.CDLL(None).sleep(600)",
+        # the signals reach another thread, so that the sleep is not cut short
+        "signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT, signal.SIGTERM]); "
+        "ctypes.CDLL(None).sleep(600)",
+    )
+    process = started(held, tmp_path)
+    assert process.stdout is not None
+    process.stdout.readline()
+    assert len(os.listdir(tmp_path)) == 1  # the temporary file
+    process.send_signal(number)
+    _, said = process.communicate(timeout=SOON)
+    assert process.returncode == code
+    assert said.count("\n") == (1 if number == signal.SIGINT else 0), said
+    assert os.listdir(tmp_path) == []
+
+
+# one of the first that the package imports, and of the last
+@pytest.mark.parametrize(
+    ("entry", "slow"),
+    [
+        ([str(ENTRY)], "numpy"),
+        ([str(ENTRY)], "mitsuba"),
+        (["-m", "mitsuba_diffraction"], "mitsuba"),
+    ],
+    ids=str,
+)
+def test_ctrl_c_while_the_package_is_imported_is_no_traceback(entry, slow, tmp_path):
+    # stands for that module, whose import takes a while
+    (tmp_path / f"{slow}.py").write_text("import time\nprint(flush=True)\ntime.sleep(600)\n")
+    process = subprocess.Popen(
+        [sys.executable, *entry, "render", "none.xml"], text=True, cwd=ROOT,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])},
+        # as on a terminal, also if these tests run in a background that ignores it
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=SOON)
+    assert process.returncode == 130
+    assert said == "mitsuba-diffraction: interrupted\n"
+
+
+@pytest.mark.parametrize(
+    ("raised", "code", "text"),
+    [
+        ("KeyboardInterrupt", 130, "interrupted; nothing half-written"),
+        ("MemoryError", 1, "error: out of memory"),
+        ("SystemExit(143)", 143, ""),
+        ("ValueError", 1, "ValueError"),
+    ],
+)
+def test_what_a_plugin_raises_while_a_scene_loads_is_not_swallowed(
+    run, tmp_path, monkeypatch, some_variant, raised, code, text
+):
+    from mitsuba_diffraction.plugin import bsdf
+
+    def read(*_: object) -> None:
+        raise eval(raised)
+
+    monkeypatch.setattr(bsdf, "read_parameters", read)
+    scene = tmp_path / "a.xml"
+    scene.write_text(
+        '<scene version="3.0.0"><shape type="sphere"><bsdf type="diffraction"/></shape></scene>'
+    )
+    ran = run("render", scene, "-m", some_variant, "-o", tmp_path / "a.exr")
+    assert ran.code == code
+    assert text in ran.err
+    assert len(ran.err.splitlines()) == bool(text)

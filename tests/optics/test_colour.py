@@ -11,6 +11,7 @@ from mitsuba_diffraction.optics.colour import (
     delta_e,
     encode_srgb,
     linear_srgb,
+    metal_tint,
     response,
 )
 
@@ -81,3 +82,24 @@ def test_the_exposure_shows_the_95th_percentile_as_white():
     assert np.nanmax(delta_e(reference, 1.02 * reference)) > 0.2
     # above the percentile both are white
     np.testing.assert_allclose(delta_e(reference, 1.02 * reference)[-5:], 0.0, atol=1e-9)
+
+
+def test_the_tint_of_a_metal_is_right_for_white_and_better_for_lines():
+    """A step of reflectance within green, as gold's; random sums of lines 40 nm wide."""
+    gold = 0.4 + 0.5 / (1.0 + np.exp((510.0 - EVERY_NM) / 15.0))
+    lines = linear_srgb(response(EVERY_NM))
+    channels = gold @ lines / lines.sum(axis=0)
+    tint = metal_tint(EVERY_NM, gold, channels)
+    white = lines.sum(axis=0)
+    np.testing.assert_allclose(tint @ (channels * white), gold @ lines, rtol=1e-12)
+    centres = np.random.default_rng(3).uniform(420.0, 680.0, 200)
+    light = np.exp(-0.5 * ((EVERY_NM - centres[:, None]) / 17.0) ** 2)
+    truth, plain = (light * gold) @ lines, light @ lines * channels
+    errors = [np.abs(found - truth).sum() for found in (plain @ tint.T, plain)]
+    assert errors[0] < 0.7 * errors[1]  # 0.60 of it
+
+
+def test_what_reflects_evenly_or_nothing_has_no_tint():
+    even = np.full(len(EVERY_NM), 0.3)
+    np.testing.assert_allclose(metal_tint(EVERY_NM, even, [0.3] * 3), np.eye(3), atol=1e-12)
+    np.testing.assert_array_equal(metal_tint(EVERY_NM, 0.0 * even, np.zeros(3)), np.eye(3))

@@ -251,6 +251,7 @@ def test_derivatives_are_those_of_differences(some_variant, kind, name, at, step
         ({"thin": True, "transmission": False}, "leave transmission=false out"),
         ({"thin": True, "pigment": {"type": "diffuse"}}, "a nested BSDF exclude each other"),
         ({"transmission": True, "coat_ior": 1.4}, "coat_ior exclude each other"),
+        ({"transmission": True, "coat_ior": 1.5}, "coat_ior exclude each other"),
         ({"thin": True, "film_ior": 1.4, "film_thickness": 100.0}, "film_ior exclude each other"),
         ({"thin": True, "shadowing": "vcavity"}, "shadowing=vcavity exclude each other"),
         ({"thin": 1.0}, "thin=1.0 must be true or false"),

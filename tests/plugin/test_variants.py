@@ -11,6 +11,8 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionTable
+from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
+from mitsuba_diffraction.plugin import reflectance
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from tests.directions import Array, as_single, rough_patch, uniform_directions
 from tests.plugin.conftest import runs
@@ -257,6 +259,30 @@ def test_a_small_scene_has_the_colours_of_the_spectral_one(
     assert found.mean(axis=(0, 1)) == pytest.approx(
         truth.mean(axis=(0, 1)), rel=tolerance, abs=tolerance * truth.mean()
     )
+
+
+def test_gold_has_the_colour_of_its_spectrum(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nearer than with one reflectance a channel, which lines of light do not all share."""
+    wi, wo, _ = pairs()
+    lines = np.arange(362.5, 780.0, 5.0, np.float32).reshape(-1, 4)
+    mi.set_variant(spectral_variant())
+    bsdf, truth = load(material="Au"), np.zeros((N, 3))
+    for group in lines if dr.is_jit_v(mi.Float) else []:
+        si = interaction(wi, np.tile(group, (N, 1)))
+        value = np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(wo.T))).T
+        truth += 5.0 * value @ linear_srgb(response(group))
+    if not truth.any():
+        pytest.skip("scalar variants would take minutes")
+    mi.set_variant(mi.variant().replace("spectral", "rgb"))
+    errors = []
+    for tinted in (True, False):
+        with monkeypatch.context() as patch:
+            if not tinted:
+                patch.setattr(reflectance, "metal_tint", lambda *_: np.eye(3))
+            si = interaction(wi, lines)
+            found = np.array(load(material="Au").eval(mi.BSDFContext(), si, mi.Vector3f(wo.T))).T
+        errors.append(delta_e(truth, found, least=1e-3))
+    assert np.nanmean(errors[0]) < 0.7 * np.nanmean(errors[1])
 
 
 @pytest.mark.parametrize("theta", [0.0, 50.0])

@@ -163,7 +163,7 @@ def _section(
 MATERIALS: dict[str, tuple[dict[str, Any], bool]] = {
     "dielectric 1.5": ({}, True),
     "none": ({"material": "none"}, True),
-    "aluminium": ({"material": "Al"}, False),
+    "aluminium": ({"material": "Al"}, True),
     "gold": ({"material": "Au"}, False),
 }
 _LIGHTS = ((0.0, 0.0), (30.0, 0.0), (30.0, 90.0), (60.0, 45.0))

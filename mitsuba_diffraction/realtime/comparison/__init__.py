@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from ...optics.colour import delta_e
 from .measures import Difference, difference, exposure_of
-from .run import Comparison
-from .same_lights import SameLights
+from .run import Comparison, SameLights
 
 __all__ = ["Comparison", "Difference", "SameLights", "delta_e", "difference", "exposure_of"]

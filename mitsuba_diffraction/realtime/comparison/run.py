@@ -10,27 +10,73 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import DiffractionError, DiffractionWarning
 from ...progress import Progress, silent
-from ...scene.passes import Stop, render_passes
-from ...scene.pictures import write_exr
+from ...scene.passes import Stop, render_passes, write_exr
 from ..glsl.context import clock_of
+from ..glsl.renderer import Renderer
+from ..glsl.scene import load
 from ..glsl.source import THESIS_METHODS
 from ..glsl.timing import fragment_times
-from .measures import difference, exposure_of
-from .same_lights import SameLights
-from .sheet import write_sheet
-from .truth import box_sensor, direct_light
+from .measures import difference, exposure_of, regions
+from .report import write_sheet
+from .truth import box_sensor, direct_light, seen, with_lights
 
 #: Samples along either side of a pixel for the slow methods, whose own errors are far larger.
 _FEWER, _MOST = 2, 64
 _DETAIL = 1024  # samples per pixel at most, under lights without extent, which are quiet
 _STEP = 8  # frames between two looks at the clock
+
 #: Of other methods than this one a part of the frames is drawn. What they differ by from this one's
 #: in the same light, places and lobes has little noise, and is added to its picture of all frames.
 _QUICK, _SPARED = "lut", 8
 _IN_FRAME = 1 << 15  # samples that progressive light draws at once: fewer take about as long
+
+
+class SameLights:
+    """A scene for both renderers: direct light of directions and points alone.
+
+    Lights with an extent are replaced by points and directions in both: the sun of a sky by its
+    direction. The rest of the sky is left out of both.
+
+    Parameters
+    ----------
+    scene : a `mi.Scene` of the variant that is set, or an XML file.
+    sensor : index of the camera.
+    name : what errors call the scene.
+
+    Attributes
+    ----------
+    renderer : draws it by shaders.
+    scene : for the path tracer; its one sensor averages evenly over each pixel.
+
+    Raises
+    ------
+    DiffractionError
+        If the scene has no light with a direction or place, or as of `glsl.Renderer`.
+    """
+
+    def __init__(self, scene: Any, *, sensor: int = 0, name: str = "the scene") -> None:
+        scene = load(scene)
+        self.renderer = Renderer(scene, sensor=sensor)
+        if not self.renderer.lights:
+            raise DiffractionError(
+                f"{name} has no light with a direction or place to compare under; add a "
+                "directional or point emitter, or a sky with a sun"
+            )
+        self.renderer.sky = np.zeros((4, 3))
+        self.scene = with_lights(scene, self.renderer.camera, self.renderer.lights)
+        self._sees = seen(self.scene, self.renderer.lights)
+        known = {surface.shape.ptr: surface for surface in self.renderer.scene.surfaces}
+        found = [known.get(shape.ptr) for shape in self.scene.shapes()]
+        self._exact = np.array([s is not None and s.exact for s in found])
+        self._diffracting = np.array([s is not None and s.material.bsdf is not None for s in found])
+
+    def regions(self, drawn: NDArray[np.floating]) -> dict[str, NDArray[np.bool_]]:
+        """Kinds of pixels (height, width) of a picture by `renderer`, see `measures.regions`."""
+        return regions(self._sees, self._exact, self._diffracting, drawn[..., 3])
 
 
 @dataclass(frozen=True)
@@ -45,9 +91,9 @@ class Halves:
         """The picture."""
         return 0.5 * (self.first + self.second)
 
-    def noise(self, exposure: float) -> dict[str, float]:
-        """ΔE2000 between a picture and one without noise, over all pixels: mean and 99 %."""
-        apart = difference(self.first, self.second, None, exposure)
+    def noise(self, exposure: float, mask: Any = None) -> dict[str, float]:
+        """ΔE2000 between a picture and one without noise, over some pixels: mean and 99 %."""
+        apart = difference(self.first, self.second, mask, exposure)
         # two halves of the samples differ by twice what their mean is off
         return {
             "delta_e_mean": 0.5 * apart.delta_e_mean,
@@ -107,25 +153,14 @@ class Comparison:
             If the rendering was interrupted: half a picture is no use here.
         """
         suited = [name for name in dict.fromkeys(methods) if self._suits(name, leave_out)]
-        renderer, first = self.both.renderer, 2 * self.seed
-        full = None
+        renderer, full = self.both.renderer, None
         with Stop() as stop:
-            direct = self.both.scene
-            halves = [
-                self._traced(direct, direct.sensors()[0], min(self.spp, _DETAIL) // 2, seed, stop)
-                for seed in (first, first + 1)
-            ]
-            every = direct_light(self.scene, renderer.camera)
-            truth = Halves(
-                *(
-                    self._traced(every, every.sensors()[0], self.spp // 2, seed, stop)
-                    for seed in (first, first + 1)
-                )
-            )
+            few = self._halves(self.both.scene, min(self.spp, _DETAIL), stop)
+            truth = self._halves(direct_light(self.scene, renderer.camera), self.spp, stop)
             if self.full_spp:
                 sensor = box_sensor(renderer.camera)
                 full = self._traced(self.scene, sensor, self.full_spp, self.seed, stop)
-        reference = 0.5 * (halves[0] + halves[1])
+        reference = few.mean
         exposure = exposure_of(reference)
         self._make_folder()
         self._write(truth.mean, "direct", self.spp)
@@ -135,14 +170,12 @@ class Comparison:
         for method in suited:
             if method not in THESIS_METHODS:
                 table[method]["whole"] = self._whole(method, truth, full)
-        noise = difference(halves[0], halves[1], compared, exposure)
         return {
             "scene": self.name, "variant": self.variant, "driver": renderer.driver,
             "size": list(renderer.camera.size), "spp": self.spp, "exposure": exposure,
             "lights": [light.name for light in renderer.lights],
             "not_shown": list(renderer.scene.omissions),
-            # two halves of the samples differ by twice what their mean is off
-            "noise_delta_e_mean": 0.5 * noise.delta_e_mean,
+            "noise_delta_e_mean": few.noise(exposure, compared)["delta_e_mean"],
             "whole_noise": truth.noise(exposure_of(truth.mean)),
             "clipped": float((truth.mean * exposure_of(truth.mean) > 1.0).any(axis=2).mean()),
             "frames": self.frames,
@@ -251,6 +284,11 @@ class Comparison:
             table[method]["fragment_ns"] = 1e9 * times["whole"]
             table[method]["look_up_ns"] = 1e9 * times["look_up"]
         return table, compared
+
+    def _halves(self, scene: Any, spp: int, stop: Stop) -> Halves:
+        """A path-traced picture of a scene with a sensor of its own."""
+        seeds = (2 * self.seed, 2 * self.seed + 1)
+        return Halves(*(self._traced(scene, scene.sensors()[0], spp // 2, s, stop) for s in seeds))
 
     def _traced(self, scene: Any, sensor: Any, spp: int, seed: int, stop: Stop) -> Any:
         """A path-traced picture (height, width, 3)."""

@@ -1,4 +1,4 @@
-"""The scenes that a path tracer renders for comparison: all light once reflected, or few lights."""
+"""What the path tracer renders for comparison: all light once reflected, or few lights."""
 
 from __future__ import annotations
 
@@ -176,3 +176,37 @@ def _lit(scene: Any, si: Any, lights: Sequence[Light]) -> NDArray[np.bool_]:
         clear &= ~above | ~scene.ray_test(ray, si.is_valid() & above)
         any_above |= above
     return np.array(si.is_valid() & clear & any_above, bool)
+
+
+class Progressive:
+    """Direct light of a scene under these lights, as `truth.with_lights` has it.
+
+    spp : samples per pixel in all.
+    step : of one pass.
+    """
+
+    def __init__(
+        self, scene: Any, camera: Camera, lights: Sequence[Light], spp: int = 64, step: int = 8
+    ) -> None:
+        self._scene = with_lights(scene, camera, lights)
+        self.spp, self._step, self.done = spp, step, 0
+        self._sum: NDArray[np.float64] = np.zeros((camera.size[1], camera.size[0], 3))
+
+    @property
+    def finished(self) -> bool:
+        """Whether all samples are taken."""
+        return self.done >= self.spp
+
+    def advance(self) -> None:
+        """Take the samples of one pass."""
+        import mitsuba as mi
+
+        taken = min(self._step, self.spp - self.done)
+        image = mi.render(self._scene, spp=taken, seed=self.done)
+        self._sum += taken * np.array(image, np.float64)[..., :3]
+        self.done += taken
+
+    @property
+    def image(self) -> NDArray[np.float32]:
+        """The picture so far, (height, width, 3), linear sRGB."""
+        return (self._sum / max(self.done, 1)).astype(np.float32)

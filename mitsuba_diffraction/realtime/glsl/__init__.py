@@ -4,32 +4,22 @@ Contents
 --------
 Renderer     draws a scene of Mitsuba by shaders, without a window (in `renderer`)
 export_shader  writes a surface's shader for other programs (in `export`)
-scene        a scene as the shaders know it, made of the next six
-shapes       triangles and their tangents
-materials    BSDFs
+scene        a scene as the shaders know it: triangles and their tangents, and the next three
+materials    BSDFs, and what plain ones mirror
 maps         their textures
-gloss        what plain BSDFs mirror
 lights       directions, points, spots, a smooth sky
 emitters     all emitters as a sequence of lights
-shadows      shadow maps
-casters      what casts shadows
-surroundings  what comes from a direction: environments, flat lights, what stands in the way
-obstacles    how far it is to the nearest surface, on a grid
-lobes        directions that a surface sends light to
-stage        what progressive light needs of a scene from wherever it is seen
+shadows      shadow maps, and what casts shadows
+surroundings  what lobes meet: environments, flat lights, what stands in the way; the lobes
 progressive  frames with one light each, or what lobes meet, accumulated
-camera       sensors
+camera       sensors; the camera and the light, moved by hand
 packing      tables as textures
-thesis       the methods of the thesis as textures
 texels       textures, uniforms and definitions that a shader reads; numbers packed in texels
-source       the shaders' text
+methods      a method's tables and programs; the methods of the thesis as textures
+source       the shaders' text, also without what a surface lacks, under names of its own
 context      OpenGL without a window: programs, textures, pictures to draw into
-prepared     a method's tables and programs
-preprocess   shader text without what a surface lacks, under names of its own
 timing       how long fragments take
-viewer       a window on a scene (extra `view`)
-panel        its panel
-navigation   the camera and the light, moved by hand
+viewer       a window on a scene with its panel (extra `view`)
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Mitsuba's sensors as cameras of OpenGL."""
+"""Mitsuba's sensors as cameras of OpenGL, and moving a camera and a light by hand."""
 
 from __future__ import annotations
 
@@ -7,29 +7,25 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from ...errors import DiffractionError
+from .lights import Light
 
 Array = NDArray[np.float64]
+
+_UPRIGHT = 0.05  # least cosine between the camera's and the scene's up
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera.
+    """A pinhole camera."""
 
-    Attributes
-    ----------
-    to_world : (4, 4); the camera looks along its z axis, y is up and x to the left.
-    fov : across the picture, degrees.
-    size : width and height, pixels.
-    offset : of the principal point, in widths and heights.
-    lens, focus : radius of a thin lens, and how far away it is sharp.
-    """
-
-    to_world: Array
-    fov: float
-    size: tuple[int, int]
-    offset: tuple[float, float] = (0.0, 0.0)
+    to_world: Array  # (4, 4); the camera looks along its z axis, y is up and x to the left
+    fov: float  # across the picture, degrees
+    size: tuple[int, int]  # width and height, pixels
+    offset: tuple[float, float] = (0.0, 0.0)  # of the principal point, in widths and heights
+    # lens, focus: radius of a thin lens, and how far away it is sharp
     lens: float = 0.0
     focus: float = 1.0
 
@@ -49,8 +45,6 @@ class Camera:
     def sampled(self, pixel: Array, lens: Array) -> Camera:
         """The same camera through one place of each pixel and of the lens.
 
-        Parameters
-        ----------
         pixel : (2,) from the middle, −1/2 to 1/2 pixels.
         lens : (2,) 0 to 1, even over the lens.
         """
@@ -95,10 +89,7 @@ class Camera:
 def read_camera(sensor: Any) -> tuple[Camera, list[str]]:
     """A sensor's camera, and what of it is not shown.
 
-    Raises
-    ------
-    DiffractionError
-        If it is no perspective camera.
+    Raises a DiffractionError if it is no perspective camera.
     """
     import mitsuba as mi
 
@@ -125,3 +116,70 @@ def read_camera(sensor: Any) -> tuple[Camera, list[str]]:
         focus=number("focus_distance") or 1.0,
     )
     return camera, omissions
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A camera around a point."""
+
+    to_world: Array  # of the camera, which looks along z, with x to the left and y up
+    target: Array  # (3,) what it turns around, straight ahead
+    up: Array  # (3,) of the scene
+
+    @classmethod
+    def of(cls, camera: Camera, middle: Array) -> Orbit:
+        """Start at a camera; what it turns around is as far away as `middle`."""
+        forward, eye = camera.to_world[:3, 2], camera.eye
+        distance = max(float((middle - eye) @ forward), 1e-3 * float(np.linalg.norm(middle - eye)))
+        above = camera.to_world[:3, 1]
+        axis = int(np.argmax(np.abs(above)))
+        up = np.zeros(3)
+        up[axis] = np.sign(above[axis])
+        return cls(camera.to_world, eye + distance * forward, up)
+
+    @property
+    def distance(self) -> float:
+        """From the camera to the point."""
+        return float(np.linalg.norm(self.target - self.to_world[:3, 3]))
+
+    def turned(self, right: float, up: float) -> Orbit:
+        """Around the point by these angles (rad); never over the top."""
+        side = -self.to_world[:3, 0]
+        rotation = rotation_about(self.up, -right) @ rotation_about(side, -up)
+        moved = self._rotated(rotation)
+        if moved[:3, 1] @ self.up < _UPRIGHT:
+            moved = self._rotated(rotation_about(self.up, -right))
+        return replace(self, to_world=moved)
+
+    def panned(self, right: float, up: float) -> Orbit:
+        """Sideways, in multiples of the distance."""
+        step = self.distance * (up * self.to_world[:3, 1] - right * self.to_world[:3, 0])
+        moved = self.to_world.copy()
+        moved[:3, 3] += step
+        return replace(self, to_world=moved, target=self.target + step)
+
+    def zoomed(self, factor: float) -> Orbit:
+        """To `factor` times the distance."""
+        moved = self.to_world.copy()
+        moved[:3, 3] = self.target + factor * (moved[:3, 3] - self.target)
+        return replace(self, to_world=moved)
+
+    def _rotated(self, rotation: Array) -> Array:
+        moved = self.to_world.copy()
+        moved[:3, :3] = rotation @ moved[:3, :3]
+        moved[:3, 3] = self.target + rotation @ (moved[:3, 3] - self.target)
+        return moved
+
+
+def dragged(light: Light, orbit: Orbit, right: float, up: float) -> Light:
+    """A light turned around the point that the camera looks at, as seen from it (rad)."""
+    rotation = rotation_about(orbit.to_world[:3, 1], right)
+    rotation = rotation_about(-orbit.to_world[:3, 0], -up) @ rotation
+    centre = orbit.target * light.place[3]
+    place = np.append(rotation @ (light.place[:3] - centre) + centre, light.place[3])
+    return replace(light, place=place)
+
+
+def rotation_about(axis: Array, angle: float) -> Array:
+    """Rotation matrix (3, 3) about a unit vector, counter-clockwise."""
+    return np.asarray(Rotation.from_rotvec(angle * axis).as_matrix())

@@ -30,10 +30,8 @@ _KINDS = {
 def headless_context() -> Any:
     """A moderngl context through EGL: a graphics card, or Mesa's software rasteriser.
 
-    Raises
-    ------
-    DiffractionError
-        If moderngl, EGL or a driver is missing, or the driver is older than OpenGL 3.3.
+    Raises a DiffractionError if moderngl, EGL or a driver is missing, or the driver is older than
+    OpenGL 3.3.
     """
     moderngl = require_moderngl()
     try:
@@ -54,10 +52,7 @@ def headless_context() -> Any:
 def require_moderngl() -> Any:
     """The module moderngl.
 
-    Raises
-    ------
-    DiffractionError
-        If it is not installed.
+    Raises a DiffractionError if it is not installed.
     """
     try:
         import moderngl
@@ -107,10 +102,7 @@ def compile_program(
 ) -> Any:
     """A method's program.
 
-    Raises
-    ------
-    DiffractionError
-        If the driver refuses it: the file, the line and the driver's words.
+    Raises a DiffractionError if the driver refuses it: the file, the line and the driver's words.
     """
     moderngl = require_moderngl()
     stage = vertex_source(name=vertex)
@@ -165,10 +157,7 @@ def compiler_words(log: str, parts: Sequence[tuple[str, str]]) -> str:
 def upload(context: Any, texture: Texture) -> Any:
     """A texture in the graphics card's memory.
 
-    Raises
-    ------
-    DiffractionError
-        If it is larger than the driver takes.
+    Raises a DiffractionError if it is larger than the driver takes.
     """
     moderngl = require_moderngl()
     rows, columns, channels = texture.data.shape
@@ -191,19 +180,11 @@ def upload(context: Any, texture: Texture) -> Any:
 class Target:
     """A picture in single precision, with depth.
 
-    Parameters
-    ----------
-    context : of moderngl.
-    width, height : pixels.
-
     Attributes
     ----------
     frame : the framebuffer.
 
-    Raises
-    ------
-    DiffractionError
-        If the driver has no textures so large.
+    Raises a DiffractionError if the driver has no textures so large.
     """
 
     def __init__(self, context: Any, width: int, height: int) -> None:

@@ -59,7 +59,6 @@ class Emitters:
 
     Parameters
     ----------
-    scene : a `mi.Scene` of the variant that is set.
     middle : (3,) where their contributions are weighed against each other.
 
     Attributes
@@ -68,10 +67,7 @@ class Emitters:
     environment : what lies around the scene.
     omissions : emitters of other kinds, in a few words each.
 
-    Raises
-    ------
-    DiffractionError
-        If no emitter brings light.
+    Raises a DiffractionError if no emitter brings light.
     """
 
     def __init__(self, scene: Any, middle: Array) -> None:

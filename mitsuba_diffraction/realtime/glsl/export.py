@@ -20,8 +20,7 @@ from ...tables.store import cached_colours
 from .maps import Map
 from .materials import Material, height_scale, pack_conservation, pack_surface
 from .packing import pack_colours, pack_powers, pack_responses
-from .preprocess import global_names, renamed, resolved
-from .source import shader_file
+from .source import global_names, renamed, resolved, shader_file
 from .texels import PAGE, Packed, Texture
 
 #: Methods that other programs can have, and the functions that they become.

@@ -21,31 +21,23 @@ _SUN_COSINE = float(np.cos(np.radians(0.6)))  # around the sun's disc, 0.27° in
 
 @dataclass(frozen=True)
 class Light:
-    """One light without extent.
+    """One light without extent."""
 
-    Attributes
-    ----------
-    name : for people.
-    place : (4,) direction towards it and 0, or position and 1.
-    wavelengths : (n,) nm.
-    spectrum : irradiance (direction) or intensity (point) relative to D65 of luminance 1, (n,), or
-        (n, 3) where the renderer knows three colours only.
-    axis : (3,) what a light shines along, or zeros where it shines alike to all sides.
-    cone : cutoff and beam of a spot, angles from its axis in rad; None for a piece of a plane,
-        whose intensity falls with the cosine.
-    density : with which a place was drawn on an area light, per area; −1 for a direction drawn from
-        an environment's picture, 0 for what is drawn in no other way (`surroundings`).
-    shape : address of the shape that an area light belongs to; 0 of others.
-    """
-
-    name: str
-    place: Array
-    wavelengths: Array
+    name: str  # for people
+    place: Array  # (4,) direction towards it and 0, or position and 1
+    wavelengths: Array  # (n,) nm
+    # irradiance (direction) or intensity (point) relative to D65 of luminance 1, (n,), or (n, 3)
+    # where the renderer knows three colours only
     spectrum: Array
+    # (3,) what a light shines along, or zeros where it shines alike to all sides
     axis: Array = field(default_factory=lambda: np.zeros(3))
+    # cutoff and beam of a spot, angles from its axis in rad; None for a piece of a plane, whose
+    # intensity falls with the cosine
     cone: tuple[float, float] | None = None
+    # with which a place was drawn on an area light, per area; −1 for a direction drawn from an
+    # environment's picture, 0 for what is drawn in no other way (`surroundings`)
     density: float = 0.0
-    shape: int = 0
+    shape: int = 0  # address of the shape that an area light belongs to; 0 of others
 
     @property
     def colour(self) -> Array:
@@ -55,18 +47,12 @@ class Light:
 
 @dataclass
 class Lighting:
-    """All of a scene's light, and what of it is shown otherwise or not at all.
+    """All of a scene's light, and what of it is shown otherwise or not at all."""
 
-    Attributes
-    ----------
-    lights : without extent.
-    sky : (4, 3) linear sRGB: a plane of normal n gets the irradiance π (sky[0] + Σᵢ nᵢ sky[1 + i]).
-    omissions : in a few words each.
-    """
-
-    lights: list[Light] = field(default_factory=list)
+    lights: list[Light] = field(default_factory=list)  # without extent
+    # (4, 3) linear sRGB: a plane of normal n gets the irradiance π (sky[0] + Σᵢ nᵢ sky[1 + i])
     sky: Array = field(default_factory=lambda: np.zeros((4, 3)))
-    omissions: list[str] = field(default_factory=list)
+    omissions: list[str] = field(default_factory=list)  # in a few words each
 
     @property
     def mean_spectrum(self) -> tuple[Array, Array]:
@@ -85,9 +71,6 @@ def read_lights(scene: Any, middle: Array, most: int) -> Lighting:
     light a point, the sun of a sky a direction; skies and environments their mean radiance and how
     it changes from one side to the other.
 
-    Parameters
-    ----------
-    scene : of the variant that is set.
     middle : (3,) where lights with an extent are looked at from.
     most : lights beyond this number, the weakest, are left out.
     """
@@ -216,7 +199,6 @@ def sampled_directions(
 
     Parameters
     ----------
-    at : (3,) the point.
     samples, start : how many, and the number of the first in a sequence that fills the emitter
         evenly.
 

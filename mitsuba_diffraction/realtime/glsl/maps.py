@@ -26,24 +26,16 @@ _SOME = 256  # texels whose spectra are known
 
 @dataclass(frozen=True)
 class Map:
-    """A value over a surface: the same everywhere, at every vertex, or a picture.
+    """A value over a surface: the same everywhere, at every vertex, or a picture."""
 
-    Attributes
-    ----------
-    value : (channels,), where it is the same.
-    picture : (rows, columns, channels), row 0 at v = 0, and `to_uv` (3, 3) that leads into it.
-    attribute : name of a mesh attribute.
-    clamped : whether the picture's edges go on beyond it, which else repeats.
-    spectra : of some texels of a colour, over `_LAM`, (n, 36).
-    colours : theirs under the light that the picture is for, (n, 3).
-    """
-
-    value: Array
+    value: Array  # (channels,), where it is the same
+    # (rows, columns, channels), row 0 at v = 0, and `to_uv` (3, 3) that leads into it
     picture: NDArray[np.floating] | None = None
     to_uv: Array = field(default_factory=lambda: np.eye(3))
-    attribute: str | None = None
-    clamped: bool = False
-    spectra: NDArray[np.floating] | None = None
+    attribute: str | None = None  # name of a mesh attribute
+    clamped: bool = False  # whether the picture's edges go on beyond it, which else repeats
+    spectra: NDArray[np.floating] | None = None  # of some texels of a colour, over `_LAM`, (n, 36)
+    # theirs under the light that the picture is for, (n, 3)
     colours: NDArray[np.floating] | None = None
 
     def under(self, wavelengths: Array, spectrum: Array) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 from ...optics.blend import NODES_PER_OCTAVE, RoughnessTable
-from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, response
+from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
 from ...optics.fresnel import reflectance
 from ...optics.geometry import wavenumber
 from ...tables.colour.build import VISIBLE
@@ -81,10 +81,7 @@ def _with_next(values: NDArray[np.floating]) -> NDArray[np.floating]:
 def pack_powers(table: DiffractionTable) -> Packed:
     """A table of powers, for `spectral`; one of amplitudes is turned into one.
 
-    Raises
-    ------
-    DiffractionError
-        For a coherent sum (`coherence="patch"`), whose orders interfere.
+    Raises a DiffractionError for a coherent sum (`coherence="patch"`), whose orders interfere.
     """
     if table.grid.coherent:
         raise DiffractionError(
@@ -187,8 +184,6 @@ def _grid(pages: int) -> dict[str, str]:
 def pack_responses(lights: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Packed:
     """What each light's wavelengths add to linear sRGB, for `spectral`.
 
-    Parameters
-    ----------
     lights : of each, wavelengths (n,) in nm and its spectrum relative to D65 of luminance 1 there,
         (n,) or, from a renderer that knows three colours only, (n, 3). Without lights there is
         one that is dark.
@@ -219,8 +214,6 @@ def pack_conductor(
 ) -> Packed:
     """A conductor's reflectance over angle and wavelength, and in linear sRGB under daylight.
 
-    Parameters
-    ----------
     wavelengths : (n,) nm.
     eta, k : (n,), the complex index of refraction η + ik.
     """
@@ -237,14 +230,16 @@ def pack_conductor(
     rows[:-1, :, 1] = np.interp(lam, wavelengths, eta)[:, None]
     rows[:-1, :, 2] = np.interp(lam, wavelengths, k)[:, None]
     fine = np.arange(360.0, 830.5, 1.0)
-    weights = linear_srgb(response(fine))
-    rows[-1, :, :3] = over(fine).T @ (weights / weights.sum(axis=0))
+    weights, found = linear_srgb(response(fine)), over(fine)
+    rows[-1, :, :3] = found.T @ (weights / weights.sum(axis=0))
+    tint = metal_tint(fine, found[:, -1], rows[-1, -1, :3])
     return Packed(
         (Texture("reflectances", rows),),
         {
             "wavenumbers": WAVENUMBERS,
             "channel_eta": tuple(np.interp(RGB_WAVELENGTHS, wavelengths, eta).tolist()),
             "channel_k": tuple(np.interp(RGB_WAVELENGTHS, wavelengths, k).tolist()),
+            **{f"tint_{n}": tuple(column) for n, column in enumerate(tint.T.tolist())},
         },
         {"SURFACE_KIND": "2"},
     )

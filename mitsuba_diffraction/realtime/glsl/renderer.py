@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,25 +30,15 @@ from .materials import (
     pack_relief,
     pack_surface,
 )
+from .methods import Prepared, window
 from .packing import pack_energy, pack_responses
-from .prepared import Prepared, window
-from .progressive import ProgressiveLight
+from .progressive import Extra, ProgressiveLight, Stage
 from .scene import RealtimeScene, load, read_scene
 from .shadows import SIZE
 from .source import LIGHTS
-from .stage import Stage
 from .texels import Uniform
 
 Image = NDArray[np.float32]
-
-
-class Extra(Protocol):
-    """What a surface's shader reads besides its material and tables."""
-
-    definitions: dict[str, str]
-
-    def use(self, program: Any, first_unit: int = 0) -> int:
-        """Set it in a program; returns the next free texture unit."""
 
 
 class Renderer:
@@ -179,7 +169,7 @@ class Renderer:
         scale : height scale of all patches, instead of their own; see `energy_for`.
         coherence_width : µm, instead of their own; not for `lut` and `pq`, whose tables hold it.
         """
-        self._draw(
+        self.draw_lights(
             frame, method, camera or self.camera, self.lights,
             light_definitions(
                 len(self.lights), bool(np.any(self.sky != 0.0)), exposure is not None
@@ -187,29 +177,6 @@ class Renderer:
             {"sky": np.asarray(self.sky, np.float32), "exposure": exposure or 1.0},
             scale=scale, coherence_width=coherence_width,
         )  # fmt: skip
-
-    def draw_light(
-        self,
-        frame: Any,
-        method: str,
-        camera: Camera,
-        light: Light,
-        definitions: dict[str, str],
-        uniforms: dict[str, Uniform],
-        extras: Sequence[Extra],
-        **surface: float | None,
-    ) -> None:
-        """Draw one light, or what the surroundings send, into a framebuffer that is cleared.
-
-        Parameters
-        ----------
-        frame, method, camera : as of `draw`.
-        light : without extent.
-        definitions, uniforms : what of it the shaders know.
-        extras : what each surface's shader reads of it.
-        surface : `scale` and `coherence_width` as of `draw`.
-        """
-        self._draw(frame, method, camera, [light], definitions, uniforms, extras=extras, **surface)
 
     def progressive(
         self,
@@ -247,7 +214,7 @@ class Renderer:
             self._stage = Stage(self)
         return self._stage
 
-    def _draw(
+    def draw_lights(
         self,
         frame: Any,
         method: str,
@@ -255,11 +222,20 @@ class Renderer:
         lights: Sequence[Light],
         definitions: dict[str, str],
         uniforms: dict[str, Uniform],
+        extras: Sequence[Extra] | None = None,
         *,
         scale: float | None = None,
         coherence_width: float | None = None,
-        extras: Sequence[Extra] | None = None,
     ) -> None:
+        """Draw some lights, or what the surroundings send, into a framebuffer.
+
+        Parameters
+        ----------
+        frame, method, camera, scale, coherence_width : as of `draw`.
+        lights : without extent.
+        definitions, uniforms : what of them the shaders know.
+        extras : what each surface's shader reads of them; without any the frame is cleared first.
+        """
         moderngl = require_moderngl()
         own_definitions = [extra.definitions for extra in extras or ()]
         parts = self.prepared(method).parts(definitions, own_definitions)

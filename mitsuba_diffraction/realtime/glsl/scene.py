@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,14 +14,16 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...plugin.names import name_of
 from ...plugin.textures import check_attributes
+from ...scene.orientation.trimesh import grid_faces, texture_tangents
 from .camera import Camera, read_camera
 from .lights import Lighting, emitted_radiance, read_lights
 from .maps import Map
 from .materials import Material, diffracts, read_material
-from .shapes import Triangles, across, triangles_of
 from .source import LIGHTS
 
 Array = NDArray[np.float64]
+
+_RINGS, _SEGMENTS = 192, 384  # of a sphere: 3e-5 of its radius away from it
 
 #: What a vertex has: position, normal, tangent, texture coordinates, colour, axis.
 VERTEX = (
@@ -30,62 +32,162 @@ VERTEX = (
 
 
 @dataclass(frozen=True)
+class Triangles:
+    """Vertices in world space, three after another making a triangle."""
+
+    # positions, normals, tangents: (n, 3); tangents are ∂p/∂u, of any length
+    positions: Array
+    normals: Array
+    tangents: Array
+    texcoords: Array  # (n, 2)
+    # (n,) index of each in the mesh that it comes from, or None
+    vertices: NDArray[np.int64] | None = None
+
+
+def triangles_of(shape: Any) -> Triangles | None:
+    """A shape's triangles, or None for a kind that cannot be shown."""
+    grid = _ANALYTIC.get(shape.class_name())
+    if grid is not None:
+        import mitsuba as mi
+
+        to_world = np.array(mi.traverse(shape)["to_world"].matrix, np.float64).reshape(4, 4)
+        return _placed(_grid(*grid), to_world, *a_normal(shape))
+    return _of_mesh(shape) if shape.is_mesh() else None
+
+
+def a_normal(shape: Any) -> tuple[Array, Array]:
+    """A place on a shape and its normal there, (3,) each: which way `flip_normals` has it."""
+    import mitsuba as mi
+
+    found = shape.sample_position(0.0, mi.Point2f(0.3, 0.4))
+    place, normal = (np.array(x, np.float64).reshape(3, -1)[:, 0] for x in (found.p, found.n))
+    return place, normal
+
+
+def _placed(local: Triangles, to_world: Array, place: Array, normal: Array) -> Triangles:
+    """In the world, with normals on the side that this one at a place is on."""
+    linear = to_world[:3, :3]
+    positions = local.positions @ linear.T + to_world[:3, 3]
+    normals = local.normals @ np.linalg.inv(linear)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    nearest = ((positions - place) ** 2).sum(axis=1).argmin()
+    return Triangles(
+        positions=positions,
+        normals=-normals if normals[nearest] @ normal < 0.0 else normals,
+        tangents=local.tangents @ linear.T,
+        texcoords=local.texcoords,
+    )
+
+
+def _of_mesh(shape: Any) -> Triangles:
+    """Mitsuba shades a triangle with one tangent, that of its texture coordinates."""
+
+    def buffer(values: Any, width: int) -> Array:
+        return np.array(values, np.float64).reshape(-1, width)[corners]
+
+    corners = np.array(shape.faces_buffer(), np.int64).ravel()
+    positions = buffer(shape.vertex_positions_buffer(), 3)
+    sides = positions.reshape(-1, 3, 3)[:, 1:] - positions[::3, None]
+    flat = np.cross(sides[:, 0], sides[:, 1])
+    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+    normals = np.repeat(flat, 3, axis=0)
+    if shape.has_vertex_normals():
+        normals = buffer(shape.vertex_normals_buffer(), 3)
+    tangents = across(flat)
+    texcoords = np.zeros((len(corners), 2))
+    if shape.has_vertex_texcoords():
+        texcoords = buffer(shape.vertex_texcoords_buffer(), 2)
+        uv_sides = texcoords.reshape(-1, 3, 2)[:, 1:] - texcoords[::3, None]
+        dp_du, _, area = texture_tangents(sides, uv_sides)
+        tangents = np.where(area[:, None] != 0.0, dp_du, tangents)
+    return Triangles(positions, normals, np.repeat(tangents, 3, axis=0), texcoords, corners)
+
+
+def across(normals: Array) -> Array:
+    """Mitsuba's tangent where there are no texture coordinates (Duff et al. 2017)."""
+    x, y, z = normals.T
+    sign = np.where(z < 0.0, -1.0, 1.0)
+    a = -1.0 / (sign + z)
+    return np.stack([1.0 + sign * x * x * a, sign * x * y * a, -sign * x], axis=1)
+
+
+def _grid(rows: int, columns: int, point: Callable[[Array, Array], tuple[Array, ...]]) -> Triangles:
+    """Triangles of a parametrisation (u, v) ↦ position, normal, tangent."""
+    s, t = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))
+    position, normal, tangent = point(s.ravel(), t.ravel())
+    index = grid_faces(np.arange(s.size).reshape(s.shape).T).ravel()
+    uv = np.stack([s.ravel(), t.ravel()], axis=1)
+    return Triangles(position[index], normal[index], tangent[index], uv[index])
+
+
+def _rectangle(u: Array, v: Array) -> tuple[Array, ...]:
+    p = np.stack([2.0 * u - 1.0, 2.0 * v - 1.0, 0.0 * u], axis=1)
+    return p, np.tile([0.0, 0.0, 1.0], (len(u), 1)), np.tile([2.0, 0.0, 0.0], (len(u), 1))
+
+
+def _sphere(u: Array, v: Array) -> tuple[Array, ...]:
+    phi, theta = 2 * np.pi * u, np.pi * v
+    p = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], 1)
+    return p, p, np.stack([-np.sin(phi), np.cos(phi), 0.0 * phi], axis=1)
+
+
+def _disk(u: Array, v: Array) -> tuple[Array, ...]:
+    phi = 2 * np.pi * v  # Mitsuba's u is the radius, v the azimuth
+    radial = np.stack([np.cos(phi), np.sin(phi), 0.0 * phi], axis=1)
+    return u[:, None] * radial, np.tile([0.0, 0.0, 1.0], (len(u), 1)), radial
+
+
+def _cylinder(u: Array, v: Array) -> tuple[Array, ...]:
+    phi = 2 * np.pi * u
+    p = np.stack([np.cos(phi), np.sin(phi), v], axis=1)
+    normal = np.stack([np.cos(phi), np.sin(phi), 0.0 * phi], axis=1)
+    return p, normal, np.stack([-np.sin(phi), np.cos(phi), 0.0 * phi], axis=1)
+
+
+#: Rows, columns and parametrisation.
+_ANALYTIC = {
+    "Rectangle": (1, 1, _rectangle),
+    "Sphere": (_RINGS, _SEGMENTS, _sphere),
+    "Disk": (_SEGMENTS, 8, _disk),
+    "Cylinder": (1, _SEGMENTS, _cylinder),
+}
+
+
+@dataclass(frozen=True)
 class Surface:
-    """One shape.
+    """One shape."""
 
-    Attributes
-    ----------
-    name : for people.
-    vertices : (n, 16) float32 as `VERTEX` says, three after another making a triangle.
-    material : how it reflects.
-    shape : of Mitsuba.
-    exact : whether all of its material is shown.
-    radiance : (3,) linear sRGB that it emits as well, the mean; None of most.
-    """
-
-    name: str
+    name: str  # for people
+    # (n, 16) float32 as `VERTEX` says, three after another making a triangle
     vertices: NDArray[np.float32]
-    material: Material
-    shape: Any
-    exact: bool
-    radiance: Array | None = None
+    material: Material  # how it reflects
+    shape: Any  # of Mitsuba
+    exact: bool  # whether all of its material is shown
+    radiance: Array | None = None  # (3,) linear sRGB that it emits as well, the mean; None of most
 
 
 @dataclass(frozen=True)
 class Glow:
-    """A shape that emits light and reflects none.
+    """A shape that emits light and reflects none."""
 
-    Attributes
-    ----------
-    vertices : as of a surface.
-    radiance : (3,) linear sRGB, the mean.
-    """
-
-    vertices: NDArray[np.float32]
-    radiance: Array
+    vertices: NDArray[np.float32]  # as of a surface
+    radiance: Array  # (3,) linear sRGB, the mean
 
 
 @dataclass(frozen=True)
 class RealtimeScene:
-    """What is shown of a scene.
+    """What is shown of a scene."""
 
-    Attributes
-    ----------
-    surfaces, camera, lighting : in world space.
-    low, high : (3,) corners of a box around all surfaces.
-    omissions : what is not shown, or shown otherwise, in a few words each.
-    emitting : shapes that emit light and reflect none.
-    of_light : of the omissions, what progressive light does show.
-    """
-
+    # surfaces, camera, lighting: in world space
     surfaces: tuple[Surface, ...]
     camera: Camera
     lighting: Lighting
+    # low, high: (3,) corners of a box around all surfaces
     low: Array
     high: Array
-    omissions: tuple[str, ...]
-    emitting: tuple[Glow, ...] = ()
-    of_light: tuple[str, ...] = ()
+    omissions: tuple[str, ...]  # what is not shown, or shown otherwise, in a few words each
+    emitting: tuple[Glow, ...] = ()  # shapes that emit light and reflect none
+    of_light: tuple[str, ...] = ()  # of the omissions, what progressive light does show
 
     @property
     def glows(self) -> bool:
@@ -107,10 +209,7 @@ class RealtimeScene:
 def load(scene: Any) -> Any:
     """A Mitsuba scene, of itself or of its file, in the variant that is set or llvm_ad_spectral.
 
-    Raises
-    ------
-    DiffractionError
-        If it is neither, the file cannot be loaded, or as of `check_variant`.
+    Raises a DiffractionError if it is neither, the file cannot be loaded, or as of `check_variant`.
     """
     import mitsuba as mi
 
@@ -143,15 +242,8 @@ def check_variant(variant: str) -> None:
 def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
     """Read a Mitsuba scene.
 
-    Parameters
-    ----------
-    scene : `mi.Scene` of the variant that is set.
-    sensor : index of the camera.
-
-    Raises
-    ------
-    DiffractionError
-        If nothing in it diffracts, there is no perspective camera, or a mesh lacks an attribute.
+    Raises a DiffractionError if nothing in it diffracts, there is no perspective camera, or a mesh
+    lacks an attribute.
     """
     sensors = scene.sensors()
     if not 0 <= sensor < len(sensors):

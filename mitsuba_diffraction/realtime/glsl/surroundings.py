@@ -6,26 +6,46 @@ from there: area lights that are flat, and the environment. The two kinds of fra
 by the balance heuristic (Veach and Guibas 1995).
 
 What such a direction meets first is exact of rectangles and disks. All else that stands in the way
-is found on a grid (`obstacles`).
+is found on a grid of distances to the nearest surface: a ray may step as far as that is without
+missing one (Hart 1996, *Sphere tracing*).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
+from scipy.ndimage import distance_transform_edt
 
 from ...errors import DiffractionError
 from ...plugin.names import name_of
+from ...tables.colour.build import LARGEST_RADIUS
+from ...tables.colour.proposals import IMPORTANCE, brightness
+from ...tables.colour.table import ColourTable
 from .lights import emitted_radiance, radiance_along
+from .scene import a_normal
 from .shadows import frame_along
-from .shapes import a_normal
-from .texels import Packed, Texture, Uniform, as_half
+from .texels import Packed, Texture, Uniform, as_half, listed
 
 Array = NDArray[np.float64]
+
+# lobes: cells over (u, v) in rings
+_RINGS, _AZIMUTHS, _PLACES = 128, 1024, 1 << 16
+_INNERMOST = 0.5  # radius of the innermost cell, in standard deviations of a lobe in the green
+_GREEN = 2.0 * np.pi / 0.55  # rad/µm
+_ZS = np.array([1.1, 1.45, 1.8])  # of w, from slanted to nearly normal incidence
+_EVERYWHERE = 0.1  # share of what is drawn evenly
+
+# the grid of distances
+_CELLS = 1 << 22  # in all, about
+_MARGIN = 2  # cells around it
+_PER_CELL = 4.0  # steps of the distances
+_SPACING = 0.7  # cells between two places of a triangle, at most
+_AT_ONCE = 1 << 20  # places
 
 _SKY = (128, 256)  # rows and columns of an environment that is no picture, and the fewest of one
 _LARGEST = (512, 1024)  # the most
@@ -35,32 +55,121 @@ _FLATS = 12
 _PLASTIC = [0.8191725134, 0.6710436067, 0.5497004779]  # steps in three numbers (Roberts 2018)
 
 
+def pack_lobes(table: ColourTable, height_scale: float) -> Packed:
+    """What shaders/lobes.glsl reads.
+
+    height_scale : factor on the heights, the index of a coat included.
+    """
+    smallest = _INNERMOST / (np.sqrt(2.0) * _GREEN * table.sigma)
+    step = np.log(LARGEST_RADIUS / smallest) / (_RINGS - 1)
+    edges = np.concatenate([[0.0], smallest * np.exp(step * np.arange(_RINGS))])
+    areas = np.diff(edges**2)[:, None] * np.full(_AZIMUTHS, np.pi / _AZIMUTHS)
+    power = _power(table, edges, height_scale)
+    share = power / max(float(power.sum()), 1e-30)
+    share = (1.0 - _EVERYWHERE) * share + _EVERYWHERE * areas / areas.sum()
+    return Packed(
+        (
+            Texture("lobe_densities", (share / areas)[..., None].astype(np.float32)),
+            listed("lobe_places", _lobe_places(share, edges)),
+        ),
+        {"lobe_smallest": float(smallest), "lobe_step": float(step)},
+        {"LOBE_PLACES": str(_PLACES)},
+    )
+
+
+def _power(
+    table: ColourTable, edges: NDArray[np.float64], height_scale: float
+) -> NDArray[np.float64]:
+    """Brightness in the cells (rings, azimuths) between these radii."""
+    zs = np.minimum(_ZS * height_scale, table.z_max)
+    grid, bright = table.grid, brightness(table, zs) / len(zs)
+    cells = np.zeros((_RINGS, _AZIMUTHS))
+    for ring, count in enumerate(grid.counts):
+        radius = grid.radius(ring)
+        row = int(np.clip(np.searchsorted(edges, radius) - 1, 0, _RINGS - 1))
+        start = grid.start(ring)
+        area = radius**2 * grid.step * 2.0 * np.pi / count
+        parts = 2 * max(1, _AZIMUTHS // count)  # of a bin, which lies on both sides of its azimuth
+        spread = np.repeat(bright[start : start + count], parts) * (area / parts)
+        turn = np.arange(len(spread)) * _AZIMUTHS // len(spread)
+        cells[row] += np.bincount(turn, np.roll(spread, -parts // 2), _AZIMUTHS)
+    radii = np.linspace(0.0, table.radius_end, len(table.order_0))
+    places = np.rint(zs / table.z_max * (table.order_0.shape[1] - 1)).astype(int)
+    profile = np.maximum(table.order_0[:, places, :3] @ np.array(IMPORTANCE), 0.0).mean(axis=1)
+    within = cumulative_trapezoid(2.0 * np.pi * radii * profile, radii, initial=0.0)
+    return cells + np.diff(np.interp(edges, radii, within))[:, None] / _AZIMUTHS
+
+
+def _lobe_places(share: NDArray[np.float64], edges: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(u, v) as often in each cell as it is drawn, in the cells' order, (n, 2)."""
+    below = np.concatenate([[0.0], np.cumsum(share)])
+    wanted = (np.arange(_PLACES) + 0.5) / _PLACES * below[-1]
+    cell = np.minimum(np.searchsorted(below, wanted, side="right") - 1, share.size - 1)
+    inside = (wanted - below[cell]) / (below[cell + 1] - below[cell])
+    ring, azimuth = np.divmod(cell, _AZIMUTHS)
+    across = np.arange(_PLACES) * 0.6180339887 % 1.0
+    radius = np.sqrt(edges[ring] ** 2 + (edges[ring + 1] ** 2 - edges[ring] ** 2) * across)
+    phi = 2.0 * np.pi * (azimuth + inside) / _AZIMUTHS
+    return np.stack([radius * np.cos(phi), radius * np.sin(phi)], axis=1).astype(np.float32)
+
+
+def pack_obstacles(triangles: Array) -> Packed:
+    """What shaders/obstacles.glsl reads of triangles (n, 3, 3)."""
+    low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+    # flat or thin, a scene gets some room
+    room = np.maximum(high - low, max(float((high - low).max()), 1e-12) / 64.0)
+    cell = float((room.prod() / _CELLS) ** (1.0 / 3.0))
+    low = low - _MARGIN * cell
+    size = np.ceil((high - low) / cell).astype(int) + _MARGIN
+    empty = np.ones(size[::-1], bool)
+    for places in _places((triangles - low) / cell):
+        x, y, z = places.astype(np.int32).T
+        empty[z, y, x] = False
+    apart = distance_transform_edt(empty)
+    steps = np.minimum(np.floor(_PER_CELL * apart), 255.0).astype(np.uint8)
+    return Packed(
+        (listed("obstacles", steps.reshape(-1, 1)),),
+        {
+            "obstacles_low": tuple(low.tolist()),
+            "obstacles_cell": cell,
+            "obstacles_size": tuple(size.tolist()),
+        },
+        {"OBSTACLES": str(255.0 / _PER_CELL)},
+    )
+
+
+def _places(triangles: Array) -> Iterator[Array]:
+    """Places (n, 3) all over triangles (n, 3, 3), in cells, some at a time."""
+    sides = triangles - np.roll(triangles, 1, axis=1)
+    longest = np.sqrt((sides**2).sum(axis=2).max(axis=1))
+    parts = np.maximum(np.ceil(longest / _SPACING), 1.0).astype(int)
+    parts = 2 ** np.ceil(np.log2(parts)).astype(int)  # few kinds
+    for count in np.unique(parts):
+        i, j = np.meshgrid(np.arange(count + 1), np.arange(count + 1))
+        kept = i + j <= count
+        weights = np.stack([i[kept], j[kept], count - i[kept] - j[kept]], axis=1) / count
+        chosen = triangles[parts == count]
+        step = max(1, _AT_ONCE // len(weights))
+        for start in range(0, len(chosen), step):
+            yield np.einsum("wc,ncx->nwx", weights, chosen[start : start + step]).reshape(-1, 3)
+
+
 @dataclass(frozen=True)
 class Environment:
-    """Radiance from infinitely far away.
+    """Radiance from infinitely far away."""
 
-    Attributes
-    ----------
-    emitter : of Mitsuba.
-    picture : (rows, columns, 3) linear sRGB without the sun's disc, rows over the angle from the z
-        axis, columns around it.
-    sun : (3,) the direction towards its middle, or zeros.
-    sun_radiance : (3,) linear sRGB, the mean over the disc.
-    """
-
-    emitter: Any
+    emitter: Any  # of Mitsuba
+    # (rows, columns, 3) linear sRGB without the sun's disc, rows over the angle from the z axis,
+    # columns around it
     picture: NDArray[np.float32]
-    sun: Array
-    sun_radiance: Array
+    sun: Array  # (3,) the direction towards its middle, or zeros
+    sun_radiance: Array  # (3,) linear sRGB, the mean over the disc
 
     @classmethod
     def of(cls, scene: Any) -> Environment | None:
         """Of a Mitsuba scene, if it has one.
 
-        Raises
-        ------
-        DiffractionError
-            If it is not finite.
+        Raises a DiffractionError if it is not finite.
         """
         import mitsuba as mi
 

@@ -26,18 +26,13 @@ Uniform = float | int | bool | tuple[float, ...] | tuple[int, ...] | NDArray[np.
 
 @dataclass(frozen=True)
 class Texture:
-    """One texture.
+    """One texture."""
 
-    Attributes
-    ----------
-    name : of the sampler in the shader.
-    data : (rows, columns, channels) float16, float32, uint8 or uint32 (read as whole numbers), one,
-        two or four channels.
-    smooth : whether it is a picture, filtered and repeated; else a list, read texel by texel.
-    """
-
-    name: str
+    name: str  # of the sampler in the shader
+    # (rows, columns, channels) float16, float32, uint8 or uint32 (read as whole numbers), one, two
+    # or four channels
     data: NDArray[np.generic]
+    # whether it is a picture, filtered and repeated; else a list, read texel by texel
     smooth: bool = False
 
     @property
@@ -48,17 +43,11 @@ class Texture:
 
 @dataclass(frozen=True)
 class Packed:
-    """What one part of a shader reads.
+    """What one part of a shader reads."""
 
-    Attributes
-    ----------
-    textures : by the names of their samplers.
-    uniforms : by name.
-    definitions : constants that the compiler must know.
-    """
-
-    textures: tuple[Texture, ...] = ()
-    uniforms: Mapping[str, Uniform] = field(default_factory=dict)
+    textures: tuple[Texture, ...] = ()  # by the names of their samplers
+    uniforms: Mapping[str, Uniform] = field(default_factory=dict)  # by name
+    # constants that the compiler must know
     definitions: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -77,10 +66,7 @@ class Packed:
 def listed(name: str, entries: NDArray[np.generic]) -> Texture:
     """Entries (n, channels) as a texture with rows of `PAGE` texels: what `entry` reads.
 
-    Raises
-    ------
-    DiffractionError
-        If they are too many for a texture.
+    Raises a DiffractionError if they are too many for a texture.
     """
     count, channels = entries.shape
     rows = -(-count // PAGE)

@@ -10,7 +10,7 @@ import numpy as np
 
 from .context import Bindings, clock_of, compile_program, require_moderngl, set_uniforms
 from .lights import light_definitions
-from .prepared import vertex_array
+from .methods import vertex_array
 from .renderer import Renderer
 from .source import LIGHTS
 from .texels import Packed, Texture, Uniform

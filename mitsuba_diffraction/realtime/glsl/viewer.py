@@ -4,26 +4,29 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import moderngl_window
 import numpy as np
 from imgui_bundle import imgui
+from moderngl_window.integrations.imgui_bundle import ModernglWindowRenderer
 from numpy.typing import NDArray
 from PIL import Image
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...optics.colour import encode_srgb
-from ..comparison.progressive import Progressive
-from .camera import Camera
-from .navigation import Orbit, dragged
-from .panel import TITLE, PanelWindow
+from ..comparison.truth import Progressive
+from .camera import Camera, Orbit, dragged
+from .context import check_version
 from .progressive import ProgressiveLight
 from .renderer import Renderer
 from .source import METHODS, THESIS_METHODS
+
+TITLE = "mitsuba-diffraction"
+
 
 HELP = (
     "left button: turn   right: drag the light\n"
@@ -36,7 +39,17 @@ _FRAMES = 30  # that the readout averages over
 _AT_ONCE, _ENOUGH = 4, 2048  # frames of progressive light at once, and when there is no more to see
 
 
-class Viewer(PanelWindow):
+def _to_panel(event: str) -> Callable[..., None]:
+    """What hands an event on to the panel."""
+
+    def handle(self: Viewer, *values: Any) -> None:
+        if hasattr(self, "panel"):  # a window may be resized before it has one
+            getattr(self.panel, event)(*values)
+
+    return handle
+
+
+class Viewer(moderngl_window.WindowConfig):
     """The window. What it shows is set on a subclass: see `show`."""
 
     gl_version = (3, 3)
@@ -55,6 +68,10 @@ class Viewer(PanelWindow):
 
     def __init__(self, **arguments: Any) -> None:
         super().__init__(**arguments)
+        check_version(self.ctx)
+        imgui.create_context()
+        imgui.get_io().set_ini_filename("")  # leave no file behind
+        self.panel = ModernglWindowRenderer(self.wnd)
         self.times: deque[float] = deque(maxlen=_FRAMES)
         self.drawn = 0
         self.message = ""
@@ -99,7 +116,7 @@ class Viewer(PanelWindow):
         """Draw one frame, or do one step of loading."""
         if self._loading is not None:
             try:
-                self.say(next(self._loading))
+                self._say(next(self._loading))
             except StopIteration:
                 self._loading = None
             return
@@ -179,7 +196,22 @@ class Viewer(PanelWindow):
         imgui.text(HELP)
         imgui.text(self.message)
         imgui.end()
-        self.show_panel()
+        self._show_panel()
+
+    def _say(self, text: str) -> None:
+        """The panel with one line alone, on an empty picture."""
+        self.wnd.fbo.clear(0.02, 0.02, 0.02)
+        imgui.new_frame()
+        imgui.begin(TITLE)
+        imgui.text(text)
+        imgui.end()
+        self._show_panel()
+
+    def _show_panel(self) -> None:
+        """Draw what ImGui was told since its last new frame."""
+        imgui.render()
+        self.wnd.use()
+        self.panel.render(imgui.get_draw_data())
 
     # ---------------------------------------------------------------- what it can do
 
@@ -228,6 +260,12 @@ class Viewer(PanelWindow):
             self.message = f"written: {path} (direct light, {tracing.spp} samples)"
 
     # ---------------------------------------------------------------- events
+
+    on_mouse_position_event = _to_panel("mouse_position_event")
+    on_mouse_press_event = _to_panel("mouse_press_event")
+    on_mouse_release_event = _to_panel("mouse_release_event")
+    on_unicode_char_entered = _to_panel("unicode_char_entered")
+    on_resize = _to_panel("resize")
 
     def on_mouse_drag_event(self, x: int, y: int, dx: int, dy: int) -> None:
         """Turn, move, or drag the light."""
@@ -294,7 +332,6 @@ def show(
 
     Parameters
     ----------
-    scene : `mi.Scene` of the variant that is set.
     sensor : index of the camera to start at.
     method, stops : to start with; exposure in stops.
     size : of the window, pixels.
@@ -306,10 +343,7 @@ def show(
     -------
     frames drawn, and the mean of the last ones in ms.
 
-    Raises
-    ------
-    DiffractionError
-        If no window can be opened, or as `Renderer`.
+    Raises a DiffractionError if no window can be opened, or as `Renderer`.
     """
     settings = {
         "mitsuba_scene": scene, "sensor": sensor, "method": method, "stops": stops,
@@ -327,14 +361,9 @@ def show(
 def open_viewer(kind: type[Viewer], arguments: list[str]) -> Viewer:
     """A window of a kind of viewer, not shown yet.
 
-    Parameters
-    ----------
     arguments : of moderngl-window's command line.
 
-    Raises
-    ------
-    DiffractionError
-        If no window can be opened, or as `Renderer`.
+    Raises a DiffractionError if no window can be opened, or as `Renderer`.
     """
     try:
         viewer: Viewer = moderngl_window.create_window_config_instance(kind, args=arguments)
@@ -352,14 +381,9 @@ def open_viewer(kind: type[Viewer], arguments: list[str]) -> Viewer:
 def write_screenshot(shown: NDArray[np.floating], folder: Path, stem: str) -> Path:
     """Write a picture as `stem_000.png`, or the next number that is free.
 
-    Parameters
-    ----------
     shown : (height, width, 3) sRGB, 0 to 1; what is beyond is cut.
 
-    Raises
-    ------
-    DiffractionError
-        If it cannot be written.
+    Raises a DiffractionError if it cannot be written.
     """
     number = 0
     while (path := folder / f"{stem}_{number:03d}.png").exists():

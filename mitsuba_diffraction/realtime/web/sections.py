@@ -1,13 +1,22 @@
-"""Arrays in little space: byte planes, differences, and zlib, as `data.js` reads them."""
+"""Arrays, triangles and textures in little space, as the page's header names them.
+
+Byte planes, differences and zlib: `data.js` undoes them.
+"""
 
 from __future__ import annotations
 
+import io
 import zlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ...optics.colour import encode_srgb
+from ..glsl.scene import VERTEX
+from ..glsl.texels import Packed, Texture
 
 _LEVEL = 6
 _NAMES = {
@@ -19,19 +28,17 @@ _NAMES = {
     np.dtype(np.float16): "Uint16Array",  # JavaScript has no half floats; WebGL takes their bits
 }
 
+_UNIT = 32767  # of directions
+_STEPS = 65535  # over a bounding box
+_NO_DIRECTION = -32768
+
 
 @dataclass(frozen=True)
 class Section:
-    """One array or file in the page's data.
+    """One array or file in the page's data."""
 
-    Attributes
-    ----------
-    data : bytes as they are stored.
-    layout : what the page must know to undo it, as JSON.
-    """
-
-    data: bytes
-    layout: dict[str, Any]
+    data: bytes  # bytes as they are stored
+    layout: dict[str, Any]  # what the page must know to undo it, as JSON
 
 
 def packed_array(values: NDArray[Any], *, differences: bool = False) -> Section:
@@ -39,8 +46,6 @@ def packed_array(values: NDArray[Any], *, differences: bool = False) -> Section:
 
     All first bytes of a column lie together, then all second ones: alike bytes compress well.
 
-    Parameters
-    ----------
     values : of any type that JavaScript has an array of, or half floats.
     differences : store whole numbers less those of the row before, where rows are alike.
     """
@@ -60,6 +65,15 @@ def packed_array(values: NDArray[Any], *, differences: bool = False) -> Section:
 def packed_file(data: bytes) -> Section:
     """A file of a format that browsers read, as it is."""
     return Section(data, {"kind": "file"})
+
+
+def as_columns(data: Any, width: int) -> Any:
+    """A texture's numbers as rows of a given width; the last row is filled up with zeros."""
+    flat = data.reshape(-1)
+    missing = -len(flat) % width
+    if missing:
+        flat = np.concatenate([flat, np.zeros(missing, flat.dtype)])
+    return flat.reshape(-1, width)
 
 
 class Sections:
@@ -85,3 +99,139 @@ class Sections:
             layouts.append({**part.layout, "start": start, "length": len(part.data)})
             start += len(part.data)
         return b"".join(part.data for part in self._parts), layouts
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A surface's triangles."""
+
+    # (vertices, n) sixteen-bit numbers of every vertex that differs from the others
+    columns: NDArray[np.uint16]
+    corners: NDArray[np.uint32]  # (3 · triangles, 1) indices into them
+    # (triangles, 2) where a triangle has one tangent, else they are in `columns`
+    tangents: NDArray[np.int16] | None
+    # of the columns, by attribute, as JSON; attributes with one value are there as it is
+    layout: dict[str, Any] = field(default_factory=dict)
+
+
+def packed_mesh(vertices: NDArray[np.float32]) -> Mesh:
+    """Vertices as `glsl.scene.VERTEX` says, three after another making a triangle."""
+    parts: dict[str, NDArray[np.float32]] = {}
+    start = 0
+    for name, size in VERTEX:
+        parts[name] = vertices[:, start : start + size]
+        start += size
+    tangents = octahedral(parts.pop("tangent"))
+    by_triangle = tangents.reshape(-1, 3, 2)
+    flat = bool(np.all(by_triangle == by_triangle[:, :1]))
+    normals = octahedral(parts.pop("normal"))
+    columns = [normals.view(np.uint16)]
+    layout: dict[str, Any] = {"normal": {"column": 0}}
+    width = 2
+    if not flat:
+        columns.append(tangents.view(np.uint16))
+        layout["tangent"] = {"column": width}
+        width += 2
+    for name, values in parts.items():
+        low = values.min(axis=0).astype(np.float64)
+        extent = values.max(axis=0) - low
+        if not extent.any():
+            layout[name] = {"value": low.tolist()}
+            continue
+        steps = np.where(extent > 0.0, extent, 1.0) / _STEPS
+        columns.append(np.round((values - low) / steps).astype(np.uint16))
+        layout[name] = {"column": width, "low": low.tolist(), "step": steps.tolist()}
+        width += values.shape[1]
+    rows = np.concatenate(columns, axis=1)
+    distinct, corners = _distinct(rows)
+    return Mesh(distinct, corners[:, None], by_triangle[:, 0] if flat else None, layout)
+
+
+def sections_of(mesh: Mesh, add: Any) -> dict[str, Any]:
+    """The mesh as the page's header names it; `add` takes sections and returns their numbers."""
+    return {
+        "columns": add(packed_array(mesh.columns, differences=True)),
+        "corners": add(packed_array(mesh.corners, differences=True)),
+        "tangents": None
+        if mesh.tangents is None
+        else add(packed_array(mesh.tangents, differences=True)),
+        "layout": mesh.layout,
+    }
+
+
+def octahedral(directions: NDArray[np.floating]) -> NDArray[np.int16]:
+    """Directions (n, 3) of any length as two numbers each (Cigolle et al. 2014), within 7e-5 rad.
+
+    A vector of length 0 has no direction: both numbers are -32768.
+    """
+    d = np.asarray(directions, np.float64)
+    length = np.abs(d).sum(axis=1, keepdims=True)
+    known = length[:, 0] > 1e-20
+    d = d / np.where(length > 1e-20, length, 1.0)
+    folded = (1.0 - np.abs(d[:, 1::-1])) * np.where(d[:, :2] < 0.0, -1.0, 1.0)
+    plane = np.where(d[:, 2:] < 0.0, folded, d[:, :2])
+    result = np.round(plane * _UNIT).astype(np.int16)
+    result[~known] = _NO_DIRECTION
+    return result
+
+
+def _distinct(rows: NDArray[np.uint16]) -> tuple[NDArray[np.uint16], NDArray[np.uint32]]:
+    """Distinct rows in the order in which they come first, and the number of each row's own.
+
+    That order keeps neighbours together, so that differences between them stay small.
+    """
+    whole = np.ascontiguousarray(rows).view(np.dtype((np.void, rows.itemsize * rows.shape[1])))
+    _, first, inverse = np.unique(whole.ravel(), return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty(len(order), np.uint32)
+    rank[order] = np.arange(len(order), dtype=np.uint32)
+    return rows[first[order]], rank[inverse.ravel()]
+
+
+def packed_parts(
+    packed: Packed, sections: Sections, done: Mapping[str, Section] | None = None
+) -> dict[str, Any]:
+    """Textures and uniforms as JSON; `done` are sections that are there already, by texture."""
+    return {
+        "uniforms": {name: _plain(value) for name, value in packed.uniforms.items()},
+        "textures": [_texture(t, sections, (done or {}).get(t.name)) for t in packed.textures],
+    }
+
+
+def _texture(texture: Texture, sections: Sections, done: Section | None) -> dict[str, Any]:
+    rows, columns, channels = texture.data.shape
+    entry: dict[str, Any] = {
+        "name": texture.name, "width": columns, "height": rows, "channels": channels,
+        "smooth": texture.smooth,
+    }  # fmt: skip
+    if texture.name == "colour_map":
+        entry["kind"] = "picture"
+        entry["section"] = sections.add(packed_file(_png(texture.data)))
+        return entry
+    data = texture.data
+    entry["kind"] = {1: "bytes", 2: "half", 4: "single"}[data.dtype.itemsize]
+    if data.dtype == np.uint32:
+        entry["kind"] = "words"
+    if done is None:
+        done = packed_array(as_columns(data, channels), differences=entry["kind"] == "bytes")
+    entry["section"] = sections.add(done)
+    return entry
+
+
+def _png(data: NDArray[np.generic]) -> bytes:
+    """A picture of reflectances as eight bits of sRGB, as which nearly all of them began."""
+    from PIL import Image
+
+    linear = np.asarray(data, np.float64)[..., :3]
+    pixels = np.round(255.0 * encode_srgb(linear)).astype(np.uint8)
+    file = io.BytesIO()
+    Image.fromarray(pixels, "RGB").save(file, "PNG", optimize=True)
+    return file.getvalue()
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.ravel().tolist()
+    if isinstance(value, tuple):
+        return [_plain(v) for v in value]
+    return value.item() if isinstance(value, np.generic) else value

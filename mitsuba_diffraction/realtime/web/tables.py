@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from ...tables.store import cached_colours
 from ...tables.table import DiffractionTable
 from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.texels import Packed, shortened
-from .sections import Section, packed_array
+from .sections import Section, as_columns, packed_array
 
 #: What a page can draw with.
 WEB_METHODS = ("lut", "spectral")
@@ -30,17 +29,11 @@ _LARGE = 1 << 20  # entries of the textures that are rounded
 
 @dataclass(frozen=True)
 class WebTable:
-    """One table for one method.
+    """One table for one method."""
 
-    Attributes
-    ----------
-    packed : textures, uniforms and definitions for the shader, rounded.
-    sections : of the textures, by name.
-    loss : mean and 99th percentile of ΔE2000 against the table that was not rounded.
-    """
-
-    packed: Packed
-    sections: dict[str, Section]
+    packed: Packed  # textures, uniforms and definitions for the shader, rounded
+    sections: dict[str, Section]  # of the textures, by name
+    # mean and 99th percentile of ΔE2000 against the table that was not rounded
     loss: tuple[float, float]
 
     @property
@@ -86,15 +79,6 @@ def rounded(values: NDArray[np.floating], bits: int) -> NDArray[np.float16]:
     largest = np.abs(exact).max(axis=-1, keepdims=True)
     step = np.exp2(np.ceil(np.log2(np.maximum(largest, 2.0**-24))) - bits)
     return (np.round(exact / step) * step).astype(np.float16)
-
-
-def as_columns(data: Any, width: int) -> Any:
-    """A texture's numbers as rows of a given width; the last row is filled up with zeros."""
-    flat = data.reshape(-1)
-    missing = -len(flat) % width
-    if missing:
-        flat = np.concatenate([flat, np.zeros(missing, flat.dtype)])
-    return flat.reshape(-1, width)
 
 
 def fitting_tables(

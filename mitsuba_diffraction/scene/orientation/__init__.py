@@ -3,12 +3,8 @@
 Contents
 --------
 trimesh      `TriangleMesh`: arrays; `oriented_mesh`: one whose patch follows a field
-files        `load_mesh`, `write_ply`
-polygons     PLY files of polygons, cut into triangles
-tangents     `check_tangents`: whether a mesh has the tangents that a patch needs
-report       `TangentReport`: what that found
-breaks       along how long lines a field of directions breaks
-surface      frames, transport and Laplacians of a mesh that is welded by position
+files        `load_mesh`, `write_ply`; PLY files of polygons
+tangents     `check_tangents`: whether a mesh has the tangents that a patch needs, where they break
 directions   `direction_field`: a smooth field of directions on any mesh
 """
 
@@ -16,8 +12,7 @@ from __future__ import annotations
 
 from .directions import DirectionField, direction_field
 from .files import load_mesh, load_orientation, write_ply
-from .report import TangentReport
-from .tangents import check_tangents
+from .tangents import TangentReport, check_tangents
 from .trimesh import TriangleMesh, oriented_mesh
 
 __all__ = [

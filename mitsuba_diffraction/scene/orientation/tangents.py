@@ -4,21 +4,214 @@ A patch is laid along dp/du, which Mitsuba takes from the texture coordinates of
 turned from there by the mesh attribute vertex_orientation, where the mesh has it. So a mesh needs
 texture coordinates, they must span an area in every triangle, and the direction must not jump
 between neighbours: where it does, the patch turns suddenly and the colours show a seam.
+
+A field given at the corners of triangles turns within them, where the corners differ, and between
+them, where two triangles differ at the edge that they share. Both are counted by length, not by
+number or area: those of a line's triangles shrink as a mesh gets finer, its length does not.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from .breaks import BREAK, Corners, length_of_breaks
-from .report import TURN, TangentReport
+from ...plugin.textures import ORIENTATION
 from .trimesh import texture_tangents
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+#: Degrees: a field that turns by more within a triangle, or from one to the next, breaks there.
+BREAK = 60.0
+# Around a singular point a field turns by over 60° within a triangle or two, and has to. What is
+# longer than this many of its own edges, or than this share of the mesh, is a line.
+_EDGES, _SHARE = 4.0, 0.2
+
+MOST_TURNING = 0.05  # of the surface, on which the direction may turn too fast
+LONG = 0.05  # of the mesh's size: breaks that are longer in all are seen
+TURN = 30.0  # degrees between neighbours from which on a seam shows
 
 FLAT = 1e-3  # of the typical ratio of texture area to surface area: as good as none
+
+
+def _turning(orientation: Floats) -> Bools:
+    """(m, 3) whether a field turns by over 60° on the way from corner n to corner n + 1.
+
+    orientation : (m, 3, 2) cosine and sine of the angle from each triangle's tangent.
+    """
+    unit = _unit(orientation)
+    cosine = (unit * np.roll(unit, -1, axis=1)).sum(axis=2)
+    return np.asarray(cosine < np.cos(np.radians(BREAK)))
+
+
+def _length_of_breaks(places: Floats, faces: Ints, crossed: Bools, jumps: Ints) -> float:
+    """Total length of the lines along which a field breaks, in the unit of the positions.
+
+    Within a triangle a line joins the middles of the edges along which the field turns; from one
+    that has only one such edge, or three, it goes to the middle. Between triangles it is the edge.
+
+    Parameters
+    ----------
+    places, faces : (n, 3) positions, each once; (m, 3) indices of them.
+    crossed : (m, 3) along which edges the field turns, as of `_turning`.
+    jumps : (e, 2) pairs of places: edges across which the field jumps by over 60 degrees.
+    """
+    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)  # (m, 3, 2)
+    edges = np.concatenate([ends[crossed], jumps])
+    if not len(edges):
+        return 0.0
+    at = places[edges]
+    middles = at.mean(axis=1)
+    sizes = np.linalg.norm(at[:, 1] - at[:, 0], axis=1)
+    # edges that follow each other share a corner
+    n = len(places)
+    graph = coo_array((np.ones(len(edges)), tuple(edges.T)), shape=(n, n))
+    count, of_place = connected_components(graph, directed=False)
+    part = of_place[edges[:, 0]]
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    longest = np.zeros(count)
+    np.minimum.at(low, part, middles)
+    np.maximum.at(high, part, middles)
+    np.maximum.at(longest, part, sizes)
+    used = longest > 0
+    extent = np.zeros(count)
+    extent[used] = np.linalg.norm(high[used] - low[used], axis=1)
+    size = float(np.ptp(places[faces].reshape(-1, 3), axis=0).max())
+    line = extent > np.minimum(_EDGES * longest, _SHARE * size)
+
+    length = np.zeros(len(edges))
+    within = int(crossed.sum())
+    length[within:] = sizes[within:]
+    length[:within] = _shares(places[faces], crossed, middles[:within])
+    return float(length[line[part]].sum())
+
+
+def _shares(corners: Floats, crossed: Bools, middles: Floats) -> Floats:
+    """Length of the line in a triangle that falls to each of its crossed edges."""
+    owner = np.nonzero(crossed)[0]
+    meeting = corners.mean(axis=1)
+    both = crossed.sum(axis=1) == 2
+    total = np.zeros_like(meeting)
+    np.add.at(total, owner, middles)
+    # from both middles half-way to each other
+    meeting[both] = total[both] / 2
+    return np.asarray(np.linalg.norm(middles - meeting[owner], axis=1))
+
+
+@dataclass(frozen=True)
+class TangentReport:
+    """What `check_tangents` found; shares are of the surface area, 0 to 1."""
+
+    triangles: int  # number of triangles with an area
+    # has_uv, has_normals, has_orientation: whether the mesh carries them
+    has_uv: bool
+    has_normals: bool
+    degenerate: float  # share whose texture coordinates span no area: no tangent there
+    mirrored: float  # share where u × v runs the other way round: the patch is seen mirrored
+    # share within which the direction turns by over 60 degrees, or which lies beside an edge across
+    # which it turns by more than 30
+    turning: float
+    stretch: float  # median ratio of |dp/du| to |dp/dv| (1: no direction is stretched)
+    # length of the lines along which the direction breaks, in the unit of the positions
+    broken: float
+    size: float  # of the mesh, its longest side along an axis
+    has_orientation: bool = False
+
+    @property
+    def usable(self) -> bool:
+        """True where a patch can follow nearly all of the surface."""
+        return self.has_uv and self.degenerate < 0.01 and not self.turns_fast and not self.breaks
+
+    @property
+    def breaks(self) -> bool:
+        """Whether the direction breaks along lines that are long enough to be seen."""
+        return self.broken >= LONG * self.size and self.broken > 0
+
+    @property
+    def turns_fast(self) -> bool:
+        """Whether the direction turns too fast for the triangles on much of the surface."""
+        return self.turning >= MOST_TURNING
+
+    def breaking(self) -> str:
+        """How long the lines are along which the direction breaks, in words."""
+        return (
+            f"breaks (turns by over {BREAK:g} degrees) along lines of {self.broken:.3g} in all, "
+            f"{self.broken / self.size:.2g} times the mesh's size of {self.size:.3g}"
+        )
+
+    def problems(self) -> list[str]:
+        """One line for each thing that speaks against this mesh, with what to do."""
+        if not self.has_uv:
+            return [
+                "no texture coordinates, so the patch has no direction: give the mesh one with "
+                "'mitsuba-diffraction tangents', or unwrap it so that u runs the way the patch's x "
+                "axis shall"
+            ]
+        lines = []
+        if not self.has_normals:
+            lines.append("no vertex normals: every triangle reflects like a flat mirror")
+        if self.degenerate >= 0.01:
+            lines.append(
+                f"{self.degenerate:.0%} of the surface has texture coordinates without area, hence "
+                "no tangent: unwrap those parts"
+            )
+        if self.breaks:
+            lines.append(
+                f"the patch's direction {self.breaking()}: colours will show seams; "
+                + (
+                    "make it with 'mitsuba-diffraction tangents' and another --along"
+                    if self.has_orientation
+                    else "unwrap along the body in one piece"
+                )
+            )
+        if self.turns_fast:
+            lines.append(
+                f"the patch's direction turns by over {TURN:g} degrees between neighbours, or "
+                f"{BREAK:g} within a triangle, on {self.turning:.0%} of the surface: "
+                + (
+                    "use a finer mesh, or another --along of 'mitsuba-diffraction tangents'"
+                    if self.has_orientation
+                    else "colours will show seams; unwrap along the body in one piece"
+                )
+            )
+        if 0.01 < self.mirrored < 0.99:
+            lines.append(
+                f"{self.mirrored:.0%} of the surface shows the patch mirrored: flip those parts"
+            )
+        return lines
+
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers and strings, for printing."""
+        return {
+            "triangles": self.triangles,
+            "texture coordinates": self.has_uv,
+            "normals": self.has_normals,
+            "direction of the patch": (
+                "none"
+                if not self.has_uv
+                else f"dp/du turned by {ORIENTATION}"
+                if self.has_orientation
+                else "dp/du"
+            ),
+            "shares of the surface area, 0 to 1": {
+                "without tangent": self.degenerate,
+                "mirrored": self.mirrored,
+                "turning tangent": self.turning,
+            },
+            "lines along which the direction breaks": {
+                "length": self.broken,
+                "length / mesh size": self.broken / self.size if self.size > 0 else 0.0,
+            },
+            "stretch, median |dp/du| / |dp/dv|": self.stretch,
+            "usable": self.usable,
+            "problems": self.problems(),
+        }
 
 
 def check_tangents(
@@ -60,9 +253,10 @@ def check_tangents(
     turn = np.tile([1.0, 0.0], (len(positions), 1)) if orientation is None else orientation
     # vertices are split along seams of the texture, so neighbours are found by position
     places, welded = np.unique(positions, axis=0, return_inverse=True)
-    beside, jumps = _jumps(welded.reshape(-1)[faces], front, tangent, turn[faces], good)
-    corners = Corners(places, welded.reshape(-1)[faces], turn[faces], jumps)
-    turning = beside | corners.turning().any(axis=1)
+    corners = welded.reshape(-1)[faces]
+    beside, jumps = _jumps(corners, front, tangent, turn[faces], good)
+    crossed = _turning(turn[faces])
+    turning = beside | crossed.any(axis=1)
     lengths = np.linalg.norm(dp_du[good], axis=1), np.linalg.norm(dp_dv[good], axis=1)
     return TangentReport(
         triangles=len(faces),
@@ -72,7 +266,7 @@ def check_tangents(
         mirrored=float(area[good & mirrored].sum() / total),
         turning=float(area[turning].sum() / total),
         stretch=float(np.median(lengths[0] / lengths[1])) if good.any() else 0.0,
-        broken=length_of_breaks(corners),
+        broken=_length_of_breaks(places, corners, crossed, jumps),
         size=float(np.ptp(positions[faces].reshape(-1, 3), axis=0).max()),
         has_orientation=orientation is not None,
     )
@@ -132,5 +326,9 @@ def _jumps(
 
 def _laid(tangent: Floats, normal: Floats, turn: Floats) -> Floats:
     """Unit tangents (n, 3) turned by (cosine, sine) (n, 2) counter-clockwise around normals."""
-    unit = turn / np.maximum(np.linalg.norm(turn, axis=1, keepdims=True), 1e-12)
+    unit = _unit(turn)
     return unit[:, :1] * tangent + unit[:, 1:] * np.cross(normal, tangent)
+
+
+def _unit(turn: Floats) -> Floats:
+    return np.asarray(turn / np.maximum(np.linalg.norm(turn, axis=-1, keepdims=True), 1e-12))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class TriangleMesh:
     positions: Floats
     normals: Floats
     uv: Floats  # (n, 2) floats; dp/du is the first tangent, which a measured patch follows
-    faces: NDArray[np.int64]  # (m, 3) integers, counter-clockwise seen from outside
+    faces: Ints  # (m, 3) integers, counter-clockwise seen from outside
     # (n, 2) floats or None Cosine and sine of the angle by which the patch is turned away from
     # dp/du
     orientation: Floats | None = None
@@ -40,25 +41,28 @@ class TriangleMesh:
             raise DiffractionError(f"mesh: 'faces' names a vertex outside 0 to {n - 1}")
 
 
-def cell_corners(grid: NDArray[np.int64]) -> tuple[NDArray[np.int64], ...]:
+def cell_corners(grid: Ints) -> tuple[Ints, ...]:
     """The four corners of every cell of a grid of vertex numbers, in the sense of rotation."""
     corners = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
     return tuple(corner.ravel() for corner in corners)
 
 
-def grid_faces(grid: NDArray[np.int64]) -> NDArray[np.int64]:
+def grid_faces(grid: Ints) -> Ints:
     """Two triangles for every cell of a grid of vertex numbers."""
     a, b, c, d = cell_corners(grid)
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
-def vertex_normals(positions: Floats, faces: NDArray[np.int64]) -> Floats:
+def across(corners: Floats) -> Floats:
+    """Normals (m, 3) of triangles (m, 3, 3), twice as long as their areas are large."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def vertex_normals(positions: Floats, faces: Ints) -> Floats:
     """Unit normals (n, 3): the mean over a vertex's triangles, weighted by their areas."""
-    corners = positions[faces]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     total = np.zeros_like(positions)
     for n in range(3):
-        np.add.at(total, faces[:, n], across)
+        np.add.at(total, faces[:, n], across(positions[faces]))
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.where(length > 0, total / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
 
@@ -89,9 +93,6 @@ def texture_tangents(sides: Floats, uv_sides: Floats) -> tuple[Floats, Floats, F
     return dp_du, dp_dv, determinant / 2
 
 
-Ints = NDArray[np.int64]
-
-
 def oriented_mesh(
     positions: Floats,
     normals: Floats,
@@ -120,7 +121,7 @@ def oriented_mesh(
         With 3m vertices, in the order of `faces`.
     """
     corners, ends = positions[faces], normals[faces]
-    wanted = _tangential(directions[faces], ends)
+    wanted = tangential(directions[faces], ends)
     texture, along = _unrolled(corners, ends, wanted)
     if uv is not None:
         given = uv[faces]
@@ -130,7 +131,7 @@ def oriented_mesh(
         along = np.where(good, dp_du, along)
         # where they span nothing, they must span a little
         texture = np.where(good[:, None], given, given[:, :1] + 1e-4 * texture)
-    first = _tangential(along[:, None], ends)
+    first = tangential(along[:, None], ends)
     second = np.cross(ends, first)
     turn = np.stack([(wanted * first).sum(axis=2), (wanted * second).sum(axis=2)], axis=2)
     return TriangleMesh(
@@ -148,22 +149,23 @@ def _unrolled(corners: Floats, normals: Floats, wanted: Floats) -> tuple[Floats,
     flat = np.cross(sides[:, 0], sides[:, 1])
     # v on the same side of u for the surface's front, whichever way the triangle turns
     flat *= np.where((flat * normals.sum(axis=1)).sum(axis=1) < 0, -1.0, 1.0)[:, None]
-    flat = _unit(flat)
+    flat = unit(flat)
     mean = wanted.sum(axis=1)
-    axis = _unit(mean - (mean * flat).sum(axis=1, keepdims=True) * flat)
+    axis = unit(mean - (mean * flat).sum(axis=1, keepdims=True) * flat)
     nowhere = ~axis.any(axis=1)
-    axis[nowhere] = _unit(sides[nowhere, 0])
+    axis[nowhere] = unit(sides[nowhere, 0])
     across = np.cross(flat, axis)
     offsets = corners - corners[:, :1]
     coordinates = [(offsets * way[:, None]).sum(axis=2) for way in (axis, across)]
     return np.stack(coordinates, axis=2), axis
 
 
-def _tangential(vectors: Floats, normals: Floats) -> Floats:
+def tangential(vectors: Floats, normals: Floats) -> Floats:
     """Unit vectors along the part of `vectors` at right angles to `normals`; zero stays zero."""
-    return _unit(vectors - (vectors * normals).sum(axis=-1, keepdims=True) * normals)
+    return unit(vectors - (vectors * normals).sum(axis=-1, keepdims=True) * normals)
 
 
-def _unit(vectors: Floats) -> Floats:
+def unit(vectors: Floats) -> Floats:
+    """Vectors (…, 3) of length 1; zero stays zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(length > 0, length, 1.0)

@@ -4,9 +4,7 @@ Contents
 --------
 paths        paths through a scene, and what its BSDFs are asked on them
 session      plans to follow and records to keep while a scene loads
-domain       from that to how much of a table it takes
-plan         `Plan`: that for all tables of a scene, as a file
-make         making one, and trying it
-difference   what it changes in the picture
+plan         `Plan`: how much of each table that takes, as a file
+make         making one, and trying what it changes in the picture
 report       what it found, as plain data, with the time of look-ups and how many fall outside
 """

@@ -1,35 +1,116 @@
-"""Making a plan for a scene, and trying it until the picture is as it was."""
+"""Making a plan for a scene, and trying it on a small picture until that is as it was."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import DiffractionError
+from ...optics.colour import delta_e, linear_srgb
+from ...plugin.sampling import forget_sampler
 from ...progress import Progress
 from ...tables.table import DiffractionTable
-from .difference import Difference, difference, small_picture
-from .domain import LookupStatistics, domain_for
 from .paths import TracedPaths, trace
-from .plan import Plan, PlannedTable
+from .plan import LookupStatistics, Plan, PlannedTable, domain_for
 from .session import Session
+
+#: Width at most, and samples per pixel.
+WIDTH, SPP = 160, 64
+
+Picture = tuple[NDArray[np.float64], bool]
 
 Load = Callable[[], Any]
 
 #: A planned table that is not smaller than this share of the whole one is not worth it.
 WORTH = 0.8
+
 #: A picture that differs by more than the tolerance is planned anew with a smaller share outside.
 ATTEMPTS, TIGHTER = 3, 0.3
+
 #: No further one is drafted if a third of the light outside leaves more than this of the error.
 HELPS = 0.8
+
 #: Share of its terms that a table with a larger tolerance keeps at least.
 FEWEST_TERMS = 0.5
+
 #: A plan is refused where this many times its tolerance lies outside: paths differ from the last.
 MOST_OUTSIDE = 3.0
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Between the pictures with whole and with planned tables, of the same random numbers."""
+
+    relative: float  # mean |ΔXYZ| over mean XYZ, all pixels
+    # delta_e_mean, delta_e_99: ΔE2000 of the pixels that are not black, or NaN
+    delta_e_mean: float
+    delta_e_99: float
+    # size, spp: of the pictures
+    size: tuple[int, int]
+    spp: int
+
+
+def difference(
+    whole: Picture,
+    tables: Mapping[str, DiffractionTable],
+    load: Callable[[], Any],
+    plan: Plan,
+    sensor: Callable[[Any], Any],
+) -> Difference:
+    """Render with planned tables, with the random numbers and directions of the whole ones.
+
+    whole, tables : `small_picture` of the scene with whole tables, and those by key.
+    load : loads the scene anew, in the variant that is set.
+    plan : what it is to be loaded with.
+    """
+    like = {key: tables[key] for key in plan.limits()}
+    session = Session(limits=plan.limits(), sample_like=like)
+    with session:
+        planned = load()
+    try:
+        second, _ = small_picture(planned, sensor(planned))
+    finally:
+        for table in session.tables.values():
+            forget_sampler(table)
+        session.close()
+    first, xyz = whole
+    mean = float(first.mean())
+    values = np.full(1, np.nan)
+    if xyz:
+        values = delta_e(linear_srgb(first), linear_srgb(second))
+        values = values[np.isfinite(values)]
+    height, width = first.shape[:2]
+    return Difference(
+        relative=float(np.abs(second - first).mean()) / mean if mean > 0.0 else float("nan"),
+        delta_e_mean=float(values.mean()) if values.size else float("nan"),
+        delta_e_99=float(np.percentile(values, 99.0)) if values.size else float("nan"),
+        size=(width, height),
+        spp=SPP,
+    )
+
+
+def small_picture(scene: Any, sensor: Any) -> Picture:
+    """A small picture (height, width, channels), and whether it is in XYZ."""
+    film = sensor.film()
+    size = np.array(film.size(), int)
+    if size[0] > WIDTH:
+        parameters = mi.traverse(sensor)
+        parameters["film.size"] = [WIDTH, max(1, round(WIDTH * int(size[1]) / int(size[0])))]
+        parameters.update()
+    mi.render(scene, sensor=sensor, spp=SPP, seed=0)
+    root = dict(film.bitmap().split()).get("<root>")
+    if root is None or root.pixel_format().name not in ("RGB", "RGBA", "XYZ", "XYZA"):
+        return np.array(film.bitmap(), np.float64), False
+    kinds = mi.Bitmap.PixelFormat
+    converted = root.convert(kinds.XYZ, mi.Struct.Type.Float32, False)
+    return np.array(converted, np.float64), True
 
 
 @dataclass(frozen=True)
@@ -53,20 +134,12 @@ def record_scene(
 ) -> RecordedScene:
     """Load a scene with whole tables, or with those of a plan, and trace paths through it.
 
-    Parameters
-    ----------
-    load : loads the scene in the variant that is set.
-    sensor : the sensor of a scene.
-    paths : how many.
     plan : whose tables to load it with.
     seed : of the paths.
     timing : build tables anew, and take the time.
 
-    Raises
-    ------
-    DiffractionError
-        If no surface diffracts or one lets light through, if no path meets one, or if the plan is
-        for others.
+    Raises a DiffractionError if no surface diffracts or one lets light through, if no path meets
+    one, or if the plan is for others.
     """
     session = Session(limits=plan.limits() if plan else {}, recording=True, timing=timing)
     with session:
@@ -144,8 +217,6 @@ def draft_plan(
 def worthwhile(plan: Plan, planned: dict[str, DiffractionTable]) -> Plan:
     """The plan without what is not worth it, and with what the rest saves.
 
-    Parameters
-    ----------
     planned : its tables by key; those that are missing stay whole.
     """
     tables = {}
@@ -164,10 +235,7 @@ def worthwhile(plan: Plan, planned: dict[str, DiffractionTable]) -> Plan:
 def load_planned(load: Load, plan: Plan, *, timing: bool = False) -> tuple[Any, Session]:
     """Load a scene with the tables of a plan.
 
-    Raises
-    ------
-    DiffractionError
-        If none of the plan's tables is one of the scene's.
+    Raises a DiffractionError if none of the plan's tables is one of the scene's.
     """
     session = Session(limits=plan.limits(), timing=timing)
     with session:
@@ -194,10 +262,8 @@ def _check_match(session: Session, plan: Plan) -> None:
 def check_light(loaded: RecordedScene, plan: Plan) -> dict[str, float]:
     """Share of each table's light that a scene looks up outside its plan.
 
-    Raises
-    ------
-    DiffractionError
-        If it is several times what the plan was to leave out: camera or lights are others.
+    Raises a DiffractionError if it is several times what the plan was to leave out: camera or
+    lights are others.
     """
     shares = {}
     for key, asked in loaded.statistics.items():

@@ -59,15 +59,10 @@ class TracedPaths:
 def trace(scene: Any, sensor: Any, session: Session, paths: int, seed: int = 0) -> TracedPaths:
     """Trace paths through a scene that was loaded in a recording session.
 
-    Parameters
-    ----------
     scene, sensor : of the variant that is set, a spectral one.
     paths : how many; two of them a pixel.
 
-    Raises
-    ------
-    DiffractionError
-        If no path carries light.
+    Raises a DiffractionError if no path carries light.
     """
     paths += paths % 2
     wavelengths, vertices, emitted, turns = _follow(scene, sensor, session, paths, seed)

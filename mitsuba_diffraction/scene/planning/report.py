@@ -14,10 +14,8 @@ from ...optics.geometry import wavenumber
 from ...plugin.restricted import Outside, RestrictedTable, device_table
 from ...plugin.sampling import sampler_bytes
 from ...tables.table import DiffractionTable
-from .difference import Difference
-from .domain import LookupStatistics, lobes_in_a_pixel, quantiles, wavelengths_needed
-from .make import RecordedScene, TestedPlan
-from .plan import Plan
+from .make import Difference, RecordedScene, TestedPlan
+from .plan import LookupStatistics, Plan, lobes_in_a_pixel, quantiles, wavelengths_needed
 
 #: That are timed: some hundredths of a second.
 LOOKUPS = 1 << 19
@@ -64,14 +62,7 @@ def _of_table(
 ) -> dict[str, Any]:
     table, mine = loaded.session.tables[key], plan.tables[key]
     result: dict[str, Any] = {"surfaces": ", ".join(mine.surfaces), "heights": mine.name}
-    whole = {
-        "memory_mb": table.nbytes / 1e6,
-        "sampling_memory_mb": sampler_bytes(table) / 1e6,
-        "build_s": loaded.session.seconds.get(key, math.nan),
-        "terms": f"{table.expansion.intervals} x {table.expansion.terms}",
-        "precision": str(table.coefficients.dtype),
-        "taps": list(table.grid.taps),
-    }
+    whole = _figures(table, loaded.session.seconds.get(key, math.nan))
     asked = loaded.statistics.get(key)
     if asked is None:
         return result | {"asked for": "nothing: no path meets it; it stays whole", "whole": whole}
@@ -105,16 +96,21 @@ def _of_table(
             "share of the light outside, read from coarse cells": mine.domain.outside,
         },
         "whole": whole,
-        "planned": {
-            "memory_mb": smaller.nbytes / 1e6,
-            "sampling_memory_mb": sampler_bytes(smaller) / 1e6,
-            "build_s": seconds.get(key, math.nan),
-            "terms": f"{smaller.expansion.intervals} x {smaller.expansion.terms}",
-            "precision": str(smaller.coefficients.dtype),
-            "taps": list(smaller.grid.taps),
-            "time of a look-up / that in the whole": evaluation_ratio(asked, table, smaller),
-        },
+        "planned": _figures(smaller, seconds.get(key, math.nan))
+        | {"time of a look-up / that in the whole": evaluation_ratio(asked, table, smaller)},
         "times less memory": table.nbytes / smaller.nbytes,
+    }
+
+
+def _figures(table: DiffractionTable, seconds: float) -> dict[str, Any]:
+    """Of a table that took these seconds to build."""
+    return {
+        "memory_mb": table.nbytes / 1e6,
+        "sampling_memory_mb": sampler_bytes(table) / 1e6,
+        "build_s": seconds,
+        "terms": f"{table.expansion.intervals} x {table.expansion.terms}",
+        "precision": str(table.coefficients.dtype),
+        "taps": list(table.grid.taps),
     }
 
 

@@ -57,27 +57,22 @@ class Recorded:
 class Session:
     """Open it (`with`) around the loading of a scene.
 
-    Parameters
-    ----------
     limits : fields of `TableSettings` by the key of the table that they restrict.
     sample_like : tables by the key of another, which is to draw directions as they do: pictures of
         both then differ by what they look up, and by nothing else.
     timing : build tables that the cache may have, too, and note how long that takes.
     recording : whether BSDFs are to record what they are asked, between `start` and `records`.
-
-    Attributes
-    ----------
-    tables : key of every table that was built from heights, in the order of loading.
-    seconds : that each took to build, with `timing`.
-    bsdfs : every `diffraction` BSDF that was loaded, with its name for people.
     """
 
     limits: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     sample_like: Mapping[str, DiffractionTable] = field(default_factory=dict)
     recording: bool = False
     timing: bool = False
+    # key of every table that was built from heights, in the order of loading
     tables: dict[str, DiffractionTable] = field(default_factory=dict)
+    # that each took to build, with `timing`
     seconds: dict[str, float] = field(default_factory=dict)
+    # every `diffraction` BSDF that was loaded, with its name for people
     bsdfs: list[tuple[str, Any]] = field(default_factory=list)
     _buffers: list[list[Any]] = field(default_factory=list)
 

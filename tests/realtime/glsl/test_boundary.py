@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionTable
-from mitsuba_diffraction.optics import blend, boundary
-from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, response
+from mitsuba_diffraction.optics import blend, boundary, fresnel
+from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.realtime.glsl.packing import (
     pack_colours,
@@ -30,6 +30,7 @@ MATERIALS = {
     "dielectric": Packed(uniforms={"eta": 1.5}, definitions={"SURFACE_KIND": "1"}),
     "conductor": pack_conductor(*METAL),
 }
+UNTINTED = Packed(uniforms={f"tint_{n}": tuple(np.eye(3)[n]) for n in range(3)})
 
 
 def index(kind: str, wavelength: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -77,7 +78,8 @@ def test_lut_has_the_factor_of_each_channel(gl: Any, table: DiffractionTable, ki
     pair = pairs(300)
     colours = pack_colours(ColourTable.build(table))
     plain = probed(gl, "lut", colours | Packed(definitions={"SURFACE_KIND": "0"}), pair[2])
-    found = shaded(gl, "lut", table, colours | MATERIALS[kind], pair)
+    material = MATERIALS[kind] | (UNTINTED if kind == "conductor" else Packed())
+    found = shaded(gl, "lut", table, colours | material, pair)
     expected = factor(table, kind, *pair[:2], np.array(RGB_WAVELENGTHS))
     if kind == "conductor":  # its colour is that of daylight, Kirchhoff's at each mean is taken out
         own = index(kind, np.array(RGB_WAVELENGTHS))
@@ -93,8 +95,23 @@ def test_lut_has_the_factor_of_each_channel(gl: Any, table: DiffractionTable, ki
 def probed_reflectance(
     gl: Any, colours: Packed, plain: NDArray[Any], at: NDArray[Any]
 ) -> NDArray[np.float64]:
-    found = probed(gl, "lut", colours | MATERIALS["conductor"], at)
+    found = probed(gl, "lut", colours | MATERIALS["conductor"] | UNTINTED, at)
     return np.divide(found, plain, out=np.ones_like(plain), where=plain != 0.0)
+
+
+def test_lut_has_the_tint_of_a_metal(gl: Any, table: DiffractionTable) -> None:
+    pair, lam = pairs(50), np.arange(360.0, 830.5)
+    colours = pack_colours(ColourTable.build(table)) | MATERIALS["conductor"]
+    plain = shaded(gl, "lut", table, colours | UNTINTED, pair)
+    spectrum = fresnel.reflectance(1.0, index("conductor", lam))
+    weights = linear_srgb(response(lam))
+    tint = metal_tint(lam, spectrum, spectrum @ weights / weights.sum(axis=0))
+    assert np.abs(tint - np.eye(3)).max() > 0.02  # it is a metal with a colour
+    expected = plain @ tint.T
+    # single precision
+    assert shaded(gl, "lut", table, colours, pair) == pytest.approx(
+        expected, rel=1e-4, abs=1e-5 * np.abs(expected).max()
+    )
 
 
 @pytest.mark.parametrize("kind", MATERIALS)

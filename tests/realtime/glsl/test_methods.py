@@ -18,6 +18,7 @@ from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics.colour import linear_srgb, response
 from mitsuba_diffraction.optics.fresnel import reflectance
 from mitsuba_diffraction.realtime.glsl.context import compile_program, compiler_words
+from mitsuba_diffraction.realtime.glsl.methods import pack_method, thesis_method
 from mitsuba_diffraction.realtime.glsl.packing import (
     WAVENUMBERS,
     pack_beneath,
@@ -41,7 +42,6 @@ from mitsuba_diffraction.realtime.glsl.texels import (
     paired,
     shortened,
 )
-from mitsuba_diffraction.realtime.glsl.thesis import pack_method, thesis_method
 from mitsuba_diffraction.tables import store
 from mitsuba_diffraction.tables.colour.table import ColourTable, colour_difference
 from mitsuba_diffraction.tables.energy.conservation import FINE, DirectionalTable
@@ -295,7 +295,7 @@ def test_the_documents_tables_are_built_once(
     def build(*_: object, **__: object) -> DiffractionTable:
         raise AssertionError("built again")
 
-    monkeypatch.setattr("mitsuba_diffraction.realtime.glsl.thesis.build_with", build)
+    monkeypatch.setattr("mitsuba_diffraction.realtime.glsl.methods.build_with", build)
     monkeypatch.setattr(store, "_tables", {})  # as in the next process
     second = thesis_method("flss", patch, table)
     np.testing.assert_array_equal(second.table.coefficients, first.table.coefficients)

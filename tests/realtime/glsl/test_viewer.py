@@ -12,9 +12,8 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable
-from mitsuba_diffraction.realtime.glsl.camera import Camera
+from mitsuba_diffraction.realtime.glsl.camera import Camera, Orbit, dragged, rotation_about
 from mitsuba_diffraction.realtime.glsl.lights import Light
-from mitsuba_diffraction.realtime.glsl.navigation import Orbit, dragged, rotation_about
 
 mi = pytest.importorskip("mitsuba")
 

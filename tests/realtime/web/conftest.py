@@ -93,7 +93,9 @@ def scene() -> Any:
 def page(scene: Any) -> Page:
     """The scene's page, with both methods."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mitsuba_diffraction.realtime.web.scene.OCTAVES", (-1.0, 0.0))  # seconds each
+        patch.setattr(
+            "mitsuba_diffraction.realtime.web.export.OCTAVES", (-1.0, 0.0)
+        )  # seconds each
         # the title is the worst that a file can be called
         return make_page(scene, title="</script><script>throw 1</script>")
 

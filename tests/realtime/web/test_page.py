@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.realtime.web import Viewer
-from mitsuba_diffraction.realtime.web.export import Page, make_page
-from mitsuba_diffraction.realtime.web.scene import MAX_BYTES
+from mitsuba_diffraction.realtime.web.export import MAX_BYTES, Page, make_page
 from tests.realtime.web.pictures import picture
 
 
@@ -199,7 +198,7 @@ def test_the_page_is_small_and_says_what_rounding_costs(page: Page) -> None:
 def test_what_does_not_fit_is_left_out_from_the_last_on(
     scene: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from mitsuba_diffraction.realtime.web import scene as packing
+    from mitsuba_diffraction.realtime.web import export as packing
 
     # the pages of the triangles alone take 0.35 MB
     monkeypatch.setattr(packing, "_HEADER", MAX_BYTES - 1000)

@@ -62,7 +62,7 @@ def room(scene: Any) -> Any:
 @pytest.fixture(scope="module")
 def opened(room: Any, browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mitsuba_diffraction.realtime.web.scene.OCTAVES", (-1.0, 0.0))
+        patch.setattr("mitsuba_diffraction.realtime.web.export.OCTAVES", (-1.0, 0.0))
         page = make_page(room, methods=["lut"])
     assert page.omissions == ()
     path = tmp_path_factory.mktemp("room") / "room.html"

@@ -13,12 +13,6 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import linear_srgb, response
 from mitsuba_diffraction.progress import silent
-from mitsuba_diffraction.scene.planning.domain import (
-    LookupStatistics,
-    domain_for,
-    quantiles,
-    wavelengths_needed,
-)
 from mitsuba_diffraction.scene.planning.make import (
     check_light,
     draft_plan,
@@ -27,7 +21,13 @@ from mitsuba_diffraction.scene.planning.make import (
     record_scene,
     worthwhile,
 )
-from mitsuba_diffraction.scene.planning.plan import Plan
+from mitsuba_diffraction.scene.planning.plan import (
+    LookupStatistics,
+    Plan,
+    domain_for,
+    quantiles,
+    wavelengths_needed,
+)
 from tests.directions import polar, rough_patch
 
 # Of coarse pixels: small tables. The plugin warns of that, and this is not about that.

@@ -51,6 +51,11 @@ const vec3 light_colour[1] = vec3[1](vec3(1.0));  // whoever calls multiplies by
 #define DIELECTRIC 1
 #define CONDUCTOR 2
 
+#if SURFACE_KIND != CONDUCTOR
+// What colours of a metal are corrected by; of all else R is nearly the same within a channel.
+vec3 tinted(vec3 colour) { return colour; }
+#endif
+
 uniform vec2 wavenumbers;        // ends of what the eye sees, rad/µm
 uniform vec3 channel_wavenumbers;  // of the mean wavelengths of red, green and blue
 
@@ -83,6 +88,7 @@ uniform sampler2D reflectances;  // columns over cosθ, rows over k, colours in 
                                  // them the index n + ik of a row
 uniform vec3 channel_eta;        // the index at the mean wavelengths of red, green and blue
 uniform vec3 channel_k;
+uniform vec3 tint_0, tint_1, tint_2;  // columns of optics/colour.py's metal_tint
 
 vec4 conductor_row(float cos_i, int row)
 {
@@ -98,6 +104,8 @@ vec3 reflectance(float cos_i)
 {
     return conductor_row(cos_i, textureSize(reflectances, 0).y - 1).rgb;
 }
+
+vec3 tinted(vec3 colour) { return tint_0 * colour.r + tint_1 * colour.g + tint_2 * colour.b; }
 
 float reflectance_at_all(float cos_i) { return 1.0; }
 

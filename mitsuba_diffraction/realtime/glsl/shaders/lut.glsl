@@ -124,7 +124,7 @@ vec3 diffracted(vec2 uv, float z, float cos_half, int light)
 {
     float squared_radius = dot(uv, uv);
     vec3 colour = other_orders(uv, squared_radius, z) + order_0(sqrt(squared_radius), z);
-    colour *= boundary(cos_half, sqrt(squared_radius), z);
+    colour = tinted(colour * boundary(cos_half, sqrt(squared_radius), z));
 #ifdef COATED
     colour += face_reflected * order_0(sqrt(squared_radius), 0.0);
 #endif

@@ -5,8 +5,8 @@ from __future__ import annotations
 import mitsuba as mi
 import numpy as np
 
-from mitsuba_diffraction.realtime.glsl.obstacles import pack_obstacles
-from mitsuba_diffraction.realtime.glsl.shapes import triangles_of
+from mitsuba_diffraction.realtime.glsl.scene import triangles_of
+from mitsuba_diffraction.realtime.glsl.surroundings import pack_obstacles
 
 
 def test_a_ball_and_a_plate_are_as_far_away_as_they_are(some_variant: str) -> None:

@@ -8,9 +8,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.realtime.glsl.casters import Solid, outline
 from mitsuba_diffraction.realtime.glsl.lights import Light
-from mitsuba_diffraction.realtime.glsl.shapes import triangles_of
+from mitsuba_diffraction.realtime.glsl.scene import triangles_of
+from mitsuba_diffraction.realtime.glsl.shadows import Solid, outline
 
 
 def solid_of(**shape: Any) -> Solid:

@@ -1,27 +1,120 @@
-"""What one method needs to draw a scene: its tables, and a program for each surface."""
+"""What a method needs to draw a scene: its tables as textures, and a program for each surface."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from ...errors import DiffractionError
+from ...heights.field import HeightField
 from ...optics.geometry import sigma_of
-from ...tables.store import cached_colours
+from ...settings import TableSettings
+from ...tables.build.build import build_with
+from ...tables.store import cached_colours, cached_table
+from ...tables.table import DiffractionTable
+from ...thesis.methods import FullSpectrum, OrdersOnly, Repeated, make
+from ...thesis.methods.method import Method
+from ...thesis.methods.periodic import SPECULAR_WAVELENGTH
 from .context import Bindings, compile_program
 from .materials import Material
 from .packing import area_factor, pack_colours, pack_powers
 from .scene import VERTEX, RealtimeScene
 from .source import METHODS, THESIS_METHODS
-from .texels import Packed, Uniform
-from .thesis import pack_method, thesis_method
+from .texels import Packed, Uniform, as_half, listed, texels
+
+#: As in the thesis: terms of the series, bins read along each axis, and nm.
+TERMS, TAPS, STEP = 37, 3, 5.0
+#: What 37 terms and 3 × 3 bins reach on snakes' scales; the thesis asks for none.
+TOLERANCE = 0.02
 
 
-class Part:
+def thesis_method(name: str, heights: HeightField, table: DiffractionTable) -> Method:
+    """A method of the thesis for a patch, with the thesis' own settings.
+
+    table : the package's own of that patch, for its window and how positions are averaged.
+
+    Raises a DiffractionError if the series is too short for the patch, or it has no period and the
+    method needs one.
+    """
+    if name not in THESIS_METHODS:
+        raise DiffractionError(f"method='{name}' is none of {', '.join(THESIS_METHODS)}")
+    settings = {} if name == "pq" else {"taps": TAPS}  # pq reads two bins along each axis
+    return make(
+        name, heights, coherence_width=table.coherence_width, coherence=table.coherence,
+        terms=TERMS, tolerance=TOLERANCE, step=STEP, build=_kept, **settings,
+    )  # fmt: skip
+
+
+def _kept(heights: HeightField, **arguments: Any) -> DiffractionTable:
+    """`DiffractionTable.build`, once for a patch and its arguments."""
+    progress = arguments.pop("progress", None)
+    settings = TableSettings(**arguments)
+    return cached_table(heights.digest(), settings, lambda: build_with(heights, settings, progress))
+
+
+def pack_method(method: Method) -> Packed:
+    """A method's Taylor table and settings.
+
+    Raises a DiffractionError if there is no shader for the method, or its table is no Taylor
+    series.
+    """
+    if isinstance(method, OrdersOnly):
+        periods = tuple(0.0 if period is None else period for period in method.periods)
+        return pack_method(method.full) | Packed(
+            uniforms={
+                "periods": periods,
+                "specular_reach": method.specular,
+                "white_wavelength": SPECULAR_WAVELENGTH * 1e-3,
+            }
+        )
+    if not isinstance(method, FullSpectrum | Repeated):
+        raise DiffractionError(f"method '{method.name}' has no shader")
+    table = method.table
+    if table.expansion.basis != "taylor":
+        raise DiffractionError(f"method '{method.name}' needs a table with basis='taylor'")
+    terms = table.expansion.terms
+    definitions = {"TEXELS": str(-(-terms // 2))}
+    repeats, taps = (1.0, 1.0), table.grid.taps
+    if isinstance(method, Repeated):
+        definitions["REPEATED"] = ""
+        repeats, taps = (float(method.repeats[0]), float(method.repeats[1])), (2, 2)
+    definitions |= {"TAPS_X": str(taps[0]), "TAPS_Y": str(taps[1])}
+    if table.grid.coherent:
+        definitions["COHERENT"] = ""
+    # real and imaginary part of a term side by side, two terms a texel
+    series = np.moveaxis(table.coefficients[0], 2, 3)
+    series = series.reshape(-1, 2 * terms)
+    zero = table.order_0[0].T.reshape(1, -1).astype(np.float32)
+    steps = np.diff(method.wavelengths)
+    return Packed(
+        textures=(
+            listed("amplitudes", as_half(texels(series))),
+            listed("amplitude_zero", texels(zero)),
+        ),
+        uniforms={
+            "last_order": (table.grid.last[0], table.grid.last[1]),
+            "spacing": (table.spacing[0], table.spacing[1]),
+            "exponents": (table.grid.exponents[0], table.grid.exponents[1]),
+            "half_range": table.expansion.half_range,
+            "inverse_scale": 1.0 / table.scale,
+            "first_wavelength": float(method.wavelengths[0]) * 1e-3,
+            "last_wavelength": float(method.wavelengths[-1]) * 1e-3,
+            "wavelength_step": float(steps.max()) * 1e-3,
+            "repeats": repeats,
+            "area_factor": area_factor(method.sigma),
+        },
+        definitions=definitions,
+    )  # fmt: skip
+
+
+class Part(NamedTuple):
     """One surface's program, its vertices in it, and its tables."""
 
-    def __init__(self, program: Any, array: Any, tables: Bindings) -> None:
-        self.program, self.array, self.tables = program, array, tables
+    program: Any
+    array: Any
+    tables: Bindings
 
 
 class Prepared:
@@ -29,21 +122,14 @@ class Prepared:
 
     Parameters
     ----------
-    context : of moderngl.
-    scene : what is drawn.
-    method : one of `source.METHODS`.
     surfaces : what each surface's shader reads but for the method's tables.
-    buffers : each surface's vertices.
 
     Attributes
     ----------
     nbytes : of the method's own textures.
     tables : each surface's; of what does not diffract those of the first that does.
 
-    Raises
-    ------
-    DiffractionError
-        If there is no such method, or a table does not suit it.
+    Raises a DiffractionError if there is no such method, or a table does not suit it.
     """
 
     def __init__(
@@ -77,15 +163,9 @@ class Prepared:
     ) -> list[Part]:
         """One part a surface.
 
-        Parameters
-        ----------
-        light : of `lights.light_definitions`.
         extras : more definitions of each surface.
 
-        Raises
-        ------
-        DiffractionError
-            If the driver refuses a program.
+        Raises a DiffractionError if the driver refuses a program.
         """
         more = list(extras) or [{}] * len(self._surfaces)
         key = tuple(tuple(sorted({**light, **one}.items())) for one in more)
@@ -120,10 +200,7 @@ class Prepared:
 def method_tables(method: str, material: Material) -> Packed:
     """What a method reads of a material's table.
 
-    Raises
-    ------
-    DiffractionError
-        If there is no such method, or the table does not suit it.
+    Raises a DiffractionError if there is no such method, or the table does not suit it.
     """
     if method == "lut":
         return pack_colours(cached_colours(material.table))

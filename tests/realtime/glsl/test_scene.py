@@ -6,7 +6,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.realtime.glsl.shapes import triangles_of
+from mitsuba_diffraction.realtime.glsl.scene import triangles_of
 
 
 @pytest.mark.parametrize("flipped", [False, True])

@@ -13,8 +13,13 @@ from hypothesis.extra import numpy as arrays
 from numpy.typing import NDArray
 
 from mitsuba_diffraction.realtime.glsl.scene import VERTEX
-from mitsuba_diffraction.realtime.web.geometry import octahedral, packed_mesh
-from mitsuba_diffraction.realtime.web.sections import Sections, packed_array, packed_file
+from mitsuba_diffraction.realtime.web.sections import (
+    Sections,
+    octahedral,
+    packed_array,
+    packed_file,
+    packed_mesh,
+)
 from mitsuba_diffraction.realtime.web.tables import rounded
 
 KINDS = {"Uint16Array": np.uint16, "Uint32Array": np.uint32, "Float32Array": np.float32}

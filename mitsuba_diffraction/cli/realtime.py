@@ -1,0 +1,264 @@
+"""`view`, `compare`, `export-viewer`, `export-shader`: scenes and surfaces drawn by shaders."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import time
+from pathlib import Path
+from typing import Any
+
+from ..errors import DiffractionError
+from ..realtime.glsl.source import METHODS
+from ..realtime.web.tables import WEB_METHODS
+from . import options
+from .brdf_map import add_surface, surface_bsdf
+from .console import Bar, mitsuba_warnings, say_warning
+from .options import path_ending_in, whole_number
+from .report import check_outputs, check_writable, plain, save_json, save_report
+
+_EXPORTED = ("lut", "spectral")
+
+
+def add_view(subparsers: options.Subparsers) -> None:
+    """Declare `view`."""
+    parser = options.add_command(
+        subparsers, "view", view, "look at a scene in a window, in real time",
+        "Open a window on a scene, drawn by shaders. Turn it with the left button, drag the "
+        "light with the right one, move with the middle one or shift, zoom with the wheel; "
+        "S takes a screenshot, P sends the view to the path tracer, R resets, Esc closes.",
+    )  # fmt: skip
+    options.add_scene(parser)
+    parser.add_argument("--method", choices=METHODS, default="lut", help="default: lut")
+    options.add_exposure(parser, 0.0, "stops to start with: +1 doubles the light; default: 0")
+    parser.add_argument(
+        "--size", metavar="WxH", type=_size, default=(1280, 800),
+        help="of the window, pixels; default: 1280x800",
+    )  # fmt: skip
+    options.add_output(parser, "for screenshots; default: the current folder", default=Path())
+    parser.add_argument(
+        "--frames", metavar="N", type=whole_number(0), default=0,
+        help="close after so many and print their time; default: 0, never",
+    )  # fmt: skip
+    parser.add_argument(
+        "--window", choices=("pyglet", "glfw", "sdl2", "headless"), default="pyglet",
+        help="what opens the window; glfw and sdl2 need packages of their own, headless opens none",
+    )  # fmt: skip
+
+
+def view(args: argparse.Namespace) -> int:
+    """Show the scene, and return the exit code."""
+    parameters = options.scene_parameters(args)
+    check_writable(args.output / "view_000.png")
+    try:
+        from ..realtime.glsl.viewer import show
+    except ImportError as error:
+        raise DiffractionError(
+            f"view needs {error.name}: pip install 'mitsuba-diffraction[view]'"
+        ) from error
+
+    _set_variant(args)
+    with mitsuba_warnings():
+        frames, milliseconds = show(
+            _scene(args, parameters), sensor=args.sensor, method=args.method, stops=args.exposure,
+            size=args.size, folder=args.output, frames=args.frames, window=args.window,
+        )  # fmt: skip
+    print(f"{frames} frames, {milliseconds:.3g} ms each at the end, method {args.method}")
+    return 0
+
+
+def add_compare(subparsers: options.Subparsers) -> None:
+    """Declare `compare`."""
+    parser = options.add_command(
+        subparsers, "compare", compare,
+        "compare the realtime picture of a scene with the path-traced one",
+        "Render a scene by shaders and by path tracing, aligned to the pixel, and measure the "
+        "difference: over all pixels in all direct light of the scene, and beside it in full "
+        "transport; and, as a detail, where both see the same lit surface under lights "
+        "without extent, by points and directions in place of the scene's.",
+    )  # fmt: skip
+    options.add_scene(parser)
+    options.add_output(
+        parser, "for pictures (EXR), sheets (PNG) and compare.json; default: the scene's name "
+        "with _compare in the current folder",
+    )  # fmt: skip
+    parser.add_argument(
+        "--method", nargs="+", metavar="NAME", choices=(*METHODS, "all"), default=["lut"],
+        help=f"of the shaders: some of {', '.join(METHODS)}, or all; default: lut",
+    )  # fmt: skip
+    options.add_samples(parser, 2, 1024)
+    parser.add_argument(
+        "--full-spp", metavar="N", type=whole_number(0), default=64,
+        help="samples per pixel of full transport; 0 leaves it out; default: 64",
+    )  # fmt: skip
+    parser.add_argument(
+        "--frames", metavar="N", type=whole_number(4), default=512,
+        help="of progressive light, in which lut and spectral are drawn; default: 512",
+    )  # fmt: skip
+    parser.add_argument(
+        "--supersampling", metavar="N", type=whole_number(1), default=8,
+        help="the shaders' samples along either side of a pixel (at most 2 of flss, nmm and pq); "
+        "default: 8",
+    )  # fmt: skip
+    options.add_json(parser)
+
+
+def compare(args: argparse.Namespace) -> int:
+    """Compare, and return the exit code."""
+    parameters = options.scene_parameters(args)
+    folder = args.output or Path(f"{args.scene.stem}_compare")
+    if folder.exists() and not folder.is_dir():
+        raise DiffractionError(f"-o {folder}: it is a file; name a folder")
+    check_writable(folder / "compare.json", make_folder=True)
+
+    from ..realtime.comparison.report import markdown
+    from ..realtime.comparison.run import Comparison
+
+    start = time.perf_counter()
+    variant = _set_variant(args)
+    every = "all" in args.method
+    with mitsuba_warnings(), Bar(args, unit=" spp", delay=0) as bar:
+        bar(0, args.spp, "loading")
+        comparison = Comparison(
+            _scene(args, parameters), str(args.scene), variant, folder, args.sensor, args.spp,
+            args.full_spp, args.frames // 4 * 4, args.supersampling, args.seed, bar,
+        )  # fmt: skip
+        found = comparison.run(METHODS if every else args.method, leave_out=every)
+    found = {"scene": found["scene"], "parameters": parameters, **found}
+    save_json(folder / "compare.json", found)
+    save_report(args, found)
+    print(markdown(plain(found)))
+    print(f"{folder}: pictures, sheets and compare.json, {time.perf_counter() - start:.0f} s")
+    return 0
+
+
+def add_export_viewer(subparsers: options.Subparsers) -> None:
+    """Declare `export-viewer`."""
+    parser = options.add_command(
+        subparsers, "export-viewer", export_viewer,
+        "write a page that shows a scene in a browser, without a server",
+        "Write one self-contained page of HTML, of at most 25 MB, that draws a scene with "
+        "WebGL 2: orbit, pan, zoom, and drag the light. Tables are rounded to as many digits "
+        "as fit; the ΔE2000 that this makes is printed and stands on the page.",
+    )  # fmt: skip
+    options.add_scene(parser)
+    parser.add_argument(
+        "output", metavar="OUT", type=path_ending_in(".html"), help="the page to write"
+    )
+    parser.add_argument(
+        "--method", choices=(*WEB_METHODS, "all"), default="all",
+        help="that the page offers; all leaves out what does not fit; default: all",
+    )  # fmt: skip
+    options.add_json(parser, "what the page shows")
+
+
+def export_viewer(args: argparse.Namespace) -> int:
+    """Export, and return the exit code."""
+    parameters = options.scene_parameters(args)
+    check_writable(args.output)
+
+    from ..realtime.web import export_viewer
+
+    start = time.perf_counter()
+    _set_variant(args)
+    with mitsuba_warnings(), Bar(args, delay=0) as bar:
+        bar(0, 0, "loading")
+        page = export_viewer(
+            _scene(args, parameters), args.output, title=args.scene.stem, sensor=args.sensor,
+            progress=bar, methods=WEB_METHODS if args.method == "all" else (args.method,),
+        )  # fmt: skip
+    if page.omissions:
+        say_warning(f"the page does not show: {'; '.join(dict.fromkeys(page.omissions))}")
+    for method, reason in page.left_out.items():
+        say_warning(f"the page goes without {method}: {reason}")
+    losses = "; ".join(
+        f"{method} ΔE2000 {mean:.2f} (99 % below {most:.2f})"
+        for method, (mean, most) in page.loss.items()
+    )
+    size, seconds = args.output.stat().st_size, time.perf_counter() - start
+    print(f"{args.output}: {size / 1e6:.1f} MB, {seconds:.1f} s; rounding: {losses}")
+    save_report(args, {"scene": args.scene, "files": [args.output], "bytes": size,
+                       "delta_e": {m: {"mean": mean, "99 %": most}
+                                   for m, (mean, most) in page.loss.items()},
+                       "left_out": page.left_out, "omissions": page.omissions,
+                       "seconds": seconds})  # fmt: skip
+    return 0
+
+
+def add_export_shader(subparsers: options.Subparsers) -> None:
+    """Declare `export-shader`."""
+    parser = options.add_command(
+        subparsers, "export-shader", export_shader,
+        "write a surface's diffraction as GLSL with its textures, for other programs",
+        "Write a function `vec3 diffraction(vec3 wi, vec3 wo)` in GLSL, its textures (EXR) and "
+        "constants (JSON), and a material of three.js that uses them. How to bring it into "
+        "another engine: docs/realtime.md.",
+    )  # fmt: skip
+    options.add_source(parser, tables=True)
+    options.add_output(
+        parser, "to write into, made if it is missing; default: SOURCE's name with -shader in the "
+        "current folder",
+    )  # fmt: skip
+    parser.add_argument(
+        "--method", choices=_EXPORTED, nargs="+", default=_EXPORTED,
+        help="colours of daylight summed up beforehand, a loop over wavelengths, or both; "
+        "default: both",
+    )  # fmt: skip
+    options.add_mode(parser)
+    add_surface(parser.add_argument_group("the surface"), turned=False)
+    options.add_heights(parser)
+    options.add_json(parser, "what was written")
+
+
+def export_shader(args: argparse.Namespace) -> int:
+    """Export, and return the exit code."""
+    if args.material is not None and args.int_ior is not None:
+        args.parser.error("argument --int-ior: not allowed with argument --material")
+    folder = args.output or Path(f"{args.source.stem}-shader")
+    check_outputs([folder / "constants.json"], [args.source], "shader", make_folder=True)
+    options.load_options(args)  # what does not fit is reported before Mitsuba is loaded
+
+    from ..realtime.glsl.export import export_shader
+
+    start = time.perf_counter()
+    _set_variant(args)
+    with mitsuba_warnings(), Bar(args) as bar:
+        bar(0, 0, "making tables")
+        shader = export_shader(surface_bsdf(args), folder, list(dict.fromkeys(args.method)))
+    files = [folder / "diffraction.glsl", *(folder / f"{t.name}.exr" for t in shader.textures)]
+    code, *textures = (file.stat().st_size for file in files)
+    print(
+        f"{folder}: {', '.join(shader.functions.values())}: {code / 1e3:.1f} kB of GLSL, "
+        f"{len(textures)} textures of {sum(textures) / 1e6:.1f} MB, "
+        f"{time.perf_counter() - start:.1f} s; {shader.surface}"
+    )
+    save_report(args, {"source": args.source, "folder": folder, "files": files,
+                       "functions": shader.functions, "surface": shader.surface,
+                       "bytes": {"code": code, "textures": sum(textures)}})  # fmt: skip
+    return 0
+
+
+def _set_variant(args: argparse.Namespace) -> str:
+    """The variant that is asked for, set, if shaders can read scenes in it."""
+    from ..realtime.glsl.scene import check_variant
+    from ..scene.load import set_variant
+
+    variant = set_variant(args.mode)
+    check_variant(variant)
+    return variant
+
+
+def _scene(args: argparse.Namespace, parameters: dict[str, str]) -> Any:
+    """The scene, which has the sensor that is asked for."""
+    from ..scene.load import load_scene, sensor_of
+
+    scene = load_scene(args.scene, parameters)
+    sensor_of(scene, args.sensor)
+    return scene
+
+
+def _size(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{2,5})x(\d{2,5})", text)
+    if not found:
+        raise argparse.ArgumentTypeError(f"expected a size like 1280x800, got {text!r}")
+    return int(found[1]), int(found[2])
