@@ -119,23 +119,14 @@ PERIODS = 3
 
 @dataclass(frozen=True)
 class Job:
-    """A scan to measure.
+    """A scan to measure."""
 
-    Attributes
-    ----------
-    files : the scan, or a recipe with its sources.
-    treatment : how it is read.
-    theta : of the light, degrees; its azimuth is across the grooves of the strongest grating.
-    resolution : pixels of the map a side.
-    variant, threads : of Mitsuba and Dr.Jit.
-    """
-
-    files: SceneFiles
-    treatment: Treatment
-    theta: float
-    resolution: int
-    variant: str
-    threads: int
+    files: SceneFiles  # the scan, or a recipe with its sources
+    treatment: Treatment  # how it is read
+    theta: float  # of the light, degrees; its azimuth is across the strongest grating's grooves
+    resolution: int  # pixels of the map a side
+    variant: str  # of Mitsuba
+    threads: int  # of Dr.Jit
 
     @property
     def key(self) -> str:

@@ -32,19 +32,13 @@ _MODEL, _EXAMPLE = "\nThe model is ", "\nXML and the same in Python:\n"
 
 @dataclass(frozen=True)
 class Parameter:
-    """One entry: usually one parameter, sometimes two that belong together.
+    """One entry: usually one parameter, sometimes two that belong together."""
 
-    Attributes
-    ----------
-    names : of the parameters; "(nested)" for an object of any name.
-    type, default, text : as the docstring has them; the default is empty if there is none.
-    differentiable : whether all of them are.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the parameters; "(nested)" for an object of any name
+    # type, default, text: as the docstring has them
     type: str
-    default: str
-    differentiable: bool
+    default: str  # empty if there is none
+    differentiable: bool  # whether all of them are
     text: str
 
 
