@@ -157,13 +157,7 @@ def film_of(scene: Any, sensor: Any) -> str:
 
 
 def check_versions(wanted: tuple[str, ...]) -> None:
-    """Refuse to work with other packages than the client's.
-
-    Raises
-    ------
-    DiffractionError
-        Naming both.
-    """
+    """Refuse to work with other packages than the client's."""
     found = versions()
     for name, mine, theirs in zip(_PACKAGES, found, wanted, strict=True):
         if mine != theirs:

@@ -171,13 +171,7 @@ def _made(
 
 
 def truncated(table: DiffractionTable, terms: int) -> DiffractionTable:
-    """A Taylor table cut off after so many terms, or as it is if it has no more.
-
-    Raises
-    ------
-    DiffractionError
-        If `terms` is no whole number above 0.
-    """
+    """A Taylor table cut off after so many terms, or as it is if it has no more."""
     if terms != int(terms) or terms < 1:
         raise DiffractionError(f"terms={terms} must be a whole number, at least 1")
     count = min(int(terms), table.expansion.terms)

@@ -206,18 +206,7 @@ def as_typed(command: str) -> str:
 
 
 def make(picture: Picture, target: Path, scenes: Path) -> None:
-    """Run a picture's commands, and write it.
-
-    Parameters
-    ----------
-    target : the file to write.
-    scenes : folder of the scenes.
-
-    Raises
-    ------
-    DiffractionError
-        If a command fails, or the picture cannot be written or is too large.
-    """
+    """Run a picture's commands, and write it."""
     with tempfile.TemporaryDirectory() as temporary:
         for command in picture.commands:
             words = [

@@ -48,13 +48,7 @@ def docstring() -> str:
 
 
 def groups(text: str) -> dict[str, list[Parameter]]:
-    """The parameters that a docstring describes, by the heading above them.
-
-    Raises
-    ------
-    DiffractionError
-        If a line within a group is no part of an entry.
-    """
+    """The parameters that a docstring describes, by the heading above them."""
     _, *parts = _GROUP.split(text.partition(_MODEL)[0])
     return {heading: _entries(body) for heading, body in zip(parts[::2], parts[1::2], strict=True)}
 

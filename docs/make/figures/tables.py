@@ -72,17 +72,7 @@ FIGURES = (
 
 
 def speed(measured: dict[str, Any], name: str = "") -> dict[str, str]:
-    """What was measured on which machine, and the goals.
-
-    Parameters
-    ----------
-    measured : what `bench --json` wrote.
-
-    Raises
-    ------
-    DiffractionError
-        If a part was not measured.
-    """
+    """What was measured on which machine, and the goals."""
     machine = measured["machine"]
     head = f"Measured by `make bench` on {machine['cores']} cores ({machine['processor']})"
     versions = f"Mitsuba {machine['mitsuba']}, version {machine['mitsuba_diffraction']}"
@@ -118,12 +108,7 @@ _SETTINGS = (
 
 
 def tradeoff(measured: dict[str, Any], name: str = "") -> dict[str, str]:
-    """Errors, times and sizes by setting; sums over the spectrum.
-
-    Parameters
-    ----------
-    measured : the content of `tradeoff.json`.
-    """
+    """Errors, times and sizes by setting; sums over the spectrum."""
     settings = measured["settings"]
     machine = measured["machine"]
     where = f"{measured['patch']}; {machine['cores']} cores ({machine['processor']})"
@@ -166,12 +151,7 @@ _PICTURE = "picture, planned against whole, same random numbers"
 
 
 def plan(report: dict[str, Any], name: str = "") -> dict[str, str]:
-    """`planned` in a sentence, `plan` in full.
-
-    Parameters
-    ----------
-    report : what `plan --json` wrote.
-    """
+    """`planned` in a sentence, `plan` in full."""
     table, picture = report["tables"][0], report[_PICTURE]
     whole, planned = table["whole"], table["planned"]
     asked, needs = table["asked for"], table["needs"]

@@ -124,13 +124,7 @@ def _number(value: float | None) -> str:
 
 
 def read_run(path: Path) -> dict[str, Any]:
-    """What `bench --json` wrote.
-
-    Raises
-    ------
-    DiffractionError
-        If the file is missing or something else.
-    """
+    """What `bench --json` wrote."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
         if isinstance(found["sections"], list) and isinstance(found["machine"], dict):

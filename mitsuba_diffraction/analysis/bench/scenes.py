@@ -60,13 +60,7 @@ def pigment(scenes: Path) -> dict[str, Any]:
 
 
 def snake(bsdf: Any, scenes: Path, width: int, height: int, light: dict[str, Any]) -> Any:
-    """The coiled snake without the ground.
-
-    Raises
-    ------
-    DiffractionError
-        If the mesh is missing.
-    """
+    """The coiled snake without the ground."""
     mesh = scenes / "meshes" / "elaphe.ply"
     _check_there(mesh)
     above = mi.ScalarTransform4f().look_at(
@@ -86,13 +80,7 @@ def snake(bsdf: Any, scenes: Path, width: int, height: int, light: dict[str, Any
 
 
 def snake_scene(scenes: Path, tables: Tables, **parameters: str) -> Any:
-    """`snake.xml` with the default table.
-
-    Raises
-    ------
-    DiffractionError
-        If it is missing.
-    """
+    """`snake.xml` with the default table."""
     file = scenes / "snake.xml"
     _check_there(file)
     return mi.load_file(str(file), patch=str(tables.paths["default"]), **parameters)

@@ -91,13 +91,7 @@ def plain(results: list[Measured], depths: Depths) -> dict[str, Any]:
 
 
 def save_csv(path: Path, settings: Sequence[Mapping[str, Any]]) -> None:
-    """Write the settings of `plain`, a row each.
-
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be written.
-    """
+    """Write the settings of `plain`, a row each."""
     with (
         atomic_path(path) as temporary,
         temporary.open("w", newline="", encoding="utf-8") as file,

@@ -77,13 +77,7 @@ def main_period(field: HeightField) -> Period:
 
 
 def required_period(field: HeightField, method: str, period: float | None) -> Period:
-    """The period that a method needs: the given one (along the main axis), or the estimate.
-
-    Raises
-    ------
-    DiffractionError
-        If `period` is out of range, or the patch has none.
-    """
+    """The period that a method needs: the given one (along the main axis), or the estimate."""
     estimate = main_period(field)
     if period is not None:
         return Period(estimate.axis, check_period(period), 1.0)
