@@ -109,6 +109,12 @@ def _windows(value: Any) -> str | float | None:
     return "auto" if value == "auto" else _between(0.0, math.inf)(value)
 
 
+def _asked(value: Any) -> bool | None:
+    if value is not None and not isinstance(value, bool):
+        raise ValueError
+    return value or None
+
+
 def _choices(*names: str) -> dict[str, Any]:
     return {"check": _among(*names), "must": f"one of {', '.join(names)}", "choices": names}
 
@@ -134,6 +140,7 @@ class TableSettings:
     kappa_max : largest k·w·height_scale that is, rad/µm; None likewise.
     windows : width in µm of the overlapping windows that a wide scan is cut into, whose powers are
         averaged (`tables.build.windows`); "auto" for twice the coherence width; None for the whole.
+    second_order : True for what tells hills from pits as well (`tables.build.slope_ratios`).
 
     Raises
     ------
@@ -181,6 +188,11 @@ class TableSettings:
         metavar="auto|W", text="the scan as a whole", type=str,
     )  # fmt: skip
 
+    second_order: bool | None = _setting(
+        None, _asked, "what the second order of small slope needs besides", "true or false",
+        text="false", type=bool,
+    )  # fmt: skip
+
     def __post_init__(self) -> None:
         for name in _BY_NAME:
             object.__setattr__(self, name, checked(name, getattr(self, name)))
@@ -199,7 +211,9 @@ class TableSettings:
 _BY_NAME: dict[str, Field[Any]] = {item.name: item for item in fields(TableSettings)}
 
 #: Those that scenes and recipes may set.
-SCENE_SETTINGS = ("coherence_width", "coherence", "basis", "tolerance", "terms", "windows")
+SCENE_SETTINGS = (
+    *("coherence_width", "coherence", "basis", "tolerance", "terms", "windows", "second_order"),
+)
 RECIPE_SETTINGS = (*SCENE_SETTINGS, "wavelength_range")
 
 

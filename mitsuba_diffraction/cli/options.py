@@ -55,7 +55,7 @@ _HEIGHTS: dict[str, tuple[str, str]] = {
 }
 _TABLE = (
     "coherence_width", "coherence", "basis", "tolerance", "terms", "taps", "height_scale_max",
-    "windows",
+    "windows", "second_order",
 )  # fmt: skip
 
 #: The settings of a table that the evaluators of the thesis take.
@@ -193,6 +193,8 @@ def add_table(group: Group, names: Sequence[str] = _TABLE, **defaults: str) -> N
                 "metavar": item.metavar,
                 "type": whole_number(1) if item.type is int else item.type,
             }
+        if item.type is bool:
+            kind = {"action": "store_true", "default": None}
         if isinstance(item.metavar, tuple):
             kind["nargs"] = len(item.metavar)
         default = defaults.get(name, item.default_text)

@@ -26,6 +26,7 @@ energy          the bound of the albedo that conserves energy
 direction_lookup  tabulated functions of direction inside a kernel
 reflectance     of the surface itself: dielectric, conductor, mirror
 boundary        what the material makes of the light, with its polarisation
+second_order    what light diffracted twice makes of orders
 fresnel         fields at an interface, or at both of a film
 coat            a clear coat over the structure
 film            a thin film that follows the heights

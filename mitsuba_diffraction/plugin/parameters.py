@@ -15,9 +15,10 @@ from ..errors import DiffractionError
 from ..heights.field import HeightField
 from ..heights.lengths import is_auto, numbers_of
 from ..heights.read import LoadOptions
+from ..optics.slope_ratio import SlopeRatios
 from ..settings import COHERENCES, SCENE_SETTINGS, SURFACE, checked
 from ..tables.table import DiffractionTable
-from .boundary import Boundary
+from .boundary import Boundary, SmallSlope
 from .coat import UnderCoat
 from .film import UnderFilm
 from .layers import LAYERINGS, Blend, Layering, Transmission
@@ -35,6 +36,7 @@ from .places import TILINGS, Places
 from .properties import choice, flag, kind_of, number
 from .reflectance import Conductor, Dielectric, Perfect, Reflectance
 from .roles import BSDF, Properties
+from .second_order import SecondOrder, material_of_second_order
 from .sides import SidesModel
 from .sources import (
     TableProvider,
@@ -103,6 +105,7 @@ class Parameters:
     nested : the BSDF beneath, or None.
     through : both sides of a surface that lets light through, or None.
     optical : index that heights are in, of coat or dielectric, over that of the medium above.
+    second_order : the second order of small slope, or None.
     """
 
     table: DiffractionTable
@@ -120,6 +123,7 @@ class Parameters:
     nested: BSDF | None
     through: Through | None
     optical: float
+    second_order: SecondOrder | None
 
 
 def read_parameters(props: Properties, provider: TableProvider = from_cache) -> Parameters:
@@ -150,6 +154,7 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
             f"a nested BSDF lies beneath a surface that lets no light through (material="
             f"'{material}'); give int_ior instead, or remove the nested BSDF"
         )
+    second = material_of_second_order(props, material)
     passing = passing_of(props, material)
     # κ grows by the coat's index, or in a dielectric by its own, as if heights did
     medium = coat or passing
@@ -168,6 +173,9 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
         flat = UnderCoat(material, coat)
     warn_of_film(reflectance, table, largest)
     boundary = boundary_of(props, reflectance, table)
+    second_order = None
+    if second is not None and isinstance(boundary, SmallSlope):
+        second_order = SecondOrder(second, boundary, _ratios(table))
     conserving, through = flag(props, "energy_conserving", True), None
     places = _places(props, table)
     if passing is not None:
@@ -191,7 +199,17 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
         nested=nested,
         through=through,
         optical=optical,
+        second_order=second_order,
     )
+
+
+def _ratios(table: DiffractionTable) -> SlopeRatios:
+    if table.grid.coherent or table.slope_ratios is None:
+        raise DiffractionError(
+            "second_order=true needs a table of coherence='ensemble' that holds what it needs: "
+            "'mitsuba-diffraction precompute --second-order'"
+        )
+    return table.slope_ratios
 
 
 def _height_scale(props: Properties) -> float | VaryingHeightScale:

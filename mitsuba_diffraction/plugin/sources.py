@@ -206,6 +206,12 @@ def _check_agreement(
         "terms": table.expansion.terms,
         "windows": table.settings.windows,
     }
+    asked = dict(asked)
+    if asked.pop("second_order", None) and table.slope_ratios is None:
+        raise DiffractionError(
+            f"second_order=true asks for what the table '{path}' does not hold; leave it out, or "
+            "build the table with 'mitsuba-diffraction precompute --second-order'"
+        )
     for name, value in asked.items():
         if value != own[name] and not (name == "basis" and value == "auto"):
             raise DiffractionError(

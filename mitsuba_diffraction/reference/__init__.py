@@ -7,6 +7,7 @@ Contents
 --------
 bsdf       `brdf`, `mueller`, `btdf`: the integral, times what the material makes of the light
 integral   `window_power`, `screen_power`: the integral alone, which knows no material
+second_order  the integral, each order times its factor of the second order of small slope
 arguments  what they take, checked
 """
 

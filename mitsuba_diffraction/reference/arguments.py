@@ -73,6 +73,23 @@ def index_of(
     return Filmed(index, layer, wavenumber(wavelength) * thickness * 1e-3)
 
 
+def bare_dielectric(
+    model: str,
+    coherence: str,
+    index: NDArray[np.complex128] | Filmed | None,
+    coat: float | None,
+) -> NDArray[np.float64]:
+    """The real index (n,) of what the second order is for."""
+    if model != "small_slope" or coherence != "ensemble" or coat is not None:
+        raise DiffractionError(
+            "second_order=True is for model='small_slope', coherence='ensemble' and no coat; got "
+            f"model='{model}', coherence='{coherence}', coat={coat}"
+        )
+    if not isinstance(index, np.ndarray) or np.any(index.imag > 0.0):
+        raise DiffractionError("second_order=True is for bare dielectrics: leave k and film out")
+    return np.asarray(index.real)
+
+
 def _complex(eta: ArrayLike, k: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.complex128]:
     real, imaginary = np.asarray(eta, np.float64), np.asarray(k, np.float64)
     if not (np.all(np.isfinite(real)) and np.all(real > 0)):

@@ -14,11 +14,12 @@ from ..errors import DiffractionError
 from ..heights.field import HeightField
 from ..optics import blend, boundary, through
 from ..optics.coat import refracted, transmitted
-from ..optics.fresnel import Filmed
+from ..optics.fresnel import Filmed, Index
 from ..optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
 from ..settings import checked
-from .arguments import directions_of, index_of, places_of, width_of
+from .arguments import bare_dielectric, directions_of, index_of, places_of, width_of
 from .integral import screen_power, window_power
+from .second_order import second_order_power
 
 
 def brdf(
@@ -35,6 +36,7 @@ def brdf(
     k: ArrayLike = 0.0,
     coat: float | None = None,
     film: tuple[complex, float] | None = None,
+    second_order: bool = False,
 ) -> NDArray[np.float64]:
     """BRDF of a surface with these heights for unpolarised light, in 1/sr, shape (n,).
 
@@ -58,6 +60,8 @@ def brdf(
         eta, and its own reflection is the lobe of a flat patch.
     film : index n + ik, relative likewise, and thickness in nm of a film that follows the heights,
         coherent with the surface (`optics.fresnel.Filmed`); it needs eta, and no coat.
+    second_order : whether to multiply orders by the second order of small slope
+        (`optics.second_order`): of a bare dielectric, by model "small_slope", in an ensemble.
 
     Raises
     ------
@@ -69,6 +73,12 @@ def brdf(
     light = directions_of(wi, wo, wavelength)
     window = sigma_of(width), coherence, places_of(coherence, place, len(light[2]))
     index = index_of(model, eta, k, light[2], film)
+    if second_order:
+        dielectric = bare_dielectric(model, coherence, index, coat)
+        share = _share(field, *_lit(*light[:2]), light[2], dielectric)
+        power = second_order_power(field, light, sigma_of(width), dielectric, share)
+        jones = blend.jones(*_lit(*light[:2]), dielectric, share)
+        return _order_factor(*light, sigma_of(width)) * power * boundary.unpolarised(jones)
     if index is not None:
         return _measured(boundary.unpolarised, field, light, model, index, coat, window)
     if coat is not None:
@@ -220,11 +230,22 @@ def _jones(
     incident, outgoing = _lit(wi, wo)
     if model == "kirchhoff":
         return boundary.kirchhoff(incident, outgoing, index)
-    u, v, w = diffraction_coordinates(incident, outgoing)
+    share = _share(field, incident, outgoing, wavelength, index)
+    return blend.jones(incident, outgoing, index, share)
+
+
+def _share(
+    field: HeightField,
+    wi: NDArray[np.float64],
+    wo: NDArray[np.float64],
+    wavelength: NDArray[np.float64],
+    index: Index,
+) -> NDArray[np.float64]:
+    """s of `blend.weight`, (n,)."""
+    u, v, w = diffraction_coordinates(wi, wo)
     wave = wavenumber(wavelength)
     roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
-    s = blend.weight(wave * w, roughness.at(wave * np.hypot(u, v)), index)
-    return blend.jones(incident, outgoing, index, s)
+    return blend.weight(wave * w, roughness.at(wave * np.hypot(u, v)), index)
 
 
 def _order_factor(

@@ -67,8 +67,8 @@ def screen_power(
     place : centre of the window in µm, instead of the patch's.
     """
     ny, nx = phase_screen.shape
-    qx, waves_x = _plane_waves(nx, pixel_size[0], alpha, sigma)
-    qy, waves_y = _plane_waves(ny, pixel_size[1], beta, sigma)
+    qx, waves_x = plane_waves(nx, pixel_size[0], alpha, sigma)
+    qy, waves_y = plane_waves(ny, pixel_size[1], beta, sigma)
     amplitude = waves_y @ phase_screen @ waves_x.T / (nx * ny)
     window_x = np.exp(-0.5 * (sigma * (alpha - qx)) ** 2)
     window_y = np.exp(-0.5 * (sigma * (beta - qy)) ** 2)
@@ -81,7 +81,7 @@ def screen_power(
     return float(4 * np.pi**2 * sigma**4 * total)
 
 
-def _plane_waves(
+def plane_waves(
     n: int, pixel: float, frequency: float, sigma: float
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
     """Frequencies q_j within the window's reach of `frequency`, and exp(i q_j x) at the pixels."""

@@ -6,6 +6,7 @@ field has its type, size and range, and agrees with the others.
 
 from __future__ import annotations
 
+import base64
 import dataclasses
 import itertools
 import math
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import quoted
 from ..optics.blend import RoughnessTable
+from ..optics.slope_ratio import SlopeRatios
 from ..settings import BASES, MAX_TAPS, MAX_TERMS, TableSettings
 from .expansion import KINDS, Expansion
 from .packing import Grid
@@ -28,6 +30,7 @@ MAX_BYTES = 4 << 30
 _REQUIRED = ("coherence_width", "coherence", "tolerance", "wavelength_range", "height_scale_max")
 _SETTINGS = tuple(field.name for field in dataclasses.fields(TableSettings))
 _OWN = ("scale", "spacing", "error", "roughness", "source", "expansion", "grid", "order_0")
+_RATIOS = "slope_ratios"
 _COMPONENTS = {"power": 1, "amplitude": 2}
 _MOST_INTERVALS, _LONGEST_SERIES = 4096, 2048
 _MOST_SERIES = 1 << 16  # terms over all intervals
@@ -35,6 +38,7 @@ _MOST_NODES = 1 << 12
 _ROUNDED = 1e-6  # relative: of what follows from other fields
 #: Of the light in one order: at most 1 but for the error of a coarse table.
 _LARGEST_POWER = 2.0
+_LARGEST_RATIO, _MOST_CELLS = 128.0, 1 << 12  # r, and cells along an axis
 _BLOCK = 1 << 22  # coefficients at a time
 
 
@@ -51,6 +55,19 @@ def document_of(table: DiffractionTable) -> dict[str, Any]:
         "grid": _given(table.grid),
         "order_0": table.order_0.tolist(),
         **({} if table.coarse is None else {"coarse": document_of(table.coarse)}),
+        **({} if table.slope_ratios is None else {_RATIOS: _ratios_of(table.slope_ratios)}),
+    }
+
+
+def _ratios_of(ratios: SlopeRatios) -> dict[str, Any]:
+    """All of it as numbers but the values, which are half floats in base 64."""
+    halves = np.ascontiguousarray(ratios.values).view(np.float32).astype("<f2")
+    return {
+        "cell": ratios.cell,
+        "orders": ratios.orders,
+        "kappa": ratios.kappa,
+        "shape": ratios.values.shape,
+        "values": base64.b64encode(halves.tobytes()).decode("ascii"),
     }
 
 
@@ -127,7 +144,8 @@ def described(document: Any) -> Described:
 
 def _described(fields: dict[str, Any], whole: bool) -> Described:
     settings = _settings(fields)
-    _names(fields, (*_OWN, *_SETTINGS), _OWN)
+    wants = (_RATIOS,) if settings.second_order else ()
+    _names(fields, (*_OWN, *_SETTINGS, *wants), (*_OWN, *wants))
     expansion = _expansion(_mapping(fields["expansion"], "expansion"))
     spacing = _pair(fields["spacing"], "spacing", 1e-9, 1e9)
     grid = _grid(_mapping(fields["grid"], "grid"))
@@ -146,6 +164,7 @@ def _described(fields: dict[str, Any], whole: bool) -> Described:
         error=_error(fields["error"]),
         roughness=_roughness(_mapping(fields["roughness"], "roughness")),
         source=_source(fields["source"]),
+        slope_ratios=_ratios(_mapping(fields[_RATIOS], _RATIOS)) if wants else None,
     )
     _check_agreement(table, whole)
     shares = np.linspace(0.0, 1.0, 33)
@@ -251,6 +270,27 @@ def _roughness(fields: Mapping[str, Any]) -> RoughnessTable:
     nodes = _numbers(fields["nodes"], "nodes", (None,))
     _require(2 <= len(nodes) <= _MOST_NODES and bool(np.all(nodes >= 0.0)), "nodes of roughness")
     return RoughnessTable(_number(fields["first"], "first", -64.0, 64.0), nodes)
+
+
+def _ratios(fields: Mapping[str, Any]) -> SlopeRatios:
+    names = ("cell", "orders", "kappa", "shape", "values")
+    _names(fields, names, names)
+    orders, shape = _two(fields["orders"], "orders"), _list(fields["shape"], "shape")
+    _require(all(isinstance(one, bool) for one in orders), "orders")
+    _require(len(shape) == 4 and shape[1] == 2, f"{_RATIOS} of shape {shape}")
+    shape = [_whole(n, "shape", 2, _MOST_CELLS) for n in shape]
+    data = base64.b64decode(str(fields["values"]), validate=True)
+    _require(len(data) == 4 * math.prod(shape), f"{len(data)} bytes of {_RATIOS}")
+    values = np.frombuffer(data, "<f2").astype(np.float32)
+    _require(bool(np.all(np.abs(values) <= _LARGEST_RATIO)), _RATIOS)  # nor not a number
+    kappa = _pair(fields["kappa"], "kappa", 1e-9, 1e9)
+    _require(kappa[0] < kappa[1], f"kappa={kappa}")
+    return SlopeRatios(
+        _pair(fields["cell"], "cell", 1e-9, 1e9),
+        (orders[0], orders[1]),
+        kappa,
+        values.view(np.complex64).reshape(shape),
+    )
 
 
 def _source(value: Any) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import DiffractionError
 from ..optics.blend import RoughnessTable
 from ..optics.geometry import sigma_of, wavenumber
+from ..optics.slope_ratio import SlopeRatios
 from ..settings import TableSettings
 from .expansion import Expansion
 from .packing import Grid
@@ -46,6 +47,7 @@ class DiffractionTable:
     source : the heights: name, digest, size, statistics, history.
     coarse : of a table that ends before `q_limit` or its own `kappa_max`, the cells that go on
         from there (`build.coarse`).
+    slope_ratios : what the second order needs of the heights, where `settings` ask for it.
     """
 
     coefficients: NDArray[np.floating]
@@ -59,6 +61,7 @@ class DiffractionTable:
     roughness: RoughnessTable
     source: Mapping[str, Any] = field(default_factory=dict)
     coarse: DiffractionTable | None = None
+    slope_ratios: SlopeRatios | None = None
 
     # Set by the package `tables`, since what they do builds on this class
     build: ClassVar[Callable[..., DiffractionTable]]  #: from heights: `build.build.build_table`
@@ -143,6 +146,9 @@ class DiffractionTable:
                 if numbers is not None:
                     plain.append([numbers.dtype.str, numbers.shape])
                     content.update(np.ascontiguousarray(numbers).data)
+            if part.slope_ratios is not None:
+                plain.append([*part.slope_ratios.cell, *part.slope_ratios.kappa])
+                content.update(part.slope_ratios.values.data)
             content.update(json.dumps(plain, sort_keys=True).encode())
         return content.hexdigest()
 

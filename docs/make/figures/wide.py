@@ -23,7 +23,7 @@ import numpy as np
 from scipy.ndimage import zoom
 
 from mitsuba_diffraction import DiffractionTable, gratings
-from mitsuba_diffraction.tables.build.powers import NEAR
+from mitsuba_diffraction.tables.build.spectrum import NEAR
 
 from . import pages
 from .pages import exit_code

@@ -13,6 +13,7 @@ from mitsuba_diffraction.progress import Progress, silent
 
 from . import (
     coated,
+    factored,
     filmed,
     models,
     passed,
@@ -88,6 +89,7 @@ def write_report(folder: Path, *, quick: bool = False, progress: Progress | None
             [c for material in models.MATERIALS for c in patch_sections.compared(material, kinds)]
         ),
         second_order.section(quick=quick),
+        factored.section(quick=quick),
         sections.slopes(kirchhoff, default),
         sections.edges(kirchhoff, default),
         coated.section(coated.GRATINGS[:1] if quick else coated.GRATINGS),

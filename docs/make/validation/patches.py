@@ -127,6 +127,19 @@ def cell(surface: Surface) -> HeightField:
     return HeightField(heights, side / PIXELS, name=surface.name)
 
 
+@cache
+def whole_patch(surface: Surface) -> HeightField:
+    """The patch that a cut is from, smoothed and scaled as the cut is, mean 0."""
+    cut, side = _cut(surface)
+    field = periodic_smooth(_source(surface.kind))
+    ny, nx = field.shape
+    qx, qy = (2 * np.pi * np.fft.fftfreq(n, field.pixel_size[0]) for n in (nx, ny))
+    weight = np.exp(-0.5 * (qx**2 + qy[:, None] ** 2) * _SMOOTHING**2)
+    heights = np.fft.ifft2(np.fft.fft2(field.heights) * weight).real
+    heights *= surface.slope / _slope(cut - cut.mean(), side)
+    return HeightField(heights - heights.mean(), field.pixel_size, name=surface.kind)
+
+
 def _cases(material: str) -> Iterator[PatchCase]:
     for surface in SURFACES.values():
         grating = surface.kind == "sinusoid"

@@ -28,6 +28,7 @@ from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.optics.fresnel import decaying_root
 from mitsuba_diffraction.optics.geometry import wavenumber
+from mitsuba_diffraction.optics.second_order import axes, fluxes
 
 from .crossed import HORIZON, Orders, is_crossed, lowest_orders
 
@@ -151,39 +152,11 @@ class Waves:
         return np.asarray(blocks.transpose(2, 0, 3, 1).reshape(shape))
 
 
-def fluxes(tests: Complex, to: Complex, fields: Complex, waves: Complex) -> Complex:
-    """(κ+κ')·(e×(κ'×e') − e'×(κ×e)) of test waves κ' and waves κ, (..., 2, 2): tests first.
-
-    tests, fields : (2, ..., 3) their s and p fields; to, waves : (..., 3); all of them broadcast.
-    """
-    total = waves + to
-    found = [
-        np.sum(
-            total * (np.cross(e, np.cross(to, e_test)) - np.cross(e_test, np.cross(waves, e))), -1
-        )
-        for e_test in tests
-        for e in fields
-    ]
-    return np.stack(found, axis=-1).reshape(*found[0].shape, 2, 2)
-
-
 def _solved(matrix: Complex, right: Complex) -> Complex:
     """The solution, rows scaled first: those of evanescent waves are far smaller."""
     scale = 1.0 / np.abs(matrix).max(axis=1, keepdims=True)
     found = np.linalg.solve(matrix * scale, right * scale)
     return np.asarray(found)
-
-
-def axes(vector: Complex, index: complex) -> Complex:
-    """Electric fields s and p of plane waves κ (n, 3) in a medium, (2, n, 3): s = ẑ×κ̂, p = κ̂×s."""
-    x, y = vector[:, 0].real, vector[:, 1].real
-    length = np.hypot(x, y)
-    slanted = length > 1e-12
-    safe = np.where(slanted, length, 1.0)
-    s = np.column_stack(
-        [np.where(slanted, -y / safe, 0.0), np.where(slanted, x / safe, 1.0), np.zeros(len(x))]
-    ).astype(complex)
-    return np.stack([s, np.cross(vector / index, s)])
 
 
 class _Spectra:

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import HeightField
+from mitsuba_diffraction.optics.second_order import Perturbation
 
 from .cases import index_of
 from .compare import GRAZING, scans_of
@@ -33,7 +34,7 @@ from .models import MATERIALS
 from .patch_sections import is_here
 from .patch_solutions import solved
 from .patches import KINDS, cell, patch_index
-from .rayleigh import Complex, Real, Waves, axes, fluxes
+from .rayleigh import Complex, Real, Waves
 from .solutions import shipped
 
 #: The first order, with the mean of the second, and with all of it.
@@ -43,7 +44,7 @@ MODELS = ("first", "mean", "second")
 _HARMONICS = (201, 1999)
 #: Steepest gratings, depth over period.
 _DEEPEST = 0.13
-_GROUPS = {
+GROUPS = {
     "sinusoid": "sinusoids in any mount",
     "crossed": "crossed grating",
     "elaphe": "cuts of scales",
@@ -58,17 +59,7 @@ def section(*, quick: bool = False) -> str:
     for material in MATERIALS:
         cases += cases_of_cells(material, KINDS[:1] if quick else KINDS)
         cases += [] if quick else cases_of_gratings(material)
-    rows = []
-    for group in dict.fromkeys(case.group for case in cases):
-        same = [case for case in cases if case.group == group]
-        row = [group, str(len(same))]
-        for model in MODELS:
-            errors = [case.deviation[model] for case in same]
-            row.append(f"{percent(float(np.mean(errors)))}, {percent(max(errors))}")
-        for model in MODELS:
-            light = [case.light[model] for case in same]
-            row.append(f"{min(light):.3f}–{max(light):.3f}")
-        rows.append(row)
+    rows = rows_of(cases, MODELS, MODELS)
     names = ("first order", "and the mean", "second order")
     header = ["surface", "cases", *names, *(f"light, {name}" for name in names)]
     return f"""## What the second order would bring
@@ -85,10 +76,26 @@ What the first order misses on scales and on a CD is thus mostly the second, and
 mean: light that is diffracted twice interferes with light that is diffracted once, and where hills
 are made pits the sign of that changes. A power spectrum does not tell hills from pits. It takes the
 sum over all waves in between, for every order of every pair of directions, which no table of powers
-has. The mean alone, a smooth factor of two directions that tables could afford, puts the reflected
-light right where walls are gentle, but hardly the colours, and makes some worse: of a sinusoid's
-order the rest takes about as much away. It is therefore not in the model. On vertical walls the
-sums depend on where they end."""
+has; what tables can have of it is below. The mean alone, a smooth factor of two directions, puts
+the reflected light right where walls are gentle, but hardly the colours, and makes some worse: of a
+sinusoid's order the rest takes about as much away. It is therefore not in the model. On vertical
+walls the sums depend on where they end."""
+
+
+def rows_of(cases: Sequence[Case], models: Sequence[str], lit: Sequence[str]) -> list[list[str]]:
+    """A row for each group: deviations of models, mean and worst; the light of some of them."""
+    rows = []
+    for group in dict.fromkeys(case.group for case in cases):
+        same = [case for case in cases if case.group == group]
+        row = [group, str(len(same))]
+        for model in models:
+            errors = [case.deviation[model] for case in same]
+            row.append(f"{percent(float(np.mean(errors)))}, {percent(max(errors))}")
+        for model in lit:
+            light = [case.light[model] for case in same]
+            row.append(f"{min(light):.3f}–{max(light):.3f}")
+        rows.append(row)
+    return rows
 
 
 def amplitudes(
@@ -104,13 +111,13 @@ def amplitudes(
     first, second = coefficients(waves, index, orders)
     heights = (field.heights - field.heights.mean()) * waves.k
     into, out = waves.orders, orders[:, None] - waves.orders
-    before, after = _at(heights, into), _at(heights, out)
+    before, after = at(heights, into), at(heights, out)
     found = {name: np.empty_like(first) for name in MODELS}
     for n, kappa in enumerate(wi[2] + wo[:, 2]):
         screen = 2 * wi[2] / kappa * np.exp(-1j * kappa * heights)
-        amplitude, moment = (_at(part, orders[n]) for part in (screen, heights * screen))
+        amplitude, moment = (at(part, orders[n]) for part in (screen, heights * screen))
         variances = np.abs(after[n]) ** 2 + np.abs(before) ** 2
-        pairs = after[n] * _at(screen, into) + before * _at(screen, out[n])
+        pairs = after[n] * at(screen, into) + before * at(screen, out[n])
         mean, whole = (np.tensordot(part, second[n], axes=1) for part in (variances, pairs))
         mean += 2 * kappa * np.mean(heights**2) * first[n]
         found["first"][n] = amplitude * first[n]
@@ -122,25 +129,14 @@ def amplitudes(
 def coefficients(
     waves: Waves, index: complex, orders: NDArray[np.int64]
 ) -> tuple[Complex, Complex]:
-    """B (n, 2, 2) and B₂ (n, waves, 2, 2) of orders (n, 2), between `rayleigh.axes`."""
-    down, above, came = waves.below * [-1, -1, -1], waves.above, waves.incident
-    tests, fields, zeroth = axes(down, index), axes(above, 1.0), [waves.zeroth]
+    """B (n, 2, 2) and B₂ (n, waves, 2, 2) of orders (n, 2), between `second_order.axes`."""
     rows = [int((waves.orders == order).all(axis=1).argmax()) for order in orders]
-    lit = fluxes(tests, down, axes(came, 1.0), came)
-    back = fluxes(tests, down, fields[:, zeroth], above[zeroth])
-    gamma, gamma_lit, gamma_back = (
-        (down + wave)[:, 2, None, None] for wave in (above, came, above[zeroth])
-    )
-    inverse = gamma * np.linalg.inv(fluxes(tests, down, fields, above))
-    flat = -(inverse @ (lit / gamma_lit))[zeroth]
-    once = -1j * inverse @ (lit + back @ flat)
-    level = -0.5 * (gamma_lit * lit + gamma_back * (back @ flat))[rows, None]
-    between = fluxes(tests[:, rows, None], down[rows, None], fields[:, None], above)
-    q0 = above[waves.zeroth, 2].real
-    return 0.5j / q0 * once[rows], -inverse[rows, None] @ (1j * between @ once + level) / q0
+    tangential = waves.above[:, :2].real
+    light = Perturbation(-waves.incident[0].real, index)
+    return light.first(tangential[rows]), light.second(tangential[rows][:, None], tangential)
 
 
-def _at(function: NDArray[np.inexact], orders: NDArray[np.int64]) -> Complex:
+def at(function: NDArray[np.inexact], orders: NDArray[np.int64]) -> Complex:
     """Fourier coefficients of orders (..., 2) of a function on pixels (ny, nx)."""
     ny, nx = function.shape
     inside = (2 * np.abs(orders) < [nx, ny]).all(axis=-1)
@@ -150,7 +146,7 @@ def _at(function: NDArray[np.inexact], orders: NDArray[np.int64]) -> Complex:
 
 @dataclass(frozen=True)
 class Case:
-    """One solution: deviation of colours of each of `MODELS`, and all light over the rigorous."""
+    """One solution: deviation of colours by each model, and all light over the rigorous."""
 
     group: str
     deviation: dict[str, float]
@@ -165,7 +161,7 @@ def cases_of_cells(material: str, kinds: Sequence[str] = KINDS) -> Iterator[Case
             field, index = cell(surface), patch_index(material, one.case.wavelength)
             orders = np.stack([one.rows["mx"], one.rows["my"]], axis=1).astype(np.int64)
             light = field, index, one.case.wavelength, one.wi, one.wo(field), orders
-            group = f"{material}, {_GROUPS[surface.kind]}, slope {surface.slope:.2g}"
+            group = f"{material}, {GROUPS[surface.kind]}, slope {surface.slope:.2g}"
             yield _case(group, light, one.efficiency(field))
 
 
@@ -188,11 +184,18 @@ def _case(
     truth: Real,
 ) -> Case:
     wi, wo, orders = light[3:]
-    keep = orders.any(axis=1) & (wo[:, 2] >= np.cos(np.radians(GRAZING)))
     powers = {
         name: 0.5 * np.sum(np.abs(found) ** 2, axis=(1, 2)) * wo[:, 2] / wi[2]
         for name, found in amplitudes(*light).items()
     }
+    return scored(group, powers, truth, wo, orders)
+
+
+def scored(
+    group: str, powers: dict[str, Real], truth: Real, wo: Real, orders: NDArray[np.int64]
+) -> Case:
+    """Efficiencies (n,) of orders (n, 2) along wo, by several models, beside the rigorous."""
+    keep = orders.any(axis=1) & (wo[:, 2] >= np.cos(np.radians(GRAZING)))
     return Case(
         group,
         {

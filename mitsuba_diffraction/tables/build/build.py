@@ -44,6 +44,7 @@ from .coefficients import coefficients_of, half_precision
 from .describe import describe, roughness_of
 from .error import FLOOR, ErrorMeter, Parts, worst
 from .powers import Spectra
+from .slope_ratios import slope_ratios
 from .windows import Run, shape_of, windows_of
 
 #: Below it single precision transforms would spend a share of the tolerance themselves.
@@ -215,6 +216,7 @@ def build_table(
     q_max: float | tuple[float, float] | None = None,
     kappa_max: float | None = None,
     windows: str | float | None = None,
+    second_order: bool | None = None,
     crop: float | tuple[float, float] | None = None,
     progress: Progress | None = None,
 ) -> DiffractionTable:
@@ -225,8 +227,9 @@ def build_table(
     heights : the patch, which tiles the plane; or several of one size, whose powers are
         averaged (`ensemble` only).
     coherence_width, coherence, basis, tolerance, terms, wavelength_range, height_scale_max, taps,
-    q_max, kappa_max, windows : see `settings.TableSettings`. Beyond `q_max` or `kappa_max` a table
-        of coarse cells answers, which is right on average (`tables.build.coarse`).
+    q_max, kappa_max, windows, second_order : see `settings.TableSettings`. Beyond `q_max` or
+        `kappa_max` a table of coarse cells answers, which is right on average
+        (`tables.build.coarse`).
     crop : the former name of `q_max`, in rad/µm; heights have a treatment of that name, in µm.
     progress : called as progress(done, total, text) while it works.
 
@@ -240,7 +243,7 @@ def build_table(
         q_max = _former_name(crop, q_max)
     settings = TableSettings(
         coherence_width, coherence, basis, tolerance, terms, taps, wavelength_range,
-        height_scale_max, checked("q_max", q_max), kappa_max, windows,
+        height_scale_max, checked("q_max", q_max), kappa_max, windows, second_order,
     )  # fmt: skip
     return build_with(heights, settings, progress)
 
@@ -369,6 +372,7 @@ def _table(
         roughness=roughness_of(patches, q_limit_of(settings.wavelength_range)),
         source=describe(patches, settings, setting.taps),
         coarse=None if wanted.whole else coarse_table(patches, settings, tell),
+        slope_ratios=slope_ratios(patches, settings) if settings.second_order else None,
     )
 
 

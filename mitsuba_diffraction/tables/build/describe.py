@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...heights.field import LARGE, HeightField
 from ...heights.validity import window_warning
@@ -77,6 +78,21 @@ def roughness_of(patches: Sequence[HeightField], q_max: float) -> RoughnessTable
         else:
             each.append(ScaleRoughness.mean(_parts(Windows([patch], math.inf)).roughness()))
     return ScaleRoughness.mean(each).table(q_max)
+
+
+def sections(
+    patches: Sequence[HeightField],
+) -> Iterator[tuple[HeightField, NDArray[np.float64]]]:
+    """Patches, or some windows on wide scans, that represent them; and how screens fade there."""
+    if isinstance(patches, Windows):
+        parts = _parts(patches)
+        yield from ((one, parts.taper) for one in parts.some())
+        return
+    for patch in patches:
+        if patch.heights.size <= LARGE:
+            yield patch, np.ones((1, 1))
+        else:
+            yield from sections(Windows([patch], math.inf))
 
 
 def _parts(windows: Windows) -> Windows:

@@ -13,7 +13,7 @@ coherence window 1/(2σ²): with L = 8σ, twice the coherence width, lobes are 1
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, overload
@@ -207,12 +207,20 @@ class Windows(Sequence[HeightField]):
 
     def roughness(self) -> list[ScaleRoughness]:
         """Of some of the windows, their heights tapered as the screens are."""
-        some = np.unique(np.linspace(0, len(self) - 1, _ROUGHNESS_OF).round().astype(int))
-        taper = np.outer(*(np.ones(1) if t is None else t for t in self.tapers))
         return [
-            ScaleRoughness.of((one.heights - one.heights.mean()) * taper, one.pixel_size)
-            for one in (self[int(n)] for n in some)
+            ScaleRoughness.of((one.heights - one.heights.mean()) * self.taper, one.pixel_size)
+            for one in self.some()
         ]
+
+    @property
+    def taper(self) -> Reals:
+        """How screens fade, along both axes: (ny or 1, nx or 1)."""
+        return np.outer(*(np.ones(1) if t is None else t for t in self.tapers))
+
+    def some(self) -> Iterator[HeightField]:
+        """Some of the windows, evenly spread."""
+        found = np.unique(np.linspace(0, len(self) - 1, _ROUGHNESS_OF).round().astype(int))
+        return (self[int(n)] for n in found)
 
     @property
     def _pixels(self) -> tuple[float, float]:

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from docs.make.validation import rayleigh
+from docs.make.validation.factored import MODELS as FACTORED
+from docs.make.validation.factored import factored_cases
 from docs.make.validation.patch_solutions import solved
 from docs.make.validation.patches import cell
 from docs.make.validation.second_order import MODELS, amplitudes, cases_of_cells, coefficients
@@ -86,3 +88,12 @@ def test_most_of_it_changes_sign_where_hills_are_made_pits():
         changes.append((powers[1] - powers[0])[coloured])
     hills, pits = changes
     assert np.abs(hills - pits).sum() > 1.5 * np.abs(hills + pits).sum()
+
+
+def test_as_a_factor_it_takes_most_of_the_error_on_a_cd():
+    cases = list(factored_cases(["cd_pits"], FACTORED[:2]))
+    for slope, first, left in ((0.2, 0.3, 0.08), (0.06, 0.07, 0.02)):
+        same = [c for c in cases if c.group.endswith(f"slope {slope:g}, from 60°")]
+        assert len(same) == 2
+        assert np.mean([c.deviation[FACTORED[0]] for c in same]) > first
+        assert np.mean([c.deviation[FACTORED[1]] for c in same]) < left

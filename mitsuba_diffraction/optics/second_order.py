@@ -1,0 +1,218 @@
+"""The second order of the small-slope approximation, as a factor on the first (NumPy, float64).
+
+Voronovich 1994 (Waves in Random Media 4, 337): with B and B₂ the first two orders of perturbation,
+R = −2i q0 B ĥ + q0 Σ_u B₂ ĥ ĥ, spectra ĥ and a of the heights and of exp(−iQh), Q = q + q0, and ξ
+what the surface adds to a wave, evanescent ones too,
+
+    R(k) = 2 q0/Q · [B a(k−k0) + i/4 Σ_ξ M ĥ(ξ) a(k−k0−ξ)],   M = B₂(k−ξ) + B₂(k0+ξ) + 2QB.
+
+M is 0 where ξ is 0 or k−k0. Where waves in between travel it is smooth, and close to
+C_l ξ_l (k−k0−ξ)_l + C_t ξ_t (k−k0−ξ)_t, with l along k−k0 and t across. As ξ ĥ is the spectrum of
+−i∇h, and (k−k0−ξ) a that of −Q ∇h exp(−iQh), the sum is then −Q/4 · (C_l D_l + C_t D_t), D_l the
+spectrum of (∂_l h)² exp(−iQh). For unpolarised light the power of the first order is multiplied by
+
+    |1 + s (c_l r_l + c_t r_t)|²,   c = −Q/4 Σ B* C / Σ |B|²,   r = a* D / |a|²,
+
+s the share of small slope in the model (`blend.weight`), r as in `slope_ratio`. c knows directions
+and index alone, is symmetric in ωi and ωo and even in the azimuth between them. It is for
+dielectrics: on metals surface plasmons are a pole of M that no such form has. Lengths over 2π/λ.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import RegularGridInterpolator
+
+from .fresnel import decaying_root
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+#: Most that the second order adds to an amplitude, of the first: power grows to 2.25 at most.
+LIMIT = 0.5
+#: Frequency that slopes are filtered at, 1/(1 + (ξ/F)²): that of light at grazing angles.
+CUTOFF = 2.0
+#: Nodes of a `CoefficientTable` along θi, θo and the azimuth.
+NODES = 17
+
+# M is sampled on circles about (k−k0)/2, up to three times the width, where waves travel
+_WIDTH, _RADII, _AZIMUTHS = 0.55, 8, 6
+# Of the weight 1/|ξ||k−k0−ξ| where either is 0
+_LEVEL = 0.02
+# Of the equations' trace: at k = k0 both components are one
+_RIDGE = 1e-6
+# Last node, rad: where cosines are 0 so is c, over 0
+_HORIZON = np.radians(89.9)
+
+
+def axes(vector: Complex, index: complex) -> Complex:
+    """Electric fields s and p of plane waves κ (..., 3) in a medium, (2, ..., 3).
+
+    s = ẑ×κ̂, p = κ̂×s.
+    """
+    x, y = vector[..., 0].real, vector[..., 1].real
+    length = np.hypot(x, y)
+    slanted = length > 1e-12
+    safe = np.where(slanted, length, 1.0)
+    sine, cosine = np.where(slanted, -y / safe, 0.0), np.where(slanted, x / safe, 1.0)
+    s = np.stack([sine, cosine, np.zeros_like(x)], axis=-1).astype(complex)
+    return np.stack([s, np.cross(vector / index, s)])
+
+
+def fluxes(tests: Complex, to: Complex, fields: Complex, waves: Complex) -> Complex:
+    """(κ+κ')·(e×(κ'×e') − e'×(κ×e)) of test waves κ' and waves κ, (..., 2, 2): tests first.
+
+    tests, fields : (2, ..., 3) their s and p fields; to, waves : (..., 3); all of them broadcast.
+    """
+    total = waves + to
+    found = [
+        np.sum(
+            total * (np.cross(e, np.cross(to, e_test)) - np.cross(e_test, np.cross(waves, e))), -1
+        )
+        for e_test in tests
+        for e in fields
+    ]
+    return np.stack(found, axis=-1).reshape(*found[0].shape, 2, 2)
+
+
+class Perturbation:
+    """B and B₂ of light from one direction, between `axes`.
+
+    They solve ∫ (E×H' − E'×H)·n dS = 0 for waves above the surface and test waves that go down in
+    the material (Brown, Celli, Haller and Marvin 1984, Surface Science 136, 381), order by order.
+
+    Parameters
+    ----------
+    wi : (3,) unit vector to the light.
+    index : n + ik of the material over that of the medium above it.
+    """
+
+    def __init__(self, wi: ArrayLike, index: complex) -> None:
+        incident = np.asarray(wi, np.float64)
+        k0 = -incident[:2]
+        self._index, self._q0 = complex(index), float(incident[2])
+        self._up = _wave(k0, 1.0)
+        self._came = self._up * [1, 1, -1]
+        lit, gamma = self._against(k0, self._came)
+        self._flat = -self._inverse(k0) @ (lit / gamma)
+
+    def first(self, k: Real) -> Complex:
+        """B (..., 2, 2) of light that leaves along k (..., 2)."""
+        return np.asarray(0.5j / self._q0 * self._once(k))
+
+    def second(self, k: Real, u: Real) -> Complex:
+        """B₂ (..., 2, 2) by way of waves of tangential part u; k and u (..., 2) broadcast."""
+        (lit, gamma), (back, gamma_back) = self._driving(k)
+        level = -0.5 * (gamma * lit + gamma_back * back)
+        between, _ = self._against(k, _wave(u, 1.0))
+        return np.asarray(-self._inverse(k) @ (1j * between @ self._once(u) + level) / self._q0)
+
+    def _once(self, k: Real) -> Complex:
+        (lit, _), (back, _) = self._driving(k)
+        return np.asarray(-1j * self._inverse(k) @ (lit + back))
+
+    def _driving(self, k: Real) -> list[tuple[Complex, Complex]]:
+        """What drives waves along k: light that comes, and what a level surface reflects of it."""
+        (lit, gamma), (back, gamma_back) = (self._against(k, w) for w in (self._came, self._up))
+        return [(lit, gamma), (back @ self._flat, gamma_back)]
+
+    def _inverse(self, k: Real) -> Complex:
+        flux, gamma = self._against(k, _wave(k, 1.0))
+        return np.asarray(gamma * np.linalg.inv(flux))
+
+    def _against(self, k: Real, wave: Complex) -> tuple[Complex, Complex]:
+        """`fluxes` between test waves −k that go down in the material and waves; κ_z + κ'_z."""
+        to = _wave(k, self._index) * [-1, -1, -1]
+        found = fluxes(axes(to, self._index), to, axes(wave, 1.0), wave)
+        return found, (wave + to)[..., 2, None, None]
+
+
+def _wave(tangential: Real, index: complex) -> Complex:
+    """Wave vectors (..., 3) that go up in a medium, or fade."""
+    normal = decaying_root(index**2 - np.sum(tangential**2, axis=-1) + 0j)
+    return np.concatenate([tangential, normal[..., None]], axis=-1)
+
+
+def slope_coefficients(wi: ArrayLike, wo: ArrayLike, index: complex) -> Complex:
+    """c_l and c_t, (n, 2): M as squared slopes, by least squares over the waves that travel.
+
+    Parameters
+    ----------
+    wi : (3,) unit vector to the light; wo : (n, 3) unit vectors of light that leaves.
+    index : of a dielectric, over that of the medium above it.
+    """
+    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    perturbation, k = Perturbation(incident, index), outgoing[:, None, :2]
+    q = incident[:2] + k
+    length = np.hypot(q[..., 0], q[..., 1])
+    along = np.where(length[..., None] > 1e-6, q / np.maximum(length, 1e-12)[..., None], [1.0, 0.0])
+    radius = 3.0 * _WIDTH * np.repeat((np.arange(_RADII) + 0.5) / _RADII, _AZIMUTHS)
+    turn = np.tile(np.pi * (np.arange(_AZIMUTHS) + 0.5) / _AZIMUTHS, _RADII)
+    z = radius * np.stack([np.cos(turn), np.sin(turn)])
+    across = along[..., ::-1] * [-1.0, 1.0]
+    offset = z[0][:, None] * along + z[1][:, None] * across
+    first, between = perturbation.first(outgoing[:, :2]), 0.5 * q + offset
+    kappa = (incident[2] + outgoing[:, 2])[:, None, None, None]
+    kernel = perturbation.second(k, k - between) + perturbation.second(k, between - incident[:2])
+    kernel = kernel + 2.0 * kappa * first[:, None]
+    squares = [(0.5 * length + sign * z[0]) ** 2 + z[1] ** 2 for sign in (1.0, -1.0)]
+    weight = (
+        radius * np.exp(-((radius / _WIDTH) ** 2)) / (np.sqrt(squares[0] * squares[1]) + _LEVEL)
+    )
+    filtered = (1.0 + squares[0] / CUTOFF**2) * (1.0 + squares[1] / CUTOFF**2)
+    products = np.stack([0.25 * length**2 - z[0] ** 2, 0.0 * length - z[1] ** 2], axis=-1)
+    products /= filtered[..., None]
+    matrix = np.einsum("nm,nmi,nmj->nij", weight, products, products)
+    trace = np.trace(matrix, axis1=1, axis2=2)[:, None, None]
+    onto = np.einsum("nmab,nab->nm", kernel, first.conj())
+    right = np.einsum("nm,nmi,nm->ni", weight, products, onto)
+    found = np.linalg.solve(matrix + _RIDGE * trace * np.eye(2), right[..., None])[..., 0]
+    power = np.sum(np.abs(first) ** 2, axis=(1, 2))
+    return np.asarray(-0.25 * kappa[:, 0, 0] * found / power[:, None])
+
+
+@lru_cache(maxsize=16)
+def coefficient_table(index: float) -> Complex:
+    """c on nodes (θi, θo, azimuth of ωo from that of −ωi, 2), each even from 0 to its end.
+
+    `NODES` each, to π/2 and π; symmetric in the first two. Half a second of work.
+    """
+    polar = np.clip(np.linspace(0.0, 0.5 * np.pi, NODES), 1e-3, _HORIZON)
+    azimuth = np.linspace(0.0, np.pi, NODES)
+    table = np.empty((NODES, NODES, NODES, 2), complex)
+    for n, theta in enumerate(polar):
+        out, turn = np.meshgrid(polar[n:], azimuth, indexing="ij")
+        wi = np.array([-np.sin(theta), 0.0, np.cos(theta)])
+        wo = np.stack([np.sin(out) * np.cos(turn), np.sin(out) * np.sin(turn), np.cos(out)], -1)
+        found = slope_coefficients(wi, wo.reshape(-1, 3), index).reshape(*out.shape, 2)
+        table[n, n:] = table[n:, n] = found
+    table.setflags(write=False)
+    return table
+
+
+def interpolated(index: float, wi: ArrayLike, wo: ArrayLike) -> Complex:
+    """`slope_coefficients` by `coefficient_table`, linear in between; wi and wo (n, 3)."""
+    incident, outgoing = np.broadcast_arrays(*(np.asarray(w, np.float64) for w in (wi, wo)))
+    nodes = np.linspace(0.0, 0.5 * np.pi, NODES)
+    angles = [np.arccos(np.clip(w[..., 2], 0.0, 1.0)) for w in (incident, outgoing)]
+    turn = np.arctan2(outgoing[..., 1], outgoing[..., 0])
+    turn = turn - np.arctan2(-incident[..., 1], -incident[..., 0])
+    angles.append(np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi))
+    table = RegularGridInterpolator((nodes, nodes, 2.0 * nodes), coefficient_table(index))
+    return np.asarray(table(np.stack(angles, axis=-1)))
+
+
+def factor(coefficients: ArrayLike, ratios: ArrayLike, share: ArrayLike) -> Real:
+    """|1 + s (c_l r_l + c_t r_t)|², (...): what unpolarised light's power is multiplied by.
+
+    Parameters
+    ----------
+    coefficients, ratios : c and r, (..., 2).
+    share : s, (...).
+    """
+    both = np.asarray(coefficients) * np.asarray(ratios)
+    added = np.asarray(share) * np.sum(both, axis=-1)
+    return np.abs(1.0 + added / np.maximum(1.0, np.abs(added) / LIMIT)) ** 2

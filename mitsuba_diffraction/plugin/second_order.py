@@ -1,0 +1,163 @@
+"""The second order of small slope as a factor on the power of orders (Dr.Jit).
+
+The twin of `optics.second_order`: c is looked up once for a pair of directions, r for each channel,
+at k (u, v) and κ; heights times a factor have r at κ times it, times its square.
+"""
+
+from __future__ import annotations
+
+import math
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DiffractionError
+from ..optics.second_order import LIMIT, NODES, coefficient_table
+from ..optics.slope_ratio import SlopeRatios
+from ..settings import COHERENCES
+from .boundary import MODELS, SmallSlope
+from .layers import LAYERINGS
+from .memory import index_between, read_record, upload
+from .pair import Pair
+from .properties import flag
+from .reflectance import Dielectric, Reflectance
+from .roles import Float, Index, Kind, Number, Properties
+
+#: Indices are rounded to this, for c.
+INDEX_STEP = 0.01
+# Cosines this close to 1 are: a derivative of their angle is no number
+_NORMAL = 1.0 - 1e-7
+
+
+def material_of_second_order(props: Properties, material: Reflectance) -> Dielectric | None:
+    """The material, if it is asked for.
+
+    Raises
+    ------
+    DiffractionError
+        If it is, of what it is not for.
+    """
+    if not flag(props, "second_order", False):
+        return None
+    defaults = {"model": MODELS[0], "coherence": COHERENCES[0], "layering": LAYERINGS[0]}
+    excluded = [
+        *(f"{name}={props.get(name)}" for name in defaults if _differs(props, name, defaults)),
+        *(name for name in ("coat_ior", "film_ior") if name in props),
+        *(f"{name}=true" for name in ("thin", "transmission") if flag(props, name, False)),
+        *([f"the polarised variant {mi.variant()}"] if mi.is_polarized else []),
+    ]
+    if not isinstance(material, Dielectric):
+        excluded = [f"the material '{material}'"]
+    if excluded or not isinstance(material, Dielectric):
+        raise DiffractionError(
+            "second_order=true is for unpolarised light that a bare dielectric reflects, by "
+            f"model='small_slope' and coherence='ensemble', not for {excluded[0]}; leave one out"
+        )
+    return material
+
+
+def _differs(props: Properties, name: str, defaults: dict[str, str]) -> bool:
+    return name in props and props.get(name) != defaults[name]
+
+
+class SecondOrder:
+    """Of one BSDF, at its index.
+
+    Parameters
+    ----------
+    material : what the surface is of.
+    boundary : its model, which says how much of small slope an order has.
+    ratios : r of its heights.
+    """
+
+    def __init__(self, material: Dielectric, boundary: SmallSlope, ratios: SlopeRatios) -> None:
+        self._material, self._boundary, self._index = material, boundary, math.nan
+        self._cell, self._orders, self._middle = ratios.cell, ratios.orders, ratios.middle
+        self._first = ratios.kappa[0]
+        self._per_kappa = (len(ratios.values) - 1) / (ratios.kappa[1] - ratios.kappa[0])
+        values = np.moveaxis(ratios.values, 1, -1)
+        self._ratios = _Grid(values, mi.Float16)
+        self.update()
+
+    def update(self) -> None:
+        """Take another index of the material, to `INDEX_STEP`."""
+        index = float(dr.slice(dr.detach(self._material.eta)))
+        index = max(1, round(index / INDEX_STEP)) * INDEX_STEP
+        if index != self._index:
+            self._index = index
+            self._coefficients = _Grid(coefficient_table(round(index, 6)), mi.Float)
+
+    def added(self, pair: Pair, height_scale: Float, wavenumbers: list[Float]) -> list[Float]:
+        """|1 + s (c_l r_l + c_t r_t)|² − 1 for each channel."""
+        indices: list[Number] = [self._material.eta]
+        shares = self._boundary.shares(pair, height_scale, wavenumbers, indices)
+        c = self._coefficients.at(self._angles(pair))
+        found = []
+        for k, share in zip(wavenumbers, shares, strict=True):
+            r = self._ratios.at(self._place(pair, height_scale, k))
+            scale = (1.0 - share) * dr.square(height_scale)
+            real = scale * (c[0] * r[0] - c[1] * r[1] + c[2] * r[2] - c[3] * r[3])
+            imaginary = scale * (c[0] * r[1] + c[1] * r[0] + c[2] * r[3] + c[3] * r[2])
+            square = dr.fma(real, real, imaginary * imaginary)
+            least = dr.minimum(1.0, LIMIT * dr.rsqrt(dr.maximum(square, 1e-20)))
+            found.append(least * dr.fma(least, square, 2.0 * real))
+        return found
+
+    def _angles(self, pair: Pair) -> list[Float]:
+        """θi, θo and the azimuth of ωo from that of −ωi, in nodes."""
+        first, second = pair.wi, pair.wo
+        dot = dr.fma(first.x, second.x, first.y * second.y)
+        squares = dr.fma(first.x, first.x, dr.square(first.y)) * dr.fma(
+            second.x, second.x, dr.square(second.y)
+        )
+        turn = -dot * dr.rsqrt(dr.maximum(squares, 1e-20))
+        cosines = (pair.cos_i, pair.cos_o, turn)
+        angles = [dr.acos(dr.clip(cosine, -_NORMAL, _NORMAL)) for cosine in cosines]
+        per = (NODES - 1) / math.pi
+        return [angles[0] * (2.0 * per), angles[1] * (2.0 * per), angles[2] * per]
+
+    def _place(self, pair: Pair, height_scale: Float, k: Float) -> list[Float]:
+        """κ, q_y and q_x, in nodes."""
+        found = [(k * pair.w * height_scale - self._first) * self._per_kappa]
+        for axis, q in ((1, pair.uv.y), (0, pair.uv.x)):
+            cells = dr.fma(k * q, 1.0 / self._cell[axis], self._middle[axis])
+            found.append(dr.round(cells) if self._orders[axis] else cells)
+        return found
+
+
+class _Grid:
+    """Two complex numbers on a grid of three axes, linear in between."""
+
+    def __init__(self, values: NDArray[np.complexfloating], kind: Kind) -> None:
+        floats = np.stack([values.real, values.imag], axis=-1).astype(np.float32)
+        floats = floats.reshape(*values.shape[:3], 4)
+        self._shape = values.shape[:3]
+        # A node and the next one side by side, so that one packet load fetches both
+        records = np.concatenate([floats[:, :, :-1], floats[:, :, 1:]], axis=-1)
+        self._records = upload(kind, records.astype(np.float16) if kind is mi.Float16 else records)
+
+    def at(self, places: list[Float]) -> list[Float]:
+        """The four floats at places in units of nodes; beyond the grid, those at its edge."""
+        lower, upper = [], []
+        for place, count in zip(places, self._shape, strict=True):
+            first = index_between(dr.floor(place), 0.0, count - 2.0)
+            lower.append(mi.UInt32(first))
+            upper.append(dr.clip(place - first, 0.0, 1.0))
+        _, rows, columns = self._shape
+        start = (lower[0] * rows + lower[1]) * (columns - 1) + lower[2]
+        ends = []
+        for x in (0, rows):
+            rows_of = [start + (x + y) * (columns - 1) for y in (0, 1)]
+            low, high = (self._between(row, upper[2]) for row in rows_of)
+            ends.append(_lerp(low, high, upper[1]))
+        return _lerp(ends[0], ends[1], upper[0])
+
+    def _between(self, index: Index, upper: Float) -> list[Float]:
+        both = read_record(self._records, index, 8)
+        return _lerp(both[:4], both[4:], upper)
+
+
+def _lerp(low: list[Float], high: list[Float], upper: Float) -> list[Float]:
+    return [dr.lerp(a, b, upper) for a, b in zip(low, high, strict=True)]

@@ -1,0 +1,89 @@
+"""The second order of small slope: its coefficients, and what they multiply."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction.optics import boundary
+from mitsuba_diffraction.optics.second_order import (
+    Perturbation,
+    factor,
+    interpolated,
+    slope_coefficients,
+)
+from mitsuba_diffraction.optics.slope_ratio import Slopes, along
+from tests.directions import polar, rough_patch
+
+KERATIN = 1.56
+
+
+@pytest.mark.parametrize("index", [KERATIN, 1 / KERATIN])
+def test_coefficients_are_reciprocal_and_even_in_the_azimuth(index):
+    first, second = polar(50.0, 20.0), polar(25.0, 140.0)
+    there = slope_coefficients(first, second[None], index)
+    assert slope_coefficients(second, first[None], index) == pytest.approx(there, abs=1e-12)
+    mirrored = polar(50.0, -20.0), polar(25.0, -140.0)
+    even = slope_coefficients(mirrored[0], mirrored[1][None], index)
+    assert even == pytest.approx(there, abs=1e-12)
+
+
+def test_across_and_along_are_one_where_light_keeps_its_direction():
+    wi = polar(1e-4, 0.0)
+    along_x, across = slope_coefficients(wi, np.array([[0.0, 0.0, 1.0]]), KERATIN)[0]
+    assert along_x == pytest.approx(across, rel=1e-3)
+
+
+def test_the_first_order_is_the_boundary_s():
+    wi, wo = polar(50.0, 20.0), np.array([polar(25.0, 140.0), polar(70.0, -30.0)])
+    found = Perturbation(wi, KERATIN).first(wo[:, :2])
+    exact = boundary.unpolarised(boundary.small_slope(wi, wo, KERATIN))
+    assert boundary.unpolarised(found) == pytest.approx(exact, rel=1e-9)
+
+
+def test_a_table_finds_the_coefficients():
+    rng = np.random.default_rng(3)
+    errors, lengths = [], []
+    for theta in rng.uniform(0.0, 85.0, 20):
+        wi = polar(theta, 180.0)
+        wo = np.array([polar(*rng.uniform([0.0, -180.0], [80.0, 180.0])) for _ in range(12)])
+        exact = slope_coefficients(wi, wo, KERATIN)
+        errors.append(np.abs(interpolated(KERATIN, wi, wo) - exact).sum(axis=1))
+        lengths.append(np.hypot(*(wi + wo)[:, :2].T))
+    # |c| is 0.6 at the median; beside the mirror direction along and across turn quickly
+    assert np.median(errors) < 0.02
+    assert np.max(np.concatenate(errors)[np.concatenate(lengths) > 0.2]) < 0.2
+
+
+def test_power_grows_to_2_25_at_most():
+    ratios = np.array([[0.1 + 0.2j, 0.0], [300.0, 200j]])
+    found = factor(np.ones((2, 2)), ratios, 1.0)
+    assert found[0] == pytest.approx(1.1**2 + 0.2**2)
+    assert found[1] <= 2.25 + 1e-12
+    assert factor(np.ones((2, 2)), ratios, 0.0) == pytest.approx(1.0)
+
+
+def test_slopes_are_those_of_the_surface_and_of_walls_nothing_is_left():
+    x = 2 * np.pi * np.arange(64) / 64
+    gentle = Slopes.of(0.05 * np.sin(x)[None, :] * np.ones((8, 1)), (2.5 / 64, 0.1))
+    q = 2 * np.pi / 2.5
+    slope = 0.05 * q * np.cos(x) / (1 + (q / 23) ** 2)
+    assert gentle.products[0] == pytest.approx(np.tile(slope**2, (8, 1)), abs=1e-12)
+    assert gentle.products[1:] == pytest.approx(0.0, abs=1e-12)
+    assert gentle.gate > 0.98
+    wall = np.tile(0.1 * (x < np.pi), (8, 1))
+    # ρ falls with the pixels, as the walls' own slopes grow
+    assert Slopes.of(wall, (2.5 / 64, 0.1)).gate > Slopes.of(wall, (0.25 / 64, 0.1)).gate < 0.1
+    assert Slopes.of(np.zeros((8, 8)), (0.1, 0.1)).products == pytest.approx(0.0)
+
+
+def test_along_and_across_turn_with_the_order():
+    patch = rough_patch((12, 15), (0.13, 0.15), 0.3)
+    products = Slopes.of(patch.heights, patch.pixel_size).products.reshape(3, -1).T
+    q = np.array([0.6, 0.8])
+    lengthwise, across = along(np.broadcast_to(q, (len(products), 2)), products + 0j).T
+    assert lengthwise + across == pytest.approx(products[:, 0] + products[:, 2])
+    x, _ = along(np.tile([2.0, 0.0], (len(products), 1)), products + 0j).T
+    assert x == pytest.approx(products[:, 0])
+    expected = products @ [0.36, 0.96, 0.64]
+    assert lengthwise == pytest.approx(expected)

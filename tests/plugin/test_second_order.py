@@ -1,0 +1,179 @@
+"""The second order in the plugin: against the reference and its NumPy twin; what it refuses."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction.optics import blend, second_order
+from mitsuba_diffraction.optics.geometry import sigma_of, wavenumber
+from tests.directions import lit_pairs, polar, rough_patch
+from tests.lanes import brdf_values, interaction, refusal, vectors
+
+# a patch this small is beyond what the model likes; that is not the point here
+pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+
+#: Of 1.7 × 1.76 µm, its orders far apart under the window.
+PATCH = rough_patch((22, 20), (0.085, 0.08), 0.1)
+WIDTH = 16.0
+KERATIN = {"int_ior": 1.56, "ext_ior": 1.0, "coherence_width": WIDTH, "tolerance": 1e-3}
+
+
+def load(field=PATCH, **parameters):
+    return mi.load_dict(md.bsdf_dict(field, **{**KERATIN, "second_order": True, **parameters}))
+
+
+def coloured():
+    """Directions and wavelengths in the lobes of other orders than 0."""
+    wi, wo, lam, near = lit_pairs(PATCH, sigma_of(WIDTH), 160, 1)
+    return wi[~near], wo[~near], lam[~near]
+
+
+def reference(light, **parameters):
+    return md.reference.brdf(
+        PATCH, *light, coherence_width=WIDTH, model="small_slope", eta=1.56, **parameters
+    )
+
+
+def test_orders_have_the_reference_s_power(variant):
+    light = coloured()
+    first, both = reference(light), reference(light, second_order=True)
+    change = np.abs(both - first).sum()
+    assert change > 0.01 * first.sum()
+    # c is interpolated between angles, r between κ
+    assert np.abs(brdf_values(load(), *light) - both).sum() < 0.12 * change
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.6])
+def test_the_factor_is_that_of_its_numpy_twin(variant, scale):
+    wi, wo, lam = light = coloured()
+    bsdf, plain = load(height_scale=scale), load(height_scale=scale, second_order=False)
+    wave = wavenumber(lam)
+    q, kappa = wave[:, None] * (wi + wo)[:, :2], wave * (wi + wo)[:, 2] * scale
+    roughness = blend.ScaleRoughness.of(scale * PATCH.heights, PATCH.pixel_size)
+    share = blend.weight(kappa / scale, roughness.at(np.hypot(*q.T)), 1.56)
+    ratios = scale**2 * bsdf.table.slope_ratios.at(q, kappa)
+    factor = second_order.factor(second_order.interpolated(1.56, wi, wo), ratios, share)
+    found, first = brdf_values(bsdf, *light), brdf_values(plain, *light)
+    strong = first > 1e-4 * first.max()  # where order 0's tail is none
+    # half floats of r, and single precision of angles
+    assert found[strong] == pytest.approx(factor[strong] * first[strong], rel=3e-3)
+    assert found.max() < 2.26 * first.max()
+
+
+def test_it_is_reciprocal_and_leaves_the_mirror_direction(variant):
+    bsdf, plain = load(), load(second_order=False)
+    wi, wo, lam = coloured()
+    there, back = brdf_values(bsdf, wi, wo, lam), brdf_values(bsdf, wo, wi, lam)
+    assert there == pytest.approx(back, rel=1e-4, abs=1e-5 * there.max())
+    mirrored = polar(40.0)[None], polar(40.0, 180.0)[None], [550.0]
+    assert brdf_values(bsdf, *mirrored) == pytest.approx(brdf_values(plain, *mirrored), rel=1e-4)
+
+
+@pytest.mark.parametrize("name", ["scalar_rgb", "scalar_spectral", "llvm_ad_rgb"])
+def test_other_variants_have_it_too(name):
+    mi.set_variant("llvm_ad_spectral")
+    spectral, changed = _of_one()
+    assert np.all(np.abs(changed / spectral - 1.0) > 0.01)
+    mi.set_variant(name)
+    first, found = _of_one()
+    if mi.is_spectral:
+        assert found == pytest.approx(changed, rel=1e-3)
+    else:  # of the channels' mean wavelengths, 450 to 610 nm
+        assert found / first == pytest.approx(np.mean(changed / spectral), abs=0.02)
+
+
+def _of_one():
+    """f·cosθo of one pair of directions, without it and with it, for each channel."""
+    si = dr.zeros(mi.SurfaceInteraction3f)
+    si.wi, wo = (mi.Vector3f(w.tolist()) for w in (polar(60.0), polar(31.0, 176.0)))
+    si.sh_frame = mi.Frame3f(mi.Normal3f(0, 0, 1))
+    if mi.is_spectral:
+        si.wavelengths = [460.0, 510.0, 560.0, 610.0]
+    bsdfs = load(second_order=False), load()
+    return [np.array(bsdf.eval(mi.BSDFContext(), si, wo), float).ravel() for bsdf in bsdfs]
+
+
+def test_derivatives_of_the_height_scale_are_those_of_differences(variant):
+    wi, wo, _ = coloured()
+    si, outgoing = interaction(wi, [[480.0, 540.0, 600.0, 660.0]]), vectors(wo)
+    bsdf = load()
+    parameters = mi.traverse(bsdf)
+
+    def total(value, differentiable=False):
+        parameters["height_scale"] = mi.Float(value)
+        if differentiable:
+            dr.enable_grad(parameters["height_scale"])
+        parameters.update()
+        return dr.sum(dr.sum(bsdf.eval(mi.BSDFContext(), si, outgoing)))
+
+    step = 2e-3
+    expected = (total(0.9 + step)[0] - total(0.9 - step)[0]) / (2 * step)
+    value = total(0.9, differentiable=True)
+    dr.backward(value)
+    found = parameters["height_scale"].grad[0]
+    assert found == pytest.approx(expected, rel=2e-3)
+    assert found != pytest.approx(0.0)
+
+
+def test_another_index_has_other_coefficients(variant):
+    light = coloured()
+    bsdf = load()
+    parameters = mi.traverse(bsdf)
+    parameters["eta"] = mi.Float(1.9)
+    parameters.update()
+    assert brdf_values(bsdf, *light) == pytest.approx(
+        brdf_values(load(int_ior=1.9), *light), rel=1e-5
+    )
+
+
+@pytest.mark.parametrize(
+    ("changed", "named"),
+    [
+        ({"material": "Al", "int_ior": None, "ext_ior": None}, "material"),
+        ({"model": "kirchhoff"}, "model=kirchhoff"),
+        ({"coherence": "patch"}, "coherence=patch"),
+        ({"coat_ior": 1.6}, "coat_ior"),
+        ({"film_ior": 1.6, "film_thickness": 100.0}, "film_ior"),
+        ({"thin": True}, "thin=true"),
+        ({"transmission": True}, "transmission=true"),
+    ],
+)
+def test_what_it_is_not_for_is_refused_by_name(variant, changed, named):
+    line = refusal(lambda: load(**changed))
+    assert "second_order=true" in line
+    assert named in line
+
+
+def test_a_table_without_it_is_refused_with_what_makes_one(variant, tmp_path):
+    for name, asked in (("without.exr", None), ("with.exr", True)):
+        md.DiffractionTable.build(PATCH, coherence_width=WIDTH, second_order=asked).save(
+            tmp_path / name
+        )
+    asked = {"coherence_width": None, "tolerance": None}
+    line = refusal(lambda: load(str(tmp_path / "without.exr"), **asked))
+    assert "--second-order" in line
+    light = coloured()
+    from_file = load(str(tmp_path / "with.exr"), **asked)
+    assert brdf_values(from_file, *light) == pytest.approx(
+        brdf_values(load(), *light), rel=1e-3, abs=1e-6
+    )
+    assert load(str(tmp_path / "with.exr"), second_order=False, **asked).only_traced is None
+    assert from_file.only_traced is not None
+
+
+def test_a_recorded_function_keeps_it(variant):
+    wi, wo, _ = coloured()
+    si, outgoing = interaction(wi, [[480.0, 540.0, 600.0, 660.0]]), vectors(wo)
+
+    @dr.freeze
+    def frozen(bsdf):
+        return bsdf.eval(mi.BSDFContext(), si, outgoing)
+
+    for parameters in ({}, {}, {"second_order": False}, {"int_ior": 1.8}):
+        bsdf = load(**parameters)
+        expected = np.array(bsdf.eval(mi.BSDFContext(), si, outgoing))
+        assert np.array(frozen(bsdf)) == pytest.approx(expected, rel=1e-5)

@@ -1,0 +1,117 @@
+"""r of patches on a grid, against transforms of the heights."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionTable, HeightField, gratings
+from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.optics.slope_ratio import SlopeRatios, Slopes, along
+from mitsuba_diffraction.settings import TableSettings
+from mitsuba_diffraction.tables.build.slope_ratios import slope_ratios
+from mitsuba_diffraction.tables.build.windows import windows_of
+from tests.directions import rough_patch
+
+#: Of few orders, and of many; not square.
+FEW = rough_patch((24, 30), (0.1, 0.11), 0.2)
+MANY = gratings.elaphe_like(extent=20.0, pixels=100, seed=3)
+SETTINGS = TableSettings(second_order=True, height_scale_max=1.0)
+#: Half floats.
+ROUNDED = 2e-3
+
+
+def ratios(*patches: HeightField, **changed: object) -> SlopeRatios:
+    return slope_ratios(
+        patches, TableSettings(second_order=True, **{"height_scale_max": 1.0, **changed})
+    )
+
+
+def exact(field: HeightField, order: tuple[int, int], kappa: float) -> np.ndarray:
+    """r_l, r_t of an order (x, y), by plane transforms."""
+    slopes = Slopes.of(field.heights, field.pixel_size)
+    screen = np.exp(-1j * kappa * field.heights)
+    a, *products = (np.fft.fft2(f * screen)[order[::-1]] for f in (1.0, *slopes.products))
+    q = 2 * np.pi * np.array(order) / field.extent
+    return slopes.gate * along(q, np.array(products)) / a
+
+
+@pytest.mark.parametrize("order", [(1, 0), (-2, 3), (0, -4)])
+def test_of_few_orders_each_has_its_own(order):
+    found = ratios(FEW)
+    assert found.orders == (True, True)
+    nodes = np.linspace(*found.kappa, len(found.values))
+    q = 2 * np.pi * np.array(order) / FEW.extent
+    for kappa in nodes[[0, 3, -1]]:
+        expected = exact(FEW, order, kappa)
+        near = found.at(q * 1.001, kappa)  # as of any place in its lobe
+        assert near == pytest.approx(expected, abs=ROUNDED * np.abs(expected).max())
+
+
+def test_cells_of_many_orders_are_their_mean_by_power():
+    found = ratios(MANY)
+    assert found.orders == (False, False)
+    kappa, place = found.kappa[1], np.array([4, 2])
+    q = place * found.cell
+    step = 2 * np.pi / np.array(MANY.extent)
+    slopes = Slopes.of(MANY.heights, MANY.pixel_size)
+    screen = np.exp(-1j * kappa * MANY.heights)
+    spectra = [np.fft.fft2(f * screen) for f in (1.0, *slopes.products)]
+    total, power = np.zeros(2, complex), 0.0
+    for x in range(30):
+        for y in range(30):
+            tent = np.prod(
+                np.maximum(0.0, 1.0 - np.abs(np.array([x, y]) * step / found.cell - place))
+            )
+            if tent > 0.0:
+                a, *products = (s[y, x] for s in spectra)
+                total += tent * a.conj() * along(np.array([x, y]) * step, np.array(products))
+                power += tent * abs(a) ** 2
+    expected = slopes.gate * total / power
+    assert found.at(q, kappa) == pytest.approx(expected, abs=ROUNDED * np.abs(expected).max())
+
+
+def test_heights_that_are_moved_up_change_nothing():
+    raised = HeightField(MANY.heights + 0.37, MANY.pixel_size)
+    assert ratios(raised).values == pytest.approx(ratios(MANY).values, abs=2e-3)
+
+
+def test_of_pits_it_is_that_of_hills_seen_from_the_other_side():
+    pits = ratios(HeightField(-MANY.heights, MANY.pixel_size)).values
+    expected = ratios(MANY).values.conj()[..., ::-1, ::-1]
+    middle = (..., slice(14, 29), slice(14, 29))  # beyond, orders are rounding over rounding
+    assert pits[middle] == pytest.approx(expected[middle], abs=5e-3)
+
+
+def test_several_patches_and_windows_have_the_mean():
+    twice = ratios(MANY, MANY)
+    assert twice.values == pytest.approx(ratios(MANY).values, abs=2e-3)
+    wide = HeightField(np.tile(MANY.heights, (4, 4)), MANY.pixel_size)
+    cut = windows_of([wide], TableSettings(16.0, windows="auto"))
+    assert len(cut) > 1
+    found, whole = slope_ratios(cut, SETTINGS), ratios(MANY)
+    q = np.random.default_rng(1).uniform(-6.0, 6.0, (200, 2))
+    expected = whole.at(q, 20.0)
+    # seams fade; neighbouring orders are seen through the window's lobe
+    assert np.abs(found.at(q, 20.0) - expected).mean() < 0.2 * np.abs(expected).mean()
+
+
+def test_a_table_holds_it_only_if_asked_and_keeps_it_in_its_file(tmp_path):
+    asked = {"coherence_width": 6.0, "tolerance": 0.01}
+    table = DiffractionTable.build(FEW, second_order=True, **asked)
+    plain = DiffractionTable.build(FEW, second_order=False, **asked)
+    assert plain.slope_ratios is None
+    assert np.array_equal(plain.coefficients, table.coefficients)
+    table.save(tmp_path / "with.exr")
+    plain.save(tmp_path / "without.exr")
+    loaded = DiffractionTable.load(tmp_path / "with.exr")
+    assert loaded.digest() == table.digest() != plain.digest()
+    assert np.array_equal(loaded.slope_ratios.values, table.slope_ratios.values)
+    text = (tmp_path / "without.exr").read_bytes()
+    assert b"second_order" not in text
+    assert b"slope_ratios" not in text
+
+
+def test_other_words_than_true_and_false_are_refused():
+    with pytest.raises(DiffractionError, match="must be true or false"):
+        TableSettings(second_order="yes")
