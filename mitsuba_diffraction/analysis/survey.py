@@ -52,6 +52,14 @@ from .maps.result import colours_of, iridescence
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+#: Raised whenever rows would differ.
+VERSION = 2
+#: Gratings in a row.
+PERIODS = 3
+#: Names of the files in a survey's folder.
+TABLE, SHEET, SCANS = "survey.csv", "sheet", "scans"
+_COLUMNS, _ROWS = 6, 8  # of a contact sheet
+
 
 @dataclass(frozen=True)
 class Treatment:
@@ -109,12 +117,6 @@ def _treatment(where: str, values: Any) -> Treatment:
         )
     except DiffractionError as error:
         raise DiffractionError(f"{where}: {error}") from error
-
-
-#: Raised whenever rows would differ.
-VERSION = 2
-#: Gratings in a row.
-PERIODS = 3
 
 
 @dataclass(frozen=True)
@@ -234,11 +236,6 @@ def _png(made: Any) -> bytes:
     shown = np.round(255.0 * made.srgb(made.exposure())[::-1]).astype(np.uint8)
     Image.fromarray(shown, "RGBA").save(stream, "PNG")
     return stream.getvalue()
-
-
-#: Names of the files in a survey's folder.
-TABLE, SHEET, SCANS = "survey.csv", "sheet", "scans"
-_COLUMNS, _ROWS = 6, 8  # of a contact sheet
 
 
 def run_survey(

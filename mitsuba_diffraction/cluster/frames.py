@@ -24,6 +24,14 @@ from ..scene.passes import Result, Stop, developed, groups_of, passes_of
 from .tasks import Failed, SceneFiles, Sums, Task, film_of, run_task, versions
 from .workers import check_workers, memory_warnings, outcome, wait_for_scheduler, workers_of
 
+#: Tasks that are with the scheduler for every worker: one is worked at, others wait.
+AHEAD = 3
+#: Sums that wait for their turn in memory, too; others are read from the disk again.
+HELD = 16
+#: Bytes that Dr.Jit takes for a sample of a pass, and for the rest of a process: estimates.
+BYTES_A_SAMPLE, BYTES_A_PROCESS = 400, 5e8
+_POLL, _COUNTED = 0.02, 2.0  # seconds
+
 
 def render(
     scene: str | os.PathLike[str],
@@ -83,15 +91,6 @@ def render(
             film.forget(0)
             return result
     raise DiffractionError("interrupted: finished passes are kept where `keep` says")
-
-
-#: Tasks that are with the scheduler for every worker: one is worked at, others wait.
-AHEAD = 3
-#: Sums that wait for their turn in memory, too; others are read from the disk again.
-HELD = 16
-#: Bytes that Dr.Jit takes for a sample of a pass, and for the rest of a process: estimates.
-BYTES_A_SAMPLE, BYTES_A_PROCESS = 400, 5e8
-_POLL, _COUNTED = 0.02, 2.0  # seconds
 
 
 @dataclass

@@ -28,6 +28,11 @@ _MOST_VALUES = 24
 # Pixels of the reference this much darker than the brightest away from the mirror are unlit.
 _LIT = 1e-4
 
+#: Each is timed so often, in turns; the first of them only warms up.
+_ROUNDS = 3
+# What Mitsuba's spectral variants span, nm.
+_RANGE = (360.0, 830.0)
+
 
 @dataclass(frozen=True)
 class _Kind:
@@ -232,12 +237,6 @@ def _distance(base: BrdfMap, other: BrdfMap) -> tuple[float, float, float, float
     blue = [share[2] / share[0] if share[0] > 0.0 else np.nan for share in shares]
     high = float(np.nanpercentile(apart, 95.0))
     return float(np.nanmean(apart)), high, float(np.nanmean(own)), float(blue[1] / blue[0])
-
-
-#: Each is timed so often, in turns; the first of them only warms up.
-_ROUNDS = 3
-# What Mitsuba's spectral variants span, nm.
-_RANGE = (360.0, 830.0)
 
 
 @dataclass(frozen=True)

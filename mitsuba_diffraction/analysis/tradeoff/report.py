@@ -18,6 +18,9 @@ from .measuring import Measured, rows
 
 _ALIKE = 1.1  # times differ by as much from one run to the next
 
+_HEAD = "  error  plugin's  ΔE2000    99 %  × roughconductor   taps  terms      MB   s"
+_MARKS = "osD^vP*Xp<>h"
+
 
 @dataclass(frozen=True)
 class Budget:
@@ -73,9 +76,6 @@ def recommended(results: Sequence[Measured], budget: Budget) -> Measured:
     fastest = min(one.relative for one in within)
     as_fast = [one for one in within if one.relative <= _ALIKE * fastest]
     return min(as_fast, key=lambda one: one.megabytes)
-
-
-_HEAD = "  error  plugin's  ΔE2000    99 %  × roughconductor   taps  terms      MB   s"
 
 
 def plain(results: list[Measured], depths: Depths) -> dict[str, Any]:
@@ -135,9 +135,6 @@ def lines(
         f"recommended{f' ({asked})' if asked else ''}: {said}: error {best.error:.1e}, "
         f"{best.relative:.1f} × roughconductor, {best.megabytes:.1f} MB"
     )
-
-
-_MARKS = "osD^vP*Xp<>h"
 
 
 def draw_trade(results: Sequence[Measured], path: Path, title: str) -> None:

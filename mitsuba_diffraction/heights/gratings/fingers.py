@@ -21,6 +21,9 @@ from .noise import FloatArray, Pair, Rng, sample_field, smooth_field
 _SWEEPS = 60
 _THINNING = 40
 
+# A sheet is drawn until it is this many lengths from its tips; by then others lie over it.
+_DRAWN = 2.35
+
 
 @dataclass(frozen=True)
 class Layout:
@@ -148,10 +151,6 @@ def _nearest(x: FloatArray, others: FloatArray, width: float) -> npt.NDArray[np.
 def _around(difference: FloatArray, width: float) -> FloatArray:
     """The shortest way from one x to another around the patch."""
     return difference - width * np.round(difference / width)
-
-
-# A sheet is drawn until it is this many lengths from its tips; by then others lie over it.
-_DRAWN = 2.35
 
 
 @dataclass(frozen=True)
