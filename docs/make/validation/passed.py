@@ -81,7 +81,7 @@ def _kept(
     sides, scale = _scale(grating, wavelength)
     ends = (theta, phi), (np.arccos(-found.wo[:, 2]), np.arctan2(found.wo[:, 1], found.wo[:, 0]))
     product = np.ones(len(found.wo))
-    for n, one in enumerate(scale or []):
+    for n, one in enumerate((scale or [])[:4]):
         changes = product * sides.at(one, n % 2, *ends[n % 2], wavelength)
         zeroth = (found.order == 0).all(axis=1)
         product = np.where(zeroth | (n > 1), changes, product)  # c is order 0's alone
