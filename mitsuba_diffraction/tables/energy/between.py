@@ -27,13 +27,22 @@ CEILING, GENTLE, MOST = 0.9995, 2, 1.5
 #: is told, as part of a lobe is below the horizon.
 LOOKED_AT = float(np.radians(80.0))
 FALLS = float(np.radians(80.0)), float(np.radians(85.0))
+#: R + T amid nodes that is below the first in a share of them above the second is not left at that:
+#: where few are, they are kinks that nodes lie beside.
+FAR, FEW = 0.95, 0.02
 
 
 class Cells(ABC):
     """The middles of all cells of a scale, at one wavelength.
 
     Cells are (2, rows, columns), of both sides.
+
+    Attributes
+    ----------
+    angles : of their middles to the normal, rad, that broadcast to them.
     """
+
+    angles: Real
 
     @abstractmethod
     def excess_and_room(self, pages: Array) -> tuple[Array, Array]:
@@ -69,7 +78,18 @@ def lowered(values: Array, cells: Sequence[Cells]) -> Array:
 
 def rooms(values: Array, cells: Sequence[Cells]) -> list[Array]:
     """What R + T is below `CEILING` in cells, by scales as `lowered` gives them."""
-    return [one.excess_and_room(pages)[1] for one, pages in _amid_pages(cells, values)]
+    return [
+        one.excess_and_room(pages)[1] * np.interp(one.angles, FALLS, (1.0, 0.0)).astype(np.float32)
+        for one, pages in _amid_pages(cells, values)
+    ]
+
+
+def is_lacking(found: Sequence[Array], cells: Sequence[Cells]) -> bool:
+    """Whether R + T of such rooms is far below 1 in more than few cells where it is to be near."""
+    certain = [one.angles <= LinkedSums.certain for one in cells]
+    far = [room > CEILING - FAR for room in found]
+    count = sum(float(np.sum(a & b)) for a, b in zip(far, certain, strict=True))
+    return count > FEW * sum(float(np.sum(np.broadcast_to(one, far[0].shape))) for one in certain)
 
 
 def at_most(found: Array, cells: Sequence[Cells], most: Sequence[Array]) -> Array:
@@ -104,17 +124,21 @@ class GridCells(Cells):
     Parameters
     ----------
     sums : in their middles, of the first rows, from weights on it.
-    angles : polar angles of these rows on both sides, rad, (2, rows).
+    angles : polar angles of these rows on both sides, rad, (2, …).
+    rows : of all cells.
     """
 
-    def __init__(self, sums: LinkedSums, angles: Real) -> None:
-        self._sums, self._rows, self._angles = sums, angles.shape[1], angles[..., None]
+    def __init__(self, sums: LinkedSums, angles: Real, rows: int) -> None:
+        self._sums, self._rows = sums, angles.shape[1]
+        self.angles = np.pad(angles, [(0, 0), (0, rows - self._rows)], constant_values=0.5 * np.pi)
+        self.angles = self.angles[..., None]
 
     def excess_and_room(self, pages: Array) -> tuple[Array, Array]:
         here = np.stack([self.amid(page)[: self._rows] for page in pages])
         excess, room = np.ones_like(pages[:2, :-1]), np.zeros_like(pages[:2, :-1])
-        much, little = excess_and_room(self._sums, pages, here, self._angles)
-        excess[:, : self._rows] = np.where(self._angles <= LOOKED_AT, much, np.float32(1.0))
+        much, little = excess_and_room(self._sums, pages, here)
+        looked_at = self.angles[:, : self._rows] <= LOOKED_AT
+        excess[:, : self._rows] = np.where(looked_at, much, np.float32(1.0))
         room[:, : self._rows] = little
         return excess, room
 
@@ -128,15 +152,19 @@ class GridCells(Cells):
 class ChainCells(Cells):
     """Those of a `GratingGrid`, from all chains, by length."""
 
-    def __init__(self, chains: Sequence[ChainSides]) -> None:
+    def __init__(self, chains: Sequence[ChainSides], rows: int) -> None:
         self._chains = chains
+        self.angles = np.full((2, rows, rows), 0.5 * np.pi)
+        for last, sums in enumerate(chains):
+            for side in self.angles:
+                put(side, sums.angle, last)
 
     def excess_and_room(self, pages: Array) -> tuple[Array, Array]:
         here = np.stack([self.amid(page) for page in pages])
         excess, room = np.ones_like(here[:2]), np.zeros_like(here[:2])
         for last, sums in enumerate(self._chains):
             own = np.stack([taken(one, last) for one in here])
-            much, little = excess_and_room(sums, own, own, sums.angle)
+            much, little = excess_and_room(sums, own, own)
             certain = sums.angle <= LinkedSums.certain  # cells are wide in angle beyond
             much = np.where(certain, much, np.float32(1.0))
             for side in (0, 1):
@@ -155,8 +183,8 @@ class ChainCells(Cells):
         return found
 
 
-def excess_and_room(sums: LinkedSums, pages: Sums, here: Sums, angles: Real) -> tuple[Array, Array]:
-    """From scales where weights are, and at the directions of the sums; their polar angles, rad."""
+def excess_and_room(sums: LinkedSums, pages: Sums, here: Sums) -> tuple[Array, Array]:
+    """From scales where weights are, and at the directions of the sums."""
     total: Sums
     changed, zeroth = sums.changed(pages[:2], here[:2]), here[:2] * sums.zeroth(pages[:2])
     if len(pages) == 4:
@@ -165,7 +193,7 @@ def excess_and_room(sums: LinkedSums, pages: Sums, here: Sums, angles: Real) -> 
     else:
         total = changed(np.ones_like(pages[:2]))
         excess = zeroth / np.maximum(zeroth - (total - CEILING), zeroth / MOST)
-    room = np.clip(CEILING - total, 0.0, None) * np.interp(angles, FALLS, (1.0, 0.0))
+    room = np.clip(CEILING - total, 0.0, None)
     return np.asarray(np.clip(excess, 1.0, MOST), np.float32), np.asarray(room, np.float32)
 
 

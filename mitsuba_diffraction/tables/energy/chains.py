@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -213,7 +213,7 @@ def _padded(s: Real) -> Real:
     return np.asarray(np.concatenate([s[..., :1], s, s[..., -1:]], axis=-1), np.float64)
 
 
-def put(values: Array, s: Real, last: int) -> None:
+def put(values: NDArray[np.floating[Any]], s: Real, last: int) -> None:
     """s (NODES, NODES, last + 1) into the nodes (rows, rows) of `GratingGrid`."""
     for k in range(last + 1):
         row, column = k * NODES, (last - k) * NODES

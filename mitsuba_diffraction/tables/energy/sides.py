@@ -40,7 +40,7 @@ from .grating import NODES, Grating, GratingGrid, fractions
 from .grid import DirectionGrid, Interpolation
 from .links import Link, Medium
 from .sheet import ChainSides, LinkGain
-from .sums import ENOUGH, LEAST, LinkedSums, solved
+from .sums import LEAST, LinkedSums, solved
 from .transport import Orders, Row, Transport
 
 Real = NDArray[np.float64]
@@ -129,27 +129,27 @@ class Sides:
         middle = np.sqrt(wavelengths[1:] * wavelengths[:-1]) if count > 1 else wavelengths
         cells = parallel(partial(self._cells, grating), middle.tolist())
         values = between.lowered(needed, cells)
-        most = between.rooms(values, cells)
-        if max(float(one.max()) for one in most) > between.CEILING - ENOUGH:
+        rooms = between.rooms(values, cells)
+        if between.is_lacking(rooms, cells):
             if len(values) == 2:
                 values = np.concatenate([values, np.ones_like(values)])
             pages = zip(wavelengths.tolist(), values.swapaxes(0, 1), strict=True)
             room = parallel(lambda one: self._room(grating, *one), list(pages))
             wanted = np.maximum(np.stack(room, axis=1) - (between.CEILING - LEAST), 0.0)
-            lack = between.at_most(wanted, cells, most)
+            lack = between.at_most(wanted, cells, rooms)
             values = np.concatenate([values, self._spread(wavelengths, lack, grating)])
         return [DirectionalTable(wavelengths, one, grating) for one in values]
 
     def _room(self, grating: Grating | None, wavelength: float, pages: Array) -> Array:
         """What R + T is below `between.CEILING` at the nodes of c and s."""
         if grating is None:
-            angles = np.stack([grid.angles for grid in self._grids])
-            transport = self.transport(list(angles), self._grid.phi, wavelength)
-            return between.excess_and_room(transport, pages, pages, angles[..., None])[1]
+            theta = [grid.angles for grid in self._grids]
+            transport = self.transport(theta, self._grid.phi, wavelength)
+            return between.excess_and_room(transport, pages, pages)[1]
         found = np.zeros_like(pages[:2])
         for last, sums in enumerate(self._by_length(grating, wavelength, np.arange(NODES))):
             own = np.stack([taken(one, last) for one in pages])
-            room = between.excess_and_room(sums, own, own, sums.angle)[1]
+            room = between.excess_and_room(sums, own, own)[1]
             for side in (0, 1):
                 put(found[side], room[side], last)
         return found
@@ -163,12 +163,14 @@ class Sides:
 
     def _cells(self, grating: Grating | None, wavelength: float) -> between.Cells:
         if grating is not None:
-            return between.ChainCells(self._by_length(grating, wavelength, np.arange(NODES) + 0.5))
+            chains = self._by_length(grating, wavelength, np.arange(NODES) + 0.5)
+            return between.ChainCells(chains, len(chains) * NODES)
         halves = [replace(grid, polar=2 * self._grid.polar).angles[1::2] for grid in self._grids]
         rows = int(np.sum(np.any(np.stack(halves) <= between.FALLS[1], axis=0)))
         phi = self._grid.phi + np.pi / self._grid.azimuthal
         angles = np.stack(halves)[:, :rows]
-        return between.GridCells(self.transport(list(angles), phi, wavelength), angles)
+        transport = self.transport(list(angles), phi, wavelength)
+        return between.GridCells(transport, angles, self._grid.polar)
 
     def _scale_at(self, wavelength: float) -> Array:
         """(4, polar + 1, azimuthal)."""
