@@ -79,6 +79,20 @@ def ctrl_c() -> Iterator[None]:
     signal.signal(signal.SIGINT, before)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def own_vectors() -> Iterator[int]:
+    """Kernels are made for vectors of 8 lanes at most; how many the processor's own have.
+
+    Child processes have these.
+    """
+    from tests.coarse import vectors_of
+
+    before = vectors_of(8)
+    vectors_of(min(8, before))
+    yield before
+    vectors_of(before)
+
+
 @pytest.fixture(scope="module")
 def coarse() -> Iterator[None]:
     """Energy conserved coarsely, for modules that do not ask how well it is."""

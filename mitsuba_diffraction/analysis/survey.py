@@ -52,6 +52,14 @@ from .maps.result import colours_of, iridescence
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+#: Raised whenever rows would differ.
+VERSION = 2
+#: Gratings in a row.
+PERIODS = 3
+#: Names of the files in a survey's folder.
+TABLE, SHEET, SCANS = "survey.csv", "sheet", "scans"
+_COLUMNS, _ROWS = 6, 8  # of a contact sheet
+
 
 @dataclass(frozen=True)
 class Treatment:
@@ -111,31 +119,16 @@ def _treatment(where: str, values: Any) -> Treatment:
         raise DiffractionError(f"{where}: {error}") from error
 
 
-#: Raised whenever rows would differ.
-VERSION = 2
-#: Gratings in a row.
-PERIODS = 3
-
-
 @dataclass(frozen=True)
 class Job:
-    """A scan to measure.
+    """A scan to measure."""
 
-    Attributes
-    ----------
-    files : the scan, or a recipe with its sources.
-    treatment : how it is read.
-    theta : of the light, degrees; its azimuth is across the grooves of the strongest grating.
-    resolution : pixels of the map a side.
-    variant, threads : of Mitsuba and Dr.Jit.
-    """
-
-    files: SceneFiles
-    treatment: Treatment
-    theta: float
-    resolution: int
-    variant: str
-    threads: int
+    files: SceneFiles  # the scan, or a recipe with its sources
+    treatment: Treatment  # how it is read
+    theta: float  # of the light, degrees; its azimuth is across the strongest grating's grooves
+    resolution: int  # pixels of the map a side
+    variant: str  # of Mitsuba
+    threads: int  # of Dr.Jit
 
     @property
     def key(self) -> str:
@@ -243,11 +236,6 @@ def _png(made: Any) -> bytes:
     shown = np.round(255.0 * made.srgb(made.exposure())[::-1]).astype(np.uint8)
     Image.fromarray(shown, "RGBA").save(stream, "PNG")
     return stream.getvalue()
-
-
-#: Names of the files in a survey's folder.
-TABLE, SHEET, SCANS = "survey.csv", "sheet", "scans"
-_COLUMNS, _ROWS = 6, 8  # of a contact sheet
 
 
 def run_survey(

@@ -10,6 +10,7 @@ from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
 from ..optics.colour import ILLUMINANTS
+from ..scene.load import set_variant
 from . import options
 from .console import Bar
 from .options import number_between
@@ -29,7 +30,6 @@ _OF_THE_BSDF = (
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
-    """Declare the sub-command."""
     parser = options.add_command(
         subparsers, "brdf-map", run, "picture what a surface reflects in every direction",
         "Picture the BRDF over all view directions for one light direction, seen from above: "
@@ -177,7 +177,6 @@ def run(args: argparse.Namespace) -> int:
 def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> tuple[Any, ...]:
     """A map by the renderer's BSDF, what reflects, and how it was made."""
     from ..analysis.maps import Light, brdf_map, check_map
-    from ..scene.load import set_variant
     from .console import mitsuba_warnings
 
     light = Light(args.theta, args.phi)

@@ -7,6 +7,7 @@ import pytest
 pytest.importorskip("distributed")
 
 from mitsuba_diffraction import cluster
+from tests.coarse import vectors_of
 
 
 @pytest.fixture(scope="package")
@@ -14,3 +15,11 @@ def client():
     """Two workers of one thread each."""
     with cluster.connect(2) as found:
         yield found
+
+
+@pytest.fixture(scope="package", autouse=True)
+def workers_vectors(own_vectors):
+    """Vectors as long as the workers', whose pictures are this process's bit by bit."""
+    before = vectors_of(own_vectors)
+    yield
+    vectors_of(before)

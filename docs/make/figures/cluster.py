@@ -38,21 +38,13 @@ TASKS, PIXELS, CHANNELS = 2000 * 320 // 8, 1024 * 640, 4
 
 @dataclass(frozen=True)
 class Costs:
-    """Seconds and bytes of a task.
+    """Seconds of a task."""
 
-    Attributes
-    ----------
-    work, spread : of a worker, and its standard deviation.
-    scheduler : of the scheduler, for one task after the other.
-    client : of the client: to receive, write, read and add a sum.
-    transfer : of the client's network, for a sum.
-    """
-
-    work: float
-    spread: float
-    scheduler: float
-    client: float
-    transfer: float
+    work: float  # of a worker
+    spread: float  # standard deviation of that
+    scheduler: float  # of the scheduler, for one task after the other
+    client: float  # of the client: to receive, write, read and add a sum
+    transfer: float  # of the client's network, for a sum
 
 
 def simulate(workers: int, tasks: int, costs: Costs, ahead: int = 3, seed: int = 0) -> float:

@@ -3,7 +3,7 @@
     python -m docs.make.figures.sweeps -o docs/sweeps.md \\
         --measured elaphe.png --pixel-size 0.0488 --max-height 0.375
 
-Sheets go to `images/sweep-KIND.png` beside the page, the numbers between its pages.
+Sheets go to `images/sweep-KIND.png` beside the page, the numbers between its markers.
 """
 
 from __future__ import annotations

@@ -66,18 +66,7 @@ def ratio(a: Sequence[float], b: Sequence[float]) -> float:
 
 
 def saved_bsdf(table: str | os.PathLike[str], **parameters: Any) -> Any:
-    """The plugin with a table.
-
-    Parameters
-    ----------
-    table : the file.
-    parameters : any other parameter of the plugin.
-
-    Raises
-    ------
-    DiffractionError
-        If the file is no table.
-    """
+    """The plugin with a table."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
         return mi.load_dict({"type": "diffraction", "table": str(table), **parameters})

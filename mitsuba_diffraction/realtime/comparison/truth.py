@@ -18,10 +18,7 @@ from ..glsl.lights import Light
 def direct_light(scene: Any, camera: Camera) -> Any:
     """The scene with its own emitters, whose light is reflected once at most.
 
-    Returns
-    -------
-    mi.Scene
-        With one sensor, whose film averages evenly over each pixel.
+    The result has one sensor, whose film averages evenly over each pixel.
     """
     import mitsuba as mi
 
@@ -41,12 +38,8 @@ def direct_light(scene: Any, camera: Camera) -> Any:
 def with_lights(scene: Any, camera: Camera, lights: Sequence[Light]) -> Any:
     """The scene's shapes under these lights alone, once reflected.
 
-    Shapes that emit light are left out: their light is among `lights`.
-
-    Returns
-    -------
-    mi.Scene
-        With one sensor, whose film averages evenly over each pixel, as supersampling does.
+    Shapes that emit light are left out: their light is among `lights`. The result has one sensor,
+    whose film averages evenly over each pixel, as supersampling does.
     """
     import mitsuba as mi
 

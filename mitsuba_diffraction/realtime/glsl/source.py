@@ -6,6 +6,7 @@ For other programs what a surface lacks is left out, and global names are out of
 from __future__ import annotations
 
 import functools
+import operator
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
@@ -113,6 +114,9 @@ def plain_source(
     return _PREAMBLES[dialect] + "".join((*lines, *map(shader_file, shared), shader_file(name)))
 
 
+_COMPARISONS = {"==": operator.eq, "!=": operator.ne, ">": operator.gt, "<": operator.lt}
+
+
 def resolved(source: str, definitions: Mapping[str, str]) -> str:
     """A source without its conditions: only lines that are compiled with these definitions.
 
@@ -142,7 +146,7 @@ def resolved(source: str, definitions: Mapping[str, str]) -> str:
 
 
 def _holds(word: str, rest: str, known: Mapping[str, str]) -> bool:
-    """Whether a condition holds: `A`, or terms `defined(A)`, `A == B`, `A > B` joined by &&."""
+    """Whether a condition holds: `A`, or terms `defined(A)` and comparisons joined by &&."""
     if word != "#if":
         return (rest.split()[0] in known) == (word == "#ifdef")
     return all(_term(term.strip(), known) for term in rest.split("&&"))
@@ -154,7 +158,7 @@ def _term(term: str, known: Mapping[str, str]) -> bool:
         return (found[2] in known) != bool(found[1])
     left, sign, right = term.split()
     a, b = _number(left, known), _number(right, known)
-    return a > b if sign == ">" else a == b
+    return bool(_COMPARISONS[sign](a, b))
 
 
 def _number(word: str, known: Mapping[str, str]) -> int:

@@ -82,16 +82,11 @@ def rounded(values: NDArray[np.floating], bits: int) -> NDArray[np.float16]:
 
 
 def fitting_tables(
-    methods: Sequence[str],
-    tables: Sequence[DiffractionTable],
-    room: int,
-    progress: Progress,
+    methods: Sequence[str], tables: Sequence[DiffractionTable], room: int, progress: Progress
 ) -> dict[tuple[str, int], WebTable] | int:
     """Tables for all methods with as many digits as fit into a number of bytes.
 
-    Returns
-    -------
-    by method and number of the table; or, if nothing fits, the least bytes that it takes.
+    Returns those by method and number of the table; or, if nothing fits, the least bytes it takes.
     """
     least = 0
     for digits in DIGITS:
@@ -110,10 +105,8 @@ def fitting_tables(
 def strongest_orders(table: DiffractionTable, count: int = 5) -> list[list[float]]:
     """The brightest orders in green light along the normal, each apart from the others.
 
-    Returns
-    -------
-    of each q_x and q_y, rad/µm, and its share of the light; of a pair ±q one. None of a table whose
-    orders interfere.
+    Returns q_x and q_y of each, rad/µm, and its share of the light; of a pair ±q one. None of a
+    table whose orders interfere.
     """
     if table.grid.coherent:
         return []

@@ -225,9 +225,7 @@ def worthwhile(plan: Plan, planned: dict[str, DiffractionTable]) -> Plan:
         now = planned[key].nbytes if key in planned else before
         worth = table.domain is not None and now < WORTH * before
         tables[key] = replace(
-            table,
-            domain=table.domain if worth else None,
-            memory=(before, now if worth else before),
+            table, domain=table.domain if worth else None, memory=(before, now if worth else before)
         )
     return replace(plan, tables=tables)
 

@@ -120,9 +120,7 @@ def domain_for(
 
 
 def _ellipse(
-    along: tuple[NDArray[np.float64], NDArray[np.float64]],
-    light: NDArray[np.float64],
-    share: float,
+    along: tuple[NDArray[np.float64], NDArray[np.float64]], light: NDArray[np.float64], share: float
 ) -> tuple[float, float]:
     """Half axes of the smallest ellipse that leaves at most a share of the light outside."""
     x, y = along
@@ -166,9 +164,8 @@ def lobes_in_a_pixel(turn: float, sigma: float) -> float:
 def wavelengths_needed(asked: LookupStatistics, share: float = 1e-3) -> dict[str, Any]:
     """The band that all but a share of the diffracted light lies in, half of it on either side.
 
-    Returns
-    -------
-    range_nm, and lost_colour: ΔE2000 between the mean colours of all light and of the band alone.
+    Returns range_nm, and lost_colour: ΔE2000 between the mean colours of all light and of the band
+    alone.
     """
     low, high = quantiles(asked.wavelength, asked.light, [0.5 * share, 1.0 - 0.5 * share])
     inside = (asked.wavelength >= low) & (asked.wavelength <= high)

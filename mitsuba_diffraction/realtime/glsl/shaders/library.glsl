@@ -51,11 +51,6 @@ const vec3 light_colour[1] = vec3[1](vec3(1.0));  // whoever calls multiplies by
 #define DIELECTRIC 1
 #define CONDUCTOR 2
 
-#if SURFACE_KIND != CONDUCTOR
-// What colours of a metal are corrected by; of all else R is nearly the same within a channel.
-vec3 tinted(vec3 colour) { return colour; }
-#endif
-
 uniform vec2 wavenumbers;        // ends of what the eye sees, rad/µm
 uniform vec3 channel_wavenumbers;  // of the mean wavelengths of red, green and blue
 
@@ -77,6 +72,7 @@ float fresnel(float cos_i)
 
 // R in linear sRGB, under daylight.
 vec3 reflectance(float cos_i) { return vec3(fresnel(cos_i)); }
+vec3 tinted(vec3 colour) { return colour; }  // R is nearly the same within a channel
 
 // R at one wavenumber: the product of what is the same at all, and the rest.
 float reflectance_at_all(float cos_i) { return fresnel(cos_i); }
@@ -119,6 +115,7 @@ float reflectance_at(float cos_i, float k)
 #else
 
 vec3 reflectance(float cos_i) { return vec3(1.0); }
+vec3 tinted(vec3 colour) { return colour; }
 
 float reflectance_at_all(float cos_i) { return 1.0; }
 float reflectance_at(float cos_i, float k) { return 1.0; }
