@@ -208,10 +208,8 @@ from ..errors import DiffractionError
 from ..tables.energy.conservation import DirectionalTable
 from .boundary import Boundary, Kirchhoff
 from .changing import Bounded, arrays_within, marks
-from .coat import CoatedPair
 from .energy import EnergyModel
-from .film import UnderFilm
-from .layers import Transmission
+from .layers import CoatedPair, Transmission, UnderFilm
 from .llvm import require_loaded_llvm
 from .pair import Pair, from_patch, in_patch, vcavity
 from .parameters import read_parameters

@@ -19,9 +19,7 @@ from ..optics.slope_ratio import SlopeRatios
 from ..settings import COHERENCES, SCENE_SETTINGS, SURFACE, checked
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, SmallSlope
-from .coat import UnderCoat
-from .film import UnderFilm
-from .layers import LAYERINGS, Blend, Layering, Transmission
+from .layers import LAYERINGS, Blend, Layering, Transmission, UnderCoat, UnderFilm
 from .materials import (
     DEFAULT_WAVELENGTH,
     boundary_of,

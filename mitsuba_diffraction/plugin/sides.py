@@ -9,7 +9,7 @@ from ..tables.energy.links import Medium
 from ..tables.energy.store import SidesEnergy
 from ..tables.table import DiffractionTable
 from .direction_lookup import DirectionLookup, scales_of
-from .film import plain
+from .layers import plain
 from .pair import in_patch
 from .reflectance import Dielectric
 from .roles import Colour, Float, Mask, Rotation, Vector3f

@@ -14,10 +14,17 @@ import drjit as dr
 import mitsuba as mi
 
 from .boundary import Boundary, Jones, Kirchhoff, SmallSlope, mueller
-from .coat import CoatedPair, transmittances
-from .crossing import Crossing, Sides, Turned
-from .crossing_jones import crossing_axes, first_order, out_of_sheet, tangent_plane
+from .crossing import (
+    Crossing,
+    Sides,
+    Turned,
+    crossing_axes,
+    first_order,
+    out_of_sheet,
+    tangent_plane,
+)
 from .fresnel import squared
+from .layers import CoatedPair, transmittances
 from .pair import Pair, Place, from_patch
 from .reflectance import Dielectric, Inside
 from .roles import (

@@ -36,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...plugin.names import name_of
+from ...plugin.properties import name_of
 from .lights import Light, sampled_directions, sampled_positions, spectra_along, without_extent
 from .surroundings import Environment, is_flat
 

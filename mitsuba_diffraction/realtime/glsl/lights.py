@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...optics.colour import daylight
 from ...plugin.memory import upload
-from ...plugin.names import name_of
+from ...plugin.properties import name_of
 from .packing import daylight_colour
 
 Array = NDArray[np.float64]
