@@ -211,6 +211,7 @@ class DiffractionTable:
             "taps": list(self.grid.taps),
             "orders": [nx, ny],
             **self._restriction(),
+            **({} if self.slope_ratios is None else {"second_order": True}),
             "components": components,
             "precision": str(self.coefficients.dtype),
             "memory_mb": round(self.nbytes / 1e6, 2),
