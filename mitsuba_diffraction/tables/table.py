@@ -18,7 +18,7 @@ from ..optics.geometry import sigma_of, wavenumber
 from ..optics.slope_ratio import SlopeRatios
 from ..settings import TableSettings
 from .expansion import Expansion
-from .packing import Grid
+from .layout import Grid
 
 #: Raised whenever what the coefficients mean changes; tables of another version are refused.
 FORMAT_VERSION = 4
