@@ -41,21 +41,21 @@ def material_of_second_order(props: Properties, material: Reflectance) -> Dielec
     """
     if not flag(props, "second_order", False):
         return None
+    bare = material if isinstance(material, Dielectric) else None
     defaults = {"model": MODELS[0], "coherence": COHERENCES[0], "layering": LAYERINGS[0]}
     excluded = [
+        *([f"the material '{material}'"] if bare is None else []),
         *(f"{name}={props.get(name)}" for name in defaults if _differs(props, name, defaults)),
         *(name for name in ("coat_ior", "film_ior") if name in props),
         *(f"{name}=true" for name in ("thin", "transmission") if flag(props, name, False)),
         *([f"the polarised variant {mi.variant()}"] if mi.is_polarized else []),
     ]
-    if not isinstance(material, Dielectric):
-        excluded = [f"the material '{material}'"]
-    if excluded or not isinstance(material, Dielectric):
+    if excluded:
         raise DiffractionError(
             "second_order=true is for unpolarised light that a bare dielectric reflects, by "
             f"model='small_slope' and coherence='ensemble', not for {excluded[0]}; leave one out"
         )
-    return material
+    return bare
 
 
 def _differs(props: Properties, name: str, defaults: dict[str, str]) -> bool:
