@@ -106,12 +106,13 @@ transmission : boolean [false]
     Component 0 is what is reflected, 1 what goes through. Orders that change the tangential part by
     more than 2/λ are left out. It excludes coat, film, nested BSDF and shadowing. energy_conserving
     makes R + T 1, since a dielectric loses no light: order 0 is multiplied by c(ωi) c(ωo), c on the
-    directions of both sides, and where that is not enough all is scaled likewise; a few seconds'
-    work, kept in the cache, in steps of 0.01 of eta.
+    directions of both sides, and where that is not enough all is scaled likewise, by at most 1.5²;
+    what is still missing of steep slopes is spread over all directions where some is missing. A few
+    seconds' work, kept in the cache, in steps of 0.01 of eta.
 thin : boolean [false]
     Light goes through a sheet, whose other side is flat; both sides have ext_ior. What that side
     sends back is summed as between two mirrors. Light beyond the sheet's critical angle is lost,
-    unless energy_conserving puts it back, into order 0.
+    unless energy_conserving puts it back, into order 0 first.
 model : string [small_slope]
     `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
     where the surface is rough at the scale of an order; polarised variants have its Mueller
