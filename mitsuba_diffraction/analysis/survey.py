@@ -38,12 +38,12 @@ from ..errors import DiffractionError, DiffractionWarning, one_line, quoted
 from ..heights.field import HeightField
 from ..heights.load import load_heights
 from ..heights.read import LoadOptions, is_recipe
-from ..heights.recipes import LOAD_KEYS, Recipe
+from ..heights.recipes import LOAD_KEYS, Recipe, options_and_settings
 from ..heights.spectra import dominant_periods
 from ..progress import Progress, silent
 from ..scene.load import error_of
 from ..scene.passes import Stop
-from ..settings import RECIPE_SETTINGS, TableSettings, checked
+from ..settings import RECIPE_SETTINGS, TableSettings
 from ..tables.build.build import build_with
 from ..tables.store import cached_table, key_of
 from .maps import brdf_map
@@ -110,13 +110,7 @@ def _treatment(where: str, values: Any) -> Treatment:
             f"{where}: unknown key {min(unknown)!r}; known are "
             f"{', '.join((*LOAD_KEYS, *RECIPE_SETTINGS))}"
         )
-    try:
-        return Treatment(
-            LoadOptions.of(**{k: v for k, v in values.items() if k in LOAD_KEYS}),
-            {k: checked(k, v) for k, v in values.items() if k in RECIPE_SETTINGS},
-        )
-    except DiffractionError as error:
-        raise DiffractionError(f"{where}: {error}") from error
+    return Treatment(*options_and_settings(values, where))
 
 
 @dataclass(frozen=True)

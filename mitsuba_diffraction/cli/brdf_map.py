@@ -20,12 +20,13 @@ _KEPT = "that of the table or recipe, else "
 _TABLE = {
     "coherence_width": f"{_KEPT}65", "coherence": f"{_KEPT}ensemble", "basis": f"{_KEPT}auto",
     "tolerance": f"{_KEPT}1e-3", "terms": "as many as the tolerance needs",
+    "second_order": "false",
 }  # fmt: skip
 # Options that are parameters of the BSDF, by the plugin's own names.
 _SURFACE = ("material", "int_ior", "coat_ior", "model", "orientation", "height_scale")
 # What only the renderer's BSDF knows.
 _OF_THE_BSDF = (
-    "mode", "material", "coat_ior", "model", "orientation", "height_scale", "basis",
+    "mode", "material", "coat_ior", "model", "orientation", "height_scale", "basis", "second_order",
 )  # fmt: skip
 
 
@@ -285,7 +286,7 @@ def _surface(bsdf: Any) -> str:
     table, scale, turn = bsdf.table, bsdf.height_scale[0], bsdf.orientation.degrees[0]
     return "; ".join(
         [
-            "R = 1" if str(bsdf.fresnel) == "none" else f"{bsdf.fresnel}, {bsdf.boundary}",
+            "R = 1" if str(bsdf.fresnel) == "none" else f"{bsdf.fresnel}, {bsdf.model}",
             f"{table.coherence}, coherence width {table.coherence_width:g} µm",
             *([f"heights × {scale:g}"] if scale != 1.0 else []),
             *([f"turned by {turn:g}°"] if turn != 0.0 else []),

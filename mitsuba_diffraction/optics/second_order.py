@@ -44,6 +44,7 @@ _WIDTH, _RADII, _AZIMUTHS = 0.55, 8, 6
 _LEVEL = 0.02
 # Of the equations' trace: at k = k0 both components are one
 _RIDGE = 1e-6
+_NO_CONTRAST = 1e-4
 # Last node, rad: where cosines are 0 so is c, over 0
 _HORIZON = np.radians(89.9)
 
@@ -145,6 +146,8 @@ def slope_coefficients(wi: ArrayLike, wo: ArrayLike, index: complex) -> Complex:
     index : of a dielectric, over that of the medium above it.
     """
     incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    if abs(index - 1.0) < _NO_CONTRAST:  # nothing is reflected, by any order
+        return np.zeros((len(outgoing), 2), complex)
     perturbation, k = Perturbation(incident, index), outgoing[:, None, :2]
     q = incident[:2] + k
     length = np.hypot(q[..., 0], q[..., 1])

@@ -15,11 +15,11 @@ vertical walls, squares of slopes say nothing, hence the gate ρ²/(ρ² + 0.01)
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import map_coordinates
 
 from .second_order import Complex, Real
 
@@ -100,23 +100,9 @@ class SlopeRatios:
         places = np.where(self.orders, np.round(places), places)
         low, high = self.kappa
         depth = (np.asarray(kappa, np.float64) - low) / (high - low) * (count - 1)
-        each = np.broadcast_arrays(depth, places[..., 0], places[..., 1])
-        found: Complex = np.zeros((*each[0].shape, 2), complex)
-        for weight, (n, x, y) in _corners(each, (count, *self.values.shape[:1:-1])):
-            found += weight[..., None] * self.values[n, :, y, x]
-        return found
-
-
-def _corners(
-    places: Sequence[Real], counts: tuple[int, ...]
-) -> Iterator[tuple[Real, list[NDArray[np.int64]]]]:
-    """Weights and indices of the nodes about places."""
-    inside = [np.clip(x, 0.0, n - 1.0) for x, n in zip(places, counts, strict=True)]
-    lower = [np.minimum(x.astype(int), n - 2) for x, n in zip(inside, counts, strict=True)]
-    for corner in np.ndindex(*(2,) * len(places)):
-        parts = [
-            f - i if upper else 1.0 - (f - i)
-            for f, i, upper in zip(inside, lower, corner, strict=True)
+        each = np.stack(np.broadcast_arrays(depth, places[..., 1], places[..., 0]))
+        found = [
+            map_coordinates(one, each.reshape(3, -1), order=1, mode="nearest")
+            for one in (self.values[:, 0], self.values[:, 1])
         ]
-        index = [i + upper for i, upper in zip(lower, corner, strict=True)]
-        yield np.prod(parts, axis=0), index
+        return np.stack(found, axis=-1).reshape(*each.shape[1:], 2).astype(complex)

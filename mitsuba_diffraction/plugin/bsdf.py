@@ -476,6 +476,11 @@ class Diffraction(mi.BSDF):
         ]
 
     @property
+    def model(self) -> str:
+        """What the material makes of the light, for people."""
+        return f"{self.boundary}, second order" if self._second_order else str(self.boundary)
+
+    @property
     def only_traced(self) -> str | None:
         """What it has that only the path tracer shows."""
         if self.places is not None:
@@ -526,7 +531,7 @@ class Diffraction(mi.BSDF):
             f"{places}"
             f"  tolerance = {self.table.tolerance:g},\n"
             f"  surface = {self.fresnel},\n"
-            f"  model = {self.boundary}{', second order' if self._second_order else ''},\n"
+            f"  model = {self.model},\n"
             f"  height_scale = {self._varying or f'{dr.slice(self.height_scale):g}'},\n"
             f"  energy_conserving = {'true' if self.energy_conserving else 'false'},\n"
             f"  orientation = {self.orientation},\n"

@@ -21,7 +21,7 @@ from ..optics.blend import RoughnessTable
 from ..optics.slope_ratio import SlopeRatios
 from ..settings import BASES, MAX_TAPS, MAX_TERMS, TableSettings
 from .expansion import KINDS, Expansion
-from .packing import Grid
+from .layout import Grid
 from .table import DiffractionTable
 
 #: Largest table, bytes: beyond it no renderer would want it.

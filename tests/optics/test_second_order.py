@@ -34,6 +34,10 @@ def test_across_and_along_are_one_where_light_keeps_its_direction():
     assert along_x == pytest.approx(across, rel=1e-3)
 
 
+def test_without_contrast_there_is_nothing():
+    assert slope_coefficients(polar(50.0), polar(25.0, 140.0)[None], 1.0) == pytest.approx(0.0)
+
+
 def test_the_first_order_is_the_boundary_s():
     wi, wo = polar(50.0, 20.0), np.array([polar(25.0, 140.0), polar(70.0, -30.0)])
     found = Perturbation(wi, KERATIN).first(wo[:, :2])

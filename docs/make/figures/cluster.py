@@ -83,21 +83,16 @@ def film_seconds(
 ) -> tuple[float, dict[str, Any]]:
     """Seconds of the command for so many frames, start included, and its report."""
     with tempfile.TemporaryDirectory() as folder:
-        return _film_seconds(scene, Path(folder), frames, more)
-
-
-def _film_seconds(
-    scene: Path, folder: Path, frames: int, more: Sequence[str]
-) -> tuple[float, dict[str, Any]]:
-    report = folder / "report.json"
-    command = [
-        sys.executable, "-m", "mitsuba_diffraction", "render", str(scene), "--frames", str(frames),
-        "-m", "llvm_ad_rgb", "-D", "resx=240", "-D", "resy=200", "-s", "32", "--no-progress",
-        "--animate", "lamp_azimuth=0:90", "-o", str(folder / "film"), "--json", str(report), *more,
-    ]  # fmt: skip
-    start = time.perf_counter()
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return time.perf_counter() - start, json.loads(report.read_text("utf-8"))
+        report = Path(folder, "report.json")
+        command = [
+            sys.executable, "-m", "mitsuba_diffraction", "render", str(scene),
+            "--frames", str(frames), "-m", "llvm_ad_rgb", "-D", "resx=240", "-D", "resy=200",
+            "-s", "32", "--no-progress", "--animate", "lamp_azimuth=0:90",
+            "-o", str(Path(folder, "film")), "--json", str(report), *more,
+        ]  # fmt: skip
+        start = time.perf_counter()
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        return time.perf_counter() - start, json.loads(report.read_text("utf-8"))
 
 
 def client_seconds(count: int = 20) -> float:

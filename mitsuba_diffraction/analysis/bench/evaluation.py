@@ -145,15 +145,12 @@ def _nanoseconds(
 
 
 def _conditions(plan: Plan, tables: Tables) -> str:
+    wavelengths = len(mi.Spectrum(0.0))
     return (
-        f"{mi.variant()}, {plan.lanes} random pairs of directions, {_wavelengths()} wavelengths a "
+        f"{mi.variant()}, {plan.lanes} random pairs of directions, {wavelengths} wavelengths a "
         f"call, {tables.patch} pixels; kernels alone, medians of {plan.rounds} "
         "rounds through all rows, ratios within a round"
     )
-
-
-def _wavelengths() -> int:
-    return len(mi.Spectrum(0.0))
 
 
 def _section(

@@ -123,11 +123,6 @@ def rays(scene: Any, side: int) -> tuple[int, Any]:
     return width * height, sensor.sample_ray(0.0, 0.5, position, mi.Point2f(0.5))[0]
 
 
-def share_of(scene: Any, shape: Any) -> float:
-    """Share of the pixels that see the shape."""
-    return float(pixels_of(scene, shape).mean())
-
-
 def _check_there(file: Path) -> None:
     if not file.is_file():
         raise DiffractionError(
@@ -313,7 +308,7 @@ def measure_snake(plan: Plan, tables: Tables, scenes: Path, progress: Progress) 
     made = {name: snake_scene(scenes, tables, **size) for name in (_SKIN, _ROUGH)}
     rough = mi.load_dict({"type": "twosided", "b": {"type": "roughconductor", "material": "Al"}})
     skin_of(made[_ROUGH]).set_bsdf(rough)
-    covered = share_of(made[_SKIN], skin_of(made[_SKIN]))
+    covered = pixels_of(made[_SKIN], skin_of(made[_SKIN])).mean()
     calls = {name: partial(render_seconds, scene, plan) for name, scene in made.items()}
     rounds = max(3, plan.rounds // 2)
     seconds = rounds_of(calls, rounds, lambda done, total: progress(done, total, "snake"))

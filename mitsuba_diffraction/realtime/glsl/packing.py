@@ -19,7 +19,7 @@ from ...tables.energy.conservation import FINE, DirectionalTable
 from ...tables.energy.gain import GRAZING
 from ...tables.energy.grid import SHARE
 from ...tables.energy.powers import order_0_power, power_series
-from ...tables.packing import Record, cells_of, functions_at
+from ...tables.layout import Record, cells_of, functions_at
 from ...tables.table import DiffractionTable
 from .texels import Packed, Texture, as_half, listed, paired, texels
 
