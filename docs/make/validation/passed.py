@@ -149,9 +149,10 @@ that is above 1. Orders come and go there: of a sheet that is a grating at the n
 if its lobes are narrow; within a dielectric, just beyond the critical angle, between them, and
 there 2 to 4 % are lost, of steep walls more. What s, which multiplies colours and is at most 1.5,
 leaves out is spread over all directions where some is missing: of these surfaces the blazed
-grating's, up to 0.16 of a sheet's light and half of the light within a dielectric beyond the
-critical angle. It cannot be order 0's: what is missing along one direction, and not along those
-that order 0 goes to, no reciprocal model can give to order 0."""
+grating's. Of the one of `precompute/` that is up to 0.16 of a sheet's light, and three quarters of
+what single directions carry within a dielectric beyond the critical angle. It cannot be order 0's:
+what is missing along one direction, and not along those that order 0 goes to, no reciprocal model
+can give to order 0."""
 
 
 def _wide(surfaces: dict[str, Callable[[], HeightField]]) -> str:
