@@ -44,7 +44,7 @@ _SETTINGS = (
 
 _SIDES = (
     *_SETTINGS, str(sides.SHEET), str(sides.DENSE), sides.WAVELENGTHS, sides.FEW_ORDERS,
-    sides.NARROW, sums.SWEEPS, sums.LEAST, sums.MOST, sums.TOLERATED, sums.ENOUGH,
+    sides.NARROW, sums.SWEEPS, sums.LEAST, sums.AIM, sums.MOST, sums.TOLERATED, sums.ENOUGH,
     sums.STRONGEST, sums.FAINT, sums.FALL, sums.BETWEEN, sums.MARGIN, sums.LinkedSums.certain,
     between.CEILING, between.GENTLE, between.MOST, between.LOOKED_AT, between.FALLS,
     between.FAR, between.FEW, sides.NODES_OF_INTEGRALS, sheet.ChainSides.certain,

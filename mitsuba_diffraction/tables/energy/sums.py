@@ -18,9 +18,9 @@ Sums = NDArray[np.floating[Any]]
 
 #: Light that goes to and fro beyond the critical angle takes more of them than reflection does.
 SWEEPS = 30
-#: R + T is left as it is between these, and brought between them elsewhere; it is left altogether
-#: if it is nowhere above the last.
-LEAST, MOST, TOLERATED = 0.99, 0.999, 1.001
+#: R + T is left altogether if it is nowhere below the first and above the last, and otherwise
+#: brought between those amid.
+LEAST, AIM, MOST, TOLERATED = 0.99, 0.993, 0.999, 1.001
 #: Least that order 0 must leave for s not to be needed; by how much order 0 may change; and below
 #: what share it is not changed.
 ENOUGH, STRONGEST, FAINT = 0.98, 2.0, 1e-4
@@ -87,7 +87,7 @@ def _near_1(sums: Sums, certain: NDArray[np.bool_], least: float) -> bool:
 def _aims(sums: Sums, beyond: Real) -> Sums:
     """What R + T is to be; beyond : `certain`, rad."""
     most = MOST - np.minimum(BETWEEN * _variation(sums), MARGIN)
-    least = LEAST - FALL * np.maximum(beyond, 0.0)
+    least = AIM - FALL * np.maximum(beyond, 0.0)
     return np.asarray(np.clip(sums, least.astype(np.float32), most), np.float32)
 
 
