@@ -12,6 +12,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
+from mitsuba_diffraction.plugin import fresnel
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from tests.directions import Array, as_single, rough_patch, uniform_directions
 from tests.plugin.conftest import runs
