@@ -92,14 +92,22 @@ SMALLER = {
     "first_render": {
         "phi=0, resolution=150)": "phi=0, resolution=150, step=20)",
         "--resolution 150 -o": "--resolution 150 --step 20 -o",
+        "extent=13, pixels=256": "extent=13, pixels=128",
         "resolution=100, step=10": "resolution=40, step=40",
     },
-    "shaders_against_path_tracing": {"spp=512": "spp=64", "spp=128": "spp=16"},
+    "from_scan_to_bsdf": {"resolution=100, step=10": "resolution=40, step=40"},
+    "shaders_against_path_tracing": {
+        '"width": 160, "height": 120': '"width": 80, "height": 60',
+        "spp=512": "spp=64",
+        "spp=128": "spp=16",
+    },
     "speed_and_accuracy": {
-        "pixels=240": "pixels=160",
-        "measure_depths(6)": "measure_depths(3)",
-        "t in (1e-2, 1e-3, 1e-5)": "t in (1e-2, 1e-3)",
-        "lanes=1 << 16, rounds=3": "lanes=1 << 12, rounds=1",
+        "pixels=240": "pixels=128",
+        "PAIRS = 80": "PAIRS = 40",
+        "TOLERANCES = (1e-1, 1e-3, 1e-5)": "TOLERANCES = (1e-1, 1e-3)",
+        "measure_depths(6)": "measure_depths(2)",
+        "t in (1e-2, 1e-3, 1e-5)": "t in (1e-2,)",
+        "pairs=40, lanes=1 << 16, rounds=3": "pairs=20, lanes=1 << 12, rounds=1",
         "spp=64": "spp=16",
     },
 }
@@ -113,7 +121,10 @@ def smaller(path: Path, folder: Path) -> Path:
         for cell in notebook.cells:
             cell.source = cell.source.replace(old, new)
     first = next(cell for cell in notebook.cells if cell.cell_type == "code")
-    first.source = f"from tests.coarse import coarse_energy\ncoarse_energy()\n{first.source}"
+    first.source = (
+        "from tests.coarse import coarse_energy, vectors_of\n"
+        f"coarse_energy()\nvectors_of(8)\n{first.source}"
+    )
     nbformat.write(notebook, folder / path.name)
     return folder / path.name
 

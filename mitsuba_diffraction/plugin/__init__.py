@@ -23,10 +23,9 @@ rgb             power and look-up in the RGB variants' colours
 places          where on the patch the window sits at a point of the surface
 energy          the bound of the albedo that conserves energy
 direction_lookup  tabulated functions of direction inside a kernel
-reflectance     of the surface itself: dielectric, conductor, mirror
 boundary        what the material makes of the light, with its polarisation
 second_order    what light diffracted twice makes of orders
-fresnel         fields at an interface, or at both of a film
+fresnel         what dielectric, conductor or mirror reflect; fields at an interface or a film
 through         both sides of a dielectric or of a thin sheet
 sides           what makes both sides add up to 1
 crossing        pairs of directions that are not both above, and what the material makes of them

@@ -210,12 +210,12 @@ from ..tables.energy.conservation import DirectionalTable
 from .boundary import Boundary, Kirchhoff
 from .changing import Bounded, arrays_within, marks
 from .energy import EnergyModel
+from .fresnel import tinted
 from .layers import CoatedPair, Transmission, UnderFilm
 from .llvm import require_loaded_llvm
 from .pair import Pair, from_patch, in_patch, vcavity
 from .parameters import read_parameters
 from .power import power_model
-from .reflectance import tinted
 from .roles import (
     BSDF,
     Callback,

@@ -17,9 +17,8 @@ from scipy.interpolate import CubicSpline
 from ..optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from ..optics.geometry import wavenumber
 from .changing import Bounded
-from .fresnel import Filmed, amplitudes, squared
+from .fresnel import Conductor, Dielectric, Filmed, Reflectance, amplitudes, squared
 from .pair import Pair
-from .reflectance import Conductor, Dielectric, Reflectance
 from .roles import Callback, Colour, Float, Interaction, Mask, Number, Vector3f
 
 

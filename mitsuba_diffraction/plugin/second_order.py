@@ -14,15 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
-from ..optics.second_order import LIMIT, NODES, coefficient_table
-from ..optics.slope_ratio import SlopeRatios
+from ..optics.second_order import LIMIT, NODES, SlopeRatios, coefficient_table
 from ..settings import COHERENCES
 from .boundary import MODELS, SmallSlope
+from .fresnel import Dielectric, Reflectance
 from .layers import LAYERINGS
 from .memory import index_between, read_record, upload
 from .pair import Pair
 from .properties import flag
-from .reflectance import Dielectric, Reflectance
 from .roles import Float, Index, Kind, Number, Properties
 
 #: Indices are rounded to this, for c.

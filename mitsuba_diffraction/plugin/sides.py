@@ -12,9 +12,9 @@ from ..tables.energy.sides import gathered
 from ..tables.energy.store import SidesEnergy
 from ..tables.table import DiffractionTable
 from .direction_lookup import DirectionLookup, scales_of
+from .fresnel import Dielectric
 from .layers import plain
 from .pair import in_patch
-from .reflectance import Dielectric
 from .roles import Colour, Float, Mask, Rotation, Vector3f
 
 #: Indices are rounded to this: an optimisation of one waits rarely, and sees s as constant.

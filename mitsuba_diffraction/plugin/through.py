@@ -25,10 +25,9 @@ from .crossing import (
     out_of_sheet,
     tangent_plane,
 )
-from .fresnel import squared
+from .fresnel import Dielectric, Inside, squared
 from .layers import CoatedPair, transmittances
 from .pair import Pair, Place, from_patch
-from .reflectance import Dielectric, Inside
 from .roles import (
     BSDF,
     Colour,

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import quoted
 from ..optics.blend import RoughnessTable
-from ..optics.slope_ratio import SlopeRatios
+from ..optics.second_order import SlopeRatios
 from ..settings import BASES, MAX_TAPS, MAX_TERMS, TableSettings
 from .expansion import KINDS, Expansion
 from .layout import Grid

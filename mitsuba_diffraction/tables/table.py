@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import DiffractionError
 from ..optics.blend import RoughnessTable
 from ..optics.geometry import sigma_of, wavenumber
-from ..optics.slope_ratio import SlopeRatios
+from ..optics.second_order import SlopeRatios
 from ..settings import TableSettings
 from .expansion import Expansion
 from .layout import Grid

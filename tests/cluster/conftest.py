@@ -17,7 +17,7 @@ def client():
         yield found
 
 
-@pytest.fixture(scope="package", autouse=True)
+@pytest.fixture(autouse=True)
 def workers_vectors(own_vectors):
     """Vectors as long as the workers', whose pictures are this process's bit by bit."""
     before = vectors_of(own_vectors)

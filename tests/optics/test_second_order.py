@@ -8,11 +8,12 @@ import pytest
 from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.optics.second_order import (
     Perturbation,
+    Slopes,
+    along,
     factor,
     interpolated,
     slope_coefficients,
 )
-from mitsuba_diffraction.optics.slope_ratio import Slopes, along
 from tests.directions import polar, rough_patch
 
 KERATIN = 1.56

@@ -81,6 +81,7 @@ def sampled(bsdf, context, n=1 << 15) -> Sampled:
     si = lit(n)
     s1, s2 = lanes(rng.random(n)), mi.Point2f(*map(lanes, rng.random((2, n))))
     drawn, weight = bsdf.sample(context, si, s1, s2)
+    dr.eval(drawn, weight)  # one kernel instead of three
     weights = np.array(weight[0], float)
     delta = np.array(mi.has_flag(drawn.sampled_type, FLAGS.Delta))
     found = np.array(drawn.pdf) > 0.0
@@ -102,6 +103,7 @@ def integrals(bsdf, context, n=240) -> tuple[float, float]:
     wo = np.stack([x * scale, y * scale, 1.0 - r2], axis=1)
     si = lit(len(wo))
     value, density = bsdf.eval_pdf(context, si, vectors(wo))
+    dr.eval(value, density)
     cell = 8.0 / n**2  # 2π over π of the disc
     return cell * np.array(value[0], float).sum(), cell * np.array(density, float).sum()
 

@@ -47,8 +47,13 @@ def browser() -> Iterator[Any]:
         found.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def scene() -> Any:
+    """The page's scene: no longer than a module, for kernels hold the BSDFs of all scenes."""
+    return load_scene()
+
+
+def load_scene() -> Any:
     """A grating on a roll over diffuse grey, on chequered ground, under a sun and a lamp."""
     import mitsuba as mi
     import numpy as np
@@ -90,14 +95,14 @@ def scene() -> Any:
 
 
 @pytest.fixture(scope="session")
-def page(scene: Any) -> Page:
+def page() -> Page:
     """The scene's page, with both methods."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(
             "mitsuba_diffraction.realtime.web.export.OCTAVES", (-1.0, 0.0)
         )  # seconds each
         # the title is the worst that a file can be called
-        return make_page(scene, title="</script><script>throw 1</script>")
+        return make_page(load_scene(), title="</script><script>throw 1</script>")
 
 
 @pytest.fixture(scope="session")

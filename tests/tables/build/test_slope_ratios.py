@@ -9,7 +9,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.optics.slope_ratio import SlopeRatios, Slopes, along
+from mitsuba_diffraction.optics.second_order import SlopeRatios, Slopes, along
 from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.build.slope_ratios import slope_ratios
 from mitsuba_diffraction.tables.build.windows import windows_of
