@@ -1,8 +1,8 @@
 """R + T amid the nodes of a scale: what is too much there, and what is lacking (NumPy only).
 
 Between directions and wavelengths of the scale an order may appear or vanish. So the sums are
-looked at amid them too: what was too much is taken from the nodes around, and what they lack is
-the least of what is lacking around them.
+looked at amid them too: what was too much is taken from the nodes around, and what is given to
+nodes is at most what is lacking amid them.
 """
 
 from __future__ import annotations
