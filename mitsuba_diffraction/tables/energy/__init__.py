@@ -12,7 +12,7 @@ powers         powers of the orders as series in κ
 links          what becomes of one order's light between the sides of a dielectric
 sums           R + T as a linear map of weights, and the scales that bring it near 1
 sheet          the same of a sheet that is a grating, chain by chain
-between        R + T amid the nodes of a scale, which is lowered where that is above 1, and what lacks
+between        R + T amid the nodes of a scale: what is too much there, and what lacks
 sides          R + T of a dielectric, and the scale and the spread light that make it 1
 store          what conserves energy, in the cache
 """
