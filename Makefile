@@ -61,10 +61,10 @@ evaluation: setup  ## make docs/evaluation.md: ridges, grating equation, fitted 
 	@$(PYTHON3) -m docs.make.figures.evaluation -o docs/evaluation.md $(if $(MEASURED),--measured $(MEASURED))
 
 sweeps: setup  ## make docs/sweeps.md: contact sheets of BRDF maps
-	@$(PYTHON3) -m docs.make.figures.sweeps -o docs/sweeps.md $(if $(MEASURED),--measured $(MEASURED))
+	@$(PYTHON3) -m docs.make.figures.thesis sweeps $(if $(MEASURED),--measured $(MEASURED))
 
 methods: setup  ## measure the methods: docs/methods.md
-	@$(PYTHON3) -m docs.make.figures.methods $(if $(MEASURED),--measured $(MEASURED))
+	@$(PYTHON3) -m docs.make.figures.thesis methods $(if $(MEASURED),--measured $(MEASURED))
 
 tradeoff: setup  ## measure accuracy against speed and memory: docs/accuracy.md
 	@$(RUN) tradeoff $(MEASURED) -o out/tradeoff

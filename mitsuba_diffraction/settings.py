@@ -189,7 +189,7 @@ class TableSettings:
     )  # fmt: skip
 
     second_order: bool | None = _setting(
-        None, _asked, "what the second order of small slope needs besides", "true or false",
+        None, _asked, "the second order of small slope, or what it needs", "true or false",
         text="false", type=bool,
     )  # fmt: skip
 

@@ -36,7 +36,8 @@ def interaction(wi: ArrayLike, wavelengths: ArrayLike) -> Any:
     si.wi = vectors(directions)
     lam = np.asarray(wavelengths, np.float32)
     lam = np.broadcast_to(lam if lam.ndim == 2 else lam.reshape(-1, 1), (n, 4))
-    si.wavelengths = mi.Spectrum(*map(lanes, lam.T))
+    if mi.is_spectral:
+        si.wavelengths = mi.Spectrum(*map(lanes, lam.T))
     si.sh_frame = mi.Frame3f(mi.Normal3f(0, 0, 1))
     return si
 

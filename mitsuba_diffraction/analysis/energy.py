@@ -52,9 +52,7 @@ def _aluminium(wavelengths: NDArray[np.float64]) -> NDArray[np.complex128]:
 
 def _of_material(table: DiffractionTable, model: str, index: Index) -> dict[str, Any]:
     found = Energy(table, model, index, table.wavelength_range).at(1.0)
-    # off the grid, and off the axes of symmetry
-    theta = np.asarray(np.radians(ANGLES), np.float64)
-    phi: NDArray[np.float64] = (np.arange(AZIMUTHS, dtype=float) + 0.3) * (2.0 * np.pi / AZIMUTHS)
+    theta, phi = np.radians(ANGLES), _azimuths()
     pairs = [
         albedos(table, 1.0, model, index, found, theta, phi, wavelength)
         for wavelength in WAVELENGTHS
@@ -90,8 +88,7 @@ def sides_summary(table: DiffractionTable) -> dict[str, Any]:
 
     Least and largest of 24 azimuths at 450, 550 and 650 nm, of light from above and from below.
     """
-    theta = np.asarray(np.radians(PASSED), np.float64)
-    phi: NDArray[np.float64] = (np.arange(AZIMUTHS, dtype=float) + 0.3) * (2.0 * np.pi / AZIMUTHS)
+    theta, phi = np.radians(PASSED), _azimuths()
     result: dict[str, Any] = {}
     for name, thin in (("dielectric 1.5, both sides", False), ("sheet 1.5", True)):
         medium = Medium(1.5, "small_slope", thin)
@@ -107,6 +104,11 @@ def sides_summary(table: DiffractionTable) -> dict[str, Any]:
             for n, kind in enumerate(("R + T", "R + T, conserved"))
         }
     return result
+
+
+def _azimuths() -> NDArray[np.float64]:
+    """Off the grid, and off the axes of symmetry; radians."""
+    return (np.arange(AZIMUTHS, dtype=np.float64) + 0.3) * (2.0 * np.pi / AZIMUTHS)
 
 
 def _range(values: NDArray[np.floating]) -> list[float]:

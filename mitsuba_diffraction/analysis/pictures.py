@@ -28,6 +28,13 @@ _HEIGHTS, _DENSITY = 200.0, 1.0
 # Light per unit of (u, v) that is drawn black and white: six decades below the mirror's order.
 _DARKEST, _BRIGHTEST = 2e-3, 4.0
 
+#: Polar angles of albedo's curves end here: towards 90° the raw albedo has no limit.
+LAST = 89.0
+#: Azimuths of its curves, degrees.
+AZIMUTHS = (0.0, 45.0, 90.0)
+#: Wavelengths that it is looked at across the table's range.
+WAVELENGTHS = 24
+
 
 def patches_figure(fields: Sequence[HeightField]) -> Figure:
     """Draw a row for each patch; the first one's curves stay in the others' panels, in grey.
@@ -121,14 +128,6 @@ def _drawn(
 ) -> list[tuple[HeightField, dict[str, object]]]:
     grey = [(other, {"color": "0.65", "lw": 2.2}) for other in others]
     return [*grey, (field, {"color": "tab:blue", "lw": 1.0})]
-
-
-#: Polar angles of the curves end here: towards 90° the raw albedo has no limit.
-LAST = 89.0
-#: Azimuths of the curves, degrees.
-AZIMUTHS = (0.0, 45.0, 90.0)
-#: Wavelengths looked at across the table's range.
-WAVELENGTHS = 24
 
 
 def albedo_figure(table: DiffractionTable) -> Figure:

@@ -38,12 +38,12 @@ from ..errors import DiffractionError, DiffractionWarning, one_line, quoted
 from ..heights.field import HeightField
 from ..heights.load import load_heights
 from ..heights.read import LoadOptions, is_recipe
-from ..heights.recipes import LOAD_KEYS, Recipe
+from ..heights.recipes import LOAD_KEYS, Recipe, options_and_settings
 from ..heights.spectra import dominant_periods
 from ..progress import Progress, silent
 from ..scene.load import error_of
 from ..scene.passes import Stop
-from ..settings import RECIPE_SETTINGS, TableSettings, checked
+from ..settings import RECIPE_SETTINGS, TableSettings
 from ..tables.build.build import build_with
 from ..tables.store import cached_table, key_of
 from .maps import brdf_map
@@ -51,6 +51,14 @@ from .maps.result import colours_of, iridescence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+#: Raised whenever rows would differ.
+VERSION = 2
+#: Gratings in a row.
+PERIODS = 3
+#: Names of the files in a survey's folder.
+TABLE, SHEET, SCANS = "survey.csv", "sheet", "scans"
+_COLUMNS, _ROWS = 6, 8  # of a contact sheet
 
 
 @dataclass(frozen=True)
@@ -102,40 +110,19 @@ def _treatment(where: str, values: Any) -> Treatment:
             f"{where}: unknown key {min(unknown)!r}; known are "
             f"{', '.join((*LOAD_KEYS, *RECIPE_SETTINGS))}"
         )
-    try:
-        return Treatment(
-            LoadOptions.of(**{k: v for k, v in values.items() if k in LOAD_KEYS}),
-            {k: checked(k, v) for k, v in values.items() if k in RECIPE_SETTINGS},
-        )
-    except DiffractionError as error:
-        raise DiffractionError(f"{where}: {error}") from error
-
-
-#: Raised whenever rows would differ.
-VERSION = 2
-#: Gratings in a row.
-PERIODS = 3
+    return Treatment(*options_and_settings(values, where))
 
 
 @dataclass(frozen=True)
 class Job:
-    """A scan to measure.
+    """A scan to measure."""
 
-    Attributes
-    ----------
-    files : the scan, or a recipe with its sources.
-    treatment : how it is read.
-    theta : of the light, degrees; its azimuth is across the grooves of the strongest grating.
-    resolution : pixels of the map a side.
-    variant, threads : of Mitsuba and Dr.Jit.
-    """
-
-    files: SceneFiles
-    treatment: Treatment
-    theta: float
-    resolution: int
-    variant: str
-    threads: int
+    files: SceneFiles  # the scan, or a recipe with its sources
+    treatment: Treatment  # how it is read
+    theta: float  # of the light, degrees; its azimuth is across the strongest grating's grooves
+    resolution: int  # pixels of the map a side
+    variant: str  # of Mitsuba
+    threads: int  # of Dr.Jit
 
     @property
     def key(self) -> str:
@@ -243,11 +230,6 @@ def _png(made: Any) -> bytes:
     shown = np.round(255.0 * made.srgb(made.exposure())[::-1]).astype(np.uint8)
     Image.fromarray(shown, "RGBA").save(stream, "PNG")
     return stream.getvalue()
-
-
-#: Names of the files in a survey's folder.
-TABLE, SHEET, SCANS = "survey.csv", "sheet", "scans"
-_COLUMNS, _ROWS = 6, 8  # of a contact sheet
 
 
 def run_survey(

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError
+from ..scene.load import set_variant
 from . import options
 from .console import Bar, say_warning
 from .options import number_between, path_ending_in
@@ -21,7 +22,6 @@ _FULL, _QUICK = (1332, 240, 1 << 19, 7, 14), (400, 160, 1 << 17, 5, 9)
 
 
 def add_bench(subparsers: options.Subparsers) -> None:
-    """Declare `bench`."""
     parser = options.add_command(
         subparsers, "bench", bench, "measure speed and memory",
         "Measure what tables cost to build, and what evaluation costs beside Mitsuba's "
@@ -94,7 +94,6 @@ def _check_scenes(folder: Path) -> None:
 
 
 def add_tradeoff(subparsers: options.Subparsers) -> None:
-    """Declare `tradeoff`."""
     parser = options.add_command(
         subparsers, "tradeoff", tradeoff,
         "measure accuracy against speed and memory, setting by setting",
@@ -144,7 +143,6 @@ def tradeoff(args: argparse.Namespace) -> int:
     from ..analysis.tradeoff.accuracy import Sample
     from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain, save_csv
     from ..heights import gratings
-    from ..scene.load import set_variant
 
     side, pairs, lanes, rounds, depths = _QUICK if args.quick else _FULL
     width = args.coherence_width or (65.0 if args.heights else min(65.0, side * PIXEL))

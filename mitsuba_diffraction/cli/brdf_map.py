@@ -10,6 +10,7 @@ from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
 from ..optics.colour import ILLUMINANTS
+from ..scene.load import set_variant
 from . import options
 from .console import Bar
 from .options import number_between
@@ -19,17 +20,17 @@ _KEPT = "that of the table or recipe, else "
 _TABLE = {
     "coherence_width": f"{_KEPT}65", "coherence": f"{_KEPT}ensemble", "basis": f"{_KEPT}auto",
     "tolerance": f"{_KEPT}1e-3", "terms": "as many as the tolerance needs",
+    "second_order": "false",
 }  # fmt: skip
 # Options that are parameters of the BSDF, by the plugin's own names.
 _SURFACE = ("material", "int_ior", "coat_ior", "model", "orientation", "height_scale")
 # What only the renderer's BSDF knows.
 _OF_THE_BSDF = (
-    "mode", "material", "coat_ior", "model", "orientation", "height_scale", "basis",
+    "mode", "material", "coat_ior", "model", "orientation", "height_scale", "basis", "second_order",
 )  # fmt: skip
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
-    """Declare the sub-command."""
     parser = options.add_command(
         subparsers, "brdf-map", run, "picture what a surface reflects in every direction",
         "Picture the BRDF over all view directions for one light direction, seen from above: "
@@ -177,7 +178,6 @@ def run(args: argparse.Namespace) -> int:
 def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> tuple[Any, ...]:
     """A map by the renderer's BSDF, what reflects, and how it was made."""
     from ..analysis.maps import Light, brdf_map, check_map
-    from ..scene.load import set_variant
     from .console import mitsuba_warnings
 
     light = Light(args.theta, args.phi)
@@ -286,7 +286,7 @@ def _surface(bsdf: Any) -> str:
     table, scale, turn = bsdf.table, bsdf.height_scale[0], bsdf.orientation.degrees[0]
     return "; ".join(
         [
-            "R = 1" if str(bsdf.fresnel) == "none" else f"{bsdf.fresnel}, {bsdf.boundary}",
+            "R = 1" if str(bsdf.fresnel) == "none" else f"{bsdf.fresnel}, {bsdf.model}",
             f"{table.coherence}, coherence width {table.coherence_width:g} µm",
             *([f"heights × {scale:g}"] if scale != 1.0 else []),
             *([f"turned by {turn:g}°"] if turn != 0.0 else []),

@@ -31,7 +31,6 @@ _NARROWEST = 20.0
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
-    """Declare the sub-command."""
     parser = options.add_command(
         subparsers, "evaluate", run, "compare the angles of maxima with the grating equation",
         "Put a patch under a monochromatic beam, follow the brightest viewing angle through "

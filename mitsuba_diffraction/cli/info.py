@@ -23,7 +23,6 @@ _OTHER_MESHES = (".stl", ".glb", ".gltf", ".fbx", ".dae", ".3ds", ".3mf", ".off"
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
-    """Declare the sub-command."""
     parser = options.add_command(
         subparsers, "info", run, "describe a table, a height field, a recipe or a mesh",
         "Describe a table, a file of heights, a recipe, or a mesh (PLY, OBJ, serialized) and "

@@ -72,8 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def build_parser() -> argparse.ArgumentParser:
     """The parser with all sub-commands."""
     parser = _Parser(
-        prog=PROGRAM,
-        description="Diffraction of measured height fields, for Mitsuba 3.",
+        prog=PROGRAM, description="Diffraction of measured height fields, for Mitsuba 3."
     )
     _add_common(parser)
     parser.set_defaults(debug=False, progress=None)

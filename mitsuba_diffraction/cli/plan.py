@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
 from ..progress import Progress
-from ..scene.load import sensor_of, set_variant
+from ..scene.load import load_scene, sensor_of, set_variant
 from . import options
 from .console import Bar, mitsuba_warnings, say, say_warning
 from .options import number_between, whole_number
@@ -29,7 +30,6 @@ MAKE = Path()
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
-    """Declare the sub-command."""
     parser = options.add_command(
         subparsers, "plan", run, "find out which part of its tables a scene needs",
         "Trace paths through an XML scene and report which spatial frequencies, kappa and "
@@ -59,8 +59,6 @@ def planning_variant(asked: str | None) -> str:
 
     Raises a DiffractionError if a plan would say nothing about the asked one.
     """
-    from ..scene.load import set_variant
-
     name = set_variant(asked)
     if "spectral" not in name:
         raise DiffractionError(
@@ -78,20 +76,14 @@ def run(args: argparse.Namespace) -> int:
     if args.paths > _MOST_PATHS:
         args.parser.error(f"argument --paths: at most {_MOST_PATHS}, got {args.paths}")
 
-    from ..scene.load import load_scene, sensor_of
     from ..scene.planning.make import find_plan, record_scene
     from ..scene.planning.report import describe
 
     variant = planning_variant(args.mode)
     tolerance: float = args.plan_tolerance
     with mitsuba_warnings(), Bar(args, delay=0) as bar:
-
-        def load() -> Any:
-            return load_scene(args.scene, parameters)
-
-        def sensor(scene: Any) -> Any:
-            return sensor_of(scene, args.sensor)
-
+        load = partial(load_scene, args.scene, parameters)
+        sensor = partial(sensor_of, index=args.sensor)
         bar(0, 0, "tracing paths")
         loaded = record_scene(load, sensor, args.paths, timing=True)
         found = find_plan(str(args.scene), loaded, load, sensor, tolerance, bar, timing=True)
@@ -185,9 +177,7 @@ def _plan(
     from ..scene.planning.make import check_light, find_plan, record_scene
     from ..scene.planning.plan import Plan
 
-    def sensor(scene: Any) -> Any:
-        return sensor_of(scene, args.sensor)
-
+    sensor = partial(sensor_of, index=args.sensor)
     given = None if args.plan == MAKE else Plan.load(args.plan)
     planning_variant(variant if variant.startswith(("llvm", "cuda")) else None)
     loaded = record_scene(load, sensor, args.paths, plan=given)

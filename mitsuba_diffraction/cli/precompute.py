@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
-    """Declare the sub-command."""
     parser = options.add_command(
         subparsers, "precompute", run, "build the table of a height field",
         "Build a table of diffraction orders from measured or made heights, and measure its "

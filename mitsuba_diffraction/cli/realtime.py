@@ -11,6 +11,7 @@ from typing import Any
 from ..errors import DiffractionError
 from ..realtime.glsl.source import METHODS
 from ..realtime.web.tables import WEB_METHODS
+from ..scene.load import load_scene, sensor_of, set_variant
 from . import options
 from .brdf_map import add_surface, surface_bsdf
 from .console import Bar, mitsuba_warnings, say_warning
@@ -21,7 +22,6 @@ _EXPORTED = ("lut", "spectral")
 
 
 def add_view(subparsers: options.Subparsers) -> None:
-    """Declare `view`."""
     parser = options.add_command(
         subparsers, "view", view, "look at a scene in a window, in real time",
         "Open a window on a scene, drawn by shaders. Turn it with the left button, drag the "
@@ -68,7 +68,6 @@ def view(args: argparse.Namespace) -> int:
 
 
 def add_compare(subparsers: options.Subparsers) -> None:
-    """Declare `compare`."""
     parser = options.add_command(
         subparsers, "compare", compare,
         "compare the realtime picture of a scene with the path-traced one",
@@ -133,7 +132,6 @@ def compare(args: argparse.Namespace) -> int:
 
 
 def add_export_viewer(subparsers: options.Subparsers) -> None:
-    """Declare `export-viewer`."""
     parser = options.add_command(
         subparsers, "export-viewer", export_viewer,
         "write a page that shows a scene in a browser, without a server",
@@ -186,7 +184,6 @@ def export_viewer(args: argparse.Namespace) -> int:
 
 
 def add_export_shader(subparsers: options.Subparsers) -> None:
-    """Declare `export-shader`."""
     parser = options.add_command(
         subparsers, "export-shader", export_shader,
         "write a surface's diffraction as GLSL with its textures, for other programs",
@@ -241,7 +238,6 @@ def export_shader(args: argparse.Namespace) -> int:
 def _set_variant(args: argparse.Namespace) -> str:
     """The variant that is asked for, set, if shaders can read scenes in it."""
     from ..realtime.glsl.scene import check_variant
-    from ..scene.load import set_variant
 
     variant = set_variant(args.mode)
     check_variant(variant)
@@ -250,8 +246,6 @@ def _set_variant(args: argparse.Namespace) -> str:
 
 def _scene(args: argparse.Namespace, parameters: dict[str, str]) -> Any:
     """The scene, which has the sensor that is asked for."""
-    from ..scene.load import load_scene, sensor_of
-
     scene = load_scene(args.scene, parameters)
     sensor_of(scene, args.sensor)
     return scene

@@ -9,13 +9,25 @@ import argparse
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..errors import DiffractionError
 from ..scene.frames import FILMS, MISSING, Frame, digest_of, render_frames, write_film, write_frame
+from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink
 from ..scene.parameters import values_of_frames
+from ..scene.passes import (
+    Result,
+    Stop,
+    colours_of,
+    count_bad,
+    integrator_of,
+    render_passes,
+    write_exr,
+    write_png,
+)
 from . import options
 from .console import INTERRUPTED, Bar, mitsuba_warnings, say, say_warning
 from .options import change, number_between, whole_number
@@ -30,12 +42,8 @@ from .plan import (
 from .report import check_writable, save_report
 from .workers import add_threads, add_workers, client_of, film_of, on_workers, say_report
 
-if TYPE_CHECKING:
-    from ..scene.passes import Result
-
 
 def add_parser(subparsers: options.Subparsers) -> None:
-    """Declare the sub-command."""
     parser = options.add_command(
         subparsers, "render", run, "render a Mitsuba scene",
         "Render an XML scene to a linear EXR and a PNG beside it. Ctrl-C stops after the "
@@ -124,8 +132,6 @@ def _on_workers(args: argparse.Namespace) -> int:
     outputs = output, _, only_png = _outputs(args)
 
     from ..cluster.frames import Wanted
-    from ..scene.load import set_variant
-    from ..scene.passes import Stop
 
     start = time.perf_counter()
     variant = set_variant(args.mode)
@@ -148,19 +154,12 @@ def _run_one(args: argparse.Namespace) -> int:
     parameters = options.scene_parameters(args)
     outputs = output, _, only_png = _outputs(args)
 
-    from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink
-    from ..scene.passes import Stop, render_passes
-
     start = time.perf_counter()
     variant = set_variant(args.mode)
     with mitsuba_warnings():
         with Bar(args, unit=" spp", delay=0) as bar:
-            spp = args.spp or 0
-
-            def load() -> Any:
-                return load_scene(args.scene, parameters)
-
-            planned = None
+            spp, planned = args.spp or 0, None
+            load = partial(load_scene, args.scene, parameters)
             if args.plan is not None:
                 bar(0, 0, "planning")
                 planned = load_by_plan(args, variant, load, bar)
@@ -195,8 +194,6 @@ def _finish(
     start: float,
 ) -> dict[str, Any]:  # fmt: skip
     """Write the picture, with warnings of what it lacks, and say so; the figures for --json."""
-    from ..scene.passes import colours_of, count_bad, write_exr, write_png
-
     output, png, only_png = outputs
     bad = count_bad(result.bitmap)
     if bad:
@@ -228,8 +225,6 @@ def _finish(
 
 def _check_colours(scene: Any, sensor: Any, args: argparse.Namespace, output: Path) -> None:
     """Refuse a film that will hold nothing for a PNG, before the work is done."""
-    from ..scene.passes import colours_of, integrator_of
-
     film = sensor.film()
     film.prepare(integrator_of(scene).aov_names())
     if colours_of(film.bitmap()) is None:
@@ -249,8 +244,6 @@ def _run_frames(args: argparse.Namespace) -> int:
     reasons = {frame.png: frame.outdated(args.exr) for frame in frames}
     to_do = [frame for frame in frames if reasons[frame.png]]
     _say_why(reasons)
-
-    from ..scene.load import set_variant
 
     start = time.perf_counter()
     done, workers = 0, None
@@ -287,8 +280,6 @@ def _frames_on_workers(
 ) -> tuple[int, dict[str, Any]]:
     """Render frames on workers; how many came before Ctrl-C, and what the workers did."""
     from ..cluster.frames import Wanted
-    from ..scene.load import set_variant
-    from ..scene.passes import Stop
 
     variant, done = set_variant(args.mode), 0
     wanted = [Wanted(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]

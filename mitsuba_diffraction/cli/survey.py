@@ -8,6 +8,8 @@ import os
 import time
 from pathlib import Path
 
+from ..scene.load import set_variant
+from ..scene.passes import Stop
 from . import options
 from .console import INTERRUPTED, Bar, mitsuba_warnings, say
 from .options import number_between, whole_number
@@ -16,7 +18,6 @@ from .workers import add_threads, add_workers, client_of, on_workers, worker_thr
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
-    """Declare the sub-command."""
     parser = options.add_command(
         subparsers, "survey", run, "measure many scans: tables, maps, gratings, colours",
         "For each scan build its table, map its BRDF and measure its heights, the gratings in "
@@ -55,8 +56,6 @@ def run(args: argparse.Namespace) -> int:
     check_writable(args.output / "survey.csv", make_folder=True)
 
     from ..analysis.survey import Treatment, run_survey, treatments_of
-    from ..scene.load import set_variant
-    from ..scene.passes import Stop
 
     treatments = treatments_of(args.treatments)
     start = time.perf_counter()

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning
+from ..scene.load import set_variant
 from . import options
 from .brdf_map import add_relative, gain_of
 from .console import Bar
@@ -23,7 +24,6 @@ _COLUMNS = ("value", "seconds", "delta_e_mean", "delta_e_95", "delta_e_own_expos
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
-    """Declare the sub-command."""
     parser = options.add_command(
         subparsers, "sweep", run,
         "BRDF maps over one parameter: wavelength step, coherence width, terms, light, method",
@@ -126,7 +126,6 @@ def _compiled(
 ) -> list[str]:
     if args.kind != "method" or not args.compiled:
         return []
-    from ..scene.load import set_variant
     from ..thesis.sweeps import time_compiled
 
     variant = set_variant(None)

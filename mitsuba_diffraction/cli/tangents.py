@@ -19,7 +19,6 @@ _NAMED = 6  # singular points that are named
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
-    """Declare the sub-command."""
     parser = options.add_command(
         subparsers, "tangents", run, "give a mesh a smooth field of directions for its patch",
         "Write a mesh (PLY, OBJ, serialized) as a PLY whose attribute vertex_orientation lays "

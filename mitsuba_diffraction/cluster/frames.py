@@ -24,6 +24,14 @@ from ..scene.passes import Result, Stop, developed, groups_of, passes_of
 from .tasks import Failed, SceneFiles, Sums, Task, film_of, run_task, versions
 from .workers import check_workers, memory_warnings, outcome, wait_for_scheduler, workers_of
 
+#: Tasks that are with the scheduler for every worker: one is worked at, others wait.
+AHEAD = 3
+#: Sums that wait for their turn in memory, too; others are read from the disk again.
+HELD = 16
+#: Bytes that Dr.Jit takes for a sample of a pass, and for the rest of a process: estimates.
+BYTES_A_SAMPLE, BYTES_A_PROCESS = 400, 5e8
+_POLL, _COUNTED = 0.02, 2.0  # seconds
+
 
 def render(
     scene: str | os.PathLike[str],
@@ -85,39 +93,21 @@ def render(
     raise DiffractionError("interrupted: finished passes are kept where `keep` says")
 
 
-#: Tasks that are with the scheduler for every worker: one is worked at, others wait.
-AHEAD = 3
-#: Sums that wait for their turn in memory, too; others are read from the disk again.
-HELD = 16
-#: Bytes that Dr.Jit takes for a sample of a pass, and for the rest of a process: estimates.
-BYTES_A_SAMPLE, BYTES_A_PROCESS = 400, 5e8
-_POLL, _COUNTED = 0.02, 2.0  # seconds
-
-
 @dataclass
 class Report:
-    """What a run on workers cost.
+    """What a run on workers cost."""
 
-    Attributes
-    ----------
-    tasks, kept : that were done now, and that had been kept.
-    retries : tasks that were given out again, since the scheduler or a worker's files were lost;
-        those of a worker that died are given to others by the scheduler.
-    lost : workers that were there and are not any more.
-    seconds, busy : of the client's clock, and of all workers' work.
-    bytes : of sums that came from workers.
-    peak : bytes of memory that a worker has taken at most.
-    workers, where : addresses, and processors with threads, of what has been added up.
-    """
-
-    tasks: int = 0
-    kept: int = 0
+    tasks: int = 0  # that were done now
+    kept: int = 0  # that had been kept
+    # tasks that were given out again, since the scheduler or a worker's files were lost; those of
+    # a worker that died are given to others by the scheduler
     retries: int = 0
-    lost: int = 0
-    seconds: float = 0.0
-    busy: float = 0.0
-    bytes: int = 0
-    peak: int = 0
+    lost: int = 0  # workers that were there and are not any more
+    seconds: float = 0.0  # of the client's clock
+    busy: float = 0.0  # seconds of all workers' work
+    bytes: int = 0  # of sums that came from workers
+    peak: int = 0  # bytes of memory that a worker has taken at most
+    # workers, where: addresses, and processors with threads, of what has been added up
     workers: set[str] = field(default_factory=set)
     where: set[str] = field(default_factory=set)
 

@@ -20,6 +20,10 @@ from ..tables.table import DiffractionTable
 from .tasks import Failed, Lacking, SceneFiles, check_versions, failure, versions
 from .workers import check_workers, outcome, wait_for_scheduler, workers_of
 
+_POLL = 0.02  # seconds
+#: Arguments that are with the scheduler for every worker: one is worked at, the other is there.
+_AHEAD = 2
+
 
 def build(
     heights: HeightField | Sequence[HeightField],
@@ -65,11 +69,6 @@ def build_on_workers(
     check_workers(client, None)
     run = OrderedMap(client)
     return build_with(heights, settings, progress, run), run
-
-
-_POLL = 0.02  # seconds
-#: Arguments that are with the scheduler for every worker: one is worked at, the other is there.
-_AHEAD = 2
 
 
 class HasFiles(Protocol):

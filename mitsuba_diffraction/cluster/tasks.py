@@ -34,29 +34,20 @@ _PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit")
 
 @dataclass(frozen=True)
 class Task:
-    """Passes of one frame, in the order that their films are added up.
+    """Passes of one frame, in the order that their films are added up."""
 
-    Attributes
-    ----------
-    files : the scene.
-    variant, sensor, preview : as in `cluster.render`.
-    film : what the client takes the film to be, see `film_of`.
-    frame, first : numbers of the frame and of the first pass, for people.
-    passes : seeds and samples.
-    versions : of the packages that decide the bits of a picture.
-    threads : of Dr.Jit; 0 for one a core.
-    """
-
-    files: SceneFiles
+    files: SceneFiles  # the scene
+    # variant, sensor, preview: as in `cluster.render`
     variant: str
     sensor: int
     preview: bool
-    film: str
+    film: str  # what the client takes the film to be, see `film_of`
+    # frame, first: numbers of the frame and of the first pass, for people
     frame: int
     first: int
-    passes: tuple[Pass, ...]
-    versions: tuple[str, ...]
-    threads: int
+    passes: tuple[Pass, ...]  # seeds and samples
+    versions: tuple[str, ...]  # of the packages that decide the bits of a picture
+    threads: int  # of Dr.Jit; 0 for one a core
 
     @property
     def key(self) -> str:
@@ -73,21 +64,13 @@ class Task:
 
 @dataclass(frozen=True)
 class Sums:
-    """What came of a task.
+    """What came of a task."""
 
-    Attributes
-    ----------
-    raw : (ny, nx, channels), the sum of the films' raw storage in double precision.
-    where : processor and Dr.Jit threads, which decide the last bits.
-    worker : address.
-    seconds, peak : of work, loading included; bytes of the process at most.
-    """
-
-    raw: NDArray[np.float64]
-    where: str
-    worker: str
-    seconds: float
-    peak: int
+    raw: NDArray[np.float64]  # (ny, nx, channels), the sum of the films' raw storage
+    where: str  # processor and Dr.Jit threads, which decide the last bits
+    worker: str  # address
+    seconds: float  # of work, loading included
+    peak: int  # bytes of the process at most
 
 
 @dataclass(frozen=True)
@@ -174,13 +157,7 @@ def film_of(scene: Any, sensor: Any) -> str:
 
 
 def check_versions(wanted: tuple[str, ...]) -> None:
-    """Refuse to work with other packages than the client's.
-
-    Raises
-    ------
-    DiffractionError
-        Naming both.
-    """
+    """Refuse to work with other packages than the client's."""
     found = versions()
     for name, mine, theirs in zip(_PACKAGES, found, wanted, strict=True):
         if mine != theirs:
@@ -215,18 +192,11 @@ def worker_address() -> str:
 
 @dataclass(frozen=True)
 class SceneFiles:
-    """A scene, its values, and the files that both name.
+    """A scene, its values, and the files that both name."""
 
-    Attributes
-    ----------
-    scene : absolute path of the XML file, on the client.
-    values : parameters by name, sorted.
-    files : absolute paths on the client, with the SHA-256 of their contents.
-    """
-
-    scene: str
-    values: tuple[tuple[str, str], ...]
-    files: tuple[tuple[str, str], ...]
+    scene: str  # absolute path of the XML file, on the client
+    values: tuple[tuple[str, str], ...]  # parameters by name, sorted
+    files: tuple[tuple[str, str], ...]  # absolute paths on the client, SHA-256 of their contents
 
     @classmethod
     def of(cls, scene: Path, values: Mapping[str, str]) -> SceneFiles:

@@ -79,13 +79,7 @@ def connect(
 
 
 def require_dask() -> Any:
-    """The module `distributed`.
-
-    Raises
-    ------
-    DiffractionError
-        If it is not installed.
-    """
+    """The module `distributed`."""
     try:
         import distributed
     except ImportError as error:
@@ -155,13 +149,7 @@ def outcome(future: Any) -> Any:
 
 
 def wait_for_scheduler(client: Any, stop: Stop | None = None) -> None:
-    """Until it answers again, or `stop` is asked.
-
-    Raises
-    ------
-    DiffractionError
-        If it does not.
-    """
+    """Until it answers again, or `stop` is asked."""
     end = time.monotonic() + _PATIENCE
     while client.status != "running" and not (stop and stop.asked):
         if client.status == "closed" or time.monotonic() > end:

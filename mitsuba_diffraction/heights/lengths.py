@@ -53,13 +53,7 @@ def pixel_size_of(value: PixelSize | None, where: str = "pixel_size") -> tuple[f
 
 
 def height_of(value: Height | None) -> float | None:
-    """Height in µm, above 0, from a number or a numeric string; `None` and "auto" give `None`.
-
-    Raises
-    ------
-    DiffractionError
-        If it is no such height.
-    """
+    """Height in µm, above 0, from a number or a numeric string; `None` and "auto" give `None`."""
     if is_auto(value):
         return None
     lengths = numbers_of(value) or ()
@@ -77,13 +71,7 @@ def micrometres_of(unit: str) -> float | None:
 
 
 def height_unit_of(value: str | None) -> str | None:
-    """A unit of length; `None` and "auto" give `None`: the file has to know.
-
-    Raises
-    ------
-    DiffractionError
-        If it is no unit.
-    """
+    """A unit of length; `None` and "auto" give `None`: the file has to know."""
     if is_auto(value):
         return None
     if not isinstance(value, str) or micrometres_of(value) is None:
@@ -98,11 +86,6 @@ def crop_of(value: Crop | None) -> tuple[float, float] | None:
     """Size (width, height) in µm from a number, a pair, "20" or "20, 10".
 
     `None` and "none" give `None`: all of the patch.
-
-    Raises
-    ------
-    DiffractionError
-        If it is none of these.
     """
     if value is None or (isinstance(value, str) and value.strip() == "none"):
         return None

@@ -80,13 +80,7 @@ def crop_line(before: tuple[int, int], after: tuple[int, int], pixel_size: Size)
 
 
 def crop(field: HeightField, size: Size) -> HeightField:
-    """The central region of `size` = (width, height) in µm; its edges need not meet any more.
-
-    Raises
-    ------
-    DiffractionError
-        If that is more than there is, or less than two pixels.
-    """
+    """The central region of `size` = (width, height) in µm; its edges need not meet any more."""
     rows, columns = middle(field.shape, field.pixel_size, size, field.name)
     heights = field.heights[rows, columns]
     if heights.shape == field.shape:

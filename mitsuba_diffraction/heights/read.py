@@ -254,22 +254,18 @@ def _height_scale(
 
 def _missing_lengths(shown: str, height: bool, pixel: bool) -> DiffractionError:
     """What to say of an image that lacks the height of white, or of heights without pixel size."""
-    lacks, names, options, parameters = [], [], [], []
-    if height:
-        lacks.append("how high white is")
-        names.append("max_height")
-        options.append("--max-height 0.375")
-        parameters.append("-D max_height=0.375")
-    if pixel:
-        lacks.append("how large a pixel is")
-        names.append("pixel_size")
-        options.append("--pixel-size 0.05")
-        parameters.append("-D pixel_size=0.05")
+    known = (
+        (height, "how high white is", "max_height", "0.375"),
+        (pixel, "how large a pixel is", "pixel_size", "0.05"),
+    )
+    lacks, names, values = zip(*(words for missing, *words in known if missing), strict=True)
+    examples = dict(zip(names, values, strict=True)).items()
+    options = " ".join(f"--{name.replace('_', '-')} {value}" for name, value in examples)
+    parameters = " ".join(f"-D {name}={value}" for name, value in examples)
     what = " is an image of grey levels and" if height else ""
     return DiffractionError(
         f"{shown}{what} does not say {' nor '.join(lacks)}; give {' and '.join(names)} in µm, for "
-        f"instance {' '.join(options)} (for a scene that has them as parameters, "
-        f"{' '.join(parameters)})"
+        f"instance {options} (for a scene that has them as parameters, {parameters})"
     )
 
 

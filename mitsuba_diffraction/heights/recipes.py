@@ -77,10 +77,7 @@ class Recipe:
                 f"{shown} needs either source, a file, or generator, one of "
                 f"{', '.join(gratings.__all__)}"
             )
-        try:
-            options = LoadOptions.of(**{key: content[key] for key in LOAD_KEYS if key in content})
-        except DiffractionError as error:
-            raise DiffractionError(f"{shown}: {error}") from error
+        options, table = options_and_settings(content, shown)
         sources: tuple[Path, ...] = ()
         arguments: tuple[Mapping[str, Any], ...] = ()
         if "source" in content:
@@ -93,7 +90,7 @@ class Recipe:
             generator=content.get("generator"),
             arguments=arguments,
             options=options,
-            table=_table(content, shown),
+            table=table,
             output=_output(content, file, shown),
         )
 
@@ -139,6 +136,17 @@ class Recipe:
             return make(**arguments)
         except DiffractionError as error:
             raise DiffractionError(f"{str(self.path)!r}: [arguments]: {error}") from error
+
+
+def options_and_settings(
+    content: Mapping[str, Any], where: str
+) -> tuple[LoadOptions, dict[str, Any]]:
+    """How heights are read, and the fields of `TableSettings` that are set, checked one by one."""
+    try:
+        options = LoadOptions.of(**{key: content[key] for key in LOAD_KEYS if key in content})
+        return options, {k: checked(k, content[k]) for k in RECIPE_SETTINGS if k in content}
+    except DiffractionError as error:
+        raise DiffractionError(f"{where}: {error}") from error
 
 
 def _parse(file: Path, shown: str) -> dict[str, Any]:
@@ -208,14 +216,6 @@ def _arguments(content: Mapping[str, Any], shown: str) -> tuple[Mapping[str, Any
         why = "seed is given too" if "seed" in arguments else f"{name!r} takes no seed"
         raise DiffractionError(f"{shown}: seeds: {why}; leave one out")
     return tuple({**arguments, "seed": seed} for seed in seeds)
-
-
-def _table(content: Mapping[str, Any], shown: str) -> dict[str, Any]:
-    """Table parameters, checked one by one."""
-    try:
-        return {key: checked(key, content[key]) for key in RECIPE_SETTINGS if key in content}
-    except DiffractionError as error:
-        raise DiffractionError(f"{shown}: {error}") from error
 
 
 def _output(content: Mapping[str, Any], file: Path, shown: str) -> Path:

@@ -13,18 +13,27 @@ spectrum of (∂_l h)² exp(−iQh). For unpolarised light the power of the firs
 
     |1 + s (c_l r_l + c_t r_t)|²,   c = −Q/4 Σ B* C / Σ |B|²,   r = a* D / |a|²,
 
-s the share of small slope in the model (`blend.weight`), r as in `slope_ratio`. c knows directions
+s the share of small slope in the model (`blend.weight`). c knows directions
 and index alone, is symmetric in ωi and ωo and even in the azimuth between them. It is for
 dielectrics: on metals surface plasmons are a pole of M that no such form has. Lengths over 2π/λ.
+
+r tells hills from pits: with l along an order's q and t across it, r_l = a* D_l/|a|² of the spectra
+of exp(−iκh) and (∂_l h)² exp(−iκh), r_t likewise. A power spectrum knows |a|² alone. Of many orders
+r is Σ a* D / Σ|a|² over a cell of q. Order 0 has none: the first order's is its power. Slopes are
+those of the surface filtered by 1/(1 + (q/23)²), q in rad/µm: what is finer than light does not
+diffract it twice into waves that travel. Where little is left of their variance, as of vertical
+walls, squares of slopes say nothing, hence a gate ρ²/(ρ² + 0.01), ρ what is left.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RegularGridInterpolator
+from scipy.ndimage import map_coordinates
 
 from .fresnel import decaying_root
 
@@ -35,6 +44,10 @@ Real = NDArray[np.float64]
 LIMIT = 0.5
 #: Frequency that slopes are filtered at, 1/(1 + (ξ/F)²): that of light at grazing angles.
 CUTOFF = 2.0
+#: And where the heights' slopes are, rad/µm: this at 550 nm, the same at all wavelengths.
+SLOPE_CUTOFF = 23.0
+#: ρ of a gate that is half open.
+_HALF = 0.1
 #: Nodes of a `CoefficientTable` along θi, θo and the azimuth.
 NODES = 17
 
@@ -44,6 +57,7 @@ _WIDTH, _RADII, _AZIMUTHS = 0.55, 8, 6
 _LEVEL = 0.02
 # Of the equations' trace: at k = k0 both components are one
 _RIDGE = 1e-6
+_NO_CONTRAST = 1e-4
 # Last node, rad: where cosines are 0 so is c, over 0
 _HORIZON = np.radians(89.9)
 
@@ -145,6 +159,8 @@ def slope_coefficients(wi: ArrayLike, wo: ArrayLike, index: complex) -> Complex:
     index : of a dielectric, over that of the medium above it.
     """
     incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    if abs(index - 1.0) < _NO_CONTRAST:  # nothing is reflected, by any order
+        return np.zeros((len(outgoing), 2), complex)
     perturbation, k = Perturbation(incident, index), outgoing[:, None, :2]
     q = incident[:2] + k
     length = np.hypot(q[..., 0], q[..., 1])
@@ -216,3 +232,82 @@ def factor(coefficients: ArrayLike, ratios: ArrayLike, share: ArrayLike) -> Real
     both = np.asarray(coefficients) * np.asarray(ratios)
     added = np.asarray(share) * np.sum(both, axis=-1)
     return np.abs(1.0 + added / np.maximum(1.0, np.abs(added) / LIMIT)) ** 2
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Products of the filtered slopes, (3, ny, nx): xx, xy, yy; and the gate, 0 to 1."""
+
+    products: Real
+    gate: float
+
+    @classmethod
+    def of(
+        cls, heights: ArrayLike, pixel_size: tuple[float, float], weight: Real | float = 1.0
+    ) -> Slopes:
+        """Those of heights (ny, nx) in µm; weight : of points, in the variances."""
+        surface = np.asarray(heights, np.float64)
+        qx, qy = (_frequencies(n, d) for n, d in zip(surface.shape[::-1], pixel_size, strict=True))
+        squares = qx**2 + qy[:, None] ** 2
+        spectrum = np.fft.rfft2(surface)
+        half = spectrum.shape[1]
+        kept = 1.0 / (1.0 + squares[:, :half] / SLOPE_CUTOFF**2)
+        waves = 1j * qx[:half], 1j * qy[:, None]
+        raw = [np.fft.irfft2(wave * spectrum, s=surface.shape) for wave in waves]
+        x, y = (np.fft.irfft2(wave * kept * spectrum, s=surface.shape) for wave in waves)
+        every = float(np.mean((raw[0] ** 2 + raw[1] ** 2) * weight))
+        left = float(np.mean((x**2 + y**2) * weight)) / every if every > 0.0 else 1.0
+        return cls(np.stack([x * x, x * y, y * y]), left**2 / (left**2 + _HALF**2))
+
+
+def _frequencies(count: int, pixel: float) -> Real:
+    """rad/µm of a transform; Nyquist's, whose slope is 0 at the points, as 0."""
+    found = np.asarray(2.0 * np.pi * np.fft.fftfreq(count, pixel), np.float64)
+    if count % 2 == 0:
+        found[count // 2] = 0.0
+    return found
+
+
+def along(q: Real, spectra: Complex) -> Complex:
+    """D_l, D_t (..., 2) of spectra (..., 3) of the products; q (..., 2), not 0."""
+    x, y = np.moveaxis(q, -1, 0) / np.hypot(q[..., 0], q[..., 1])
+    xx, xy, yy = np.moveaxis(spectra, -1, 0)
+    length = x * x * xx + 2.0 * x * y * xy + y * y * yy
+    return np.stack([length, xx + yy - length], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class SlopeRatios:
+    """r of a surface, times its gate, on a grid of q and κ; linear in between.
+
+    Attributes
+    ----------
+    cell : (dqx, dqy), rad/µm.
+    orders : whether a cell is one order, along x and y, and q is rounded to it.
+    kappa : first and last κ, rad/µm, evenly between; beyond them r is that of the nearest.
+    values : (n, 2, ny, nx) complex, l and t; q = 0 is in the middle.
+    """
+
+    cell: tuple[float, float]
+    orders: tuple[bool, bool]
+    kappa: tuple[float, float]
+    values: NDArray[np.complexfloating]
+
+    @property
+    def middle(self) -> tuple[int, int]:
+        """Index of q = 0, along x and y."""
+        _, _, ny, nx = self.values.shape
+        return nx // 2, ny // 2
+
+    def at(self, q: ArrayLike, kappa: ArrayLike) -> Complex:
+        """r_l, r_t (..., 2) at q (..., 2) and κ (...), both in rad/µm."""
+        places, count = np.asarray(q, np.float64) / self.cell + self.middle, len(self.values)
+        places = np.where(self.orders, np.round(places), places)
+        low, high = self.kappa
+        depth = (np.asarray(kappa, np.float64) - low) / (high - low) * (count - 1)
+        each = np.stack(np.broadcast_arrays(depth, places[..., 1], places[..., 0]))
+        found = [
+            map_coordinates(one, each.reshape(3, -1), order=1, mode="nearest")
+            for one in (self.values[:, 0], self.values[:, 1])
+        ]
+        return np.stack(found, axis=-1).reshape(*each.shape[1:], 2).astype(complex)

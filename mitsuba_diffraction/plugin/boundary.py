@@ -18,12 +18,22 @@ import mitsuba as mi
 import numpy as np
 
 from ..optics.blend import NODES_PER_OCTAVE, RoughnessTable
-from .coat import CoatedPair, bounced, transmittances
-from .film import UnderFilm
-from .fresnel import Face, Filmed, Index, amplitudes, faces, squared
+from .fresnel import (
+    Conductor,
+    Dielectric,
+    Face,
+    Filmed,
+    Index,
+    Inside,
+    Perfect,
+    Reflectance,
+    amplitudes,
+    faces,
+    squared,
+)
+from .layers import CoatedPair, UnderFilm, bounced, transmittances
 from .memory import index_between, read_record, upload
 from .pair import Pair, Place
-from .reflectance import Conductor, Dielectric, Inside, Perfect, Reflectance
 from .roles import Float, Interaction, Mask, Number, Spectrum, Vector3f
 
 #: The first is the default of a material with an index.

@@ -106,12 +106,13 @@ transmission : boolean [false]
     Component 0 is what is reflected, 1 what goes through. Orders that change the tangential part by
     more than 2/λ are left out. It excludes coat, film, nested BSDF and shadowing. energy_conserving
     makes R + T 1, since a dielectric loses no light: order 0 is multiplied by c(ωi) c(ωo), c on the
-    directions of both sides, and where that is not enough all is scaled likewise; a few seconds'
-    work, kept in the cache, in steps of 0.01 of eta.
+    directions of both sides, and where that is not enough all is scaled likewise, by at most 1.5²;
+    what is still missing of steep slopes is spread over all directions where some is missing. A few
+    seconds' work, kept in the cache, in steps of 0.01 of eta.
 thin : boolean [false]
     Light goes through a sheet, whose other side is flat; both sides have ext_ior. What that side
     sends back is summed as between two mirrors. Light beyond the sheet's critical angle is lost,
-    unless energy_conserving puts it back, into order 0.
+    unless energy_conserving puts it back, into order 0 first.
 model : string [small_slope]
     `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
     where the surface is rough at the scale of an order; polarised variants have its Mueller
@@ -208,15 +209,13 @@ from ..errors import DiffractionError
 from ..tables.energy.conservation import DirectionalTable
 from .boundary import Boundary, Kirchhoff
 from .changing import Bounded, arrays_within, marks
-from .coat import CoatedPair
 from .energy import EnergyModel
-from .film import UnderFilm
-from .layers import Transmission
+from .fresnel import tinted
+from .layers import CoatedPair, Transmission, UnderFilm
 from .llvm import require_loaded_llvm
 from .pair import Pair, from_patch, in_patch, vcavity
 from .parameters import read_parameters
 from .power import power_model
-from .reflectance import tinted
 from .roles import (
     BSDF,
     Callback,
@@ -477,6 +476,11 @@ class Diffraction(mi.BSDF):
         ]
 
     @property
+    def model(self) -> str:
+        """What the material makes of the light, for people."""
+        return f"{self.boundary}, second order" if self._second_order else str(self.boundary)
+
+    @property
     def only_traced(self) -> str | None:
         """What it has that only the path tracer shows."""
         if self.places is not None:
@@ -527,7 +531,7 @@ class Diffraction(mi.BSDF):
             f"{places}"
             f"  tolerance = {self.table.tolerance:g},\n"
             f"  surface = {self.fresnel},\n"
-            f"  model = {self.boundary}{', second order' if self._second_order else ''},\n"
+            f"  model = {self.model},\n"
             f"  height_scale = {self._varying or f'{dr.slice(self.height_scale):g}'},\n"
             f"  energy_conserving = {'true' if self.energy_conserving else 'false'},\n"
             f"  orientation = {self.orientation},\n"

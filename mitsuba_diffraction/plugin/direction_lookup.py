@@ -122,13 +122,15 @@ class DirectionLookup:
         return [dr.lerp(*both, share - lower) for both in zip(*ends, strict=True)]
 
 
-def scales_of(found: Sequence[DirectionalTable | None]) -> list[DirectionalTable] | None:
-    """s of each, 1 where there is none; nothing if there is none at all."""
+def scales_of(
+    found: Sequence[DirectionalTable | None], otherwise: float = 1.0
+) -> list[DirectionalTable] | None:
+    """s of each, `otherwise` where there is none; nothing if there is none at all."""
     made = next((one for one in found if one is not None), None)
     if made is None:
         return None
-    ones = replace(made, values=np.ones_like(made.values))
-    return [one or ones for one in found]
+    others = replace(made, values=np.full_like(made.values, otherwise))
+    return [one or others for one in found]
 
 
 def _chain(grating: Grating, tangential: Vector2f, wavenumber: Float) -> tuple[Float, Float]:

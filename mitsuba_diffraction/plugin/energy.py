@@ -25,9 +25,9 @@ from ..tables.energy.store import Energy
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, Kirchhoff
 from .direction_lookup import DirectionLookup, alike, between, scales_of
-from .film import UnderFilm, plain
+from .fresnel import Inside, Perfect, Reflectance
+from .layers import UnderFilm, plain
 from .pair import Pair
-from .reflectance import Inside, Perfect, Reflectance
 from .roles import Colour, Float, Vector2f
 
 Array = NDArray[np.float32]

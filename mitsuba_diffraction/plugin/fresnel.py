@@ -1,14 +1,27 @@
-"""Fields at a flat interface, or at both of a film (Dr.Jit): the twin of `optics.fresnel`."""
+"""Interfaces (Dr.Jit), the twin of `optics.fresnel`: what the material reflects, and its fields.
+
+Power reflectance of a dielectric, a conductor or a perfect mirror; fields at a flat interface, or
+at both of a film.
+"""
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
 
-from .roles import Float, Number
+from ..errors import DiffractionError
+from ..optics import fresnel
+from ..optics.colour import metal_tint
+from .changing import Bounded, children
+from .roles import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Spectrum, Texture
 
 
 @dataclass(frozen=True)
@@ -107,3 +120,231 @@ def root(square: Number) -> Number:
     smaller = 0.5 * square.imag / dr.maximum(larger, 1e-20)
     travels = square.real >= 0.0
     return mi.Complex2f(dr.select(travels, larger, smaller), dr.select(travels, smaller, larger))
+
+
+#: Ratios of refractive indices that are taken when one changes.
+INDICES = (1e-3, 1e3)
+
+Array = NDArray[Any]
+#: Wavelengths of a metal's spectrum that its colour is made of, nm.
+_VISIBLE = np.arange(380.0, 780.0)
+
+
+class Perfect:
+    """R = 1 at every angle, `material="none"`."""
+
+    def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
+        """R for the cosine (mi.Float) of the angle to the half vector, mi.UnpolarizedSpectrum."""
+        return mi.UnpolarizedSpectrum(1.0)
+
+    def traverse(self, callback: Callback) -> None:
+        """Nothing to expose."""
+
+    def settle(self) -> None:
+        """Nothing to settle."""
+
+    def __str__(self) -> str:
+        return "none"
+
+
+class Dielectric:
+    """Fresnel reflectance of an interface between two dielectrics, unpolarised.
+
+    Parameters
+    ----------
+    int_ior, ext_ior : indices, or names that Mitsuba knows.
+    name, least : of the ratio as a parameter, and the least that it may become.
+
+    Attributes
+    ----------
+    eta : the ratio.
+    reflects_all : whether there is total reflection: the medium above is the denser one.
+    """
+
+    def __init__(
+        self,
+        int_ior: float | str,
+        ext_ior: float | str,
+        name: str = "eta",
+        least: float = INDICES[0],
+    ) -> None:
+        probe = _load("dielectric", int_ior=int_ior, ext_ior=ext_ior)
+        eta = float(dr.slice(mi.traverse(probe)["eta"]))
+        self._index = Bounded(name, eta, least, INDICES[1], partial(_ratio_refusal, name, least))
+        self.eta = self._index.value
+        self.traverse = self._index.traverse
+        self.settle()
+
+    def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
+        """R for the cosine of the angle to the half vector, the same at every wavelength."""
+        return mi.UnpolarizedSpectrum(mi.fresnel(cos_theta, self.eta)[0])
+
+    def indices(self, si: Interaction, active: Mask) -> list[Number]:
+        """The relative index, one for all channels; complex where there is total reflection."""
+        return [mi.Complex2f(self.eta, 0.0) if self.reflects_all else self.eta]
+
+    def settle(self) -> str | None:
+        """See `Bounded.settle`."""
+        refused = self._index.settle()
+        self.reflects_all = bool(dr.slice(dr.detach(self.eta)) < 1.0)
+        return refused
+
+    def __str__(self) -> str:
+        return f"dielectric[eta = {dr.slice(self.eta):.5g}]"
+
+
+def _ratio_refusal(name: str, least: float, ratio: float) -> str:
+    lowest = "above 0" if least == INDICES[0] else f"at least {least:g}"
+    return (
+        f"{name}={ratio:g}, the ratio of refractive indices, must be {lowest} and at most "
+        f"{INDICES[1]:g}"
+    )
+
+
+class Inside:
+    """A dielectric seen from within, over the medium above it; `Dielectric` of the reciprocal."""
+
+    reflects_all = True
+
+    def __init__(self, outside: Dielectric, thin: bool) -> None:
+        self._outside, self._thin = outside, thin
+
+    def reflectance(self, cosine: Float, si: Interaction, active: Mask) -> Colour:
+        """R for the cosine inside."""
+        return mi.UnpolarizedSpectrum(mi.fresnel(cosine, dr.rcp(self._outside.eta))[0])
+
+    def indices(self, si: Interaction, active: Mask) -> list[Number]:
+        """The index, one for all channels; light from outside is never reflected totally."""
+        index = dr.rcp(self._outside.eta)
+        return [index if self._thin else mi.Complex2f(index, 0.0)]
+
+
+class Conductor:
+    """Fresnel reflectance of a conductor, eta and k as textures over wavelength."""
+
+    def __init__(self, eta: Texture, k: Texture, name: str) -> None:
+        self.eta, self.k, self.name = eta, k, name
+        self.medium: Dielectric | None = None  #: what lies above, if not air
+        # of RGB's channels: the index over wavelengths, and as the channels have it
+        self._spectrum: tuple[Array, Array] | None = None
+        #: Columns of `optics.colour.metal_tint`, in RGB variants and of a tabulated material.
+        self.tint: list[Colour] | None = None
+
+    @classmethod
+    def of_material(cls, material: str, wavelength: float) -> Conductor:
+        """Mitsuba's tabulated conductors, by the names that `roughconductor` takes.
+
+        wavelength : nm, where mono variants take the index; Mitsuba's is a mean over the spectrum.
+        """
+        objects = children(_load("conductor", material=material))
+        if mi.is_monochromatic:
+            objects = {name: _at(material, name, wavelength) for name in ("eta", "k")}
+        made = cls(objects["eta"], objects["k"], material)
+        if mi.is_rgb:
+            index = _tabulated(material, "eta", _VISIBLE) + 1j * _tabulated(material, "k", _VISIBLE)
+            made._spectrum = index, made._channels()
+        return made
+
+    def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
+        """R for the cosine of the angle to the half vector, at si.wavelengths."""
+        indices = self.indices(si, active)
+        return mi.UnpolarizedSpectrum([mi.fresnel_conductor(cos_theta, n) for n in indices])
+
+    def indices(self, si: Interaction, active: Mask) -> list[Number]:
+        """The complex index n + ik of each channel, over that of the medium above."""
+        eta, k = self.eta.eval(si, active), self.k.eval(si, active)
+        if self.medium is not None:
+            eta, k = eta / self.medium.eta, k / self.medium.eta
+        return [mi.Complex2f(n, x) for n, x in zip(eta, k, strict=True)]
+
+    def _channels(self) -> Array:
+        """n + ik of RGB's channels, without a medium."""
+        si = dr.zeros(mi.SurfaceInteraction3f)
+        eta, k = (np.array(dr.detach(one.eval(si, True))).ravel() for one in (self.eta, self.k))
+        return np.asarray(eta + 1j * k)
+
+    def traverse(self, callback: Callback) -> None:
+        """Expose both spectra."""
+        callback.put("eta", self.eta, mi.ParamFlags.Differentiable)
+        callback.put("k", self.k, mi.ParamFlags.Differentiable)
+
+    def settle(self) -> None:
+        """The textures look after themselves; changed, they have no spectrum that is known."""
+        self.tint = None
+        if self._spectrum is None or not np.array_equal(self._channels(), self._spectrum[1]):
+            return
+        medium = 1.0 if self.medium is None else float(dr.slice(dr.detach(self.medium.eta)))
+        spectrum, channels = (fresnel.reflectance(1.0, one / medium) for one in self._spectrum)
+        self.tint = [mi.Color3f(one) for one in metal_tint(_VISIBLE, spectrum, channels).T.tolist()]
+        dr.make_opaque(self.tint)
+
+    def __str__(self) -> str:
+        return f"conductor[{self.name}]"
+
+
+Reflectance = Perfect | Dielectric | Conductor
+
+
+def tinted(value: Spectrum, material: object) -> Spectrum:
+    """Light of a metal, multiplied by its channels' reflectances, as its spectrum would have it."""
+    tint: list[Colour] | None = getattr(material, "tint", None)
+    if tint is None:
+        return value
+
+    def of_channels(channels: Colour) -> Colour:
+        red, green, blue = (column * one for column, one in zip(tint, channels, strict=True))
+        return red + green + blue
+
+    if not mi.is_polarized:
+        return of_channels(value)
+    return mi.Spectrum([[of_channels(value[i, j]) for j in range(4)] for i in range(4)])
+
+
+def _load(plugin: str, **parameters: float | str) -> BSDF:
+    """One of Mitsuba's own BSDFs, which know the names of materials."""
+    try:
+        return mi.load_dict({"type": plugin, **parameters})
+    except Exception as error:  # Mitsuba throws RuntimeError, over several lines
+        given = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
+        reason = " ".join(str(error).split())
+        if plugin == "conductor":
+            raise DiffractionError(_unknown_conductor(str(parameters["material"]))) from error
+        raise DiffractionError(
+            f"{given} is no material that Mitsuba knows ({reason[:200]}); give a number, a name "
+            "from Mitsuba's table of materials, or eta and k"
+        ) from error
+
+
+def _unknown_conductor(material: str) -> str:
+    """That there is no such conductor, and which there are."""
+    names = _conductors()
+    close = difflib.get_close_matches(material.lower(), [name.lower() for name in names], 3, 0.6)
+    listed = [name for name in names if name.lower() in close] or names
+    hint = f"; did you mean {' or '.join(listed)}?" if close else f"; there are {', '.join(names)}"
+    return (
+        f"material={material!r} is no conductor that Mitsuba knows{hint if names else ''} "
+        "(all: Mitsuba's documentation of roughconductor); or give eta and k, or none for R = 1"
+    )
+
+
+def _conductors() -> list[str]:
+    """Names of the tabulated conductors, without those that are another's in Palik's table."""
+    folder = Path(str(mi.file_resolver().resolve("data/ior")))
+    found = {file.name.removesuffix(".eta.spd") for file in folder.glob("*.eta.spd")}
+    return sorted(
+        (name for name in found if name.removesuffix("_palik") not in found - {name}),
+        key=str.lower,
+    )
+
+
+def _at(material: str, name: str, wavelength: float) -> Texture:
+    """Part of a material's index at one wavelength, as a texture."""
+    value = float(_tabulated(material, name, wavelength))
+    return mi.load_dict({"type": "uniform", "value": value})
+
+
+def _tabulated(material: str, name: str, wavelengths: Array | float) -> Array:
+    """Part of a material's index, as Mitsuba has it tabulated."""
+    file = str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd"))
+    nodes, values = np.loadtxt(file).T
+    return np.asarray(np.interp(wavelengths, nodes, values))

@@ -1,16 +1,254 @@
-"""How much light reaches what lies beneath the diffracting surface (Dr.Jit)."""
+"""What lies over the structure, and what beneath it gets (Dr.Jit).
+
+A flat clear coat, the twin of `optics.coat`; a thin film that is coherent with the material, see
+`optics.fresnel.Filmed`; and how much light reaches a nested BSDF.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
+from scipy.interpolate import CubicSpline
 
-from .coat import UnderCoat
-from .film import UnderFilm
-from .reflectance import Reflectance
-from .roles import Colour, Interaction, Mask, Vector3f
+from ..optics.colour import RGB_WAVELENGTHS, linear_srgb, response
+from ..optics.geometry import wavenumber
+from .changing import Bounded
+from .fresnel import Conductor, Dielectric, Filmed, Reflectance, amplitudes, squared
+from .pair import Pair
+from .roles import Callback, Colour, Float, Interaction, Mask, Number, Vector3f
+
+
+class CoatedPair(Pair):
+    """A pair as it is in a coat.
+
+    `uv` and `w` are optical, those of k in vacuum: `w` is n times the sum of the cosines. All else
+    is that of the refracted directions.
+
+    Attributes
+    ----------
+    n : index of the coat over that of the medium above it.
+    """
+
+    def __init__(self, outer: Pair, n: Float) -> None:
+        self._outer, self.n = outer, n
+        self.wi, self.wo = _refracted(outer.wi, n), _refracted(outer.wo, n)
+        self._rotation = outer._rotation
+        self.uv = outer.uv
+        self.cos_i, self.cos_o = self.wi.z, self.wo.z
+        self.w = n * (self.cos_i + self.cos_o)
+        self.one_plus_dot = 0.5 * dr.squared_norm(self.wi + self.wo)
+
+    @property
+    def outer(self) -> Pair:
+        """The pair outside."""
+        return self._outer
+
+
+class UnderCoat:
+    """A material under a coat, as far as flat faces go: what light is not transmitted by both."""
+
+    def __init__(self, material: Dielectric | Conductor, coat: Dielectric) -> None:
+        self.material, self.coat = material, coat
+
+    def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
+        """1 − T T / (1 − R R) of coat and material, for the cosine of the angle outside."""
+        n = self.coat.eta
+        inside = dr.sqrt(dr.maximum(dr.fma(cos_theta, cos_theta, n * n - 1.0), 1e-12)) / n
+        face = self.coat.reflectance(cos_theta, si, active)
+        beneath = self.material.reflectance(inside, si, active)
+        through = (1.0 - face) * (1.0 - beneath)
+        # Mirrors that reflect everything let nothing through
+        return 1.0 - through * dr.rcp(dr.maximum(1.0 - face * beneath, 1e-6))
+
+    def traverse(self, callback: Callback) -> None:
+        """Expose the material's index, and the coat's over that of the medium above it."""
+        self.material.traverse(callback)
+        self.coat.traverse(callback)
+
+    def settle(self) -> str | None:
+        """See `Bounded.settle`."""
+        refused = [line for line in (self.material.settle(), self.coat.settle()) if line]
+        return "; ".join(refused) or None
+
+    def __str__(self) -> str:
+        return f"{self.material} under coat[eta = {dr.slice(self.coat.eta):.5g}]"
+
+
+def transmittances(cosine: Float, n: Float) -> tuple[Float, Float]:
+    """T_s and T_p of the face for light at this angle outside; the same both ways."""
+    inside = dr.safe_sqrt(dr.fma(cosine, cosine, n * n - 1.0))
+    outside = 4.0 * cosine * inside
+    below = dr.fma(n * n, cosine, inside)
+    return outside * dr.rcp(dr.square(cosine + inside)), n * n * outside * dr.rcp(dr.square(below))
+
+
+def bounced(face: tuple[Float, Float], structure: tuple[Float, Float]) -> Float:
+    """G of the light that comes and goes, from R of the face and ρ of the structure for both."""
+    # At Brewster's angle R is 0 to rounding
+    ends = [dr.safe_sqrt(r * rho) for r, rho in zip(face, structure, strict=True)]
+    left = dr.fma(-ends[0], ends[1], 1.0)
+    return dr.rcp(dr.maximum(left, dr.maximum(*structure) * (1.0 - dr.minimum(*face))))
+
+
+def _refracted(direction: Vector3f, n: Float) -> Vector3f:
+    x, y = direction.x / n, direction.y / n
+    # Grazing light would come to lie in the face where the coat is none
+    return mi.Vector3f(x, y, dr.sqrt(dr.maximum(1.0 - dr.fma(x, x, y * y), 1e-12)))
+
+
+#: Path there and back, nm, over which light interferes: λ²/Δλ at 550 nm of a band of 25 nm.
+COHERENCE = 12e3
+#: Power that comes back of light that would see the material alone, below which nobody sees it.
+LEAST_THROUGH = 1e-6
+
+# Ends of what RGB variants sum, nm, and nodes between them a fringe, evenly in 1/λ
+_ENDS, _PER_FRINGE, _LEAST_NODES = (390.0, 710.0), 4, 6
+
+
+@dataclass(frozen=True)
+class Channels:
+    """How RGB variants sum a film's colours: channels are `weights` (3, n) times those at nodes.
+
+    Attributes
+    ----------
+    wavelengths : (n,) nm.
+    """
+
+    wavelengths: list[float]
+    weights: list[list[float]]
+
+    @classmethod
+    def of(cls, path: float) -> Channels:
+        """For fringes of a path there and back (nm): a cubic spline under the sensitivities."""
+        first, last = (1.0 / end for end in _ENDS)
+        count = _LEAST_NODES + math.ceil(_PER_FRINGE * path * (first - last))
+        nodes = np.linspace(last, first, count)
+        dense = np.arange(*_ENDS, 1.0)
+        rows = linear_srgb(response(dense)).T @ CubicSpline(nodes, np.eye(count))(1.0 / dense)
+        return cls((1.0 / nodes).tolist(), (rows / rows.sum(axis=1, keepdims=True)).tolist())
+
+    def sums(self, values: list[Float]) -> list[Float]:
+        """The channels' of values at the nodes; none below 0, as of a colour beyond the gamut."""
+        return [
+            dr.maximum(sum(w * v for w, v in zip(row, values, strict=True)), 0.0)
+            for row in self.weights
+        ]
+
+
+class UnderFilm:
+    """A material under a film; wherever a material is asked for its reflectance or its indices.
+
+    Parameters
+    ----------
+    material : the material itself.
+    film : the real part of the film's index, over that of the medium above it.
+    k : its imaginary part.
+    thickness : nm.
+    wavelength : nm, of mono variants.
+    """
+
+    def __init__(
+        self,
+        material: Dielectric | Conductor,
+        film: Dielectric,
+        k: float,
+        thickness: float,
+        wavelength: float,
+    ) -> None:
+        self.material, self.film, self._fixed = material, film, mi.Float(wavelength)
+        dr.make_opaque(self._fixed)
+        self._k = Bounded("film_k", k, 0.0, math.inf, _refusal)
+        self._thickness = Bounded("film_thickness", thickness, 0.0, COHERENCE, _refusal)
+        self.k, self.thickness = self._k.value, self._thickness.value
+        self.channels: Channels | None = None
+        self._path = -1.0
+        self.settle()
+
+    def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
+        """R of the flat film for the cosine of the angle of incidence, unpolarised."""
+        square = dr.fma(-cos_theta, cos_theta, 1.0)
+        pairs = [amplitudes(cos_theta, square, index) for index in self.indices(si, active)]
+        powers = [0.5 * (squared(r_s) + squared(r_p)) for r_s, r_p in pairs]
+        return mi.UnpolarizedSpectrum(self.summed(powers))
+
+    def indices(self, si: Interaction, active: Mask) -> list[Filmed]:
+        """Of each channel, or in RGB variants of each of the wavelengths that are summed."""
+        found = [_complex(n) for n in self.material.indices(si, active)]
+        waves = self._wavelengths(si)
+        if self.channels is not None:
+            found = _between(found, self.channels.wavelengths)
+        elif len(found) == 1:
+            found *= len(waves)
+        film, depth = mi.Complex2f(self.film.eta, self.k), self.thickness * (2.0 * dr.pi)
+        return [Filmed(n, film, depth * dr.rcp(w)) for n, w in zip(found, waves, strict=True)]
+
+    def summed(self, values: list[Float]) -> list[Float]:
+        """The channels' values of those of `indices`."""
+        return values if self.channels is None else self.channels.sums(values)
+
+    def wavenumbers(self, given: list[Float]) -> list[Float]:
+        """rad/µm of `indices`; given : of the channels."""
+        if self.channels is None:
+            return given
+        return [mi.Float(k) for k in wavenumber(self.channels.wavelengths).tolist()]
+
+    def traverse(self, callback: Callback) -> None:
+        """Expose what the material has, and the film's `film_eta`, `film_k`, `film_thickness`."""
+        for one in (self.material, self.film, self._k, self._thickness):
+            one.traverse(callback)
+
+    def settle(self) -> str | None:
+        """See `Bounded.settle`."""
+        changing = self.material, self.film, self._k, self._thickness
+        refused = [line for line in [one.settle() for one in changing] if line]
+        path = 2.0 * plain(self.film.eta) * plain(self.thickness)
+        # Fewer fringes need no other kernels
+        if mi.is_rgb and path > self._path:
+            self._path, self.channels = path, Channels.of(path)
+        return "; ".join(refused) or None
+
+    def numbers(self) -> tuple[complex, float]:
+        """The film's index and its thickness, nm."""
+        return complex(plain(self.film.eta), plain(self.k)), plain(self.thickness)
+
+    def _wavelengths(self, si: Interaction) -> list[Float]:
+        if self.channels is not None:
+            return [mi.Float(wavelength) for wavelength in self.channels.wavelengths]
+        return list(si.wavelengths) if mi.is_spectral else [self._fixed]
+
+    def __str__(self) -> str:
+        index, thickness = self.numbers()
+        return f"{self.material} under film[eta = {index:.5g}, {thickness:.5g} nm]"
+
+
+def _refusal(value: float) -> str:
+    return (
+        f"film_k or film_thickness={value:g} must be at least 0, and the thickness at most "
+        f"{COHERENCE:g} nm"
+    )
+
+
+def _complex(index: Number) -> Number:
+    return index if dr.is_complex_v(index) else mi.Complex2f(index, 0.0)
+
+
+def _between(found: list[Number], wavelengths: list[float]) -> list[Number]:
+    """An index by red, green and blue at other wavelengths: linear, level beyond the ends."""
+    if len(found) == 1:
+        return found * len(wavelengths)
+    shares = [np.interp(wavelengths, RGB_WAVELENGTHS[::-1], row) for row in np.eye(3)]
+    rows = np.stack(shares[::-1], axis=1).tolist()
+    return [sum(n * w for n, w in zip(found, row, strict=True)) for row in rows]
+
+
+def plain(number: Float) -> float:
+    """A number of all lanes."""
+    return float(dr.slice(dr.detach(number)))
+
 
 LAYERINGS = ("transmission", "thesis")
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import DiffractionError
 from ..tables.expansion import Expansion
-from ..tables.packing import Record, cells_of, functions_at
+from ..tables.layout import Record, cells_of, functions_at
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
 from .memory import PACKET, index_between, packet_size, read_packets, read_record, upload

@@ -12,10 +12,9 @@ import numpy as np
 from ..errors import DiffractionError, DiffractionWarning
 from ..tables.table import DiffractionTable
 from .boundary import MODELS, Boundary, Kirchhoff, SmallSlope
-from .film import COHERENCE, LEAST_THROUGH, UnderFilm
-from .layers import LAYERINGS
+from .fresnel import Conductor, Dielectric, Perfect, Reflectance
+from .layers import COHERENCE, LAYERINGS, LEAST_THROUGH, UnderFilm
 from .properties import choice, flag, number
-from .reflectance import Conductor, Dielectric, Perfect, Reflectance
 from .roles import Properties, Texture
 from .through import LEAST_INDEX
 

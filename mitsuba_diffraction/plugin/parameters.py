@@ -15,13 +15,12 @@ from ..errors import DiffractionError
 from ..heights.field import HeightField
 from ..heights.lengths import is_auto, numbers_of
 from ..heights.read import LoadOptions
-from ..optics.slope_ratio import SlopeRatios
+from ..optics.second_order import SlopeRatios
 from ..settings import COHERENCES, SCENE_SETTINGS, SURFACE, checked
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, SmallSlope
-from .coat import UnderCoat
-from .film import UnderFilm
-from .layers import LAYERINGS, Blend, Layering, Transmission
+from .fresnel import Conductor, Dielectric, Perfect, Reflectance
+from .layers import LAYERINGS, Blend, Layering, Transmission, UnderCoat, UnderFilm
 from .materials import (
     DEFAULT_WAVELENGTH,
     boundary_of,
@@ -34,7 +33,6 @@ from .materials import (
 from .pair import SHADOWINGS
 from .places import TILINGS, Places
 from .properties import choice, flag, kind_of, number
-from .reflectance import Conductor, Dielectric, Perfect, Reflectance
 from .roles import BSDF, Properties
 from .second_order import SecondOrder, material_of_second_order
 from .sides import SidesModel

@@ -145,9 +145,9 @@ def direction_of(tangential: Vector2f) -> Vector3f:
     return mi.Vector3f(tangential.x, tangential.y, cos)
 
 
-def with_even_share(density: Float) -> Float:
+def with_even_share(density: Float, even: Float = EVEN) -> Float:
     """The density of drawing a direction by the orders, and a little evenly."""
-    return dr.lerp(density, dr.inv_two_pi, EVEN)
+    return dr.lerp(density, dr.inv_two_pi, even)
 
 
 def invert(

@@ -14,15 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
-from ..optics.second_order import LIMIT, NODES, coefficient_table
-from ..optics.slope_ratio import SlopeRatios
+from ..optics.second_order import LIMIT, NODES, SlopeRatios, coefficient_table
 from ..settings import COHERENCES
 from .boundary import MODELS, SmallSlope
+from .fresnel import Dielectric, Reflectance
 from .layers import LAYERINGS
 from .memory import index_between, read_record, upload
 from .pair import Pair
 from .properties import flag
-from .reflectance import Dielectric, Reflectance
 from .roles import Float, Index, Kind, Number, Properties
 
 #: Indices are rounded to this, for c.
@@ -41,21 +40,21 @@ def material_of_second_order(props: Properties, material: Reflectance) -> Dielec
     """
     if not flag(props, "second_order", False):
         return None
+    bare = material if isinstance(material, Dielectric) else None
     defaults = {"model": MODELS[0], "coherence": COHERENCES[0], "layering": LAYERINGS[0]}
     excluded = [
+        *([f"the material '{material}'"] if bare is None else []),
         *(f"{name}={props.get(name)}" for name in defaults if _differs(props, name, defaults)),
         *(name for name in ("coat_ior", "film_ior") if name in props),
         *(f"{name}=true" for name in ("thin", "transmission") if flag(props, name, False)),
         *([f"the polarised variant {mi.variant()}"] if mi.is_polarized else []),
     ]
-    if not isinstance(material, Dielectric):
-        excluded = [f"the material '{material}'"]
-    if excluded or not isinstance(material, Dielectric):
+    if excluded:
         raise DiffractionError(
             "second_order=true is for unpolarised light that a bare dielectric reflects, by "
             f"model='small_slope' and coherence='ensemble', not for {excluded[0]}; leave one out"
         )
-    return material
+    return bare
 
 
 def _differs(props: Properties, name: str, defaults: dict[str, str]) -> bool:
@@ -134,8 +133,9 @@ class _Grid:
         floats = np.stack([values.real, values.imag], axis=-1).astype(np.float32)
         floats = floats.reshape(*values.shape[:3], 4)
         self._shape = values.shape[:3]
-        # A node and the next one side by side, so that one packet load fetches both
-        records = np.concatenate([floats[:, :, :-1], floats[:, :, 1:]], axis=-1)
+        # A node and the three next to it side by side, so that one packet load fetches them
+        rows = np.concatenate([floats[:, :, :-1], floats[:, :, 1:]], axis=-1)
+        records = np.concatenate([rows[:, :-1], rows[:, 1:]], axis=-1)
         self._records = upload(kind, records.astype(np.float16) if kind is mi.Float16 else records)
 
     def at(self, places: list[Float]) -> list[Float]:
@@ -146,17 +146,14 @@ class _Grid:
             lower.append(mi.UInt32(first))
             upper.append(dr.clip(place - first, 0.0, 1.0))
         _, rows, columns = self._shape
-        start = (lower[0] * rows + lower[1]) * (columns - 1) + lower[2]
-        ends = []
-        for x in (0, rows):
-            rows_of = [start + (x + y) * (columns - 1) for y in (0, 1)]
-            low, high = (self._between(row, upper[2]) for row in rows_of)
-            ends.append(_lerp(low, high, upper[1]))
+        start = (lower[0] * (rows - 1) + lower[1]) * (columns - 1) + lower[2]
+        ends = [self._between(start + n * (rows - 1) * (columns - 1), upper) for n in (0, 1)]
         return _lerp(ends[0], ends[1], upper[0])
 
-    def _between(self, index: Index, upper: Float) -> list[Float]:
-        both = read_record(self._records, index, 8)
-        return _lerp(both[:4], both[4:], upper)
+    def _between(self, index: Index, upper: list[Float]) -> list[Float]:
+        four = read_record(self._records, index, 16)
+        ends = [_lerp(four[n : n + 4], four[n + 4 : n + 8], upper[2]) for n in (0, 8)]
+        return _lerp(ends[0], ends[1], upper[1])
 
 
 def _lerp(low: list[Float], high: list[Float], upper: Float) -> list[Float]:

@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import DiffractionError
 from .changing import Bounded
 from .memory import index_between
-from .names import name_of
+from .properties import name_of
 from .roles import Callback, Float, Interaction, Mask, Rotation, Texture
 
 #: What `meshes.write_ply` calls a field of directions.

@@ -10,16 +10,24 @@ mirrors leave it. Light that the structure sends beyond the sheet's critical ang
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import drjit as dr
 import mitsuba as mi
 
 from .boundary import Boundary, Jones, Kirchhoff, SmallSlope, mueller
-from .coat import CoatedPair, transmittances
-from .crossing import Crossing, Sides, Turned
-from .crossing_jones import crossing_axes, first_order, out_of_sheet, tangent_plane
-from .fresnel import squared
+from .crossing import (
+    Crossing,
+    Sides,
+    Turned,
+    crossing_axes,
+    first_order,
+    out_of_sheet,
+    tangent_plane,
+)
+from .fresnel import Dielectric, Inside, squared
+from .layers import CoatedPair, transmittances
 from .pair import Pair, Place, from_patch
-from .reflectance import Dielectric, Inside
 from .roles import (
     BSDF,
     Colour,
@@ -81,7 +89,7 @@ class Through:
         """`eval` and `pdf` of the BSDF."""
         cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
         reflects, passes = _asked(ctx)
-        share = self._share(cos_i, si, active, reflects, passes)
+        shares = self._shares(bsdf, ctx, si, active)
         rotation = bsdf.orientation.rotation(si, active)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         scales: list[Colour] = []
@@ -94,7 +102,7 @@ class Through:
                 lit = active & ((cos_i > 0.0) == front) & (cos_i * cos_o > 0.0)
                 found, one = self._reflected(bsdf, ctx, si, wo, rotation, lit, front, change)
                 value = dr.select(lit, found, value)
-                density = dr.select(lit, share * one, density)
+                density = dr.select(lit, shares.of_reflected(one), density)
         if passes:
             lit = active & (cos_i * cos_o < 0.0)
             crossing = Crossing(si, wo, rotation, lit, self.material.eta, self.thin)
@@ -103,10 +111,30 @@ class Through:
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
             scale = bsdf.scale_at(si, active)
             orders = bsdf.power.density(crossing, scale, si) * dr.square(out)
-            density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
+            density = dr.select(lit, shares.of_passed(orders), density)
         if len(scales) > 1:
             value *= mi.Spectrum(scales[1])
+        if len(scales) > 2:
+            value += self._spread(ctx, cos_i, cos_o, scales[2], active, reflects, passes)
         return value, density
+
+    def _spread(
+        self,
+        ctx: Context,
+        cos_i: Float,
+        cos_o: Float,
+        product: Colour,
+        active: Mask,
+        reflects: bool,
+        passes: bool,
+    ) -> Spectrum:
+        """g(ωi) g(ωo) cosθo: what R + T lacks, as the mode of transport has it."""
+        lit = mi.Mask(reflects) & (cos_i * cos_o > 0.0) | mi.Mask(passes) & (cos_i * cos_o < 0.0)
+        factor = dr.abs(cos_o)
+        if not self.thin:
+            end = cos_o if ctx.mode == mi.TransportMode.Importance else cos_i
+            factor *= dr.select(end < 0.0, dr.square(self.material.eta), 1.0)
+        return mi.depolarizer(product * dr.select(mi.Mask(active) & lit, factor, 0.0))
 
     def sample(
         self,
@@ -119,13 +147,14 @@ class Through:
     ) -> tuple[Sample, Spectrum]:
         """`sample` of the BSDF: one of the sides by its flat reflectance, then by the orders."""
         cos_i = mi.Frame3f.cos_theta(si.wi)
-        reflects, passes = _asked(ctx)
         active = mi.Mask(active) & (cos_i != 0.0)
-        share = self._share(cos_i, si, active, reflects, passes)
+        shares = self._shares(bsdf, ctx, si, active)
+        share = shares.reflected
         reflected = sample1 < share
         sample1 = dr.select(
             reflected, sample1 / dr.maximum(share, 1e-6), (sample1 - share) / (1.0 - share + 1e-6)
         )
+        even = dr.select(reflected, *shares.even)
         down, n = cos_i > 0.0, dr.detach(self.material.eta)
         sides = Sides.of(n, self.thin, down)
         inner = mi.Float(1.0) if self.thin else n
@@ -136,14 +165,14 @@ class Through:
         drawn = bsdf.power.draw(
             dr.select(reflected, cosine, sides.cosine(cosine, n, down, self.thin)),
             dr.detach(bsdf.scale_at(si, active) * dr.select(reflected & (cos_i < 0.0), n, 1.0)),
-            dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
+            dr.maximum((sample1 - even) * dr.rcp(dr.maximum(1.0 - even, 1e-6)), 0.0),
             sample2,
             si,
         )
         rotation = bsdf.orientation.rotation(si, active)
         total = sign * from_patch(drawn, rotation) - into * mi.Vector2f(si.wi.x, si.wi.y)
         wo = dr.select(
-            sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), direction_of(total / out)
+            sample1 < even, mi.warp.square_to_uniform_hemisphere(sample2), direction_of(total / out)
         )
         active &= wo.z > 0.0
         wo.z = dr.select(reflected == down, wo.z, -wo.z)
@@ -178,7 +207,7 @@ class Through:
             if self.thin:
                 value += self._returned(bsdf, si, pair, scale, change)
             density = bsdf.power.density(pair, scale, si)
-            return value, with_even_share(density)
+            return value, density
         if self.thin:
             outer = Turned(si, wo, rotation, lit, mi.Float(1.0))
             pair = CoatedPair(outer, n)
@@ -187,13 +216,14 @@ class Through:
             face = bsdf.face(ctx, si, outer, self.mirror, lit)
             value += face if change is None else mi.Spectrum(change) * face
             density = bsdf.power.density(outer, scale * n, si)
-            return value, with_even_share(density)
+            return value, density
         inner = Turned(si, wo, rotation, lit, n)
-        lit &= inner.reached
         power = _changed(bsdf, si, inner.place, scale, change)
+        # not in place: beyond what tables reach there is light that is spread
+        lit = lit & inner.reached
         value = bsdf.lobe(ctx, si, inner, self.below, lit, power) * dr.square(n)
         density = bsdf.power.density(inner, scale * n, si) * dr.square(n)
-        return value, with_even_share(density)
+        return value, density
 
     def _returned(
         self, bsdf: BSDF, si: Interaction, pair: Pair, scale: Float, change: Colour | None
@@ -277,10 +307,26 @@ class Through:
         ]
         return mueller(turned_round, light, about)
 
-    def _share(
-        self, cos_i: Float, si: Interaction, active: Mask, reflects: bool, passes: bool
-    ) -> Float:
-        """Share of the samples that stay on their side: by the flat reflectance."""
+    def _shares(self, bsdf: BSDF, ctx: Context, si: Interaction, active: Mask) -> Shares:
+        """Of the samples: by the flat reflectance, and by what is spread."""
+        reflects, passes = _asked(ctx)
+        cos_i = mi.Frame3f.cos_theta(si.wi)
+        orders = self._share(cos_i, reflects, passes)
+        if self.balance is None or not self.balance.spreads:
+            return Shares(orders, (mi.Float(EVEN), mi.Float(EVEN)))
+        rotation, scale = bsdf.orientation.rotation(si, active), bsdf.scale_at(si, active)
+        above, below = self.balance.shares(si.wi, rotation, bsdf.power.wavenumbers(si), scale)
+        down = cos_i > 0.0
+        stays = dr.select(down, above, below) if reflects else mi.Float(0.0)
+        goes = dr.select(down, below, above) if passes else mi.Float(0.0)
+        even = [
+            dr.fma(part, EVEN, spread) * dr.rcp(dr.maximum(part + spread, 1e-6))
+            for part, spread in ((orders, stays), (1.0 - orders, goes))
+        ]
+        return Shares((orders + stays) * dr.rcp(1.0 + stays + goes), (even[0], even[1]))
+
+    def _share(self, cos_i: Float, reflects: bool, passes: bool) -> Float:
+        """Share of the orders' samples that stay on their side."""
         if not (reflects and passes):
             return mi.Float(1.0 if reflects else 0.0)
         cosine = dr.abs(cos_i) if self.thin else cos_i
@@ -288,6 +334,24 @@ class Through:
         if self.thin:
             flat = 2.0 * flat * dr.rcp(1.0 + flat)
         return dr.clip(flat, _LEAST_SHARE, 1.0 - _LEAST_SHARE)
+
+
+@dataclass(frozen=True)
+class Shares:
+    """Of the samples: those that stay on their side; and the evenly drawn ones of these and of the
+    others.
+    """
+
+    reflected: Float
+    even: tuple[Float, Float]
+
+    def of_reflected(self, density: Float) -> Float:
+        """Density of the samples that stay, from that of the orders'."""
+        return self.reflected * with_even_share(density, self.even[0])
+
+    def of_passed(self, density: Float) -> Float:
+        """That of the others."""
+        return (1.0 - self.reflected) * with_even_share(density, self.even[1])
 
 
 def _changed(

@@ -1,6 +1,6 @@
 """⟨|P|²⟩ with the second order of small slope: each order times its own factor.
 
-Of an order j of a patch r_j = D_j / a_j is exact (`optics.slope_ratio`, whose spectra are
+Of an order j of a patch r_j = D_j / a_j is exact (`optics.second_order`, whose spectra are
 the conjugates of this integral's), and so is c of a pair of directions (`optics.second_order`):
 
     ⟨|P|²⟩ = 4π²σ⁴ Σ_j |a_j|² |1 + s (c_l r_l,j + c_t r_t,j)|² exp(−σ²|q − q_j|²).
@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from ..heights.field import HeightField
 from ..optics.geometry import diffraction_coordinates, wavenumber
-from ..optics.second_order import factor, slope_coefficients
-from ..optics.slope_ratio import Slopes, along
+from ..optics.second_order import Slopes, along, factor, slope_coefficients
 from .integral import plane_waves
 
 Complex = NDArray[np.complex128]

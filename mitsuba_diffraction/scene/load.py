@@ -17,7 +17,7 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning, one_line
-from ..plugin.names import name_of
+from ..plugin.properties import name_of
 from ..plugin.textures import check_attributes
 from .parameters import check_parameters
 

@@ -222,14 +222,7 @@ def _splats(integrator: Any) -> bool:
 
 
 def render_passes(
-    scene: Any,
-    sensor: Any,
-    *,
-    spp: int,
-    seed: int,
-    variant: str,
-    stop: Stop,
-    progress: Progress,
+    scene: Any, sensor: Any, *, spp: int, seed: int, variant: str, stop: Stop, progress: Progress
 ) -> Result:
     """Render `spp` samples per pixel as the average over passes, exactly as one pass would.
 

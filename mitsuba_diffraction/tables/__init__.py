@@ -9,7 +9,7 @@ window             the coherence window, cut to a few taps
 lookup             the NumPy twin of the renderer's look-up
 exr                tables as EXR files
 document           all but the coefficients as plain data, checked when read
-packing            where a table's numbers lie: for NumPy, the plugin and the shaders
+layout             where a table's numbers lie: for NumPy, the plugin and the shaders
 energy             the directional albedo and its bound
 sampling           densities to draw directions from
 colour             the sum over daylight's spectrum

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from ..errors import quoted
 from ..optics.blend import RoughnessTable
-from ..optics.slope_ratio import SlopeRatios
+from ..optics.second_order import SlopeRatios
 from ..settings import BASES, MAX_TAPS, MAX_TERMS, TableSettings
 from .expansion import KINDS, Expansion
-from .packing import Grid
+from .layout import Grid
 from .table import DiffractionTable
 
 #: Largest table, bytes: beyond it no renderer would want it.

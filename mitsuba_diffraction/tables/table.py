@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import DiffractionError
 from ..optics.blend import RoughnessTable
 from ..optics.geometry import sigma_of, wavenumber
-from ..optics.slope_ratio import SlopeRatios
+from ..optics.second_order import SlopeRatios
 from ..settings import TableSettings
 from .expansion import Expansion
-from .packing import Grid
+from .layout import Grid
 
 #: Raised whenever what the coefficients mean changes; tables of another version are refused.
 FORMAT_VERSION = 4
@@ -211,6 +211,7 @@ class DiffractionTable:
             "taps": list(self.grid.taps),
             "orders": [nx, ny],
             **self._restriction(),
+            **({} if self.slope_ratios is None else {"second_order": True}),
             "components": components,
             "precision": str(self.coefficients.dtype),
             "memory_mb": round(self.nbytes / 1e6, 2),

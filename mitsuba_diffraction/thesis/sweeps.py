@@ -28,6 +28,11 @@ _MOST_VALUES = 24
 # Pixels of the reference this much darker than the brightest away from the mirror are unlit.
 _LIT = 1e-4
 
+#: Each is timed so often, in turns; the first of them only warms up.
+_ROUNDS = 3
+# What Mitsuba's spectral variants span, nm.
+_RANGE = (360.0, 830.0)
+
 
 @dataclass(frozen=True)
 class _Kind:
@@ -171,13 +176,7 @@ def _made(
 
 
 def truncated(table: DiffractionTable, terms: int) -> DiffractionTable:
-    """A Taylor table cut off after so many terms, or as it is if it has no more.
-
-    Raises
-    ------
-    DiffractionError
-        If `terms` is no whole number above 0.
-    """
+    """A Taylor table cut off after so many terms, or as it is if it has no more."""
     if terms != int(terms) or terms < 1:
         raise DiffractionError(f"terms={terms} must be a whole number, at least 1")
     count = min(int(terms), table.expansion.terms)
@@ -238,12 +237,6 @@ def _distance(base: BrdfMap, other: BrdfMap) -> tuple[float, float, float, float
     blue = [share[2] / share[0] if share[0] > 0.0 else np.nan for share in shares]
     high = float(np.nanpercentile(apart, 95.0))
     return float(np.nanmean(apart)), high, float(np.nanmean(own)), float(blue[1] / blue[0])
-
-
-#: Each is timed so often, in turns; the first of them only warms up.
-_ROUNDS = 3
-# What Mitsuba's spectral variants span, nm.
-_RANGE = (360.0, 830.0)
 
 
 @dataclass(frozen=True)

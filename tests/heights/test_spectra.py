@@ -1,19 +1,25 @@
-"""Spectra are normalised, and orders lie where gratings throw them."""
+"""Spectra are normalised, orders lie where gratings throw them, a patch's gratings are found."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.ndimage import map_coordinates
 
 from mitsuba_diffraction import HeightField
+from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.gratings import blazed, sinusoidal
 from mitsuba_diffraction.heights.spectra import (
+    dominant_periods,
     far_field,
     frequencies,
     height_spectrum,
     order_powers,
     profile,
 )
+from tests.directions import rough_patch
 
 
 def test_the_spectrum_integrates_to_the_variance():
@@ -65,3 +71,134 @@ def test_nothing_is_seen_beyond_the_horizon():
     radius = np.hypot(sines[None, :], sines[:, None])
     assert np.isnan(light[radius > 1.001]).all()  # the horizon itself is a matter of rounding
     assert np.isfinite(light[radius < 0.999]).all()
+
+
+PIXEL = (0.05, 0.06)
+
+
+def waves(shape, *gratings_, profile=np.cos):
+    """Sum of gratings (period in µm, direction in degrees, depth in µm) on PIXEL."""
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    total = np.zeros(shape)
+    for period, direction, depth in gratings_:
+        turn = np.radians(direction)
+        along = x * PIXEL[0] * np.cos(turn) + y * PIXEL[1] * np.sin(turn)
+        total += depth * profile(2 * np.pi * along / period)
+    return HeightField(total, PIXEL, cut_out=True)
+
+
+def sawtooth(phase):
+    return (phase / (2 * np.pi)) % 1.0
+
+
+def lamellar(duty):
+    return lambda phase: np.where(sawtooth(phase) < duty, 0.5, -0.5)
+
+
+def track(extent, pixels, direction, seed):
+    """A piece of a CD, cut out and turned; its track repeats every 1.6 µm in the direction."""
+    disc, turn, pixel = (
+        gratings.cd(64.0, 1024, seed=seed),
+        np.radians(direction),
+        extent / max(pixels),
+    )
+    y, x = pixel * np.mgrid[: pixels[0], : pixels[1]]
+    across, along = x * np.cos(turn) + y * np.sin(turn), y * np.cos(turn) - x * np.sin(turn)
+    places = [across / disc.pixel_size[1], along / disc.pixel_size[0]]
+    heights = map_coordinates(disc.heights, places, order=1, mode="grid-wrap")
+    return HeightField(heights, pixel, cut_out=True)
+
+
+# The main lobe of a Hann window is four bins wide, and the centre of mass of what is in it is off
+# by a few hundredths of a bin, more with noise: of four repeats and more, less than one per cent,
+# and a hundredth of four is 0.6 degrees.
+PERIOD, DIRECTION = 0.01, 1.0
+
+
+def angle_between(one, other):
+    return abs((one - other + 90) % 180 - 90)
+
+
+@settings(max_examples=25)
+@given(
+    st.floats(0.5, 3.5), st.floats(-89.0, 90.0),
+    st.one_of(st.sampled_from([np.cos, sawtooth]), st.floats(0.25, 0.75).map(lamellar)),
+    st.tuples(st.integers(300, 400), st.integers(300, 400)), st.floats(0.0, 0.5),
+)  # fmt: skip
+def test_periods_to_one_per_cent_and_directions_to_a_degree(
+    period, direction, profile, shape, noise
+):
+    field = waves(shape, (period, direction, 0.1), profile=profile)
+    rough = np.random.default_rng(shape[0]).standard_normal(shape) * noise * field.rms_height
+    found = dominant_periods(HeightField(field.heights + rough, PIXEL, cut_out=True))[0]
+    assert found.period == pytest.approx(period, rel=PERIOD)
+    assert angle_between(found.direction, direction) < DIRECTION
+    if profile is np.cos:
+        assert found.share == pytest.approx(1.0 / (1.0 + noise**2), abs=0.06)
+    elif profile is sawtooth:  # whose harmonics hold 1 − 6/π² of its variance
+        assert found.share == pytest.approx(6 / np.pi**2 / (1.0 + noise**2), abs=0.06)
+
+
+@settings(max_examples=10)
+@given(
+    st.floats(-89.0, 90.0), st.integers(0, 20), st.floats(20.0, 40.0),
+    st.tuples(st.integers(300, 400), st.integers(300, 400)),
+)  # fmt: skip
+def test_a_disc_s_track_is_found_in_whatever_direction(direction, seed, extent, shape):
+    # a dozen tracks and more: the pits are random, and below their data outweigh some bins
+    found = dominant_periods(track(extent, shape, direction, seed))[0]
+    assert found.period == pytest.approx(1.6, rel=PERIOD)
+    assert angle_between(found.direction, direction) < DIRECTION
+
+
+def test_crossed_gratings_are_two_the_stronger_first():
+    found = dominant_periods(waves((400, 380), (1.2, 80.0, 0.05), (0.8, -5.0, 0.1)))
+    assert [one.period for one in found] == pytest.approx([0.8, 1.2], rel=0.01)
+    assert [one.share for one in found] == pytest.approx([0.8, 0.2], abs=0.02)
+
+
+def test_a_scale_s_bending_does_not_hide_its_fingers():
+    scale = gratings.xenopeltis_like(32.0, 512)
+    bending = rough_patch((512, 512), (0.0625, 0.0625), 0.1, correlation=3.0).heights
+    for heights in (scale.heights, scale.heights + bending):
+        found = dominant_periods(HeightField(heights, 0.0625))[0]
+        assert found.period == pytest.approx(0.6, rel=0.05)  # stretched by some per cent
+        assert abs(found.direction) < 2.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rough_surfaces_have_none(seed):
+    rough = rough_patch((160, 200), (0.1, 0.1), 0.2, correlation=0.4 * (1 + seed % 3), seed=seed)
+    assert dominant_periods(rough) == []
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (2, 400), (400, 2), (3, 5)])
+def test_tiny_and_flat_patches_are_answered(shape):
+    assert dominant_periods(HeightField(np.zeros(shape), 0.1)) == []
+    found = dominant_periods(waves(shape, (2.0, 0.0 if shape[1] > 5 else 90.0, 0.1)))
+    if max(shape) > 5:
+        assert [one.period for one in found] == pytest.approx([2.0], rel=0.01)
+
+
+def test_the_measured_scale_has_its_fingers(shared_afm):
+    patch = HeightField.load(shared_afm / "elaphe-65um.png", pixel_size=65 / 1332, max_height=0.375)
+    (found,) = dominant_periods(patch)
+    assert found.period == pytest.approx(1.04, rel=0.03)  # a plain FFT shows some 1 µm
+    assert abs(found.direction) < 3.0
+
+
+def test_the_measured_scale_is_within_the_spread_of_its_windows(shared_afm):
+    patch = HeightField.load(shared_afm / "elaphe-65um.png", pixel_size=65 / 1332, max_height=0.375)
+    (whole,) = dominant_periods(patch)
+    width, step = 328, 251  # 16 µm, fifteen fingers
+    found = []
+    for top in range(0, 1332 - width + 1, step):
+        for left in range(0, 1332 - width + 1, step):
+            part = patch.heights[top : top + width, left : left + width]
+            first = dominant_periods(HeightField(part, patch.pixel_size, cut_out=True))[0]
+            found.append((first.period, first.direction))
+    assert len(found) == 25
+    for value, mean, spread in zip(
+        (whole.period, whole.direction), np.mean(found, 0), np.std(found, 0), strict=True
+    ):
+        assert abs(value - mean) < spread

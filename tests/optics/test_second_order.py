@@ -8,11 +8,12 @@ import pytest
 from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.optics.second_order import (
     Perturbation,
+    Slopes,
+    along,
     factor,
     interpolated,
     slope_coefficients,
 )
-from mitsuba_diffraction.optics.slope_ratio import Slopes, along
 from tests.directions import polar, rough_patch
 
 KERATIN = 1.56
@@ -32,6 +33,10 @@ def test_across_and_along_are_one_where_light_keeps_its_direction():
     wi = polar(1e-4, 0.0)
     along_x, across = slope_coefficients(wi, np.array([[0.0, 0.0, 1.0]]), KERATIN)[0]
     assert along_x == pytest.approx(across, rel=1e-3)
+
+
+def test_without_contrast_there_is_nothing():
+    assert slope_coefficients(polar(50.0), polar(25.0, 140.0)[None], 1.0) == pytest.approx(0.0)
 
 
 def test_the_first_order_is_the_boundary_s():

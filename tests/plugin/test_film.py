@@ -14,7 +14,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.colour import linear_srgb, response
 from mitsuba_diffraction.optics.fresnel import Filmed, reflectance
-from mitsuba_diffraction.plugin.film import Channels
+from mitsuba_diffraction.plugin.layers import Channels
 from tests.directions import as_single, polar
 from tests.lanes import evaluated, interaction, refusal
 from tests.plugin.conftest import runs

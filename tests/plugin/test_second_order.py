@@ -19,7 +19,10 @@ pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.Diffraction
 #: Of 1.7 × 1.76 µm, its orders far apart under the window.
 PATCH = rough_patch((22, 20), (0.085, 0.08), 0.1)
 WIDTH = 16.0
-KERATIN = {"int_ior": 1.56, "ext_ior": 1.0, "coherence_width": WIDTH, "tolerance": 1e-3}
+KERATIN = {
+    "int_ior": 1.56, "ext_ior": 1.0, "coherence_width": WIDTH, "tolerance": 1e-3,
+    "energy_conserving": False,
+}  # fmt: skip
 
 
 def load(field=PATCH, **parameters):
@@ -73,7 +76,26 @@ def test_it_is_reciprocal_and_leaves_the_mirror_direction(variant):
     assert brdf_values(bsdf, *mirrored) == pytest.approx(brdf_values(plain, *mirrored), rel=1e-4)
 
 
-@pytest.mark.parametrize("name", ["scalar_rgb", "scalar_spectral", "llvm_ad_rgb"])
+@pytest.mark.parametrize("theta", [0.0, 60.0, 85.0])
+def test_directions_are_drawn_as_without_it_and_light_is_kept(variant, theta):
+    si, n = interaction(np.tile(polar(theta, 30.0), (1 << 15, 1)), 550.0), 1 << 15
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(1, n)
+    numbers = sampler.next_1d(), sampler.next_2d()
+    drawn, weights = zip(
+        *(
+            load(second_order=second).sample(mi.BSDFContext(), si, *numbers)
+            for second in (False, True)
+        ),
+        strict=True,
+    )
+    assert np.array_equal(drawn[0].pdf, drawn[1].pdf)
+    without, found = (np.array(one)[0] for one in weights)
+    assert found.mean() == pytest.approx(without.mean(), abs=0.005)
+    assert np.all(found <= 2.2501 * without + 1e-9)
+
+
+@pytest.mark.parametrize("name", ["scalar_spectral", "llvm_ad_rgb"])
 def test_other_variants_have_it_too(name):
     mi.set_variant("llvm_ad_spectral")
     spectral, changed = _of_one()
@@ -93,7 +115,7 @@ def _of_one():
     si.sh_frame = mi.Frame3f(mi.Normal3f(0, 0, 1))
     if mi.is_spectral:
         si.wavelengths = [460.0, 510.0, 560.0, 610.0]
-    bsdfs = load(second_order=False), load()
+    bsdfs = (load(second_order=second, coherence_width=6.0) for second in (False, True))
     return [np.array(bsdf.eval(mi.BSDFContext(), si, wo), float).ravel() for bsdf in bsdfs]
 
 
@@ -123,10 +145,10 @@ def test_another_index_has_other_coefficients(variant):
     light = coloured()
     bsdf = load()
     parameters = mi.traverse(bsdf)
-    parameters["eta"] = mi.Float(1.9)
+    parameters["eta"] = mi.Float(1.8)
     parameters.update()
     assert brdf_values(bsdf, *light) == pytest.approx(
-        brdf_values(load(int_ior=1.9), *light), rel=1e-5
+        brdf_values(load(int_ior=1.8), *light), rel=1e-5
     )
 
 

@@ -120,9 +120,11 @@ def test_the_density_is_that_of_the_samples_on_both_sides(
     assert test.histogram_sum[0] > 0.01, test.messages
 
 
-def sampled(bsdf: Any, theta: float, count: int = 1 << 15) -> tuple[Array, Array]:
-    """Weights of samples at 550 nm, of light from above, and which are reflected."""
-    si = interaction(np.tile(as_single(polar(theta, 20.0)), (count, 1)), 550.0)
+def sampled(
+    bsdf: Any, theta: float, count: int = 1 << 15, azimuth: float = 20.0
+) -> tuple[Array, Array]:
+    """Weights of samples at 550 nm, and which are reflected."""
+    si = interaction(np.tile(as_single(polar(theta, azimuth)), (count, 1)), 550.0)
     rng = mi.PCG32(count)
     one, two = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
     context = mi.BSDFContext(mi.TransportMode.Importance)
@@ -137,8 +139,10 @@ def sampled(bsdf: Any, theta: float, count: int = 1 << 15) -> tuple[Array, Array
     transmits = int(mi.BSDFFlags.GlossyTransmission)
     passed = np.array(found.sampled_type) == transmits
     assert np.all(np.array(found.sampled_component) == passed)
-    assert np.array(found.wo.z)[valid & passed].max() < 0.0
-    assert np.array(found.eta)[passed][0] == pytest.approx(1.5 if "thin" not in str(bsdf) else 1.0)
+    down = theta < 90.0
+    assert np.all((np.array(found.wo.z)[valid & passed] < 0.0) == down)
+    eta = 1.0 if "thin" in str(bsdf) else 1.5 if down else 1 / 1.5
+    assert np.array(found.eta)[passed][0] == pytest.approx(eta)
     return weights, ~passed
 
 

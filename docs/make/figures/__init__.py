@@ -6,8 +6,7 @@ pictures                pictures: heights and their light, BRDF maps, the scenes
 gallery                 a picture of every scene, and the pages that show them
 tables                  tables of what `bench`, `tradeoff`, `plan` and `info --energy` measured
 realtime                tables of what `compare` measured
-evaluation, sweeps      pages about the methods: the grating equation, one parameter at a time
-methods                 the table of docs/methods.md
+evaluation, thesis      pages about the thesis' methods: the grating equation; a table, and sweeps
 cluster, wide           a film on workers; a scan of 16,384² points, whole and by windows
 parameters              the reference of the plugin's parameters, from its own docstring
 notebooks               notebooks, run anew

@@ -38,21 +38,13 @@ TASKS, PIXELS, CHANNELS = 2000 * 320 // 8, 1024 * 640, 4
 
 @dataclass(frozen=True)
 class Costs:
-    """Seconds and bytes of a task.
+    """Seconds of a task."""
 
-    Attributes
-    ----------
-    work, spread : of a worker, and its standard deviation.
-    scheduler : of the scheduler, for one task after the other.
-    client : of the client: to receive, write, read and add a sum.
-    transfer : of the client's network, for a sum.
-    """
-
-    work: float
-    spread: float
-    scheduler: float
-    client: float
-    transfer: float
+    work: float  # of a worker
+    spread: float  # standard deviation of that
+    scheduler: float  # of the scheduler, for one task after the other
+    client: float  # of the client: to receive, write, read and add a sum
+    transfer: float  # of the client's network, for a sum
 
 
 def simulate(workers: int, tasks: int, costs: Costs, ahead: int = 3, seed: int = 0) -> float:
@@ -91,21 +83,16 @@ def film_seconds(
 ) -> tuple[float, dict[str, Any]]:
     """Seconds of the command for so many frames, start included, and its report."""
     with tempfile.TemporaryDirectory() as folder:
-        return _film_seconds(scene, Path(folder), frames, more)
-
-
-def _film_seconds(
-    scene: Path, folder: Path, frames: int, more: Sequence[str]
-) -> tuple[float, dict[str, Any]]:
-    report = folder / "report.json"
-    command = [
-        sys.executable, "-m", "mitsuba_diffraction", "render", str(scene), "--frames", str(frames),
-        "-m", "llvm_ad_rgb", "-D", "resx=240", "-D", "resy=200", "-s", "32", "--no-progress",
-        "--animate", "lamp_azimuth=0:90", "-o", str(folder / "film"), "--json", str(report), *more,
-    ]  # fmt: skip
-    start = time.perf_counter()
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    return time.perf_counter() - start, json.loads(report.read_text("utf-8"))
+        report = Path(folder, "report.json")
+        command = [
+            sys.executable, "-m", "mitsuba_diffraction", "render", str(scene),
+            "--frames", str(frames), "-m", "llvm_ad_rgb", "-D", "resx=240", "-D", "resy=200",
+            "-s", "32", "--no-progress", "--animate", "lamp_azimuth=0:90",
+            "-o", str(Path(folder, "film")), "--json", str(report), *more,
+        ]  # fmt: skip
+        start = time.perf_counter()
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        return time.perf_counter() - start, json.loads(report.read_text("utf-8"))
 
 
 def client_seconds(count: int = 20) -> float:

@@ -3,7 +3,7 @@
     python -m docs.make.figures.evaluation -o docs/evaluation.md \\
         --measured elaphe.png --pixel-size 0.0488 --max-height 0.375
 
-The picture goes to `images/evaluation.png` beside the page, the numbers between its pages.
+The picture goes to `images/evaluation.png` beside the page, the numbers between its markers.
 """
 
 from __future__ import annotations
@@ -60,24 +60,14 @@ class Evaluated:
 
 @dataclass(frozen=True)
 class Periods:
-    """Periods of one patch.
+    """Periods of one patch, µm."""
 
-    Attributes
-    ----------
-    name : of the patch.
-    by_method : the methods' responses and fits.
-    given : period that it is made with, µm, or `None`.
-    windows : mean, spread, smallest and largest period of single windows, µm.
-    count : number of those windows.
-    thesis : period that the procedure of the thesis finds, µm; NaN if none.
-    """
-
-    name: str
-    by_method: dict[str, Evaluated]
-    given: float | None
-    windows: tuple[float, float, float, float]
-    count: int
-    thesis: float
+    name: str  # of the patch
+    by_method: dict[str, Evaluated]  # the methods' responses and fits
+    given: float | None  # period that it is made with
+    windows: tuple[float, float, float, float]  # mean, spread, smallest, largest of single windows
+    count: int  # number of those windows
+    thesis: float  # period that the procedure of the thesis finds; NaN if none
 
 
 def exact_gratings() -> list[tuple[HeightField, float | None]]:

@@ -35,21 +35,14 @@ _MESHES = ".venv/bin/python -m scenes.make"
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture of a page.
+    """A picture of a page."""
 
-    Attributes
-    ----------
-    page : the page's name, and that of its pages.
-    name : of the picture's file.
-    title, text : what it shows.
-    commands : what makes it, the last one writing it; files are made in `out`.
-    """
-
-    page: str
-    name: str
+    page: str  # the page's name, and that of its markers
+    name: str  # of the picture's file
+    # title, text: what it shows
     title: str
     text: str
-    commands: tuple[str, ...]
+    commands: tuple[str, ...]  # what makes it, the last one writing it; files are made in `out`
 
     @property
     def file(self) -> Path:
@@ -213,18 +206,7 @@ def as_typed(command: str) -> str:
 
 
 def make(picture: Picture, target: Path, scenes: Path) -> None:
-    """Run a picture's commands, and write it.
-
-    Parameters
-    ----------
-    target : the file to write.
-    scenes : folder of the scenes.
-
-    Raises
-    ------
-    DiffractionError
-        If a command fails, or the picture cannot be written or is too large.
-    """
+    """Run a picture's commands, and write it."""
     with tempfile.TemporaryDirectory() as temporary:
         for command in picture.commands:
             words = [

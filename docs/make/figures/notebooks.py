@@ -27,13 +27,7 @@ _TIMEOUT = 300
 
 
 def execute(path: Path) -> Any:
-    """The notebook with the outputs that it has now; its file stays as it is.
-
-    Raises
-    ------
-    DiffractionError
-        If it cannot be read, a cell fails, or the extra `notebooks` is missing.
-    """
+    """The notebook with the outputs that it has now; its file stays as it is."""
     try:
         import nbclient
         import nbformat

@@ -1,6 +1,7 @@
 """What the programs of this folder share: parts of pages, renderings as JPEG, measurements, errors.
 
-Generated parts of Markdown files stand between `<!-- begin NAME -->` and its end.
+Generated parts of Markdown files stand between `<!-- begin NAME -->` and its end. What is missing,
+damaged or cannot be written is a DiffractionError, which `exit_code` prints in one line.
 """
 
 from __future__ import annotations
@@ -29,13 +30,7 @@ _QUALITIES = (90, 86, 82, 78, 74, 70, 64, 58)
 
 
 def replaced(text: str, name: str, content: str) -> str:
-    """The text with the part of that name replaced; the markers stay.
-
-    Raises
-    ------
-    DiffractionError
-        If the markers are missing, twice there, or the wrong way round.
-    """
+    """The text with the part of that name replaced; the markers stay."""
     begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
     if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
         raise DiffractionError(f"expected '{begin}' and then '{end}', once each")
@@ -45,13 +40,7 @@ def replaced(text: str, name: str, content: str) -> str:
 
 
 def part(text: str, name: str) -> str:
-    """What stands between the markers of that name.
-
-    Raises
-    ------
-    DiffractionError
-        If they are missing.
-    """
+    """What stands between the markers of that name."""
     begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
     if begin not in text or end not in text:
         raise DiffractionError(f"expected '{begin}' and '{end}'")
@@ -59,13 +48,7 @@ def part(text: str, name: str) -> str:
 
 
 def update(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
-    """Replace parts of a file by name.
-
-    Raises
-    ------
-    DiffractionError
-        If the file or a marker is missing, or it cannot be written.
-    """
+    """Replace parts of a file by name."""
     file = Path(path)
     text = _read(file)
     for name, content in parts.items():
@@ -78,13 +61,7 @@ def update(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
 
 
 def update_present(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
-    """Replace those parts that a file has markers for.
-
-    Raises
-    ------
-    DiffractionError
-        If it has none, or as in `update`.
-    """
+    """Replace those parts that a file has markers for."""
     text = _read(Path(path))
     present = {name: part for name, part in parts.items() if f"<!-- begin {name} -->" in text}
     if not present:
@@ -118,11 +95,6 @@ def write_jpeg(
     target : the JPEG.
     width : of the result in pixels; None keeps it.
     most : size in bytes that is not exceeded, at the price of quality.
-
-    Raises
-    ------
-    DiffractionError
-        If the source cannot be read, or the target not be written or made so small.
     """
     try:
         with Image.open(source) as opened:
@@ -154,13 +126,7 @@ def add_measured(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def measured_patch(args: argparse.Namespace) -> HeightField | None:
-    """The patch that these options name, or None.
-
-    Raises
-    ------
-    DiffractionError
-        If it cannot be read.
-    """
+    """The patch that these options name, or None."""
     if args.measured is None:
         return None
     return HeightField.load(args.measured, pixel_size=args.pixel_size, max_height=args.max_height)
@@ -173,11 +139,6 @@ def from_json(file: Path, make: Callable[[Any], Made], *, writer: str, remedy: s
     ----------
     make : takes the document; what it misses there shows that this is another file.
     writer, remedy : the command that writes such files, and what to do if this is none.
-
-    Raises
-    ------
-    DiffractionError
-        If the file is missing or something else.
     """
     try:
         return make(json.loads(file.read_text(encoding="utf-8")))

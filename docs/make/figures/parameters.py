@@ -32,19 +32,13 @@ _MODEL, _EXAMPLE = "\nThe model is ", "\nXML and the same in Python:\n"
 
 @dataclass(frozen=True)
 class Parameter:
-    """One entry: usually one parameter, sometimes two that belong together.
+    """One entry: usually one parameter, sometimes two that belong together."""
 
-    Attributes
-    ----------
-    names : of the parameters; "(nested)" for an object of any name.
-    type, default, text : as the docstring has them; the default is empty if there is none.
-    differentiable : whether all of them are.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the parameters; "(nested)" for an object of any name
+    # type, default, text: as the docstring has them
     type: str
-    default: str
-    differentiable: bool
+    default: str  # empty if there is none
+    differentiable: bool  # whether all of them are
     text: str
 
 
@@ -54,13 +48,7 @@ def docstring() -> str:
 
 
 def groups(text: str) -> dict[str, list[Parameter]]:
-    """The parameters that a docstring describes, by the heading above them.
-
-    Raises
-    ------
-    DiffractionError
-        If a line within a group is no part of an entry.
-    """
+    """The parameters that a docstring describes, by the heading above them."""
     _, *parts = _GROUP.split(text.partition(_MODEL)[0])
     return {heading: _entries(body) for heading, body in zip(parts[::2], parts[1::2], strict=True)}
 

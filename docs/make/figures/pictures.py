@@ -95,19 +95,7 @@ def _perfect_reflector(field: HeightField) -> Any:
 def render_snakes(
     folder: Path, scenes: Path, *, spp: int, size: tuple[int, int] = _SIZE
 ) -> list[Path]:
-    """Render all `SNAKES` to JPEG files in `folder`.
-
-    Parameters
-    ----------
-    scenes : folder of the scenes.
-    spp : samples per pixel.
-    size : pixels, width and height.
-
-    Raises
-    ------
-    DiffractionError
-        If the scenes are missing, a rendering fails, or a picture cannot be written.
-    """
+    """Render all `SNAKES` to JPEG files in `folder`."""
     written = []
     for name, (scene, azimuth) in SNAKES.items():
         file = scenes / scene

@@ -83,12 +83,7 @@ def _of_sheet(folder: Path) -> str:
 
 
 def scenes_table(documents: Sequence[dict[str, Any]]) -> str:
-    """How far `lut` and `spectral` are off in some scenes, over all pixels.
-
-    Parameters
-    ----------
-    documents : what is in each compare.json.
-    """
+    """How far `lut` and `spectral` are off in some scenes, over all pixels."""
     head = "| scene |" + "".join(
         f" `{m}`, ΔE2000 mean | 99 % | noise, mean | 99 % |" for m in _OURS
     )

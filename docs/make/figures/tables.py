@@ -27,23 +27,15 @@ from .pages import exit_code, from_json
 
 @dataclass(frozen=True)
 class Figure:
-    """One line of the table.
+    """One line of the table of speed."""
 
-    Attributes
-    ----------
-    section, row : how the section's title and the row's name begin.
-    words : what is said of it.
-    column : of the row.
-    pattern : how the number is written.
-    goal : which of the row's goals is for this number.
-    """
-
+    # section, row: how the section's title and the row's name begin
     section: str
     row: str
-    words: str
-    column: str
-    pattern: str
-    goal: int | None = None
+    words: str  # what is said of it
+    column: str  # of the row
+    pattern: str  # how the number is written
+    goal: int | None = None  # which of the row's goals is for this number
 
 
 _ROUGH, _DEFAULT = "× roughconductor", "diffraction, the defaults"
@@ -80,17 +72,7 @@ FIGURES = (
 
 
 def speed(measured: dict[str, Any], name: str = "") -> dict[str, str]:
-    """What was measured on which machine, and the goals.
-
-    Parameters
-    ----------
-    measured : what `bench --json` wrote.
-
-    Raises
-    ------
-    DiffractionError
-        If a part was not measured.
-    """
+    """What was measured on which machine, and the goals."""
     machine = measured["machine"]
     head = f"Measured by `make bench` on {machine['cores']} cores ({machine['processor']})"
     versions = f"Mitsuba {machine['mitsuba']}, version {machine['mitsuba_diffraction']}"
@@ -126,12 +108,7 @@ _SETTINGS = (
 
 
 def tradeoff(measured: dict[str, Any], name: str = "") -> dict[str, str]:
-    """Errors, times and sizes by setting; sums over the spectrum.
-
-    Parameters
-    ----------
-    measured : the content of `tradeoff.json`.
-    """
+    """Errors, times and sizes by setting; sums over the spectrum."""
     settings = measured["settings"]
     machine = measured["machine"]
     where = f"{measured['patch']}; {machine['cores']} cores ({machine['processor']})"
@@ -174,12 +151,7 @@ _PICTURE = "picture, planned against whole, same random numbers"
 
 
 def plan(report: dict[str, Any], name: str = "") -> dict[str, str]:
-    """`planned` in a sentence, `plan` in full.
-
-    Parameters
-    ----------
-    report : what `plan --json` wrote.
-    """
+    """`planned` in a sentence, `plan` in full."""
     table, picture = report["tables"][0], report[_PICTURE]
     whole, planned = table["whole"], table["planned"]
     asked, needs = table["asked for"], table["needs"]
@@ -253,21 +225,14 @@ def _range(ends: Sequence[float]) -> str:
 
 @dataclass(frozen=True)
 class Part:
-    """What one command measured.
+    """What one command measured."""
 
-    Attributes
-    ----------
-    tables : Markdown by the name of its markers, from a document and the name of its file.
-    pages : those that have the markers.
-    writer, remedy : the command that writes such documents, and what to do about another file.
-    pictures : that lie beside a document named as the part is, in a folder.
-    """
-
+    # Markdown by the name of its markers, from a document and the name of its file
     tables: Callable[[dict[str, Any], str], dict[str, str]]
-    pages: tuple[str, ...]
-    writer: str
-    remedy: str
-    pictures: tuple[str, ...] = ()
+    pages: tuple[str, ...]  # those that have the markers
+    writer: str  # the command that writes such documents
+    remedy: str  # what to do about another file
+    pictures: tuple[str, ...] = ()  # that lie beside a document named as the part is, in a folder
 
 
 PARTS = {

@@ -11,8 +11,7 @@ import numpy as np
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.optics import blend, boundary
 from mitsuba_diffraction.optics.geometry import wavenumber
-from mitsuba_diffraction.optics.second_order import factor, interpolated
-from mitsuba_diffraction.optics.slope_ratio import SlopeRatios
+from mitsuba_diffraction.optics.second_order import SlopeRatios, factor, interpolated
 from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.build.slope_ratios import slope_ratios
 

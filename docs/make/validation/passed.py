@@ -81,7 +81,7 @@ def _kept(
     sides, scale = _scale(grating, wavelength)
     ends = (theta, phi), (np.arccos(-found.wo[:, 2]), np.arctan2(found.wo[:, 1], found.wo[:, 0]))
     product = np.ones(len(found.wo))
-    for n, one in enumerate(scale or []):
+    for n, one in enumerate((scale or [])[:4]):
         changes = product * sides.at(one, n % 2, *ends[n % 2], wavelength)
         zeroth = (found.order == 0).all(axis=1)
         product = np.where(zeroth | (n > 1), changes, product)  # c is order 0's alone
@@ -147,9 +147,11 @@ Coherent over the default 65 µm, by default: {_wide(surfaces)}.
 Between the scale's directions and wavelengths R + T is looked at too, and the scale lowered where
 that is above 1. Orders come and go there: of a sheet that is a grating at the nodes of its scale,
 if its lobes are narrow; within a dielectric, just beyond the critical angle, between them, and
-there 2 to 4 % are lost. Of steep walls, as a blazed grating's, first order is so far off that s
-would have to be a thousand for R + T to be 0.92 everywhere (reciprocity alone forbids nothing
-here); since it multiplies colours too, it is at most 1.5, and what is left over is lost."""
+there 2 to 4 % are lost, of steep walls more. What s, which multiplies colours and is at most 1.5,
+leaves out is spread over all directions where some is missing: of these surfaces the blazed
+grating's, up to 0.16 of a sheet's light and half of the light within a dielectric beyond the
+critical angle. It cannot be order 0's: what is missing along one direction, and not along those
+that order 0 goes to, no reciprocal model can give to order 0."""
 
 
 def _wide(surfaces: dict[str, Callable[[], HeightField]]) -> str:

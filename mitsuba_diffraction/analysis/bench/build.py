@@ -61,14 +61,7 @@ def cases(plan: Plan) -> Iterator[Case]:
 
 
 def measure_builds(plan: Plan, folder: Path, progress: Progress) -> Section:
-    """Build each of the cases once.
-
-    Parameters
-    ----------
-    plan : sizes.
-    folder : where heights are kept between processes.
-    progress : called as progress(done, total, text).
-    """
+    """Build each of the cases once."""
     todo = list(cases(plan))
     rows = []
     for n, case in enumerate(todo):

@@ -66,18 +66,7 @@ def ratio(a: Sequence[float], b: Sequence[float]) -> float:
 
 
 def saved_bsdf(table: str | os.PathLike[str], **parameters: Any) -> Any:
-    """The plugin with a table.
-
-    Parameters
-    ----------
-    table : the file.
-    parameters : any other parameter of the plugin.
-
-    Raises
-    ------
-    DiffractionError
-        If the file is no table.
-    """
+    """The plugin with a table."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
         return mi.load_dict({"type": "diffraction", "table": str(table), **parameters})
@@ -134,6 +123,7 @@ DEFAULT = "diffraction, the defaults"
 DEFAULT_AL = "diffraction, Al"
 KIRCHHOFF = "diffraction, kirchhoff"
 KIRCHHOFF_AL = "diffraction, Al, kirchhoff"
+SECOND_ORDER = "diffraction, second order"
 COARSE = "diffraction, tolerance 1e-2"
 ONE_WINDOW = "diffraction, patch"
 ON_SURFACE = "diffraction, surface"
@@ -171,6 +161,7 @@ def build_tables(
         patch = gratings.elaphe_like(plan.pixels * PIXEL, plan.pixels)
     settings: dict[str, dict[str, Any]] = {
         "default": {},
+        "second order": {"second_order": True},
         "1e-2": {"tolerance": 1e-2},
         "patch": {"coherence": "patch"},
         # no tolerance could be met by this
@@ -210,6 +201,7 @@ def bsdf_factories(tables: Tables) -> dict[str, Callable[[], Any]]:
         KIRCHHOFF: ours("default", model="kirchhoff"),
         DEFAULT_AL: ours("default", material="Al"),
         KIRCHHOFF_AL: ours("default", material="Al", model="kirchhoff"),
+        SECOND_ORDER: ours("second order", second_order=True),
         COARSE: ours("1e-2"),
         ONE_WINDOW: ours("patch"),
         ON_SURFACE: ours("patch", coherence="surface", uv_scale=1e4),

@@ -47,6 +47,20 @@ _BASELINES = {
     "× roughconductor": ALUMINIUM, "× defaults": DEFAULT, "× patch": ONE_WINDOW, "× gathers": FLOOR,
 }  # fmt: skip
 
+#: What reflects, and whether the goals are for it.
+MATERIALS: dict[str, tuple[dict[str, Any], bool]] = {
+    "dielectric 1.5": ({}, True),
+    "none": ({"material": "none"}, True),
+    "aluminium": ({"material": "Al"}, True),
+    "gold": ({"material": "Au"}, False),
+}
+# Of the comparison of colours.
+_LIGHTS = ((0.0, 0.0), (30.0, 0.0), (30.0, 90.0), (60.0, 45.0))
+_STEP = 2.5  # nm
+_SUN = (-0.4, 0.6, 0.8)  # towards it
+_RAYS = 4  # along each side of a pixel
+_COLUMNS = ("mean ΔE2000", "99th percentile", "pixels")
+
 
 def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
     """Nanoseconds for `eval` of four wavelengths, of every contender and of the bare gathers."""
@@ -131,15 +145,12 @@ def _nanoseconds(
 
 
 def _conditions(plan: Plan, tables: Tables) -> str:
+    wavelengths = len(mi.Spectrum(0.0))
     return (
-        f"{mi.variant()}, {plan.lanes} random pairs of directions, {_wavelengths()} wavelengths a "
+        f"{mi.variant()}, {plan.lanes} random pairs of directions, {wavelengths} wavelengths a "
         f"call, {tables.patch} pixels; kernels alone, medians of {plan.rounds} "
         "rounds through all rows, ratios within a round"
     )
-
-
-def _wavelengths() -> int:
-    return len(mi.Spectrum(0.0))
 
 
 def _section(
@@ -157,20 +168,6 @@ def _section(
         raw = {"ns": taken, "lanes": lanes[name]}
         rows.append(Row(name, values, goals.get(name, ()), raw))
     return Section(title, (_TIMES, *baselines), rows)
-
-
-#: What reflects, and whether the goals are for it.
-MATERIALS: dict[str, tuple[dict[str, Any], bool]] = {
-    "dielectric 1.5": ({}, True),
-    "none": ({"material": "none"}, True),
-    "aluminium": ({"material": "Al"}, True),
-    "gold": ({"material": "Au"}, False),
-}
-_LIGHTS = ((0.0, 0.0), (30.0, 0.0), (30.0, 90.0), (60.0, 45.0))
-_STEP = 2.5  # nm
-_SUN = (-0.4, 0.6, 0.8)  # towards it
-_RAYS = 4  # along each side of a pixel
-_COLUMNS = ("mean ΔE2000", "99th percentile", "pixels")
 
 
 def measure_colours(

@@ -20,6 +20,8 @@ PIXEL = 65.0 / 1332
 #: The numbers that directions and wavelengths are drawn with.
 SEED = 20140113
 
+_PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit", "numpy", "scipy")
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -124,13 +126,7 @@ def _number(value: float | None) -> str:
 
 
 def read_run(path: Path) -> dict[str, Any]:
-    """What `bench --json` wrote.
-
-    Raises
-    ------
-    DiffractionError
-        If the file is missing or something else.
-    """
+    """What `bench --json` wrote."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
         if isinstance(found["sections"], list) and isinstance(found["machine"], dict):
@@ -164,9 +160,6 @@ def _numbers(run: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str, str], flo
         for row in section["rows"]:
             for column, value in row["values"].items():
                 yield (name, row["name"], column), value
-
-
-_PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit", "numpy", "scipy")
 
 
 def describe_machine() -> dict[str, Any]:

@@ -21,6 +21,16 @@ from ..maps.result import Light
 from .contenders import Tables, ratio, rounds_of
 from .figures import SEED, Goal, Plan, Row, Section
 
+#: Of noise: angle of incidence in degrees, relative standard deviation that one sample may have.
+_GOALS = {0.0: 0.6, 45.0: 0.8, 75.0: 1.2}
+_AZIMUTHS = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)
+_WAVELENGTHS = (450.0, 550.0, 650.0)
+#: Samples a pixel of the rendering in which bright pixels are looked for.
+_FIREFLY_SPP = 64
+# Of the snake's scene.
+_COLUMNS = ("ms", "ns/sample", "× roughconductor")
+_SKIN, _ROUGH = "the skin diffracts, pigment beneath", "the skin is roughconductor, Al"
+
 
 def furnace(bsdf: Any, resolution: int) -> Any:
     """A ball that fills the picture's circle, under the same light from everywhere."""
@@ -60,13 +70,7 @@ def pigment(scenes: Path) -> dict[str, Any]:
 
 
 def snake(bsdf: Any, scenes: Path, width: int, height: int, light: dict[str, Any]) -> Any:
-    """The coiled snake without the ground.
-
-    Raises
-    ------
-    DiffractionError
-        If the mesh is missing.
-    """
+    """The coiled snake without the ground."""
     mesh = scenes / "meshes" / "elaphe.ply"
     _check_there(mesh)
     above = mi.ScalarTransform4f().look_at(
@@ -86,13 +90,7 @@ def snake(bsdf: Any, scenes: Path, width: int, height: int, light: dict[str, Any
 
 
 def snake_scene(scenes: Path, tables: Tables, **parameters: str) -> Any:
-    """`snake.xml` with the default table.
-
-    Raises
-    ------
-    DiffractionError
-        If it is missing.
-    """
+    """`snake.xml` with the default table."""
     file = scenes / "snake.xml"
     _check_there(file)
     return mi.load_file(str(file), patch=str(tables.paths["default"]), **parameters)
@@ -123,11 +121,6 @@ def rays(scene: Any, side: int) -> tuple[int, Any]:
         (mi.Float(pixel // width) + (mi.Float(part // side) + 0.5) / side) / height,
     )
     return width * height, sensor.sample_ray(0.0, 0.5, position, mi.Point2f(0.5))[0]
-
-
-def share_of(scene: Any, shape: Any) -> float:
-    """Share of the pixels that see the shape."""
-    return float(pixels_of(scene, shape).mean())
 
 
 def _check_there(file: Path) -> None:
@@ -165,15 +158,6 @@ def _window_map(rows: int = 128) -> np.ndarray[Any, np.dtype[np.float32]]:
     top, left = int(35 * degree), int(200 * degree)
     light[top : top + int(20 * degree), left : left + int(20 * degree)] = 30.0
     return light
-
-
-#: Angle of incidence in degrees: relative standard deviation that one sample may have.
-_GOALS = {0.0: 0.6, 45.0: 0.8, 75.0: 1.2}
-_AZIMUTHS = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)
-_WAVELENGTHS = (450.0, 550.0, 650.0)
-
-#: Samples a pixel of the rendering in which bright pixels are looked for.
-_FIREFLY_SPP = 64
 
 
 def measure_noise(plan: Plan, tables: Tables, progress: Progress) -> Section:
@@ -318,17 +302,13 @@ def _luminance(picture: Any) -> Any:
     return rgb @ np.array([0.2126, 0.7152, 0.0722])
 
 
-_COLUMNS = ("ms", "ns/sample", "× roughconductor")
-_SKIN, _ROUGH = "the skin diffracts, pigment beneath", "the skin is roughconductor, Al"
-
-
 def measure_snake(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> Section:
     """Time to render the snake's scene as it is, and with `roughconductor` for its skin."""
     size = {"resx": str(2 * plan.resolution), "resy": str(5 * plan.resolution // 4)}
     made = {name: snake_scene(scenes, tables, **size) for name in (_SKIN, _ROUGH)}
     rough = mi.load_dict({"type": "twosided", "b": {"type": "roughconductor", "material": "Al"}})
     skin_of(made[_ROUGH]).set_bsdf(rough)
-    covered = share_of(made[_SKIN], skin_of(made[_SKIN]))
+    covered = pixels_of(made[_SKIN], skin_of(made[_SKIN])).mean()
     calls = {name: partial(render_seconds, scene, plan) for name, scene in made.items()}
     rounds = max(3, plan.rounds // 2)
     seconds = rounds_of(calls, rounds, lambda done, total: progress(done, total, "snake"))

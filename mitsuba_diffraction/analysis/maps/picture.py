@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
 
-
 #: Polar angles of the thin circles, degrees; the horizon, 90, is drawn stronger.
 _CIRCLES = (30, 60)
 #: What the marks of `draw` mean.
@@ -34,6 +33,10 @@ _SMALLEST_AXES = 4.8
 _TEXT, _SUN = "#303030", "#e0c060"
 # What is this close to the mirror direction stays free of marks.
 _LOBE = 0.1
+# Of contact sheets: side of a map, inches, and maps in a row.
+_SMALLEST_SIDE, _MOST_COLUMNS = 2.3, 4
+#: The attribute that says what an EXR's map is of. One string: OpenEXR keeps numbers as floats.
+ATTRIBUTE = "brdf_map"
 
 
 def draw(
@@ -141,10 +144,6 @@ def signed(stops: float) -> str:
     return f"{stops:+g}".replace("-", "−")
 
 
-_SMALLEST_SIDE = 2.3  # inches, of a map
-_MOST_COLUMNS = 4
-
-
 def contact_sheet(
     maps: Sequence[BrdfMap],
     titles: Sequence[str],
@@ -186,10 +185,6 @@ def contact_sheet(
     figure.suptitle(f"{title}{how}", fontsize=10, y=1.0 - 0.12 / height, va="top")
     figure.text(0.1 / width, 0.08 / height, LEGEND, fontsize=7, color="#303030")
     return figure
-
-
-#: The attribute that says what an EXR's map is of. One string: OpenEXR keeps numbers as floats.
-ATTRIBUTE = "brdf_map"
 
 
 def save_png(

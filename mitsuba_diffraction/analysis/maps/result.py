@@ -12,6 +12,24 @@ from ...errors import DiffractionError
 from ...optics.colour import encode_srgb, linear_srgb
 from ...optics.geometry import check_angles
 
+Image = NDArray[np.float32]
+Reals = NDArray[np.float64]
+
+#: nm. A finer step than this shows nothing: even a tenth of it moves no order by a pixel.
+FINEST_STEP = 0.1
+# Stops for a map without any light.
+_NO_EXPOSURE = 0.0
+# Less than this share of the light, beside the mirror's lobe, is not worth an exposure.
+_WORTH_SHOWING = 1e-3
+# At most this share of the map may be this many times as bright as white.
+_CLIPPED, _CLIPPED_FROM = 1e-3, 8.0
+#: Names of sextants of hue, from red on, each 60° wide in HSV; and of what has next to none.
+HUES = ("red", "yellow", "green", "cyan", "blue", "magenta")
+#: Saturation below which a colour counts as grey.
+GREY = 0.1
+# Of the brightest direction's luminance: what is below has no colour to speak of.
+_DARK = 1e-9
+
 
 @dataclass(frozen=True)
 class Light:
@@ -48,10 +66,6 @@ class Light:
 
     def __str__(self) -> str:
         return f"θ = {self.theta:g}°, φ = {self.phi:g}°"
-
-
-#: nm. A finer step than this shows nothing: even a tenth of it moves no order by a pixel.
-FINEST_STEP = 0.1
 
 
 @dataclass(frozen=True)
@@ -120,16 +134,6 @@ class Bands:
         if self.is_single:
             return f"{self.low:g} nm"
         return f"{self.low:g}–{self.high:g} nm in steps of {self.width:.4g} nm"
-
-
-Image = NDArray[np.float32]
-
-# Stops for a map without any light.
-_NO_EXPOSURE = 0.0
-# Less than this share of the light, beside the mirror's lobe, is not worth an exposure.
-_WORTH_SHOWING = 1e-3
-# At most this share of the map may be this many times as bright as white.
-_CLIPPED, _CLIPPED_FROM = 1e-3, 8.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -226,16 +230,6 @@ class BrdfMap:
         centres = (np.arange(n) + 0.5) * (2.0 / n) - 1.0
         x, y, _ = self.light.mirror
         return np.hypot(centres[None, :] - x, centres[:, None] - y) > self.lobe + 2.0 / n
-
-
-#: Names of sextants of hue, from red on, each 60° wide in HSV; and of what has next to none.
-HUES = ("red", "yellow", "green", "cyan", "blue", "magenta")
-#: Saturation below which a colour counts as grey.
-GREY = 0.1
-# Of the brightest direction's luminance: what is below has no colour to speak of.
-_DARK = 1e-9
-
-Reals = NDArray[np.float64]
 
 
 def iridescence(brdf_map: BrdfMap) -> float:

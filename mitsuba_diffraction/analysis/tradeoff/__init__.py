@@ -19,13 +19,6 @@ from .measuring import Measured, Setting, measure, settings
 from .report import Budget, recommended
 
 __all__ = [
-    "Budget",
-    "Measured",
-    "Setting",
-    "lit_pairs",
-    "measure",
-    "measure_depths",
-    "measure_wavelengths",
-    "recommended",
-    "settings",
-]
+    "Budget", "Measured", "Setting", "lit_pairs", "measure", "measure_depths",
+    "measure_wavelengths", "recommended", "settings",
+]  # fmt: skip

@@ -21,6 +21,18 @@ from ...tables.table import DiffractionTable, q_limit_of
 
 Array = NDArray[np.float64]
 
+#: nm between the samples of a sum.
+STEPS = (2.0, 5.0, 10.0, 20.0, 40.0)
+#: Wavelengths of one ray.
+COUNTS = (1, 2, 4, 8, 16)
+_FIRST, _LAST, _FINEST = 380.0, 780.0, 0.5  # nm
+_DRAWS = 256  # rays for each pair
+#: Terms of the thesis' shaders.
+TERMS = 37
+#: Normal incidence and return at 380 nm: the largest κ of the visible.
+KAPPA = q_limit_of((380.0, 780.0))
+_SIDE, _PIXEL = 48, 0.1  # of the patch that is made deeper: pixels, µm
+
 
 @dataclass(frozen=True, eq=False)
 class Sample:
@@ -125,15 +137,6 @@ def lit_pairs(
     return wi, wo, lam, near
 
 
-#: nm between the samples of a sum.
-STEPS = (2.0, 5.0, 10.0, 20.0, 40.0)
-#: Wavelengths of one ray.
-COUNTS = (1, 2, 4, 8, 16)
-
-_FIRST, _LAST, _FINEST = 380.0, 780.0, 0.5  # nm
-_DRAWS = 256  # rays for each pair
-
-
 @dataclass(frozen=True)
 class Spectral:
     """Errors of sums, and noise of rays."""
@@ -189,14 +192,6 @@ def _important(u: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
     """Mitsuba's wavelengths (nm) and their density: after Radziszewski et al. 2009."""
     lam = 538.0 - np.arctanh(0.8569106254698279 - 1.8275019724092267 * u) * 138.88888888888889
     return lam, 0.003939804229326285 / np.cosh(0.0072 * (lam - 538.0)) ** 2
-
-
-#: Terms of the thesis' shaders.
-TERMS = 37
-#: Normal incidence and return at 380 nm: the largest κ of the visible.
-KAPPA = q_limit_of((380.0, 780.0))
-
-_SIDE, _PIXEL = 48, 0.1
 
 
 @dataclass(frozen=True)

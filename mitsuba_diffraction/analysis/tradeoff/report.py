@@ -18,6 +18,9 @@ from .measuring import Measured, rows
 
 _ALIKE = 1.1  # times differ by as much from one run to the next
 
+_HEAD = "  error  plugin's  ΔE2000    99 %  × roughconductor   taps  terms      MB   s"
+_MARKS = "osD^vP*Xp<>h"
+
 
 @dataclass(frozen=True)
 class Budget:
@@ -75,9 +78,6 @@ def recommended(results: Sequence[Measured], budget: Budget) -> Measured:
     return min(as_fast, key=lambda one: one.megabytes)
 
 
-_HEAD = "  error  plugin's  ΔE2000    99 %  × roughconductor   taps  terms      MB   s"
-
-
 def plain(results: list[Measured], depths: Depths) -> dict[str, Any]:
     """All settings, and the errors over depth."""
     return {
@@ -91,13 +91,7 @@ def plain(results: list[Measured], depths: Depths) -> dict[str, Any]:
 
 
 def save_csv(path: Path, settings: Sequence[Mapping[str, Any]]) -> None:
-    """Write the settings of `plain`, a row each.
-
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be written.
-    """
+    """Write the settings of `plain`, a row each."""
     with (
         atomic_path(path) as temporary,
         temporary.open("w", newline="", encoding="utf-8") as file,
@@ -141,9 +135,6 @@ def lines(
         f"recommended{f' ({asked})' if asked else ''}: {said}: error {best.error:.1e}, "
         f"{best.relative:.1f} × roughconductor, {best.megabytes:.1f} MB"
     )
-
-
-_MARKS = "osD^vP*Xp<>h"
 
 
 def draw_trade(results: Sequence[Measured], path: Path, title: str) -> None:

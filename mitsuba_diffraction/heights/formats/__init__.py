@@ -21,30 +21,16 @@ from ...errors import DiffractionError
 
 @dataclass
 class RawHeights:
-    """Heights as one file holds them.
+    """Heights as one file holds them, before lengths and treatments are settled."""
 
-    Attributes
-    ----------
-    values
-        Shape (ny, nx), y upwards (`values[0]` is y = 0). In `unit`, or in [0, 1] if `relative`;
-        points without data are NaN.
-    pixel_size
-        (dx, dy) in µm if the file says so.
-    relative
-        The values are fractions of a full scale that the file does not know.
-    notes
-        One line per choice that the reader made.
-    unit
-        µm in one unit of the values; `None` if the file does not say, or says no length.
-    stated
-        That unit as the file states it; "" if the values are in µm because files of this kind are.
-    """
-
+    # (ny, nx), y upwards (`values[0]` is y = 0), in `unit`, or in [0, 1] if `relative`; points
+    # without data are NaN
     values: npt.NDArray[np.floating]
-    pixel_size: tuple[float, float] | None = None
-    relative: bool = False
-    notes: tuple[str, ...] = ()
-    unit: float | None = 1.0
+    pixel_size: tuple[float, float] | None = None  # (dx, dy) in µm if the file says so
+    relative: bool = False  # the values are fractions of a full scale that the file does not know
+    notes: tuple[str, ...] = ()  # one line per choice that the reader made
+    unit: float | None = 1.0  # µm in one unit of the values; None if the file says no length
+    # that unit as the file states it; "" if the values are in µm because files of this kind are
     stated: str = ""
 
 

@@ -18,6 +18,11 @@ from . import RawHeights, first_line
 
 _BLOCK = 1 << 22  # values
 
+_MISSING = {"", "nan", "na", "n/a", "bad", "none", "null", "-", "--", "inf", "-inf"}
+# Lines that Gwyddion and others put above an exported matrix: "# Width: 10.00 µm".
+_SIZE = re.compile(r"[#;%\s]*(Width|Height)\s*[:=]\s*([-+.\deE]+)\s*(\S+)\s*$", re.IGNORECASE)
+_VALUES = re.compile(r"[#;%\s]*Value units\s*[:=]\s*(\S+)\s*$", re.IGNORECASE)
+
 
 def read_npy(path: Path) -> RawHeights:
     """Read heights in µm from an NPY file of shape (ny, nx), taken as it is: row 0 is y = 0.
@@ -67,12 +72,6 @@ def _copied(path: Path, values: np.ndarray) -> np.ndarray:
             result[start : start + rows] = mapped[start : start + rows]
     result.setflags(write=False)
     return result
-
-
-_MISSING = {"", "nan", "na", "n/a", "bad", "none", "null", "-", "--", "inf", "-inf"}
-# Lines that Gwyddion and others put above an exported matrix: "# Width: 10.00 µm".
-_SIZE = re.compile(r"[#;%\s]*(Width|Height)\s*[:=]\s*([-+.\deE]+)\s*(\S+)\s*$", re.IGNORECASE)
-_VALUES = re.compile(r"[#;%\s]*Value units\s*[:=]\s*(\S+)\s*$", re.IGNORECASE)
 
 
 def read_text(path: Path) -> RawHeights:

@@ -28,7 +28,7 @@ import numpy.typing as npt
 from ..field import HeightField
 from ..lengths import Counts, Lengths, count_pair, length_pair, number_between, seed_of
 from .fingers import ramp
-from .noise import FloatArray, grain, rounded
+from .noise import FloatArray, Rng, grain, rounded
 
 _SHORTEST_RUN, _LONGEST_RUN = 3, 11  # channel bits
 # λ of P(n) = λ⁻ⁿ: the root above 1 of Σ λ⁻ⁿ = 1 over n = 3..11; 2 to the capacity, 0.5418 bit
@@ -143,7 +143,7 @@ def _disc(
 
 
 def _track(
-    rng: np.random.Generator, disc: Format, length: float, x: FloatArray, irregularity: float
+    rng: Rng, disc: Format, length: float, x: FloatArray, irregularity: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The pit nearest to each x (nx,) on a track around the patch, as a stadium.
 
@@ -171,7 +171,7 @@ def _track(
     return ahead[np.arange(x.size), nearest], aside[nearest], half[nearest]
 
 
-def _runs(rng: np.random.Generator, bits: int) -> npt.NDArray[np.int64]:
+def _runs(rng: Rng, bits: int) -> npt.NDArray[np.int64]:
     """An even number of run lengths, 3 to 11, that add up to `bits`, at least 6."""
     lengths = np.arange(_SHORTEST_RUN, _LONGEST_RUN + 1)
     chance = _GROWTH ** -lengths.astype(np.float64)

@@ -14,12 +14,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from .noise import FloatArray, sample_field, smooth_field
+from .noise import FloatArray, Pair, Rng, sample_field, smooth_field
 
 # Sweeps that even out the columns around an inserted one, and the one after which columns that are
 # still too close to another are taken out. Enough for what remains to be spread over a few columns.
 _SWEEPS = 60
 _THINNING = 40
+
+# A sheet is drawn until it is this many lengths from its tips; by then others lie over it.
+_DRAWN = 2.35
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ class Row:
     rise: FloatArray  # height of the finger above the others
 
 
-def lay_out(rng: np.random.Generator, extent: tuple[float, float], layout: Layout) -> list[Row]:
+def lay_out(rng: Rng, extent: Pair, layout: Layout) -> list[Row]:
     """Rows of fingers that fill the patch of `extent` (Lx, Ly), lowest y first."""
     width, height = extent
     n_rows = max(1, round(height / layout.row_pitch))
@@ -85,9 +88,7 @@ def lay_out(rng: np.random.Generator, extent: tuple[float, float], layout: Layou
     return rows
 
 
-def _columns(
-    rng: np.random.Generator, extent: tuple[float, float], n_rows: int, layout: Layout
-) -> list[FloatArray]:
+def _columns(rng: Rng, extent: Pair, n_rows: int, layout: Layout) -> list[FloatArray]:
     """Tips' x per row: even columns and extra ones that last for some rows, then swayed."""
     width, height = extent
     extra = round(layout.faults * width * height)
@@ -112,9 +113,7 @@ def _columns(
     return swayed
 
 
-def _along_rows(
-    field: FloatArray, extent: tuple[float, float], rows: list[FloatArray]
-) -> list[FloatArray]:
+def _along_rows(field: FloatArray, extent: Pair, rows: list[FloatArray]) -> list[FloatArray]:
     """Values of a periodic field at the tips of every row, before rows are bent."""
     sizes = [x.size for x in rows]
     y = np.repeat(np.arange(len(rows)) * (extent[1] / len(rows)), sizes)
@@ -154,10 +153,6 @@ def _around(difference: FloatArray, width: float) -> FloatArray:
     return difference - width * np.round(difference / width)
 
 
-# A sheet is drawn until it is this many lengths from its tips; by then others lie over it.
-_DRAWN = 2.35
-
-
 @dataclass(frozen=True)
 class Blade:
     """Shape of a finger and of the sheet that it grows from; heights in µm below its crest.
@@ -184,7 +179,7 @@ class Blade:
 
 
 def overlay(
-    rows: list[Row], extent: tuple[float, float], serration: FloatArray, blade: Blade
+    rows: list[Row], extent: Pair, serration: FloatArray, blade: Blade
 ) -> tuple[FloatArray, FloatArray]:
     """Upper envelope of all sheets over the patch and the distance to the next edge above.
 
@@ -210,7 +205,7 @@ def _lay(
     distance: FloatArray,
     row: Row,
     x: FloatArray,
-    extent: tuple[float, float],
+    extent: Pair,
     serration: FloatArray,
     blade: Blade,
 ) -> None:

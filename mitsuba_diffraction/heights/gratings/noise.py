@@ -9,14 +9,15 @@ import numpy.typing as npt
 from scipy.ndimage import gaussian_filter, map_coordinates, spline_filter1d
 
 FloatArray = npt.NDArray[np.float64]
+Rng = np.random.Generator
+#: Along x and y, µm: the size of a patch above all.
+Pair = tuple[float, float]
+#: (ny, nx) pixels.
+Shape = tuple[int, int]
 
 
 def smooth_field(
-    rng: np.random.Generator,
-    extent: tuple[float, float],
-    correlation: tuple[float, float],
-    slope: float,
-    detail: float = 4.0,
+    rng: Rng, extent: Pair, correlation: Pair, slope: float, detail: float = 4.0
 ) -> FloatArray:
     """Periodic Gaussian field whose power falls as (1 + |ql|²)^(−slope/2), of unit variance.
 
@@ -42,9 +43,7 @@ def smooth_field(
     return np.fft.irfft2(waves, (my, mx)) / math.sqrt(float((response**2).sum()))
 
 
-def sample_field(
-    field: FloatArray, extent: tuple[float, float], x: FloatArray, y: FloatArray
-) -> FloatArray:
+def sample_field(field: FloatArray, extent: Pair, x: FloatArray, y: FloatArray) -> FloatArray:
     """Values of a periodic `field` (my, mx) over `extent` at points in µm, by cubic splines."""
     my, mx = field.shape
     at = (y * (my / extent[1]), x * (mx / extent[0]))
@@ -75,12 +74,7 @@ def _spline_rows(field: FloatArray, at: FloatArray) -> FloatArray:
     return result
 
 
-def grain(
-    rng: np.random.Generator,
-    extent: tuple[float, float],
-    shape: tuple[int, int],
-    size: tuple[float, float],
-) -> FloatArray:
+def grain(rng: Rng, extent: Pair, shape: Shape, size: Pair) -> FloatArray:
     """White noise blurred to grains of `size` (σ along x, along y, µm), of unit variance.
 
     Drawn per pixel, so a seed gives another texture at another resolution, with the same statistics

@@ -18,7 +18,17 @@ from scipy.ndimage import gaussian_filter1d
 from ..field import HeightField
 from ..lengths import Counts, Lengths, count_pair, length_pair, number_between, seed_of
 from .fingers import Blade, Layout, Row, lay_out, overlay, ramp
-from .noise import FloatArray, grain, on_pixels, rounded, sample_field, smooth_field
+from .noise import (
+    FloatArray,
+    Pair,
+    Rng,
+    Shape,
+    grain,
+    on_pixels,
+    rounded,
+    sample_field,
+    smooth_field,
+)
 
 # Creases and bends are drawn on a grid of this many µm, whatever the pixels.
 _COARSE = 0.3
@@ -38,7 +48,7 @@ class Species:
     pore: float  # depth of the pores in it
     fuzz: float  # rms of what has no structure
     bend: float  # rms of the bending of the whole scale
-    bend_reach: tuple[float, float]
+    bend_reach: Pair
     crease: float  # depth of creases
     beads: float
     debris: float
@@ -187,12 +197,7 @@ def _patch(
 
 
 def _surface(
-    rng: np.random.Generator,
-    extent: tuple[float, float],
-    shape: tuple[int, int],
-    rows: list[Row],
-    species: Species,
-    roughness: float,
+    rng: Rng, extent: Pair, shape: Shape, rows: list[Row], species: Species, roughness: float
 ) -> FloatArray:
     """Sheets with frayed edges, the streaks and pores of the floor, and fuzz, (ny, nx) in µm."""
     # the probe meets an edge a little earlier or later on every scan line, which runs along x
@@ -210,12 +215,7 @@ def _surface(
     return heights
 
 
-def _bent(
-    rng: np.random.Generator,
-    extent: tuple[float, float],
-    shape: tuple[int, int],
-    species: Species,
-) -> FloatArray:
+def _bent(rng: Rng, extent: Pair, shape: Shape, species: Species) -> FloatArray:
     """Bending of the whole scale and creases in it, (ny, nx) in µm."""
     reach = 30.0  # µm, of creases
     bend = smooth_field(rng, extent, species.bend_reach, 3.3, species.bend_reach[0] / _COARSE)
@@ -230,12 +230,7 @@ def _bent(
 
 
 def stamp(
-    shape: tuple[int, int],
-    extent: tuple[float, float],
-    x: FloatArray,
-    y: FloatArray,
-    radius: FloatArray,
-    height: FloatArray,
+    shape: Shape, extent: Pair, x: FloatArray, y: FloatArray, radius: FloatArray, height: FloatArray
 ) -> FloatArray:
     """Upper envelope (ny, nx) of rounded bumps at (x, y) on the torus, µm; 0 between them.
 
@@ -262,13 +257,7 @@ def stamp(
     return result.reshape(shape)
 
 
-def beads(
-    rng: np.random.Generator,
-    extent: tuple[float, float],
-    shape: tuple[int, int],
-    rows: list[Row],
-    density: float,
-) -> FloatArray:
+def beads(rng: Rng, extent: Pair, shape: Shape, rows: list[Row], density: float) -> FloatArray:
     """Small round beads that sit on the crests of fingers, in swarms; `density` per µm²."""
     names = ("x", "y", "length", "lean")
     tip_x, tip_y, length, lean = (
@@ -285,12 +274,7 @@ def beads(
     return stamp(shape, extent, x, tip_y[finger] - t, radius, radius * (0.08 + 0.2 * rng.random(n)))
 
 
-def debris(
-    rng: np.random.Generator,
-    extent: tuple[float, float],
-    shape: tuple[int, int],
-    density: float,
-) -> FloatArray:
+def debris(rng: Rng, extent: Pair, shape: Shape, density: float) -> FloatArray:
     """Crumbs, alone or in loose heaps up to 2 µm across; `density` of heaps per µm²."""
     n = int(rng.poisson(density * extent[0] * extent[1]))
     spread = np.minimum(0.05 / (1 - rng.random(n)), 0.35)  # µm, heavy-tailed
@@ -302,12 +286,7 @@ def debris(
     return stamp(shape, extent, x, y, radius, radius * (0.08 + 0.3 * rng.random(heap.size)))
 
 
-def flakes(
-    rng: np.random.Generator,
-    extent: tuple[float, float],
-    shape: tuple[int, int],
-    density: float,
-) -> FloatArray:
+def flakes(rng: Rng, extent: Pair, shape: Shape, density: float) -> FloatArray:
     """Particles with flat, tilted tops and straight, steep sides; `density` per µm²."""
     ny, nx = shape
     result = np.zeros(shape)
@@ -330,9 +309,7 @@ def flakes(
     return result
 
 
-def scratches(
-    rng: np.random.Generator, extent: tuple[float, float], shape: tuple[int, int], density: float
-) -> FloatArray:
+def scratches(rng: Rng, extent: Pair, shape: Shape, density: float) -> FloatArray:
     """Thin broken lines, all at about the same angle; `density` per µm²."""
     n = int(rng.poisson(density * extent[0] * extent[1]))
     angle = np.radians(48 + 6 * rng.standard_normal(n))

@@ -14,14 +14,14 @@ from ...plugin.memory import upload
 from ..glsl.camera import Camera
 from ..glsl.lights import Light
 
+_RAYS = 4  # along either side of a pixel, to see what is there
+_STEP = 8  # samples per pixel of one pass
+
 
 def direct_light(scene: Any, camera: Camera) -> Any:
     """The scene with its own emitters, whose light is reflected once at most.
 
-    Returns
-    -------
-    mi.Scene
-        With one sensor, whose film averages evenly over each pixel.
+    The result has one sensor, whose film averages evenly over each pixel.
     """
     import mitsuba as mi
 
@@ -41,12 +41,8 @@ def direct_light(scene: Any, camera: Camera) -> Any:
 def with_lights(scene: Any, camera: Camera, lights: Sequence[Light]) -> Any:
     """The scene's shapes under these lights alone, once reflected.
 
-    Shapes that emit light are left out: their light is among `lights`.
-
-    Returns
-    -------
-    mi.Scene
-        With one sensor, whose film averages evenly over each pixel, as supersampling does.
+    Shapes that emit light are left out: their light is among `lights`. The result has one sensor,
+    whose film averages evenly over each pixel, as supersampling does.
     """
     import mitsuba as mi
 
@@ -115,12 +111,8 @@ def _spectrum(light: Light) -> dict[str, Any]:
     }
 
 
-def seen(scene: Any, lights: Sequence[Light], samples: int = 4) -> dict[str, NDArray[Any]]:
+def seen(scene: Any, lights: Sequence[Light]) -> dict[str, NDArray[Any]]:
     """What each pixel of a scene of `with_lights` sees, by rays through a grid in the pixel.
-
-    Parameters
-    ----------
-    samples : rays along either side of a pixel.
 
     Returns
     -------
@@ -138,9 +130,9 @@ def seen(scene: Any, lights: Sequence[Light], samples: int = 4) -> dict[str, NDA
     same = np.ones((height, width), bool)
     lit = np.ones((height, width), bool)
     y, x = np.mgrid[:height, :width]
-    for j in range(samples):
-        for i in range(samples):
-            place = [(x + (i + 0.5) / samples) / width, (y + (j + 0.5) / samples) / height]
+    for j in range(_RAYS):
+        for i in range(_RAYS):
+            place = [(x + (i + 0.5) / _RAYS) / width, (y + (j + 0.5) / _RAYS) / height]
             ray, _ = sensor.sample_ray(
                 0.0, 0.5,
                 mi.Point2f(*(upload(mi.Float, p.astype(np.float32)) for p in place)),
@@ -182,14 +174,11 @@ class Progressive:
     """Direct light of a scene under these lights, as `truth.with_lights` has it.
 
     spp : samples per pixel in all.
-    step : of one pass.
     """
 
-    def __init__(
-        self, scene: Any, camera: Camera, lights: Sequence[Light], spp: int = 64, step: int = 8
-    ) -> None:
+    def __init__(self, scene: Any, camera: Camera, lights: Sequence[Light], spp: int = 64) -> None:
         self._scene = with_lights(scene, camera, lights)
-        self.spp, self._step, self.done = spp, step, 0
+        self.spp, self.done = spp, 0
         self._sum: NDArray[np.float64] = np.zeros((camera.size[1], camera.size[0], 3))
 
     @property
@@ -201,7 +190,7 @@ class Progressive:
         """Take the samples of one pass."""
         import mitsuba as mi
 
-        taken = min(self._step, self.spp - self.done)
+        taken = min(_STEP, self.spp - self.done)
         image = mi.render(self._scene, spp=taken, seed=self.done)
         self._sum += taken * np.array(image, np.float64)[..., :3]
         self.done += taken

@@ -67,8 +67,7 @@ class Camera:
         Column vectors; near and far planes lie around the scene, which keeps depths apart.
         """
         to_camera = np.linalg.inv(self.to_world)
-        corners = np.array([[(low, high)[n >> i & 1][i] for i in range(3)] for n in range(8)])
-        depths = corners @ to_camera[2, :3] + to_camera[2, 3]
+        depths = box_corners(low, high) @ to_camera[2, :3] + to_camera[2, 3]
         outside = np.maximum(np.maximum(low - self.eye, self.eye - high), 0.0)
         far = max(float(depths.max()) * 1.001, 1e-6)
         near = max(0.5 * float(np.linalg.norm(outside)), float(depths.min()) * 0.999, 1e-5 * far)
@@ -84,6 +83,11 @@ class Camera:
             ]
         )
         return projection @ to_camera
+
+
+def box_corners(low: Array, high: Array) -> Array:
+    """(8, 3) of a box between two of them."""
+    return np.array([[(low, high)[n >> i & 1][i] for i in range(3)] for n in range(8)])
 
 
 def read_camera(sensor: Any) -> tuple[Camera, list[str]]:

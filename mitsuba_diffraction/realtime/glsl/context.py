@@ -180,10 +180,6 @@ def upload(context: Any, texture: Texture) -> Any:
 class Target:
     """A picture in single precision, with depth.
 
-    Attributes
-    ----------
-    frame : the framebuffer.
-
     Raises a DiffractionError if the driver has no textures so large.
     """
 
@@ -199,7 +195,6 @@ class Target:
         self.frame = context.framebuffer([self.colour], self.depth)
 
     def release(self) -> None:
-        """Free it."""
         for thing in (self.frame, self.colour, self.depth):
             thing.release()
 
@@ -223,7 +218,6 @@ class Bindings:
         return first_unit
 
     def release(self) -> None:
-        """Free the textures."""
         for texture in self.textures.values():
             texture.release()
 

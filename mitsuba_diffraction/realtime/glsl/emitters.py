@@ -36,14 +36,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...plugin.names import name_of
-from .lights import (
-    Light,
-    sampled_directions,
-    sampled_positions,
-    spectra_along,
-    without_extent,
-)
+from ...plugin.properties import name_of
+from .lights import Light, sampled_directions, sampled_positions, spectra_along, without_extent
 from .surroundings import Environment, is_flat
 
 Array = NDArray[np.float64]
@@ -57,21 +51,13 @@ _EVEN = 0.1  # share of the choices for all emitters alike: some light other pla
 class Emitters:
     """A scene's emitters, and the lights that are drawn from them.
 
-    Parameters
-    ----------
     middle : (3,) where their contributions are weighed against each other.
-
-    Attributes
-    ----------
-    probabilities : (n,) of each emitter that is drawn from.
-    environment : what lies around the scene.
-    omissions : emitters of other kinds, in a few words each.
 
     Raises a DiffractionError if no emitter brings light.
     """
 
     def __init__(self, scene: Any, middle: Array) -> None:
-        self.omissions: list[str] = []
+        self.omissions: list[str] = []  # emitters of other kinds, in a few words each
         self._drawn: list[_Drawn] = []
         self._scene = scene  # area lights look their shapes up in it
         self._middle = middle
@@ -89,6 +75,7 @@ class Emitters:
                 "no emitter of the scene brings light to what diffracts; add one, or brighten it"
             )
         shares = np.array(brought) / sum(brought)
+        # (n,) of each emitter that is drawn from
         self.probabilities = (1.0 - _EVEN) * shares + _EVEN / len(shares)
 
     def lights(self) -> Iterator[Light]:

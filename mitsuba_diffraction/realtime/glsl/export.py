@@ -21,7 +21,7 @@ from .maps import Map
 from .materials import Material, height_scale, pack_conservation, pack_surface
 from .packing import pack_colours, pack_powers, pack_responses
 from .source import global_names, renamed, resolved, shader_file
-from .texels import PAGE, Packed, Texture
+from .texels import PAGE, Packed, Texture, plain
 
 #: Methods that other programs can have, and the functions that they become.
 EXPORTED = {"lut": "diffraction", "spectral": "diffraction_spectral"}
@@ -138,7 +138,7 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
     tables = {method: _tables(method, bsdf) for method in methods}
     # of all methods the same, and read by what they share
     common |= Packed(uniforms={"area_factor": tables[methods[0]].uniforms["area_factor"]})
-    return _Writer(common, tables).shader(_words(bsdf))
+    return _joined(common, tables, _words(bsdf))
 
 
 def export_shader(
@@ -182,68 +182,46 @@ def _tables(method: str, bsdf: Any) -> Packed:
     return pack_powers(bsdf.table) | pack_responses([daylight])
 
 
-class _Writer:
-    """Joins shared text with that of each method, all under names of their own."""
+def _joined(common: Packed, tables: dict[str, Packed], surface: str) -> Shader:
+    """Shared text with that of each method, all under names of their own."""
+    definitions = dict(common.definitions)
+    for packed in tables.values():
+        definitions |= packed.definitions
+    constants = [f"#define {name} {value}\n" for name, value in definitions.items() if value]
+    files = map(shader_file, ("library.glsl", "boundary.glsl", "layers.glsl"))
+    shared = "".join(constants) + resolved("\n".join(files), definitions)
+    names = global_names(shared)
+    code = [renamed(shared, [(_PREFIX, names)])]
+    found = _declared(common, _PREFIX, names)
+    for method, packed in tables.items():
+        prefix = f"{_PREFIX}{method[:4]}_"
+        text = shader_file(f"{method}.glsl") + "\n" + shader_file("diffraction.glsl")
+        text = resolved(text, {**common.definitions, **packed.definitions})
+        own = global_names(text)
+        text = renamed(text, [(_PREFIX, names), (prefix, own)])
+        code.append(text + _ENTRY.format(name=EXPORTED[method], prefix=prefix))
+        found |= _declared(packed, prefix, own) | _declared(packed, _PREFIX, names)
+    functions = {method: EXPORTED[method] for method in tables}
+    head = _HEAD.format(
+        version=version("mitsuba_diffraction"), surface=surface,
+        functions="\n//   ".join(f"vec3 {name}(vec3 wi, vec3 wo)" for name in functions.values()),
+    )  # fmt: skip
+    text = "\n".join([head, *code]) + _BENEATH
+    return Shader(text, dict(found.uniforms), found.textures, functions, surface)
 
-    def __init__(self, common: Packed, tables: dict[str, Packed]) -> None:
-        self._common, self._tables = common, tables
-        definitions = dict(common.definitions)
-        for packed in tables.values():
-            definitions |= packed.definitions
-        constants = "".join(
-            f"#define {name} {value}\n" for name, value in definitions.items() if value
-        )
-        files = map(shader_file, ("library.glsl", "boundary.glsl", "layers.glsl"))
-        self._shared = constants + resolved("\n".join(files), definitions)
-        self._names = global_names(self._shared)
 
-    def shader(self, surface: str) -> Shader:
-        code = [renamed(self._shared, [(_PREFIX, self._names)])]
-        found = self._named(self._common, _PREFIX, self._names, code[0])
-        for method, packed in self._tables.items():
-            prefix = f"{_PREFIX}{method[:4]}_"
-            definitions = {**self._common.definitions, **packed.definitions}
-            text = shader_file(f"{method}.glsl") + "\n" + shader_file("diffraction.glsl")
-            text = resolved(text, definitions)
-            own = global_names(text)
-            text = renamed(text, [(_PREFIX, self._names), (prefix, own)])
-            code.append(text + _ENTRY.format(name=EXPORTED[method], prefix=prefix))
-            found |= self._named(packed, prefix, own, text)
-            found |= self._named(packed, _PREFIX, self._names, code[0])
-        functions = {method: EXPORTED[method] for method in self._tables}
-        declared = "\n//   ".join(f"vec3 {name}(vec3 wi, vec3 wo)" for name in functions.values())
-        head = _HEAD.format(
-            version=version("mitsuba_diffraction"), surface=surface, functions=declared
-        )
-        return Shader(
-            "\n".join([head, *code]) + _BENEATH, dict(found.uniforms), found.textures,
-            functions, surface,
-        )  # fmt: skip
-
-    @staticmethod
-    def _named(packed: Packed, prefix: str, names: set[str], code: str) -> Packed:
-        """What of a part the code declares, under its names there."""
-        textures = [
-            Texture(prefix + t.name, _four(t.data), t.smooth)
-            for t in packed.textures
-            if t.name in names
-        ]
-        uniforms = {
-            prefix + name: _plain(value) for name, value in packed.uniforms.items() if name in names
-        }
-        return Packed(tuple(textures), uniforms)
+def _declared(packed: Packed, prefix: str, names: set[str]) -> Packed:
+    """What of a part a text with these global names declares, under its names there."""
+    known = [t for t in packed.textures if t.name in names]
+    uniforms = {prefix + n: plain(value) for n, value in packed.uniforms.items() if n in names}
+    textures = tuple(Texture(prefix + t.name, _four(t.data), t.smooth) for t in known)
+    return Packed(textures, uniforms)
 
 
 def _four(data: Any) -> Any:
     """Four channels, of which some loaders know no fewer."""
     missing = 4 - data.shape[2]
     return np.pad(data, [(0, 0), (0, 0), (0, missing)]) if missing else data
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray | tuple):
-        return np.asarray(value).ravel().tolist()
-    return value
 
 
 def _words(bsdf: Any) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...optics.colour import daylight
 from ...plugin.memory import upload
-from ...plugin.names import name_of
+from ...plugin.properties import name_of
 from .packing import daylight_colour
 
 Array = NDArray[np.float64]
@@ -156,9 +156,8 @@ def _sampled(
 ) -> tuple[Array, Array, Array, float]:
     """Irradiance at a point from one emitter, by Mitsuba's own sampling of it.
 
-    Returns
-    -------
-    wavelengths (n,), spectrum (n,) or (n, 3), mean direction towards it (3,), mean distance.
+    Returns wavelengths (n,), spectrum (n,) or (n, 3), mean direction towards it (3,), mean
+    distance.
     """
     values, directions, distances, wavelengths = sampled_directions(emitter, at, samples)
     if sun is not None:
@@ -197,15 +196,11 @@ def sampled_directions(
 ) -> tuple[Array, Array, Array, Array]:
     """An emitter as directions from a point, drawn by Mitsuba in proportion to what they bring.
 
-    Parameters
-    ----------
     samples, start : how many, and the number of the first in a sequence that fills the emitter
         evenly.
 
-    Returns
-    -------
-    irradiance over density (samples, wavelengths, 1 or 3) relative to D65, directions (samples, 3),
-    distances (samples,), wavelengths (n,) in nm.
+    Returns irradiance over density (samples, wavelengths, 1 or 3) relative to D65, directions
+    (samples, 3), distances (samples,), wavelengths (n,) in nm.
     """
     import drjit as dr
     import mitsuba as mi
@@ -226,10 +221,8 @@ def sampled_positions(
 ) -> tuple[Array, Array, Array, Array]:
     """An area light as points on it, even over its area.
 
-    Returns
-    -------
-    radiance times area (samples, wavelengths, 1 or 3) relative to D65, positions (samples, 3),
-    normals (samples, 3), wavelengths (n,) in nm.
+    Returns radiance times area (samples, wavelengths, 1 or 3) relative to D65, positions (samples,
+    3), normals (samples, 3), wavelengths (n,) in nm.
     """
     import drjit as dr
     import mitsuba as mi

@@ -169,8 +169,9 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
     """
     import mitsuba as mi
 
-    two_sided = False
-    bumps, normals = None, None
+    from ...plugin.bsdf import Diffraction  # which only a variant has
+
+    two_sided, bumps, normals = False, None, None
     while bsdf.class_name() in _WRAPPERS:
         kind, lost = bsdf.class_name(), _WRAPPERS[bsdf.class_name()]
         two_sided = two_sided or kind == "TwoSidedBRDF"
@@ -186,7 +187,7 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
         bsdf = inner[0]
     if only := getattr(bsdf, "only_traced", None):
         raise DiffractionError(f"{only} of {name} is for the path tracer alone")
-    if _diffracts(bsdf):
+    if isinstance(bsdf, Diffraction):
         pigment = Map(np.zeros(3))
         if bsdf.nested is not None:
             pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)
@@ -241,9 +242,11 @@ def pack_surface(material: Material) -> Packed:
                 definitions[f"{name.upper()}_CLAMPED"] = ""
     packed = Packed(tuple(textures), uniforms, definitions)
     bsdf, gloss = material.bsdf, material.gloss
-    if bsdf is not None and bsdf.nested is None:
-        pass
-    elif gloss is None or gloss.pigment is not None:
+    if bsdf is None:
+        pigmented = gloss is None or gloss.pigment is not None
+    else:
+        pigmented = bsdf.nested is not None
+    if pigmented:
         definitions["PIGMENTED"] = ""
     if gloss is not None:
         return packed | gloss.packed(_spectra)
@@ -324,25 +327,17 @@ def _spectra(eta: Any, k: Any) -> tuple[Array, Array, Array]:
     """Wavelengths, and two textures over them; three colours count as three wavelengths."""
     import mitsuba as mi
 
-    if mi.is_spectral:
-        lam = np.linspace(360.0, 830.0, 96)
-        uv = np.full((1, 2), 0.5)
-        return lam, *(evaluated(t, uv, lam)[0].astype(float) for t in (eta, k))
-    colours = np.array([464.0, 549.0, 611.0])  # of sRGB's primaries
+    # else of sRGB's primaries, of which textures give the reddest first
+    lam = np.linspace(360.0, 830.0, 96) if mi.is_spectral else np.array([464.0, 549.0, 611.0])
+    order = slice(None, None, 1 if mi.is_spectral else -1)
     uv = np.full((1, 2), 0.5)
-    return colours, *(evaluated(t, uv, colours)[0][::-1].astype(float) for t in (eta, k))
+    return lam, *(evaluated(t, uv, lam)[0][order].astype(float) for t in (eta, k))
 
 
 def _is_bsdf(thing: Any) -> bool:
     import mitsuba as mi
 
     return isinstance(thing, mi.BSDF)
-
-
-def _diffracts(bsdf: Any) -> bool:
-    from ...plugin.bsdf import Diffraction
-
-    return isinstance(bsdf, Diffraction)
 
 
 def diffracts(bsdf: Any) -> bool:

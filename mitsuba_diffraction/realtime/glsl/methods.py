@@ -120,14 +120,7 @@ class Part(NamedTuple):
 class Prepared:
     """Programs and tables of one method for all surfaces of a scene.
 
-    Parameters
-    ----------
     surfaces : what each surface's shader reads but for the method's tables.
-
-    Attributes
-    ----------
-    nbytes : of the method's own textures.
-    tables : each surface's; of what does not diffract those of the first that does.
 
     Raises a DiffractionError if there is no such method, or a table does not suit it.
     """
@@ -148,13 +141,13 @@ class Prepared:
             if key not in packed:
                 packed[key] = method_tables(method, surface.material)
         bound = {key: Bindings(context, found) for key, found in packed.items()}
-        # what does not diffract is drawn by any of the programs
         first = next(iter(bound.values()))
+        # each surface's; what does not diffract is drawn by any of the programs
         self.tables = [
             first if s.material.bsdf is None else bound[id(s.material.table)]
             for s in scene.surfaces
         ]
-        self.nbytes = sum(p.nbytes for p in packed.values())
+        self.nbytes = sum(p.nbytes for p in packed.values())  # of the method's own textures
         self._programs: dict[tuple[tuple[str, str], ...], Any] = {}
         self._parts: dict[object, list[Part]] = {}
 
@@ -189,7 +182,6 @@ class Prepared:
         return self._programs[key]
 
     def release(self) -> None:
-        """Free what lies in the graphics card's memory."""
         for parts in self._parts.values():
             for part in parts:
                 part.array.release()

@@ -19,7 +19,7 @@ from ...tables.energy.conservation import FINE, DirectionalTable
 from ...tables.energy.gain import GRAZING
 from ...tables.energy.grid import SHARE
 from ...tables.energy.powers import order_0_power, power_series
-from ...tables.packing import Record, cells_of, functions_at
+from ...tables.layout import Record, cells_of, functions_at
 from ...tables.table import DiffractionTable
 from .texels import Packed, Texture, as_half, listed, paired, texels
 
@@ -29,6 +29,7 @@ WAVENUMBERS = (2e3 * math.pi / VISIBLE[1], 2e3 * math.pi / VISIBLE[0])
 #: Phase of a cell of κ within which functions are straight: off by its square over 8, 1e-4.
 _CELL = 0.03
 
+_LAM = np.arange(360.0, 830.5, 1.0)  # nm
 _RESPONSES = 2048  # over k: 0.4 nm apart
 _ANGLES, _WAVELENGTHS = 129, 64  # of a conductor's reflectance
 
@@ -161,15 +162,18 @@ def pack_beneath(ratios: Sequence[DirectionalTable]) -> Packed:
 
 def _daylight_mean(table: DirectionalTable) -> NDArray[np.float64]:
     """In linear sRGB under daylight, on `FINE`: exact of what is straight between wavelengths."""
-    lam = np.arange(360.0, 830.5, 1.0)
     place = np.interp(
-        np.log(lam), np.log(table.wavelengths), np.arange(len(table.wavelengths), dtype=float)
+        np.log(_LAM), np.log(table.wavelengths), np.arange(len(table.wavelengths), dtype=float)
     )
     shares = np.maximum(1.0 - np.abs(place - np.arange(len(table.wavelengths))[:, None]), 0.0)
-    weights = linear_srgb(response(lam))
-    weights /= weights.sum(axis=0)
     pages = [table.at(FINE.theta[:, None], FINE.phi, at) for at in table.wavelengths]
-    return np.tensordot(np.stack(pages, axis=-1), shares @ weights, 1)
+    return np.tensordot(np.stack(pages, axis=-1), shares @ _daylight_weights(), 1)
+
+
+def _daylight_weights() -> NDArray[np.float64]:
+    """From values over `_LAM` to linear sRGB under daylight, (n, 3)."""
+    weights = linear_srgb(response(_LAM))
+    return np.asarray(weights / weights.sum(axis=0))
 
 
 def _grid(pages: int) -> dict[str, str]:
@@ -204,9 +208,8 @@ def daylight_colour(
     wavelengths: NDArray[np.float64], spectrum: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Linear sRGB (3,) of a spectrum relative to D65, as in `pack_responses`."""
-    lam = np.arange(360.0, 830.5, 1.0)
-    values = np.stack([np.interp(lam, wavelengths, s) for s in np.atleast_2d(spectrum.T)], 1)
-    return np.asarray((linear_srgb(response(lam)) * values).sum(axis=0))
+    values = np.stack([np.interp(_LAM, wavelengths, s) for s in np.atleast_2d(spectrum.T)], 1)
+    return np.asarray((linear_srgb(response(_LAM)) * values).sum(axis=0))
 
 
 def pack_conductor(
@@ -229,10 +232,9 @@ def pack_conductor(
     rows[:-1, :, 0] = over(lam)
     rows[:-1, :, 1] = np.interp(lam, wavelengths, eta)[:, None]
     rows[:-1, :, 2] = np.interp(lam, wavelengths, k)[:, None]
-    fine = np.arange(360.0, 830.5, 1.0)
-    weights, found = linear_srgb(response(fine)), over(fine)
-    rows[-1, :, :3] = found.T @ (weights / weights.sum(axis=0))
-    tint = metal_tint(fine, found[:, -1], rows[-1, -1, :3])
+    found = over(_LAM)
+    rows[-1, :, :3] = found.T @ _daylight_weights()
+    tint = metal_tint(_LAM, found[:, -1], rows[-1, -1, :3])
     return Packed(
         (Texture("reflectances", rows),),
         {

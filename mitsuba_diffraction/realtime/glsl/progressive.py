@@ -60,13 +60,6 @@ class Drawing(Protocol):
 class Stage:
     """What does not depend on the camera: emitters, surroundings, what casts shadows.
 
-    Attributes
-    ----------
-    emitters : that lights are drawn from.
-    casters : what casts shadows.
-    extras : of each surface, what its shader reads of the surroundings.
-    looks_up : whether there is anything to look up along lobes.
-
     Raises a DiffractionError if no emitter brings light, or the environment is not finite.
     """
 
@@ -90,7 +83,8 @@ class Stage:
                 )
             )  # fmt: skip
             self._triangle = self._kept(self._context.vertex_array(self._background, []))
-        self.extras = self._with_lobes(around)
+        self.extras = self._with_lobes(around)  # of each surface, what its shader reads of it
+        # whether there is anything to look up along lobes
         self.looks_up = self._scene.glows or self._background is not None
 
     def _kept(self, thing: Any) -> Any:
@@ -151,7 +145,6 @@ class Stage:
             array.render(moderngl.TRIANGLES)
 
     def release(self) -> None:
-        """Free what lies in the graphics card's memory."""
         for thing in reversed(self._owned):
             thing.release()
 
@@ -195,14 +188,8 @@ class Joined:
 class ProgressiveLight:
     """A picture that gets better with every frame: made by `Renderer.progressive`.
 
-    Parameters
-    ----------
     lights : these alone, instead of the scene's emitters and what surrounds it.
     shadow_size : texels along either side of a shadow map.
-
-    Attributes
-    ----------
-    frames : how many are in the picture.
     """
 
     def __init__(
@@ -229,7 +216,7 @@ class ProgressiveLight:
 
     @property
     def frames(self) -> int:
-        """How many there are."""
+        """How many are in the picture."""
         return sum(self._counts)
 
     def restart(self, camera: Camera | None = None, **surface: float | None) -> None:
@@ -337,7 +324,6 @@ class ProgressiveLight:
         return total
 
     def release(self) -> None:
-        """Free what lies in the graphics card's memory."""
         made = (self._triangle, self._add, self._whole, self._mean)
         for thing in (*made, self._frame, *self._sums, self._map):
             thing.release()

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...plugin.names import name_of
+from ...plugin.properties import name_of
 from ...plugin.textures import check_attributes
 from ...scene.orientation.trimesh import grid_faces, texture_tangents
 from .camera import Camera, read_camera

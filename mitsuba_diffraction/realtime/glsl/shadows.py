@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from .camera import Camera
+from .camera import Camera, box_corners
 from .context import Target, compile_plain, require_moderngl, set_uniforms
 from .lights import Light
 from .methods import vertex_array
@@ -88,16 +88,9 @@ class Solid:
 class Casters:
     """The scene's triangles, drawn by their places alone.
 
-    Parameters
-    ----------
     buffers : their vertices in the graphics card's memory.
     emitting : those of what emits light and reflects none, which stands in the way of light from
         far away only.
-
-    Attributes
-    ----------
-    low, high : (3,) corners of a box around all surfaces.
-    corners : (8, 3) all of them.
     """
 
     def __init__(
@@ -116,9 +109,8 @@ class Casters:
         self._shapes = [int(s.shape.ptr) for s in surfaces]
         hulls = np.concatenate([outline(t.reshape(-1, 3)) for t in triangles])
         self.solids = [Solid.of(v[..., :3], v[..., 3:], hulls) for v in vertices]
-        self.low, self.high = hulls.min(axis=0), hulls.max(axis=0)
-        box = self.low, self.high
-        self.corners = np.array([[box[n >> i & 1][i] for i in range(3)] for n in range(8)])
+        self.low, self.high = hulls.min(axis=0), hulls.max(axis=0)  # corners of a box around all
+        self.corners = box_corners(self.low, self.high)
 
     def draw(self, matrix: Array) -> None:
         """All surfaces, from the scene to clip space by a matrix (4, 4)."""
@@ -131,9 +123,7 @@ class Casters:
     def draw_map(self, matrix: Array, light: Light, seen: Seen) -> list[float]:
         """What a shadow map holds, into the framebuffer in use.
 
-        Returns
-        -------
-        Of each surface, texels by which what the map holds of it may shade what is lit.
+        Returns, of each surface, texels by which what the map holds of it may shade what is lit.
         """
         moderngl = require_moderngl()
         set_uniforms(self.program, {"view_projection": tuple(matrix.T.ravel().tolist())})
@@ -174,7 +164,6 @@ class Casters:
         return Seen(places, outline(places), solid)
 
     def release(self) -> None:
-        """Free the graphics card's memory."""
         for thing in (*self._arrays, *self._emitting, self.program):
             thing.release()
 
@@ -310,7 +299,6 @@ class ShadowMap:
         return matrix @ moved, scale
 
     def release(self) -> None:
-        """Free the graphics card's memory."""
         self._frame.release()
         self.texture.release()
 
@@ -324,14 +312,10 @@ def parallel_view(
 ) -> tuple[Array, float]:
     """From the scene to clip space, seen in parallel from a direction.
 
-    Parameters
-    ----------
     places, corners : (n, 3) what lies within the map, and between its planes.
     size, beside : texels, and parts of one by which the map is shifted, 0 to 1.
 
-    Returns
-    -------
-    matrix (4, 4), and the depth in clip space of as much as a texel is wide.
+    Returns matrix (4, 4), and the depth in clip space of as much as a texel is wide.
     """
     axes = frame_along(-towards / np.linalg.norm(towards))
     low, high = _bounds(places @ axes[:2].T, size, beside)

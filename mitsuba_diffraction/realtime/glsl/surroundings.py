@@ -22,7 +22,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import distance_transform_edt
 
 from ...errors import DiffractionError
-from ...plugin.names import name_of
+from ...plugin.properties import name_of
 from ...tables.colour.build import LARGEST_RADIUS
 from ...tables.colour.proposals import IMPORTANCE, brightness
 from ...tables.colour.table import ColourTable

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,3 +123,12 @@ def paired(values: NDArray[np.floating]) -> NDArray[np.uint32]:
     """The upper halves of numbers (…, 2n), `shortened`, two in each word (…, n), low one first."""
     upper = shortened(values).view(np.uint32)
     return np.asarray(upper[..., ::2] >> 16 | upper[..., 1::2], np.uint32)
+
+
+def plain(value: Any) -> Any:
+    """A uniform for JSON; an array's numbers are one list."""
+    if isinstance(value, np.ndarray):
+        return value.ravel().tolist()
+    if isinstance(value, tuple):
+        return [plain(v) for v in value]
+    return value.item() if isinstance(value, np.generic) else value

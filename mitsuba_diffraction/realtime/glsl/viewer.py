@@ -82,8 +82,6 @@ class Viewer(moderngl_window.WindowConfig):
         self._shown: tuple[Any, ...] = ()
         self._loading: Iterator[str] | None = self._load()
 
-    # ---------------------------------------------------------------- loading
-
     def _load(self) -> Iterator[str]:
         """Everything slow, in steps between which the window can be closed."""
         yield "reading the scene ..."
@@ -109,8 +107,6 @@ class Viewer(moderngl_window.WindowConfig):
     def _ready(self) -> Renderer:
         assert self.renderer is not None
         return self.renderer
-
-    # ---------------------------------------------------------------- frames
 
     def on_render(self, now: float, since: float) -> None:
         """Draw one frame, or do one step of loading."""
@@ -213,8 +209,6 @@ class Viewer(moderngl_window.WindowConfig):
         self.wnd.use()
         self.panel.render(imgui.get_draw_data())
 
-    # ---------------------------------------------------------------- what it can do
-
     def choose(self, method: str) -> None:
         """Draw with another method, if it suits the surface."""
         try:
@@ -258,8 +252,6 @@ class Viewer(moderngl_window.WindowConfig):
             shown = encode_srgb(tracing.image * 2.0**self.stops)
             path = write_screenshot(shown, self.folder, "view_path")
             self.message = f"written: {path} (direct light, {tracing.spp} samples)"
-
-    # ---------------------------------------------------------------- events
 
     on_mouse_position_event = _to_panel("mouse_position_event")
     on_mouse_press_event = _to_panel("mouse_press_event")
@@ -330,8 +322,6 @@ def show(
 ) -> tuple[int, float]:
     """Open a window on a scene and wait until it is closed.
 
-    Parameters
-    ----------
     sensor : index of the camera to start at.
     method, stops : to start with; exposure in stops.
     size : of the window, pixels.
@@ -339,9 +329,7 @@ def show(
     frames : close after so many; 0 waits for the user.
     window : kind of window, as moderngl-window names it; "headless" needs no display.
 
-    Returns
-    -------
-    frames drawn, and the mean of the last ones in ms.
+    Returns frames drawn, and the mean of the last ones in ms.
 
     Raises a DiffractionError if no window can be opened, or as `Renderer`.
     """

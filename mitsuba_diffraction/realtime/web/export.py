@@ -223,10 +223,10 @@ def _packed(
         "subject": [x.tolist() for x in box_of([s.vertices[:, :3] for s in scene.diffracting])],
     }
     _add_programs(header, surfaces, shown, packed, definitions)
-    header["left_out"] = left_out
     header["loss"] = {
         method: _worst([packed[method, n].loss for n in range(len(tables))]) for method in shown
     }
+    header["left_out"] = left_out
     header["orders"] = [strongest_orders(table) for table in tables]
     data, header["sections"] = sections.joined()
     return header, data

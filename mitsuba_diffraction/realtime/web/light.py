@@ -109,9 +109,7 @@ def packed_surroundings(
 
     materials : one for each table, which lobes are drawn by.
 
-    Returns
-    -------
-    JSON, None where there is neither; definitions.
+    Returns JSON, None where there is neither; definitions.
     """
     environment = None if emitters is None else emitters.environment
     if emitters is None or not (scene.glows or environment):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...optics.colour import encode_srgb
 from ..glsl.scene import VERTEX
-from ..glsl.texels import Packed, Texture
+from ..glsl.texels import Packed, Texture, plain
 
 _LEVEL = 6
 _NAMES = {
@@ -193,7 +193,7 @@ def packed_parts(
 ) -> dict[str, Any]:
     """Textures and uniforms as JSON; `done` are sections that are there already, by texture."""
     return {
-        "uniforms": {name: _plain(value) for name, value in packed.uniforms.items()},
+        "uniforms": {name: plain(value) for name, value in packed.uniforms.items()},
         "textures": [_texture(t, sections, (done or {}).get(t.name)) for t in packed.textures],
     }
 
@@ -227,11 +227,3 @@ def _png(data: NDArray[np.generic]) -> bytes:
     file = io.BytesIO()
     Image.fromarray(pixels, "RGB").save(file, "PNG", optimize=True)
     return file.getvalue()
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return value.ravel().tolist()
-    if isinstance(value, tuple):
-        return [_plain(v) for v in value]
-    return value.item() if isinstance(value, np.generic) else value

@@ -24,6 +24,7 @@ WEB_METHODS = ("lut", "spectral")
 #: Binary digits that are tried, from the largest page to the smallest.
 DIGITS = (9, 8, 7, 6)
 
+_ORDERS = 5  # that are named, at most
 _LARGE = 1 << 20  # entries of the textures that are rounded
 
 
@@ -82,16 +83,11 @@ def rounded(values: NDArray[np.floating], bits: int) -> NDArray[np.float16]:
 
 
 def fitting_tables(
-    methods: Sequence[str],
-    tables: Sequence[DiffractionTable],
-    room: int,
-    progress: Progress,
+    methods: Sequence[str], tables: Sequence[DiffractionTable], room: int, progress: Progress
 ) -> dict[tuple[str, int], WebTable] | int:
     """Tables for all methods with as many digits as fit into a number of bytes.
 
-    Returns
-    -------
-    by method and number of the table; or, if nothing fits, the least bytes that it takes.
+    Returns those by method and number of the table; or, if nothing fits, the least bytes it takes.
     """
     least = 0
     for digits in DIGITS:
@@ -107,13 +103,11 @@ def fitting_tables(
     return least
 
 
-def strongest_orders(table: DiffractionTable, count: int = 5) -> list[list[float]]:
-    """The brightest orders in green light along the normal, each apart from the others.
+def strongest_orders(table: DiffractionTable) -> list[list[float]]:
+    """The few brightest orders in green light along the normal, each apart from the others.
 
-    Returns
-    -------
-    of each q_x and q_y, rad/µm, and its share of the light; of a pair ±q one. None of a table whose
-    orders interfere.
+    Returns q_x and q_y of each, rad/µm, and its share of the light; of a pair ±q one. None of a
+    table whose orders interfere.
     """
     if table.grid.coherent:
         return []
@@ -127,7 +121,7 @@ def strongest_orders(table: DiffractionTable, count: int = 5) -> list[list[float
     shares, apart = np.sort(powers, axis=None)[::-1], 2.0 / table.sigma
     found: list[list[float]] = []
     for at, share in zip(q, shares, strict=True):
-        if len(found) == count or share <= 1e-5:
+        if len(found) == _ORDERS or share <= 1e-5:
             break
         taken = np.array([one[:2] for one in found] or [[0.0, 0.0]])
         near = np.minimum(*(np.linalg.norm(taken - sign * at, axis=1) for sign in (1.0, -1.0)))

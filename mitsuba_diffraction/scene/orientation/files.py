@@ -33,9 +33,7 @@ _CODES = {
 }  # fmt: skip
 
 
-def load_mesh(
-    path: str | os.PathLike[str],
-) -> tuple[Floats, Floats | None, Floats | None, Ints]:
+def load_mesh(path: str | os.PathLike[str]) -> tuple[Floats, Floats | None, Floats | None, Ints]:
     """Positions (n, 3), normals (n, 3) or None, texture coordinates (n, 2) or None, faces (m, 3).
 
     Reads what Mitsuba reads, .ply, .obj, .serialized, and PLY files of polygons.

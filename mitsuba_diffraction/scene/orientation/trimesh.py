@@ -94,11 +94,7 @@ def texture_tangents(sides: Floats, uv_sides: Floats) -> tuple[Floats, Floats, F
 
 
 def oriented_mesh(
-    positions: Floats,
-    normals: Floats,
-    faces: Ints,
-    directions: Floats,
-    uv: Floats | None = None,
+    positions: Floats, normals: Floats, faces: Ints, directions: Floats, uv: Floats | None = None
 ) -> TriangleMesh:
     """A mesh on which the patch's x axis follows one direction per vertex.
 

@@ -18,8 +18,8 @@ from ...plugin.sampling import forget_sampler
 from ...progress import Progress
 from ...tables.table import DiffractionTable
 from .paths import TracedPaths, trace
-from .plan import LookupStatistics, Plan, PlannedTable, domain_for
-from .session import Session
+from .plan import Lookups, Plan, PlannedTable, domain_for
+from .recording import Session
 
 #: Width at most, and samples per pixel.
 WIDTH, SPP = 160, 64
@@ -120,7 +120,7 @@ class RecordedScene:
     scene: Any
     session: Session
     traced: TracedPaths
-    statistics: dict[str, LookupStatistics]
+    statistics: dict[str, Lookups]
 
 
 def record_scene(
@@ -174,14 +174,14 @@ def _names(session: Session) -> str:
     return ", ".join(sorted({name for name, _ in session.bsdfs}))
 
 
-def _statistics(session: Session, traced: TracedPaths) -> dict[str, LookupStatistics]:
+def _statistics(session: Session, traced: TracedPaths) -> dict[str, Lookups]:
     """What each table is asked; tables from files, which cannot be made smaller, are left out."""
     found = {}
     for key, table in session.tables.items():
         mine = [n for n, (_, bsdf) in enumerate(session.bsdfs) if bsdf.table is table]
         asked = traced.of(mine)
         if len(asked):
-            found[key] = LookupStatistics(
+            found[key] = Lookups(
                 asked["u"], asked["v"], asked["w"], asked["wavelength"], asked["xyz"],
                 float(min(traced.total[mine].sum(), 1.0)),
             )  # fmt: skip
@@ -225,9 +225,7 @@ def worthwhile(plan: Plan, planned: dict[str, DiffractionTable]) -> Plan:
         now = planned[key].nbytes if key in planned else before
         worth = table.domain is not None and now < WORTH * before
         tables[key] = replace(
-            table,
-            domain=table.domain if worth else None,
-            memory=(before, now if worth else before),
+            table, domain=table.domain if worth else None, memory=(before, now if worth else before)
         )
     return replace(plan, tables=tables)
 

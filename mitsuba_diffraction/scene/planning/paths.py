@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...optics.colour import response
 from ...plugin.memory import upload
-from .session import Session
+from .recording import Session
 
 #: Longest paths that are followed, vertices and camera included.
 MOST_BOUNCES = 12

@@ -32,7 +32,7 @@ _REMEDY = "make one with 'mitsuba-diffraction plan SCENE -o plan.json'"
 
 
 @dataclass(frozen=True)
-class LookupStatistics:
+class Lookups:
     """What one table is asked, over all surfaces that share it."""
 
     # u, v, w: (n,) ωi + ωo in the patch's frame, w times height_scale
@@ -92,7 +92,7 @@ class Domain:
 
 
 def domain_for(
-    asked: LookupStatistics, table: DiffractionTable, height_scale: float, tolerance: float
+    asked: Lookups, table: DiffractionTable, height_scale: float, tolerance: float
 ) -> Domain:
     """The smallest domain that leaves at most `tolerance` of the surfaces' light outside.
 
@@ -120,9 +120,7 @@ def domain_for(
 
 
 def _ellipse(
-    along: tuple[NDArray[np.float64], NDArray[np.float64]],
-    light: NDArray[np.float64],
-    share: float,
+    along: tuple[NDArray[np.float64], NDArray[np.float64]], light: NDArray[np.float64], share: float
 ) -> tuple[float, float]:
     """Half axes of the smallest ellipse that leaves at most a share of the light outside."""
     x, y = along
@@ -163,12 +161,11 @@ def lobes_in_a_pixel(turn: float, sigma: float) -> float:
     return float((2.0 * turn * float(wavenumber(550.0)) * sigma) ** 2)
 
 
-def wavelengths_needed(asked: LookupStatistics, share: float = 1e-3) -> dict[str, Any]:
+def wavelengths_needed(asked: Lookups, share: float = 1e-3) -> dict[str, Any]:
     """The band that all but a share of the diffracted light lies in, half of it on either side.
 
-    Returns
-    -------
-    range_nm, and lost_colour: ΔE2000 between the mean colours of all light and of the band alone.
+    Returns range_nm, and lost_colour: ΔE2000 between the mean colours of all light and of the band
+    alone.
     """
     low, high = quantiles(asked.wavelength, asked.light, [0.5 * share, 1.0 - 0.5 * share])
     inside = (asked.wavelength >= low) & (asked.wavelength <= high)

@@ -15,15 +15,13 @@ from ...plugin.restricted import Outside, RestrictedTable, device_table
 from ...plugin.sampling import sampler_bytes
 from ...tables.table import DiffractionTable
 from .make import Difference, RecordedScene, TestedPlan
-from .plan import LookupStatistics, Plan, lobes_in_a_pixel, quantiles, wavelengths_needed
+from .plan import Lookups, Plan, lobes_in_a_pixel, quantiles, wavelengths_needed
 
 #: That are timed: some hundredths of a second.
 LOOKUPS = 1 << 19
 
 
-def evaluation_ratio(
-    asked: LookupStatistics, whole: DiffractionTable, planned: DiffractionTable
-) -> float:
+def evaluation_ratio(asked: Lookups, whole: DiffractionTable, planned: DiffractionTable) -> float:
     """Time of a look-up in the planned table over that in the whole one, where the scene asks."""
     rng = np.random.default_rng(0)
     chosen = rng.integers(0, len(asked.w), LOOKUPS)

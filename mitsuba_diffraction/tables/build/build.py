@@ -19,7 +19,7 @@ from ...optics.geometry import sigma_of
 from ...progress import Progress, silent
 from ...settings import MAX_TAPS, TableSettings, checked
 from ..expansion import Expansion
-from ..packing import Grid
+from ..layout import Grid
 from ..table import DiffractionTable, build_error, q_limit_of
 from ..window import FULL_REACH, reach_error, taps_for, trims_for
 from .checks import (

@@ -13,7 +13,7 @@ from ...optics.geometry import sigma_of
 from ...settings import MAX_TAPS, TableSettings
 from ..document import MAX_BYTES
 from ..expansion import Expansion
-from ..packing import Grid
+from ..layout import Grid
 from ..table import build_error
 from ..window import taps_for
 from .choose import taylor_rounding, taylor_truncation

@@ -24,7 +24,7 @@ from ...optics.geometry import sigma_of
 from ...progress import Progress
 from ...settings import TableSettings
 from ..expansion import Expansion
-from ..packing import Grid
+from ..layout import Grid
 from ..table import DiffractionTable, q_limit_of
 from ..window import taps_for
 from .choose import svd_expansion

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..expansion import Expansion, principal_functions
-from ..packing import Grid
+from ..layout import Grid
 from .error import alternate
 from .powers import Spectra
 from .spectrum import NEAR, Spectrum

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..expansion import Expansion
-from ..packing import Grid
+from ..layout import Grid
 from ..window import apply_window, rows_by_trim, tap_matrix
 from .powers import Spectra
 from .spectrum import NEAR

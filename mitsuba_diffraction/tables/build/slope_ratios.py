@@ -1,4 +1,4 @@
-"""r of a table's patches on a grid: what tells hills from pits (`optics.slope_ratio`).
+"""r of a table's patches on a grid: what tells hills from pits (`optics.second_order`).
 
 Cells hold many orders, whose r is averaged by power: what all windows on a surface have in common,
 not the speckle of one. Of a short period, whose orders are few, each cell is one order.
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ...heights.field import HeightField
-from ...optics.slope_ratio import SlopeRatios, Slopes, along
+from ...optics.second_order import SlopeRatios, Slopes, along
 from ...settings import TableSettings
 from ..table import q_limit_of
 from .describe import sections

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,11 +60,13 @@ class Chains:
     orders : of the grating.
     grating : the same.
     gain : of model and material.
+    sign : of the orders' numbers.
     """
 
     orders: Orders
     grating: Grating
     gain: OrderGain
+    sign: int = 1
 
     def shares(self, first: Real, second: Real, last: int, steepest: bool = False) -> Real:
         """M (..., last + 1, last + 3), from ξ = (k + first, last − k + second), any one shape.
@@ -90,7 +92,9 @@ class Chains:
         least = math.cos(LAST_ANGLE) if steepest else float(lobes(*lobe)[2][-1])
         cos_i = np.sqrt(np.maximum(1.0 - x**2 - y_squared, least**2))
         w = self.gain.width(cos_i, np.sqrt(np.maximum(1.0 - radius**2, 0.0)))
-        power = self._powers(np.rint(last - k - o).astype(int), self.grating.spacing / g * w)
+        power = self._powers(
+            self.sign * np.rint(last - k - o).astype(int), self.grating.spacing / g * w
+        )
         across = np.hypot(x, np.sqrt(y_squared)) * radius
         turn = (x * x_o - y_squared) / np.maximum(across, 1e-12)
         turn = np.arccos(np.clip(turn, -1.0, 1.0))
@@ -209,8 +213,15 @@ def _padded(s: Real) -> Real:
     return np.asarray(np.concatenate([s[..., :1], s, s[..., -1:]], axis=-1), np.float64)
 
 
-def put(values: Array, s: Real, last: int) -> None:
+def put(values: NDArray[np.floating[Any]], s: Real, last: int) -> None:
     """s (NODES, NODES, last + 1) into the nodes (rows, rows) of `GratingGrid`."""
     for k in range(last + 1):
         row, column = k * NODES, (last - k) * NODES
         values[row : row + NODES, column : column + NODES] = s[..., k]
+
+
+def taken(values: Array, last: int) -> Array:
+    """The inverse of `put`."""
+    parts = values.reshape(len(values) // NODES, NODES, -1, NODES)
+    k = np.arange(last + 1)
+    return np.asarray(np.moveaxis(parts[k, :, last - k], 0, -1))

@@ -99,6 +99,11 @@ class Link:
     #: Whether the orders are those of a flat surface.
     flat = False
 
+    @property
+    def sign(self) -> int:
+        """Of the orders' frequencies: seen from within, heights are turned over; through, κ is."""
+        return 1 if self.came == self.left == 0 else -1
+
     def width(self, cos_i: Real | float, cos_o: Real) -> Real:
         """w."""
         q_i, q_o = self._normals(cos_i, cos_o)

@@ -8,8 +8,15 @@ directions of both sides such that with f = f_0 + f_orders
 
 as in `conservation`, but upwards too. A sheet loses what is beyond its critical angle; that is put
 back likewise. Where order 0 is too weak, as of rough surfaces, all of f' is scaled by s(ωi) s(ωo)
-besides, evenly in proportion to what there is. Sums as in `transport`, over the links of a side
-with a side.
+besides, evenly in proportion to what there is.
+
+What is missing after that, m(ω), may be missing along a direction and not along the one that order
+0 goes to, as on a blazed grating: no reciprocal model can give it to order 0. It is spread over all
+directions where some is missing, which is reciprocal and sums to m (Kulla and Conty 2017):
+
+    f'' = f' + g(ωi) g(ωo),   g = m/√M,   M = ∫ m n² cosθ dω over both sides.
+
+Sums as in `transport`, over the links of a side with a side.
 """
 
 from __future__ import annotations
@@ -26,14 +33,14 @@ from ...optics.geometry import wavenumber
 from ..sampling import OrderMixture
 from ..table import DiffractionTable
 from . import between, sheet
-from .chains import Chains, put
+from .chains import Chains, put, taken
 from .conservation import DirectionalTable, parallel
 from .gain import bilinear
 from .grating import NODES, Grating, GratingGrid, fractions
 from .grid import DirectionGrid, Interpolation
 from .links import Link, Medium
 from .sheet import ChainSides, LinkGain
-from .sums import LinkedSums, solved
+from .sums import LEAST, LinkedSums, solved
 from .transport import Orders, Row, Transport
 
 Real = NDArray[np.float64]
@@ -46,6 +53,8 @@ SHEET, DENSE, WAVELENGTHS = DirectionGrid(48, 96), DirectionGrid(60, 96), (6, 12
 #: are further apart than the first of these, in 1/σ, and the shortest waves' horizon further off
 #: than the second: lobes are narrow at 75°, too.
 FEW_ORDERS, NARROW = 24, (25.0, 150.0)
+#: Polar angles and azimuths of integrals over a side.
+NODES_OF_INTEGRALS = 240, 96
 
 
 @dataclass(frozen=True)
@@ -103,7 +112,7 @@ class Sides:
         self._parts: dict[tuple[Link, bytes], Real] = {}
 
     def scale(self, wavelength_range: tuple[float, float]) -> list[DirectionalTable] | None:
-        """c above and below, then s if any is needed; None where R + T is near 1 as it is.
+        """c above and below, then s, then g, if needed; None where R + T is near 1 as it is.
 
         A second or two. Their polar angles are `Medium.angle`.
         """
@@ -118,18 +127,50 @@ class Sides:
             return None
         needed = found if np.any(found[2:] != 1.0) else found[:2]
         middle = np.sqrt(wavelengths[1:] * wavelengths[:-1]) if count > 1 else wavelengths
-        amid = partial(self._amid, grating)
-        needed = between.lowered(needed, parallel(amid, middle.tolist()))
-        return [DirectionalTable(wavelengths, values, grating) for values in needed]
+        cells = parallel(partial(self._cells, grating), middle.tolist())
+        values = between.lowered(needed, cells)
+        rooms = between.rooms(values, cells)
+        if between.is_lacking(rooms, cells):
+            if len(values) == 2:
+                values = np.concatenate([values, np.ones_like(values)])
+            pages = zip(wavelengths.tolist(), values.swapaxes(0, 1), strict=True)
+            room = parallel(lambda one: self._room(grating, *one), list(pages))
+            wanted = np.maximum(np.stack(room, axis=1) - (between.CEILING - LEAST), 0.0)
+            lack = between.at_most(wanted, cells, rooms)
+            values = np.concatenate([values, self._spread(wavelengths, lack, grating)])
+        return [DirectionalTable(wavelengths, one, grating) for one in values]
 
-    def _amid(self, grating: Grating | None, wavelength: float) -> between.Excess:
+    def _room(self, grating: Grating | None, wavelength: float, pages: Array) -> Array:
+        """What R + T is below `between.CEILING` at the nodes of c and s."""
+        if grating is None:
+            theta = [grid.angles for grid in self._grids]
+            transport = self.transport(theta, self._grid.phi, wavelength)
+            return between.excess_and_room(transport, pages, pages)[1]
+        found = np.zeros_like(pages[:2])
+        for last, sums in enumerate(self._by_length(grating, wavelength, np.arange(NODES))):
+            own = np.stack([taken(one, last) for one in pages])
+            room = between.excess_and_room(sums, own, own)[1]
+            for side in (0, 1):
+                put(found[side], room[side], last)
+        return found
+
+    def _spread(self, wavelengths: Real, lack: Array, grating: Grating | None) -> Array:
+        """g from m."""
+        tables = [DirectionalTable(wavelengths, one, grating) for one in lack]
+        totals = np.array([sum(gathered(tables, self._medium, k)) for k in wavelengths.tolist()])
+        scale = 1.0 / np.sqrt(np.maximum(totals, 1e-12))
+        return np.asarray(lack * scale[:, None, None], np.float32)
+
+    def _cells(self, grating: Grating | None, wavelength: float) -> between.Cells:
         if grating is not None:
-            return between.on_chains(self._by_length(grating, wavelength, np.arange(NODES) + 0.5))
+            chains = self._by_length(grating, wavelength, np.arange(NODES) + 0.5)
+            return between.ChainCells(chains, len(chains) * NODES)
         halves = [replace(grid, polar=2 * self._grid.polar).angles[1::2] for grid in self._grids]
-        rows = int(np.sum(np.any(np.stack(halves) <= between.LOOKED_AT, axis=0)))
+        rows = int(np.sum(np.any(np.stack(halves) <= between.FALLS[1], axis=0)))
         phi = self._grid.phi + np.pi / self._grid.azimuthal
-        transport = self.transport([angles[:rows] for angles in halves], phi, wavelength)
-        return between.on_grid(transport, rows)
+        angles = np.stack(halves)[:, :rows]
+        transport = self.transport(list(angles), phi, wavelength)
+        return between.GridCells(transport, angles, self._grid.polar)
 
     def _scale_at(self, wavelength: float) -> Array:
         """(4, polar + 1, azimuthal)."""
@@ -177,7 +218,7 @@ class Sides:
                 self._parts_of(link, theta), theta, k, self._table, self._height_scale
             )
             gain = LinkGain(link, table, k, orders.mixture.kappa_step / k)
-            chains[link.came].append((link.left, Chains(orders, grating, gain)))
+            chains[link.came].append((link.left, Chains(orders, grating, gain, link.sign)))
         return chains
 
     def sums(
@@ -196,7 +237,10 @@ class Sides:
         changed = transport.changed(np.stack(pages[:2]), np.stack(here[:2]))
         if len(pages) == 2:
             return raw, np.asarray(changed(np.ones_like(pages[:2])), np.float32)
-        return raw, np.asarray(np.stack(here[2:]) * changed(np.stack(pages[2:])), np.float32)
+        found = np.stack(here[2:4]) * changed(np.stack(pages[2:4]))
+        if len(pages) == 6:
+            found += np.stack(here[4:]) * sum(gathered(scale[4:], self._medium, wavelength))
+        return raw, np.asarray(found, np.float32)
 
     def at(
         self,
@@ -207,9 +251,7 @@ class Sides:
         wavelength: float,
     ) -> Array:
         """One of `scale` at directions on its side: angles (rad) of any one shape."""
-        if table.grating is not None:
-            return table.at(theta, phi, wavelength)
-        return self._grids[side].interpolation(theta, phi)(table.page(wavelength))
+        return _value(table, self._medium, side, theta, phi, wavelength)
 
     def transport(
         self,
@@ -252,6 +294,36 @@ class Sides:
         return self._parts[key]
 
 
+def gathered(
+    tables: Sequence[DirectionalTable], medium: Medium, wavelength: float
+) -> tuple[float, float]:
+    """∫ g n² cosθ dω of both sides' g, at a wavelength (nm)."""
+    polar, azimuthal = NODES_OF_INTEGRALS
+    theta = (np.arange(polar) + 0.5) * (0.5 * np.pi / polar)
+    phi = (np.arange(azimuthal) + 0.5) * (2.0 * np.pi / azimuthal)
+    weights = 0.5 * np.sin(2.0 * theta) * (0.5 * np.pi / polar) * (2.0 * np.pi / azimuthal)
+    above, below = (
+        medium.measured(side) ** 2
+        * float(weights @ _value(table, medium, side, theta[:, None], phi, wavelength).sum(axis=1))
+        for side, table in enumerate(tables)
+    )
+    return above, below
+
+
+def _value(
+    table: DirectionalTable,
+    medium: Medium,
+    side: int,
+    theta: ArrayLike,
+    phi: ArrayLike,
+    wavelength: float,
+) -> Array:
+    if table.grating is not None:
+        return table.at(theta, phi, wavelength)
+    grid = SideGrid(table.grid.polar, table.grid.azimuthal, medium, side)
+    return grid.interpolation(theta, phi)(table.page(wavelength))
+
+
 class _Linked(Row):
     """Of light that goes along a link."""
 
@@ -261,6 +333,7 @@ class _Linked(Row):
         came, left = (link.medium.measured(side) for side in (link.came, link.left))
         sine = came * np.sin(theta) / left
         super().__init__(orders, k * left, sine, float(np.arcsin(min(sine, 1.0))), phi)
+        self.sign = link.sign
         self._link, self._table, self._cos = link, table, float(np.cos(theta))
         self._per_w = k / link.medium.index
 

@@ -21,7 +21,7 @@ from .grid import LAST_ANGLE
 from .links import Medium
 
 #: Raised whenever the computation changes.
-VERSION = 6
+VERSION = 10
 
 #: Height scales are n/steps: this phase (rad) changes at most in between. The power of an order
 #: bends by a fiftieth then, and by less at grazing angles, where there is most to take.
@@ -46,7 +46,8 @@ _SIDES = (
     *_SETTINGS, str(sides.SHEET), str(sides.DENSE), sides.WAVELENGTHS, sides.FEW_ORDERS,
     sides.NARROW, sums.SWEEPS, sums.LEAST, sums.MOST, sums.TOLERATED, sums.ENOUGH,
     sums.STRONGEST, sums.FAINT, sums.FALL, sums.BETWEEN, sums.MARGIN, sums.LinkedSums.certain,
-    between.CEILING, between.GENTLE, between.MOST, between.LOOKED_AT, sheet.ChainSides.certain,
+    between.CEILING, between.GENTLE, between.MOST, between.LOOKED_AT, between.FALLS,
+    between.FAR, between.FEW, sides.NODES_OF_INTEGRALS, sheet.ChainSides.certain,
     sheet.POLAR, links.POLAR, links.AZIMUTHS, links.FARTHEST,
 )  # fmt: skip
 

@@ -201,7 +201,10 @@ class Row(ABC):
     k : wavenumber where the light goes to, rad/µm.
     sin : of the angle of incidence, as the light would have it there.
     mirrored : polar angle of order 0.
+    sign : of the orders' frequencies.
     """
+
+    sign = 1.0
 
     def __init__(self, orders: Orders, k: float, sin: float, mirrored: float, phi: Real) -> None:
         self.mixture, self.phi = orders.mixture, phi
@@ -250,7 +253,7 @@ class Row(ABC):
         lower = position.astype(np.int32)
         upper_share = (position - lower).astype(np.float32)
         layer = mixture.density[0].size
-        scale = k / mixture.pitch
+        scale = self.sign * k / mixture.pitch
         bx, by = scale * (x + self.sin), scale * y
         sin, cos = np.sin(self.phi)[:, None], np.cos(self.phi)[:, None]
         rows, columns = mixture.density.shape[1:]
@@ -267,8 +270,9 @@ class Row(ABC):
     def strong(self) -> tuple[Real, Real, Real]:
         """Shares (p, m) of the strong orders, and their θo and azimuths."""
         mixture, k = self.mixture, self.k
-        x = mixture.frequency[:, 0] / k - self.sin * np.cos(self.phi)[:, None]
-        y = mixture.frequency[:, 1] / k - self.sin * np.sin(self.phi)[:, None]
+        places = mixture.frequency * (self.sign / k)
+        x = places[:, 0] - self.sin * np.cos(self.phi)[:, None]
+        y = places[:, 1] - self.sin * np.sin(self.phi)[:, None]
         radius, azimuth = np.hypot(x, y), np.arctan2(y, x)
         share, cos_o, pole = lobe_means(self.sigma, k, radius)
         power = mixture.strong_at(self.kappa(np.sqrt(np.maximum(1.0 - radius**2, 0.0))))

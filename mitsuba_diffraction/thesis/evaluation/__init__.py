@@ -23,15 +23,6 @@ from .windows import thesis_fit, window_fits
 documents_fit = thesis_fit
 
 __all__ = [
-    "Beam",
-    "Fit",
-    "Response",
-    "Ridge",
-    "documents_fit",
-    "find_period",
-    "fit_period",
-    "measure",
-    "ridge_of",
-    "thesis_fit",
-    "window_fits",
-]
+    "Beam", "Fit", "Response", "Ridge", "documents_fit", "find_period", "fit_period", "measure",
+    "ridge_of", "thesis_fit", "window_fits",
+]  # fmt: skip

@@ -24,6 +24,22 @@ Brdf = Callable[[Array, Array, Array], Array]
 
 MOST_POINTS = 20_000_000
 
+#: Fewer maxima than this determine no period.
+FEWEST = 5
+#: Share of the light on an order's side that a grating sends into the order, at least; and how much
+#: brighter its lobe is than what is within an octave.
+LEAST_SHARE, LEAST_RATIO = 0.05, 4.0
+# Relative half widths of an irregular grating's order and of what it is compared with.
+_SPREAD, _AROUND = 0.07, 0.5
+# A period found in the heights and one found in the light agree to this factor.
+_AGREES = 1.15
+# In units of 1/σ: beyond it exp(−25), 1e-11, is left of order 0's power.
+_ORDER_0 = 5.0
+# Light this much weaker than the brightest order is the window's own tail, not a maximum.
+_FAINT = 1e-12
+# Periods that are tried, evenly spaced in frequency.
+_LINES = 4000
+
 
 @dataclass(frozen=True)
 class Beam(Light):
@@ -110,25 +126,6 @@ def check_axes(wavelengths: Array, angles: Array) -> None:
             f"{wavelengths.size} wavelengths at {angles.size} angles are more than {MOST_POINTS} "
             "points; make the steps larger"
         )
-
-
-#: Fewer maxima than this determine no period.
-FEWEST = 5
-
-#: Share of the light on an order's side that a grating sends into the order, at least; and how much
-#: brighter its lobe is than what is within an octave.
-LEAST_SHARE, LEAST_RATIO = 0.05, 4.0
-
-# Relative half widths of an irregular grating's order and of what it is compared with.
-_SPREAD, _AROUND = 0.07, 0.5
-# A period found in the heights and one found in the light agree to this factor.
-_AGREES = 1.15
-# In units of 1/σ: beyond it exp(−25), 1e-11, is left of order 0's power.
-_ORDER_0 = 5.0
-# Light this much weaker than the brightest order is the window's own tail, not a maximum.
-_FAINT = 1e-12
-# Periods that are tried, evenly spaced in frequency.
-_LINES = 4000
 
 
 @dataclass(frozen=True, eq=False)

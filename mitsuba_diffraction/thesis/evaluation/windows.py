@@ -18,7 +18,7 @@ from ...optics.geometry import diffraction_coordinates, wavenumber
 from ...progress import Progress
 from ...tables.table import DiffractionTable
 from ..methods.method import Gain
-from .ridge import Array, Beam, Fit, Response, fit_period, measure, ridge_of
+from .ridge import Array, Beam, Fit, fit_period, measure, ridge_of
 
 MOST_WINDOWS = 4096
 
@@ -101,16 +101,15 @@ def _lattice(count: int) -> Array:
     return np.asarray((steps + np.random.default_rng(_SEED).random(2)) % 1.0)
 
 
-def thesis_response(
-    table: DiffractionTable, beam: Beam, wavelengths: Array, angles: Array
-) -> Response:
-    """Its response: C·S at κ = k, the window on the corner; in `values`, times cosθo.
+def thesis_fit(
+    table: DiffractionTable, beam: Beam, wavelengths: Array, angles: Array, order: int = 1
+) -> Fit:
+    """The period that its procedure finds, at viewing angles across the normal from the light.
 
-    Parameters
-    ----------
-    table : with coherence="patch".
+    That is where it looks; on the light's own side its response grows towards the horizon. The
+    response is C·S at κ = k, the window on the corner, of a table with coherence="patch".
     """
-    gain = Gain()
+    gain, across = Gain(), angles[angles <= 0.0]
 
     def relative(wi: Array, wo: Array, wavelength: Array) -> Array:
         k = wavenumber(wavelength)
@@ -118,15 +117,5 @@ def thesis_response(
         return gain.factor(wi, wo) * table.window_sum(k * u, k * v, k, (0.0, 0.0))
 
     label = "thesis' procedure"
-    return measure(relative, beam, wavelengths, angles, sigma=table.sigma, label=label)
-
-
-def thesis_fit(
-    table: DiffractionTable, beam: Beam, wavelengths: Array, angles: Array, order: int = 1
-) -> Fit:
-    """The period that its procedure finds, at viewing angles across the normal from the light.
-
-    That is where it looks; on the light's own side its response grows towards the horizon.
-    """
-    across = angles[angles <= 0.0]
-    return fit_period(ridge_of(thesis_response(table, beam, wavelengths, across), order))
+    found = measure(relative, beam, wavelengths, across, sigma=table.sigma, label=label)
+    return fit_period(ridge_of(found, order))

@@ -25,16 +25,6 @@ from .method import FullSpectrum, Gain, Method
 from .periodic import OrdersOnly, Period, Rainbow, Repeated, estimate_periods
 
 __all__ = [
-    "NAMES",
-    "FullSpectrum",
-    "Gain",
-    "Method",
-    "OrdersOnly",
-    "Period",
-    "Rainbow",
-    "Repeated",
-    "estimate_periods",
-    "make",
-    "make_all",
-    "method_map",
-]
+    "NAMES", "FullSpectrum", "Gain", "Method", "OrdersOnly", "Period", "Rainbow", "Repeated",
+    "estimate_periods", "make", "make_all", "method_map",
+]  # fmt: skip

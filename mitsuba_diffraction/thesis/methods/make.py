@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -88,31 +90,42 @@ def make_all(
     trapezoid_rule(wavelength_range, step)
     if period is not None:
         check_period(period)
-    tables = _Tables(
-        heights, coherence_width, tolerance, terms, taps, wavelength_range, progress,
-        build or DiffractionTable.build,
-    )  # fmt: skip
+    common: dict[str, Any] = {
+        "coherence_width": coherence_width, "tolerance": tolerance, "height_scale_max": 1.0,
+        "wavelength_range": wavelength_range, "progress": progress,
+    }  # fmt: skip
+
+    @functools.cache  # methods share what they tabulate
+    def table(**own: Any) -> DiffractionTable:
+        return (build or DiffractionTable.build)(heights, **(common | own))
+
+    def default(name: str) -> FullSpectrum:
+        own = table(coherence=coherence or "ensemble")
+        return FullSpectrum(name, own, wavelength_range, step)
 
     def flss(name: str) -> FullSpectrum:
-        table = tables.taylor(coherence or "patch")
-        return FullSpectrum(name, table, wavelength_range, step)
+        taylor = table(coherence=coherence or "patch", basis="taylor", terms=terms, taps=taps)
+        return FullSpectrum(name, taylor, wavelength_range, step)
 
     def nmm(name: str) -> OrdersOnly:
         periods = _periods(heights, name, period)
         return OrdersOnly(flss("flss"), periods, weights=nmm_weights, specular=specular, name=name)
 
     def pq(name: str) -> Repeated:
-        fill = [max(2, round(coherence_width / extent)) for extent in heights.extent]
+        x, y = (max(2, round(coherence_width / extent)) for extent in heights.extent)
+        width = max(heights.extent)  # of a window that does not matter
+        step_x, step_y = (0.5 * math.pi * width / extent for extent in heights.extent)
+        most = max(SINC_TAPS, *taps_for((step_x, step_y), tolerance * TAPS_SHARE, True))
+        copies = table(
+            coherence="patch", basis="taylor", terms=terms, coherence_width=width, taps=most
+        )
         return Repeated(
-            tables.for_copies(), repeats or (fill[0], fill[1]),
-            interpolation="sinc" if name == "pq-sinc" else "linear", taps=SINC_TAPS,
-            wavelength_range=wavelength_range, step=step, name=name,
+            copies, repeats or (x, y), interpolation="sinc" if name == "pq-sinc" else "linear",
+            taps=SINC_TAPS, wavelength_range=wavelength_range, step=step, name=name,
         )  # fmt: skip
 
     makers: dict[str, Callable[[str], Method]] = {
-        "default": lambda name: FullSpectrum(
-            name, tables.own(coherence or "ensemble"), wavelength_range, step
-        ),
+        "default": default,
         "flss": flss,
         "nmm": nmm,
         "pq": pq,
@@ -134,54 +147,6 @@ def _periods(
         x, y = (p.length if p.found else None for p in estimate_periods(heights))
         return x, y
     return (main.length, None) if main.axis == "x" else (None, main.length)
-
-
-@dataclass
-class _Tables:
-    """Tables of one patch, built when they are first asked for."""
-
-    heights: HeightField
-    coherence_width: float
-    tolerance: float
-    terms: int | None
-    taps: int | None
-    wavelength_range: tuple[float, float]
-    progress: Progress | None
-    build: Build
-    _built: dict[str, DiffractionTable] = field(default_factory=dict)
-
-    def own(self, coherence: str) -> DiffractionTable:
-        """What the package would build by itself."""
-        return self._build(f"own {coherence}", coherence=coherence)
-
-    def taylor(self, coherence: str) -> DiffractionTable:
-        """The thesis' series."""
-        return self._build(
-            f"taylor {coherence}", coherence=coherence, basis="taylor", terms=self.terms,
-            taps=self.taps,
-        )  # fmt: skip
-
-    def for_copies(self) -> DiffractionTable:
-        """The thesis' series with taps for `pq`; its own window does not matter."""
-        width = max(self.heights.extent)
-        steps = [0.5 * 3.141592653589793 * width / extent for extent in self.heights.extent]
-        least = taps_for((steps[0], steps[1]), self.tolerance * TAPS_SHARE, True)
-        return self._build(
-            "copies", coherence="patch", basis="taylor", terms=self.terms,
-            coherence_width=width, taps=max(SINC_TAPS, *least),
-        )  # fmt: skip
-
-    def _build(self, key: str, **arguments: object) -> DiffractionTable:
-        if key not in self._built:
-            settings: dict[str, object] = {
-                "coherence_width": self.coherence_width,
-                "tolerance": self.tolerance,
-                "wavelength_range": self.wavelength_range,
-                "height_scale_max": 1.0,
-                "progress": self.progress,
-            }
-            self._built[key] = self.build(self.heights, **(settings | arguments))
-        return self._built[key]
 
 
 def method_map(

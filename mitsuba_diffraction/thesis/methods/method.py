@@ -36,6 +36,10 @@ from ...tables.table import DiffractionTable
 
 SHADOWINGS = ("none", "vcavity")
 
+Array = NDArray[np.float64]
+_FINEST_STEP = 0.1  # nm
+_PAIRS = 4096  # direction pairs at a time, per thread
+
 
 @dataclass(frozen=True)
 class Gain:
@@ -83,12 +87,6 @@ class Gain:
         if self.shadowing == "vcavity":
             gain *= np.minimum(1.0, 2.0 * w * np.minimum(cos_i, cos_o) / one_plus_dot)
         return np.where(above, gain, 0.0)
-
-
-Array = NDArray[np.float64]
-
-_FINEST_STEP = 0.1  # nm
-_PAIRS = 4096  # direction pairs at a time, per thread
 
 
 class Method(ABC):

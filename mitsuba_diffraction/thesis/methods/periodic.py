@@ -28,6 +28,10 @@ from .method import Array, FullSpectrum, Gain, Method, UniformMethod
 LEAST_CONFIDENCE = 0.3
 
 _SHORTEST, _LONGEST = 1e-2, 1e3  # µm
+#: Of `OrdersOnly` and of `Repeated`.
+WEIGHTS, INTERPOLATIONS = ("step", "lobe"), ("linear", "sinc")
+#: nm, whose value the white around the mirror direction takes: where the eye sees best.
+SPECULAR_WAVELENGTH = 555.0
 
 
 @dataclass(frozen=True)
@@ -77,13 +81,7 @@ def main_period(field: HeightField) -> Period:
 
 
 def required_period(field: HeightField, method: str, period: float | None) -> Period:
-    """The period that a method needs: the given one (along the main axis), or the estimate.
-
-    Raises
-    ------
-    DiffractionError
-        If `period` is out of range, or the patch has none.
-    """
+    """The period that a method needs: the given one (along the main axis), or the estimate."""
     estimate = main_period(field)
     if period is not None:
         return Period(estimate.axis, check_period(period), 1.0)
@@ -123,12 +121,6 @@ def _first_peak(axis: str, correlation: NDArray[np.float64], pixel: float) -> Pe
         if best.found:
             break
     return best
-
-
-WEIGHTS = ("step", "lobe")
-
-#: nm, whose value the white around the mirror direction takes: where the eye sees best.
-SPECULAR_WAVELENGTH = 555.0
 
 
 class OrdersOnly(Method):
@@ -221,9 +213,6 @@ class OrdersOnly(Method):
             return np.full(len(wavelength), self._step)
         slope = np.maximum(np.abs(frequency), 1e-12)
         return 1e-3 * wavelength**2 / (2.0 * math.sqrt(math.pi) * self.sigma * slope)
-
-
-INTERPOLATIONS = ("linear", "sinc")
 
 
 def _orders(

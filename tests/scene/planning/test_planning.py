@@ -23,7 +23,7 @@ from mitsuba_diffraction.scene.planning.make import (
     worthwhile,
 )
 from mitsuba_diffraction.scene.planning.plan import (
-    LookupStatistics,
+    Lookups,
     Plan,
     domain_for,
     quantiles,
@@ -90,7 +90,7 @@ def asked_of(u, v, w, wavelength, light):
     """Look-ups by hand; the picture's light is theirs."""
     columns = (np.atleast_1d(np.asarray(a, float)) for a in (u, v, w, wavelength))
     xyz = np.asarray(light, float)[:, None] * np.full(3, 1.0 / 3.0)
-    return LookupStatistics(*columns, xyz, float(np.sum(light)))
+    return Lookups(*columns, xyz, float(np.sum(light)))
 
 
 def test_a_plate_is_asked_for_one_direction_only(looked):
@@ -158,7 +158,7 @@ def test_wavelengths_that_the_eye_does_not_see_cost_no_colour():
     wavelength = np.linspace(360.0, 830.0, 471)
     xyz = response(wavelength)
     ones = np.ones(471)
-    asked = LookupStatistics(ones, ones, ones, wavelength, xyz / xyz.sum(), 1.0)
+    asked = Lookups(ones, ones, ones, wavelength, xyz / xyz.sum(), 1.0)
     found = wavelengths_needed(asked, 1e-3)
     low, high = found["range_nm"]
     assert 380.0 < low < 410.0

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.optics.slope_ratio import SlopeRatios, Slopes, along
+from mitsuba_diffraction.optics.second_order import SlopeRatios, Slopes, along
 from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.build.slope_ratios import slope_ratios
 from mitsuba_diffraction.tables.build.windows import windows_of
+from mitsuba_diffraction.tables.document import described, document_of, plain
 from tests.directions import rough_patch
 
 #: Of few orders, and of many; not square.
@@ -110,6 +113,28 @@ def test_a_table_holds_it_only_if_asked_and_keeps_it_in_its_file(tmp_path):
     text = (tmp_path / "without.exr").read_bytes()
     assert b"second_order" not in text
     assert b"slope_ratios" not in text
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("cell", [0.0, 1.0]),
+        ("orders", [1, 0]),
+        ("kappa", [9.0, 3.0]),
+        ("shape", [3, 2, 5]),
+        ("values", "AAAA"),
+        ("values", "no base 64!"),
+        ("more", 1),
+    ],
+)
+def test_of_a_damaged_file_it_is_refused(name, value):
+    table = DiffractionTable.build(FEW, second_order=True, coherence_width=6.0, tolerance=0.01)
+    document = document_of(table)
+    assert table.summary()["second_order"]
+    described(json.loads(json.dumps(document, default=plain)))
+    document["slope_ratios"][name] = value
+    with pytest.raises(ValueError, match=r".+"):
+        described(json.loads(json.dumps(document, default=plain)))
 
 
 def test_other_words_than_true_and_false_are_refused():

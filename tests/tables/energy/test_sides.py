@@ -9,7 +9,9 @@ import pytest
 
 from mitsuba_diffraction import DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.tables.energy import sides as made
+from mitsuba_diffraction.tables.energy.chains import put, taken
 from mitsuba_diffraction.tables.energy.gain import bilinear
+from mitsuba_diffraction.tables.energy.grating import NODES
 from mitsuba_diffraction.tables.energy.links import Link, Medium
 from mitsuba_diffraction.tables.energy.sides import Sides
 
@@ -97,6 +99,30 @@ def test_scaled_both_sides_add_up_to_all_light(thin, width, monkeypatch):
     # nodes of azimuth (at 46°)
     assert (kept if thin else kept[0]).min() > 0.98
     assert kept.min() > 0.97
+
+
+def test_what_scales_leave_out_is_spread():
+    field = gratings.blazed(2.5, 0.25, periods=26, pixels_per_period=28)
+    steep = DiffractionTable.build(field, height_scale_max=1.6)
+    surface = Sides(steep, 1.0, Medium(1.5, "small_slope", True))
+    scale = surface.scale((550.0, 550.0))
+    assert scale is not None
+    assert len(scale) == 6
+    _, scaled = surface.sums(scale[:4], THETA, PHI, 550.0)
+    _, kept = surface.sums(scale, THETA, PHI, 550.0)
+    assert scaled.min() < 0.96
+    # bilinear between nodes, beside which an order comes up
+    assert kept.min() > 0.965
+    assert kept.max() < 1.002
+
+
+def test_chains_are_taken_as_they_are_put():
+    values, rng = np.zeros((4 * NODES, 4 * NODES), np.float32), np.random.default_rng(0)
+    chains = [rng.random((NODES, NODES, last + 1), np.float32) for last in range(4)]
+    for last, one in enumerate(chains):
+        put(values, one, last)
+    for last, one in enumerate(chains):
+        assert np.array_equal(taken(values, last), one)
 
 
 def test_what_is_near_1_stays_as_it_is():

@@ -1,5 +1,5 @@
 // What the material makes of the light: N' / (1 + ωi·ωo)², the twin of plugin/boundary.py and
-// plugin/coat.py. Kirchhoff's is the reflectance at the half vector.
+// plugin/layers.py. Kirchhoff's is the reflectance at the half vector.
 
 #ifdef COATED
 

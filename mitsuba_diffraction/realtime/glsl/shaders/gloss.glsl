@@ -1,5 +1,5 @@
 // What plain materials mirror: microfacets (Walter et al. 2007), or a smooth face; the twin of
-// gloss.py.
+// materials.py.
 
 uniform float gloss_alpha;        // roughness
 

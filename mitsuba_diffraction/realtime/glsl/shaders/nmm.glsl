@@ -1,5 +1,5 @@
 // `nmm`: the thesis' n_min–n_max method, only wavelengths whose orders reach the view
-// direction, each with the step of the full sum (methods/nmm.py).
+// direction, each with the step of the full sum (thesis/methods/periodic.py).
 
 uniform vec2 periods;           // along x and y, µm; 0 where there is none
 uniform float specular_reach;   // of hypot(u, v), within which the colour is white

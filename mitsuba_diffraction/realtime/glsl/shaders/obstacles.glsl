@@ -1,4 +1,4 @@
-// Whether the scene stands in the way of a ray; see obstacles.py.
+// Whether the scene stands in the way of a ray; see surroundings.py.
 
 #ifdef OBSTACLES
 uniform sampler2D obstacles;      // distances from the nearest surface over OBSTACLES cells

@@ -1,4 +1,4 @@
-// A surface's triangles in the graphics card's memory; the other half of geometry.py.
+// A surface's triangles in the graphics card's memory; the other half of sections.py.
 
 const ATTRIBUTES = { position: 3, normal: 3, tangent: 3, texcoord: 2, colour: 3, axis: 2 };
 

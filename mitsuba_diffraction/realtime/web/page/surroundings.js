@@ -1,5 +1,5 @@
 // What surrounds the scene: its environment, shapes that emit light, and what lobes meet; as
-// glsl/stage.py and glsl/surroundings.py have it.
+// glsl/progressive.py and glsl/surroundings.py have it.
 
 const WHITE = { place: [0, 0, 1, 0], colour: [1, 1, 1], axis: DARK, cone: [0, 0], spectrum: -1, density: 0 };
 // Other numbers for each sample, as glsl/progressive.py has them.

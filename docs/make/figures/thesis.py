@@ -1,27 +1,41 @@
-"""The table of docs/methods.md, from a measured run.
+"""The methods of the thesis: the table of docs/methods.md, and the page of sweeps.
 
-    python -m docs.make.figures.methods \\
+    python -m docs.make.figures.thesis methods \\
         --measured elaphe.png --pixel-size 0.0488 --max-height 0.375
+    python -m docs.make.figures.thesis sweeps
 
-What is written goes between the markers `methods` of the file.
+What is written goes between markers: a table, and how far each map of a sweep is from the best.
+Contact sheets of sweeps go to `images/sweep-KIND.png` beside the page.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from mitsuba_diffraction.analysis.maps.picture import contact_sheet
 from mitsuba_diffraction.analysis.maps.result import Light
+from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionWarning
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.gratings import blazed, elaphe_like
 from mitsuba_diffraction.thesis.methods import NAMES, OrdersOnly, make, make_all
 from mitsuba_diffraction.thesis.methods.make import method_map
-from mitsuba_diffraction.thesis.sweeps import Compiled, Step, compared, time_compiled, timed_map
+from mitsuba_diffraction.thesis.sweeps import (
+    SWEEPS,
+    Compiled,
+    Step,
+    Sweep,
+    compared,
+    sweep,
+    time_compiled,
+    timed_map,
+)
 
 from . import pages
 from .pages import SHOWN, add_measured, exit_code, measured_patch
@@ -113,34 +127,78 @@ def table(measured: Measured) -> str:
     return f"{pages.table(header, rows)}\n\n{note}"
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Measure, and write the table into a page."""
+def numbers(result: Sweep) -> str:
+    """ΔE of every step, and its time where that is the point, as a Markdown table."""
+    timed = result.kind == "wavelength-step"
+    rows: list[tuple[str, ...]] = []
+    for step in result.steps:
+        cells = ["", ""]
+        if step.label == result.reference:
+            cells = ["reference", ""]
+        elif math.isfinite(step.mean):
+            cells = [f"{step.mean:.2g}", f"{step.high:.2g}"]
+        time = [f"{step.seconds / result.steps[0].seconds:.2g}"] if timed else []
+        rows.append((SHOWN.get(step.label, step.label), *cells, *time))
+    header = ("value", "mean ΔE", "95th percentile")
+    return pages.table((*header, "time (first = 1)") if timed else header, rows)
+
+
+def write_methods(args: argparse.Namespace, scale: HeightField | None) -> None:
+    """Measure, and write the table."""
     from mitsuba_diffraction.scene.load import set_variant
 
-    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.methods")
-    parser.add_argument("-o", "--output", type=Path, default=Path("docs/methods.md"))
-    add_measured(parser, "scale to measure; default: elaphe_like")
-    parser.add_argument("--resolution", type=int, default=128)
+    set_variant(None)
+    scale = scale or (elaphe_like(8.0, 128) if args.small else elaphe_like())
+    grating = blazed(2.5, 0.25, pixels_per_period=60, rows=16 if args.small else 64)
+    measured = measure(
+        grating, scale, resolution=args.resolution or 128,
+        coherence_width=8.0 if args.small else 65.0,
+    )  # fmt: skip
+    pages.update(args.output or Path("docs/methods.md"), {"methods": table(measured)})
+
+
+def write_sweeps(args: argparse.Namespace, patch: HeightField | None) -> None:
+    """Make all sheets and tables."""
+    page = args.output or Path("docs/sweeps.md")
+    small = blazed(2.0, 0.2, periods=6, rows=8)
+    patch = patch or (small if args.small else elaphe_like())
+    parts = {}
+    for kind in args.only or SWEEPS:
+        print(f"sweeping {kind}", flush=True)
+        result = sweep(kind, patch, _LIGHT, resolution=args.resolution or 160)
+        parts[kind] = numbers(result)
+        best = next((s for s in result.steps if s.label == result.reference), None)
+        sheet = contact_sheet(
+            [step.map for step in result.steps],
+            [SHOWN.get(step.label, step.label) for step in result.steps],
+            title=f"{patch.name}: {kind}",
+            exposure=None if best is None else best.map.exposure(),
+        )
+        with atomic_path(page.parent / "images" / f"sweep-{kind}.png") as path:
+            sheet.savefig(path, format="png")
+    pages.update(page, parts)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Write one of the pages, and return the exit code."""
+    programs = {"methods": write_methods, "sweeps": write_sweeps}
+    parser = argparse.ArgumentParser(prog="python -m docs.make.figures.thesis")
+    parser.add_argument("page", choices=tuple(programs))
+    parser.add_argument("-o", "--output", type=Path, help="default: that page in docs")
+    add_measured(parser, "scale to take; default: elaphe_like")
+    parser.add_argument("--only", metavar="KIND", action="append", choices=tuple(SWEEPS))
+    parser.add_argument("--resolution", type=int, help="of maps; default: 128, of sweeps 160")
     parser.add_argument("--small", action="store_true", help="small patches: a check")
     args = parser.parse_args(argv)
 
     def work() -> None:
-        set_variant(None)
-        scale = measured_patch(args)
-        if scale is None:
-            scale = elaphe_like(8.0, 128) if args.small else elaphe_like()
+        patch = measured_patch(args)
         with warnings.catch_warnings():
             # how far the model holds is not the question here
             warnings.simplefilter("ignore", DiffractionWarning)
-            grating = blazed(2.5, 0.25, pixels_per_period=60, rows=16 if args.small else 64)
-            measured = measure(
-                grating, scale, resolution=args.resolution,
-                coherence_width=8.0 if args.small else 65.0,
-            )  # fmt: skip
-        text = table(measured)
-        pages.update(args.output, {"methods": text})
+            programs[args.page](args, patch)
 
-    return exit_code("methods", work)
+    return exit_code(args.page, work)
 
 
 if __name__ == "__main__":

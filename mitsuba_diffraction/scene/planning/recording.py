@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...plugin.names import own_id
 from ...plugin.pair import Pair
+from ...plugin.properties import own_id
 from ...plugin.roles import (
     BSDF,
     Colour,

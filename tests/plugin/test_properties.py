@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from mitsuba_diffraction.plugin.names import name_of, own_id
+from mitsuba_diffraction.plugin.properties import name_of, own_id
 
 
 class Element:

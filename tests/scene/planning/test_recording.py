@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.scene.planning.session import Session
+from mitsuba_diffraction.scene.planning.recording import Session
 
 PATCH = md.HeightField(0.005 * np.random.default_rng(1).random((64, 64)), 0.0875)
 

@@ -1,0 +1,42 @@
+"""The pages on methods and sweeps, in small."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PIL import Image
+
+from docs.make.figures import pages, thesis
+from mitsuba_diffraction.cli.options import METHODS
+from mitsuba_diffraction.thesis.sweeps import SWEEPS
+
+DOCS = Path(__file__).parents[3] / "docs"
+
+
+def test_the_table_of_methods_is_made_by_one_command(tmp_path, capsys, some_variant):
+    page = tmp_path / "README.md"
+    page.write_text("<!-- begin methods -->\n<!-- end methods -->\n", encoding="utf-8")
+    code = thesis.main(["methods", "-o", str(page), "--small", "--resolution", "12"])
+    assert code == 0, capsys.readouterr().err
+    text = pages.part(page.read_text(encoding="utf-8"), "methods")
+    rows = {line.split("|")[1].strip(): line.split("|") for line in text.splitlines()[2:9]}
+    assert set(rows) == {
+        *(f"`{n}`" for n in METHODS), "nmm, lobes",
+    }  # fmt: skip
+    assert float(rows["`flss`"][3]) == 1.0
+
+
+def test_the_page_of_sweeps_is_made_by_one_command(tmp_path, capsys):
+    page = tmp_path / "sweeps.md"
+    page.write_text((DOCS / "sweeps.md").read_text(encoding="utf-8"), encoding="utf-8")
+    (tmp_path / "images").mkdir()
+    assert thesis.main(["sweeps", "-o", str(page), "--small", "--resolution", "8"]) == 0, (
+        capsys.readouterr()
+    )
+    text = page.read_text(encoding="utf-8")
+    for kind, parameter in SWEEPS.items():
+        rows = pages.part(text, kind).splitlines()[2:]
+        assert len(rows) == len(parameter.values)
+        assert ("reference" in pages.part(text, kind)) == (parameter.reference is not None)
+        with Image.open(tmp_path / "images" / f"sweep-{kind}.png") as image:
+            assert image.size[0] > 400
