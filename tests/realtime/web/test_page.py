@@ -16,7 +16,7 @@ from mitsuba_diffraction.realtime.web.export import MAX_BYTES, Page, make_page
 from tests.realtime.web.pictures import picture
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def desktop(scene: Any) -> dict[str, NDArray[np.float32]]:
     """The desktop's pictures, by method."""
     from mitsuba_diffraction.realtime.glsl import Renderer
