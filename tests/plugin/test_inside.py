@@ -42,7 +42,7 @@ def assert_consistent(bsdf: Any, si: Any) -> None:
     assert np.mean(drawn) > 0.5
     # Mitsuba's maps keep the density of what would go through the surface, but no light
     assert np.all(spectra(weight)[~drawn] == 0.0)
-    # the same expressions in another kernel, in single precision
+    # the same expressions in single precision
     assert np.array(sample.pdf)[drawn] == pytest.approx(np.array(pdf)[drawn], rel=1e-3)
     product = (spectra(weight) * np.array(sample.pdf)[:, None])[drawn]
     value = spectra(value)[drawn]

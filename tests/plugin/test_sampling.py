@@ -163,7 +163,7 @@ def test_eval_pdf_equals_eval_and_pdf_and_sample(variant, request, name):
         kept = pdf > 0
         assert np.all(weights[~kept] == 0)
         assert np.linalg.norm(wo[kept], axis=1) == pytest.approx(1.0, abs=1e-6)  # single precision
-        # the same expressions, fused differently in another kernel
+        # the same expressions, of directions in single precision
         assert pdf[kept] == pytest.approx(density[kept], rel=1e-4)
         assert (weights * pdf[:, None])[kept] == pytest.approx(value[kept], rel=1e-3, abs=1e-6)
 
