@@ -11,6 +11,7 @@ from docs.make.validation.__main__ import main
 from docs.make.validation.markdown import joined, percent, table
 
 
+@pytest.mark.usefixtures("coarse")  # of energy it only asks that figures are there
 def test_the_report_is_whole(tmp_path, capsys):
     assert main(["report", "--quick", "-o", str(tmp_path / "docs")]) == 0
     page = tmp_path / "docs" / "validation.md"
