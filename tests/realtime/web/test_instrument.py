@@ -46,10 +46,10 @@ def clock_stopped(page: Any) -> Iterator[None]:
 
 
 def test_all_light_is_that_of_the_desktop(scene: Any, page_file: Path, tab: Any) -> None:
-    expected = of_the_desktop(scene, 16)
+    expected = of_the_desktop(scene, 8)
     opened = tab()
     assert opened.open(page_file) == "ready"
-    found = picture(opened, shadows=True, samples=16)
+    found = picture(opened, shadows=True, samples=8)
     inside = (found[..., 3] > 0.99) & (expected[..., 3] > 0.99)
     errors = delta_e(expected[..., :3], found[..., :3])[inside]
     # rounded tables; edges of shadows fall between other texels of the maps, in a few pixels
