@@ -35,7 +35,7 @@ def steep(kind: str, width: float = 20.0, **parameters: Any) -> Any:
 @pytest.mark.parametrize(("kind", "theta"), [("dielectric", 110.0), ("sheet", 70.0)])
 def test_what_scales_leave_out_is_spread(kind, theta):
     mi.set_variant("llvm_ad_mono")
-    raw, conserved = (steep(kind, 20.0, energy_conserving=e) for e in (False, True))
+    raw, conserved = (steep(kind, 40.0, energy_conserving=e) for e in (False, True))
     surface = sides.Sides(raw.table, 1.0, Medium(1.5, "small_slope", kind == "sheet"))
     along = np.radians([min(theta, 180.0 - theta)]), np.radians([20.0, 200.0])
     expected = surface.sums(None, *along, 550.0)[0][int(theta > 90.0), 0]
