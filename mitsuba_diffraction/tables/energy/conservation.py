@@ -64,7 +64,7 @@ PEAKS = 1.3
 CEILING = 0.995
 #: Parts of a cell that are looked at for a scale along the tracks of a surface; albedos of
 #: directions that mirror each other in their plane differ by less.
-ALONG, EVEN = 2, 0.01
+ALONG, EVEN = 3, 0.01
 
 
 @dataclass(frozen=True)
