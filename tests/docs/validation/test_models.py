@@ -13,26 +13,10 @@ from docs.make.validation.solutions import shipped
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.geometry import wavenumber
 
-#: Largest deviation of colours on keratin at 60°, by profile and depth/period.
-GOALS = {
-    ("sinusoidal", 0.03): 0.01,
-    ("sinusoidal", 0.08): 0.05,
-    ("lamellar", 0.03): 0.04,
-    ("lamellar", 0.08): 0.22,
-    ("blazed", 0.03): 0.09,
-    ("blazed", 0.08): 0.18,
-}
-
 
 @pytest.fixture(scope="module")
 def keratin() -> Comparison:
     return compare("keratin", model="small_slope")
-
-
-def test_on_keratin_in_oblique_light_it_meets_the_goals(keratin):
-    found = {(name, high): values[0] for name, (_, high), values in banded(keratin, [60.0])}
-    for case, goal in GOALS.items():
-        assert 0 < found[case] <= goal, case
 
 
 def test_nowhere_on_keratin_is_it_worse_than_kirchhoff_by_more_than_a_tenth(keratin):
