@@ -129,8 +129,9 @@ def no_worse(sides: Sides, material: str) -> str:
     header = ["", "light from", "Kirchhoff", "default", "change", "one share", "with it", "any"]
     return f"""On {material} it was to be no worse than Kirchhoff. Of {len(every)} gratings and
 angles it is better in {better} by more than the solver's last refinement changed (*change*), at
-best by {100 * max(gains):.1f} points, and worse in {len(worse)}, at worst by {-100 * min(gains):.2f}.
-Bands of depth/period that are worse in the mean, then these:
+best by {100 * max(gains):.1f} points, and worse in {len(worse)}, at worst by
+{-100 * min(gains):.2f}; half of them were solved after the blend had been chosen. Bands of
+depth/period that are worse in the mean, then these:
 
 {table(header, rows)}
 

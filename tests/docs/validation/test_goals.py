@@ -33,12 +33,12 @@ def test_on_keratin_in_oblique_light_goals_are_met(sides):
 
 
 def test_on_aluminium_few_gratings_are_worse_and_by_little(cases):
-    assert len(cases) > 60
+    assert len(cases) > 130
     gains = np.array([case.gain for case in cases])
     change = np.array([case.change for case in cases])
-    assert np.sum(gains > change) > 6 * np.sum(gains < -change)
-    # errors of Kirchhoff that cancel; the table says where, and that no share does better there
-    assert gains.min() > -0.0075
+    assert np.sum(gains > change) > 5 * np.sum(gains < -change)
+    # Kirchhoff's errors cancel there; the table says where, and what other shares would leave
+    assert gains.min() > -0.0085
     assert gains.max() > 0.05
     assert gains.mean() > 0.005
 

@@ -37,7 +37,7 @@ def test_on_aluminium_it_is_no_worse_in_any_band():
         for theta, was, now in zip(ANGLES, before, after, strict=True):
             # Kirchhoff's errors of the two polarisations cancel: blazed 1.1/0.1 µm at 30° has 47 %
             # of the mean, 54 and 68 % of either; and where both are as good as exact
-            assert now <= max(1.013 * was, was + 5e-5), (name, band, theta)
+            assert now <= max(1.01 * was, was + 5e-5), (name, band, theta)
     assert new[0][2][2] < 0.3 * old[0][2][2]  # gentle sinusoids at 60°
 
 
