@@ -60,6 +60,8 @@ _AZIMUTHS = 12
 _WIDTH = 0.01
 #: A spectrum is of bands, so many an octave, and each of a few lines: g has no finer features.
 _PER_OCTAVE, _LINES = 4, 3
+#: Share of the variance that is none.
+_LEAST = 1e-5
 _HORIZON = np.radians(89.5)
 
 
@@ -129,7 +131,7 @@ def _spectrum(roughness: ScaleRoughness | RoughnessTable) -> ScaleRoughness:
     which = place - place.min(initial=0)
     total = np.bincount(which, roughness.variance).astype(np.float64)
     moment = np.bincount(which, roughness.variance * roughness.frequency)
-    kept = total > 0.0
+    kept = total > _LEAST * total.sum()
     return ScaleRoughness(moment[kept] / total[kept], total[kept])
 
 
@@ -144,7 +146,8 @@ def _components(roughness: RoughnessTable) -> ScaleRoughness:
     first, last = np.log2(nodes[[0, -1]])
     frequency = 2.0 ** np.arange(first, last + 1.0, 1.0 / _PER_OCTAVE)
     variance, _ = nnls(shares(frequency, nodes), roughness.nodes)
-    return ScaleRoughness(frequency[variance > 0.0], variance[variance > 0.0])
+    kept = variance > _LEAST * variance.sum()
+    return ScaleRoughness(frequency[kept], variance[kept])
 
 
 def _of_waves(cosine: Real, index: Filmed, step: Real, power: Real) -> Real:
