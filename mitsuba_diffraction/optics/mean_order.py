@@ -14,8 +14,13 @@ and what the film adds to the power of any order, from ωi to ωo, is taken for
 
     g(ωi) g(ωo),   ln g = m of the film less m of the material without it, limited (`LIMIT`):
 
-symmetric, 1 where the film is none, and of heights times a factor with ln g times its square.
-Without a film m gains nothing (docs/validation.md). The heights' spectrum is taken for isotropic,
+symmetric, 1 where the film is none, and of heights times a factor with ln g times its square. Only
+waves in between that are φ apart in the film's fringes count, each by 1 − exp(−φ²),
+
+    φ = 2d Re(β(k) − β(u)),   β = √(ε_film − k²):
+
+of the others what all directions share is made up for by what the mean leaves out, as without a
+film, where m gains nothing (docs/validation.md). The heights' spectrum is taken for isotropic,
 so that g is of the angle to the normal alone.
 
 r₂ is from the boundary conditions at both faces, both of the heights h: E_t + ∇h E_z and
@@ -47,11 +52,11 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 #: Raised whenever the computation changes.
-VERSION = 1
+VERSION = 2
 #: x is taken for x/(1 + (x/LIMIT)⁴): where the second order is as large as the first, no series in
 #: the heights says anything, and facets reflect.
 LIMIT = 0.5
-#: Angles to the normal at which ln g is computed; linear in between.
+#: Angles to the normal at which ln g is computed for as many or more; linear in between.
 NODES = 46
 #: Azimuths of ξ, from 0 to π.
 _AZIMUTHS = 12
@@ -81,10 +86,14 @@ def mean_gain(
     wavenumber : 2π/λ in the medium above the film, rad/µm.
     height_scale : factor on the heights.
     """
-    numbers = (complex(part) for part in index.parts)
-    nodes = _at_nodes(roughness, *numbers, float(wavenumber))
-    theta = np.arccos(np.clip(np.asarray(cosine, np.float64), 0.0, 1.0))
-    return limited(np.interp(theta, _angles(), nodes) * height_scale**2)
+    given = np.clip(np.asarray(cosine, np.float64), np.cos(_HORIZON), 1.0)
+    if given.size < NODES:
+        found = exponents(given.ravel(), index, roughness, wavenumber).reshape(given.shape)
+    else:
+        numbers = (complex(part) for part in index.parts)
+        nodes = _at_nodes(roughness, *numbers, float(wavenumber))
+        found = np.interp(np.arccos(given), _angles(), nodes)
+    return limited(found * height_scale**2)
 
 
 def limited(exponent: ArrayLike) -> Real:
@@ -97,14 +106,25 @@ def exponents(
     cosine: Real, index: Filmed, roughness: ScaleRoughness | RoughnessTable, wavenumber: float
 ) -> Real:
     """ln g (t,) at cosines (t,), without its limit; arguments as `mean_gain`."""
+    material, film, depth = index.parts
+    bare, heights = Filmed(material, film, np.zeros_like(depth)), _heights(roughness, wavenumber)
+    return _of_waves(cosine, index, *heights, index) - _of_waves(cosine, bare, *heights, index)
+
+
+def coherent(
+    cosine: Real, index: complex, roughness: ScaleRoughness | RoughnessTable, wavenumber: float
+) -> Real:
+    """m (t,) of a material without a film, all waves in between; arguments likewise."""
+    return _of_waves(cosine, Filmed(index, index, 0.0), *_heights(roughness, wavenumber))
+
+
+def _heights(roughness: ScaleRoughness | RoughnessTable, wavenumber: float) -> tuple[Real, Real]:
+    """|ξ| of the heights' components, (n,), and their variances."""
     spectrum = _spectrum(roughness)
     step = _lines(spectrum.frequency / wavenumber)
     # What is finer than light scatters it to no wave that travels
     power = np.exp(-((0.5 * step) ** 4)) * wavenumber**2
-    power *= np.repeat(spectrum.variance / _LINES, _LINES)
-    material, film, depth = index.parts
-    bare = Filmed(material, film, np.zeros_like(depth))
-    return _of_waves(cosine, index, step, power) - _of_waves(cosine, bare, step, power)
+    return step, power * np.repeat(spectrum.variance / _LINES, _LINES)
 
 
 @lru_cache(maxsize=256)
@@ -150,8 +170,10 @@ def _components(roughness: RoughnessTable) -> ScaleRoughness:
     return ScaleRoughness(frequency[kept], variance[kept])
 
 
-def _of_waves(cosine: Real, index: Filmed, step: Real, power: Real) -> Real:
-    """m (t,) of one film; step : (n,) |ξ| of the heights' components; power : their variances."""
+def _of_waves(
+    cosine: Real, index: Filmed, step: Real, power: Real, fringes: Filmed | None = None
+) -> Real:
+    """m (t,) of one film; step, power : `_heights`; fringes : of a film, in which φ is."""
     sine = np.sqrt(1.0 - cosine**2)
     azimuth = _azimuths()
     ux = sine[:, None, None] + step[:, None] * np.cos(azimuth)
@@ -159,15 +181,26 @@ def _of_waves(cosine: Real, index: Filmed, step: Real, power: Real) -> Real:
     square = np.maximum(ux**2 + uy**2, 1e-20)
     turn = ux / np.sqrt(square), uy / np.sqrt(square)
     wave, between = _Film(sine**2, index), _Film(square, index)
-    variance, whole, light = power.sum(), np.zeros_like(cosine), np.zeros_like(cosine)
+    seen = np.ones(square.shape)
+    if fringes is not None:
+        seen = -np.expm1(-(_apart(sine[:, None, None] ** 2, square, fringes) ** 2))
+    variance = seen.mean(axis=-1) @ power
+    whole, light = np.zeros_like(cosine), np.zeros_like(cosine)
     for p in (False, True):
         came = wave.came(p)
         r = came.amplitude[0] - 1.0
-        jumps = _jumps(between, came, sine, turn).mean(axis=-1) @ power
+        jumps = (_jumps(between, came, sine, turn) * seen).mean(axis=-1) @ power
         added = wave.returned(came, jumps, sine, variance) + 2.0 * cosine**2 * variance * r
         whole += (r.conj() * added).real
         light += np.abs(r) ** 2
     return np.asarray(whole / light)
+
+
+def _apart(square: Real, between: Real, index: Filmed) -> Real:
+    """φ of waves of two squared tangential lengths."""
+    _, film, depth = index.parts
+    first, second = (decaying_root(film**2 - one + 0j).real for one in (square, between))
+    return np.asarray(2.0 * depth.real * (first - second))
 
 
 def _azimuths() -> Real:

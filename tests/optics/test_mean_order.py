@@ -12,7 +12,7 @@ from docs.make.validation.cases import Grating
 from mitsuba_diffraction.optics import mean_order
 from mitsuba_diffraction.optics.blend import ScaleRoughness
 from mitsuba_diffraction.optics.fresnel import Filmed
-from mitsuba_diffraction.optics.mean_order import exponents, limited, mean_gain
+from mitsuba_diffraction.optics.mean_order import coherent, exponents, limited, mean_gain
 from mitsuba_diffraction.optics.second_order import Perturbation
 
 COSINES = np.cos(np.radians([0.0, 25.0, 50.0, 75.0]))
@@ -41,13 +41,21 @@ def test_its_logarithm_goes_with_the_square_of_the_heights_up_to_its_limit():
     assert limited(-50.0) == pytest.approx(1.0, abs=1e-3)  # and fades beyond it
 
 
-def test_long_waves_leave_the_films_reflectance():
-    """What tilts no facet to speak of is Kirchhoff's phase alone."""
+@pytest.mark.parametrize("index", [1.56, 1.0 + 6.5j])
+def test_long_waves_are_kirchhoff_s_phase_alone(index):
+    """What tilts no facet to speak of changes no reflectance: m goes with the slopes' square."""
+    waves = [ScaleRoughness(np.array([q]), np.ones(1)) for q in (0.04, 0.02)]
+    found = [coherent(COSINES, index, one, WAVENUMBER) for one in waves]
+    # along the normal that cancels, and what is left goes with their fourth power
+    assert found[1] == pytest.approx(0.25 * found[0], rel=0.01, abs=1e-9)
+
+
+def test_thin_films_count_by_the_square_of_their_fringes():
     found = [
-        np.abs(exponents(COSINES, LACQUER, ScaleRoughness(np.array([q]), np.ones(1)), WAVENUMBER))
-        for q in (0.04, 0.02)
+        exponents(COSINES, Filmed(1.0 + 6.5j, 1.5, depth), ROUGH, WAVENUMBER)
+        for depth in (1e-3, 5e-4)
     ]
-    assert found[1] == pytest.approx(0.25 * found[0], rel=0.05)  # as the slopes' square
+    assert found[1] == pytest.approx(found[0] / 8.0, rel=0.02)  # and they differ from none by d
 
 
 @pytest.mark.parametrize("stack", filmed.STACKS, ids=lambda stack: stack.name)

@@ -225,8 +225,9 @@ on gentle slopes as the bare surface's. Of the lacquer the second order counts i
 light that is diffracted twice meets the film's fringes at the order in between, and they are
 narrower in angle than the orders are apart. What is diffracted there and back is most of it, a
 factor of either direction alone. It takes the heights' spectrum, and has it from the roughness that
-a table keeps, as if it were isotropic. Of other films, whose fringes are wide, it is next to
-nothing, and none of bare surfaces, where it brings nothing (see above).
+a table keeps, as if it were isotropic; waves in between count as they are on another part of the
+fringes, so that films of wide fringes have little of it and bare surfaces none, where it brings
+nothing (see above).
 
 Beyond these: {_beyond()}.
 The plugin warns of such films, thick on metals that are rough beside them."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.directions import rough_patch
 
 from mitsuba_diffraction.optics import mean_order
 from mitsuba_diffraction.optics.blend import ScaleRoughness
 from mitsuba_diffraction.optics.fresnel import Filmed
 from mitsuba_diffraction.tables.energy.film import exponents
+from tests.directions import rough_patch
 
 RANGE = (400.0, 700.0)
 
