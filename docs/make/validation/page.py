@@ -15,6 +15,7 @@ from . import (
     coated,
     factored,
     filmed,
+    goals,
     models,
     passed,
     patch_sections,
@@ -85,6 +86,7 @@ def write_report(folder: Path, *, quick: bool = False, progress: Progress | None
     text = [
         sections.introduction(),
         models.section(sides),
+        goals.section(sides),
         patch_sections.section(
             [c for material in models.MATERIALS for c in patch_sections.compared(material, kinds)]
         ),
