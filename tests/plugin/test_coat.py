@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
@@ -9,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from numpy.typing import NDArray
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
@@ -35,11 +37,20 @@ def load(field: md.HeightField = PATCH, **parameters: Any) -> Any:
 
 
 def assert_values_are_the_reference_s(
-    model: str, ours: dict[str, Any], theirs: dict[str, Any]
+    model: str,
+    ours: dict[str, Any],
+    theirs: dict[str, Any],
+    ratio: Callable[..., NDArray[np.float64]] | None = None,
 ) -> None:
-    """The plugin with some parameters against the reference with its own."""
+    """The plugin with some parameters against the reference with its own.
+
+    ratio : of what the plugin has tabulated beside the heights' table over the exact.
+    """
     wi, wo, lam = (a[:120] for a in pairs())
-    found = evaluated(load(model=model, **ours), wi, wo, lam)
+    bsdf = load(model=model, **ours)
+    found = evaluated(bsdf, wi, wo, lam)
+    if ratio is not None:
+        found = found / ratio(bsdf.table, wi, wo, lam)
     exact = np.stack(
         [
             reference.brdf(PATCH, wi, wo, one, coherence_width=WIDTH, model=model, **theirs)
