@@ -59,7 +59,8 @@ surface plasmons are a pole that no such form has.
 
 The mean of either direction is no way to the second order without a film: it leaves the cuts of
 scales as they are. {_worst(cases)} What
-the whole mean brings, in the table above, is in how both directions go together, a function of both for each wavelength."""
+the whole mean brings, in the table above, is in how both directions go together, a function of both
+for each wavelength."""
 
 
 def _worst(cases: Sequence[Case]) -> str:
