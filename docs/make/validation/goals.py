@@ -125,7 +125,8 @@ def no_worse(sides: Sides, material: str) -> str:
         share, best = case.with_one_share()
         both = case.deviation("kirchhoff"), case.deviation("small_slope")
         values = [f"{100 * x:.2f} %" for x in (*both, case.change, best, case.with_any_shares())]
-        rows.append([case.label, f"{case.theta:g}°", *values[:3], f"{share:.2f}", *values[3:]])
+        angle = f"{case.theta:g}°".replace("-", "−")
+        rows.append([case.label, angle, *values[:3], f"{share:.2f}", *values[3:]])
     header = ["", "light from", "Kirchhoff", "default", "change", "one share", "with it", "any"]
     return f"""On {material} it was to be no worse than Kirchhoff. Of {len(every)} gratings and
 angles it is better in {better} by more than the solver's last refinement changed (*change*), at

@@ -73,5 +73,5 @@ def test_no_blend_does_better_than_the_bounds(cases):
 def test_what_is_worse_is_listed(sides, cases):
     listed = goals.no_worse(sides, "aluminium")
     for case in cases:
-        row = f"| {case.label} | {case.theta:g}° |"
+        row = f"| {case.label} | {case.theta:g}° |".replace("-", "−")
         assert (row in listed) == (case.gain < -case.change)
