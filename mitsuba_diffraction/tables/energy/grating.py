@@ -26,7 +26,7 @@ from .grid import Interpolation
 
 Real = NDArray[np.float64]
 
-#: Nodes from one whole ξ to the next, evenly in the root up to `LAST_NODE`; `ENDS` parts are left
+#: Nodes from one whole ξ to the next, up to `LAST_NODE` evenly in the root; `ENDS` parts are left
 #: over for the half of a lobe that is above the horizon before its centre is.
 NODES, LAST_NODE, ENDS = 8, 0.965, 2
 #: Beyond so many orders in all the general grid does: each appears hardly seen.
@@ -44,10 +44,20 @@ class Grating:
     ----------
     axis : unit vector in the patch along which heights change.
     spacing : |q| of the first order, rad/µm.
+    nodes, last, dense : of a `GratingGrid`, from one whole ξ to the next; where those of the root
+        end; and these are evenly in (1 + dense) r/(1 + dense r) of the root r.
     """
 
     axis: tuple[float, float]
     spacing: float
+    nodes: int = NODES
+    last: float = LAST_NODE
+    dense: float = 0.0
+
+    @property
+    def places(self) -> tuple[int, float, float]:
+        """Of nodes: for `position_of` and `fractions`."""
+        return self.nodes, self.last, self.dense
 
     def units(self, shortest: float) -> int:
         """Whole numbers that ξ passes at the shortest wavelength (nm)."""
@@ -74,30 +84,37 @@ class GratingGrid:
         """From values on the grid to directions (rad), of any one shape."""
         x, c = self.grating.along(*np.broadcast_arrays(theta, phi))
         per_x = float(wavenumber(self.wavelength)) / self.grating.spacing
-        row, column = (
-            np.clip(position_of(per_x * (c + sign * x)), 0.0, self.rows - 1.0) for sign in (-1, 1)
-        )
+        places = self.grating.places
+        return self.at(*(position_of(per_x * (c + sign * x), *places) for sign in (-1, 1)))
+
+    def at(self, row: Real, column: Real) -> Interpolation:
+        """To rows and columns amid the nodes."""
+        row, column = (np.clip(place, 0.0, self.rows - 1.0) for place in (row, column))
         i, j = (np.minimum(p.astype(np.int32), self.rows - 2) for p in (row, column))
         left = i * self.rows + j
         s, t = (row - i).astype(np.float32), (column - j).astype(np.float32)
         return Interpolation(left, left + 1, self.rows, s, t)
 
 
-def position_of(xi: Real) -> Real:
-    """Row or column of ξ: `NODES` from one whole number to the next."""
+def position_of(xi: Real, nodes: int = NODES, last: float = LAST_NODE, dense: float = 0.0) -> Real:
+    """Row or column of ξ: `nodes` from one whole number to the next."""
     whole = np.floor(np.maximum(xi, 0.0))
     rest = np.maximum(xi, 0.0) - whole
-    within = np.sqrt(rest / LAST_NODE) * (NODES - ENDS)
-    beyond = NODES - ENDS + (rest - LAST_NODE) / (1.0 - LAST_NODE) * ENDS
-    return np.asarray(NODES * whole + np.where(rest < LAST_NODE, within, beyond))
+    root = np.sqrt(rest / last)
+    within = (1.0 + dense) * root / (1.0 + dense * root) * (nodes - ENDS)
+    beyond = nodes - ENDS + (rest - last) / (1.0 - last) * ENDS
+    return np.asarray(nodes * whole + np.where(rest < last, within, beyond))
 
 
-def fractions(places: ArrayLike) -> Real:
-    """ξ above a whole number of places among the nodes there, 0 to `NODES`."""
+def fractions(
+    places: ArrayLike, nodes: int = NODES, last: float = LAST_NODE, dense: float = 0.0
+) -> Real:
+    """ξ above a whole number of places among the nodes there, 0 to `nodes`."""
     places = np.asarray(places, np.float64)
-    root = LAST_NODE * (places / (NODES - ENDS)) ** 2
-    beyond = (places - NODES + ENDS) / ENDS
-    return np.where(beyond <= 0.0, root, LAST_NODE + (1.0 - LAST_NODE) * beyond)
+    within = np.minimum(places / (nodes - ENDS), 1.0)
+    root = within / (1.0 + dense - dense * within)
+    beyond = np.maximum(places - nodes + ENDS, 0.0) / ENDS
+    return np.asarray(last * root**2 + (1.0 - last) * beyond)
 
 
 def grating_of(table: DiffractionTable) -> tuple[Grating, NDArray[np.int64]] | None:
@@ -106,6 +123,14 @@ def grating_of(table: DiffractionTable) -> tuple[Grating, NDArray[np.int64]] | N
         return None
     rows, columns = np.nonzero(table.coefficients.any(axis=(0, 3, 4)))
     bins = np.stack([columns, rows], axis=1).astype(np.int64) - np.array(table.grid.last)
+    grating = on_one_line(table, bins)
+    if grating is None or grating.spacing * table.sigma <= _SEPARATE:
+        return None
+    return grating, bins
+
+
+def on_one_line(table: DiffractionTable, bins: NDArray[np.int64]) -> Grating | None:
+    """The grating of a table's bins (n, 2) of |q|, if it is one, of few orders."""
     if not len(bins):
         return None
     first = bins[0]
@@ -115,8 +140,7 @@ def grating_of(table: DiffractionTable) -> tuple[Grating, NDArray[np.int64]] | N
     vector = step * np.array(table.spacing)
     spacing = float(np.hypot(*vector))
     grating = Grating((float(vector[0] / spacing), float(vector[1] / spacing)), spacing)
-    few = grating.units(table.wavelength_range[0]) <= MOST_UNITS
-    return (grating, bins) if few and spacing * table.sigma > _SEPARATE else None
+    return grating if grating.units(table.wavelength_range[0]) <= MOST_UNITS else None
 
 
 def orders_of(

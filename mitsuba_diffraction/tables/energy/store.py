@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import weakref
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from .grid import LAST_ANGLE
 from .links import Medium
 
 #: Raised whenever the computation changes.
-VERSION = 10
+VERSION = 11
 
 #: Height scales are n/steps: this phase (rad) changes at most in between. The power of an order
 #: bends by a fiftieth then, and by less at grazing angles, where there is most to take.
@@ -43,10 +43,11 @@ _SETTINGS = (
 )  # fmt: skip
 
 _SIDES = (
-    *_SETTINGS, str(sides.SHEET), str(sides.DENSE), sides.WAVELENGTHS, sides.FEW_ORDERS,
-    sides.NARROW, sums.SWEEPS, sums.LEAST, sums.AIM, sums.MOST, sums.TOLERATED, sums.ENOUGH,
+    *_SETTINGS, str(sides.SHEET), str(sides.DENSE), sides.WAVELENGTHS, sides.NARROW,
+    sides.PLACES, sides.EARLIER,
+    sums.SWEEPS, sums.LEAST, sums.AIM, sums.MOST, sums.TOLERATED, sums.ENOUGH,
     sums.STRONGEST, sums.FAINT, sums.FALL, sums.BETWEEN, sums.MARGIN, sums.LinkedSums.certain,
-    between.CEILING, between.GENTLE, between.MOST, between.LOOKED_AT, between.FALLS,
+    between.CEILING, between.FLOOR, between.GENTLE, between.MOST, between.LOOKED_AT, between.FALLS,
     between.FAR, between.FEW, sides.NODES_OF_INTEGRALS, sheet.ChainSides.certain,
     sheet.POLAR, links.POLAR, links.AZIMUTHS, links.FARTHEST,
 )  # fmt: skip
@@ -177,7 +178,7 @@ def _conservation(record: Record) -> Conservation:
 
 def _packed(tables: list[DirectionalTable]) -> Record:
     document = [
-        [table.wavelengths.tolist(), table.grating and [table.grating.axis, table.grating.spacing]]
+        [table.wavelengths.tolist(), table.grating and list(astuple(table.grating))]
         for table in tables
     ]
     return Record(document, [table.values for table in tables])
@@ -188,6 +189,6 @@ def _tables(record: Record) -> list[DirectionalTable]:
     for (wavelengths, line), values in zip(record.document, record.arrays, strict=True):
         if values.ndim != 3 or len(values) != len(wavelengths) or not np.isfinite(values).all():
             raise ValueError(f"values of shape {values.shape}")
-        grating = Grating((line[0][0], line[0][1]), line[1]) if line else None
+        grating = Grating((line[0][0], line[0][1]), *line[1:]) if line else None
         tables.append(DirectionalTable(np.array(wavelengths, float), values, grating))
     return tables
