@@ -47,10 +47,11 @@ _SETTINGS = (
 )  # fmt: skip
 
 _SIDES = (
-    *_SETTINGS, str(sides.SHEET), str(sides.DENSE), sides.WAVELENGTHS, sides.FEW_ORDERS,
-    sides.NARROW, sums.SWEEPS, sums.LEAST, sums.AIM, sums.MOST, sums.TOLERATED, sums.ENOUGH,
+    *_SETTINGS, str(sides.SHEET), str(sides.DENSE), sides.WAVELENGTHS, sides.NARROW,
+    sides.PLACES, sides.EARLIER,
+    sums.SWEEPS, sums.LEAST, sums.AIM, sums.MOST, sums.TOLERATED, sums.ENOUGH,
     sums.STRONGEST, sums.FAINT, sums.FALL, sums.BETWEEN, sums.MARGIN, sums.LinkedSums.certain,
-    between.CEILING, between.GENTLE, between.MOST, between.LOOKED_AT, between.FALLS,
+    between.CEILING, between.FLOOR, between.GENTLE, between.MOST, between.LOOKED_AT, between.FALLS,
     between.FAR, between.FEW, sides.NODES_OF_INTEGRALS, sheet.ChainSides.certain,
     sheet.POLAR, links.POLAR, links.AZIMUTHS, links.FARTHEST,
 )  # fmt: skip
