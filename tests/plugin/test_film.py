@@ -75,6 +75,15 @@ def test_kirchhoff_s_values_are_the_reference_s(some_variant, kind):
     assert_values_are_the_reference_s("kirchhoff", *FILMED[kind])
 
 
+def test_a_height_scale_is_as_heights(some_variant):
+    wi, wo, lam = pairs(100)
+    half = md.HeightField(0.5 * PATCH.heights, PATCH.pixel_size)
+    scaled = evaluated(load(height_scale=0.5, **METAL, **OXIDE), wi, wo, lam)
+    lower = evaluated(load(half, **METAL, **OXIDE), wi, wo, lam)
+    # both tables' tolerance, as above
+    assert scaled == pytest.approx(lower, rel=2e-3, abs=2e-5 * lower.max())
+
+
 @pytest.mark.parametrize("material", [METAL, GLASS], ids=["metal", "dielectric"])
 @pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
 def test_films_that_are_none_leave_the_surface_bare(some_variant, material, model):
