@@ -43,7 +43,7 @@ FILMED = {
 
 
 def means(kind: str, table: md.DiffractionTable, wi: Array, wo: Array, lam: Array) -> Array:
-    """g(ωi) g(ωo) of the table of angles and wavelengths over that of `mean_second_order`, (n, 4)."""
+    """g(ωi) g(ωo) of the table of angles and wavelengths over the exact, (n, 4)."""
     given = FILMED[kind][1]
     index, (film, thickness) = given["eta"] + 1j * given.get("k", 0.0), given["film"]
     heights = ScaleRoughness.of(PATCH.heights, PATCH.pixel_size)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...optics import mean_second_order
 from ...optics.blend import RoughnessTable
@@ -37,10 +38,9 @@ def exponents(
     grid = DirectionGrid(FINE.polar, 1)
     cosine = np.cos(grid.theta)
 
-    def one(n: int) -> np.ndarray:
-        return mean_second_order.exponents(
-            cosine, films[n], roughness, float(wavenumber(wavelengths[n]))
-        )
+    def one(n: int) -> NDArray[np.float64]:
+        k = float(wavenumber(wavelengths[n]))
+        return mean_second_order.exponents(cosine, films[n], roughness, k)
 
     values = np.stack(parallel(one, list(range(len(wavelengths)))))
     return DirectionalTable(wavelengths, values[:, :, None].astype(np.float32))
