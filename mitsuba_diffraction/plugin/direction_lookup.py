@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import wavenumber
 from ..tables.energy.conservation import DirectionalTable
-from ..tables.energy.grating import ENDS, LAST_NODE, NODES, Grating
+from ..tables.energy.grating import DENSE, ENDS, LAST_NODE, Grating
 from ..tables.energy.grid import SHARE, DirectionGrid
 from .memory import index_between, read_record, upload
 from .roles import Buffer, Float, Index, Vector2f
@@ -139,14 +139,15 @@ def _chain(grating: Grating, tangential: Vector2f, wavenumber: Float) -> tuple[F
     x = cosine * tangential.x + sine * tangential.y
     y = cosine * tangential.y - sine * tangential.x
     width, per_x = dr.safe_sqrt(dr.fma(-y, y, 1.0)), wavenumber / grating.spacing
-    rows = []
+    last, rows = grating.nodes - ENDS, []
     for one in (width - x, width + x):
         xi = dr.maximum(one * per_x, 0.0)
         whole = dr.floor(xi)
         rest = xi - whole
-        within = dr.sqrt(rest / LAST_NODE) * (NODES - ENDS)
-        beyond = (rest - LAST_NODE) * (ENDS / (1.0 - LAST_NODE)) + (NODES - ENDS)
-        rows.append(dr.fma(whole, NODES, dr.select(rest < LAST_NODE, within, beyond)))
+        root = dr.sqrt(rest / LAST_NODE)
+        within = root * dr.rcp(root + DENSE) * ((1.0 + DENSE) * last)
+        beyond = (rest - LAST_NODE) * (ENDS / (1.0 - LAST_NODE)) + last
+        rows.append(dr.fma(whole, grating.nodes, dr.select(rest < LAST_NODE, within, beyond)))
     return rows[0], rows[1]
 
 

@@ -8,7 +8,7 @@ at x = ±c, so all that is peculiar lies where one of
     ξ₁ = (c − x)/g,   ξ₂ = (c + x)/g,   cosθ = g √(ξ₁ ξ₂),
 
 is a whole number, whatever the wavelength: just above it an order's share rises as the root of the
-distance. A `GratingGrid` has its nodes there, evenly in the root.
+distance. A `GratingGrid` has its nodes there, nearly evenly in the root.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ from .grid import Interpolation
 
 Real = NDArray[np.float64]
 
-#: Nodes from one whole ξ to the next, evenly in the root up to `LAST_NODE`; `ENDS` parts are left
-#: over for the half of a lobe that is above the horizon before its centre is.
-NODES, LAST_NODE, ENDS = 8, 0.965, 2
+#: Nodes from one whole ξ to the next, up to `LAST_NODE` evenly in (1 + DENSE) r/(r + DENSE) of the
+#: root r; `ENDS` parts are left over for the half of a lobe that is above the horizon before its
+#: centre is.
+NODES, LAST_NODE, ENDS, DENSE = 8, 0.965, 2, 3.0
 #: Beyond so many orders in all the general grid does: each appears hardly seen.
 MOST_UNITS = 16
 #: Lobes closer than this, in 1/σ, are no chain.
@@ -44,14 +45,20 @@ class Grating:
     ----------
     axis : unit vector in the patch along which heights change.
     spacing : |q| of the first order, rad/µm.
+    nodes : of a `GratingGrid`, from one whole ξ to the next.
     """
 
     axis: tuple[float, float]
     spacing: float
+    nodes: int = NODES
 
     def units(self, shortest: float) -> int:
         """Whole numbers that ξ passes at the shortest wavelength (nm)."""
         return math.floor(2.0 * float(wavenumber(shortest)) / self.spacing) + 1
+
+    def rows(self, shortest: float) -> int:
+        """Of a `GratingGrid` for wavelengths from the shortest (nm) on."""
+        return (self.units(shortest) + 1) * self.nodes
 
     def along(self, theta: ArrayLike, phi: ArrayLike) -> tuple[Real, Real]:
         """x, and c of directions (rad)."""
@@ -74,30 +81,36 @@ class GratingGrid:
         """From values on the grid to directions (rad), of any one shape."""
         x, c = self.grating.along(*np.broadcast_arrays(theta, phi))
         per_x = float(wavenumber(self.wavelength)) / self.grating.spacing
-        row, column = (
-            np.clip(position_of(per_x * (c + sign * x)), 0.0, self.rows - 1.0) for sign in (-1, 1)
-        )
+        nodes = self.grating.nodes
+        return self.at(*(position_of(per_x * (c + sign * x), nodes) for sign in (-1, 1)))
+
+    def at(self, row: Real, column: Real) -> Interpolation:
+        """To rows and columns amid the nodes."""
+        row, column = (np.clip(place, 0.0, self.rows - 1.0) for place in (row, column))
         i, j = (np.minimum(p.astype(np.int32), self.rows - 2) for p in (row, column))
         left = i * self.rows + j
         s, t = (row - i).astype(np.float32), (column - j).astype(np.float32)
         return Interpolation(left, left + 1, self.rows, s, t)
 
 
-def position_of(xi: Real) -> Real:
-    """Row or column of ξ: `NODES` from one whole number to the next."""
-    whole = np.floor(np.maximum(xi, 0.0))
+def position_of(xi: Real, nodes: int = NODES) -> Real:
+    """Row or column of ξ: `nodes` from one whole number to the next."""
+    whole, last = np.floor(np.maximum(xi, 0.0)), nodes - ENDS
     rest = np.maximum(xi, 0.0) - whole
-    within = np.sqrt(rest / LAST_NODE) * (NODES - ENDS)
-    beyond = NODES - ENDS + (rest - LAST_NODE) / (1.0 - LAST_NODE) * ENDS
-    return np.asarray(NODES * whole + np.where(rest < LAST_NODE, within, beyond))
+    root = np.sqrt(rest / LAST_NODE)
+    within = (1.0 + DENSE) * root / (root + DENSE) * last
+    beyond = last + (rest - LAST_NODE) / (1.0 - LAST_NODE) * ENDS
+    return np.asarray(nodes * whole + np.where(rest < LAST_NODE, within, beyond))
 
 
-def fractions(places: ArrayLike) -> Real:
-    """ξ above a whole number of places among the nodes there, 0 to `NODES`."""
+def fractions(places: ArrayLike, nodes: int = NODES) -> Real:
+    """ξ above a whole number of places among the nodes there, 0 to `nodes`."""
     places = np.asarray(places, np.float64)
-    root = LAST_NODE * (places / (NODES - ENDS)) ** 2
-    beyond = (places - NODES + ENDS) / ENDS
-    return np.where(beyond <= 0.0, root, LAST_NODE + (1.0 - LAST_NODE) * beyond)
+    last = nodes - ENDS
+    within = np.minimum(places / last, 1.0)
+    root = DENSE * within / (1.0 + DENSE - within)
+    beyond = np.maximum(places - last, 0.0) / ENDS
+    return np.asarray(LAST_NODE * root**2 + (1.0 - LAST_NODE) * beyond)
 
 
 def grating_of(table: DiffractionTable) -> tuple[Grating, NDArray[np.int64]] | None:
@@ -106,6 +119,14 @@ def grating_of(table: DiffractionTable) -> tuple[Grating, NDArray[np.int64]] | N
         return None
     rows, columns = np.nonzero(table.coefficients.any(axis=(0, 3, 4)))
     bins = np.stack([columns, rows], axis=1).astype(np.int64) - np.array(table.grid.last)
+    grating = on_one_line(table, bins)
+    if grating is None or grating.spacing * table.sigma <= _SEPARATE:
+        return None
+    return grating, bins
+
+
+def on_one_line(table: DiffractionTable, bins: NDArray[np.int64]) -> Grating | None:
+    """The grating of a table's bins (n, 2) of |q|, if it is one, of few orders."""
     if not len(bins):
         return None
     first = bins[0]
@@ -115,8 +136,7 @@ def grating_of(table: DiffractionTable) -> tuple[Grating, NDArray[np.int64]] | N
     vector = step * np.array(table.spacing)
     spacing = float(np.hypot(*vector))
     grating = Grating((float(vector[0] / spacing), float(vector[1] / spacing)), spacing)
-    few = grating.units(table.wavelength_range[0]) <= MOST_UNITS
-    return (grating, bins) if few and spacing * table.sigma > _SEPARATE else None
+    return grating if grating.units(table.wavelength_range[0]) <= MOST_UNITS else None
 
 
 def orders_of(

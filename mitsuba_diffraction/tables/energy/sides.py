@@ -34,7 +34,8 @@ from ..sampling import OrderMixture
 from ..table import DiffractionTable
 from . import between, sheet
 from .chains import Chains, put, taken
-from .conservation import DirectionalTable, parallel
+from .conservation import DirectionalTable
+from .fit import parallel
 from .gain import bilinear
 from .grating import NODES, Grating, GratingGrid, fractions
 from .grid import DirectionGrid, Interpolation

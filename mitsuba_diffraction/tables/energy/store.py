@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import weakref
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from ...optics.fresnel import Filmed
 from ..sampling import MOST_STRONG, STRONG
 from ..store import Record, kept, key_of
 from ..table import DiffractionTable
-from . import between, chains, film, gain, grating, links, sheet, sides, sums, transport
+from . import between, chains, film, fit, gain, grating, links, sheet, sides, sums, transport
 from . import conservation as made
 from .conservation import Conservation, DirectionalTable, Index, conservation
 from .grating import Grating
@@ -22,7 +22,7 @@ from .grid import LAST_ANGLE
 from .links import Medium
 
 #: Raised whenever the computation changes.
-VERSION = 10
+VERSION = 11
 
 #: Height scales are n/steps: this phase (rad) changes at most in between. The power of an order
 #: bends by a fiftieth then, and by less at grazing angles, where there is most to take.
@@ -35,8 +35,11 @@ _PROBES = 24
 
 _SETTINGS = (
     VERSION, str(made.FINE), str(made.COARSE), made.FINE_WAVELENGTHS, made.COARSE_WAVELENGTHS,
-    made.TARGET, made.SWEEPS, made.LARGEST, made.PARTS, made.FEW_ORDERS, made.GENTLE,
-    made.PEAKS, made.CEILING, made.TURNS, chains.SWEEPS,
+    made.TARGET, made.SWEEPS, made.LARGEST, made.PARTS, made.FEW_ORDERS, made.GENTLE, made.PEAKS,
+    made.CEILING, made.ALONG, made.EVEN, made.NODES, made.GRATING_WAVELENGTHS,
+    chains.GIVEN, chains.SPIKE,
+    *(fit.TOLERANCE, fit.LEAST, fit.MOST, fit.GAINS, fit.GRAZING, fit.LESS, fit.FITS, fit.GENTLE),
+    fit.CEILING, fit.STEP, fit.FEW, grating.DENSE,
     grating.NODES, grating.LAST_NODE, grating.ENDS, grating.MOST_UNITS,
     gain.POLAR_NODES, gain.AZIMUTH_NODES, gain.GRAZING,
     transport.RINGS, transport.STEPS, transport.SMOOTHING,
@@ -206,7 +209,7 @@ def _conservation(record: Record) -> Conservation:
 
 def _packed(tables: list[DirectionalTable]) -> Record:
     document = [
-        [table.wavelengths.tolist(), table.grating and [table.grating.axis, table.grating.spacing]]
+        [table.wavelengths.tolist(), table.grating and list(astuple(table.grating))]
         for table in tables
     ]
     return Record(document, [table.values for table in tables])
@@ -217,6 +220,6 @@ def _tables(record: Record) -> list[DirectionalTable]:
     for (wavelengths, line), values in zip(record.document, record.arrays, strict=True):
         if values.ndim != 3 or len(values) != len(wavelengths) or not np.isfinite(values).all():
             raise ValueError(f"values of shape {values.shape}")
-        grating = Grating((line[0][0], line[0][1]), line[1]) if line else None
+        grating = Grating((line[0][0], line[0][1]), *line[1:]) if line else None
         tables.append(DirectionalTable(np.array(wavelengths, float), values, grating))
     return tables
