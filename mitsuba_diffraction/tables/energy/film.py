@@ -11,7 +11,8 @@ from ...optics import mean_second_order
 from ...optics.blend import RoughnessTable
 from ...optics.fresnel import Filmed
 from ...optics.geometry import wavenumber
-from .conservation import FINE, DirectionalTable, Index, parallel
+from .conservation import FINE, DirectionalTable, Index
+from .fit import parallel
 from .grid import DirectionGrid
 
 #: Phase of a fringe, rad, from one wavelength to the next, and most wavelengths: within a twentieth
