@@ -16,7 +16,7 @@ from ..optics import blend, boundary, through
 from ..optics.coat import refracted, transmitted
 from ..optics.fresnel import Filmed, Index
 from ..optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
-from ..optics.mean_order import mean_gain
+from ..optics.mean_second_order import mean_gain
 from ..settings import checked
 from .arguments import bare_dielectric, directions_of, index_of, places_of, width_of
 from .integral import screen_power, window_power
@@ -245,7 +245,7 @@ def _mean_gain(
     wavelength: NDArray[np.float64],
     index: Filmed,
 ) -> NDArray[np.float64]:
-    """g(ωi) g(ωo) of `mean_order`, (n,)."""
+    """g(ωi) g(ωo) of `mean_second_order`, (n,)."""
     roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
     found = np.ones(len(wavelength))
     parts = np.stack(np.broadcast_arrays(wavelength, *index.parts), axis=1)

@@ -26,7 +26,7 @@ from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.blend import ScaleRoughness
 from mitsuba_diffraction.optics.fresnel import Filmed, decaying_root
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
-from mitsuba_diffraction.optics.mean_order import mean_gain
+from mitsuba_diffraction.optics.mean_second_order import mean_gain
 from mitsuba_diffraction.progress import Progress, silent
 
 from .cases import ALUMINIUM, FEW_WAVELENGTHS, KERATIN, PROFILES, Grating, order_sines
