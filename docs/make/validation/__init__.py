@@ -18,7 +18,8 @@ crossed          another: coupled waves in layers
 patch_solutions  solutions of all of them
 coated           solutions of gratings under a coat
 filmed           solutions of gratings under a film
-passed           orders that go through a dielectric
+passed           orders that go through a dielectric, and R + T of the recipes
+spread           where light goes that is spread there
 model            what the package says of the same surfaces
 compare          how far apart they are
 second_order     what the second order in slope would bring
