@@ -87,7 +87,8 @@ def _of_material(table: DiffractionTable, model: str, index: Index) -> dict[str,
 def sides_summary(table: DiffractionTable) -> dict[str, Any]:
     """R + T of a lossless dielectric of index 1.5 and of a thin sheet of it, as it is and scaled.
 
-    Least and largest of 24 azimuths at 450, 550 and 650 nm, of light from above and from below.
+    Least and largest of 24 azimuths at 450, 550 and 650 nm, of light from above and from below; and
+    the largest share of it that is spread over all directions.
     """
     theta, phi = np.radians(PASSED), _azimuths()
     result: dict[str, Any] = {}
@@ -104,6 +105,8 @@ def sides_summary(table: DiffractionTable) -> dict[str, Any]:
             for m, side in enumerate(("above", "below"))
             for n, kind in enumerate(("R + T", "R + T, conserved"))
         }
+        spread = [float(model.spread(scale, theta, phi, one).max()) for one in WAVELENGTHS]
+        result[name]["spread, largest"] = round(max(spread), 3)
     return result
 
 

@@ -18,7 +18,10 @@ sinusoid's first order. On a metal, whose K and B differ by the facet's tilt alo
 it halves the errors of either polarisation on gentle aluminium at normal incidence. On a dielectric
 they differ by Brewster's angle too, there K is so far from B in oblique light that a small share of
 it does more harm than good. Hence R₀. Band and fourth power are chosen against rigorous solutions,
-see docs/validation.md. s is symmetric in ωi and ωo, and smooth in both and in the wavelength.
+see docs/validation.md. On metals neither another band nor other constants, nor weights of their own
+for the mean and the difference of the polarisations, make fewer gratings worse than Kirchhoff
+without giving away more elsewhere. s is symmetric in ωi and ωo, and smooth in both and in the
+wavelength.
 """
 
 from __future__ import annotations
@@ -39,7 +42,7 @@ _BINS_PER_OCTAVE = 256
 NODES_PER_OCTAVE = 32
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ScaleRoughness:
     """Height variance of a periodic surface by the length of the spatial frequency.
 
@@ -80,11 +83,7 @@ class ScaleRoughness:
 
     def at(self, q: ArrayLike) -> Real:
         """σ_q² in µm², shaped as q, the length of an order's spatial frequency in rad/µm."""
-        order = np.abs(np.asarray(q, np.float64))
-        with np.errstate(divide="ignore", over="ignore", under="ignore"):
-            ratio = (self.frequency / order[..., None]) ** 4  # infinite at q = 0: no component
-            share = -np.expm1(-256.0 * ratio) * np.exp(-ratio / 16.0)
-        return np.asarray(share @ self.variance, np.float64)
+        return np.asarray(shares(self.frequency, q) @ self.variance, np.float64)
 
     def table(self, q_max: float) -> RoughnessTable:
         """σ_q² at nodes, up to q_max (rad/µm) or just above."""
@@ -95,6 +94,14 @@ class ScaleRoughness:
         count = max(1, int(np.ceil((np.log2(q_max) - first) * NODES_PER_OCTAVE)))
         nodes = self.at(2.0 ** (first + np.arange(count + 1) / NODES_PER_OCTAVE))
         return RoughnessTable(first, nodes)
+
+
+def shares(frequency: ArrayLike, q: ArrayLike) -> Real:
+    """What components of these frequencies (n,) have in the σ_q² of an order's q, (..., n)."""
+    order = np.abs(np.asarray(q, np.float64))
+    with np.errstate(divide="ignore", over="ignore", under="ignore"):
+        ratio = (np.asarray(frequency) / order[..., None]) ** 4  # infinite at q = 0: no component
+        return np.asarray(-np.expm1(-256.0 * ratio) * np.exp(-ratio / 16.0), np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +116,11 @@ class RoughnessTable:
 
     first: float
     nodes: Real
+
+    @property
+    def frequencies(self) -> Real:
+        """q of the nodes, rad/µm."""
+        return np.asarray(2.0 ** (self.first + np.arange(len(self.nodes)) / NODES_PER_OCTAVE))
 
     def at(self, q: ArrayLike) -> Real:
         """σ_q² in µm², shaped as q, in rad/µm."""

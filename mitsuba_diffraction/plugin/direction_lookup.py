@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import wavenumber
 from ..tables.energy.conservation import DirectionalTable
-from ..tables.energy.grating import DENSE, ENDS, LAST_NODE, Grating
+from ..tables.energy.grating import ENDS, Grating
 from ..tables.energy.grid import SHARE, DirectionGrid
 from .memory import index_between, read_record, upload
 from .roles import Buffer, Float, Index, Vector2f
@@ -56,7 +56,8 @@ class DirectionLookup:
         if not varies:
             share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
             self._values = upload(mi.Float, maps[0] * (1 - share) + maps[1] * share)
-        self._nodes = upload(mi.Float, maps)
+        # Where there is but one node nothing varies with the height scale
+        self._nodes = upload(mi.Float, maps) if varies or width > 0.0 else None
         wavelengths = tables[0].wavelengths
         self._low = mi.Float(nodes[0])
         self._slope = mi.Float(1.0 / width if width > 0.0 else 0.0)
@@ -70,7 +71,7 @@ class DirectionLookup:
     ) -> list[Float]:
         """For each channel; tangential in the patch's frame."""
         share = None
-        if self._varies or dr.grad_enabled(height_scale):
+        if self._nodes is not None and (self._varies or dr.grad_enabled(height_scale)):
             share = (height_scale - self._low) * self._slope
         if self._grating is None:
             at = self._cell(*self._place(tangential, cosine))
@@ -139,15 +140,16 @@ def _chain(grating: Grating, tangential: Vector2f, wavenumber: Float) -> tuple[F
     x = cosine * tangential.x + sine * tangential.y
     y = cosine * tangential.y - sine * tangential.x
     width, per_x = dr.safe_sqrt(dr.fma(-y, y, 1.0)), wavenumber / grating.spacing
-    last, rows = grating.nodes - ENDS, []
+    nodes, last, dense = grating.places
+    rows = []
     for one in (width - x, width + x):
         xi = dr.maximum(one * per_x, 0.0)
         whole = dr.floor(xi)
         rest = xi - whole
-        root = dr.sqrt(rest / LAST_NODE)
-        within = root * dr.rcp(root + DENSE) * ((1.0 + DENSE) * last)
-        beyond = (rest - LAST_NODE) * (ENDS / (1.0 - LAST_NODE)) + last
-        rows.append(dr.fma(whole, grating.nodes, dr.select(rest < LAST_NODE, within, beyond)))
+        root = dr.sqrt(rest / last)
+        within = root * dr.rcp(dr.fma(root, dense, 1.0)) * ((1.0 + dense) * (nodes - ENDS))
+        beyond = (rest - last) * (ENDS / (1.0 - last)) + (nodes - ENDS)
+        rows.append(dr.fma(whole, nodes, dr.select(rest < last, within, beyond)))
     return rows[0], rows[1]
 
 

@@ -18,7 +18,8 @@ crossed          another: coupled waves in layers
 patch_solutions  solutions of all of them
 coated           solutions of gratings under a coat
 filmed           solutions of gratings under a film
-passed           orders that go through a dielectric
+passed           orders that go through a dielectric, and R + T of the recipes
+spread           where light goes that is spread there
 model            what the package says of the same surfaces
 compare          how far apart they are
 second_order     what the second order in slope would bring
@@ -29,6 +30,7 @@ roughness        random surfaces of known mean diffraction
 statistics       checks with them, and windows at random places
 page             the page as a whole
 models           its section on Kirchhoff, small slope and their blend
+goals            what was asked of the default model, and what misses it
 patch_sections   its section on two dimensions
 sections         its other sections
 plots            its pictures

@@ -3,6 +3,7 @@
 python -m docs.make.validation report -o docs
 python -m docs.make.validation solve perfect      # minutes to an hour; extra `validation`
 python -m docs.make.validation groups             # deviations by material, profile and slope
+python -m docs.make.validation passed             # R + T of the recipes; some minutes
 python -m docs.make.validation patches keratin    # in two dimensions; a minute
 python -m docs.make.validation coated             # under a coat; half an hour; extra `validation`
 python -m docs.make.validation films              # under a film; seconds
@@ -37,6 +38,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     report.set_defaults(run=_report)
     groups = commands.add_parser("groups", help="print deviations by material, profile and slope")
     groups.set_defaults(run=_groups, progress=False)
+    passed = commands.add_parser("passed", help="print R + T of the recipes of precompute/")
+    passed.set_defaults(run=_passed, progress=False)
     solve = commands.add_parser("solve", help="compute the rigorous solutions again")
     solve.add_argument("material", choices=MATERIALS)
     solve.add_argument("--solver", choices=("integral", "coupled_wave"), default="integral")
@@ -80,12 +83,20 @@ def _report(args: argparse.Namespace) -> int:
 
 
 def _groups(args: argparse.Namespace) -> int:
-    from . import models, patch_sections
+    from . import goals, models, patch_sections
     from .compare import compare
 
     sides = models.compare_all({name: compare(name) for name in models.MATERIALS})
     cuts = [c for material in models.MATERIALS for c in patch_sections.compared(material)]
-    print(models.section(sides), patch_sections.section(cuts), sep="\n\n")
+    sections = models.section(sides), goals.section(sides), patch_sections.section(cuts)
+    print(*sections, sep="\n\n")
+    return 0
+
+
+def _passed(args: argparse.Namespace) -> int:
+    from .passed import wide
+
+    print(wide())
     return 0
 
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from .fit import GAINS, Samples, limits
 from .gain import LEAST_COSINE, over_lobe
-from .grating import LAST_NODE, NODES, Grating, GratingGrid, fractions
+from .grating import LAST_NODE, Grating, GratingGrid, fractions
 from .grid import LAST_ANGLE
 from .transport import Orders, lobe_means, lobes
 
@@ -208,14 +208,15 @@ def _padded(s: NDArray[np.floating]) -> Real:
 
 
 def put(values: NDArray[np.floating[Any]], s: Real, last: int) -> None:
-    """s (NODES, NODES, last + 1) into the nodes (rows, rows) of `GratingGrid`."""
+    """s (nodes, nodes, last + 1) into the nodes (rows, rows) of `GratingGrid`."""
+    nodes = len(s)
     for k in range(last + 1):
-        row, column = k * NODES, (last - k) * NODES
-        values[row : row + NODES, column : column + NODES] = s[..., k]
+        row, column = k * nodes, (last - k) * nodes
+        values[row : row + nodes, column : column + nodes] = s[..., k]
 
 
-def taken(values: Array, last: int) -> Array:
+def taken(values: Array, last: int, nodes: int) -> Array:
     """The inverse of `put`."""
-    parts = values.reshape(len(values) // NODES, NODES, -1, NODES)
+    parts = values.reshape(len(values) // nodes, nodes, -1, nodes)
     k = np.arange(last + 1)
     return np.asarray(np.moveaxis(parts[k, :, last - k], 0, -1))

@@ -37,7 +37,7 @@ from .chains import Chains, put, taken
 from .conservation import DirectionalTable
 from .fit import parallel
 from .gain import bilinear
-from .grating import NODES, Grating, GratingGrid, fractions
+from .grating import Grating, GratingGrid, fractions
 from .grid import DirectionGrid, Interpolation
 from .links import Link, Medium
 from .sheet import ChainSides, LinkGain
@@ -49,11 +49,14 @@ Array = NDArray[np.float32]
 
 #: Directions on either side, of a sheet and of a dielectric, whose critical angle is all but one of
 #: the latter; and wavelengths. In variants of one there is one.
-SHEET, DENSE, WAVELENGTHS = DirectionGrid(48, 96), DirectionGrid(60, 96), (6, 12)
-#: More of few orders, all of them strong. Chains of directions are solved of gratings whose orders
-#: are further apart than the first of these, in 1/σ, and the shortest waves' horizon further off
-#: than the second: lobes are narrow at 75°, too.
-FEW_ORDERS, NARROW = 24, (25.0, 150.0)
+SHEET, DENSE, WAVELENGTHS = DirectionGrid(48, 96), DirectionGrid(60, 96), (9, 12)
+#: More of gratings. Chains of directions are solved of those whose orders are further apart than
+#: the first of these, in 1/σ, and the shortest waves' horizon further off than the second: lobes
+#: are narrow at 75°, too. Of their grid what `Grating` says of nodes.
+NARROW, PLACES = (25.0, 150.0), (10, 0.94, 1 / 3)
+#: Shares of the way to the next nodes at which cells are looked at, the last one where it is above
+#: the horizon.
+EARLIER = (0.125, 0.25, 0.375, 0.5)
 #: Polar angles and azimuths of integrals over a side.
 NODES_OF_INTEGRALS = 240, 96
 
@@ -119,8 +122,7 @@ class Sides:
         """
         low, high = wavelength_range
         grating = self._grating
-        few = len(self._orders.mixture.frequency) <= FEW_ORDERS and not self._orders.has_weak
-        count = WAVELENGTHS[few] if high > low else 1
+        count = WAVELENGTHS[self._orders.grating is not None] if high > low else 1
         wavelengths = np.geomspace(low, high, count)
         at = partial(self._scale_of_chains, grating) if grating else self._scale_at
         found = np.stack(parallel(at, wavelengths.tolist()), axis=1)
@@ -136,8 +138,9 @@ class Sides:
                 values = np.concatenate([values, np.ones_like(values)])
             pages = zip(wavelengths.tolist(), values.swapaxes(0, 1), strict=True)
             room = parallel(lambda one: self._room(grating, *one), list(pages))
-            wanted = np.maximum(np.stack(room, axis=1) - (between.CEILING - LEAST), 0.0)
-            lack = between.at_most(wanted, cells, rooms)
+            most = np.stack(room, axis=1)
+            wanted = np.maximum(most - (between.CEILING - LEAST), 0.0)
+            lack = between.fitted(wanted, most, cells, rooms)
             values = np.concatenate([values, self._spread(wavelengths, lack, grating)])
         return [DirectionalTable(wavelengths, one, grating) for one in values]
 
@@ -148,8 +151,8 @@ class Sides:
             transport = self.transport(theta, self._grid.phi, wavelength)
             return between.excess_and_room(transport, pages, pages)[1]
         found = np.zeros_like(pages[:2])
-        for last, sums in enumerate(self._by_length(grating, wavelength, np.arange(NODES))):
-            own = np.stack([taken(one, last) for one in pages])
+        for last, sums in enumerate(self._by_length(grating, wavelength)):
+            own = np.stack([taken(one, last, grating.nodes) for one in pages])
             room = between.excess_and_room(sums, own, own)[1]
             for side in (0, 1):
                 put(found[side], room[side], last)
@@ -164,8 +167,8 @@ class Sides:
 
     def _cells(self, grating: Grating | None, wavelength: float) -> between.Cells:
         if grating is not None:
-            chains = self._by_length(grating, wavelength, np.arange(NODES) + 0.5)
-            return between.ChainCells(chains, len(chains) * NODES)
+            shares = [_amid(grating, wavelength, last) for last in range(self._units(grating) + 1)]
+            return between.ChainCells(self._by_length(grating, wavelength, shares), shares)
         halves = [replace(grid, polar=2 * self._grid.polar).angles[1::2] for grid in self._grids]
         rows = int(np.sum(np.any(np.stack(halves) <= between.FALLS[1], axis=0)))
         phi = self._grid.phi + np.pi / self._grid.azimuthal
@@ -187,12 +190,15 @@ class Sides:
             return None
         k = float(wavenumber(self._table.wavelength_range[0]))
         widths = np.array([grating.spacing, k]) * self._orders.sigma
-        return grating if np.all(widths > NARROW) else None
+        if not np.all(widths > NARROW):
+            return None
+        return Grating(grating.axis, grating.spacing, *PLACES)
 
     def _scale_of_chains(self, grating: Grating, wavelength: float) -> Array:
         """(4, rows, rows) at the nodes of a `GratingGrid`."""
-        found = self._by_length(grating, wavelength, np.arange(NODES))
-        values = np.ones((4, NODES * len(found), NODES * len(found)), np.float32)
+        found = self._by_length(grating, wavelength)
+        rows = grating.nodes * len(found)
+        values = np.ones((4, rows, rows), np.float32)
         for last, sums in enumerate(found):
             ones = np.ones((2, *sums.angle.shape))
             for page, scale in zip(values, solved(sums, ones, sums.angle), strict=True):
@@ -200,13 +206,17 @@ class Sides:
         return values
 
     def _by_length(
-        self, grating: Grating, wavelength: float, places: ArrayLike
+        self, grating: Grating, wavelength: float, shares: Sequence[Real] | None = None
     ) -> list[ChainSides]:
-        """All chains from 1 direction of either side on, at places among the nodes."""
-        chains, f = self._chains(grating, wavelength), fractions(places)
-        first, second = np.broadcast_arrays(f[:, None], f)
-        units = grating.units(self._table.wavelength_range[0])
-        return [ChainSides(chains, first, second, last) for last in range(units + 1)]
+        """All chains from 1 direction of either side on, at nodes or shares beyond them."""
+        chains, found = self._chains(grating, wavelength), []
+        for last in range(self._units(grating) + 1):
+            first, second = _places(grating, 0.0 if shares is None else shares[last])
+            found.append(ChainSides(chains, first, second, last))
+        return found
+
+    def _units(self, grating: Grating) -> int:
+        return grating.units(self._table.wavelength_range[0])
 
     def _chains(self, grating: Grating, wavelength: float) -> list[list[tuple[int, Chains]]]:
         """Those of every link, of either side."""
@@ -239,9 +249,19 @@ class Sides:
         if len(pages) == 2:
             return raw, np.asarray(changed(np.ones_like(pages[:2])), np.float32)
         found = np.stack(here[2:4]) * changed(np.stack(pages[2:4]))
-        if len(pages) == 6:
-            found += np.stack(here[4:]) * sum(gathered(scale[4:], self._medium, wavelength))
-        return raw, np.asarray(found, np.float32)
+        return raw, np.asarray(found + self.spread(scale, theta, phi, wavelength), np.float32)
+
+    def spread(
+        self, scale: Sequence[DirectionalTable] | None, theta: Real, phi: Real, wavelength: float
+    ) -> Array:
+        """Of light from above and from below what is spread, (2, t, p); arguments as of `sums`."""
+        if scale is None or len(scale) < 6:
+            return np.zeros((2, len(theta), len(phi)), np.float32)
+        g = [
+            self.at(one, side, theta[:, None], phi, wavelength)
+            for side, one in enumerate(scale[4:])
+        ]
+        return np.stack(g) * np.float32(sum(gathered(scale[4:], self._medium, wavelength)))
 
     def at(
         self,
@@ -271,10 +291,10 @@ class Sides:
             orders = self._flat if link.flat else self._orders
             grid: SideGrid | GratingGrid = self._grids[link.left]
             if grating is not None:
-                units = grating.units(self._table.wavelength_range[0])
-                grid = GratingGrid(grating, (units + 1) * NODES, wavelength)
+                rows = (self._units(grating) + 1) * grating.nodes
+                grid = GratingGrid(grating, rows, wavelength)
 
-            def rows(at: Real, phi: Real, link: Link = link, orders: Orders = orders) -> list[Row]:
+            def of(at: Real, phi: Real, link: Link = link, orders: Orders = orders) -> list[Row]:
                 tables = link.tables(
                     self._parts_of(link, at), at, k, self._table, self._height_scale
                 )
@@ -283,7 +303,7 @@ class Sides:
                     for angle, table in zip(at, tables, strict=True)
                 ]
 
-            found = orders.of_rows(rows, theta[link.came], phi, grid)
+            found = orders.of_rows(of, theta[link.came], phi, grid)
             parts[link.came].append((link.left, found))
         return BothSides(parts)
 
@@ -347,6 +367,23 @@ class _Linked(Row):
     def gain(self, cos_o: Real, turn: Real) -> Real:
         w = self.kappa(cos_o) / self._per_w
         return self._link.gain(partial(bilinear, self._table), w, self._cos, cos_o, turn)
+
+
+def _places(grating: Grating, share: Real | float) -> tuple[Real, Real]:
+    """ξ₁ and ξ₂ above whole numbers, (nodes, nodes): a share of the way beyond each two nodes."""
+    place = np.arange(grating.nodes)
+    first, second = np.broadcast_arrays(place[:, None] + share, place + share)
+    return fractions(first, *grating.places), fractions(second, *grating.places)
+
+
+def _amid(grating: Grating, wavelength: float, last: int) -> Real:
+    """Half of the way beyond nodes, or less if directions there are beyond the hemisphere."""
+    share = np.full((grating.nodes, grating.nodes), 0.5)
+    for earlier in EARLIER:
+        width = last + sum(_places(grating, earlier))
+        inside = width * grating.spacing <= 2.0 * float(wavenumber(wavelength))
+        share = np.where(inside, earlier, share)
+    return share
 
 
 def _level(mixture: OrderMixture) -> OrderMixture:

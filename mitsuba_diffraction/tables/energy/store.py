@@ -9,11 +9,12 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...optics import mean_second_order
 from ...optics.fresnel import Filmed
 from ..sampling import MOST_STRONG, STRONG
 from ..store import Record, kept, key_of
 from ..table import DiffractionTable
-from . import between, chains, fit, gain, grating, links, sheet, sides, sums, transport
+from . import between, chains, film, fit, gain, grating, links, sheet, sides, sums, transport
 from . import conservation as made
 from .conservation import Conservation, DirectionalTable, Index, conservation
 from .grating import Grating
@@ -46,15 +47,19 @@ _SETTINGS = (
 )  # fmt: skip
 
 _SIDES = (
-    *_SETTINGS, str(sides.SHEET), str(sides.DENSE), sides.WAVELENGTHS, sides.FEW_ORDERS,
-    sides.NARROW, sums.SWEEPS, sums.LEAST, sums.AIM, sums.MOST, sums.TOLERATED, sums.ENOUGH,
+    *_SETTINGS, str(sides.SHEET), str(sides.DENSE), sides.WAVELENGTHS, sides.NARROW,
+    sides.PLACES, sides.EARLIER,
+    sums.SWEEPS, sums.LEAST, sums.AIM, sums.MOST, sums.TOLERATED, sums.ENOUGH,
     sums.STRONGEST, sums.FAINT, sums.FALL, sums.BETWEEN, sums.MARGIN, sums.LinkedSums.certain,
-    between.CEILING, between.GENTLE, between.MOST, between.LOOKED_AT, between.FALLS,
+    between.CEILING, between.FLOOR, between.GENTLE, between.MOST, between.LOOKED_AT, between.FALLS,
     between.FAR, between.FEW, sides.NODES_OF_INTEGRALS, sheet.ChainSides.certain,
     sheet.POLAR, links.POLAR, links.AZIMUTHS, links.FARTHEST,
 )  # fmt: skip
 
 _known: weakref.WeakKeyDictionary[DiffractionTable, dict[str, Conservation]] = (
+    weakref.WeakKeyDictionary()
+)
+_known_means: weakref.WeakKeyDictionary[DiffractionTable, dict[str, DirectionalTable]] = (
     weakref.WeakKeyDictionary()
 )
 _known_sides: weakref.WeakKeyDictionary[DiffractionTable, dict[str, list[DirectionalTable]]] = (
@@ -126,7 +131,9 @@ class Energy(_HeightScales):
         probes = np.geomspace(*self.wavelength_range, _PROBES)
         found = self.index(probes)
         indices = None if found is None else _rounded(found)
-        material = [self.model, indices, list(self.wavelength_range)]
+        material: list[object] = [self.model, indices, list(self.wavelength_range)]
+        if isinstance(found, Filmed):
+            material.append(mean_second_order.VERSION)
         return kept(
             "energy",
             key_of(_SETTINGS, self.table.digest(), height_scale, material),
@@ -160,6 +167,29 @@ class SidesEnergy(_HeightScales):
             _packed,
             _tables,
         )
+
+
+def mean_exponents(
+    table: DiffractionTable, index: Index, wavelength_range: tuple[float, float]
+) -> DirectionalTable:
+    """`film.exponents`, kept likewise; arguments as of `Energy`."""
+    found = index(np.geomspace(*wavelength_range, _PROBES))
+    assert isinstance(found, Filmed)
+    given = [
+        mean_second_order.VERSION,
+        film.STEP,
+        film.MOST,
+        _rounded(found),
+        list(wavelength_range),
+    ]
+    return kept(
+        "film",
+        key_of(_SETTINGS, table.digest(), 1.0, given),
+        _known_means.setdefault(table, {}),
+        lambda: film.exponents(table.roughness, index, wavelength_range),
+        lambda made: _packed([made]),
+        lambda record: _tables(record)[0],
+    )
 
 
 def _rounded(index: NDArray[np.complex128] | Filmed) -> list[str]:
