@@ -138,7 +138,7 @@ def conservation(
     index: Index,
     wavelength_range: tuple[float, float],
 ) -> Conservation:
-    """Of a table at one height scale: a second or two where energy is gained.
+    """Of a table at one height scale: a few seconds where energy is gained.
 
     Parameters
     ----------
