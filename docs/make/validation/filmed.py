@@ -221,7 +221,8 @@ mean of the second order as well ([theory.md](theory.md#the-material)):
 
 {table(header, rows)}
 
-Asked was 10 %: at worst the default is {percent(worst[2])} off, the first order {percent(worst[1])}.
+Asked was 10 %: at worst the default is {percent(worst[2])} off,
+the first order {percent(worst[1])}.
 
 The film's kernel is that of first-order perturbation of both faces, displaced alike, and as right
 on gentle slopes as the bare surface's. Of the lacquer the second order counts in oblique light:
