@@ -54,21 +54,28 @@ hypothesis.settings.register_profile("search", **_BUSY)
 hypothesis.settings.register_profile("tests", **_BUSY, derandomize=True, database=None)
 hypothesis.settings.load_profile("tests")
 
-_imported = 0
+_frozen: tuple[Path, int] | None = None
 
 
 @pytest.fixture(autouse=True)
-def alone() -> None:
+def alone(request: pytest.FixtureRequest) -> None:
     """Without the BSDFs of earlier tests.
 
     A kernel that calls BSDFs holds the code of all there are: with those of a few tests it takes
     ten times as long to compile, and it is another one whenever tests run in another order.
     """
-    global _imported
+    global _frozen
+    here = request.path.parent, len(sys.modules)
+    if here == _frozen:
+        gc.collect()
+        return
+    # modules stay, later collections need not look at them; what fixtures of a module or a folder
+    # held meanwhile stays with them, until the next folder
+    if _frozen and _frozen[0] != here[0]:
+        gc.unfreeze()
     gc.collect()
-    if len(sys.modules) > _imported:  # modules stay: later collections need not look at them
-        _imported = len(sys.modules)
-        gc.freeze()
+    gc.freeze()
+    _frozen = here
 
 
 @pytest.fixture(scope="session", autouse=True)

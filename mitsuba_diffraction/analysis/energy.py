@@ -29,8 +29,8 @@ def energy_summary(table: DiffractionTable) -> dict[str, Any]:
     """For each material what is reflected, before and after, and how much of it is taken.
 
     The albedos are sums over the orders at 24 azimuths of seven angles up to 80° at 450, 550 and
-    650 nm, not at the directions for which the scale was made. Of gratings there is a bound beside
-    it: what any reciprocal BRDF of the same orders must take of some direction.
+    650 nm, not at the directions for which the scale was made. Beside it, what a reciprocal BRDF of
+    the same orders keeps at best: a bound for gratings, found on a grid of directions for others.
     """
     materials: dict[str, tuple[str, Index]] = {
         "dielectric 1.5": ("small_slope", lambda wavelengths: np.full(len(wavelengths), 1.5 + 0j)),
@@ -75,9 +75,10 @@ def _of_material(table: DiffractionTable, model: str, index: Index) -> dict[str,
         result["conserved where raw is above 1"] = _range(kept[gains])
         inside = (kept[gains] >= 0.97) & (kept[gains] <= 1.001)
         result["between 0.97 and 1.001 there"] = round(float(inside.mean()), 3)
-    if found.scale is not None and found.scale.grating is not None:
-        parts = [most_kept(table, 1.0, model, index, theta, phi, one) for one in WAVELENGTHS]
-        most = np.stack([part for part in parts if part is not None])
+    if found.scale is not None:
+        most = np.stack(
+            [most_kept(table, 1.0, model, index, theta, phi, one) for one in WAVELENGTHS]
+        )
         result["reciprocity lets be kept"] = round(float(most.min()), 3)
         result["kept over that"] = _range(kept / np.minimum(raw, 1.0) / most)
     return result

@@ -39,7 +39,7 @@ _BINS_PER_OCTAVE = 256
 NODES_PER_OCTAVE = 32
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ScaleRoughness:
     """Height variance of a periodic surface by the length of the spatial frequency.
 
@@ -80,11 +80,7 @@ class ScaleRoughness:
 
     def at(self, q: ArrayLike) -> Real:
         """σ_q² in µm², shaped as q, the length of an order's spatial frequency in rad/µm."""
-        order = np.abs(np.asarray(q, np.float64))
-        with np.errstate(divide="ignore", over="ignore", under="ignore"):
-            ratio = (self.frequency / order[..., None]) ** 4  # infinite at q = 0: no component
-            share = -np.expm1(-256.0 * ratio) * np.exp(-ratio / 16.0)
-        return np.asarray(share @ self.variance, np.float64)
+        return np.asarray(shares(self.frequency, q) @ self.variance, np.float64)
 
     def table(self, q_max: float) -> RoughnessTable:
         """σ_q² at nodes, up to q_max (rad/µm) or just above."""
@@ -95,6 +91,14 @@ class ScaleRoughness:
         count = max(1, int(np.ceil((np.log2(q_max) - first) * NODES_PER_OCTAVE)))
         nodes = self.at(2.0 ** (first + np.arange(count + 1) / NODES_PER_OCTAVE))
         return RoughnessTable(first, nodes)
+
+
+def shares(frequency: ArrayLike, q: ArrayLike) -> Real:
+    """What components of these frequencies (n,) have in the σ_q² of an order's q, (..., n)."""
+    order = np.abs(np.asarray(q, np.float64))
+    with np.errstate(divide="ignore", over="ignore", under="ignore"):
+        ratio = (np.asarray(frequency) / order[..., None]) ** 4  # infinite at q = 0: no component
+        return np.asarray(-np.expm1(-256.0 * ratio) * np.exp(-ratio / 16.0), np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +113,11 @@ class RoughnessTable:
 
     first: float
     nodes: Real
+
+    @property
+    def frequencies(self) -> Real:
+        """q of the nodes, rad/µm."""
+        return np.asarray(2.0 ** (self.first + np.arange(len(self.nodes)) / NODES_PER_OCTAVE))
 
     def at(self, q: ArrayLike) -> Real:
         """σ_q² in µm², shaped as q, in rad/µm."""

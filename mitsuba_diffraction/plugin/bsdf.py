@@ -95,6 +95,8 @@ film_ior : float or string [none]
     A thin film that follows the heights and interferes: oxide on a metal (1.77 is alumina), wax on
     a scale. Its lower face is the structure, its upper one the same heights, film_thickness above.
     Over that of the medium above it is the differentiable parameter `film_eta`. It excludes a coat.
+    Small slope has the mean of the second order under a film, which thick films on metals need: a
+    second or two at loading, kept in the cache, in steps of 5 nm and of 0.01 of the indices.
 film_thickness : float ∂ [none]
     The film's thickness along the vertical, nm; at most the length over which light is coherent,
     2 n d = 12 µm. RGB variants sum its colours over wavelengths, apart from those of the orders.

@@ -19,9 +19,10 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import DiffractionWarning
 from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS, response
+from ..optics.mean_order import limited
 from ..tables.energy.conservation import FINE, Conservation, DirectionalTable
 from ..tables.energy.gain import GRAZING
-from ..tables.energy.store import Energy
+from ..tables.energy.store import Energy, mean_exponents
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, Kirchhoff
 from .direction_lookup import DirectionLookup, alike, between, scales_of
@@ -36,6 +37,8 @@ Indices = NDArray[np.complex128] | fresnel.Filmed
 
 #: Indices are rounded to this, real and imaginary part, for s and the ratio of albedos.
 INDEX_STEP = 0.05
+#: For g.
+FILM_STEP = 0.01
 #: And a film's thickness, nm.
 THICKNESS_STEP = 5.0
 #: Largest ratio of a film's albedo to that of the flat one.
@@ -62,12 +65,15 @@ class EnergyModel:
             low = high = wavelength
         kirchhoff = isinstance(boundary, Kirchhoff)
         self.conserving, self._material = conserving, boundary.material
-        self._indices = partial(_rounded_indices, self._material)
+        self._indices, self._exact = (
+            partial(_rounded_indices, self._material, step) for step in (INDEX_STEP, FILM_STEP)
+        )
         model = "kirchhoff" if kirchhoff else "small_slope"
         self._energy = Energy(table, model, self._indices, (low, high))
         self._kirchhoff = self._fades = kirchhoff
         self._warned = False
-        self._scale = DirectionLookup()
+        self._filmed = isinstance(self._material, UnderFilm) and not kirchhoff
+        self._scale, self._mean = DirectionLookup(), DirectionLookup()
         self._reflected = DirectionLookup()
 
     def update(
@@ -82,12 +88,17 @@ class EnergyModel:
         beneath : whether light goes on to something.
         lowest : where height scales vary, the least of them; then height_scale is the largest.
         """
-        if not (self.conserving or beneath):
+        if not (self.conserving or beneath or self._filmed):
             return
         if lowest is None:
             nodes = list(self._energy.nodes(height_scale, interval=differentiable))
         else:
             nodes = self._energy.between(lowest, height_scale)
+        if self._filmed:
+            means = [self._mean_gain(node) for node in nodes]
+            self._mean.update(means, nodes, height_scale, lowest is not None)
+        if not (self.conserving or beneath):
+            return
         found = [self._energy.at(node) for node in nodes]
         if self.conserving:
             scales = scales_of([one.scale for one in found])
@@ -138,22 +149,26 @@ class EnergyModel:
         return self._fades
 
     @property
-    def takes(self) -> bool:
-        """Whether the BSDF is multiplied by anything."""
-        return self._scale.present
+    def takes(self) -> int:
+        """By what the BSDF is multiplied: 0 where it is by nothing."""
+        return self._scale.present + 2 * self._mean.present
 
     def factor(self, pair: Pair, wavenumbers: list[Float], height_scale: Float) -> Colour:
-        """s(ωi) s(ωo), and for Kirchhoff's model `tables.energy.gain.fade`, per channel.
+        """s(ωi) s(ωo), of a film g(ωi) g(ωo) (`optics.mean_order`), and for Kirchhoff's model
+        `tables.energy.gain.fade`, per channel.
 
         height_scale : the one given to `update`; needed where derivatives with respect to it are,
             and where it varies.
         """
-        both = zip(
-            self._scale.at(pair.incident, pair.cos_i, wavenumbers, height_scale),
-            self._scale.at(pair.outgoing, pair.cos_o, wavenumbers, height_scale),
-            strict=True,
-        )
-        found = mi.UnpolarizedSpectrum([one * other for one, other in both])
+        found = mi.UnpolarizedSpectrum(1.0)
+        for lookup in (self._scale, self._mean):
+            if lookup.present:
+                both = zip(
+                    lookup.at(pair.incident, pair.cos_i, wavenumbers, height_scale),
+                    lookup.at(pair.outgoing, pair.cos_o, wavenumbers, height_scale),
+                    strict=True,
+                )
+                found *= mi.UnpolarizedSpectrum([one * other for one, other in both])
         if self._fades:
             one, other = dr.minimum(pair.cos_i, GRAZING), dr.minimum(pair.cos_o, GRAZING)
             found *= dr.square(dr.minimum(one, other) * dr.rcp(dr.maximum(one, other)))
@@ -166,6 +181,12 @@ class EnergyModel:
         return mi.UnpolarizedSpectrum(
             self._reflected.at(tangential, cosine, wavenumbers, height_scale)
         )
+
+    def _mean_gain(self, height_scale: float) -> DirectionalTable:
+        """g at a height scale."""
+        found = mean_exponents(self._energy.table, self._exact, self._energy.wavelength_range)
+        values = limited(found.values * height_scale**2).astype(np.float32)
+        return DirectionalTable(found.wavelengths, values)
 
     def _ratio(self, albedo: DirectionalTable) -> DirectionalTable:
         found = self._indices(albedo.wavelengths)
@@ -209,18 +230,18 @@ def _rounded(value: ArrayLike, step: float) -> NDArray[Any]:
 
 
 def _rounded_indices(
-    material: Reflectance | Inside | UnderFilm, wavelengths: NDArray[np.float64]
+    material: Reflectance | Inside | UnderFilm, step: float, wavelengths: NDArray[np.float64]
 ) -> Indices | None:
-    """`indices_of`, to `INDEX_STEP`: an optimisation of them waits rarely, and sees s and the ratio
-    of albedos as constants.
+    """`indices_of`, to a step: an optimisation of them waits rarely, and sees s, g and the ratio of
+    albedos as constants.
     """
     found = indices_of(material, wavelengths)
     if found is None:
         return None
     if isinstance(found, fresnel.Filmed):
         index, film, depth = found.parts
-        return fresnel.Filmed(_rounded(index, INDEX_STEP), _rounded(film, INDEX_STEP), depth)
-    return _rounded(found, INDEX_STEP)
+        return fresnel.Filmed(_rounded(index, step), _rounded(film, step), depth)
+    return _rounded(found, step)
 
 
 def _complex(number: Float) -> complex:

@@ -16,6 +16,7 @@ from ..optics import blend, boundary, through
 from ..optics.coat import refracted, transmitted
 from ..optics.fresnel import Filmed, Index
 from ..optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
+from ..optics.mean_order import mean_gain
 from ..settings import checked
 from .arguments import bare_dielectric, directions_of, index_of, places_of, width_of
 from .integral import screen_power, window_power
@@ -231,7 +232,29 @@ def _jones(
     if model == "kirchhoff":
         return boundary.kirchhoff(incident, outgoing, index)
     share = _share(field, incident, outgoing, wavelength, index)
-    return blend.jones(incident, outgoing, index, share)
+    jones = blend.jones(incident, outgoing, index, share)
+    if isinstance(index, Filmed):
+        both = _mean_gain(field, (incident[:, 2], outgoing[:, 2]), wavelength, index)
+        jones = jones * np.sqrt(both)[:, None, None]
+    return jones
+
+
+def _mean_gain(
+    field: HeightField,
+    cosines: tuple[NDArray[np.float64], NDArray[np.float64]],
+    wavelength: NDArray[np.float64],
+    index: Filmed,
+) -> NDArray[np.float64]:
+    """g(ωi) g(ωo) of `mean_order`, (n,)."""
+    roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
+    found = np.ones(len(wavelength))
+    parts = np.stack(np.broadcast_arrays(wavelength, *index.parts), axis=1)
+    for one in np.unique(parts, axis=0):
+        at = (parts == one).all(axis=1)
+        film, k = Filmed(*one[1:]), float(wavenumber(one[0].real))
+        for cosine in cosines:
+            found[at] *= mean_gain(cosine[at], film, roughness, k)
+    return found
 
 
 def _share(

@@ -124,4 +124,6 @@ def test_scenes_loaded_many_times_do_not_grow_memory(variant, without_gc):
     # three tables at least leak if one does at each load; Mitsuba's parser leaves a few cycles
     assert grown < 0.1 * size
     assert variables <= 0
-    assert kernels == 0
+    # one at each of three loads if a surface stays; else hardly any: kernels hold the numbers that
+    # objects have in Dr.Jit's register, which are given out anew in no fixed order
+    assert kernels < 3

@@ -30,6 +30,7 @@ roughness        random surfaces of known mean diffraction
 statistics       checks with them, and windows at random places
 page             the page as a whole
 models           its section on Kirchhoff, small slope and their blend
+goals            what was asked of the default model, and what misses it
 patch_sections   its section on two dimensions
 sections         its other sections
 plots            its pictures

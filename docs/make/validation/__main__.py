@@ -83,12 +83,13 @@ def _report(args: argparse.Namespace) -> int:
 
 
 def _groups(args: argparse.Namespace) -> int:
-    from . import models, patch_sections
+    from . import goals, models, patch_sections
     from .compare import compare
 
     sides = models.compare_all({name: compare(name) for name in models.MATERIALS})
     cuts = [c for material in models.MATERIALS for c in patch_sections.compared(material)]
-    print(models.section(sides), patch_sections.section(cuts), sep="\n\n")
+    sections = models.section(sides), goals.section(sides), patch_sections.section(cuts)
+    print(*sections, sep="\n\n")
     return 0
 
 

@@ -127,14 +127,9 @@ def _scans(material: str) -> Iterator[Scan]:
 
 def _affordable(grating: Grating, material: str) -> bool:
     """Light is short in a material, most of all in aluminium, and edges take a finer mesh yet."""
-    if material == "perfect":
+    if material == "perfect" or grating.profile == "sinusoidal":
         return True
-    narrow = grating.period in (1.1, 2.5)
-    if grating.profile == "sinusoidal":
-        return narrow or material == "keratin"
-    if material == "keratin":
-        return narrow
-    return grating.period == 1.1 or (grating.period == 2.5 and grating.depth in (0.1, 0.4))
+    return grating.period in (1.1, 2.5) or (material == "aluminium" and grating.period < 5.0)
 
 
 def _angles(profile: str, material: str) -> tuple[float, ...]:

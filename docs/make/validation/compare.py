@@ -70,6 +70,13 @@ class Comparison:
         total = float(exact[keep].sum())
         return float(np.abs(model - exact)[keep].sum()) / total if total else np.nan
 
+    def change(self) -> float:
+        """What the solver's last refinement changed, in the measure of `deviation` of colours."""
+        rows = self.solutions.rows
+        keep = self.counted & (rows["order"] != 0)
+        changed = rows["te_change"][keep].astype(float) + rows["tm_change"][keep]
+        return float(0.5 * changed.sum() / self.rigorous[keep].sum())
+
     def largest_relative(self, orders: int = 2) -> float:
         """Largest |η/η_rigorous − 1| among the counted rows with |m| up to `orders`."""
         keep = self.counted & (np.abs(self.solutions.rows["order"]) <= orders)

@@ -21,12 +21,12 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import j0
 
 from mitsuba_diffraction import reference
-from mitsuba_diffraction.optics.boundary import small_slope
+from mitsuba_diffraction.optics.blend import ScaleRoughness
 from mitsuba_diffraction.optics.fresnel import Filmed, decaying_root
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
+from mitsuba_diffraction.optics.mean_order import mean_gain
 from mitsuba_diffraction.progress import Progress, silent
 
 from .cases import ALUMINIUM, FEW_WAVELENGTHS, KERATIN, PROFILES, Grating, order_sines
@@ -72,11 +72,8 @@ ANGLES = (0.0, 30.0, 60.0)
 #: Highest order of the expansion: first and finally.
 _HARMONICS = (14, 18)
 _PIXELS = 256
-#: Of `mean_second_order`: its share of the depth, which is of the first order in a thousandth of
-#: this, and the highest order.
-_SMALL, _FEW = 0.02, 4
-#: The default model times `mean_second_order`'s factor.
-MEAN = "small_slope and the mean"
+#: The default model without the mean of the second order.
+FIRST = "first order"
 
 
 def name() -> str:
@@ -119,22 +116,6 @@ def _amplitudes(
         scale = np.abs(matrix).max(axis=0)
         found.append((np.linalg.solve(matrix / scale, came) / scale)[: len(m)])
     return np.asarray(found), above
-
-
-def mean_second_order(grating: Grating, stack: Stack, sine: float, wavelength: float) -> Complex:
-    """δ of both polarisations, (2,): what order 0 is more than first order's, to h², by size.
-
-    Of first order it is the flat film's r times J₀(κh): 1 + δ is what it is over that. An order
-    that leaves along k of light along k₀ has √((1 + δ(k))(1 + δ(k₀))) of the field then, if what
-    light of other orders adds has no phase of its own (random heights; Voronovich 1994).
-    """
-    small = Grating(grating.profile, grating.period, grating.depth * _SMALL)
-    level = Grating(grating.profile, grating.period, 0.0)
-    there, flat = (
-        _amplitudes(one, stack, sine, wavelength, _FEW)[0][:, _FEW] for one in (small, level)
-    )
-    kappa = 2.0 * float(wavenumber(wavelength)) * np.sqrt(1.0 - sine**2)
-    return np.asarray((there / flat / j0(0.5 * kappa * small.depth) - 1.0) / _SMALL**2)
 
 
 def _projected(heights: Real, alpha: Real, beta: Complex, eta: complex) -> Complex:
@@ -185,7 +166,7 @@ def deviations(stack: Stack, model: str) -> Real:
         exact = kept.where(
             period=grating.period, depth=grating.depth, theta=theta, wavelength=wavelength
         ).mean
-        counted = (orders != 0) & (np.abs(sines) <= np.sin(np.radians(GRAZING)))
+        counted = _counted(orders, sines)
         off = np.abs(model_of(grating, stack, theta, wavelength, model) - exact)
         place = GRATINGS.index(grating), ANGLES.index(theta)
         found[(0, *place)] += off[counted].sum()
@@ -195,9 +176,9 @@ def deviations(stack: Stack, model: str) -> Real:
 
 def model_of(grating: Grating, stack: Stack, theta: float, wavelength: float, model: str) -> Real:
     """The model's efficiencies of the orders, for unpolarised light."""
-    if model == MEAN:
-        alone = model_of(grating, stack, theta, wavelength, "small_slope")
-        return alone * _dressed(grating, stack, theta, wavelength)
+    if model == FIRST:
+        default = model_of(grating, stack, theta, wavelength, "small_slope")
+        return default / _of_mean(grating, stack, theta, wavelength)
     _, sines = order_sines(grating.period, wavelength, theta)
     sigma, index = lobe_sigma(grating), stack.index[wavelength]
     brdf = reference.brdf(
@@ -208,26 +189,22 @@ def model_of(grating: Grating, stack: Stack, theta: float, wavelength: float, mo
     return np.asarray(brdf * np.pi / (sigma * float(wavenumber(wavelength))) ** 2)
 
 
-def _dressed(grating: Grating, stack: Stack, theta: float, wavelength: float) -> Real:
-    """|(1 + δ(k))(1 + δ(k₀))| of the orders, the mean of both polarisations by their power."""
+def _of_mean(grating: Grating, stack: Stack, theta: float, wavelength: float) -> Real:
+    """g(ωi) g(ωo) of the orders, by which the default model differs from its first order."""
+    field, k = grating.heights(), float(wavenumber(wavelength))
+    film = Filmed(stack.index[wavelength], stack.film, k * stack.thickness * 1e-3)
     _, sines = order_sines(grating.period, wavelength, theta)
-    sine = float(np.sin(np.radians(theta)))
-    came = mean_second_order(grating, stack, sine, wavelength)
-    left = [mean_second_order(grating, stack, float(one), wavelength) for one in sines]
-    factor = np.abs((1.0 + came) * (1.0 + np.stack(left)))
-    depth = wavenumber(wavelength) * stack.thickness * 1e-3
-    film = Filmed(stack.index[wavelength], stack.film, depth)
-    wi, wo = np.broadcast_arrays(in_plane(sine), in_plane(sines))
-    jones = small_slope(wi, wo, film)
-    power = np.abs(np.stack([jones[:, 0, 0], jones[:, 1, 1]], axis=1)) ** 2
-    return np.asarray(np.sum(power * factor, axis=1) / np.sum(power, axis=1))
+    cosines = np.sqrt(1.0 - np.append(sines, np.sin(np.radians(theta))) ** 2)
+    roughness = ScaleRoughness.of(field.heights, field.pixel_size)
+    found = mean_gain(cosines, film, roughness, k)
+    return np.asarray(found[:-1] * found[-1])
 
 
 def section(chosen: Sequence[Stack] = STACKS) -> str:
     """The section of docs/validation.md."""
     rows = []
     for stack in chosen:
-        found = [deviations(stack, model) for model in ("kirchhoff", "small_slope", MEAN)]
+        found = [deviations(stack, model) for model in ("kirchhoff", FIRST, "small_slope")]
         for grating, *all_three in zip(GRATINGS, *found, strict=True):
             cells = [" / ".join(map(percent, one)) for one in zip(*all_three, strict=True)]
             rows.append([stack.name, f"{grating.period:g}/{grating.depth:g} µm", *cells])
@@ -238,53 +215,46 @@ def section(chosen: Sequence[Stack] = STACKS) -> str:
 A film that follows the heights (`film_ior`, `film_k`, `film_thickness`), against Rayleigh's
 expansion at both of its faces (docs/make/validation/filmed.py), steepest slopes from 0.03 to 0.1.
 Index and thickness: {stacks}.
-Deviation of colours, Kirchhoff's model / the default / the default times the mean of what the
-second order adds to light that keeps its direction:
+Deviation of colours, Kirchhoff's model / small slope of first order / the default, which has the
+mean of the second order as well ([theory.md](theory.md#the-material)):
 
 {table(header, rows)}
 
 The film's kernel is that of first-order perturbation of both faces, displaced alike, and as right
 on gentle slopes as the bare surface's. Of the lacquer the second order counts in oblique light:
 light that is diffracted twice meets the film's fringes at the order in between, and they are
-narrower in angle than the orders are apart. The deviation grows as the square of the heights, and
-with the angle; by wavelength it does not follow where an evanescent order meets a guided mode of
-the film. The plugin warns of such films.
+narrower in angle than the orders are apart. What is diffracted there and back is most of it, a
+factor of either direction alone. It takes the heights' spectrum, and has it from the roughness that
+a table keeps, as if it were isotropic; waves in between count as they are on another part of the
+fringes, so that films of wide fringes have little of it and bare surfaces none, where it brings
+nothing (see above).
 
-The film's thickness across its faces, less by half the mean squared slope than the vertical one, is
-not it: {_thickness()}.
-What light that is diffracted there and back does to a wave is most of it, δ of
-`filmed.mean_second_order`: it brings the lacquer below 10 %. Of other films, whose fringes are
-wide, it makes about as many cases worse as better, as of bare surfaces (see above), and it takes
-the spectrum of the heights, for every direction and wavelength: it is not in the model."""
+Beyond these: {_beyond()}.
+The plugin warns of such films, thick on metals that are rough beside them."""
 
 
-def _thickness() -> str:
-    """By how much a film would have to be other for the default model to be right."""
-    stack, grating, theta = STACKS[-1], GRATINGS[2], ANGLES[-1]
-    exact = {
-        w: solve(grating, stack, theta, w, _HARMONICS[-1]).mean(axis=0) for w in FEW_WAVELENGTHS
-    }
-
-    def off(thickness: float) -> float:
-        other = replace(stack, thickness=thickness)
-        found = 0.0
+def _beyond() -> str:
+    """Thicker films and higher gratings than those that are kept."""
+    lacquer, theta = STACKS[-1], ANGLES[-1]
+    found = []
+    for thickness, depth in ((700.0, 0.12), (1400.0, 0.05), (1400.0, 0.08)):
+        stack, grating = replace(lacquer, thickness=thickness), Grating("sinusoidal", 2.5, depth)
+        exact = {w: solve(grating, stack, theta, w, _HARMONICS[-1]) for w in FEW_WAVELENGTHS}
+        sums = np.zeros((2, 2))
         for wavelength, powers in exact.items():
-            orders, sines = order_sines(grating.period, wavelength, theta)
-            counted = (orders != 0) & (np.abs(sines) <= np.sin(np.radians(GRAZING)))
-            model = model_of(grating, other, theta, wavelength, "small_slope")
-            found += float(np.abs(model - powers)[counted].sum() / powers[counted].sum())
-        return found / len(exact)
+            counted = _counted(*order_sines(grating.period, wavelength, theta))
+            for n, model in enumerate((FIRST, "small_slope")):
+                found_here = model_of(grating, stack, theta, wavelength, model)
+                off = np.abs(found_here - powers.mean(axis=0))[counted].sum()
+                sums[n] += off, powers.mean(axis=0)[counted].sum()
+        first, default = (percent(float(off / light)) for off, light in sums)
+        found.append(f"{thickness:g} nm on 2.5/{depth:g} µm {first} / {default}")
+    return f"lacquer at {theta:g}°, first order / default, {', '.join(found)}"
 
-    nodes = stack.thickness * np.linspace(0.9, 1.1, 81)
-    best = float(nodes[np.argmin([off(one) for one in nodes])])
-    slope = np.pi * grating.depth / grating.period
-    less = stack.thickness * slope**2 / 4.0
-    now, then = percent(off(stack.thickness)), percent(off(best))
-    return (
-        f"of the {stack.name} on {grating.period:g}/{grating.depth:g} µm at {theta:g}° the model "
-        f"is nearest with {best:.0f} nm\n({then} off; {now} with {stack.thickness:g} nm), where "
-        f"slopes take {less:.1f} nm"
-    )
+
+def _counted(orders: NDArray[np.int64], sines: Real) -> NDArray[np.bool_]:
+    """Which orders are colours."""
+    return np.asarray((orders != 0) & (np.abs(sines) <= np.sin(np.radians(GRAZING))))
 
 
 def _cases() -> Iterator[tuple[Grating, float, float]]:

@@ -27,8 +27,8 @@ from .cases import PIXELS, Grating, index_of, order_sines
 # Neighbouring orders are 2π/d apart and weigh exp(−(2π·σ/d)²), 4e-18 at σ = d
 _SIGMA_PER_PERIOD = 1.0
 
-#: As `reference.brdf` has them, and the small-slope matrix alone, unblended.
-MODELS = (*reference.MODELS, "small_slope_alone")
+#: As `reference.brdf` has them, and the small-slope matrix alone, or in equal parts with Kirchhoff.
+MODELS = (*reference.MODELS, "small_slope_alone", "half_and_half")
 
 
 def order_efficiencies(
@@ -110,6 +110,8 @@ def jones_of(
         return boundary.kirchhoff(wi, wo, index)
     if model == "small_slope_alone":
         return boundary.small_slope(wi, wo, index)
+    if model == "half_and_half":
+        return blend.jones(wi, wo, index, 0.5)
     k, total = float(wavenumber(wavelength)), wi + wo
     roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
     variance = roughness.at(k * np.hypot(total[:, 0], total[:, 1]))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from .cases import PROFILES
+from .cases import PROFILES, Grating
 from .compare import Comparison, compare, gratings_of, table_of
 from .markdown import percent, table
 
@@ -39,15 +39,21 @@ def banded(
     """Profile, band, and the mean over its gratings of a measure at each angle."""
     for profile in PROFILES:
         for low, high in BANDS:
-            gratings = [
-                grating
-                for grating in gratings_of(comparison, profile)
-                # ratios are of decimal numbers: 0.2/2.5 is 0.08
-                if low < round(grating.depth / grating.period, 6) <= high
-            ]
+            gratings = within(comparison, profile, (low, high))
             if gratings:
                 values = table_of(comparison, gratings, angles, measure)
                 yield profile, (low, high), [float(x) for x in np.nanmean(values, axis=0)]
+
+
+def within(comparison: Comparison, profile: str, band: tuple[float, float]) -> list[Grating]:
+    """The gratings of a profile whose depth/period lies in a band."""
+    low, high = band
+    return [
+        grating
+        for grating in gratings_of(comparison, profile)
+        # ratios are of decimal numbers: 0.2/2.5 is 0.08
+        if low < round(grating.depth / grating.period, 6) <= high
+    ]
 
 
 def groups(comparisons: dict[tuple[str, str], Comparison]) -> str:

@@ -78,8 +78,8 @@ are made pits the sign of that changes. A power spectrum does not tell hills fro
 sum over all waves in between, for every order of every pair of directions, which no table of powers
 has; what tables can have of it is below. The mean alone, a smooth factor of two directions, puts
 the reflected light right where walls are gentle, but hardly the colours, and makes some worse: of a
-sinusoid's order the rest takes about as much away. It is therefore not in the model. On vertical
-walls the sums depend on where they end."""
+sinusoid's order the rest takes about as much away. It is therefore not in the model, but of films.
+On vertical walls the sums depend on where they end."""
 
 
 def rows_of(cases: Sequence[Case], models: Sequence[str], lit: Sequence[str]) -> list[list[str]]:

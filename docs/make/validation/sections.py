@@ -30,7 +30,7 @@ What it is compared with are closed forms from optics, and rigorous solutions of
 by `gratinglab` (boundary integrals), `pySCATMECH` and `grcwa` (coupled waves) and by Rayleigh's
 expansion, kept as data in docs/make/validation/data with what made them. `python -m
 docs.make.validation solve`, `patches` and `coated` make those anew. `python -m docs.make.validation
-groups` prints the first three tables alone.
+groups` prints the first three sections alone.
 
 A grating's order m carries the power of its lobe of the BRDF. Through a window much wider than the
 period, ∫ f cosθo dωo over that lobe is

@@ -14,5 +14,6 @@ sums           R + T as a linear map of weights, and the scales that bring it ne
 sheet          the same of a sheet that is a grating, chain by chain
 between        R + T amid the nodes of a scale: what is too much there, and what lacks
 sides          R + T of a dielectric, and the scale and the spread light that make it 1
+film           what a thin film makes of the second order's mean
 store          what conserves energy, in the cache
 """

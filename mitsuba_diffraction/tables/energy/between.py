@@ -87,9 +87,7 @@ def is_lacking(found: Sequence[Array], cells: Sequence[Cells]) -> bool:
     return count > FEW * sum(float(np.sum(np.broadcast_to(one, far[0].shape))) for one in certain)
 
 
-def fitted(
-    wanted: Array, most: Array, cells: Sequence[Cells], room_amid: Sequence[Array]
-) -> Array:
+def fitted(wanted: Array, most: Array, cells: Sequence[Cells], room_amid: Sequence[Array]) -> Array:
     """What is spread, (2, wavelengths, rows, columns), from what is wanted at nodes.
 
     Between 0 and `most` there, and amid them at most the room; as far as it can be, no less than

@@ -6,11 +6,12 @@ matrix M with its transpose, of a few directions each, whatever lies between the
 
     s_k Σ_l M_kl s_l = min(a_k, 1)
 
-is solved exactly at every node, with no interpolation. It has a solution if both halves of a chain
+is one of each chain for itself. It has a solution if both halves of a chain
 are to reflect the same in all, Σ_k min(a_k, 1) = Σ_l min(a_l, 1), as M's symmetry wants. On a
 symmetric profile the halves mirror each other. On a blazed one they do not: what one half may
-reflect and the other cannot send is lost to any reciprocal model, and is taken from all of that
-half alike (`Chains.most_kept`).
+reflect and the other cannot send is lost to any reciprocal model (`Chains.most_kept`). It is taken
+first from those directions of that half which reflect more than comes in, up to a tenth, and then
+from all alike.
 """
 
 from __future__ import annotations
@@ -22,17 +23,19 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from .fit import GAINS, Samples, limits
 from .gain import LEAST_COSINE, over_lobe
-from .grating import NODES, Grating, fractions
+from .grating import LAST_NODE, Grating, GratingGrid, fractions
 from .grid import LAST_ANGLE
 from .transport import Orders, lobe_means, lobes
 
 Real = NDArray[np.float64]
 Array = NDArray[np.float32]
 
-SWEEPS = 40
-#: Nodes and parts of cells, from a whole ξ, where orders come up.
-SPIKES = (0.0, 0.25, 0.75, NODES - 1.0)
+#: Of what reciprocity takes, directions above 1 lose at most this share of theirs before all do.
+GIVEN = 0.1
+#: Kirchhoff's spikes reach as far, in ξ beyond a whole number, and from `LAST_NODE` on.
+SPIKE = 0.02
 
 
 class OrderGain(Protocol):
@@ -79,7 +82,7 @@ class Chains:
         """
         first, second = first[..., None, None], second[..., None, None]
         width = last + first + second
-        g = np.minimum(self.grating.spacing / self.gain.wavenumber, 2.0 / np.maximum(width, 1e-9))
+        g = self._step(width)
         k, o = np.arange(last + 1.0)[:, None], np.arange(-1.0, last + 2.0)
         x, x_o = (
             0.5 * g * (last - 2 * k + second - first),
@@ -117,21 +120,52 @@ class Chains:
         share = place - low
         return np.asarray(flat[index] * (1.0 - share) + flat[index + table.shape[1]] * share)
 
-    def scale(self, units: int, target: float, largest: float) -> Array:
-        """s at the nodes of a `GratingGrid` of (units + 1) `NODES` rows."""
-        rows = (units + 1) * NODES
-        values = np.ones((rows, rows), np.float32)
-        f = fractions(np.arange(NODES))
+    def samples(self, units: int, page: float, places: Real) -> Samples:
+        """All chains' albedos, at places between whole ξ, those of a `GratingGrid`'s nodes."""
+        nodes, count = self.grating.nodes, len(places)
+        f = fractions(places, nodes)
         first, second = np.broadcast_arrays(f[:, None], f)
+        shares, at, found = [], [], []
         for last in range(units + 1):
-            shares = self.shares(first, second, last)
-            aim = np.minimum(shares.sum(axis=-1), target)
-            total = aim.sum(axis=-1)
-            aim *= balance(total, total.T)[..., None]
-            s = scaled(shares, aim, largest)
-            self._lower_horizon(s, last, target)
-            put(values, s, last)
-        return values
+            m, k = self.shares(first, second, last, True), np.arange(last + 1)
+            rows, columns = places[:, None] + nodes * k, places[:, None] + nodes * (last - k)
+            at.append(np.broadcast_arrays(rows[:, None], columns))
+            found.append(self._limits(m, first, second, last))
+            shares.append(m)
+        ends = np.cumsum([count**2 * (last + 1) for last in range(units + 1)])[:-1]
+        grid = GratingGrid(self.grating, (units + 1) * nodes, 2e3 * np.pi / self.gain.wavenumber)
+        here = grid.at(*_flat(at))
+
+        def transport(values: Array) -> Array:
+            parts = np.split(here(values), ends)
+            sums = [
+                reflected(m, s.reshape(count, count, -1))
+                for m, s in zip(shares, parts, strict=True)
+            ]
+            return np.concatenate([one.ravel() for one in sums])
+
+        return Samples(page, here, transport, *_flat(found))
+
+    def _limits(self, shares: Real, first: Real, second: Real, last: int) -> tuple[Real, Real]:
+        """As `fit.limits`, as far as reciprocity lets them be."""
+        g, k = self._step(last + first + second)[..., None], np.arange(last + 1)
+        ends = (k + first[..., None]) * (last - k + second[..., None])
+        raw = shares.sum(axis=-1)
+        low, high = limits(raw, g * np.sqrt(ends))
+        lacking = np.maximum(low.sum(axis=-1) - high.sum(axis=-1).T, 0.0)[..., None]
+        gives = low * np.clip((raw - 1.0) / (GAINS - 1.0), 0.0, 1.0)
+        give = gives.sum(axis=-1)[..., None]
+        low = low - gives * np.minimum(lacking / np.maximum(give, 1e-12), GIVEN)
+        low *= balance(low.sum(axis=-1), high.sum(axis=-1).T)[..., None]
+        if self.gain.model == "kirchhoff":
+            near = [(f < SPIKE) | (f > LAST_NODE) for f in (first, second)]
+            low = np.where((near[0] | near[1])[..., None], 0.0, low)
+        return low, high
+
+    def _step(self, width: Real) -> Real:
+        """g, of chains wider than the hemisphere that of the longest wavelength that has them."""
+        g = self.grating.spacing / self.gain.wavenumber
+        return np.minimum(g, 2.0 / np.maximum(width, 1e-9))
 
     def most_kept(self, first: Real, second: Real, last: int) -> Real:
         """Of min(a, 1), what a reciprocal BRDF of the same orders can keep everywhere in a chain.
@@ -145,41 +179,10 @@ class Chains:
         ]
         return balance(*totals)
 
-    def _lower_horizon(self, s: Real, last: int, target: float) -> None:
-        """Nodes at the horizon are met by light that comes yet closer to it."""
-        f = fractions(np.arange(NODES))
-        low = self.shares(np.zeros(1), f, last, True)[:, 0]
-        high = self.shares(f, np.zeros(1), last, True)[:, last]
-        ends = [np.sum(m * _padded(o), axis=-1) for m, o in ((low, s[:, 0]), (high, s[0]))]
-        s[0, :, 0] = np.minimum(s[0, :, 0], target / np.maximum(ends[0], target))
-        s[:, 0, last] = np.minimum(s[:, 0, last], target / np.maximum(ends[1], target))
 
-    def sums(self, units: int) -> list[Real]:
-        """M of all chains at `_places`, for `excess`."""
-        f = fractions(self._places)
-        first, second = np.broadcast_arrays(f[:, None], f)
-        return [self.shares(first, second, last, True) for last in range(units + 1)]
-
-    def excess(self, sums: list[Real], values: Array, limit: float) -> Array:
-        """By what factor, at least 1, the albedo around each node is above a limit."""
-        low = self._places.astype(int)
-        share = (self._places - low)[:, None]
-        padded = np.pad(values, 1, mode="edge")[1:, 1:].astype(np.float64)
-        found = np.ones_like(padded)
-        for last, shares in enumerate(sums):
-            cells = [(k * NODES + low[:, None], (last - k) * NODES + low) for k in range(last + 1)]
-            s = np.stack([_bilinear(padded, *cell, share) for cell in cells], axis=-1)
-            over = s * reflected(shares, s) / limit
-            for k, (row, column) in enumerate(cells):
-                for down, right in ((0, 0), (0, 1), (1, 0), (1, 1)):
-                    np.maximum.at(found, (row + down, column + right), over[..., k])
-        return found[:-1, :-1].astype(np.float32)
-
-    @property
-    def _places(self) -> Real:
-        """Where between nodes albedos are looked at: amid, and where Kirchhoff's has its spikes."""
-        amid = np.arange(NODES) + 0.5
-        return np.append(amid, SPIKES if self.gain.model == "kirchhoff" else [])
+def places_amid(nodes: int, model: str) -> Real:
+    """Nodes and amid them, and where Kirchhoff's albedo has its spikes."""
+    return np.append(0.5 * np.arange(2 * nodes), (0.25, 0.75) if model == "kirchhoff" else [])
 
 
 def balance(total: Real, other: Real) -> Real:
@@ -187,29 +190,20 @@ def balance(total: Real, other: Real) -> Real:
     return np.asarray(np.minimum(1.0, other / np.maximum(total, 1e-12)))
 
 
-def _bilinear(values: Real, row: NDArray[np.int_], column: NDArray[np.int_], share: Real) -> Real:
-    """Between four nodes each; `share` of the next row, and of the next column."""
-    low, high = (
-        values[r, column] * (1.0 - share.T) + values[r, column + 1] * share.T
-        for r in (row, row + 1)
+def _flat(parts: list[Any]) -> tuple[Real, Real]:
+    """Pairs of arrays, one after the other."""
+    one, other = (
+        np.concatenate([part.ravel() for part in side]) for side in zip(*parts, strict=True)
     )
-    return np.asarray(low * (1.0 - share) + high * share, np.float64)
+    return one, other
 
 
-def scaled(shares: Real, aim: Real, largest: float) -> Real:
-    """s (f, f', last + 1) of chains whose other halves have f and f' swapped."""
-    s = np.ones_like(aim)
-    for _ in range(SWEEPS):
-        s = np.minimum(s * np.sqrt(aim / np.maximum(s * reflected(shares, s), 1e-6)), largest)
-    return s
-
-
-def reflected(shares: Real, s: Real) -> Real:
+def reflected(shares: Real, s: NDArray[np.floating]) -> Real:
     """Σ_l M_kl s_l: the other halves' s, and that of their ends beyond the horizon."""
     return np.asarray(np.einsum("...ko,...o->...k", shares, _padded(s.swapaxes(0, 1))))
 
 
-def _padded(s: Real) -> Real:
+def _padded(s: NDArray[np.floating]) -> Real:
     return np.asarray(np.concatenate([s[..., :1], s, s[..., -1:]], axis=-1), np.float64)
 
 

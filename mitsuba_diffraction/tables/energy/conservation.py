@@ -13,15 +13,14 @@ with M of `transport`. What is left to do:
 - Between the grid's directions and wavelengths an order may appear or vanish (a Rayleigh anomaly).
   So the albedo is looked at between them too, and s lowered around where it is above 1.
 - Gratings have few orders and so the most of both, and they are solved otherwise: by chains of
-  directions, at nodes that lie where orders appear (`chains`, `grating`).
+  directions, on a grid whose nodes lie where orders appear (`chains`, `grating`, `fit`). So are
+  surfaces whose strong orders are a grating's, but without chains.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...optics.fresnel import Filmed
 from ..table import DiffractionTable
-from .chains import Chains
+from .chains import Chains, places_amid
+from .fit import Samples, fitted, limits, parallel
 from .gain import Gain
 from .grating import Grating, GratingGrid
 from .grid import DirectionGrid
@@ -42,11 +42,15 @@ Index = Callable[[Real], "NDArray[np.complex128] | Filmed | None"]
 
 #: Directions of the scale, and of the albedo by which it is told whether any is needed.
 FINE, COARSE = DirectionGrid(40, 60), DirectionGrid(20, 30)
+#: Of the scale of a grating, or of tracks: nodes, as in `Grating`, and wavelengths.
+NODES, GRATING_WAVELENGTHS = 12, 8
 #: Wavelengths of either; in variants of one wavelength there is one.
 FINE_WAVELENGTHS, COARSE_WAVELENGTHS = 12, 4
 #: Albedos are scaled to this, half of what may be taken: for what interpolation leaves out.
 TARGET = 0.99
 SWEEPS = 10
+#: As many until nothing changes any more.
+UNTIL_BEST = 40
 #: s is at most this up to 70°, and from 80° at most 1: there part of a lobe is below the horizon,
 #: which would ask for any, and what is above reaches across directions of very different s.
 LARGEST = 1.5
@@ -56,8 +60,11 @@ PARTS, FEW_ORDERS = 3, 24
 GENTLE = 4
 #: And by how much more than what is too much where it was looked at: peaks lie in between.
 PEAKS = 1.3
-#: A grating's albedo is brought below this where its cells were looked at, in so many turns.
-CEILING, TURNS = 0.995, 3
+#: The albedo is brought below this where cells of a `DirectionGrid` were looked at.
+CEILING = 0.995
+#: Parts of a cell that are looked at for a scale along the tracks of a surface; albedos of
+#: directions that mirror each other in their plane differ by less.
+ALONG, EVEN = 2, 0.01
 
 
 @dataclass(frozen=True)
@@ -141,20 +148,29 @@ def conservation(
     maps = _Maps(_orders(table, height_scale), model, index)
     low, high = wavelength_range
     for grid, count in ((COARSE, COARSE_WAVELENGTHS), (FINE, FINE_WAVELENGTHS)):
-        wavelengths = np.geomspace(low, high, count if high > low else 1)
+        wavelengths = _wavelengths(low, high, count)
         transports = maps.at(wavelengths, grid.theta, grid.phi, grid)
         weights = np.ones((grid.polar + 1, grid.azimuthal), np.float32)
         values = np.stack([transport(weights) for transport in transports])
         albedo = DirectionalTable(wavelengths, values)
         if values.max() <= TARGET:
             return Conservation(albedo, None)
-    if maps.orders.grating is not None:
-        return Conservation(albedo, maps.of_chains(maps.orders.grating, wavelengths))
+    few = _wavelengths(low, high, GRATING_WAVELENGTHS)
+    if (grating := maps.orders.grating) is not None:
+        return Conservation(albedo, maps.of_chains(replace(grating, nodes=NODES), few))
+    if (grating := maps.tracks(albedo)) is not None:
+        return Conservation(albedo, maps.of_tracks(replace(grating, nodes=NODES), few))
     if maps.fades:
         transports = maps.at(wavelengths, grid.theta, grid.phi, grid, faded=True)
     aims = np.clip(values, np.float32(0.0), np.float32(TARGET))  # quadrature may fall below 0
-    scale = np.stack([_scaled(*one) for one in zip(transports, aims, strict=True)])
+    scale = np.stack(
+        [scaled(*one, FINE.theta[:, None]) for one in zip(transports, aims, strict=True)]
+    )
     return Conservation(albedo, maps.lowered(DirectionalTable(wavelengths, scale)))
+
+
+def _wavelengths(low: float, high: float, count: int) -> Real:
+    return np.geomspace(low, high, count if high > low else 1)
 
 
 def albedos(
@@ -190,16 +206,25 @@ def most_kept(
     theta: Real,
     phi: Real,
     wavelength: float,
-) -> Real | None:
-    """What reciprocity leaves of a grating at best, (t, p); arguments as in `albedos`.
+) -> Real:
+    """What reciprocity leaves at best of min(a, 1), (t, p); arguments as in `albedos`.
 
-    Of min(a, 1), the share that can be kept of every direction which light goes to and fro between
-    with this one. None for a surface that is no grating: all its directions hang together.
+    Of a grating, the share that can be kept of every direction which light goes to and fro between
+    with this one: a bound. All directions of other surfaces hang together, and there it is what
+    is kept by the s that is best on the directions of `FINE`, interpolated: no bound, but as much
+    can be kept there.
     """
     orders = _orders(table, height_scale)
+    maps = _Maps(orders, model, index)
+    gain = maps.gains(np.array([wavelength]))[0]
     if orders.grating is None:
-        return None
-    gain = _Maps(orders, model, index).gains(np.array([wavelength]))[0]
+        at = FINE.theta, FINE.phi, gain, FINE
+        aim = np.clip(
+            orders.of_gain(*at)(np.ones((FINE.polar + 1, FINE.azimuthal), np.float32)), 1e-6, 1.0
+        )
+        transport = orders.of_gain(*at, maps.fades)
+        s = scaled(transport, aim, np.zeros(1), UNTIL_BEST)
+        return FINE.interpolation(theta[:, None], phi)(s * transport(s) / aim).astype(np.float64)
     x, c = orders.grating.along(theta[:, None], phi)
     per_x = gain.wavenumber / orders.grating.spacing
     first, second = per_x * (c - x), per_x * (c + x)
@@ -219,11 +244,6 @@ def _orders(table: DiffractionTable, height_scale: float) -> Orders:
         last.clear()
         last[height_scale] = Orders(table, height_scale)
     return last[height_scale]
-
-
-def _scaled(transport: Transport, aim: Array) -> Array:
-    """s of one wavelength, at the grid's directions alone."""
-    return np.ones_like(aim) if aim.max() < TARGET else scaled(transport, aim, FINE.theta[:, None])
 
 
 def scaled(
@@ -280,25 +300,63 @@ class _Maps:
 
     def of_chains(self, grating: Grating, wavelengths: Real) -> DirectionalTable:
         """A grating's s."""
-        units = grating.units(float(wavelengths[0]))
-        middle = np.sqrt(wavelengths[1:] * wavelengths[:-1])
-        pages, between = (
-            [Chains(self.orders, grating, gain) for gain in self.gains(at)]
-            for at in (wavelengths, middle if len(middle) else wavelengths)
+        units, count = grating.units(float(wavelengths[0])), grating.nodes
+
+        def one(page: float, wavelength: float, gain: Gain, nodes: bool) -> Samples:
+            places = np.arange(0.0, count) if nodes else places_amid(count, self.model)
+            return Chains(self.orders, grating, gain).samples(units, page, places)
+
+        return self._fitted(grating, wavelengths, one)
+
+    def of_tracks(self, grating: Grating, wavelengths: Real) -> DirectionalTable:
+        """s of a surface whose strong orders are a grating's, and the weak ones even beside it."""
+        rows = grating.rows(float(wavelengths[0]))
+        ones = np.ones((rows, rows), np.float32)
+
+        def one(page: float, wavelength: float, gain: Gain, nodes: bool) -> Samples:
+            theta, phi = (FINE.theta, FINE.phi) if nodes else _between(FINE, ALONG)
+            grid = GratingGrid(grating, rows, wavelength)
+            found = self.orders.of_gain(theta, phi, gain, grid)
+            bounds = limits(found(ones), np.cos(theta[:, None]))
+            return Samples(page, grid.interpolation(theta[:, None], phi), found, *bounds)
+
+        return self._fitted(grating, wavelengths, one)
+
+    def _fitted(
+        self,
+        grating: Grating,
+        wavelengths: Real,
+        one: Callable[[float, float, Gain, bool], Samples],
+    ) -> DirectionalTable:
+        """s of a grating's nodes; one : samples at a page, at nodes or amid them."""
+        pages = np.arange(float(len(wavelengths)))
+        single = len(pages) == 1
+        between = pages if single else pages[1:] - 0.5
+        middle = wavelengths if single else np.sqrt(wavelengths[1:] * wavelengths[:-1])
+        given = [
+            (*each, nodes)
+            for at, lengths, nodes in ((pages, wavelengths, True), (between, middle, False))
+            for each in zip(at, lengths, self.gains(lengths), strict=True)
+        ]
+        samples = parallel(lambda each: one(*each), given)
+        rows = grating.rows(float(wavelengths[0]))
+        return DirectionalTable(wavelengths, fitted(len(pages), (rows, rows), samples), grating)
+
+    def tracks(self, albedo: DirectionalTable) -> Grating | None:
+        """The grating of all strong orders, if the weak ones, too, reflect evenly beside it.
+
+        Kirchhoff's spikes are more than its nodes can follow, if there is more than a grating.
+        """
+        grating = self.orders.tracks
+        if grating is None or self.model == "kirchhoff":
+            return None
+        mirrored = 2.0 * np.arctan2(grating.axis[1], grating.axis[0]) - FINE.phi
+        theta = FINE.theta[FINE.theta <= np.radians(80.0), None]
+        one, other = (
+            np.stack([albedo.at(theta, phi, float(at)) for at in albedo.wavelengths])
+            for phi in (FINE.phi, mirrored)
         )
-        s = np.stack(parallel(lambda one: one.scale(units, TARGET, LARGEST), pages))
-        sums = parallel(lambda one: one.sums(units), between)
-        for turn in range(TURNS + 1):
-            means = 0.5 * (s + np.append(s[1:], s[-1:], axis=0))
-            much = np.stack(
-                [
-                    one.excess(m, mean, CEILING)
-                    for one, m, mean in zip(between, sums, means, strict=False)
-                ]
-            )
-            much = of_both_pages(much, len(s))
-            s /= much if turn == TURNS else np.sqrt(much)
-        return DirectionalTable(wavelengths, s, grating)
+        return grating if np.abs(one - other).max() <= EVEN else None
 
     def lowered(self, scale: DirectionalTable) -> DirectionalTable:
         """s lowered around where between its nodes the albedo is above 1."""
@@ -326,12 +384,6 @@ def of_both_pages(much: Array, pages: int) -> Array:
     if pages == 1:
         return much
     return np.concatenate([much[:1], np.maximum(much[1:], much[:-1]), much[-1:]])
-
-
-def parallel(one: Callable[[Any], Any], arguments: list[Any]) -> list[Any]:
-    """Results for all arguments, by as many threads as there are processors."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(one, arguments))
 
 
 def fades(grating: Grating | None, model: str) -> bool:

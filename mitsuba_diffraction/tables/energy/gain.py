@@ -20,6 +20,7 @@ from scipy.ndimage import map_coordinates
 
 from ...optics import blend, boundary, fresnel
 from ...optics.blend import RoughnessTable
+from ...optics.mean_order import mean_gain
 
 Real = NDArray[np.float64]
 
@@ -71,6 +72,9 @@ class Gain:
         variance = self.roughness.at(self.wavenumber * np.hypot(x + sin_i, y))
         s = blend.weight(self.wavenumber * w * self.height_scale, variance, self.index)
         power = boundary.unpolarised(blend.jones(wi, wo, self.index, s))
+        if isinstance(self.index, fresnel.Filmed):
+            heights = self.roughness, self.wavenumber, self.height_scale
+            power = power * np.prod([mean_gain(c, self.index, *heights) for c in (cos_i, cos_o)], 0)
         return np.asarray((2.0 * cos_i * cos_o / one_plus_dot) ** 2 * power)
 
     def tables(self, theta: Real) -> Real:

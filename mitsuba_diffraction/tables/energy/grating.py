@@ -8,7 +8,7 @@ at x = ±c, so all that is peculiar lies where one of
     ξ₁ = (c − x)/g,   ξ₂ = (c + x)/g,   cosθ = g √(ξ₁ ξ₂),
 
 is a whole number, whatever the wavelength: just above it an order's share rises as the root of the
-distance. A `GratingGrid` has its nodes there, evenly in the root.
+distance. A `GratingGrid` has its nodes there, nearly evenly in the root.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ from .grid import Interpolation
 
 Real = NDArray[np.float64]
 
-#: Nodes from one whole ξ to the next, up to `LAST_NODE` evenly in the root; `ENDS` parts are left
-#: over for the half of a lobe that is above the horizon before its centre is.
-NODES, LAST_NODE, ENDS = 8, 0.965, 2
+#: Nodes from one whole ξ to the next, up to `LAST_NODE` evenly in (1 + DENSE) r/(r + DENSE) of the
+#: root r; `ENDS` parts are left over for the half of a lobe that is above the horizon before its
+#: centre is.
+NODES, LAST_NODE, ENDS, DENSE = 8, 0.965, 2, 3.0
 #: Beyond so many orders in all the general grid does: each appears hardly seen.
 MOST_UNITS = 16
 #: Lobes closer than this, in 1/σ, are no chain.
@@ -44,24 +45,21 @@ class Grating:
     ----------
     axis : unit vector in the patch along which heights change.
     spacing : |q| of the first order, rad/µm.
-    nodes, last, dense : of a `GratingGrid`, from one whole ξ to the next; where those of the root
-        end; and these are evenly in (1 + dense) r/(1 + dense r) of the root r.
+    nodes, last : of a `GratingGrid`, from one whole ξ to the next; and where those of the root end.
     """
 
     axis: tuple[float, float]
     spacing: float
     nodes: int = NODES
     last: float = LAST_NODE
-    dense: float = 0.0
-
-    @property
-    def places(self) -> tuple[int, float, float]:
-        """Of nodes: for `position_of` and `fractions`."""
-        return self.nodes, self.last, self.dense
 
     def units(self, shortest: float) -> int:
         """Whole numbers that ξ passes at the shortest wavelength (nm)."""
         return math.floor(2.0 * float(wavenumber(shortest)) / self.spacing) + 1
+
+    def rows(self, shortest: float) -> int:
+        """Of a `GratingGrid` for wavelengths from the shortest (nm) on."""
+        return (self.units(shortest) + 1) * self.nodes
 
     def along(self, theta: ArrayLike, phi: ArrayLike) -> tuple[Real, Real]:
         """x, and c of directions (rad)."""
@@ -84,8 +82,8 @@ class GratingGrid:
         """From values on the grid to directions (rad), of any one shape."""
         x, c = self.grating.along(*np.broadcast_arrays(theta, phi))
         per_x = float(wavenumber(self.wavelength)) / self.grating.spacing
-        places = self.grating.places
-        return self.at(*(position_of(per_x * (c + sign * x), *places) for sign in (-1, 1)))
+        nodes = self.grating.nodes, self.grating.last
+        return self.at(*(position_of(per_x * (c + sign * x), *nodes) for sign in (-1, 1)))
 
     def at(self, row: Real, column: Real) -> Interpolation:
         """To rows and columns amid the nodes."""
@@ -96,24 +94,23 @@ class GratingGrid:
         return Interpolation(left, left + 1, self.rows, s, t)
 
 
-def position_of(xi: Real, nodes: int = NODES, last: float = LAST_NODE, dense: float = 0.0) -> Real:
+def position_of(xi: Real, nodes: int = NODES, last: float = LAST_NODE) -> Real:
     """Row or column of ξ: `nodes` from one whole number to the next."""
-    whole = np.floor(np.maximum(xi, 0.0))
+    whole, parts = np.floor(np.maximum(xi, 0.0)), nodes - ENDS
     rest = np.maximum(xi, 0.0) - whole
     root = np.sqrt(rest / last)
-    within = (1.0 + dense) * root / (1.0 + dense * root) * (nodes - ENDS)
-    beyond = nodes - ENDS + (rest - last) / (1.0 - last) * ENDS
+    within = (1.0 + DENSE) * root / (root + DENSE) * parts
+    beyond = parts + (rest - last) / (1.0 - last) * ENDS
     return np.asarray(nodes * whole + np.where(rest < last, within, beyond))
 
 
-def fractions(
-    places: ArrayLike, nodes: int = NODES, last: float = LAST_NODE, dense: float = 0.0
-) -> Real:
+def fractions(places: ArrayLike, nodes: int = NODES, last: float = LAST_NODE) -> Real:
     """ξ above a whole number of places among the nodes there, 0 to `nodes`."""
     places = np.asarray(places, np.float64)
-    within = np.minimum(places / (nodes - ENDS), 1.0)
-    root = within / (1.0 + dense - dense * within)
-    beyond = np.maximum(places - nodes + ENDS, 0.0) / ENDS
+    parts = nodes - ENDS
+    within = np.minimum(places / parts, 1.0)
+    root = DENSE * within / (1.0 + DENSE - within)
+    beyond = np.maximum(places - parts, 0.0) / ENDS
     return np.asarray(last * root**2 + (1.0 - last) * beyond)
 
 

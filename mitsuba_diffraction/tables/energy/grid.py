@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,3 +75,24 @@ class Interpolation:
             for d in (0, self.stride)
         )
         return np.asarray(low * (1.0 - self.s) + high * self.s)
+
+    def spread(self, values: NDArray[np.floating], shape: tuple[int, int]) -> Real:
+        """The transposed: values at the directions, by their shares in the nodes."""
+        sums = (
+            np.bincount(at.ravel(), (share * values).ravel(), math.prod(shape))
+            for at, share in self._nodes()
+        )
+        return np.asarray(sum(sums)).reshape(shape)
+
+    def largest(self, values: NDArray[np.floating], shape: tuple[int, int]) -> Real:
+        """The largest of the values, at least 1, that each node has a share in."""
+        found = np.ones(math.prod(shape))
+        for at, share in self._nodes():
+            np.maximum.at(found, at.ravel(), np.where(share > 1e-3, values, 1.0).ravel())
+        return found.reshape(shape)
+
+    def _nodes(self) -> Iterator[tuple[NDArray[np.int32], NDArray[np.float32]]]:
+        """All four, and their shares."""
+        for step, s in ((0, 1.0 - self.s), (self.stride, self.s)):
+            yield self.left + step, s * (1.0 - self.t)
+            yield self.right + step, s * self.t

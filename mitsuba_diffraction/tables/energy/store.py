@@ -9,11 +9,12 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...optics import mean_order
 from ...optics.fresnel import Filmed
 from ..sampling import MOST_STRONG, STRONG
 from ..store import Record, kept, key_of
 from ..table import DiffractionTable
-from . import between, chains, gain, grating, links, sheet, sides, sums, transport
+from . import between, chains, film, fit, gain, grating, links, sheet, sides, sums, transport
 from . import conservation as made
 from .conservation import Conservation, DirectionalTable, Index, conservation
 from .grating import Grating
@@ -34,8 +35,11 @@ _PROBES = 24
 
 _SETTINGS = (
     VERSION, str(made.FINE), str(made.COARSE), made.FINE_WAVELENGTHS, made.COARSE_WAVELENGTHS,
-    made.TARGET, made.SWEEPS, made.LARGEST, made.PARTS, made.FEW_ORDERS, made.GENTLE,
-    made.PEAKS, made.CEILING, made.TURNS, chains.SWEEPS,
+    made.TARGET, made.SWEEPS, made.LARGEST, made.PARTS, made.FEW_ORDERS, made.GENTLE, made.PEAKS,
+    made.CEILING, made.ALONG, made.EVEN, made.NODES, made.GRATING_WAVELENGTHS,
+    chains.GIVEN, chains.SPIKE,
+    *(fit.TOLERANCE, fit.LEAST, fit.MOST, fit.GAINS, fit.GRAZING, fit.LESS, fit.FITS, fit.GENTLE),
+    fit.CEILING, fit.STEP, fit.FEW, grating.DENSE,
     grating.NODES, grating.LAST_NODE, grating.ENDS, grating.MOST_UNITS,
     gain.POLAR_NODES, gain.AZIMUTH_NODES, gain.GRAZING,
     transport.RINGS, transport.STEPS, transport.SMOOTHING,
@@ -53,6 +57,9 @@ _SIDES = (
 )  # fmt: skip
 
 _known: weakref.WeakKeyDictionary[DiffractionTable, dict[str, Conservation]] = (
+    weakref.WeakKeyDictionary()
+)
+_known_means: weakref.WeakKeyDictionary[DiffractionTable, dict[str, DirectionalTable]] = (
     weakref.WeakKeyDictionary()
 )
 _known_sides: weakref.WeakKeyDictionary[DiffractionTable, dict[str, list[DirectionalTable]]] = (
@@ -124,7 +131,9 @@ class Energy(_HeightScales):
         probes = np.geomspace(*self.wavelength_range, _PROBES)
         found = self.index(probes)
         indices = None if found is None else _rounded(found)
-        material = [self.model, indices, list(self.wavelength_range)]
+        material: list[object] = [self.model, indices, list(self.wavelength_range)]
+        if isinstance(found, Filmed):
+            material.append(mean_order.VERSION)
         return kept(
             "energy",
             key_of(_SETTINGS, self.table.digest(), height_scale, material),
@@ -158,6 +167,23 @@ class SidesEnergy(_HeightScales):
             _packed,
             _tables,
         )
+
+
+def mean_exponents(
+    table: DiffractionTable, index: Index, wavelength_range: tuple[float, float]
+) -> DirectionalTable:
+    """`film.exponents`, kept likewise; arguments as of `Energy`."""
+    found = index(np.geomspace(*wavelength_range, _PROBES))
+    assert isinstance(found, Filmed)
+    given = [mean_order.VERSION, film.STEP, film.MOST, _rounded(found), list(wavelength_range)]
+    return kept(
+        "film",
+        key_of(_SETTINGS, table.digest(), 1.0, given),
+        _known_means.setdefault(table, {}),
+        lambda: film.exponents(table.roughness, index, wavelength_range),
+        lambda made: _packed([made]),
+        lambda record: _tables(record)[0],
+    )
 
 
 def _rounded(index: NDArray[np.complex128] | Filmed) -> list[str]:

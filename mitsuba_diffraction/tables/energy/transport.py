@@ -30,7 +30,7 @@ from ...optics.geometry import wavenumber
 from ..sampling import OrderMixture, order_mixture
 from ..table import DiffractionTable
 from .gain import LEAST_COSINE, Gain, fade, over_lobe, read
-from .grating import Grating, GratingGrid, grating_of, orders_of
+from .grating import Grating, GratingGrid, grating_of, on_one_line, orders_of
 from .grid import DirectionGrid, Interpolation
 
 Real = NDArray[np.float64]
@@ -63,6 +63,11 @@ class Orders:
             longest = float(wavenumber(table.wavelength_range[0]))
             spacing = longest * 0.5 * math.pi / RINGS
             self.mixture = order_mixture(table, height_scale, SMOOTHING * spacing)
+        #: the grating of all strong orders
+        self.tracks: Grating | None = None
+        if not table.grid.coherent and table.coarse is None:
+            bins = np.rint(self.mixture.frequency / np.array(table.spacing)).astype(np.int64)
+            self.tracks = on_one_line(table, bins)
         total = self.mixture.density.sum(axis=(1, 2)).max() * self.mixture.pitch**2
         self.has_weak = bool(total > LEAST_WEAK)
         self.nodes, self.weights = _directions()
@@ -132,8 +137,9 @@ class Orders:
         grid: DirectionGrid | GratingGrid,
     ) -> Weak:
         """The weak orders' part: smooth, so that a grid of half as many angles will do."""
-        assert isinstance(grid, DirectionGrid)  # a grating has none
-        half = DirectionGrid(min(grid.polar // 2, 24), min(grid.azimuthal // 2, 30))
+        half = DirectionGrid(20, 30)
+        if isinstance(grid, DirectionGrid):
+            half = DirectionGrid(min(grid.polar // 2, 24), min(grid.azimuthal // 2, 30))
         x, y, cos_o = self.nodes
         turned = half.phi[:, None] + np.arctan2(y, x)
         return Weak(

@@ -32,16 +32,17 @@ def test_what_is_kept_is_what_is_solved_and_has_converged():
     assert np.stack([part.rows["te"], part.rows["tm"]]) == pytest.approx(solved, abs=1e-7)
 
 
-@pytest.mark.parametrize("stack", STACKS[:4], ids=lambda stack: stack.name)
+@pytest.mark.parametrize("stack", STACKS, ids=lambda stack: stack.name)
 def test_gratings_of_slope_up_to_a_tenth(stack):
     found = filmed.deviations(stack, "small_slope")
     assert found.max() < 0.1
-    assert found[0].max() < 0.005  # of slope 0.03: first order is exact as heights go to 0
+    assert found[0].max() < 0.007  # of slope 0.03: first order is exact as heights go to 0
     assert np.median(found / filmed.deviations(stack, "kirchhoff")) < 0.3
 
 
 def test_of_thick_films_the_mean_of_the_second_order_is_most_of_it():
-    lacquer = STACKS[4]
-    first, dressed = (filmed.deviations(lacquer, model) for model in ("small_slope", filmed.MEAN))
-    assert first.max() > 0.15
-    assert dressed.max() < 0.1
+    first, default = (
+        filmed.deviations(STACKS[4], model)[2, 2] for model in (filmed.FIRST, "small_slope")
+    )
+    assert first > 0.15
+    assert default < 0.5 * first

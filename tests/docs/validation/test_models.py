@@ -13,26 +13,10 @@ from docs.make.validation.solutions import shipped
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.geometry import wavenumber
 
-#: Largest deviation of colours on keratin at 60°, by profile and depth/period.
-GOALS = {
-    ("sinusoidal", 0.03): 0.01,
-    ("sinusoidal", 0.08): 0.05,
-    ("lamellar", 0.03): 0.04,
-    ("lamellar", 0.08): 0.22,
-    ("blazed", 0.03): 0.09,
-    ("blazed", 0.08): 0.18,
-}
-
 
 @pytest.fixture(scope="module")
 def keratin() -> Comparison:
     return compare("keratin", model="small_slope")
-
-
-def test_on_keratin_in_oblique_light_it_meets_the_goals(keratin):
-    found = {(name, high): values[0] for name, (_, high), values in banded(keratin, [60.0])}
-    for case, goal in GOALS.items():
-        assert 0 < found[case] <= goal, case
 
 
 def test_nowhere_on_keratin_is_it_worse_than_kirchhoff_by_more_than_a_tenth(keratin):
@@ -53,7 +37,7 @@ def test_on_aluminium_it_is_no_worse_in_any_band():
         for theta, was, now in zip(ANGLES, before, after, strict=True):
             # Kirchhoff's errors of the two polarisations cancel: blazed 1.1/0.1 µm at 30° has 47 %
             # of the mean, 54 and 68 % of either; and where both are as good as exact
-            assert now <= max(1.013 * was, was + 5e-5), (name, band, theta)
+            assert now <= max(1.01 * was, was + 5e-5), (name, band, theta)
     assert new[0][2][2] < 0.3 * old[0][2][2]  # gentle sinusoids at 60°
 
 

@@ -101,6 +101,7 @@ def viewer(gl: Any, some_variant: str, table: DiffractionTable, tmp_path: Path) 
     yield made
     made.on_close()
     made.wnd.destroy()
+    del kind.mitsuba_scene  # moderngl-window keeps its last windows, and what they show
     gl.__enter__()  # the tests' own context is current again
 
 
