@@ -114,19 +114,23 @@ def fractions(places: ArrayLike, nodes: int = NODES, last: float = LAST_NODE) ->
     return np.asarray(last * root**2 + (1.0 - last) * beyond)
 
 
-def grating_of(table: DiffractionTable) -> tuple[Grating, NDArray[np.int64]] | None:
+def grating_of(
+    table: DiffractionTable, most_units: int = MOST_UNITS
+) -> tuple[Grating, NDArray[np.int64]] | None:
     """The grating, if a table has the orders of one only, and their bins (n, 2)."""
     if table.grid.coherent or table.coarse is not None:
         return None
     rows, columns = np.nonzero(table.coefficients.any(axis=(0, 3, 4)))
     bins = np.stack([columns, rows], axis=1).astype(np.int64) - np.array(table.grid.last)
-    grating = on_one_line(table, bins)
+    grating = on_one_line(table, bins, most_units)
     if grating is None or grating.spacing * table.sigma <= _SEPARATE:
         return None
     return grating, bins
 
 
-def on_one_line(table: DiffractionTable, bins: NDArray[np.int64]) -> Grating | None:
+def on_one_line(
+    table: DiffractionTable, bins: NDArray[np.int64], most_units: int = MOST_UNITS
+) -> Grating | None:
     """The grating of a table's bins (n, 2) of |q|, if it is one, of few orders."""
     if not len(bins):
         return None
@@ -137,7 +141,7 @@ def on_one_line(table: DiffractionTable, bins: NDArray[np.int64]) -> Grating | N
     vector = step * np.array(table.spacing)
     spacing = float(np.hypot(*vector))
     grating = Grating((float(vector[0] / spacing), float(vector[1] / spacing)), spacing)
-    return grating if grating.units(table.wavelength_range[0]) <= MOST_UNITS else None
+    return grating if grating.units(table.wavelength_range[0]) <= most_units else None
 
 
 def orders_of(
