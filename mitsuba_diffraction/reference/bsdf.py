@@ -60,7 +60,8 @@ def brdf(
     coat : index of a flat clear coat over the surface, relative likewise (`optics.coat`); it needs
         eta, and its own reflection is the lobe of a flat patch.
     film : index n + ik, relative likewise, and thickness in nm of a film that follows the heights,
-        coherent with the surface (`optics.fresnel.Filmed`); it needs eta, and no coat.
+        coherent with the surface (`optics.fresnel.Filmed`); it needs eta, and no coat. Small slope
+        has the mean of the second order then (`optics.mean_second_order`).
     second_order : whether to multiply orders by the second order of small slope
         (`optics.second_order`): of a bare dielectric, by model "small_slope", in an ensemble.
 

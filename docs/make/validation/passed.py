@@ -154,8 +154,8 @@ share of single directions' light (`python -m docs.make.validation passed` print
 The aim is 0.98 to 1.001. Sheets reach it, blazed ones in all but one of some hundred directions.
 These are sums over orders. A path tracer found the sheet of `blazed` between 0.982 and 1.010 in 60
 random directions and wavelengths (noise 0.0015), those of `cd` and `dvd_pits` between 0.985 and
-1.001 in 50, within 0.013, 0.004 and 0.003 of the sums, which take the scale in the middle of a lobe:
-amid kinks it bends across one, and of 18 directions picked where kinks are, one was at 1.035.
+1.001 in 50, within 0.013, 0.004 and 0.003 of the sums. These take the scale in the middle of a
+lobe, across which it bends amid kinks: of 18 directions picked there one was at 1.035.
 
 Between the scale's directions and wavelengths R + T is looked at too: the scale is lowered where
 that is above 1, and more is spread where it is below 0.985. Orders come and go there. Of a sheet

@@ -116,8 +116,9 @@ def section() -> str:
         "light", "R + T, rigorous", "as it is", "scaled", "spread", "orders off, as they are",
         "scaled", f"of what is missing, in the {STRONGEST} strongest",
     ]  # fmt: skip
-    return f"""Is what is spread where it belongs? An interface of {PERIOD:g}/{DEPTH:g} µm with a sloped
-return flank (slopes of 0.1 and 0.34), light from above at {WAVELENGTH:g} nm, across the grooves from either
-side, beside Rayleigh's expansion; *off* is Σ|η − η_rigorous| over all orders of both sides:
+    return f"""Is what is spread where it belongs? An interface of {PERIOD:g}/{DEPTH:g} µm
+with a sloped return flank (slopes of 0.1 and 0.34), light from above at {WAVELENGTH:g} nm,
+across the grooves from either side, beside Rayleigh's expansion; *off* is Σ|η − η_rigorous| over
+all orders of both sides:
 
 {table(header, rows)}"""

@@ -52,8 +52,8 @@ Array = NDArray[np.float32]
 SHEET, DENSE, WAVELENGTHS = DirectionGrid(48, 96), DirectionGrid(60, 96), (9, 12)
 #: More of gratings. Chains of directions are solved of those whose orders are further apart than
 #: the first of these, in 1/σ, and the shortest waves' horizon further off than the second: lobes
-#: are narrow at 75°, too. Of their grid what `Grating` says of nodes.
-NARROW, PLACES = (25.0, 150.0), (10, 0.94, 1 / 3)
+#: are narrow at 75°, too. Of their grid what `Grating` says of nodes, and the most units.
+NARROW, PLACES, MOST_UNITS = (25.0, 150.0), (10, 0.94), 24
 #: Shares of the way to the next nodes at which cells are looked at, the last one where it is above
 #: the horizon.
 EARLIER = (0.125, 0.25, 0.375, 0.5)
@@ -105,7 +105,7 @@ class Sides:
     def __init__(self, table: DiffractionTable, height_scale: float, medium: Medium) -> None:
         self._table, self._height_scale, self._medium = table, height_scale, medium
         # κ of light that stays within is larger by the index
-        self._orders = Orders(table, height_scale * medium.index)
+        self._orders = Orders(table, height_scale * medium.index, MOST_UNITS)
         self._flat = copy.copy(self._orders)
         self._flat.mixture, self._flat.has_weak = _level(self._orders.mixture), False
         self._links = medium.links()
@@ -371,9 +371,9 @@ class _Linked(Row):
 
 def _places(grating: Grating, share: Real | float) -> tuple[Real, Real]:
     """ξ₁ and ξ₂ above whole numbers, (nodes, nodes): a share of the way beyond each two nodes."""
-    place = np.arange(grating.nodes)
+    place, nodes = np.arange(grating.nodes), (grating.nodes, grating.last)
     first, second = np.broadcast_arrays(place[:, None] + share, place + share)
-    return fractions(first, *grating.places), fractions(second, *grating.places)
+    return fractions(first, *nodes), fractions(second, *nodes)
 
 
 def _amid(grating: Grating, wavelength: float, last: int) -> Real:

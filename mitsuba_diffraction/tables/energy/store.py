@@ -48,7 +48,7 @@ _SETTINGS = (
 
 _SIDES = (
     *_SETTINGS, str(sides.SHEET), str(sides.DENSE), sides.WAVELENGTHS, sides.NARROW,
-    sides.PLACES, sides.EARLIER,
+    sides.PLACES, sides.MOST_UNITS, sides.EARLIER,
     sums.SWEEPS, sums.LEAST, sums.AIM, sums.MOST, sums.TOLERATED, sums.ENOUGH,
     sums.STRONGEST, sums.FAINT, sums.FALL, sums.BETWEEN, sums.MARGIN, sums.LinkedSums.certain,
     between.CEILING, between.FLOOR, between.GENTLE, between.MOST, between.LOOKED_AT, between.FALLS,

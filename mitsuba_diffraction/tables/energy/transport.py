@@ -30,7 +30,7 @@ from ...optics.geometry import wavenumber
 from ..sampling import OrderMixture, order_mixture
 from ..table import DiffractionTable
 from .gain import LEAST_COSINE, Gain, fade, over_lobe, read
-from .grating import Grating, GratingGrid, grating_of, on_one_line, orders_of
+from .grating import MOST_UNITS, Grating, GratingGrid, grating_of, on_one_line, orders_of
 from .grid import DirectionGrid, Interpolation
 
 Real = NDArray[np.float64]
@@ -51,12 +51,14 @@ _HERMITE = np.polynomial.hermite.hermgauss(5)
 class Orders:
     """A table's orders, sorted for one height scale; `transport` sums over them."""
 
-    def __init__(self, table: DiffractionTable, height_scale: float = 1.0) -> None:
+    def __init__(
+        self, table: DiffractionTable, height_scale: float = 1.0, most_units: int = MOST_UNITS
+    ) -> None:
         # not the table, which may keep these
         self.sigma, self.roughness = table.sigma, table.roughness
         self.height_scale = height_scale
         self.grating: Grating | None = None
-        if (found := grating_of(table)) is not None:
+        if (found := grating_of(table, most_units)) is not None:
             self.grating, bins = found
             self.mixture: OrderMixture = orders_of(table, bins, height_scale)
         else:
