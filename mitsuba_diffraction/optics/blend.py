@@ -18,7 +18,10 @@ sinusoid's first order. On a metal, whose K and B differ by the facet's tilt alo
 it halves the errors of either polarisation on gentle aluminium at normal incidence. On a dielectric
 they differ by Brewster's angle too, there K is so far from B in oblique light that a small share of
 it does more harm than good. Hence R₀. Band and fourth power are chosen against rigorous solutions,
-see docs/validation.md. s is symmetric in ωi and ωo, and smooth in both and in the wavelength.
+see docs/validation.md. On metals neither another band nor other constants, nor weights of their own
+for the mean and the difference of the polarisations, make fewer gratings worse than Kirchhoff
+without giving away more elsewhere. s is symmetric in ωi and ωo, and smooth in both and in the
+wavelength.
 """
 
 from __future__ import annotations

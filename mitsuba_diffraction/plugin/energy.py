@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import DiffractionWarning
 from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS, response
-from ..optics.mean_order import limited
+from ..optics.mean_second_order import limited
 from ..tables.energy.conservation import FINE, Conservation, DirectionalTable
 from ..tables.energy.gain import GRAZING
 from ..tables.energy.store import Energy, mean_exponents
@@ -154,8 +154,8 @@ class EnergyModel:
         return self._scale.present + 2 * self._mean.present
 
     def factor(self, pair: Pair, wavenumbers: list[Float], height_scale: Float) -> Colour:
-        """s(ωi) s(ωo), of a film g(ωi) g(ωo) (`optics.mean_order`), and for Kirchhoff's model
-        `tables.energy.gain.fade`, per channel.
+        """s(ωi) s(ωo), per channel; of a film g(ωi) g(ωo) as well (`optics.mean_second_order`), of
+        Kirchhoff's model `tables.energy.gain.fade`.
 
         height_scale : the one given to `update`; needed where derivatives with respect to it are,
             and where it varies.

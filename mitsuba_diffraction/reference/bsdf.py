@@ -16,7 +16,7 @@ from ..optics import blend, boundary, through
 from ..optics.coat import refracted, transmitted
 from ..optics.fresnel import Filmed, Index
 from ..optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
-from ..optics.mean_order import mean_gain
+from ..optics.mean_second_order import mean_gain
 from ..settings import checked
 from .arguments import bare_dielectric, directions_of, index_of, places_of, width_of
 from .integral import screen_power, window_power
@@ -60,7 +60,8 @@ def brdf(
     coat : index of a flat clear coat over the surface, relative likewise (`optics.coat`); it needs
         eta, and its own reflection is the lobe of a flat patch.
     film : index n + ik, relative likewise, and thickness in nm of a film that follows the heights,
-        coherent with the surface (`optics.fresnel.Filmed`); it needs eta, and no coat.
+        coherent with the surface (`optics.fresnel.Filmed`); it needs eta, and no coat. Small slope
+        has the mean of the second order then (`optics.mean_second_order`).
     second_order : whether to multiply orders by the second order of small slope
         (`optics.second_order`): of a bare dielectric, by model "small_slope", in an ensemble.
 
@@ -245,7 +246,7 @@ def _mean_gain(
     wavelength: NDArray[np.float64],
     index: Filmed,
 ) -> NDArray[np.float64]:
-    """g(ωi) g(ωo) of `mean_order`, (n,)."""
+    """g(ωi) g(ωo) of `mean_second_order`, (n,)."""
     roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
     found = np.ones(len(wavelength))
     parts = np.stack(np.broadcast_arrays(wavelength, *index.parts), axis=1)

@@ -20,7 +20,7 @@ from mitsuba_diffraction.optics.blend import ScaleRoughness
 from mitsuba_diffraction.optics.colour import linear_srgb, response
 from mitsuba_diffraction.optics.fresnel import Filmed, reflectance
 from mitsuba_diffraction.optics.geometry import wavenumber
-from mitsuba_diffraction.optics.mean_order import limited, mean_gain
+from mitsuba_diffraction.optics.mean_second_order import limited, mean_gain
 from mitsuba_diffraction.plugin.layers import Channels
 from mitsuba_diffraction.tables.energy.film import exponents
 from tests.directions import as_single, polar
@@ -44,7 +44,7 @@ FILMED = {
 
 
 def means(kind: str, table: md.DiffractionTable, wi: Array, wo: Array, lam: Array) -> Array:
-    """g(ωi) g(ωo) of the table of angles and wavelengths over that of `mean_order`, (n, 4)."""
+    """g(ωi) g(ωo) of the table of angles and wavelengths over the exact, (n, 4)."""
     given = FILMED[kind][1]
     index, (film, thickness) = given["eta"] + 1j * given.get("k", 0.0), given["film"]
     heights = ScaleRoughness.of(PATCH.heights, PATCH.pixel_size)

@@ -11,7 +11,7 @@ import numpy as np
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.optics import blend, boundary
 from mitsuba_diffraction.optics.geometry import wavenumber
-from mitsuba_diffraction.optics.mean_order import coherent
+from mitsuba_diffraction.optics.mean_second_order import coherent
 from mitsuba_diffraction.optics.second_order import SlopeRatios, factor, interpolated
 from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.build.slope_ratios import slope_ratios
@@ -46,7 +46,7 @@ tables of short periods do; *the whole patch* those of the 20 to 65 µm that a c
 of many orders, as tables of scans do. Deviation of colours of keratin, mean and worst of the cases,
 of the default model, blend included, without and with the factor; and all reflected light over the
 rigorous. *Either direction's mean* is what films have by default, exp(s m) of both directions
-(`mitsuba_diffraction/optics/mean_order.py`), on the bare surface.
+(`mitsuba_diffraction/optics/mean_second_order.py`), on the bare surface.
 
 {table(header, rows)}
 

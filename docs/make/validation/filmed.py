@@ -26,7 +26,7 @@ from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.blend import ScaleRoughness
 from mitsuba_diffraction.optics.fresnel import Filmed, decaying_root
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
-from mitsuba_diffraction.optics.mean_order import mean_gain
+from mitsuba_diffraction.optics.mean_second_order import mean_gain
 from mitsuba_diffraction.progress import Progress, silent
 
 from .cases import ALUMINIUM, FEW_WAVELENGTHS, KERATIN, PROFILES, Grating, order_sines
@@ -202,9 +202,10 @@ def _of_mean(grating: Grating, stack: Stack, theta: float, wavelength: float) ->
 
 def section(chosen: Sequence[Stack] = STACKS) -> str:
     """The section of docs/validation.md."""
-    rows = []
+    rows, worst = [], np.zeros(3)
     for stack in chosen:
         found = [deviations(stack, model) for model in ("kirchhoff", FIRST, "small_slope")]
+        worst = np.maximum(worst, [one.max() for one in found])
         for grating, *all_three in zip(GRATINGS, *found, strict=True):
             cells = [" / ".join(map(percent, one)) for one in zip(*all_three, strict=True)]
             rows.append([stack.name, f"{grating.period:g}/{grating.depth:g} µm", *cells])
@@ -219,6 +220,9 @@ Deviation of colours, Kirchhoff's model / small slope of first order / the defau
 mean of the second order as well ([theory.md](theory.md#the-material)):
 
 {table(header, rows)}
+
+Asked was 10 %: at worst the default is {percent(worst[2])} off,
+the first order {percent(worst[1])}.
 
 The film's kernel is that of first-order perturbation of both faces, displaced alike, and as right
 on gentle slopes as the bare surface's. Of the lacquer the second order counts in oblique light:

@@ -5,6 +5,7 @@ Contents
 gain           what becomes of one order's light, by model and material
 transport      the albedo of one wavelength, as a linear map of weights of directions
 conservation   the scale by which no more is reflected than comes in
+fit            a scale fitted where albedos are looked at, at its nodes and amid them
 grating        orders on one line, and a grid with its nodes where they come up
 chains         the scale of a grating, solved exactly between few directions
 grid           the grid of directions

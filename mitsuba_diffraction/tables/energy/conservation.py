@@ -62,9 +62,10 @@ GENTLE = 4
 PEAKS = 1.3
 #: The albedo is brought below this where cells of a `DirectionGrid` were looked at.
 CEILING = 0.995
-#: Parts of a cell that are looked at for a scale along the tracks of a surface; albedos of
-#: directions that mirror each other in their plane differ by less.
-ALONG, EVEN = 2, 0.01
+#: Parts of a cell that are looked at for a scale along the tracks of a surface, of one wavelength
+#: and of many, which look at the same nodes; albedos of directions that mirror each other in the
+#: tracks' plane differ by less.
+ALONG, EVEN = (5, 3), 0.01
 
 
 @dataclass(frozen=True)
@@ -311,10 +312,10 @@ class _Maps:
     def of_tracks(self, grating: Grating, wavelengths: Real) -> DirectionalTable:
         """s of a surface whose strong orders are a grating's, and the weak ones even beside it."""
         rows = grating.rows(float(wavelengths[0]))
-        ones = np.ones((rows, rows), np.float32)
+        ones, parts = np.ones((rows, rows), np.float32), ALONG[len(wavelengths) > 1]
 
         def one(page: float, wavelength: float, gain: Gain, nodes: bool) -> Samples:
-            theta, phi = (FINE.theta, FINE.phi) if nodes else _between(FINE, ALONG)
+            theta, phi = (FINE.theta, FINE.phi) if nodes else _between(FINE, parts)
             grid = GratingGrid(grating, rows, wavelength)
             found = self.orders.of_gain(theta, phi, gain, grid)
             bounds = limits(found(ones), np.cos(theta[:, None]))

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...optics import mean_order
+from ...optics import mean_second_order
 from ...optics.blend import RoughnessTable
 from ...optics.fresnel import Filmed
 from ...optics.geometry import wavenumber
@@ -23,7 +24,7 @@ _FEWEST = 8
 def exponents(
     roughness: RoughnessTable, index: Index, wavelength_range: tuple[float, float]
 ) -> DirectionalTable:
-    """ln g of `optics.mean_order`, of the angle alone; a second or two of a thick film.
+    """ln g of `optics.mean_second_order`, of the angle alone; a second or two of a thick film.
 
     Arguments as in `conservation`.
     """
@@ -38,8 +39,9 @@ def exponents(
     grid = DirectionGrid(FINE.polar, 1)
     cosine = np.cos(grid.theta)
 
-    def one(n: int) -> np.ndarray:
-        return mean_order.exponents(cosine, films[n], roughness, float(wavenumber(wavelengths[n])))
+    def one(n: int) -> NDArray[np.float64]:
+        k = float(wavenumber(wavelengths[n]))
+        return mean_second_order.exponents(cosine, films[n], roughness, k)
 
     values = np.stack(parallel(one, list(range(len(wavelengths)))))
     return DirectionalTable(wavelengths, values[:, :, None].astype(np.float32))

@@ -36,11 +36,11 @@ LARGEST = 1.5
 #: Steps of the fit, and of what is taken at last: by the root of it, then by all.
 FITS, GENTLE = 40, 3
 #: Part of what is missing: by half, both ends of a pair of directions would have all of it.
-STEP = 0.8
+STEP = 0.9
 #: Albedos are at most this at last.
 CEILING = 0.997
 #: Nodes around which so little is looked at are as the nearest others.
-FEW = 0.1
+FEW = 0.05
 
 
 def limits(raw: Real | Array, cosine: Real) -> tuple[Real, Real]:

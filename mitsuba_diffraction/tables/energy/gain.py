@@ -20,7 +20,7 @@ from scipy.ndimage import map_coordinates
 
 from ...optics import blend, boundary, fresnel
 from ...optics.blend import RoughnessTable
-from ...optics.mean_order import mean_gain
+from ...optics.mean_second_order import mean_gain
 
 Real = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...optics import mean_order
+from ...optics import mean_second_order
 from ...optics.fresnel import Filmed
 from ..sampling import MOST_STRONG, STRONG
 from ..store import Record, kept, key_of
@@ -133,7 +133,7 @@ class Energy(_HeightScales):
         indices = None if found is None else _rounded(found)
         material: list[object] = [self.model, indices, list(self.wavelength_range)]
         if isinstance(found, Filmed):
-            material.append(mean_order.VERSION)
+            material.append(mean_second_order.VERSION)
         return kept(
             "energy",
             key_of(_SETTINGS, self.table.digest(), height_scale, material),
@@ -175,7 +175,13 @@ def mean_exponents(
     """`film.exponents`, kept likewise; arguments as of `Energy`."""
     found = index(np.geomspace(*wavelength_range, _PROBES))
     assert isinstance(found, Filmed)
-    given = [mean_order.VERSION, film.STEP, film.MOST, _rounded(found), list(wavelength_range)]
+    given = [
+        mean_second_order.VERSION,
+        film.STEP,
+        film.MOST,
+        _rounded(found),
+        list(wavelength_range),
+    ]
     return kept(
         "film",
         key_of(_SETTINGS, table.digest(), 1.0, given),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.optics import mean_order
+from mitsuba_diffraction.optics import mean_second_order
 from mitsuba_diffraction.optics.blend import ScaleRoughness
 from mitsuba_diffraction.optics.fresnel import Filmed
 from mitsuba_diffraction.tables.energy.film import exponents
@@ -28,7 +28,9 @@ def test_tables_have_it(thickness):
     theta = np.radians([5.0, 30.0, 55.0, 80.0])
     for lam in (437.0, 561.0, 643.0):
         wavenumber = 2e3 * np.pi / lam
-        expected = mean_order.exponents(np.cos(theta), oxide(thickness, lam), exact, wavenumber)
+        expected = mean_second_order.exponents(
+            np.cos(theta), oxide(thickness, lam), exact, wavenumber
+        )
         found = table.at(theta, 0.0 * theta, lam)
         assert found == pytest.approx(expected, abs=0.013)
         assert found[:2] == pytest.approx(expected[:2], abs=0.004)

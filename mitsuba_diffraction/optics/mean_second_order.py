@@ -19,8 +19,8 @@ waves in between that are φ apart in the film's fringes count, each by 1 − ex
 
     φ = 2d Re(β(k) − β(u)),   β = √(ε_film − k²):
 
-of the others what all directions share is made up for by what the mean leaves out, as without a
-film, where m gains nothing (docs/validation.md). The heights' spectrum is taken for isotropic,
+what the others take away, light that changes its direction gives back, as it does without a film,
+where m gains nothing (docs/validation.md). The heights' spectrum is taken for isotropic,
 so that g is of the angle to the normal alone.
 
 r₂ is from the boundary conditions at both faces, both of the heights h: E_t + ∇h E_z and
