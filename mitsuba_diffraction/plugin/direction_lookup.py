@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import wavenumber
 from ..tables.energy.conservation import DirectionalTable
-from ..tables.energy.grating import ENDS, Grating
+from ..tables.energy.grating import DENSE, ENDS, Grating
 from ..tables.energy.grid import SHARE, DirectionGrid
 from .memory import index_between, read_record, upload
 from .roles import Buffer, Float, Index, Vector2f
@@ -140,16 +140,15 @@ def _chain(grating: Grating, tangential: Vector2f, wavenumber: Float) -> tuple[F
     x = cosine * tangential.x + sine * tangential.y
     y = cosine * tangential.y - sine * tangential.x
     width, per_x = dr.safe_sqrt(dr.fma(-y, y, 1.0)), wavenumber / grating.spacing
-    nodes, last, dense = grating.places
-    rows = []
+    parts, last, rows = grating.nodes - ENDS, grating.last, []
     for one in (width - x, width + x):
         xi = dr.maximum(one * per_x, 0.0)
         whole = dr.floor(xi)
         rest = xi - whole
         root = dr.sqrt(rest / last)
-        within = root * dr.rcp(dr.fma(root, dense, 1.0)) * ((1.0 + dense) * (nodes - ENDS))
-        beyond = (rest - last) * (ENDS / (1.0 - last)) + (nodes - ENDS)
-        rows.append(dr.fma(whole, nodes, dr.select(rest < last, within, beyond)))
+        within = root * dr.rcp(root + DENSE) * ((1.0 + DENSE) * parts)
+        beyond = (rest - last) * (ENDS / (1.0 - last)) + parts
+        rows.append(dr.fma(whole, grating.nodes, dr.select(rest < last, within, beyond)))
     return rows[0], rows[1]
 
 

@@ -26,10 +26,10 @@ from .grid import Interpolation
 
 Real = NDArray[np.float64]
 
-#: Nodes from one whole ξ to the next, up to `LAST_NODE` evenly in (1 + DENSE) r/(1 + DENSE r) of
-#: the root r; `ENDS` parts are left over for the half of a lobe that is above the horizon before
-#: its centre is.
-NODES, LAST_NODE, ENDS, DENSE = 8, 0.965, 2, 1.0 / 3.0
+#: Nodes from one whole ξ to the next, up to `LAST_NODE` evenly in (1 + DENSE) r/(r + DENSE) of the
+#: root r; `ENDS` parts are left over for the half of a lobe that is above the horizon before its
+#: centre is.
+NODES, LAST_NODE, ENDS, DENSE = 8, 0.965, 2, 3.0
 #: Beyond so many orders in all the general grid does: each appears hardly seen.
 MOST_UNITS = 16
 #: Lobes closer than this, in 1/σ, are no chain.
@@ -45,20 +45,13 @@ class Grating:
     ----------
     axis : unit vector in the patch along which heights change.
     spacing : |q| of the first order, rad/µm.
-    nodes, last, dense : of a `GratingGrid`, from one whole ξ to the next; where those of the root
-        end; and these are evenly in (1 + dense) r/(1 + dense r) of the root r.
+    nodes, last : of a `GratingGrid`, from one whole ξ to the next; and where those of the root end.
     """
 
     axis: tuple[float, float]
     spacing: float
     nodes: int = NODES
     last: float = LAST_NODE
-    dense: float = DENSE
-
-    @property
-    def places(self) -> tuple[int, float, float]:
-        """Of nodes: for `position_of` and `fractions`."""
-        return self.nodes, self.last, self.dense
 
     def units(self, shortest: float) -> int:
         """Whole numbers that ξ passes at the shortest wavelength (nm)."""
@@ -89,8 +82,8 @@ class GratingGrid:
         """From values on the grid to directions (rad), of any one shape."""
         x, c = self.grating.along(*np.broadcast_arrays(theta, phi))
         per_x = float(wavenumber(self.wavelength)) / self.grating.spacing
-        places = self.grating.places
-        return self.at(*(position_of(per_x * (c + sign * x), *places) for sign in (-1, 1)))
+        nodes = self.grating.nodes, self.grating.last
+        return self.at(*(position_of(per_x * (c + sign * x), *nodes) for sign in (-1, 1)))
 
     def at(self, row: Real, column: Real) -> Interpolation:
         """To rows and columns amid the nodes."""
@@ -101,26 +94,23 @@ class GratingGrid:
         return Interpolation(left, left + 1, self.rows, s, t)
 
 
-def position_of(
-    xi: Real, nodes: int = NODES, last: float = LAST_NODE, dense: float = DENSE
-) -> Real:
+def position_of(xi: Real, nodes: int = NODES, last: float = LAST_NODE) -> Real:
     """Row or column of ξ: `nodes` from one whole number to the next."""
-    whole = np.floor(np.maximum(xi, 0.0))
+    whole, parts = np.floor(np.maximum(xi, 0.0)), nodes - ENDS
     rest = np.maximum(xi, 0.0) - whole
     root = np.sqrt(rest / last)
-    within = (1.0 + dense) * root / (1.0 + dense * root) * (nodes - ENDS)
-    beyond = nodes - ENDS + (rest - last) / (1.0 - last) * ENDS
+    within = (1.0 + DENSE) * root / (root + DENSE) * parts
+    beyond = parts + (rest - last) / (1.0 - last) * ENDS
     return np.asarray(nodes * whole + np.where(rest < last, within, beyond))
 
 
-def fractions(
-    places: ArrayLike, nodes: int = NODES, last: float = LAST_NODE, dense: float = DENSE
-) -> Real:
+def fractions(places: ArrayLike, nodes: int = NODES, last: float = LAST_NODE) -> Real:
     """ξ above a whole number of places among the nodes there, 0 to `nodes`."""
     places = np.asarray(places, np.float64)
-    within = np.minimum(places / (nodes - ENDS), 1.0)
-    root = within / (1.0 + dense - dense * within)
-    beyond = np.maximum(places - nodes + ENDS, 0.0) / ENDS
+    parts = nodes - ENDS
+    within = np.minimum(places / parts, 1.0)
+    root = DENSE * within / (1.0 + DENSE - within)
+    beyond = np.maximum(places - parts, 0.0) / ENDS
     return np.asarray(last * root**2 + (1.0 - last) * beyond)
 
 

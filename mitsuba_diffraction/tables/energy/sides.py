@@ -371,9 +371,9 @@ class _Linked(Row):
 
 def _places(grating: Grating, share: Real | float) -> tuple[Real, Real]:
     """ξ₁ and ξ₂ above whole numbers, (nodes, nodes): a share of the way beyond each two nodes."""
-    place = np.arange(grating.nodes)
+    place, nodes = np.arange(grating.nodes), (grating.nodes, grating.last)
     first, second = np.broadcast_arrays(place[:, None] + share, place + share)
-    return fractions(first, *grating.places), fractions(second, *grating.places)
+    return fractions(first, *nodes), fractions(second, *nodes)
 
 
 def _amid(grating: Grating, wavelength: float, last: int) -> Real:
