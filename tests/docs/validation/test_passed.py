@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from docs.make.validation import passed, rayleigh
+from docs.make.validation import passed, rayleigh, spread
 from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.optics import boundary
 from tests.directions import polar
@@ -33,3 +33,11 @@ def test_on_a_surface_without_symmetry_orders_are_on_their_own_side():
     assert exact[first[1]] > 1.1 * exact[first[-1]]  # there is something to tell apart
     for order in (-1, 1):
         assert model[first[order]] == pytest.approx(exact[first[order]], rel=2e-3)
+
+
+def test_what_is_spread_is_rigorously_in_the_strong_orders():
+    found = spread.shares(75.0, 180.0)
+    assert found.exact.sum() == pytest.approx(1.0, abs=1e-3)
+    assert found.spread > 0.05
+    assert found.scaled.sum() + found.spread == pytest.approx(1.0, abs=0.02)
+    assert found.in_strongest() > 0.9
