@@ -42,8 +42,9 @@ Index = Callable[[Real], "NDArray[np.complex128] | Filmed | None"]
 
 #: Directions of the scale, and of the albedo by which it is told whether any is needed.
 FINE, COARSE = DirectionGrid(40, 60), DirectionGrid(20, 30)
-#: Of the scale of a grating, or of tracks: nodes, as in `Grating`, and wavelengths.
-NODES, GRATING_WAVELENGTHS = 12, 8
+#: Of the scale of a grating, or of tracks: nodes, as in `Grating`, and wavelengths, without a film
+#: and with one, whose fringes albedos follow.
+NODES, GRATING_WAVELENGTHS, FILM_WAVELENGTHS = 12, 8, 16
 #: Wavelengths of either; in variants of one wavelength there is one.
 FINE_WAVELENGTHS, COARSE_WAVELENGTHS = 12, 4
 #: Albedos are scaled to this, half of what may be taken: for what interpolation leaves out.
@@ -156,7 +157,8 @@ def conservation(
         albedo = DirectionalTable(wavelengths, values)
         if values.max() <= TARGET:
             return Conservation(albedo, None)
-    few = _wavelengths(low, high, GRATING_WAVELENGTHS)
+    filmed = isinstance(index(wavelengths), Filmed)
+    few = _wavelengths(low, high, FILM_WAVELENGTHS if filmed else GRATING_WAVELENGTHS)
     if (grating := maps.orders.grating) is not None:
         return Conservation(albedo, maps.of_chains(replace(grating, nodes=NODES), few))
     if (grating := maps.tracks(albedo)) is not None:

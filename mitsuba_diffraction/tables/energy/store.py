@@ -37,6 +37,7 @@ _SETTINGS = (
     VERSION, str(made.FINE), str(made.COARSE), made.FINE_WAVELENGTHS, made.COARSE_WAVELENGTHS,
     made.TARGET, made.SWEEPS, made.LARGEST, made.PARTS, made.FEW_ORDERS, made.GENTLE, made.PEAKS,
     made.CEILING, made.ALONG, made.EVEN, made.NODES, made.GRATING_WAVELENGTHS,
+    made.FILM_WAVELENGTHS,
     chains.GIVEN, chains.SPIKE,
     *(fit.TOLERANCE, fit.LEAST, fit.MOST, fit.GAINS, fit.GRAZING, fit.LESS, fit.FITS, fit.GENTLE),
     fit.CEILING, fit.STEP, fit.FEW, grating.DENSE,
