@@ -132,6 +132,7 @@ def on_one_line(
     table: DiffractionTable, bins: NDArray[np.int64], most_units: int = MOST_UNITS
 ) -> Grating | None:
     """The grating of a table's bins (n, 2) of |q|, if it is one, of few orders."""
+    bins = bins[bins.any(axis=1)]  # q = 0 is on every line
     if not len(bins):
         return None
     first = bins[0]
