@@ -22,7 +22,7 @@ from .sums import LinkedSums, Sums
 Array = NDArray[np.float32]
 #: What R + T is brought below, and above by what is spread; how often by the mean of what is asked
 #: for, before by the largest; and by how much at most at a time.
-CEILING, FLOOR, GENTLE, MOST = 0.998, 0.985, 2, 1.5
+CEILING, FLOOR, GENTLE, MOST = 0.997, 0.985, 2, 1.5
 #: And up to which polar angle of a `DirectionGrid`, rad; between which ever less of what is lacking
 #: is told, as part of a lobe is below the horizon.
 LOOKED_AT = float(np.radians(80.0))

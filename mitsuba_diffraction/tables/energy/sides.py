@@ -49,11 +49,11 @@ Array = NDArray[np.float32]
 
 #: Directions on either side, of a sheet and of a dielectric, whose critical angle is all but one of
 #: the latter; and wavelengths. In variants of one there is one.
-SHEET, DENSE, WAVELENGTHS = DirectionGrid(48, 96), DirectionGrid(60, 96), (9, 12)
+SHEET, DENSE, WAVELENGTHS = DirectionGrid(48, 96), DirectionGrid(60, 96), (9, 16)
 #: More of gratings. Chains of directions are solved of those whose orders are further apart than
 #: the first of these, in 1/σ, and the shortest waves' horizon further off than the second: lobes
 #: are narrow at 75°, too. Of their grid what `Grating` says of nodes, and the most units.
-NARROW, PLACES, MOST_UNITS = (25.0, 150.0), (10, 0.94), 24
+NARROW, PLACES, MOST_UNITS = (25.0, 150.0), (12, 0.94), 24
 #: Shares of the way to the next nodes at which cells are looked at, the last one where it is above
 #: the horizon.
 EARLIER = (0.125, 0.25, 0.375, 0.5)
