@@ -126,12 +126,13 @@ class DirectionLookup:
 def scales_of(
     found: Sequence[DirectionalTable | None], otherwise: float = 1.0
 ) -> list[DirectionalTable] | None:
-    """s of each, `otherwise` where there is none; nothing if there is none at all."""
+    """s of each on the same directions, `otherwise` where it is None; nothing if all are."""
     made = next((one for one in found if one is not None), None)
     if made is None:
         return None
     others = replace(made, values=np.full_like(made.values, otherwise))
-    return [one or others for one in found]
+    scales = [one or others for one in found]
+    return scales if made.grating is not None else alike(scales)
 
 
 def _chain(grating: Grating, tangential: Vector2f, wavenumber: Float) -> tuple[Float, Float]:
@@ -163,7 +164,7 @@ def between(
 
 
 def alike(tables: list[DirectionalTable]) -> list[DirectionalTable]:
-    """Albedos, all on the directions and wavelengths of the finest."""
+    """Albedos or scales, all on the directions and wavelengths of the finest."""
     finest = max(tables, key=lambda table: table.values.size)
     theta, phi = finest.grid.theta[:, None], finest.grid.phi
     return [

@@ -49,11 +49,13 @@ Array = NDArray[np.float32]
 
 #: Directions on either side, of a sheet and of a dielectric, whose critical angle is all but one of
 #: the latter; and wavelengths. In variants of one there is one.
-SHEET, DENSE, WAVELENGTHS = DirectionGrid(48, 96), DirectionGrid(60, 96), (9, 16)
+SHEET, DENSE, WAVELENGTHS = DirectionGrid(48, 96), DirectionGrid(60, 96), (9, 14)
+#: Directions of a sheet that is a grating and lacks light that is to be spread.
+FINER = DirectionGrid(80, 160)
 #: More of gratings. Chains of directions are solved of those whose orders are further apart than
 #: the first of these, in 1/σ, and the shortest waves' horizon further off than the second: lobes
 #: are narrow at 75°, too. Of their grid what `Grating` says of nodes, and the most units.
-NARROW, PLACES, MOST_UNITS = (25.0, 150.0), (12, 0.94), 24
+NARROW, PLACES, MOST_UNITS = (25.0, 150.0), (14, 0.94), 24
 #: Shares of the way to the next nodes at which cells are looked at, the last one where it is above
 #: the horizon.
 EARLIER = (0.125, 0.25, 0.375, 0.5)
@@ -109,11 +111,16 @@ class Sides:
         self._flat = copy.copy(self._orders)
         self._flat.mixture, self._flat.has_weak = _level(self._orders.mixture), False
         self._links = medium.links()
-        self._grid = SHEET if medium.thin else DENSE
-        shape = self._grid.polar, self._grid.azimuthal
-        self._grids = [SideGrid(*shape, medium, side) for side in (0, 1)]
+        self._use(SHEET if medium.thin else DENSE)
+
+    def _use(self, grid: DirectionGrid) -> None:
+        self._grid, shape = grid, (grid.polar, grid.azimuthal)
+        self._grids = self._sides_of(shape)
         self._ones = np.ones((2, shape[0] + 1, shape[1]), np.float32)
         self._parts: dict[tuple[Link, bytes], Real] = {}
+
+    def _sides_of(self, shape: tuple[int, int]) -> list[SideGrid]:
+        return [SideGrid(*shape, self._medium, side) for side in (0, 1)]
 
     def scale(self, wavelength_range: tuple[float, float]) -> list[DirectionalTable] | None:
         """c above and below, then s, then g, if needed; None where R + T is near 1 as it is.
@@ -134,6 +141,10 @@ class Sides:
         values = between.lowered(needed, cells)
         rooms = between.rooms(values, cells)
         if between.is_lacking(rooms, cells):
+            if grating is None and self._grid is SHEET and self._orders.grating is not None:
+                finer = copy.copy(self)
+                finer._use(FINER)
+                return finer.scale(wavelength_range)
             if len(values) == 2:
                 values = np.concatenate([values, np.ones_like(values)])
             pages = zip(wavelengths.tolist(), values.swapaxes(0, 1), strict=True)
@@ -244,7 +255,7 @@ class Sides:
             return raw, raw
         pages = [one.page(wavelength) for one in scale]
         here = [self.at(one, n % 2, theta[:, None], phi, wavelength) for n, one in enumerate(scale)]
-        transport = self.transport([theta, theta], phi, wavelength, scale[0].grating)
+        transport = self.transport([theta, theta], phi, wavelength, scale[0])
         changed = transport.changed(np.stack(pages[:2]), np.stack(here[:2]))
         if len(pages) == 2:
             return raw, np.asarray(changed(np.ones_like(pages[:2])), np.float32)
@@ -279,20 +290,18 @@ class Sides:
         theta: Sequence[Real],
         phi: Real,
         wavelength: float,
-        grating: Grating | None = None,
+        weighted: DirectionalTable | None = None,
     ) -> BothSides:
         """From weights on the grids to R + T at polar angles of either side, and azimuths, rad.
 
-        grating : that the weights are on the grid of.
+        weighted : what has the weights, if on other directions than the grids'.
         """
         k = float(wavenumber(wavelength))
+        grids = self._grids if weighted is None else self._grids_of(weighted, wavelength)
         parts: list[list[tuple[int, Transport]]] = [[], []]
         for link in self._links:
             orders = self._flat if link.flat else self._orders
-            grid: SideGrid | GratingGrid = self._grids[link.left]
-            if grating is not None:
-                rows = (self._units(grating) + 1) * grating.nodes
-                grid = GratingGrid(grating, rows, wavelength)
+            grid = grids[link.left]
 
             def of(at: Real, phi: Real, link: Link = link, orders: Orders = orders) -> list[Row]:
                 tables = link.tables(
@@ -306,6 +315,14 @@ class Sides:
             found = orders.of_rows(of, theta[link.came], phi, grid)
             parts[link.came].append((link.left, found))
         return BothSides(parts)
+
+    def _grids_of(
+        self, scale: DirectionalTable, wavelength: float
+    ) -> Sequence[SideGrid | GratingGrid]:
+        if scale.grating is None:
+            return self._sides_of((scale.values.shape[1] - 1, scale.values.shape[2]))
+        rows = (self._units(scale.grating) + 1) * scale.grating.nodes
+        return [GratingGrid(scale.grating, rows, wavelength)] * 2
 
     def _parts_of(self, link: Link, theta: Real) -> Real:
         """Those of a link, the same at all wavelengths."""

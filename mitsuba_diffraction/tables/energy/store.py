@@ -48,7 +48,8 @@ _SETTINGS = (
 )  # fmt: skip
 
 _SIDES = (
-    *_SETTINGS, str(sides.SHEET), str(sides.DENSE), sides.WAVELENGTHS, sides.NARROW,
+    *_SETTINGS, str(sides.SHEET), str(sides.DENSE), str(sides.FINER), sides.WAVELENGTHS,
+    sides.NARROW,
     sides.PLACES, sides.MOST_UNITS, sides.EARLIER,
     sums.SWEEPS, sums.LEAST, sums.AIM, sums.MOST, sums.TOLERATED, sums.ENOUGH,
     sums.STRONGEST, sums.FAINT, sums.FALL, sums.BETWEEN, sums.MARGIN, sums.LinkedSums.certain,
