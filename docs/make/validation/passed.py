@@ -161,10 +161,10 @@ of fourteen. The sums take the scale in the middle of a lobe, across which it be
 
 Between the scale's directions and wavelengths R + T is looked at too: the scale is lowered where
 that is above 1, and more is spread where it is below 0.985. Orders come and go there. Of a sheet
-that is a grating the nodes lie where they do, if its lobes are narrow, and are finer if they are not
-and light is to be spread. Of an interface they cannot:
-orders come up at its upper side where (c − x)/g is whole and at its lower one where (c' − x)/g is,
-c² = 1 − y², c'² = n² − y², and no grid of two whole numbers has both. So light from within a
+that is a grating the nodes lie where they do, if its lobes are narrow; if they are not and light is
+lacking, its directions are finer. Of an interface they cannot: orders come up at its upper side
+where (c − x)/g is whole and at its lower one where (c' − x)/g is, c² = 1 − y², c'² = n² − y², and
+no grid of two whole numbers has both. So light from within a
 grating meets kinks between nodes, narrower than a cell, and loses 2 to 4 % there in single
 directions, on steep walls more. A third to a half more nodes along angles and azimuths bring `cd`
 from 0.91 to 0.937 at least, before anything is spread, in twice the time: they are not spent.
