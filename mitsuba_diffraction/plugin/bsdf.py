@@ -584,9 +584,8 @@ class Diffraction(mi.BSDF):
         if power is None:
             power = self.power.power(pair, scale, si)
         if self._second_order is not None:
-            added = self._second_order.added(pair, scale, wavenumbers)
-            orders = power - self.power.zeroth(pair, scale, si)  # order 0 keeps its power
-            power = power + orders * mi.UnpolarizedSpectrum(added)
+            factors = self._second_order.factors(pair, scale, wavenumbers)
+            power *= mi.UnpolarizedSpectrum(factors)
         factor = boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)
         power = outside * power
         if self._energy is not None and self._energy.takes:

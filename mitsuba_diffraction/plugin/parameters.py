@@ -173,7 +173,7 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     boundary = boundary_of(props, reflectance, table)
     second_order = None
     if second is not None and isinstance(boundary, SmallSlope):
-        second_order = SecondOrder(second, boundary, _ratios(table))
+        second_order = SecondOrder(second, boundary, _ratios(table), table.sigma)
     conserving, through = flag(props, "energy_conserving", True), None
     places = _places(props, table)
     if passing is not None:

@@ -69,10 +69,14 @@ class SecondOrder:
     material : what the surface is of.
     boundary : its model, which says how much of small slope an order has.
     ratios : r of its heights.
+    sigma : µm, of the coherence window.
     """
 
-    def __init__(self, material: Dielectric, boundary: SmallSlope, ratios: SlopeRatios) -> None:
+    def __init__(
+        self, material: Dielectric, boundary: SmallSlope, ratios: SlopeRatios, sigma: float
+    ) -> None:
         self._material, self._boundary, self._index = material, boundary, math.nan
+        self._apart = -(sigma**2) / math.log(2.0)  # the lobe of order 0, by powers of 2
         self._cell, self._orders, self._middle = ratios.cell, ratios.orders, ratios.middle
         self._first = ratios.kappa[0]
         self._per_kappa = (len(ratios.values) - 1) / (ratios.kappa[1] - ratios.kappa[0])
@@ -88,12 +92,12 @@ class SecondOrder:
             self._index = index
             self._coefficients = _Grid(coefficient_table(round(index, 6)), mi.Float)
 
-    def added(self, pair: Pair, height_scale: Float, wavenumbers: list[Float]) -> list[Float]:
-        """|1 + s (c_l r_l + c_t r_t)|² − 1 for each channel."""
+    def factors(self, pair: Pair, height_scale: Float, wavenumbers: list[Float]) -> list[Float]:
+        """|1 + s (c_l r_l + c_t r_t)|² for each channel; 1 amid the lobe of order 0."""
         indices: list[Number] = [self._material.eta]
         shares = self._boundary.shares(pair, height_scale, wavenumbers, indices)
         c = self._coefficients.at(self._angles(pair))
-        found = []
+        found, apart = [], self._apart * dr.squared_norm(pair.uv)
         for k, share in zip(wavenumbers, shares, strict=True):
             r = self._ratios.at(self._place(pair, height_scale, k))
             scale = (1.0 - share) * dr.square(height_scale)
@@ -101,7 +105,8 @@ class SecondOrder:
             imaginary = scale * (c[0] * r[1] + c[1] * r[0] + c[2] * r[3] + c[3] * r[2])
             square = dr.fma(real, real, imaginary * imaginary)
             least = dr.minimum(1.0, LIMIT * dr.rsqrt(dr.maximum(square, 1e-20)))
-            found.append(least * dr.fma(least, square, 2.0 * real))
+            lobe = dr.exp2(apart * dr.square(k))
+            found.append(dr.fma(least * (1.0 - lobe), dr.fma(least, square, 2.0 * real), 1.0))
         return found
 
     def _angles(self, pair: Pair) -> list[Float]:
