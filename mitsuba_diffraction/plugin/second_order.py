@@ -90,7 +90,7 @@ class SecondOrder:
         index = max(1, round(index / INDEX_STEP)) * INDEX_STEP
         if index != self._index:
             self._index = index
-            self._coefficients = _Grid(coefficient_table(round(index, 6)), mi.Float)
+            self._coefficients = _Grid(coefficient_table(round(index, 6)), mi.Float16)
 
     def factors(self, pair: Pair, height_scale: Float, wavenumbers: list[Float]) -> list[Float]:
         """|1 + s (c_l r_l + c_t r_t)|² for each channel; 1 amid the lobe of order 0."""
