@@ -21,7 +21,7 @@ from ..table import q_limit_of
 from .describe import sections
 
 #: Width of a cell, nodes of κ and the first of them, in units of `q_limit`.
-CELL, STEP, FIRST = 1 / 20, 1 / 6, 1 / 24
+CELL, STEP, FIRST = 1 / 14, 1 / 4, 1 / 24
 #: Least light in a cell that has an r: less is single precision's.
 LEAST = 1e-12
 #: Of r times its gate: more adds `second_order.LIMIT` in any case.
