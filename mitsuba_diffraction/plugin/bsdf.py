@@ -483,6 +483,11 @@ class Diffraction(mi.BSDF):
         return f"{self.boundary}, second order" if self._second_order else str(self.boundary)
 
     @property
+    def second_order_index(self) -> float | None:
+        """Index that the second order of small slope is for; None without it."""
+        return None if self._second_order is None else self._second_order.index
+
+    @property
     def only_traced(self) -> str | None:
         """What it has that only the path tracer shows."""
         if self.places is not None:
@@ -491,8 +496,6 @@ class Diffraction(mi.BSDF):
             return "light that goes through"
         if isinstance(self.fresnel, UnderFilm):
             return "a thin film"
-        if self._second_order is not None:
-            return "second_order=true"
         return "a height_scale that varies" if self._varying else None
 
     @property

@@ -188,7 +188,7 @@ def _joined(common: Packed, tables: dict[str, Packed], surface: str) -> Shader:
     for packed in tables.values():
         definitions |= packed.definitions
     constants = [f"#define {name} {value}\n" for name, value in definitions.items() if value]
-    files = map(shader_file, ("library.glsl", "boundary.glsl", "layers.glsl"))
+    files = map(shader_file, ("library.glsl", "second_order.glsl", "boundary.glsl", "layers.glsl"))
     shared = "".join(constants) + resolved("\n".join(files), definitions)
     names = global_names(shared)
     code = [renamed(shared, [(_PREFIX, names)])]

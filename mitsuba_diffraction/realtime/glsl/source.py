@@ -83,7 +83,7 @@ def fragment_parts(
     constants = _CONSTANTS | dict(definitions)
     lines = [f"#define {name} {value}\n" for name, value in constants.items()]
     parts = [("preamble", _PREAMBLES[dialect] + "".join(lines))]
-    shared = ["library.glsl", "boundary.glsl"]
+    shared = ["library.glsl", "second_order.glsl", "boundary.glsl"]
     if method in THESIS_METHODS:
         shared.append("taylor.glsl")
     if "SHADOWED" in constants:

@@ -22,7 +22,7 @@ vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
     outside = area_factor * ratio * ratio / wi.z * leaving / wo.z;
     sum.z *= coat;  // κ grows by the index
 #endif
-    begin_pair(wi, wo, there, back);
+    begin_pair(wi, wo, uv, there, back);
 #ifdef ENERGY_CONSERVING
     outside *= energy_scale(in_patch(wi, rotation), wi.z)
              * energy_scale(in_patch(wo, rotation), wo.z) * energy_fade(wi.z, wo.z);
