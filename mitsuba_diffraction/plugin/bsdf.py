@@ -587,8 +587,10 @@ class Diffraction(mi.BSDF):
         if power is None:
             power = self.power.power(pair, scale, si)
         if self._second_order is not None:
-            factors = self._second_order.factors(pair, scale, wavenumbers)
-            power *= mi.UnpolarizedSpectrum(factors)
+            # order 0 keeps its power, and others where a mirror's lobe, its most, outshines them
+            others = dr.maximum(power - self.power.flat(pair, si), 0.0)
+            added = self._second_order.added(pair, scale, wavenumbers)
+            power = power + others * mi.UnpolarizedSpectrum(added)
         factor = boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)
         power = outside * power
         if self._energy is not None and self._energy.takes:

@@ -21,7 +21,7 @@ from ..table import q_limit_of
 from .describe import sections
 
 #: Width of a cell, nodes of κ and the first of them, in units of `q_limit`.
-CELL, STEP, FIRST = 1 / 20, 1 / 6, 1 / 24
+CELL, STEP, FIRST = 1 / 14, 1 / 4, 1 / 24
 #: Least light in a cell that has an r: less is single precision's.
 LEAST = 1e-12
 #: Of r times its gate: more adds `second_order.LIMIT` in any case.
@@ -31,21 +31,23 @@ Complex = NDArray[np.complex64]
 
 
 def slope_ratios(patches: Sequence[HeightField], settings: TableSettings) -> SlopeRatios:
-    """r of patches, as far as light can probe; four transforms for each node of κ."""
+    """r of patches, as far as the table has orders; four transforms for each node of κ."""
     q_limit = q_limit_of(settings.wavelength_range)
+    reach = tuple(min(q, q_limit) for q in settings.q_max or (q_limit, q_limit))
     first, last = q_limit * FIRST, q_limit * settings.height_scale_max
+    last = max(2.0 * first, min(last, settings.kappa_max or last))
     nodes = np.linspace(first, last, 2 + math.floor((last - first) / (q_limit * STEP)))
     spacing = [2.0 * np.pi / length for length in next(sections(patches))[0].extent]
     few = [step >= 0.5 * CELL * q_limit for step in spacing]
     cell = [step if own else CELL * q_limit for own, step in zip(few, spacing, strict=True)]
-    middle = [math.ceil(q_limit / width) + 1 for width in cell]
+    middle = [math.ceil(q / width) + 1 for q, width in zip(reach, cell, strict=True)]
     shape = 2 * middle[1] + 1, 2 * middle[0] + 1
     sums = np.zeros((len(nodes), shape[0] * shape[1], 3), np.complex64)
     gates = []
     for patch, taper in sections(patches):
         slopes = Slopes.of(patch.heights, patch.pixel_size, taper**2)
         gates.append(slopes.gate)
-        q, which = _orders(patch, q_limit)
+        q, which = _orders(patch, reach)
         within = _weights(q / cell + middle, shape)
         for found, kappa in zip(sums, nodes, strict=True):
             a, *products = (s.ravel()[which] for s in _spectra(patch, slopes, taper, kappa))
@@ -73,13 +75,15 @@ def _spectra(
         yield scipy.fft.fft2(one, norm="forward", overwrite_x=True)
 
 
-def _orders(patch: HeightField, q_limit: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Frequencies (n, 2) of all orders that light can probe but order 0; their places."""
+def _orders(
+    patch: HeightField, reach: tuple[float, ...]
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Frequencies (n, 2) of all orders but order 0 within these half axes; their places."""
     ny, nx = patch.shape
     dx, dy = patch.pixel_size
     qx, qy = (2.0 * np.pi * np.fft.fftfreq(n, d) for n, d in ((nx, dx), (ny, dy)))
-    length = np.hypot(qx, qy[:, None])
-    y, x = np.nonzero((length > 0.0) & (length <= q_limit))
+    length = np.hypot(qx / reach[0], qy[:, None] / reach[1])
+    y, x = np.nonzero((length > 0.0) & (length <= 1.0))
     return np.column_stack([qx[x], qy[y]]), y * nx + x
 
 

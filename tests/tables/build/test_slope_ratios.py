@@ -99,9 +99,31 @@ def test_several_patches_and_windows_have_the_mean():
     assert np.abs(found.at(q, 20.0) - expected).mean() < 0.2 * np.abs(expected).mean()
 
 
-def test_a_table_holds_it_only_if_asked_and_keeps_it_in_its_file(tmp_path):
+def test_a_restricted_table_has_it_as_far_as_it_has_orders():
+    whole, cut = ratios(MANY), ratios(MANY, q_max=(9.0, 6.0), kappa_max=20.0)
+    assert cut.values.nbytes < 0.2 * whole.values.nbytes
+    assert cut.kappa == (whole.kappa[0], 20.0)
+    for q in ([4.0, 1.0], [-5.0, 2.0], [0.0, -4.0]):  # and the cells about
+        place = np.round(np.array(q) / whole.cell) * whole.cell
+        expected = whole.at(place, whole.kappa[0])
+        assert cut.at(place, cut.kappa[0]) == pytest.approx(expected, abs=ROUNDED)
+    assert not cut.at([[15.0, 0.0], [0.0, -15.0]], 10.0).any()  # the first order alone
+
+
+def test_ensembles_have_it_unless_told_otherwise():
+    for given, expected in (
+        ({}, True),
+        ({"coherence": "patch"}, False),
+        ({"basis": "taylor"}, False),
+    ):
+        assert TableSettings(**given).second_order is expected
+        for asked in (False, True):
+            assert TableSettings(**given, second_order=asked).second_order is asked
+
+
+def test_a_table_keeps_it_in_its_file_unless_told_not_to(tmp_path):
     asked = {"coherence_width": 6.0, "tolerance": 0.01}
-    table = DiffractionTable.build(FEW, second_order=True, **asked)
+    table = DiffractionTable.build(FEW, **asked)
     plain = DiffractionTable.build(FEW, second_order=False, **asked)
     assert plain.slope_ratios is None
     assert np.array_equal(plain.coefficients, table.coefficients)
@@ -110,6 +132,10 @@ def test_a_table_holds_it_only_if_asked_and_keeps_it_in_its_file(tmp_path):
     loaded = DiffractionTable.load(tmp_path / "with.exr")
     assert loaded.digest() == table.digest() != plain.digest()
     assert np.array_equal(loaded.slope_ratios.values, table.slope_ratios.values)
+    again = DiffractionTable.load(tmp_path / "without.exr")  # as all files of before
+    assert again.slope_ratios is None
+    assert again.settings == plain.settings
+    assert again.digest() == plain.digest()
     text = (tmp_path / "without.exr").read_bytes()
     assert b"second_order" not in text
     assert b"slope_ratios" not in text
