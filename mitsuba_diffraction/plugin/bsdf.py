@@ -588,7 +588,8 @@ class Diffraction(mi.BSDF):
             power = self.power.power(pair, scale, si)
         if self._second_order is not None:
             # order 0 keeps its power, and others where a mirror's lobe, its most, outshines them
-            others = dr.maximum(power - self.power.flat(pair, si), 0.0)
+            mirror = dr.abs(self.power.flat(pair, si))
+            others = power - dr.clip(power, -mirror, mirror)  # colours may be negative
             added = self._second_order.added(pair, scale, wavenumbers)
             power = power + others * mi.UnpolarizedSpectrum(added)
         factor = boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)

@@ -24,7 +24,7 @@ from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from tests.directions import as_single, uniform_directions
 from tests.realtime.glsl.conftest import probed
-from tests.realtime.glsl.test_methods import DAYLIGHT, difference
+from tests.realtime.glsl.test_methods import DAYLIGHT, PERFECT, difference
 
 METAL = (np.array([360.0, 830.0]), np.array([1.4, 0.4]), np.array([2.0, 5.0]))
 DIELECTRIC = Packed(uniforms={"eta": 1.5}, definitions={"SURFACE_KIND": "1"})
@@ -53,21 +53,40 @@ def pairs(n: int) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
 def factor(
     table: DiffractionTable, kind: str, wi: NDArray[Any], wo: NDArray[Any], lam: NDArray[Any]
 ) -> NDArray[np.float64]:
-    """N' / (1 + ωi·ωo)² at wavelengths (m,), shape (n, m); times what `twice` has of orders."""
-    total = wi + wo
-    k = wavenumber(lam)
-    q = total[:, None, :2] * k[:, None]
-    length = np.hypot(q[..., 0], q[..., 1])
-    kappa = HEIGHTS * total[:, 2:] * k
-    s = blend.weight(kappa, table.roughness.at(length), index(kind, lam))
+    """N' / (1 + ωi·ωo)² at wavelengths (m,), shape (n, m)."""
+    s = share(table, kind, wi + wo, lam)
     jones = blend.jones(wi[:, None], wo[:, None], index(kind, lam), s)
     scale = 2 * wi[:, 2] * wo[:, 2] / (1 + np.sum(wi * wo, axis=1))
-    found = boundary.unpolarised(jones) * scale[:, None] ** 2
-    if kind == "twice":
-        ratios = HEIGHTS**2 * table.slope_ratios.at(q, kappa)
-        gain = second_order.factor(second_order.interpolated(1.5, wi, wo)[:, None], ratios, s)
-        found *= 1 + (gain - 1) * -np.expm1(-((table.sigma * length) ** 2))
-    return found
+    return boundary.unpolarised(jones) * scale[:, None] ** 2
+
+
+def share(
+    table: DiffractionTable, kind: str, total: NDArray[Any], lam: NDArray[Any]
+) -> NDArray[np.float64]:
+    """What small slope has of the blend, (n, m)."""
+    k = wavenumber(lam)
+    q = np.hypot(total[:, 0], total[:, 1])[:, None] * k
+    return blend.weight(HEIGHTS * total[:, 2:] * k, table.roughness.at(q), index(kind, lam))
+
+
+def twice(
+    power: NDArray[Any],
+    mirror: NDArray[Any],
+    table: DiffractionTable,
+    pair: tuple[Any, ...],
+    lam: NDArray[Any],
+) -> NDArray[np.float64]:
+    """Power (n, m) of orders that light is diffracted into twice, but for a mirror's lobe."""
+    wi, wo, _ = pair
+    total, k = wi + wo, wavenumber(lam)
+    ratios = table.slope_ratios.at(total[:, None, :2] * k[:, None], HEIGHTS * total[:, 2:] * k)
+    gain = second_order.factor(
+        second_order.interpolated(1.5, wi, wo)[:, None],
+        HEIGHTS**2 * ratios,
+        share(table, "twice", total, lam),
+    )
+    mirror = np.abs(mirror)
+    return power + (power - np.clip(power, -mirror, mirror)) * (gain - 1.0)
 
 
 def shaded(
@@ -91,7 +110,7 @@ def shaded(
 def test_lut_has_the_factor_of_each_channel(gl: Any, table: DiffractionTable, kind: str) -> None:
     pair = pairs(300)
     colours = pack_colours(ColourTable.build(table))
-    plain = probed(gl, "lut", colours | Packed(definitions={"SURFACE_KIND": "0"}), pair[2])
+    plain = probed(gl, "lut", colours | PERFECT, pair[2])
     material = MATERIALS[kind] | (UNTINTED if kind == "conductor" else Packed())
     found = shaded(gl, "lut", table, colours | material, pair, kind)
     expected = factor(table, kind, *pair[:2], np.array(RGB_WAVELENGTHS))
@@ -102,6 +121,9 @@ def test_lut_has_the_factor_of_each_channel(gl: Any, table: DiffractionTable, ki
         expected /= boundary.unpolarised(tangent) * scale[:, None] ** 2
         expected *= probed_reflectance(gl, colours, plain, pair[2])
     lit = np.abs(plain) > 1e-3 * np.abs(plain).max()
+    if kind == "twice":
+        level = probed(gl, "lut", colours | PERFECT, pair[2] * [1, 1, 0, 1])
+        plain = twice(plain, level, table, pair, np.array(RGB_WAVELENGTHS))
     # single precision, and lut's reading of reflectances between 129 angles
     assert found[lit] / plain[lit] == pytest.approx(expected[lit], rel=1e-3)
 
@@ -139,5 +161,8 @@ def test_spectral_has_the_factor_of_each_wavelength(
     k = wavenumber(lam)
     weights = linear_srgb(response(lam)) * 0.5 / (lam[:, None] * 1e-3) ** 2
     powers = table.window_sum(*(at[:, n, None] * k for n in range(3)))
+    if kind == "twice":
+        mirror = np.exp(-np.sum((table.sigma * at[:, None, :2] * k[:, None]) ** 2, axis=-1))
+        powers = twice(powers, mirror, table, pair, lam)
     exact = (powers * factor(table, kind, wi, wo, lam)) @ weights
     assert difference(found, exact) < 8e-3  # as for a perfect mirror

@@ -219,7 +219,7 @@ def test_an_environment_of_one_texel_is_a_directional_light(opened: Any) -> None
     [
         {"material": "Al", "coat_ior": 1.5},
         {"int_ior": 1.5, "model": "kirchhoff", "pigment": {"type": "diffuse"}},
-        {"int_ior": 1.5, "second_order": True},
+        {"int_ior": 1.7, "coat_ior": 1.5, "second_order": True, "shadowing": "vcavity"},
     ],
     ids=["coated", "kirchhoff", "twice"],
 )

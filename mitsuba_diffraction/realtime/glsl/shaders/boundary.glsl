@@ -41,7 +41,7 @@ vec3 flat_reflectance(float cosine) { return reflectance(cosine); }
 
 #if !defined(SMALL_SLOPE) && !defined(COATED)
 
-void begin_pair(vec3 wi, vec3 wo, vec2 uv, vec2 there, vec2 back) {}
+void begin_pair(vec3 wi, vec3 wo, vec2 there, vec2 back) {}
 
 vec3 boundary(float cos_half, float r, float z) { return reflectance(cos_half); }
 float boundary_at_all(float cos_half) { return reflectance_at_all(cos_half); }
@@ -52,17 +52,18 @@ float boundary_at(float cos_half, float k, float r, float z) { return reflectanc
 // A dielectric's matrices are real.
 #if SURFACE_KIND == DIELECTRIC
 #define NUMBER float
-#else
-#define NUMBER vec2
-#endif
 
 float times(float a, float b) { return a * b; }
-vec2 times(vec2 a, vec2 b) { return vec2(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x); }
 float inverse_of(float a) { return 1.0 / a; }
-vec2 inverse_of(vec2 a) { return vec2(a.x, -a.y) / dot(a, a); }
 float plus(float a, float b) { return a + b; }
-vec2 plus(vec2 a, float b) { return vec2(a.x + b, a.y); }
 float root(float a) { return sqrt(max(a, 0.0)); }
+
+#else
+#define NUMBER vec2
+
+vec2 times(vec2 a, vec2 b) { return vec2(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x); }
+vec2 inverse_of(vec2 a) { return vec2(a.x, -a.y) / dot(a, a); }
+vec2 plus(vec2 a, float b) { return vec2(a.x + b, a.y); }
 
 // The root whose wave decays, or else travels, away from the surface.
 vec2 root(vec2 a)
@@ -71,6 +72,8 @@ vec2 root(vec2 a)
     float smaller = 0.5 * a.y / max(larger, 1e-20);
     return a.x >= 0.0 ? vec2(larger, smaller) : vec2(smaller, larger);
 }
+
+#endif
 
 // Of the pair: cosines and squared sines, products of the turns to the facet's axis and back, ...
 vec2 pair_cosines, pair_squares;
@@ -180,8 +183,7 @@ float boundary_at_all(float cos_half) { return 1.0; }
 
 float boundary_at(float cos_half, float k, float r, float z)
 {
-    float s = gentle_share(eta, k, r, z);
-    return mean_power(pair_tangent, pair_gentle, s) * second_order(s, k, r, z);
+    return mean_power(pair_tangent, pair_gentle, gentle_share(eta, k, r, z));
 }
 
 vec3 boundary(float cos_half, float r, float z)
@@ -209,8 +211,7 @@ float boundary_at(float cos_half, float k, float r, float z)
     float last = float(textureSize(reflectances, 0).y - 2);
     float y = clamp((k - wavenumbers.x) / (wavenumbers.y - wavenumbers.x), 0.0, 1.0) * last;
     vec2 index = texelFetch(reflectances, ivec2(0, int(y + 0.5)), 0).yz;
-    float s = gentle_share(index, k, r, z);
-    return of_index(index, s) * second_order(s, k, r, z);
+    return of_index(index, gentle_share(index, k, r, z));
 }
 
 // A channel's reflectance is that of daylight, what is beside it that at the channel's mean.
@@ -225,8 +226,7 @@ vec3 boundary(float cos_half, float r, float z)
         float own = 0.0;
         for (int m = 0; m < 4; ++m) own += dot(tangent[m], tangent[m]);
         own *= 0.5 / (pair_one_plus_dot * pair_one_plus_dot);
-        float s = gentle_share(index, k, r, z);
-        found[n] = mean_power(tangent, gentle, s) * second_order(s, k, r, z) / max(own, 1e-20);
+        found[n] = mean_power(tangent, gentle, gentle_share(index, k, r, z)) / max(own, 1e-20);
     }
     return found * reflectance(cos_half);
 }
@@ -234,9 +234,8 @@ vec3 boundary(float cos_half, float r, float z)
 #endif
 
 // What all wavelengths share, of directions above the structure.
-// uv: tangential part of their sum outside, in the patch's frame; there, back: transmittances of
-// a coat.
-void begin_pair(vec3 wi, vec3 wo, vec2 uv, vec2 there, vec2 back)
+// there, back: transmittances of a coat.
+void begin_pair(vec3 wi, vec3 wo, vec2 there, vec2 back)
 {
     vec3 sum = wi + wo;
     pair_one_plus_dot = max(0.5 * dot(sum, sum), 1e-12);
@@ -263,7 +262,6 @@ void begin_pair(vec3 wi, vec3 wo, vec2 uv, vec2 there, vec2 back)
     inverse = inversesqrt(lengths.x) * inversesqrt(lengths.y);
     vec4 turned = vec4(turns.y * turns.x, turns.y * across, -across * turns.x, -across * across);
     pair_turns = found ? turned * inverse : vec4(pair_dot, 0.0, pair_cross, 0.0);
-    begin_second_order(vec3(pair_cosines, pair_dot), uv);
     of_material();
 }
 

@@ -1,5 +1,7 @@
-// The patch's frame, and what is left for what lies beneath.
+// A surface's own constants, the patch's frame, and what is left for what lies beneath.
 
+uniform float area_factor;        // 4πσ², that is 4π²σ⁴ over the window's area πσ²
+uniform float height_scale;
 uniform float diffuse_weight;     // of layering `thesis`
 
 vec2 in_patch(vec3 direction, vec2 rotation)

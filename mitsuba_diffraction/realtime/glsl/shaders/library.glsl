@@ -2,9 +2,6 @@
 
 const float PI = 3.14159265358979;
 
-uniform float area_factor;        // 4πσ², that is 4π²σ⁴ over the window's area πσ²
-uniform float height_scale;
-
 // Number i of a list, which lies in rows of PAGE = 2^PAGE_BITS texels.
 vec4 entry(sampler2D list, int i)
 {

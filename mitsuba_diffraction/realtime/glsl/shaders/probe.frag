@@ -9,12 +9,15 @@ out vec4 fragment;
 
 void main()
 {
-    vec4 place = texelFetch(places, ivec2(gl_FragCoord.xy), 0);
 #ifdef PAIRED
     ivec2 column = ivec2(gl_FragCoord.x, 0);
     vec3 wi = texelFetch(directions, column, 0).xyz;
-    vec3 wo = texelFetch(directions, column + ivec2(0, 1), 0).xyz;
-    begin_pair(wi, wo, place.xy, vec2(1.0), vec2(1.0));
+    begin_pair(wi, texelFetch(directions, column + ivec2(0, 1), 0).xyz, vec2(1.0),
+               vec2(1.0));
+#ifdef SECOND_ORDER
+    begin_second_order();
 #endif
+#endif
+    vec4 place = texelFetch(places, ivec2(gl_FragCoord.xy), 0);
     fragment = vec4(diffracted(place.xy, place.z, place.w, 0), 1.0);
 }
