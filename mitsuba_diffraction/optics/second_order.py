@@ -31,6 +31,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import map_coordinates
@@ -241,14 +242,15 @@ class Slopes:
         """Those of heights (ny, nx) in µm; weight : of points, in the variances."""
         surface = np.asarray(heights, np.float64)
         qx, qy = (_frequencies(n, d) for n, d in zip(surface.shape[::-1], pixel_size, strict=True))
-        squares = qx**2 + qy[:, None] ** 2
-        spectrum = np.fft.rfft2(surface)
-        half = spectrum.shape[1]
-        kept = 1.0 / (1.0 + squares[:, :half] / SLOPE_CUTOFF**2)
-        waves = 1j * qx[:half], 1j * qy[:, None]
-        raw = [np.fft.irfft2(wave * spectrum, s=surface.shape) for wave in waves]
-        x, y = (np.fft.irfft2(wave * kept * spectrum, s=surface.shape) for wave in waves)
-        every = float(np.mean((raw[0] ** 2 + raw[1] ** 2) * weight))
+        spectrum = scipy.fft.rfft2(surface)
+        qx, qy = qx[: spectrum.shape[1]], qy[:, None]
+
+        def slope(q: Real) -> Real:
+            return np.asarray(scipy.fft.irfft2(1j * q * spectrum, surface.shape, overwrite_x=True))
+
+        every = sum(float(np.mean(slope(q) ** 2 * weight)) for q in (qx, qy))
+        spectrum /= 1.0 + (qx**2 + qy**2) / SLOPE_CUTOFF**2
+        x, y = slope(qx), slope(qy)
         left = float(np.mean((x**2 + y**2) * weight)) / every if every > 0.0 else 1.0
         return cls(np.stack([x * x, x * y, y * y]), left**2 / (left**2 + _HALF**2))
 
