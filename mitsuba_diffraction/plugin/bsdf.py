@@ -486,6 +486,11 @@ class Diffraction(mi.BSDF):
         return f"{self.boundary}, second order" if self._second_order else str(self.boundary)
 
     @property
+    def second_order_index(self) -> float | None:
+        """Index that the second order of small slope is for; None without it."""
+        return None if self._second_order is None else self._second_order.index
+
+    @property
     def only_traced(self) -> str | None:
         """What it has that only the path tracer shows."""
         if self.places is not None:
@@ -494,8 +499,6 @@ class Diffraction(mi.BSDF):
             return "light that goes through"
         if isinstance(self.fresnel, UnderFilm):
             return "a thin film"
-        if self._second_order is not None:
-            return "second_order=true"
         return "a height_scale that varies" if self._varying else None
 
     @property
@@ -588,7 +591,8 @@ class Diffraction(mi.BSDF):
             power = self.power.power(pair, scale, si)
         if self._second_order is not None:
             # order 0 keeps its power, and others where a mirror's lobe, its most, outshines them
-            others = dr.maximum(power - self.power.flat(pair, si), 0.0)
+            mirror = dr.abs(self.power.flat(pair, si))
+            others = power - dr.clip(power, -mirror, mirror)  # colours may be negative
             added = self._second_order.added(pair, scale, wavenumbers)
             power = power + others * mi.UnpolarizedSpectrum(added)
         factor = boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)

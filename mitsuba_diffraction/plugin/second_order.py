@@ -72,10 +72,14 @@ class SecondOrder:
     material : what the surface is of.
     boundary : its model, which says how much of small slope an order has.
     ratios : r of its heights.
+
+    Attributes
+    ----------
+    index : that c is for, to `INDEX_STEP`.
     """
 
     def __init__(self, material: Dielectric, boundary: SmallSlope, ratios: SlopeRatios) -> None:
-        self._material, self._boundary, self._index = material, boundary, math.nan
+        self._material, self._boundary, self.index = material, boundary, math.nan
         self._cell, self._orders, self._middle = ratios.cell, ratios.orders, ratios.middle
         self._first = ratios.kappa[0]
         self._per_kappa = (len(ratios.values) - 1) / (ratios.kappa[1] - ratios.kappa[0])
@@ -86,10 +90,10 @@ class SecondOrder:
     def update(self) -> None:
         """Take another index of the material, to `INDEX_STEP`."""
         index = float(dr.slice(dr.detach(self._material.eta)))
-        index = max(1, round(index / INDEX_STEP)) * INDEX_STEP
-        if index != self._index:
-            self._index = index
-            self._coefficients = _Grid(coefficient_table(round(index, 6)), mi.Float16)
+        index = round(max(1, round(index / INDEX_STEP)) * INDEX_STEP, 6)
+        if index != self.index:
+            self.index = index
+            self._coefficients = _Grid(coefficient_table(index), mi.Float16)
 
     def added(self, pair: Pair, height_scale: Float, wavenumbers: list[Float]) -> list[Float]:
         """|1 + s (c_l r_l + c_t r_t)|² − 1 for each channel."""

@@ -205,6 +205,8 @@ def test_a_table_without_it_is_refused_with_what_makes_one(variant, tmp_path):
     assert brdf_values(from_file, *light) == pytest.approx(
         brdf_values(load(), *light), rel=1e-3, abs=1e-6
     )
+    without = load(str(tmp_path / "with.exr"), second_order=False, **asked)
+    assert (without.second_order_index, from_file.second_order_index) == (None, 1.56)
 
 
 def test_a_recorded_function_keeps_it(variant):
