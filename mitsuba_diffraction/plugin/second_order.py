@@ -116,9 +116,9 @@ class SecondOrder:
         )
         turn = -dot * dr.rsqrt(dr.maximum(squares, 1e-20))
         cosines = (pair.cos_i, pair.cos_o, turn)
-        roots = [dr.sqrt(1.0 - dr.clip(cosine, -_NORMAL, _NORMAL)) for cosine in cosines]
-        per = NODES - 1
-        return [roots[0] * per, roots[1] * per, roots[2] * (per*0.70710678)]
+        angles = [dr.acos(dr.clip(cosine, -_NORMAL, _NORMAL)) for cosine in cosines]
+        per = (NODES - 1) / math.pi
+        return [angles[0] * (2.0 * per), angles[1] * (2.0 * per), angles[2] * per]
 
     def _place(self, pair: Pair, height_scale: Float, k: Float) -> list[Float]:
         """κ, q_y and q_x, in nodes."""

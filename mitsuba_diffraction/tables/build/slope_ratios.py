@@ -23,6 +23,8 @@ from .describe import sections
 
 #: Width of a cell, nodes of κ and the first of them, in units of `q_limit`.
 CELL, STEP, FIRST = 1 / 14, 1 / 4, 1 / 24
+#: Nodes of κ where a cell is one order, whose r has poles in κ.
+STEP_OF_ORDERS = 1 / 12
 #: Between transforms, at most this in units of 1/RMS height: r κ is straight there, as r goes with
 #: 1/κ where κ is small. What powers are multiplied by changes by less than 0.3 % on average.
 BETWEEN = 0.8
@@ -42,13 +44,13 @@ def slope_ratios(patches: Sequence[HeightField], settings: TableSettings) -> Slo
     reach = tuple(min(q, q_limit) for q in settings.q_max or (q_limit, q_limit))
     first, last = q_limit * FIRST, q_limit * settings.height_scale_max
     last = max(2.0 * first, min(last, settings.kappa_max or last))
-    nodes = np.linspace(first, last, 2 + math.floor((last - first) / (q_limit * STEP)))
     spacing = [2.0 * np.pi / length for length in next(sections(patches))[0].extent]
     few = [step >= 0.5 * CELL * q_limit for step in spacing]
     cell = [step if own else CELL * q_limit for own, step in zip(few, spacing, strict=True)]
     middle = [math.ceil(q / width) + 1 for q, width in zip(reach, cell, strict=True)]
+    step = q_limit * (STEP_OF_ORDERS if any(few) else STEP)
+    nodes = np.linspace(first, last, 2 + math.floor((last - first) / step))
     count = 2 + math.floor((last - first) * max(p.rms_height for p in patches) / BETWEEN)
-    # r of single orders has poles in κ
     summed = nodes if any(few) else np.linspace(first, last, min(count, len(nodes)))
     sums, gate = _sums(patches, summed, reach, cell, middle)
     power = sums[:, :1].real
