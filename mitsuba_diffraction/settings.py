@@ -109,10 +109,10 @@ def _windows(value: Any) -> str | float | None:
     return "auto" if value == "auto" else _between(0.0, math.inf)(value)
 
 
-def _asked(value: Any) -> bool | None:
+def _flag(value: Any) -> bool | None:
     if value is not None and not isinstance(value, bool):
         raise ValueError
-    return value or None
+    return value
 
 
 def _choices(*names: str) -> dict[str, Any]:
@@ -140,7 +140,8 @@ class TableSettings:
     kappa_max : largest k·w·height_scale that is, rad/µm; None likewise.
     windows : width in µm of the overlapping windows that a wide scan is cut into, whose powers are
         averaged (`tables.build.windows`); "auto" for twice the coherence width; None for the whole.
-    second_order : True for what tells hills from pits as well (`tables.build.slope_ratios`).
+    second_order : whether to tabulate what tells hills from pits as well
+        (`tables.build.slope_ratios`); None for True in an ensemble, but for basis "taylor".
 
     Raises
     ------
@@ -189,13 +190,16 @@ class TableSettings:
     )  # fmt: skip
 
     second_order: bool | None = _setting(
-        None, _asked, "the second order of small slope, or what it needs", "true or false",
-        text="false", type=bool,
+        None, _flag, "the second order of small slope, or what it needs", "true or false",
+        text="true for coherence ensemble, but for basis taylor", type=bool,
     )  # fmt: skip
 
     def __post_init__(self) -> None:
         for name in _BY_NAME:
             object.__setattr__(self, name, checked(name, getattr(self, name)))
+        if self.second_order is None:
+            wanted = not self.coherent and self.basis != "taylor"
+            object.__setattr__(self, "second_order", wanted)
 
     @property
     def coherent(self) -> bool:
@@ -203,9 +207,9 @@ class TableSettings:
         return self.coherence == "patch"
 
     def given(self) -> dict[str, Any]:
-        """The settings by name, without those that are None: as JSON has them."""
+        """The settings by name, without those that are None or false: as JSON has them."""
         values = ((name, getattr(self, name)) for name in _BY_NAME)
-        return {name: value for name, value in values if value is not None}
+        return {name: value for name, value in values if value not in (None, False)}
 
 
 _BY_NAME: dict[str, Field[Any]] = {item.name: item for item in fields(TableSettings)}

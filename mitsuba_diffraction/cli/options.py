@@ -194,7 +194,7 @@ def add_table(group: Group, names: Sequence[str] = _TABLE, **defaults: str) -> N
                 "type": whole_number(1) if item.type is int else item.type,
             }
         if item.type is bool:
-            kind = {"action": "store_true", "default": None}
+            kind = {"action": argparse.BooleanOptionalAction}
         if isinstance(item.metavar, tuple):
             kind["nargs"] = len(item.metavar)
         default = defaults.get(name, item.default_text)

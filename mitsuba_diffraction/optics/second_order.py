@@ -31,6 +31,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import RegularGridInterpolator
 from scipy.ndimage import map_coordinates
@@ -72,24 +73,12 @@ def axes(vector: Complex, index: complex) -> Complex:
     slanted = length > 1e-12
     safe = np.where(slanted, length, 1.0)
     sine, cosine = np.where(slanted, -y / safe, 0.0), np.where(slanted, x / safe, 1.0)
-    s = np.stack([sine, cosine, np.zeros_like(x)], axis=-1).astype(complex)
-    return np.stack([s, np.cross(vector / index, s)])
-
-
-def fluxes(tests: Complex, to: Complex, fields: Complex, waves: Complex) -> Complex:
-    """(κ+κ')·(e×(κ'×e') − e'×(κ×e)) of test waves κ' and waves κ, (..., 2, 2): tests first.
-
-    tests, fields : (2, ..., 3) their s and p fields; to, waves : (..., 3); all of them broadcast.
-    """
-    total = waves + to
-    found = [
-        np.sum(
-            total * (np.cross(e, np.cross(to, e_test)) - np.cross(e_test, np.cross(waves, e))), -1
-        )
-        for e_test in tests
-        for e in fields
-    ]
-    return np.stack(found, axis=-1).reshape(*found[0].shape, 2, 2)
+    fields = np.zeros((2, *vector.shape), complex)
+    fields[0, ..., 0], fields[0, ..., 1] = sine, cosine
+    z = vector[..., 2] / index
+    fields[1, ..., 0], fields[1, ..., 1] = -z * cosine, z * sine
+    fields[1, ..., 2] = (x * cosine - y * sine) / index
+    return fields
 
 
 class Perturbation:
@@ -97,6 +86,8 @@ class Perturbation:
 
     They solve ∫ (E×H' − E'×H)·n dS = 0 for waves above the surface and test waves that go down in
     the material (Brown, Celli, Haller and Marvin 1984, Surface Science 136, 381), order by order.
+    Of plane waves the integrand is (κ+κ')·(e×(κ'×e') − e'×(κ×e)) = (n² − 1) e·e', fields being
+    transverse.
 
     Parameters
     ----------
@@ -138,10 +129,13 @@ class Perturbation:
         return np.asarray(gamma * np.linalg.inv(flux))
 
     def _against(self, k: Real, wave: Complex) -> tuple[Complex, Complex]:
-        """`fluxes` between test waves −k that go down in the material and waves; κ_z + κ'_z."""
+        """What test waves −k that go down in the material have of waves; κ_z + κ'_z."""
         to = _wave(k, self._index) * [-1, -1, -1]
-        found = fluxes(axes(to, self._index), to, axes(wave, 1.0), wave)
-        return found, (wave + to)[..., 2, None, None]
+        tests, fields = axes(to, self._index), axes(wave, 1.0)
+        products = [np.einsum("...i,...i", one, e) for one in tests for e in fields]
+        found = np.stack(products, axis=-1)
+        flux = (self._index**2 - 1.0) * found.reshape(*found.shape[:-1], 2, 2)
+        return flux, (wave + to)[..., 2, None, None]
 
 
 def _wave(tangential: Real, index: complex) -> Complex:
@@ -248,14 +242,15 @@ class Slopes:
         """Those of heights (ny, nx) in µm; weight : of points, in the variances."""
         surface = np.asarray(heights, np.float64)
         qx, qy = (_frequencies(n, d) for n, d in zip(surface.shape[::-1], pixel_size, strict=True))
-        squares = qx**2 + qy[:, None] ** 2
-        spectrum = np.fft.rfft2(surface)
-        half = spectrum.shape[1]
-        kept = 1.0 / (1.0 + squares[:, :half] / SLOPE_CUTOFF**2)
-        waves = 1j * qx[:half], 1j * qy[:, None]
-        raw = [np.fft.irfft2(wave * spectrum, s=surface.shape) for wave in waves]
-        x, y = (np.fft.irfft2(wave * kept * spectrum, s=surface.shape) for wave in waves)
-        every = float(np.mean((raw[0] ** 2 + raw[1] ** 2) * weight))
+        spectrum = scipy.fft.rfft2(surface)
+        qx, qy = qx[: spectrum.shape[1]], qy[:, None]
+
+        def slope(q: Real) -> Real:
+            return np.asarray(scipy.fft.irfft2(1j * q * spectrum, surface.shape, overwrite_x=True))
+
+        every = sum(float(np.mean(slope(q) ** 2 * weight)) for q in (qx, qy))
+        spectrum /= 1.0 + (qx**2 + qy**2) / SLOPE_CUTOFF**2
+        x, y = slope(qx), slope(qy)
         left = float(np.mean((x**2 + y**2) * weight)) / every if every > 0.0 else 1.0
         return cls(np.stack([x * x, x * y, y * y]), left**2 / (left**2 + _HALF**2))
 

@@ -120,14 +120,17 @@ model : string [small_slope]
     where the surface is rough at the scale of an order; polarised variants have its Mueller
     matrices. `kirchhoff`: the tangent plane, also the default of material `none`, which has no
     index, and of layering `thesis`.
-second_order : boolean [false]
+second_order : boolean [true where it can be]
     Multiplies orders by what light diffracted twice makes of them (Voronovich 1994, the second
     order of small slope as a factor of directions and of the heights' slopes). Of light from 60° it
     takes the error of colours on a CD's pits from a third to a tenth, on scales by a tenth to a
-    quarter, at normal incidence nothing (docs/validation.md). For unpolarised light that a bare
-    dielectric reflects, in ensembles; a table must hold what it takes (`precompute
-    --second-order`). Order 0, the directions drawn and the light that goes on to what lies beneath
-    are as without it. Coefficients follow the index in steps of 0.01.
+    quarter, at normal incidence nothing (docs/validation.md). It can be where a dielectric denser
+    than what is above it reflects, bare or under a coat, by model `small_slope`, in an ensemble,
+    and the table holds what it takes, as tables of ensembles do unless told not to (`precompute
+    --no-second-order`); not of light that goes through, films or layering `thesis`. Polarised
+    variants multiply matrices by the factor of unpolarised light. Order 0, the directions drawn and
+    the light that goes on to what lies beneath are as without it. Coefficients follow the index in
+    steps of 0.01. `true` elsewhere is refused, `false` leaves it out.
 energy_conserving : boolean [true]
     Where the model reflects more than it gets, multiplies it by s(ωi) s(ωo), a scale of directions
     found for this table, model, material and each wavelength, so that no more is reflected than
@@ -483,6 +486,11 @@ class Diffraction(mi.BSDF):
         return f"{self.boundary}, second order" if self._second_order else str(self.boundary)
 
     @property
+    def second_order_index(self) -> float | None:
+        """Index that the second order of small slope is for; None without it."""
+        return None if self._second_order is None else self._second_order.index
+
+    @property
     def only_traced(self) -> str | None:
         """What it has that only the path tracer shows."""
         if self.places is not None:
@@ -491,8 +499,6 @@ class Diffraction(mi.BSDF):
             return "light that goes through"
         if isinstance(self.fresnel, UnderFilm):
             return "a thin film"
-        if self._second_order is not None:
-            return "second_order=true"
         return "a height_scale that varies" if self._varying else None
 
     @property
@@ -584,9 +590,11 @@ class Diffraction(mi.BSDF):
         if power is None:
             power = self.power.power(pair, scale, si)
         if self._second_order is not None:
+            # order 0 keeps its power, and others where a mirror's lobe, its most, outshines them
+            mirror = dr.abs(self.power.flat(pair, si))
+            others = power - dr.clip(power, -mirror, mirror)  # colours may be negative
             added = self._second_order.added(pair, scale, wavenumbers)
-            orders = power - self.power.zeroth(pair, scale, si)  # order 0 keeps its power
-            power = power + orders * mi.UnpolarizedSpectrum(added)
+            power = power + others * mi.UnpolarizedSpectrum(added)
         factor = boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)
         power = outside * power
         if self._energy is not None and self._energy.takes:

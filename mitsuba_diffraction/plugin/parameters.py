@@ -158,7 +158,7 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     medium = coat or passing
     optical = 1.0 if medium is None else float(dr.slice(medium.eta))
     largest = height_scale.high if isinstance(height_scale, VaryingHeightScale) else height_scale
-    table, heights = _table(props, largest * optical, provider)
+    table, heights = _table(props, largest * optical, provider, second is not None)
     wavelength = _wavelength(props, table)
     reflectance = under_film(props, material, wavelength, table.wavelength_range[0])
     if nested is not None and isinstance(reflectance, UnderFilm) and reflectance.numbers()[0].imag:
@@ -172,8 +172,9 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     warn_of_film(reflectance, table, largest)
     boundary = boundary_of(props, reflectance, table)
     second_order = None
-    if second is not None and isinstance(boundary, SmallSlope):
-        second_order = SecondOrder(second, boundary, _ratios(table))
+    ratios = None if second is None else _ratios(table, "second_order" in props)
+    if second is not None and ratios is not None and isinstance(boundary, SmallSlope):
+        second_order = SecondOrder(second, boundary, ratios)
     conserving, through = flag(props, "energy_conserving", True), None
     places = _places(props, table)
     if passing is not None:
@@ -201,13 +202,14 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     )
 
 
-def _ratios(table: DiffractionTable) -> SlopeRatios:
-    if table.grid.coherent or table.slope_ratios is None:
+def _ratios(table: DiffractionTable, asked: bool) -> SlopeRatios | None:
+    """What the second order takes, of ensembles; None of tables that do not hold it."""
+    if asked and (table.grid.coherent or table.slope_ratios is None):
         raise DiffractionError(
             "second_order=true needs a table of coherence='ensemble' that holds what it needs: "
-            "'mitsuba-diffraction precompute --second-order'"
+            "'mitsuba-diffraction precompute' without '--no-second-order'"
         )
-    return table.slope_ratios
+    return None if table.grid.coherent else table.slope_ratios
 
 
 def _height_scale(props: Properties) -> float | VaryingHeightScale:
@@ -224,7 +226,7 @@ def _height_scale(props: Properties) -> float | VaryingHeightScale:
 
 
 def _table(
-    props: Properties, height_scale: float, provider: TableProvider
+    props: Properties, height_scale: float, provider: TableProvider, second_order: bool
 ) -> tuple[DiffractionTable, Callable[[], HeightField]]:
     given = [name for name in SOURCES if name in props]
     if len(given) != 1:
@@ -234,6 +236,8 @@ def _table(
     given_settings = {name: props.get(name) for name in SCENE_SETTINGS if name in props}
     if _on_surface(props):
         given_settings["coherence"] = "patch"
+    if not second_order:
+        given_settings["second_order"] = False  # not to be built for nothing
     if is_auto(given_settings.get("coherence_width", 0.0)):
         del given_settings["coherence_width"]
     asked = {name: checked(name, value) for name, value in given_settings.items()}

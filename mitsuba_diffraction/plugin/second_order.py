@@ -31,30 +31,33 @@ _NORMAL = 1.0 - 1e-7
 
 
 def material_of_second_order(props: Properties, material: Reflectance) -> Dielectric | None:
-    """The material, if it is asked for.
+    """The material, unless it is not for it, or it is not wanted.
 
     Raises
     ------
     DiffractionError
-        If it is, of what it is not for.
+        If it is asked for, of what it is not for.
     """
-    if not flag(props, "second_order", False):
-        return None
-    bare = material if isinstance(material, Dielectric) else None
+    wanted = flag(props, "second_order", True)
+    dielectric = material if isinstance(material, Dielectric) else None
     defaults = {"model": MODELS[0], "coherence": COHERENCES[0], "layering": LAYERINGS[0]}
     excluded = [
-        *([f"the material '{material}'"] if bare is None else []),
+        *([f"the material '{material}'"] if dielectric is None else []),
         *(f"{name}={props.get(name)}" for name in defaults if _differs(props, name, defaults)),
-        *(name for name in ("coat_ior", "film_ior") if name in props),
+        *(["film_ior"] if "film_ior" in props else []),
         *(f"{name}=true" for name in ("thin", "transmission") if flag(props, name, False)),
-        *([f"the polarised variant {mi.variant()}"] if mi.is_polarized else []),
+        *(["an index below that of the medium above"] if _is_below(dielectric) else []),
     ]
-    if excluded:
+    if excluded and wanted and "second_order" in props:
         raise DiffractionError(
-            "second_order=true is for unpolarised light that a bare dielectric reflects, by "
-            f"model='small_slope' and coherence='ensemble', not for {excluded[0]}; leave one out"
+            "second_order=true is for light that a dielectric reflects, by model='small_slope' and "
+            f"coherence='ensemble', not for {excluded[0]}; leave one out"
         )
-    return bare
+    return dielectric if wanted and not excluded else None
+
+
+def _is_below(dielectric: Dielectric | None) -> bool:
+    return dielectric is not None and float(dr.slice(dielectric.eta)) < 1.0
 
 
 def _differs(props: Properties, name: str, defaults: dict[str, str]) -> bool:
@@ -69,10 +72,14 @@ class SecondOrder:
     material : what the surface is of.
     boundary : its model, which says how much of small slope an order has.
     ratios : r of its heights.
+
+    Attributes
+    ----------
+    index : that c is for, to `INDEX_STEP`.
     """
 
     def __init__(self, material: Dielectric, boundary: SmallSlope, ratios: SlopeRatios) -> None:
-        self._material, self._boundary, self._index = material, boundary, math.nan
+        self._material, self._boundary, self.index = material, boundary, math.nan
         self._cell, self._orders, self._middle = ratios.cell, ratios.orders, ratios.middle
         self._first = ratios.kappa[0]
         self._per_kappa = (len(ratios.values) - 1) / (ratios.kappa[1] - ratios.kappa[0])
@@ -83,10 +90,10 @@ class SecondOrder:
     def update(self) -> None:
         """Take another index of the material, to `INDEX_STEP`."""
         index = float(dr.slice(dr.detach(self._material.eta)))
-        index = max(1, round(index / INDEX_STEP)) * INDEX_STEP
-        if index != self._index:
-            self._index = index
-            self._coefficients = _Grid(coefficient_table(round(index, 6)), mi.Float)
+        index = round(max(1, round(index / INDEX_STEP)) * INDEX_STEP, 6)
+        if index != self.index:
+            self.index = index
+            self._coefficients = _Grid(coefficient_table(index), mi.Float16)
 
     def added(self, pair: Pair, height_scale: Float, wavenumbers: list[Float]) -> list[Float]:
         """|1 + s (c_l r_l + c_t r_t)|² − 1 for each channel."""

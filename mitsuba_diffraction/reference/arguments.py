@@ -73,21 +73,17 @@ def index_of(
     return Filmed(index, layer, wavenumber(wavelength) * thickness * 1e-3)
 
 
-def bare_dielectric(
-    model: str,
-    coherence: str,
-    index: NDArray[np.complex128] | Filmed | None,
-    coat: float | None,
-) -> NDArray[np.float64]:
-    """The real index (n,) of what the second order is for."""
-    if model != "small_slope" or coherence != "ensemble" or coat is not None:
+def require_dielectric(
+    model: str, coherence: str, index: NDArray[np.complex128] | Filmed | None
+) -> None:
+    """Refuse what the second order is not for."""
+    if model != "small_slope" or coherence != "ensemble":
         raise DiffractionError(
-            "second_order=True is for model='small_slope', coherence='ensemble' and no coat; got "
-            f"model='{model}', coherence='{coherence}', coat={coat}"
+            "second_order=True is for model='small_slope' and coherence='ensemble'; got "
+            f"model='{model}', coherence='{coherence}'"
         )
     if not isinstance(index, np.ndarray) or np.any(index.imag > 0.0):
-        raise DiffractionError("second_order=True is for bare dielectrics: leave k and film out")
-    return np.asarray(index.real)
+        raise DiffractionError("second_order=True is for dielectrics: leave k and film out")
 
 
 def _complex(eta: ArrayLike, k: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.complex128]:

@@ -18,7 +18,7 @@ from ..optics.fresnel import Filmed, Index
 from ..optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
 from ..optics.mean_second_order import mean_gain
 from ..settings import checked
-from .arguments import bare_dielectric, directions_of, index_of, places_of, width_of
+from .arguments import directions_of, index_of, places_of, require_dielectric, width_of
 from .integral import screen_power, window_power
 from .second_order import second_order_power
 
@@ -63,7 +63,8 @@ def brdf(
         coherent with the surface (`optics.fresnel.Filmed`); it needs eta, and no coat. Small slope
         has the mean of the second order then (`optics.mean_second_order`).
     second_order : whether to multiply orders by the second order of small slope
-        (`optics.second_order`): of a bare dielectric, by model "small_slope", in an ensemble.
+        (`optics.second_order`): of a dielectric, bare or under a coat, by model "small_slope", in
+        an ensemble.
 
     Raises
     ------
@@ -76,13 +77,10 @@ def brdf(
     window = sigma_of(width), coherence, places_of(coherence, place, len(light[2]))
     index = index_of(model, eta, k, light[2], film)
     if second_order:
-        dielectric = bare_dielectric(model, coherence, index, coat)
-        share = _share(field, *_lit(*light[:2]), light[2], dielectric)
-        power = second_order_power(field, light, sigma_of(width), dielectric, share)
-        jones = blend.jones(*_lit(*light[:2]), dielectric, share)
-        return _order_factor(*light, sigma_of(width)) * power * boundary.unpolarised(jones)
+        require_dielectric(model, coherence, index)
     if index is not None:
-        return _measured(boundary.unpolarised, field, light, model, index, coat, window)
+        made = model, index, coat, second_order
+        return _measured(boundary.unpolarised, field, light, made, window)
     if coat is not None:
         raise DiffractionError(f"coat={coat} needs an index beneath it: give eta (and k)")
     power = window_power(field, *light, *window)
@@ -103,6 +101,7 @@ def mueller(
     model: str = "small_slope",
     coat: float | None = None,
     film: tuple[complex, float] | None = None,
+    second_order: bool = False,
 ) -> NDArray[np.float64]:
     """Mueller matrices of the BRDF, in 1/sr, shape (n, 4, 4); arguments and errors as `brdf`.
 
@@ -115,7 +114,9 @@ def mueller(
     index = index_of(model, eta, k, light[2], film)
     if index is None:
         raise DiffractionError("polarisation needs an index: give eta (and k of a conductor)")
-    return _measured(boundary.mueller, field, light, model, index, coat, window)
+    if second_order:
+        require_dielectric(model, coherence, index)
+    return _measured(boundary.mueller, field, light, (model, index, coat, second_order), window)
 
 
 def btdf(
@@ -176,16 +177,15 @@ def _measured(
     measure: Callable[[NDArray[np.complex128]], NDArray[np.float64]],
     field: HeightField,
     light: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    model: str,
-    index: NDArray[np.complex128] | Filmed,
-    coat: float | None,
+    made: tuple[str, NDArray[np.complex128] | Filmed, float | None, bool],
     window: tuple[float, str, NDArray[np.float64] | None],
 ) -> NDArray[np.float64]:
     """The BRDF as a measure of its Jones matrices; under a coat, that of its face too.
 
-    light : wi, wo, wavelength; window : sigma, coherence, places.
+    light : wi, wo, wavelength; made : model, index, coat, second order; window : sigma, coherence,
+    places.
     """
-    sigma = window[0]
+    sigma, (model, index, coat, second) = window[0], made
 
     def weighed(factor: NDArray[np.float64], jones: NDArray[np.complex128]) -> NDArray[np.float64]:
         found = measure(jones)
@@ -193,7 +193,7 @@ def _measured(
 
     wi, wo, wavelength = light
     if coat is None:
-        power = window_power(field, *light, *window)
+        power = _power(field, light, index, window, second)
         return weighed(_order_factor(*light, sigma) * power, _jones(field, *light, model, index))
     if isinstance(index, Filmed):
         raise DiffractionError(f"coat={coat} and a film exclude each other: leave one of them out")
@@ -202,13 +202,27 @@ def _measured(
     below, above = refracted(wi, coat), refracted(wo, coat)
     below, above = (np.where(w[:, 2:] > 0, r, -r) for w, r in ((wi, below), (wo, above)))
     inside = below, above, wavelength / coat
-    power = window_power(field, *inside, *window) / coat**2
+    power = _power(field, inside, index / coat, window, second) / coat**2
     lit = _lit(wi, wo)
     jones = transmitted(_jones(field, *inside, model, index / coat), *lit, coat, index / coat)
     structure = weighed(_order_factor(*inside, sigma) * power, jones)
     flat = np.exp(-((sigma * wavenumber(wavelength)) ** 2) * np.sum((wi + wo)[:, :2] ** 2, axis=1))
     face = _order_factor(*light, sigma) * 4 * np.pi**2 * sigma**4 * flat
     return structure + weighed(face, boundary.kirchhoff(*lit, coat))
+
+
+def _power(
+    field: HeightField,
+    light: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    index: NDArray[np.complex128] | Filmed,
+    window: tuple[float, str, NDArray[np.float64] | None],
+    second: bool,
+) -> NDArray[np.float64]:
+    """⟨|P|²⟩, with the second order if there is one."""
+    if not second or isinstance(index, Filmed):
+        return window_power(field, *light, *window)
+    share = _share(field, *_lit(*light[:2]), light[2], index)
+    return second_order_power(field, light, window[0], index.real, share)
 
 
 def _lit(

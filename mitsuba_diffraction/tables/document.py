@@ -199,7 +199,8 @@ def _check_agreement(table: DiffractionTable, whole: bool) -> None:
 
 def _settings(fields: Mapping[str, Any]) -> TableSettings:
     _names(fields, fields, _REQUIRED)
-    return TableSettings(**{name: fields[name] for name in _SETTINGS if name in fields})
+    given = {name: fields[name] for name in _SETTINGS if name in fields}
+    return TableSettings(**{"second_order": False, **given})
 
 
 def _expansion(fields: Mapping[str, Any]) -> Expansion:

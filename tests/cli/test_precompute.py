@@ -40,6 +40,19 @@ def test_options_reach_the_table(run, heights, here):
     assert table.height_scale_max == 2
 
 
+def test_the_second_order_is_held_unless_the_recipe_or_the_options_say_no(run, recipe, here):
+    text = recipe.read_text()
+    for line, options, held in (
+        ("", [], True),
+        ("", ["--no-second-order"], False),
+        ("second_order = false", [], False),
+        ("second_order = false", ["--second-order"], True),
+    ):
+        recipe.write_text(f"{text}\n{line}")
+        assert run("precompute", recipe, "-o", "out.exr", *options).code == 0
+        assert (DiffractionTable.load("out.exr").slope_ratios is not None) == held
+
+
 def test_the_report_says_size_terms_taps_error_and_cost(run, heights, here):
     ran = run("precompute", heights, *QUICK)
     assert ran.code == 0

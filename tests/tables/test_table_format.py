@@ -112,8 +112,7 @@ def test_the_plugin_takes_what_the_page_s_writer_wrote(examples, some_variant):
 
 def test_the_page_describes_every_field(tmp_path):
     file = tmp_path / "table.exr"
-    settings = KINDS["restricted"] | {"second_order": True}  # what is optional, too
-    DiffractionTable.build(PATCH, coherence_width=1.8, **settings).save(file)
+    DiffractionTable.build(PATCH, coherence_width=1.8, **KINDS["restricted"]).save(file)
     document = read_document(file)
     coarse = document["coarse"]
     rows = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \|", PAGE, re.M)

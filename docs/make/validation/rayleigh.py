@@ -28,7 +28,7 @@ from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.optics.fresnel import decaying_root
 from mitsuba_diffraction.optics.geometry import wavenumber
-from mitsuba_diffraction.optics.second_order import axes, fluxes
+from mitsuba_diffraction.optics.second_order import axes
 
 from .crossed import HORIZON, Orders, is_crossed, lowest_orders
 
@@ -145,11 +145,27 @@ class Waves:
             waves[:, 2] + to[:, None, 2], columns[None, :, :] - self.orders[:, None, :]
         )
         # (rows, columns, 2, 2), in blocks of s and p
-        blocks = weight[..., None, None] * fluxes(
+        blocks = weight[..., None, None] * _fluxes(
             tests[:, :, None], to[:, None], fields[:, None], waves[None]
         )
         shape = 2 * len(to), 2 * len(waves)
         return np.asarray(blocks.transpose(2, 0, 3, 1).reshape(shape))
+
+
+def _fluxes(tests: Complex, to: Complex, fields: Complex, waves: Complex) -> Complex:
+    """(κ+κ')·(e×(κ'×e') − e'×(κ×e)) of test waves κ' and waves κ, (..., 2, 2): tests first.
+
+    tests, fields : (2, ..., 3) their s and p fields; to, waves : (..., 3); all of them broadcast.
+    """
+    total = waves + to
+    found = [
+        np.sum(
+            total * (np.cross(e, np.cross(to, e_test)) - np.cross(e_test, np.cross(waves, e))), -1
+        )
+        for e_test in tests
+        for e in fields
+    ]
+    return np.stack(found, axis=-1).reshape(*found[0].shape, 2, 2)
 
 
 def _solved(matrix: Complex, right: Complex) -> Complex:

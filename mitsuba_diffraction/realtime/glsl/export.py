@@ -20,7 +20,7 @@ from ...tables.store import cached_colours
 from .maps import Map
 from .materials import Material, height_scale, pack_conservation, pack_surface
 from .packing import pack_colours, pack_powers, pack_responses
-from .source import global_names, renamed, resolved, shader_file
+from .source import global_names, pruned, renamed, resolved, shader_file
 from .texels import PAGE, Packed, Texture, plain
 
 #: Methods that other programs can have, and the functions that they become.
@@ -188,8 +188,9 @@ def _joined(common: Packed, tables: dict[str, Packed], surface: str) -> Shader:
     for packed in tables.values():
         definitions |= packed.definitions
     constants = [f"#define {name} {value}\n" for name, value in definitions.items() if value]
-    files = map(shader_file, ("library.glsl", "boundary.glsl", "layers.glsl"))
-    shared = "".join(constants) + resolved("\n".join(files), definitions)
+    twice = ["second_order.glsl"] if "SECOND_ORDER" in definitions else []
+    files = ["library.glsl", "boundary.glsl", "layers.glsl", *twice, "pair.glsl"]
+    shared = "".join(constants) + resolved("\n".join(map(shader_file, files)), definitions)
     names = global_names(shared)
     code = [renamed(shared, [(_PREFIX, names)])]
     found = _declared(common, _PREFIX, names)
@@ -206,7 +207,7 @@ def _joined(common: Packed, tables: dict[str, Packed], surface: str) -> Shader:
         version=version("mitsuba_diffraction"), surface=surface,
         functions="\n//   ".join(f"vec3 {name}(vec3 wi, vec3 wo)" for name in functions.values()),
     )  # fmt: skip
-    text = "\n".join([head, *code]) + _BENEATH
+    text = f"{head}\n" + pruned("".join(code) + _BENEATH, _PREFIX)
     return Shader(text, dict(found.uniforms), found.textures, functions, surface)
 
 

@@ -15,7 +15,13 @@ from ...optics.geometry import wavenumber
 from ...plugin.changing import children
 from ...tables.table import DiffractionTable
 from .maps import Map, Spectrum, axis_map, colour_map, evaluated, raw_picture
-from .packing import pack_beneath, pack_conductor, pack_energy, pack_roughness
+from .packing import (
+    pack_beneath,
+    pack_conductor,
+    pack_energy,
+    pack_roughness,
+    pack_second_order,
+)
 from .texels import Packed, Texture, Uniform, as_half
 
 _COSINES = 64
@@ -268,6 +274,9 @@ def pack_surface(material: Material) -> Packed:
         uniforms["channel_wavenumbers"] = tuple(wavenumber(RGB_WAVELENGTHS).tolist())
     if isinstance(bsdf.boundary, SmallSlope):
         packed |= pack_roughness(material.table.roughness)
+    ratios = material.table.slope_ratios
+    if bsdf.second_order_index is not None and ratios is not None:
+        packed |= pack_second_order(bsdf.second_order_index, ratios)
     return packed | _reflectance(surface)
 
 

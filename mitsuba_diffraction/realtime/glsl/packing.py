@@ -13,6 +13,7 @@ from ...optics.blend import NODES_PER_OCTAVE, RoughnessTable
 from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
 from ...optics.fresnel import reflectance
 from ...optics.geometry import wavenumber
+from ...optics.second_order import LIMIT, NODES, SlopeRatios, coefficient_table
 from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
 from ...tables.energy.conservation import FINE, DirectionalTable
@@ -261,3 +262,35 @@ def pack_roughness(roughness: RoughnessTable) -> Packed:
         },
         {"SMALL_SLOPE": "", "NODES_PER_OCTAVE": f"{NODES_PER_OCTAVE}.0"},
     )
+
+
+def pack_second_order(index: float, ratios: SlopeRatios) -> Packed:
+    """What light diffracted twice makes of orders, `optics.second_order`.
+
+    index : of a dielectric, over that of the medium above it.
+    """
+    first, last = ratios.kappa
+    count, _, rows, columns = ratios.values.shape
+    steps = [1.0 / width for width in ratios.cell] + [(count - 1) / (last - first)]
+    return Packed(
+        (
+            _paged("second_coefficients", coefficient_table(index)),
+            _paged("slope_ratios", np.moveaxis(ratios.values, 1, -1)),
+        ),
+        {
+            "ratio_size": (float(columns), float(rows), float(count)),
+            "ratio_steps": tuple(steps),
+            "ratio_zero": (*map(float, ratios.middle), -first * steps[2]),
+            "ratio_orders": tuple(map(float, ratios.orders)),
+        },
+        {
+            "SECOND_ORDER": "", "SECOND_ORDER_LIMIT": repr(LIMIT),
+            "COEFFICIENT_NODES": f"{NODES}.0",
+        },
+    )  # fmt: skip
+
+
+def _paged(name: str, values: NDArray[np.complexfloating]) -> Texture:
+    """Two complex numbers at nodes (pages, rows, columns, 2), page below page."""
+    floats = np.stack([values.real, values.imag], axis=-1).astype(np.float16)
+    return Texture(name, floats.reshape(-1, values.shape[2], 4), smooth=True)

@@ -89,6 +89,10 @@ def fragment_parts(
     if "SHADOWED" in constants:
         shared.append("shadow.glsl")
     shared.append("layers.glsl")
+    if "SECOND_ORDER" in constants:
+        shared.append("second_order.glsl")
+    if "DIFFRACTING" in constants:
+        shared.append("pair.glsl")
     if "GLOSS" in constants:
         shared.append("gloss.glsl")
     if "WEIGHTED" in constants or "LOOKED_UP" in constants:
@@ -190,6 +194,21 @@ def renamed(source: str, prefixes: Iterable[tuple[str, set[str]]]) -> str:
         code, mark, comment = line.partition("//")
         code = re.sub(r"(?<![.\w])[A-Za-z_]\w*", lambda m: new.get(m[0], m[0]), code)
         indent = (len(code) - len(code.lstrip(" "))) // 4
-        declared = mark + comment if code.startswith("uniform") else ""
-        lines.append("\t" * indent + f"{code.lstrip(' ')}{declared}".rstrip())
+        declared = f" {mark}{comment}" if code.startswith("uniform") and mark else ""
+        lines.append(("\t" * indent + code.strip(" ") + declared).rstrip())
     return re.sub(r"\n{3,}", "\n\n", "\n".join(lines))
+
+
+def pruned(source: str, prefix: str) -> str:
+    """A resolved source without functions, constants and macros of this prefix that none reads."""
+    body = r"\(.*\)(?: {.*}|\n{\n(?s:.*?)^})| = .*;"
+    of_type, macro = rf"(?:const )?{_TYPES} ({prefix}\w+)(?:{body})", rf"#define ({prefix}\w+) .*"
+    pattern = re.compile(rf"(?m)^(?:{of_type}|{macro})\n+")
+
+    def kept(found: re.Match[str]) -> str:
+        name = found[1] or found[2]
+        return found[0] if len(re.findall(rf"\b{name}\b", source)) > 1 else ""
+
+    while (shorter := pattern.sub(kept, source)) != source:
+        source = shorter
+    return source

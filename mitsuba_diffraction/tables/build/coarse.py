@@ -50,6 +50,7 @@ def coarse_table(
         tolerance=TOLERANCE,
         wavelength_range=settings.wavelength_range,
         height_scale_max=settings.height_scale_max,
+        second_order=False,
     )
     deepest = max(patches, key=lambda patch: patch.range)
     sigma = sigma_of(settings.coherence_width)

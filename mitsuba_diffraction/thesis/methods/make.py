@@ -92,7 +92,7 @@ def make_all(
         check_period(period)
     common: dict[str, Any] = {
         "coherence_width": coherence_width, "tolerance": tolerance, "height_scale_max": 1.0,
-        "wavelength_range": wavelength_range, "progress": progress,
+        "wavelength_range": wavelength_range, "progress": progress, "second_order": False,
     }  # fmt: skip
 
     @functools.cache  # methods share what they tabulate

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionTable
-from mitsuba_diffraction.optics import blend, boundary, fresnel
+from mitsuba_diffraction.optics import blend, boundary, fresnel, second_order
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.realtime.glsl.packing import (
@@ -18,23 +18,23 @@ from mitsuba_diffraction.realtime.glsl.packing import (
     pack_powers,
     pack_responses,
     pack_roughness,
+    pack_second_order,
 )
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from tests.directions import as_single, uniform_directions
 from tests.realtime.glsl.conftest import probed
-from tests.realtime.glsl.test_methods import DAYLIGHT, difference
+from tests.realtime.glsl.test_methods import DAYLIGHT, PERFECT, difference
 
 METAL = (np.array([360.0, 830.0]), np.array([1.4, 0.4]), np.array([2.0, 5.0]))
-MATERIALS = {
-    "dielectric": Packed(uniforms={"eta": 1.5}, definitions={"SURFACE_KIND": "1"}),
-    "conductor": pack_conductor(*METAL),
-}
+DIELECTRIC = Packed(uniforms={"eta": 1.5}, definitions={"SURFACE_KIND": "1"})
+MATERIALS = {"dielectric": DIELECTRIC, "twice": DIELECTRIC, "conductor": pack_conductor(*METAL)}
+HEIGHTS = 0.8  # their scale
 UNTINTED = Packed(uniforms={f"tint_{n}": tuple(np.eye(3)[n]) for n in range(3)})
 
 
 def index(kind: str, wavelength: NDArray[np.float64]) -> NDArray[np.complex128]:
-    if kind == "dielectric":
+    if kind != "conductor":
         return np.full(len(wavelength), 1.5 + 0j)
     lam, eta, k = METAL
     return np.interp(wavelength, lam, eta) + 1j * np.interp(wavelength, lam, k)
@@ -47,29 +47,62 @@ def pairs(n: int) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     wi[0], wo[1], wi[2] = (0, 0, 1), (0, 0, 1), wo[2]
     wi, wo = as_single(wi), as_single(wo)
     cos_half = np.sqrt(0.5 + 0.5 * np.sum(wi * wo, axis=1))
-    return wi, wo, np.concatenate([wi + wo, cos_half[:, None]], axis=1)
+    return wi, wo, np.concatenate([(wi + wo) * [1, 1, HEIGHTS], cos_half[:, None]], axis=1)
 
 
 def factor(
     table: DiffractionTable, kind: str, wi: NDArray[Any], wo: NDArray[Any], lam: NDArray[Any]
 ) -> NDArray[np.float64]:
     """N' / (1 + ωi·ωo)² at wavelengths (m,), shape (n, m)."""
-    total = wi + wo
-    k = wavenumber(lam)
-    q = np.hypot(total[:, 0], total[:, 1])[:, None] * k
-    s = blend.weight(total[:, 2:] * k, table.roughness.at(q), index(kind, lam))
+    s = share(table, kind, wi + wo, lam)
     jones = blend.jones(wi[:, None], wo[:, None], index(kind, lam), s)
     scale = 2 * wi[:, 2] * wo[:, 2] / (1 + np.sum(wi * wo, axis=1))
     return boundary.unpolarised(jones) * scale[:, None] ** 2
 
 
+def share(
+    table: DiffractionTable, kind: str, total: NDArray[Any], lam: NDArray[Any]
+) -> NDArray[np.float64]:
+    """What small slope has of the blend, (n, m)."""
+    k = wavenumber(lam)
+    q = np.hypot(total[:, 0], total[:, 1])[:, None] * k
+    return blend.weight(HEIGHTS * total[:, 2:] * k, table.roughness.at(q), index(kind, lam))
+
+
+def twice(
+    power: NDArray[Any],
+    mirror: NDArray[Any],
+    table: DiffractionTable,
+    pair: tuple[Any, ...],
+    lam: NDArray[Any],
+) -> NDArray[np.float64]:
+    """Power (n, m) of orders that light is diffracted into twice, but for a mirror's lobe."""
+    wi, wo, _ = pair
+    total, k = wi + wo, wavenumber(lam)
+    ratios = table.slope_ratios.at(total[:, None, :2] * k[:, None], HEIGHTS * total[:, 2:] * k)
+    gain = second_order.factor(
+        second_order.interpolated(1.5, wi, wo)[:, None],
+        HEIGHTS**2 * ratios,
+        share(table, "twice", total, lam),
+    )
+    mirror = np.abs(mirror)
+    return power + (power - np.clip(power, -mirror, mirror)) * (gain - 1.0)
+
+
 def shaded(
-    gl: Any, method: str, table: DiffractionTable, parts: Packed, pair: tuple[Any, ...]
+    gl: Any,
+    method: str,
+    table: DiffractionTable,
+    parts: Packed,
+    pair: tuple[Any, ...],
+    kind: str = "",
 ) -> NDArray[np.float64]:
     wi, wo, at = pair
     directions = np.zeros((2, len(wi), 4), np.float32)
     directions[0, :, :3], directions[1, :, :3] = wi, wo
-    paired = Packed((Texture("directions", directions),), definitions={"PAIRED": ""})
+    paired = Packed((Texture("directions", directions),), {"height_scale": HEIGHTS}, {"PAIRED": ""})
+    if kind == "twice":
+        paired |= pack_second_order(1.5, table.slope_ratios)
     return probed(gl, method, parts | pack_roughness(table.roughness) | paired, at)
 
 
@@ -77,9 +110,9 @@ def shaded(
 def test_lut_has_the_factor_of_each_channel(gl: Any, table: DiffractionTable, kind: str) -> None:
     pair = pairs(300)
     colours = pack_colours(ColourTable.build(table))
-    plain = probed(gl, "lut", colours | Packed(definitions={"SURFACE_KIND": "0"}), pair[2])
+    plain = probed(gl, "lut", colours | PERFECT, pair[2])
     material = MATERIALS[kind] | (UNTINTED if kind == "conductor" else Packed())
-    found = shaded(gl, "lut", table, colours | material, pair)
+    found = shaded(gl, "lut", table, colours | material, pair, kind)
     expected = factor(table, kind, *pair[:2], np.array(RGB_WAVELENGTHS))
     if kind == "conductor":  # its colour is that of daylight, Kirchhoff's at each mean is taken out
         own = index(kind, np.array(RGB_WAVELENGTHS))
@@ -88,6 +121,9 @@ def test_lut_has_the_factor_of_each_channel(gl: Any, table: DiffractionTable, ki
         expected /= boundary.unpolarised(tangent) * scale[:, None] ** 2
         expected *= probed_reflectance(gl, colours, plain, pair[2])
     lit = np.abs(plain) > 1e-3 * np.abs(plain).max()
+    if kind == "twice":
+        level = probed(gl, "lut", colours | PERFECT, pair[2] * [1, 1, 0, 1])
+        plain = twice(plain, level, table, pair, np.array(RGB_WAVELENGTHS))
     # single precision, and lut's reading of reflectances between 129 angles
     assert found[lit] / plain[lit] == pytest.approx(expected[lit], rel=1e-3)
 
@@ -120,10 +156,13 @@ def test_spectral_has_the_factor_of_each_wavelength(
 ) -> None:
     pair = wi, wo, at = pairs(120)
     parts = pack_powers(table) | pack_responses(DAYLIGHT) | MATERIALS[kind]
-    found = shaded(gl, "spectral", table, parts, pair)
+    found = shaded(gl, "spectral", table, parts, pair, kind)
     lam = np.arange(376.0, 744.0, 0.5) + 0.25
     k = wavenumber(lam)
     weights = linear_srgb(response(lam)) * 0.5 / (lam[:, None] * 1e-3) ** 2
     powers = table.window_sum(*(at[:, n, None] * k for n in range(3)))
+    if kind == "twice":
+        mirror = np.exp(-np.sum((table.sigma * at[:, None, :2] * k[:, None]) ** 2, axis=-1))
+        powers = twice(powers, mirror, table, pair, lam)
     exact = (powers * factor(table, kind, wi, wo, lam)) @ weights
     assert difference(found, exact) < 8e-3  # as for a perfect mirror

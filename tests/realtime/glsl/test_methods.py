@@ -27,6 +27,8 @@ from mitsuba_diffraction.realtime.glsl.packing import (
     pack_energy,
     pack_powers,
     pack_responses,
+    pack_roughness,
+    pack_second_order,
 )
 from mitsuba_diffraction.realtime.glsl.source import (
     METHODS,
@@ -233,7 +235,7 @@ def test_a_conductors_colour_multiplies_the_light(gl: Any, table: DiffractionTab
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("all_parts", [False, True])
 def test_one_body_compiles_on_the_desktop_and_in_a_browser(
-    gl: Any, method: str, all_parts: bool
+    gl: Any, table: DiffractionTable, method: str, all_parts: bool
 ) -> None:
     definitions = {"TEXELS": "2", "TAPS_X": "3", "TAPS_Y": "3", "DIFFRACTING": ""}
     if all_parts:
@@ -243,6 +245,8 @@ def test_one_body_compiles_on_the_desktop_and_in_a_browser(
         definitions |= pack_energy([scale, scale], True).definitions
         ratio = DirectionalTable(np.array([550.0]), scale[None])
         definitions |= pack_beneath([ratio, ratio]).definitions
+        definitions |= pack_roughness(table.roughness).definitions
+        definitions |= pack_second_order(1.5, table.slope_ratios).definitions
     compile_program(gl, method, definitions).release()
     if "GL_ARB_ES3_compatibility" not in gl.extensions:
         pytest.skip(f"{gl.info['GL_RENDERER']} compiles no GLSL ES")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import types
 import warnings
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
+import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
 from mitsuba_diffraction.optics.fresnel import reflectance
@@ -203,18 +205,7 @@ def pigment_of(gl: Any, plate: Any, wo: NDArray[np.float64], scale: float) -> ND
 
     scale : height scale, set when the plate's own has been packed.
     """
-    scene = {
-        "type": "scene",
-        "sensor": {
-            "type": "perspective",
-            "fov": 0.1,
-            "to_world": mi.ScalarTransform4f().look_at(list(100.0 * VIEW), [0, 0, 0], [0, 0, 1]),
-            "film": {"type": "hdrfilm", "width": 4, "height": 4},
-        },
-        "plate": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(9), "bsdf": plate},
-        "sun": {"type": "directional", "direction": (-wo).tolist(), "irradiance": 1.0},
-    }
-    made = Renderer(mi.load_dict(scene), context=gl)
+    made = Renderer(mi.load_dict(under_a_sun(plate, wo)), context=gl)
     made.energy_for(scale)
     (surface,), (buffer,) = made.scene.surfaces, made.buffers
     vertices, pictures = surface.vertices.copy(), []
@@ -227,6 +218,21 @@ def pigment_of(gl: Any, plate: Any, wo: NDArray[np.float64], scale: float) -> ND
     return np.asarray(found)
 
 
+def under_a_sun(plate: Any, wo: NDArray[np.float64]) -> dict[str, Any]:
+    """A plate seen along `VIEW`, lit along wo."""
+    return {
+        "type": "scene",
+        "sensor": {
+            "type": "perspective",
+            "fov": 0.1,
+            "to_world": mi.ScalarTransform4f().look_at(list(100.0 * VIEW), [0, 0, 0], [0, 0, 1]),
+            "film": {"type": "hdrfilm", "width": 4, "height": 4},
+        },
+        "plate": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(9), "bsdf": plate},
+        "sun": {"type": "directional", "direction": (-wo).tolist(), "irradiance": 1.0},
+    }
+
+
 def beneath(plate: Any, wo: NDArray[np.float64]) -> NDArray[np.float64]:
     """The same by the plugin, over all wavelengths of daylight."""
     lam = np.arange(380.0, 740.0, 5.0)
@@ -237,6 +243,57 @@ def beneath(plate: Any, wo: NDArray[np.float64]) -> NDArray[np.float64]:
     found = spectra(plate.eval(of_nested, si, everywhere))[:, 0]
     weights = linear_srgb(response(lam))
     return np.asarray(found @ (weights / weights.sum(axis=0)))
+
+
+@pytest.mark.parametrize(
+    ("name", "method"), [("llvm_ad_rgb", "lut"), ("llvm_ad_spectral", "spectral")]
+)
+@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+def test_light_diffracted_twice_is_the_plugins(gl: Any, name: str, method: str) -> None:
+    mi.set_variant(name)
+    pits = md.gratings.cd(4.0, 80)  # whose orders have an r each
+    turns = np.radians([50, 62, 74, 86, 98, 110])
+    found, expected = [], []
+    for second in (False, True):
+        bsdf = mi.load_dict(
+            md.bsdf_dict(
+                pits, coherence_width=12, int_ior=1.58, height_scale=0.9,
+                energy_conserving=False, second_order=second,
+            )
+        )  # fmt: skip
+        made = Renderer(mi.load_dict(under_a_sun(bsdf, turned(turns[0]))), context=gl)
+        assert ("slope_ratios" in made.bindings[0].textures) == second
+        drawn = []
+        for turn in turns:
+            made.lights = [dataclasses.replace(made.lights[0], place=(*turned(turn), 0.0))]
+            drawn.append(made.render(method, supersampling=1)[1, 1, :3] / made.lights[0].colour)
+        found.append(np.array(drawn, float))
+        expected.append(np.array([reflected(bsdf, turned(turn)) for turn in turns]))
+        made.release()
+    first, change = off(found[0], expected[0]), expected[1] - expected[0]
+    assert np.abs(change).sum() > 0.1 * np.abs(expected[0]).sum()
+    # half floats of r and c, besides what the first order's table is off by
+    assert off(found[1] - found[0], change) < first + 2e-3
+
+
+def off(found: NDArray[np.float64], exact: NDArray[np.float64]) -> float:
+    """By how much of the exact values' sum."""
+    return float(np.abs(found - exact).sum() / np.abs(exact).sum())
+
+
+def turned(turn: float) -> NDArray[np.float64]:
+    """60° from the normal."""
+    return np.array([np.cos(turn) * 0.75**0.5, np.sin(turn) * 0.75**0.5, 0.5])
+
+
+def reflected(bsdf: Any, wo: NDArray[np.float64]) -> NDArray[np.float64]:
+    """f·cosθ by the plugin in linear sRGB under daylight, (3,)."""
+    lam = np.arange(376.0, 744.0, 0.5) if mi.is_spectral else np.array([550.0])
+    si = interaction(np.broadcast_to(VIEW, (len(lam), 3)), lam)
+    value = bsdf.eval(mi.BSDFContext(), si, vectors(np.broadcast_to(wo, (len(lam), 3))))
+    if not mi.is_spectral:
+        return np.array(value, float).ravel()
+    return np.asarray(spectra(value)[:, 0] @ (0.5 * linear_srgb(response(lam))))
 
 
 def test_all_that_is_not_shown_is_named_in_warnings(

@@ -78,7 +78,8 @@ def load_scene() -> Any:
             "roll": {
                 "type": "cylinder", "p0": [-1.2, 0.3, 0.9], "p1": [1.2, -0.3, 0.9], "radius": 0.9,
                 "bsdf": md.bsdf_dict(
-                    grating, coherence_width=6, orientation=30.0, pigment=grey
+                    grating, coherence_width=6, orientation=30.0, int_ior=1.5, second_order=True,
+                    pigment=grey,
                 ),
             },
             "ground": {

@@ -52,17 +52,18 @@ float boundary_at(float cos_half, float k, float r, float z) { return reflectanc
 // A dielectric's matrices are real.
 #if SURFACE_KIND == DIELECTRIC
 #define NUMBER float
-#else
-#define NUMBER vec2
-#endif
 
 float times(float a, float b) { return a * b; }
-vec2 times(vec2 a, vec2 b) { return vec2(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x); }
 float inverse_of(float a) { return 1.0 / a; }
-vec2 inverse_of(vec2 a) { return vec2(a.x, -a.y) / dot(a, a); }
 float plus(float a, float b) { return a + b; }
-vec2 plus(vec2 a, float b) { return vec2(a.x + b, a.y); }
 float root(float a) { return sqrt(max(a, 0.0)); }
+
+#else
+#define NUMBER vec2
+
+vec2 times(vec2 a, vec2 b) { return vec2(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x); }
+vec2 inverse_of(vec2 a) { return vec2(a.x, -a.y) / dot(a, a); }
+vec2 plus(vec2 a, float b) { return vec2(a.x + b, a.y); }
 
 // The root whose wave decays, or else travels, away from the surface.
 vec2 root(vec2 a)
@@ -71,6 +72,8 @@ vec2 root(vec2 a)
     float smaller = 0.5 * a.y / max(larger, 1e-20);
     return a.x >= 0.0 ? vec2(larger, smaller) : vec2(smaller, larger);
 }
+
+#endif
 
 // Of the pair: cosines and squared sines, products of the turns to the facet's axis and back, ...
 vec2 pair_cosines, pair_squares;

@@ -1,38 +1,8 @@
-// A pair of directions in the tangent frame; what a method adds is `diffracted`.
+// f·cosθ of the diffraction times the light's irradiance; what a method adds is `diffracted`.
 
-// f·cosθ of the diffraction times the light's irradiance, wi towards the eye.
 vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
 {
-    vec3 sum = wi + wo;
-    vec2 uv = in_patch(sum, rotation);
-    float one_plus_dot = 0.5 * dot(sum, sum);
-    float ratio = one_plus_dot / sum.z;
-    float outside = area_factor * ratio * ratio / wi.z;
-    vec2 there = vec2(1.0), back = vec2(1.0);
-#ifdef COATED
-    there = transmittances(wi.z);
-    back = transmittances(wo.z);
-    float face = outside * face_reflectance(sqrt(min(0.5 * one_plus_dot, 1.0)));
-    float leaving = wo.z;
-    wi = refracted(wi);
-    wo = refracted(wo);
-    sum = wi + wo;
-    one_plus_dot = 0.5 * dot(sum, sum);
-    ratio = one_plus_dot / sum.z;
-    outside = area_factor * ratio * ratio / wi.z * leaving / wo.z;
-    sum.z *= coat;  // κ grows by the index
-#endif
-    begin_pair(wi, wo, there, back);
-#ifdef ENERGY_CONSERVING
-    outside *= energy_scale(in_patch(wi, rotation), wi.z)
-             * energy_scale(in_patch(wo, rotation), wo.z) * energy_fade(wi.z, wo.z);
-#endif
-#ifdef VCAVITY
-    outside *= groove_shadow(wi.z, wo.z, one_plus_dot);
-#endif
-#ifdef COATED
-    face_reflected = face / outside;
-#endif
-    float cos_half = sqrt(min(0.5 * one_plus_dot, 1.0));
-    return outside * diffracted(uv, sum.z * height_scale, cos_half, light);
+    vec4 place;
+    float outside = begin_diffraction(wi, wo, rotation, place);
+    return outside * diffracted(place.xy, place.z, place.w, light);
 }

@@ -36,6 +36,14 @@ float turn_of(vec2 p)
     return p.y < 0.0 ? 1.0 - turn : turn;
 }
 
+// 1 − 2θ/π of cosines from 0 to 1. A minimax polynomial over √(1 − cosθ), 3e-6.
+vec3 elevations(vec3 cosines)
+{
+    vec3 c = clamp(cosines, 0.0, 1.0);
+    return 1.0 - sqrt(1.0 - c) * (0.99999695 + c * (-0.13641527 + c * (0.05451908
+               + c * (-0.02394849 + c * 0.006196195))));
+}
+
 #ifdef LIGHTS
 uniform vec3 light_colour[LIGHTS];  // irradiance, or intensity of a point light, linear sRGB
 #else
@@ -138,11 +146,8 @@ uniform float energy_page;   // between pages, which are for different height sc
 // Row and column on a grid of directions (tables/energy/grid.py), given the tangential part.
 vec2 on_grid(vec2 tangential, float cosine)
 {
-    // 1 − 2θ/π by a minimax polynomial over √(1 − cosθ), 3e-6
-    float c = clamp(cosine, 0.0, 1.0);
-    float remaining = 1.0 - sqrt(1.0 - c) * (0.99999695 + c * (-0.13641527 + c * (0.05451908
-                      + c * (-0.02394849 + c * 0.006196195))));
-    return vec2((1.0 - sqrt(max(remaining, 0.0))) * (float(GRID_POLAR) / GRID_SHARE),
+    float remaining = max(elevations(vec3(cosine)).x, 0.0);
+    return vec2((1.0 - sqrt(remaining)) * (float(GRID_POLAR) / GRID_SHARE),
                 turn_of(tangential) * float(GRID_AZIMUTHAL));
 }
 

@@ -122,11 +122,17 @@ vec3 order_0(float radius, float z)
 // R ⟨|P|²⟩ / (4π²σ⁴ λ²) over the light's wavelengths, linear sRGB, 1/µm².
 vec3 diffracted(vec2 uv, float z, float cos_half, int light)
 {
-    float squared_radius = dot(uv, uv);
-    vec3 colour = other_orders(uv, squared_radius, z) + order_0(sqrt(squared_radius), z);
-    colour = tinted(colour * boundary(cos_half, sqrt(squared_radius), z));
+    float r = length(uv);
+    vec3 colour = other_orders(uv, r * r, z) + order_0(r, z);
+#ifdef SECOND_ORDER
+    vec3 factors;
+    for (int n = 0; n < 3; ++n) factors[n] = second_order(uv, r, channel_wavenumbers[n], z);
+    vec3 mirror = abs(order_0(r, 0.0));
+    colour += (colour - clamp(colour, -mirror, mirror)) * (factors - 1.0);
+#endif
+    colour = tinted(colour * boundary(cos_half, r, z));
 #ifdef COATED
-    colour += face_reflected * order_0(sqrt(squared_radius), 0.0);
+    colour += face_reflected * order_0(r, 0.0);
 #endif
     return light_colour[light] * colour;
 }

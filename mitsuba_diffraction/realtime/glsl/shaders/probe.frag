@@ -14,6 +14,9 @@ void main()
     vec3 wi = texelFetch(directions, column, 0).xyz;
     begin_pair(wi, texelFetch(directions, column + ivec2(0, 1), 0).xyz, vec2(1.0),
                vec2(1.0));
+#ifdef SECOND_ORDER
+    begin_second_order();
+#endif
 #endif
     vec4 place = texelFetch(places, ivec2(gl_FragCoord.xy), 0);
     fragment = vec4(diffracted(place.xy, place.z, place.w, 0), 1.0);

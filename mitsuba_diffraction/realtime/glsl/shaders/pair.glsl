@@ -1,0 +1,40 @@
+// A pair of directions in the tangent frame, wi towards the eye: where its diffraction is looked up
+// (u, v, z = w·height_scale, cosine at the half vector), and what that is multiplied by.
+float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
+{
+    vec3 sum = wi + wo;
+    place.xy = in_patch(sum, rotation);
+    float one_plus_dot = 0.5 * dot(sum, sum);
+    float ratio = one_plus_dot / sum.z;
+    float outside = area_factor * ratio * ratio / wi.z;
+    vec2 there = vec2(1.0), back = vec2(1.0);
+#ifdef COATED
+    there = transmittances(wi.z);
+    back = transmittances(wo.z);
+    float face = outside * face_reflectance(sqrt(min(0.5 * one_plus_dot, 1.0)));
+    float leaving = wo.z;
+    wi = refracted(wi);
+    wo = refracted(wo);
+    sum = wi + wo;
+    one_plus_dot = 0.5 * dot(sum, sum);
+    ratio = one_plus_dot / sum.z;
+    outside = area_factor * ratio * ratio / wi.z * leaving / wo.z;
+    sum.z *= coat;  // κ grows by the index
+#endif
+    begin_pair(wi, wo, there, back);
+#ifdef SECOND_ORDER
+    begin_second_order();
+#endif
+#ifdef ENERGY_CONSERVING
+    outside *= energy_scale(in_patch(wi, rotation), wi.z)
+             * energy_scale(in_patch(wo, rotation), wo.z) * energy_fade(wi.z, wo.z);
+#endif
+#ifdef VCAVITY
+    outside *= groove_shadow(wi.z, wo.z, one_plus_dot);
+#endif
+#ifdef COATED
+    face_reflected = face / outside;
+#endif
+    place.zw = vec2(sum.z * height_scale, sqrt(min(0.5 * one_plus_dot, 1.0)));
+    return outside;
+}

@@ -1,0 +1,54 @@
+// What light that is diffracted twice makes of orders: the twin of plugin/second_order.py.
+
+uniform sampler2D second_coefficients;  // c: a page for each θi, of θo over the azimuth between
+uniform sampler2D slope_ratios;   // r: a page for each κ, of q_y over q_x
+uniform vec3 ratio_size;          // nodes of q_x, q_y and κ ...
+uniform vec3 ratio_steps;         // ... per rad/µm
+uniform vec3 ratio_zero;          // ... and which is where they are 0
+uniform vec2 ratio_orders;        // 1 where a node is one order, along x and y
+
+#if SURFACE_KIND == DIELECTRIC
+#define OWN_INDEX eta
+#else
+#define OWN_INDEX vec2(channel_eta.x, 0.0)
+#endif
+
+vec4 pair_coefficients;
+
+// Of pages below each other; size and place are in nodes.
+vec4 on_pages(sampler2D pages, vec3 size, vec3 place)
+{
+    place = clamp(place, vec3(0.0), size - 1.0);
+    vec2 texel = 1.0 / vec2(size.x, size.y * size.z);
+    vec2 at = (place.xy + 0.5) * texel;
+    float page = size.y * texel.y;
+#ifdef GLANCE  // the nearest page alone
+    return textureLod(pages, at + vec2(0.0, floor(place.z + 0.5) * page), 0.0);
+#else
+    float lower = min(floor(place.z), size.z - 2.0);
+    at.y += lower * page;
+    vec4 low = textureLod(pages, at, 0.0);
+    return mix(low, textureLod(pages, at + vec2(0.0, page), 0.0), place.z - lower);
+#endif
+}
+
+// Of the pair that `begin_pair` was told.
+void begin_second_order()
+{
+    vec3 cosines = vec3(pair_dot, pair_cosines.yx);
+    vec3 angles = 1.0 - sign(cosines) * elevations(abs(cosines));  // over π/2
+    vec3 place = angles * vec3(0.5, 1.0, 1.0) * (COEFFICIENT_NODES - 1.0);
+    pair_coefficients = on_pages(second_coefficients, vec3(COEFFICIENT_NODES), place);
+}
+
+// |1 + s (c_l r_l + c_t r_t)|² at a wavenumber.
+float second_order(vec2 uv, float r, float k, float z)
+{
+    vec3 place = k * vec3(uv, z) * ratio_steps + ratio_zero;
+    place.xy = mix(place.xy, floor(place.xy + 0.5), ratio_orders);
+    vec4 ratios = on_pages(slope_ratios, ratio_size, place);
+    vec4 c = pair_coefficients * gentle_share(OWN_INDEX, k, r, z) * height_scale * height_scale;
+    vec2 added = vec2(dot(c * vec4(1.0, -1.0, 1.0, -1.0), ratios), dot(c, ratios.yxwz));
+    added *= min(1.0, SECOND_ORDER_LIMIT * inversesqrt(max(dot(added, added), 1e-20)));
+    return dot(added, added) + 2.0 * added.x + 1.0;
+}
