@@ -57,10 +57,10 @@ UNTIL_BEST = 40
 #: s is at most this up to 70°, and from 80° at most 1: there part of a lobe is below the horizon,
 #: which would ask for any, and what is above reaches across directions of very different s.
 LARGEST = 1.5
-#: Parts of a cell that are looked at for a scale along the tracks of a surface, of one wavelength
-#: and of many, which look at the same nodes; albedos of directions that mirror each other in the
-#: tracks' plane differ by less.
-ALONG, EVEN = (5, 3), 0.01
+#: Parts of a cell of `SCALE` that are looked at, polar and azimuthal; of one of `FINE` for a scale
+#: along the tracks of a surface, of one wavelength and of many, which look at the same nodes;
+#: albedos of directions that mirror each other in the tracks' plane differ by less.
+ACROSS, ALONG, EVEN = (1, 2), (5, 3), 0.01
 #: Beyond `gain.GRAZING` this share of an albedo that has faded will do.
 FADED = 0.8
 
@@ -311,11 +311,12 @@ class _Maps:
         any other.
         """
         table = _ones(grating, wavelengths)
-        looked_at = SCALE if grating is None else FINE
-        parts = 1 if grating is None else ALONG[len(wavelengths) > 1]
+        looked_at, parts = SCALE, ACROSS
+        if grating is not None:
+            looked_at, parts = FINE, (ALONG[len(wavelengths) > 1],) * 2
 
         def one(page: float, wavelength: float, gain: Gain, nodes: bool) -> Samples:
-            theta, phi = _between(looked_at, 0 if nodes else parts)
+            theta, phi = _between(looked_at, *(0, 0) if nodes else parts)
             grid, ones = table.grid_at(wavelength), table.values[0]
             if grating is not None:  # directions that mirror these lie amid them then
                 phi = phi + 0.25 * (phi[1] - phi[0])
@@ -377,12 +378,12 @@ def fades(grating: Grating | None, model: str) -> bool:
     return model == "kirchhoff" and (grating is None or not grating.alone)
 
 
-def _between(grid: DirectionGrid, parts: int) -> tuple[Real, Real]:
-    """Middles of the parts of all cells: polar angles and azimuths; the nodes, for no parts."""
-    if parts == 0:
+def _between(grid: DirectionGrid, polar: int, azimuthal: int) -> tuple[Real, Real]:
+    """Middles of so many parts of all cells: polar angles and azimuths; for none, the nodes."""
+    if polar == 0:
         return grid.theta, grid.phi
     low, high = grid.theta[:-1, None], grid.theta[1:, None]
-    theta = low + (high - low) * ((np.arange(parts) + 0.5) / parts)
-    count = grid.azimuthal * parts
+    theta = low + (high - low) * ((np.arange(polar) + 0.5) / polar)
+    count = grid.azimuthal * azimuthal
     phi: Real = (np.arange(count, dtype=float) + 0.5) * (2.0 * np.pi / count)
     return theta.ravel(), phi

@@ -35,8 +35,8 @@ _PROBES = 24
 
 _SETTINGS = (
     VERSION, str(made.FINE), str(made.COARSE), str(made.SCALE), made.COARSE_WAVELENGTHS,
-    made.TARGET, made.LARGEST, made.ALONG, made.EVEN, made.FADED, made.NODES, made.TRACK_NODES,
-    made.TRACK_ROWS, made.WAVELENGTHS, made.FILM_WAVELENGTHS,
+    made.TARGET, made.LARGEST, made.ACROSS, made.ALONG, made.EVEN, made.FADED, made.NODES,
+    made.TRACK_NODES, made.TRACK_ROWS, made.WAVELENGTHS, made.FILM_WAVELENGTHS,
     chains.GIVEN, chains.SPIKE,
     *(fit.TOLERANCE, fit.LEAST, fit.MOST, fit.GAINS, fit.GRAZING, fit.LESS, fit.GENTLE),
     fit.FEW, str(fit.FEW_ORDERS), str(fit.MANY_ORDERS), str(fit.SPIKES), grating.DENSE,
