@@ -210,7 +210,7 @@ def _check_agreement(
     if asked.pop("second_order", None) and table.slope_ratios is None:
         raise DiffractionError(
             f"second_order=true asks for what the table '{path}' does not hold; leave it out, or "
-            "build the table with 'mitsuba-diffraction precompute --second-order'"
+            "build the table without '--no-second-order', for an ensemble"
         )
     for name, value in asked.items():
         if value != own[name] and not (name == "basis" and value == "auto"):

@@ -18,7 +18,7 @@ from ..optics.fresnel import Filmed, Index
 from ..optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
 from ..optics.mean_second_order import mean_gain
 from ..settings import checked
-from .arguments import require_dielectric, directions_of, index_of, places_of, width_of
+from .arguments import directions_of, index_of, places_of, require_dielectric, width_of
 from .integral import screen_power, window_power
 from .second_order import second_order_power
 

@@ -392,7 +392,6 @@ def test_the_second_order_knows_hills_from_pits_and_leaves_the_mirror_direction(
         {"coherence": "patch"},
         {"k": 3.0},
         {"eta": None, "model": "kirchhoff"},
-        {"coat": 1.5},
         {"film": (1.5, 100.0)},
     ],
 )

@@ -23,7 +23,7 @@ spread           where light goes that is spread there
 model            what the package says of the same surfaces
 compare          how far apart they are
 second_order     what the second order in slope would bring
-factored         what it brings as a factor, second_order=true
+factored         what it brings the default as a factor
 limits           up to which slopes that is little
 closed_forms     ideal gratings
 roughness        random surfaces of known mean diffraction

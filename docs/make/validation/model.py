@@ -10,10 +10,13 @@ and carries the power ∫ f cosθo dωo of a beam of unit power. With dωo = dα
     η_m = f(ωi, ω_m) · π/(σ²k²) = 4 cosθi cosθ_m N / w² · |a_m(k w)|².
 
 For a mirror this is R; for m = 0 of any grating R·|a_0|². Kirchhoff's model has
-R (1 + ωi·ω_m)²/(w² cosθi cosθ_m) for the factor, see `mitsuba_diffraction.optics.boundary`.
+R (1 + ωi·ω_m)²/(w² cosθi cosθ_m) for the factor, see `mitsuba_diffraction.optics.boundary`. The
+default has the second order on dielectrics, from what a table holds of it: `second_order`.
 """
 
 from __future__ import annotations
+
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,14 +24,20 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.optics import blend, boundary
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
+from mitsuba_diffraction.optics.second_order import SlopeRatios, factor, interpolated
+from mitsuba_diffraction.settings import TableSettings
+from mitsuba_diffraction.tables.build.slope_ratios import slope_ratios
 
 from .cases import PIXELS, Grating, index_of, order_sines
 
 # Neighbouring orders are 2π/d apart and weigh exp(−(2π·σ/d)²), 4e-18 at σ = d
 _SIGMA_PER_PERIOD = 1.0
 
-#: As `reference.brdf` has them, and the small-slope matrix alone, or in equal parts with Kirchhoff.
-MODELS = (*reference.MODELS, "small_slope_alone", "half_and_half")
+#: The default, of which dielectrics have the second order.
+DEFAULT = "small_slope"
+#: As the plugin has them, and the default in the first order, the small-slope matrix alone, or in
+#: equal parts with Kirchhoff.
+MODELS = (*reference.MODELS, "first_order", "small_slope_alone", "half_and_half")
 
 
 def order_efficiencies(
@@ -54,7 +63,7 @@ def order_efficiencies(
     wi, wo = in_plane(np.sin(np.radians(theta))), in_plane(sines)
     index = None if material == "perfect" else index_of(material, wavelength)
     return efficiencies(
-        grating.heights(), index, wi, wo, wavelength, model, sigma=lobe_sigma(grating), coat=coat
+        _period(grating), index, wi, wo, wavelength, model, sigma=lobe_sigma(grating), coat=coat
     )
 
 
@@ -68,6 +77,7 @@ def efficiencies(
     *,
     sigma: float,
     coat: float | None = None,
+    patch: HeightField | None = None,
 ) -> NDArray[np.float64]:
     """η of the orders of a periodic surface that leave along `wo`, for unpolarised light.
 
@@ -77,17 +87,21 @@ def efficiencies(
     wi, wo : (3,) and (n, 3), unit vectors away from the surface.
     model : of `MODELS`.
     sigma : of a window (µm) through which the lobes are separate.
+    patch : whose table's ratios the second order has; the surface's own by default.
     """
     width = WIDTHS_PER_SIGMA * sigma
     per_brdf = np.pi / (sigma * float(wavenumber(wavelength))) ** 2
     if index is None:
         return per_brdf * reference.brdf(field, wi, wo, wavelength, coherence_width=width)
-    known = model if model in reference.MODELS else "kirchhoff"
+    if model == DEFAULT and not index.imag and coat is None:
+        first = efficiencies(field, index, wi, wo, wavelength, "first_order", sigma=sigma)
+        return first * second_order(field, index.real, wi, wo, wavelength, patch)
+    known = DEFAULT if model in (DEFAULT, "first_order") else "kirchhoff"
     brdf = per_brdf * reference.brdf(
         field, wi, wo, wavelength,
         coherence_width=width, model=known, eta=index.real, k=index.imag, coat=coat,
     )  # fmt: skip
-    if model == known:
+    if model in (*reference.MODELS, "first_order"):
         return brdf
     # what Kirchhoff's matrix weighs, replaced
     alone, tangent = (
@@ -112,10 +126,47 @@ def jones_of(
         return boundary.small_slope(wi, wo, index)
     if model == "half_and_half":
         return blend.jones(wi, wo, index, 0.5)
+    return blend.jones(wi, wo, index, share_of(field, index, wi, wo, wavelength))
+
+
+def share_of(
+    field: HeightField,
+    index: complex,
+    wi: NDArray[np.float64],
+    wo: NDArray[np.float64],
+    wavelength: float,
+) -> NDArray[np.float64]:
+    """s of small slope in the default, (n,); arguments as `efficiencies`."""
     k, total = float(wavenumber(wavelength)), wi + wo
     roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
     variance = roughness.at(k * np.hypot(total[:, 0], total[:, 1]))
-    return blend.jones(wi, wo, index, blend.weight(k * total[:, 2], variance, index))
+    return np.asarray(blend.weight(k * total[:, 2], variance, index))
+
+
+def second_order(
+    field: HeightField,
+    index: float,
+    wi: NDArray[np.float64],
+    wo: NDArray[np.float64],
+    wavelength: float,
+    patch: HeightField | None = None,
+) -> NDArray[np.float64]:
+    """What the default multiplies orders of a dielectric by, (n,); arguments as `efficiencies`."""
+    total = float(wavenumber(wavelength)) * (wi + wo)
+    ratios = _ratios(patch or field).at(total[:, :2], total[:, 2])
+    ratios[np.hypot(*total[:, :2].T) < 1e-6] = 0.0  # order 0 is the first order's
+    share = share_of(field, index, wi, wo, wavelength)
+    return factor(interpolated(index, wi, wo), ratios, share)
+
+
+@cache
+def _ratios(patch: HeightField) -> SlopeRatios:
+    return slope_ratios([patch], TableSettings(height_scale_max=1.0))
+
+
+@cache
+def _period(grating: Grating) -> HeightField:
+    return grating.heights()
 
 
 def shares(jones: NDArray[np.complex128]) -> NDArray[np.float64]:

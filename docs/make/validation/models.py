@@ -95,15 +95,16 @@ def section(comparisons: dict[tuple[str, str], Comparison]) -> str:
 first-order small-slope approximation puts Rice's for them, which are right for gentle slopes at any
 angle, but not where a surface is rough against the wavelength and yet gentle: that is Kirchhoff's
 ground. `model="small_slope"`, the default, is a blend of both amplitudes, weighted by the roughness
-at the scales that make an order (`mitsuba_diffraction/optics/blend.py`). Deviation of colours, mean
-over the gratings of that depth/period: Kirchhoff / small slope alone / the blend. On gentle
-gratings the blend is the second, on deep ones the first, and in between it lies near the better.
+at the scales that make an order (`mitsuba_diffraction/optics/blend.py`), on dielectrics times the
+second order ([below](#what-the-defaults-second-order-brings)). Deviation of colours, mean over the
+gratings of that depth/period: Kirchhoff / small slope alone / the default. On gentle gratings the
+blend is the second, on deep ones the first, and in between it lies near the better.
 
 {groups(comparisons)}
 
 Unpolarised light hides a part: errors of the two polarisations have opposite signs, on metals most
 of all, and cancel. Each alone, TE having the electric field along the grooves: Kirchhoff / the
-blend.
+default, whose second order multiplies both alike.
 
 {polarised_groups(comparisons)}"""
 
@@ -125,7 +126,9 @@ def compare_all(kirchhoff: dict[str, Comparison]) -> dict[tuple[str, str], Compa
     """Every model for the solutions that Kirchhoff's comparisons have, by (material, model)."""
     found = {(material, "kirchhoff"): kirchhoff[material] for material in MATERIALS}
     for material in MATERIALS:
-        for model in _ORDER[1:]:
+        # of metals it is the default
+        more = ("first_order",) if material == "keratin" else ()
+        for model in (*_ORDER[1:], *more):
             found[material, model] = compare(material, kirchhoff[material].solutions, model)
     return found
 

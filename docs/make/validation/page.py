@@ -90,7 +90,7 @@ def write_report(folder: Path, *, quick: bool = False, progress: Progress | None
             [c for material in models.MATERIALS for c in patch_sections.compared(material, kinds)]
         ),
         second_order.section(quick=quick),
-        factored.section(quick=quick),
+        factored.section(sides, quick=quick),
         sections.slopes(kirchhoff, default),
         sections.edges(kirchhoff, default),
         coated.section(coated.GRATINGS[:1] if quick else coated.GRATINGS),

@@ -44,8 +44,8 @@ with `energy_conserving` false.
 
 *Deviation* is Σ|η − η_rigorous| / Σ η_rigorous over the wavelengths and the orders that leave
 within {GRAZING:g}° of the normal, for unpolarised light unless a polarisation is named; *of
-colours* leaves out order 0. The *default* is `model="small_slope"`. A perfect conductor has no
-index, and is Kirchhoff's alone."""
+colours* leaves out order 0. The *default* is `model="small_slope"`, on a bare dielectric with the
+second order as tables hold it. A perfect conductor has no index, and is Kirchhoff's alone."""
 
 
 def closed_forms(chosen: Sequence[tuple[float, float]]) -> str:

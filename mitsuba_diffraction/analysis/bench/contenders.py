@@ -123,7 +123,7 @@ DEFAULT = "diffraction, the defaults"
 DEFAULT_AL = "diffraction, Al"
 KIRCHHOFF = "diffraction, kirchhoff"
 KIRCHHOFF_AL = "diffraction, Al, kirchhoff"
-SECOND_ORDER = "diffraction, second order"
+FIRST_ORDER = "diffraction, first order"
 COARSE = "diffraction, tolerance 1e-2"
 ONE_WINDOW = "diffraction, patch"
 ON_SURFACE = "diffraction, surface"
@@ -161,7 +161,6 @@ def build_tables(
         patch = gratings.elaphe_like(plan.pixels * PIXEL, plan.pixels)
     settings: dict[str, dict[str, Any]] = {
         "default": {},
-        "second order": {"second_order": True},
         "1e-2": {"tolerance": 1e-2},
         "patch": {"coherence": "patch"},
         # no tolerance could be met by this
@@ -201,7 +200,7 @@ def bsdf_factories(tables: Tables) -> dict[str, Callable[[], Any]]:
         KIRCHHOFF: ours("default", model="kirchhoff"),
         DEFAULT_AL: ours("default", material="Al"),
         KIRCHHOFF_AL: ours("default", material="Al", model="kirchhoff"),
-        SECOND_ORDER: ours("second order", second_order=True),
+        FIRST_ORDER: ours("default", second_order=False),
         COARSE: ours("1e-2"),
         ONE_WINDOW: ours("patch"),
         ON_SURFACE: ours("patch", coherence="surface", uv_scale=1e4),

@@ -22,6 +22,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from .fit import GAINS, Samples, limits
 from .gain import LEAST_COSINE, over_lobe
@@ -102,8 +103,11 @@ class Chains:
         turn = (x * x_o - y_squared) / np.maximum(across, 1e-12)
         turn = np.arccos(np.clip(turn, -1.0, 1.0))
         gain = self.gain.at(cos_i, cos_o, turn)
-        end = np.full_like(cos_o, LEAST_COSINE)
-        gain = over_lobe(gain, self.gain.at(cos_i, end, turn) * LEAST_COSINE, cos_o, pole)
+        cos_i, cos_o, pole = np.broadcast_arrays(cos_i, cos_o, pole, turn)[:3]
+        near = cos_o * pole > 1.001
+        end = np.full(np.count_nonzero(near), LEAST_COSINE)
+        at_horizon = self.gain.at(cos_i[near], end, turn[near]) * LEAST_COSINE
+        gain[near] = over_lobe(gain[near], at_horizon, cos_o[near], pole[near])
         return np.asarray(power * share * gain)
 
     def _powers(self, number: NDArray[np.int_], kappa: Real) -> Real:
@@ -120,31 +124,34 @@ class Chains:
         share = place - low
         return np.asarray(flat[index] * (1.0 - share) + flat[index + table.shape[1]] * share)
 
-    def samples(self, units: int, page: float, places: Real) -> Samples:
-        """All chains' albedos, at places between whole ξ, those of a `GratingGrid`'s nodes."""
+    def samples(self, rows: int, units: int, page: float, places: Real) -> Samples:
+        """Chains' albedos, at places between whole ξ, those of a `GratingGrid`'s nodes.
+
+        rows : of the grid; units : of the longest chain that is looked at.
+        """
         nodes, count = self.grating.nodes, len(places)
         f = fractions(places, nodes)
         first, second = np.broadcast_arrays(f[:, None], f)
-        shares, at, found = [], [], []
+        shares, at, found, starts = [], [], [], [0]
         for last in range(units + 1):
             m, k = self.shares(first, second, last, True), np.arange(last + 1)
-            rows, columns = places[:, None] + nodes * k, places[:, None] + nodes * (last - k)
-            at.append(np.broadcast_arrays(rows[:, None], columns))
+            row, column = places[:, None] + nodes * k, places[:, None] + nodes * (last - k)
+            at.append(np.broadcast_arrays(row[:, None], column))
             found.append(self._limits(m, first, second, last))
             shares.append(m)
-        ends = np.cumsum([count**2 * (last + 1) for last in range(units + 1)])[:-1]
-        grid = GratingGrid(self.grating, (units + 1) * nodes, 2e3 * np.pi / self.gain.wavenumber)
-        here = grid.at(*_flat(at))
-
-        def transport(values: Array) -> Array:
-            parts = np.split(here(values), ends)
-            sums = [
-                reflected(m, s.reshape(count, count, -1))
-                for m, s in zip(shares, parts, strict=True)
-            ]
-            return np.concatenate([one.ravel() for one in sums])
-
-        return Samples(page, here, transport, *_flat(found))
+            starts.append(starts[-1] + count**2 * (last + 1))
+        here = GratingGrid(self.grating, rows, 2e3 * np.pi / self.gain.wavenumber).at(*_flat(at))
+        reached = np.concatenate([_reached(count, n) + at for n, at in enumerate(starts[:-1])])
+        ends = np.concatenate([np.full(m[..., 0].size, m.shape[-1]) for m in shares])
+        matrix = sparse.csr_array(
+            (
+                np.concatenate([m.ravel() for m in shares]).astype(np.float32),
+                reached,
+                np.append(0, np.cumsum(ends)),
+            ),
+            shape=(starts[-1], starts[-1]),
+        )
+        return Samples(page, here, lambda values: matrix @ here(values), *_flat(found))
 
     def _limits(self, shares: Real, first: Real, second: Real, last: int) -> tuple[Real, Real]:
         """As `fit.limits`, as far as reciprocity lets them be."""
@@ -201,6 +208,13 @@ def _flat(parts: list[Any]) -> tuple[Real, Real]:
 def reflected(shares: Real, s: NDArray[np.floating]) -> Real:
     """Σ_l M_kl s_l: the other halves' s, and that of their ends beyond the horizon."""
     return np.asarray(np.einsum("...ko,...o->...k", shares, _padded(s.swapaxes(0, 1))))
+
+
+def _reached(count: int, last: int) -> NDArray[np.int_]:
+    """Where `reflected` finds s among that of all places (count, count, last + 1)."""
+    places = np.arange(count**2 * (last + 1), dtype=float).reshape(count, count, -1)
+    padded = _padded(places.swapaxes(0, 1))[:, :, None].astype(int)
+    return np.repeat(padded, last + 1, axis=2).ravel()
 
 
 def _padded(s: NDArray[np.floating]) -> Real:

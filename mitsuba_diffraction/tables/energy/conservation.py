@@ -19,6 +19,7 @@ with M of `transport`. What is left to do:
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -149,22 +150,18 @@ def conservation(
     """
     maps = _Maps(_orders(table, height_scale), model, index)
     low, high = wavelength_range
-    for grid, count in ((COARSE, COARSE_WAVELENGTHS), (FINE, FINE_WAVELENGTHS)):
-        wavelengths = _wavelengths(low, high, count)
-        transports = maps.at(wavelengths, grid.theta, grid.phi, grid)
-        weights = np.ones((grid.polar + 1, grid.azimuthal), np.float32)
-        values = np.stack([transport(weights) for transport in transports])
-        albedo = DirectionalTable(wavelengths, values)
-        if values.max() <= TARGET:
-            return Conservation(albedo, None)
+    albedo = maps.albedo(COARSE, _wavelengths(low, high, COARSE_WAVELENGTHS))
+    if albedo.values.max() <= TARGET:
+        return Conservation(albedo, None)
+    wavelengths = _wavelengths(low, high, FINE_WAVELENGTHS)
     filmed = isinstance(index(wavelengths), Filmed)
     few = _wavelengths(low, high, FILM_WAVELENGTHS if filmed else GRATING_WAVELENGTHS)
     if (grating := maps.orders.grating) is not None:
         return Conservation(albedo, maps.of_chains(replace(grating, nodes=NODES), few))
     if (grating := maps.tracks(albedo)) is not None:
         return Conservation(albedo, maps.of_tracks(replace(grating, nodes=NODES), few))
-    if maps.fades:
-        transports = maps.at(wavelengths, grid.theta, grid.phi, grid, faded=True)
+    values = maps.albedo(FINE, wavelengths).values
+    transports = maps.at(wavelengths, FINE.theta, FINE.phi, FINE, faded=maps.fades)
     aims = np.clip(values, np.float32(0.0), np.float32(TARGET))  # quadrature may fall below 0
     scale = np.stack(
         [scaled(*one, FINE.theta[:, None]) for one in zip(transports, aims, strict=True)]
@@ -292,6 +289,13 @@ class _Maps:
 
         return parallel(one, self.gains(wavelengths))
 
+    def albedo(self, grid: DirectionGrid, wavelengths: Real) -> DirectionalTable:
+        """Of the model as it is, on a grid of directions."""
+        transports = self.at(wavelengths, grid.theta, grid.phi, grid)
+        weights = np.ones((grid.polar + 1, grid.azimuthal), np.float32)
+        values = np.stack([transport(weights) for transport in transports])
+        return DirectionalTable(wavelengths, values)
+
     def gains(self, wavelengths: Real) -> list[Gain]:
         """G at several wavelengths (nm), each made once."""
         found = self.index(wavelengths)
@@ -303,11 +307,13 @@ class _Maps:
 
     def of_chains(self, grating: Grating, wavelengths: Real) -> DirectionalTable:
         """A grating's s."""
-        units, count = grating.units(float(wavelengths[0])), grating.nodes
+        rows, count = grating.rows(float(wavelengths[0])), grating.nodes
 
         def one(page: float, wavelength: float, gain: Gain, nodes: bool) -> Samples:
             places = np.arange(0.0, count) if nodes else places_amid(count, self.model)
-            return Chains(self.orders, grating, gain).samples(units, page, places)
+            # longer chains are beyond the horizon at all wavelengths that a page is for
+            units = grating.units(float(wavelengths[max(math.ceil(page) - 1, 0)]))
+            return Chains(self.orders, grating, gain).samples(rows, units, page, places)
 
         return self._fitted(grating, wavelengths, one)
 

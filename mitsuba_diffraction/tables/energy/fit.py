@@ -79,12 +79,13 @@ class Samples:
     def missing(self, scale: Array) -> Real:
         """Sums at nodes of the logarithms of what albedos are to be multiplied with."""
         kept = self._kept(scale)
-        return self.here.spread(np.log(np.clip(kept, self.low, self.high) / kept), scale[0].shape)
+        missing = np.log(np.clip(kept, self.low, self.high) / kept)
+        return self.here.spread(missing).reshape(scale[0].shape)
 
     def excess(self, scale: Array) -> Real:
         """By what factor, at least 1, an albedo around each node is too much."""
         much = self._kept(scale) / CEILING
-        return self.here.largest(np.maximum(much, 1.0), scale[0].shape)
+        return self.here.largest(much).reshape(scale[0].shape)
 
     def _kept(self, scale: Array) -> Real:
         first, *other = (scale[n] for n in self.pages)
@@ -109,7 +110,7 @@ def fitted(pages: int, shape: tuple[int, int], samples: Sequence[Samples]) -> Ar
     def excess(one: Samples) -> Real:
         return one.excess(scale)
 
-    ones = [one.here.spread(np.ones(one.low.shape), shape) for one in samples]
+    ones = [one.here.spread(np.ones(one.low.shape)).reshape(shape) for one in samples]
     count = np.maximum(at_pages(ones, np.add, 0.0), 1e-9)
     for _ in range(FITS):
         step = at_pages(parallel(missing, samples), np.add, 0.0) / count

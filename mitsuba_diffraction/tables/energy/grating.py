@@ -91,7 +91,7 @@ class GratingGrid:
         i, j = (np.minimum(p.astype(np.int32), self.rows - 2) for p in (row, column))
         left = i * self.rows + j
         s, t = (row - i).astype(np.float32), (column - j).astype(np.float32)
-        return Interpolation(left, left + 1, self.rows, s, t)
+        return Interpolation(left, left + 1, self.rows, self.rows**2, s, t)
 
 
 def position_of(xi: Real, nodes: int = NODES, last: float = LAST_NODE) -> Real:

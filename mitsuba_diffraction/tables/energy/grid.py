@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
 
 Real = NDArray[np.float64]
 
@@ -54,45 +55,64 @@ class DirectionGrid:
         j %= self.azimuthal
         index = i * self.azimuthal + j
         right = i * self.azimuthal + (j + 1) % self.azimuthal
-        return Interpolation(index, right, self.azimuthal, s, t)
+        nodes = (self.polar + 1) * self.azimuthal
+        return Interpolation(index, right, self.azimuthal, nodes, s, t)
 
 
 @dataclass(frozen=True)
 class Interpolation:
-    """Bilinear: of values on the grid, four are read for each direction."""
+    """Bilinear, from values on `nodes` of the grid: four are read for each direction."""
 
     left: NDArray[np.int32]
     right: NDArray[np.int32]
     stride: int
+    nodes: int
     s: NDArray[np.float32]
     t: NDArray[np.float32]
 
     def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Values at the directions."""
-        flat = np.ascontiguousarray(values).ravel()
-        low, high = (
-            flat.take(self.left + d) * (1.0 - self.t) + flat.take(self.right + d) * self.t
-            for d in (0, self.stride)
-        )
-        return np.asarray(low * (1.0 - self.s) + high * self.s)
+        return np.asarray((self._matrix @ values.ravel()).reshape(self.left.shape))
 
-    def spread(self, values: NDArray[np.floating], shape: tuple[int, int]) -> Real:
-        """The transposed: values at the directions, by their shares in the nodes."""
-        sums = (
-            np.bincount(at.ravel(), (share * values).ravel(), math.prod(shape))
-            for at, share in self._nodes()
-        )
-        return np.asarray(sum(sums)).reshape(shape)
+    def spread(self, values: NDArray[np.floating]) -> Real:
+        """The transposed: values at the directions, by their shares in the nodes (nodes,)."""
+        return np.asarray(self._matrix.T @ values.ravel(), np.float64)
 
-    def largest(self, values: NDArray[np.floating], shape: tuple[int, int]) -> Real:
-        """The largest of the values, at least 1, that each node has a share in."""
-        found = np.ones(math.prod(shape))
-        for at, share in self._nodes():
-            np.maximum.at(found, at.ravel(), np.where(share > 1e-3, values, 1.0).ravel())
-        return found.reshape(shape)
+    def largest(self, values: NDArray[np.floating]) -> Real:
+        """The largest of the values, at least 1, that each node (nodes,) has a share in."""
+        found = np.ones(self.nodes)
+        much = np.flatnonzero(values.ravel() > 1.0)
+        shared = self._matrix[much]
+        at = shared.data > 1e-3
+        of = np.repeat(values.ravel()[much], 4)
+        np.maximum.at(found, shared.indices[at], of[at])
+        return found
 
-    def _nodes(self) -> Iterator[tuple[NDArray[np.int32], NDArray[np.float32]]]:
-        """All four, and their shares."""
-        for step, s in ((0, 1.0 - self.s), (self.stride, self.s)):
-            yield self.left + step, s * (1.0 - self.t)
-            yield self.right + step, s * self.t
+    def summed(self, shares: NDArray[np.float32]) -> Summed:
+        """Sums over the last axis of the directions, by shares (…, m)."""
+        data = self._matrix.data * np.repeat(shares.ravel(), 4)
+        starts = np.arange(0, len(data) + 1, 4 * shares.shape[-1], dtype=np.int32)
+        shape = len(starts) - 1, self.nodes
+        matrix = sparse.csr_array((data, self._matrix.indices, starts), shape=shape)
+        return Summed(matrix, shares.shape[:-1])
+
+    @cached_property
+    def _matrix(self) -> sparse.csr_array:
+        """(directions, nodes)."""
+        columns = [at + step for step in (0, self.stride) for at in (self.left, self.right)]
+        shares = [s * t for s in (1.0 - self.s, self.s) for t in (1.0 - self.t, self.t)]
+        indices, data = (np.stack(part, axis=-1).ravel() for part in (columns, shares))
+        starts = np.arange(0, len(data) + 1, 4, dtype=np.int32)
+        return sparse.csr_array((data, indices, starts), shape=(self.left.size, self.nodes))
+
+
+@dataclass(frozen=True)
+class Summed:
+    """A linear map from values on a grid: `matrix` (sums, nodes), of sums of a shape."""
+
+    matrix: sparse.csr_array
+    shape: tuple[int, ...]
+
+    def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The sums."""
+        return np.asarray((self.matrix @ values.ravel()).reshape(self.shape))

@@ -22,7 +22,7 @@ from .grid import LAST_ANGLE
 from .links import Medium
 
 #: Raised whenever the computation changes.
-VERSION = 11
+VERSION = 12
 
 #: Height scales are n/steps: this phase (rad) changes at most in between. The power of an order
 #: bends by a fiftieth then, and by less at grazing angles, where there is most to take.

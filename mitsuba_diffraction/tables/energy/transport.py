@@ -31,7 +31,7 @@ from ..sampling import OrderMixture, order_mixture
 from ..table import DiffractionTable
 from .gain import LEAST_COSINE, Gain, fade, over_lobe, read
 from .grating import MOST_UNITS, Grating, GratingGrid, grating_of, on_one_line, orders_of
-from .grid import DirectionGrid, Interpolation
+from .grid import DirectionGrid, Interpolation, Summed
 
 Real = NDArray[np.float64]
 Array = NDArray[np.float32]
@@ -164,17 +164,6 @@ class Weak:
 
 
 @dataclass(frozen=True)
-class Strong:
-    """Shares (t, p, m) that go to `orders` (t, p, m)."""
-
-    shares: Array
-    orders: Interpolation
-
-    def __call__(self, s: Array) -> Array:
-        return np.einsum("tpm,tpm->tp", self.shares, self.orders(s))
-
-
-@dataclass(frozen=True)
 class Transport:
     """a = M s: the albedo (t, p) from weights s on the grid of directions.
 
@@ -187,7 +176,7 @@ class Transport:
     glossy: Real
     mirror: Interpolation
     weak: Weak | None
-    strong: Strong | None
+    strong: Summed | None
 
     def __call__(self, s: Array) -> Array:
         result = self.glossy * self.mirror(s)
@@ -197,10 +186,10 @@ class Transport:
         return np.asarray(result, np.float32)
 
 
-def _strong_of(rows: Sequence[Row], grid: DirectionGrid | GratingGrid) -> Strong:
+def _strong_of(rows: Sequence[Row], grid: DirectionGrid | GratingGrid) -> Summed:
     found = [row.strong() for row in rows]
     shares, theta, phi = (np.stack(part) for part in zip(*found, strict=True))
-    return Strong(shares.astype(np.float32), grid.interpolation(theta, phi))
+    return grid.interpolation(theta, phi).summed(shares.astype(np.float32))
 
 
 class Row(ABC):

@@ -51,18 +51,16 @@ def test_cuts_of_scales_meet_the_goals(keratin):
     ]
     assert len(cuts) >= 6
     assert np.mean(cuts) < 0.07
-    # one direction at 460 nm and 60° is 10.7 %; the goal of 10 % was met by coupled waves alone,
-    # which more harmonics still changed by 11 % there
-    assert sorted(cuts)[-2] < 0.10
-    assert max(cuts) < 0.11
+    assert max(cuts) < 0.10
 
 
 def test_sinusoids_in_any_mount_and_crossed_gratings_are_nearly_exact(keratin):
     for c in keratin:
         if c.case.surface.kind in ("sinusoid", "crossed"):
             assert c.by_model["small_slope"] < 0.03, c.case
-            # or worse by a twentieth of a per cent, where both are as good as exact
-            assert c.by_model["small_slope"] < c.by_model["kirchhoff"] + 5e-4, c.case
+            # or worse by little, where both are as good as exact; see test_models
+            assert c.by_model["small_slope"] < c.by_model["kirchhoff"] + 1e-3, c.case
+            assert c.by_model["first_order"] < c.by_model["kirchhoff"] + 5e-4, c.case
             for new, old in zip(c.polarised["small_slope"], c.polarised["kirchhoff"], strict=True):
                 assert new < old, c.case
 

@@ -8,7 +8,8 @@ from scipy.ndimage import gaussian_filter
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.heights import field as field_module
-from mitsuba_diffraction.heights import preprocess, validity
+from mitsuba_diffraction.heights import preprocess
+from mitsuba_diffraction.heights.validity import edge_lines
 from mitsuba_diffraction.tables.build import windows as module
 from mitsuba_diffraction.tables.build.windows import Windows
 
@@ -148,7 +149,7 @@ def test_large_fields_have_the_same_statistics_in_parts(monkeypatch, tmp_path):
     monkeypatch.setattr(preprocess, "LARGE", 1)
     level = parts.treated(level="plane")
     assert "RMS change" in level.history[-1]
-    lines = validity.edge_lines(parts, 0.4)
+    lines = edge_lines(parts, 0.4)
     monkeypatch.undo()
     assert level.history == whole.treated(level="plane").history
-    assert lines == validity.edge_lines(whole, 0.4)
+    assert lines == edge_lines(whole, 0.4)
