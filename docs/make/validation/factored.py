@@ -37,7 +37,7 @@ def section(sides: Sides, *, quick: bool = False) -> str:
     cases = list(factored_cases(KINDS[3:4] if quick else KINDS))
     rows = rows_of(cases, MODELS, lit)
     header = ["surface", "cases", *MODELS, *(f"light, {name}" for name in lit)]
-    return f"""## What the default's second order brings
+    return f"""## What the second order brings
 
 The sum over all waves in between in closed form, as a factor on each order's power
 ([theory.md](theory.md#the-material)): two numbers that know directions and index alone, and two

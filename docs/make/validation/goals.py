@@ -124,7 +124,7 @@ def keratin(sides: Sides) -> str:
 Nowhere on keratin was it to be worse than Kirchhoff by more than a tenth. Of {len(every)} gratings
 and angles the default in the first order is so in {len(worse["first_order"])}, beyond what the
 solver's last refinement changed, and with its second order, whose closed form errs there
-([why](#what-the-defaults-second-order-brings)), in {len(worse["small_slope"])}:
+([why](#what-the-second-order-brings)), in {len(worse["small_slope"])}:
 
 {table(header, listed)}"""
 

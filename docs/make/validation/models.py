@@ -96,7 +96,7 @@ first-order small-slope approximation puts Rice's for them, which are right for 
 angle, but not where a surface is rough against the wavelength and yet gentle: that is Kirchhoff's
 ground. `model="small_slope"`, the default, is a blend of both amplitudes, weighted by the roughness
 at the scales that make an order (`mitsuba_diffraction/optics/blend.py`), on dielectrics times the
-second order ([below](#what-the-defaults-second-order-brings)). Deviation of colours, mean over the
+second order ([below](#what-the-second-order-brings)). Deviation of colours, mean over the
 gratings of that depth/period: Kirchhoff / small slope alone / the default. On gentle gratings the
 blend is the second, on deep ones the first, and in between it lies near the better.
 
