@@ -249,7 +249,7 @@ def beneath(plate: Any, wo: NDArray[np.float64]) -> NDArray[np.float64]:
     ("name", "method", "material"),
     [
         ("llvm_ad_rgb", "lut", {"int_ior": 1.58}),
-        ("llvm_ad_spectral", "spectral", {"int_ior": 2.2, "coat_ior": 1.4}),
+        ("llvm_ad_spectral", "spectral", {"int_ior": 2.2, "coat_ior": 1.2}),
     ],
 )
 @pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
