@@ -18,7 +18,7 @@ from mitsuba_diffraction.tables.energy.grid import DirectionGrid
 
 def coarse_energy(set_value: Callable[[object, str, object], object] = setattr) -> None:
     """From now on, or for as long as a monkeypatch's `setattr` lasts."""
-    set_value(conservation, "FINE_WAVELENGTHS", 3)
+    set_value(conservation, "WAVELENGTHS", 3)
     set_value(sides, "SHEET", DirectionGrid(24, 24))
     set_value(sides, "DENSE", DirectionGrid(24, 24))
     set_value(sides, "FINER", DirectionGrid(24, 24))

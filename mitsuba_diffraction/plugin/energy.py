@@ -20,7 +20,7 @@ from ..errors import DiffractionWarning
 from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS, response
 from ..optics.mean_second_order import limited
-from ..tables.energy.conservation import FINE, Conservation, DirectionalTable
+from ..tables.energy.conservation import FINE, Conservation, DirectionalTable, fades
 from ..tables.energy.gain import GRAZING
 from ..tables.energy.store import Energy, mean_exponents
 from ..tables.table import DiffractionTable
@@ -70,7 +70,7 @@ class EnergyModel:
         )
         model = "kirchhoff" if kirchhoff else "small_slope"
         self._energy = Energy(table, model, self._indices, (low, high))
-        self._kirchhoff = self._fades = kirchhoff
+        self._fades = kirchhoff
         self._warned = False
         self._filmed = isinstance(self._material, UnderFilm) and not kirchhoff
         self._scale, self._mean = DirectionLookup(), DirectionLookup()
@@ -103,7 +103,8 @@ class EnergyModel:
         if self.conserving:
             scales = scales_of([one.scale for one in found])
             self._warn(found)
-            self._fades = self._kirchhoff and (scales is None or scales[0].grating is None)
+            grating = None if scales is None else scales[0].grating
+            self._fades = fades(grating, self._energy.model)
             self._scale.update(scales, nodes, height_scale, lowest is not None)
         if beneath:
             ratios = [self._ratio(one) for one in alike([one.albedo for one in found])]
@@ -132,8 +133,7 @@ class EnergyModel:
         scales = scales_of([one.scale for one in found])
         if scales is None:
             return None
-        scales = [one if one.grating is None else one.on(FINE) for one in scales]
-        scale = between(scales, nodes, height_scale)
+        scale = between([one.on(FINE) for one in scales], nodes, height_scale)
         weights = response(scale.wavelengths)[:, 1] * scale.wavelengths
         return np.average(scale.values, axis=0, weights=weights).astype(np.float32)
 

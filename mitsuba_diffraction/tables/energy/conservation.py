@@ -30,8 +30,8 @@ from numpy.typing import ArrayLike, NDArray
 from ...optics.fresnel import Filmed
 from ..table import DiffractionTable
 from .chains import Chains, places_amid
-from .fit import Samples, fitted, limits, parallel
-from .gain import Gain
+from .fit import FEW_ORDERS, MANY_ORDERS, SPIKES, Pace, Samples, fitted, limits, parallel
+from .gain import GRAZING, Gain
 from .grating import Grating, GratingGrid
 from .grid import DirectionGrid
 from .transport import Orders, Transport
@@ -41,33 +41,28 @@ Array = NDArray[np.float32]
 #: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.
 Index = Callable[[Real], "NDArray[np.complex128] | Filmed | None"]
 
-#: Directions of the scale, and of the albedo by which it is told whether any is needed.
-FINE, COARSE = DirectionGrid(40, 60), DirectionGrid(20, 30)
-#: Of the scale of a grating, or of tracks: nodes, as in `Grating`, and wavelengths, without a film
-#: and with one, whose fringes albedos follow.
-NODES, GRATING_WAVELENGTHS, FILM_WAVELENGTHS = 12, 8, 16
-#: Wavelengths of either; in variants of one wavelength there is one.
-FINE_WAVELENGTHS, COARSE_WAVELENGTHS = 12, 4
-#: Albedos are scaled to this, half of what may be taken: for what interpolation leaves out.
+#: Directions of a scale, whose albedos rise and fall within few degrees of azimuth; of what is
+#: looked at, and of the albedo by which it is told whether any is needed.
+SCALE, FINE, COARSE = DirectionGrid(40, 120), DirectionGrid(40, 60), DirectionGrid(20, 30)
+#: Wavelengths of a scale, without a film and with one, whose fringes albedos follow, and of that
+#: albedo; in variants of one wavelength there is one.
+WAVELENGTHS, FILM_WAVELENGTHS, COARSE_WAVELENGTHS = 8, 16, 4
+#: Of the scale of a grating, and of tracks, with weak orders beside it, at most: nodes, as in
+#: `Grating`, and rows, of which there are to be no more than is looked at.
+NODES, TRACK_NODES, TRACK_ROWS = 12, 16, 120
+#: Nothing is scaled where the albedo is at most this: the rest is for what lies between directions.
 TARGET = 0.99
-SWEEPS = 10
-#: As many until nothing changes any more.
+#: Sweeps until nothing changes any more.
 UNTIL_BEST = 40
 #: s is at most this up to 70°, and from 80° at most 1: there part of a lobe is below the horizon,
 #: which would ask for any, and what is above reaches across directions of very different s.
 LARGEST = 1.5
-#: Parts of a cell, polar and azimuthal, looked at where few orders are strong.
-PARTS, FEW_ORDERS = 3, 24
-#: How often s is lowered by the root of what is too much, before by all of it.
-GENTLE = 4
-#: And by how much more than what is too much where it was looked at: peaks lie in between.
-PEAKS = 1.3
-#: The albedo is brought below this where cells of a `DirectionGrid` were looked at.
-CEILING = 0.995
-#: Parts of a cell that are looked at for a scale along the tracks of a surface, of one wavelength
-#: and of many, which look at the same nodes; albedos of directions that mirror each other in the
-#: tracks' plane differ by less.
-ALONG, EVEN = (5, 3), 0.01
+#: Parts of a cell of `SCALE` that are looked at, polar and azimuthal; of one of `FINE` for a scale
+#: along the tracks of a surface, of one wavelength and of many, which look at the same nodes;
+#: albedos of directions that mirror each other in the tracks' plane differ by less.
+ACROSS, ALONG, EVEN = (1, 2), (5, 3), 0.01
+#: Beyond `gain.GRAZING` this share of an albedo that has faded will do.
+FADED = 0.8
 
 
 @dataclass(frozen=True)
@@ -153,20 +148,14 @@ def conservation(
     albedo = maps.albedo(COARSE, _wavelengths(low, high, COARSE_WAVELENGTHS))
     if albedo.values.max() <= TARGET:
         return Conservation(albedo, None)
-    wavelengths = _wavelengths(low, high, FINE_WAVELENGTHS)
-    filmed = isinstance(index(wavelengths), Filmed)
-    few = _wavelengths(low, high, FILM_WAVELENGTHS if filmed else GRATING_WAVELENGTHS)
+    filmed = isinstance(index(albedo.wavelengths), Filmed)
+    wavelengths = _wavelengths(low, high, FILM_WAVELENGTHS if filmed else WAVELENGTHS)
     if (grating := maps.orders.grating) is not None:
-        return Conservation(albedo, maps.of_chains(replace(grating, nodes=NODES), few))
-    if (grating := maps.tracks(albedo)) is not None:
-        return Conservation(albedo, maps.of_tracks(replace(grating, nodes=NODES), few))
-    values = maps.albedo(FINE, wavelengths).values
-    transports = maps.at(wavelengths, FINE.theta, FINE.phi, FINE, faded=maps.fades)
-    aims = np.clip(values, np.float32(0.0), np.float32(TARGET))  # quadrature may fall below 0
-    scale = np.stack(
-        [scaled(*one, FINE.theta[:, None]) for one in zip(transports, aims, strict=True)]
-    )
-    return Conservation(albedo, maps.lowered(DirectionalTable(wavelengths, scale)))
+        return Conservation(albedo, maps.of_chains(replace(grating, nodes=NODES), wavelengths))
+    if (grating := maps.tracks(wavelengths)) is not None:
+        nodes = min(TRACK_NODES, TRACK_ROWS // (grating.units(low) + 1))
+        grating = replace(grating, nodes=nodes, alone=False)
+    return Conservation(albedo, maps.of_directions(grating, wavelengths))
 
 
 def _wavelengths(low: float, high: float, count: int) -> Real:
@@ -250,7 +239,7 @@ def scaled(
     transport: Callable[[Any], Any],
     aim: NDArray[np.floating[Any]],
     theta: Real,
-    sweeps: int = SWEEPS,
+    sweeps: int,
 ) -> Array:
     """s on a grid, whose sums s Ms are `aim`; theta : polar angles, rad, that broadcast to it."""
     s = np.ones_like(aim)
@@ -315,29 +304,41 @@ class _Maps:
             units = grating.units(float(wavelengths[max(math.ceil(page) - 1, 0)]))
             return Chains(self.orders, grating, gain).samples(rows, units, page, places)
 
-        return self._fitted(grating, wavelengths, one)
+        return self._fitted(_ones(grating, wavelengths), one, FEW_ORDERS)
 
-    def of_tracks(self, grating: Grating, wavelengths: Real) -> DirectionalTable:
-        """s of a surface whose strong orders are a grating's, and the weak ones even beside it."""
-        rows = grating.rows(float(wavelengths[0]))
-        ones, parts = np.ones((rows, rows), np.float32), ALONG[len(wavelengths) > 1]
+    def of_directions(self, grating: Grating | None, wavelengths: Real) -> DirectionalTable:
+        """s of a surface whose strong orders are a grating's, with weak ones even beside it; or of
+        any other.
+        """
+        table = _ones(grating, wavelengths)
+        looked_at, parts = SCALE, ACROSS
+        if grating is not None:
+            looked_at, parts = FINE, (ALONG[len(wavelengths) > 1],) * 2
 
         def one(page: float, wavelength: float, gain: Gain, nodes: bool) -> Samples:
-            theta, phi = (FINE.theta, FINE.phi) if nodes else _between(FINE, parts)
-            grid = GratingGrid(grating, rows, wavelength)
-            found = self.orders.of_gain(theta, phi, gain, grid)
-            bounds = limits(found(ones), np.cos(theta[:, None]))
-            return Samples(page, grid.interpolation(theta[:, None], phi), found, *bounds)
+            theta, phi = _between(looked_at, *(0, 0) if nodes else parts)
+            grid, ones = table.grid_at(wavelength), table.values[0]
+            if grating is not None:  # directions that mirror these lie amid them then
+                phi = phi + 0.25 * (phi[1] - phi[0])
+            raw = found = self.orders.of_gain(theta, phi, gain, grid)
+            low, high = limits(raw(ones), np.cos(theta[:, None]))
+            if self.fades:
+                found = self.orders.of_gain(theta, phi, gain, grid, True)
+                # what has faded is not to be made up for
+                faded = np.where(np.cos(theta) < GRAZING, FADED * found(ones).T, np.inf).T
+                low = np.minimum(low, faded)
+            return Samples(page, grid.interpolation(theta[:, None], phi), found, low, high)
 
-        return self._fitted(grating, wavelengths, one)
+        return self._fitted(table, one, SPIKES if self.fades else MANY_ORDERS)
 
     def _fitted(
         self,
-        grating: Grating,
-        wavelengths: Real,
+        ones: DirectionalTable,
         one: Callable[[float, float, Gain, bool], Samples],
+        pace: Pace,
     ) -> DirectionalTable:
-        """s of a grating's nodes; one : samples at a page, at nodes or amid them."""
+        """s at the nodes of a table; one : samples at a page, at nodes or amid them."""
+        wavelengths = ones.wavelengths
         pages = np.arange(float(len(wavelengths)))
         single = len(pages) == 1
         between = pages if single else pages[1:] - 0.5
@@ -348,17 +349,14 @@ class _Maps:
             for each in zip(at, lengths, self.gains(lengths), strict=True)
         ]
         samples = parallel(lambda each: one(*each), given)
-        rows = grating.rows(float(wavelengths[0]))
-        return DirectionalTable(wavelengths, fitted(len(pages), (rows, rows), samples), grating)
+        return replace(ones, values=fitted(ones.values, samples, pace))
 
-    def tracks(self, albedo: DirectionalTable) -> Grating | None:
-        """The grating of all strong orders, if the weak ones, too, reflect evenly beside it.
-
-        Kirchhoff's spikes are more than its nodes can follow, if there is more than a grating.
-        """
+    def tracks(self, wavelengths: Real) -> Grating | None:
+        """The grating of all strong orders, if the weak ones, too, reflect evenly beside it."""
         grating = self.orders.tracks
-        if grating is None or self.model == "kirchhoff":
+        if grating is None:
             return None
+        albedo = self.albedo(FINE, wavelengths[[0, -1]])
         mirrored = 2.0 * np.arctan2(grating.axis[1], grating.axis[0]) - FINE.phi
         theta = FINE.theta[FINE.theta <= np.radians(80.0), None]
         one, other = (
@@ -367,50 +365,25 @@ class _Maps:
         )
         return grating if np.abs(one - other).max() <= EVEN else None
 
-    def lowered(self, scale: DirectionalTable) -> DirectionalTable:
-        """s lowered around where between its nodes the albedo is above 1."""
-        grid, s = scale.grid, scale.values.copy()
-        parts = PARTS if len(self.orders.mixture.frequency) <= FEW_ORDERS else 1
-        theta, phi = _between(grid, parts)
-        middle = np.sqrt(scale.wavelengths[1:] * scale.wavelengths[:-1])
-        if not len(middle):
-            middle = scale.wavelengths
-        transports = self.at(middle, theta, phi, grid, self.fades)
-        here = grid.interpolation(theta[:, None], phi)
-        for turn in range(GENTLE + 1):
-            much = np.empty((len(middle), *s.shape[1:]), np.float32)
-            for n, transport in enumerate(transports):
-                mean = 0.5 * (s[n] + s[min(n + 1, len(s) - 1)])
-                found = (here(mean) * transport(mean)).reshape(grid.polar, parts, -1, parts)
-                much[n] = largest_around(np.maximum(found.max(axis=(1, 3)) / CEILING, 1.0))
-            much = of_both_pages(much, len(s))
-            s /= 1.0 + PEAKS * (much - 1.0) if turn == GENTLE else np.sqrt(much)
-        return DirectionalTable(scale.wavelengths, s)
 
-
-def of_both_pages(much: Array, pages: int) -> Array:
-    """From between the wavelengths to them, each the larger of what is to its sides."""
-    if pages == 1:
-        return much
-    return np.concatenate([much[:1], np.maximum(much[1:], much[:-1]), much[-1:]])
+def _ones(grating: Grating | None, wavelengths: Real) -> DirectionalTable:
+    """On a grating's nodes, or on `SCALE`."""
+    rows = grating.rows(float(wavelengths[0])) if grating else 0
+    shape = (rows, rows) if grating else (SCALE.polar + 1, SCALE.azimuthal)
+    return DirectionalTable(wavelengths, np.ones((len(wavelengths), *shape), np.float32), grating)
 
 
 def fades(grating: Grating | None, model: str) -> bool:
-    """Whether what is scaled has `gain.fade`: Kirchhoff's, but for gratings."""
-    return model == "kirchhoff" and grating is None
+    """Whether what is scaled has `gain.fade`: Kirchhoff's, but for orders of a grating alone."""
+    return model == "kirchhoff" and (grating is None or not grating.alone)
 
 
-def _between(grid: DirectionGrid, parts: int) -> tuple[Real, Real]:
-    """Middles of the parts of all cells: polar angles and azimuths."""
+def _between(grid: DirectionGrid, polar: int, azimuthal: int) -> tuple[Real, Real]:
+    """Middles of so many parts of all cells: polar angles and azimuths; for none, the nodes."""
+    if polar == 0:
+        return grid.theta, grid.phi
     low, high = grid.theta[:-1, None], grid.theta[1:, None]
-    theta = low + (high - low) * ((np.arange(parts) + 0.5) / parts)
-    count = grid.azimuthal * parts
+    theta = low + (high - low) * ((np.arange(polar) + 0.5) / polar)
+    count = grid.azimuthal * azimuthal
     phi: Real = (np.arange(count, dtype=float) + 0.5) * (2.0 * np.pi / count)
     return theta.ravel(), phi
-
-
-def largest_around(cells: Array) -> Array:
-    """From cells (polar, azimuthal) to vertices, each the largest of the cells around it."""
-    rows = np.concatenate([cells[:1], np.maximum(cells[1:], cells[:-1]), cells[-1:]])
-    rows[0] = rows[0].max()  # all cells of the first row meet at the normal
-    return np.maximum(rows, np.roll(rows, 1, axis=1))

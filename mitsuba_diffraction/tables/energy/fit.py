@@ -12,7 +12,7 @@ import math
 import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -33,14 +33,29 @@ GAINS = 1.02
 GRAZING, LESS = math.cos(math.radians(81.0)), 0.1
 #: s is at most this.
 LARGEST = 1.5
-#: Steps of the fit, and of what is taken at last: by the root of it, then by all.
-FITS, GENTLE = 40, 3
-#: Part of what is missing: by half, both ends of a pair of directions would have all of it.
-STEP = 0.9
-#: Albedos are at most this at last.
-CEILING = 0.997
+#: What is taken at last: so often by the root of it, then by all.
+GENTLE = 3
 #: Nodes around which so little is looked at are as the nearest others.
 FEW = 0.05
+
+
+@dataclass(frozen=True)
+class Pace:
+    """Of a fit: how many steps it has; the part of what is missing that each goes, of which half
+    would give both ends of a pair of directions all of it; and of the step before. At last albedos
+    are at most `ceiling`.
+    """
+
+    steps: int
+    part: float
+    inertia: float
+    ceiling: float
+
+
+#: Of a grating, whose directions hang together by few orders, and of other surfaces; and of these
+#: if they have Kirchhoff's spikes, which are more than is looked at.
+FEW_ORDERS, MANY_ORDERS = Pace(40, 0.9, 0.0, 0.997), Pace(24, 0.5, 0.6, 0.997)
+SPIKES = replace(MANY_ORDERS, ceiling=0.992)
 
 
 def limits(raw: Real | Array, cosine: Real) -> tuple[Real, Real]:
@@ -82,9 +97,9 @@ class Samples:
         missing = np.log(np.clip(kept, self.low, self.high) / kept)
         return self.here.spread(missing).reshape(scale[0].shape)
 
-    def excess(self, scale: Array) -> Real:
+    def excess(self, scale: Array, ceiling: float) -> Real:
         """By what factor, at least 1, an albedo around each node is too much."""
-        much = self._kept(scale) / CEILING
+        much = self._kept(scale) / ceiling
         return self.here.largest(much).reshape(scale[0].shape)
 
     def _kept(self, scale: Array) -> Real:
@@ -93,9 +108,9 @@ class Samples:
         return np.maximum(self.here(s) * self.transport(s), 1e-6)
 
 
-def fitted(pages: int, shape: tuple[int, int], samples: Sequence[Samples]) -> Array:
-    """s (pages, *shape)."""
-    scale = np.ones((pages, *shape), np.float32)
+def fitted(scale: Array, samples: Sequence[Samples], pace: Pace) -> Array:
+    """s (pages, rows, columns), from where it begins."""
+    shape = scale.shape[1:]
 
     def at_pages(found: list[Real], combine: np.ufunc, start: float) -> Real:
         total = np.full(scale.shape, start)
@@ -108,13 +123,15 @@ def fitted(pages: int, shape: tuple[int, int], samples: Sequence[Samples]) -> Ar
         return one.missing(scale)
 
     def excess(one: Samples) -> Real:
-        return one.excess(scale)
+        return one.excess(scale, pace.ceiling)
 
     ones = [one.here.spread(np.ones(one.low.shape)).reshape(shape) for one in samples]
     count = np.maximum(at_pages(ones, np.add, 0.0), 1e-9)
-    for _ in range(FITS):
-        step = at_pages(parallel(missing, samples), np.add, 0.0) / count
-        scale = np.minimum(scale * np.exp(STEP * step), LARGEST).astype(np.float32)
+    step = np.zeros(scale.shape)
+    for _ in range(pace.steps):
+        step = pace.inertia * step
+        step += pace.part * at_pages(parallel(missing, samples), np.add, 0.0) / count
+        scale = np.minimum(scale * np.exp(step), LARGEST).astype(np.float32)
     for page, few in zip(scale, count < FEW, strict=True):
         if few.any() and not few.all():
             nearest = distance_transform_edt(few, return_distances=False, return_indices=True)

@@ -164,17 +164,17 @@ def over_lobe(gain: Real, at_horizon: Real, cos_o: Real, pole: Real) -> Real:
     return np.asarray(gain * (1.0 + share * (cos_o * pole - 1.0)))
 
 
-#: cosθ of `fade`: light that leaves or comes within 9° of the horizon.
-GRAZING = float(np.cos(np.radians(81.0)))
+#: cosθ of `fade`: light that leaves or comes within 5° of the horizon.
+GRAZING = float(np.cos(np.radians(85.0)))
 
 
 def fade(cos_i: ArrayLike, cos_o: ArrayLike) -> Real:
-    """(min/max)² of the two cosines, those above cos 81° taken for cos 81°: symmetric.
+    """(min/max)² of the two cosines, those above cos 85° taken for cos 85°: symmetric.
 
     Kirchhoff's G grows as 1/cosθo towards the horizon: an order that comes up there is a spike of
     the albedo as narrow as the coherence window's lobe. So it comes up gently, and what is taken
-    from light between the horizon and 9° above the other directions get back (`conservation`).
-    Mirrors, and all light that comes and leaves within 81° of the normal, are left as they are.
+    from light between the horizon and 5° above the other directions get back (`conservation`).
+    Mirrors, and all light that comes and leaves within 85° of the normal, are left as they are.
     """
     one, other = np.minimum(cos_i, GRAZING), np.minimum(cos_o, GRAZING)
     return np.asarray((np.minimum(one, other) / np.maximum(one, other)) ** 2)

@@ -107,9 +107,11 @@ class Orders:
         """As `transport`."""
 
         def rows(theta: Real, phi: Real) -> list[Row]:
+            # R = 1 is Kirchhoff's own
+            tables = [None] * len(theta) if gain.index is None else gain.tables(theta)
             return [
                 _Reflected(self, gain.wavenumber, float(angle), phi, table, faded)
-                for angle, table in zip(theta, gain.tables(theta), strict=True)
+                for angle, table in zip(theta, tables, strict=True)
             ]
 
         return self.of_rows(rows, theta, phi, grid)
@@ -286,7 +288,7 @@ class _Reflected(Row):
     """Of light that stays above the surface."""
 
     def __init__(
-        self, orders: Orders, k: float, theta: float, phi: Real, table: Real, faded: bool
+        self, orders: Orders, k: float, theta: float, phi: Real, table: Real | None, faded: bool
     ) -> None:
         super().__init__(orders, k, math.sin(theta), theta, phi)
         self.cos, self._table, self._faded = math.cos(theta), table, faded
@@ -297,8 +299,9 @@ class _Reflected(Row):
     def gain(self, cos_o: Real, turn: Real) -> Real:
         """G, faded or not."""
         one_plus_dot = 1.0 + self.cos * cos_o + self.sin * np.sqrt(1.0 - cos_o**2) * np.cos(turn)
-        kirchhoff = (one_plus_dot / (self.cos + cos_o)) ** 2 / (self.cos * cos_o)
-        gain = read(self._table, cos_o, turn) * kirchhoff
+        gain = (one_plus_dot / (self.cos + cos_o)) ** 2 / (self.cos * cos_o)
+        if self._table is not None:
+            gain = gain * read(self._table, cos_o, turn)
         return gain * fade(self.cos, cos_o) if self._faded else gain
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.tables.energy import conservation as energy
-from mitsuba_diffraction.tables.energy.fit import CEILING, Samples, fitted, limits
+from mitsuba_diffraction.tables.energy.fit import FEW_ORDERS, Samples, fitted, limits
 from mitsuba_diffraction.tables.energy.grid import DirectionGrid
 from tests.tables.energy.test_conservation import ALUMINIUM, grating, index_of, rough
 
@@ -54,11 +54,11 @@ def test_a_fit_moves_what_is_beyond_its_limits_alone():
     raw = np.where(np.arange(9)[:, None] < 5, 0.8, 1.3) * np.ones((9, 4))
     here = grid.interpolation(grid.theta[:, None], grid.phi)
     samples = Samples(0.0, here, lambda s: raw * s, *limits(raw, np.ones((9, 1))))
-    s = fitted(1, (9, 4), [samples])[0]
+    s = fitted(np.ones((1, 9, 4), np.float32), [samples], FEW_ORDERS)[0]
     assert np.all(s[:5] == 1.0)
     kept = s[5:] ** 2 * raw[5:]
     assert kept.min() >= 0.97
-    assert kept.max() <= CEILING
+    assert kept.max() <= FEW_ORDERS.ceiling
 
 
 @pytest.mark.parametrize(
