@@ -20,8 +20,8 @@ from ..errors import DiffractionWarning
 from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS, response
 from ..optics.mean_second_order import limited
-from ..tables.energy.conservation import FINE, Conservation, DirectionalTable, fades
-from ..tables.energy.gain import GRAZING
+from ..tables.energy.conservation import FINE, Conservation, DirectionalTable
+from ..tables.energy.gain import GRAZING, fades
 from ..tables.energy.store import Energy, mean_exponents
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, Kirchhoff
@@ -70,7 +70,7 @@ class EnergyModel:
         )
         model = "kirchhoff" if kirchhoff else "small_slope"
         self._energy = Energy(table, model, self._indices, (low, high))
-        self._fades = kirchhoff
+        self._fades = fades(model)
         self._warned = False
         self._filmed = isinstance(self._material, UnderFilm) and not kirchhoff
         self._scale, self._mean = DirectionLookup(), DirectionLookup()
@@ -103,8 +103,6 @@ class EnergyModel:
         if self.conserving:
             scales = scales_of([one.scale for one in found])
             self._warn(found)
-            grating = None if scales is None else scales[0].grating
-            self._fades = fades(grating, self._energy.model)
             self._scale.update(scales, nodes, height_scale, lowest is not None)
         if beneath:
             ratios = [self._ratio(one) for one in alike([one.albedo for one in found])]

@@ -204,7 +204,7 @@ def _row(name: str, material: str, found: dict[str, Any]) -> tuple[str, ...]:
     above = found.get("conserved where raw is above 1")
     within = found.get("between 0.97 and 1.001 there")
     most = found.get("reciprocity lets be kept")
-    taken = ", ".join(f"{100 * max(share, 0.0):.1f}" for share in found["taken at"].values())
+    taken = ", ".join(f"{100 * max(0.0, share):.1f}" for share in found["taken at"].values())
     return (
         name,
         material,

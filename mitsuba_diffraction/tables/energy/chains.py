@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from .fit import GAINS, Samples, limits
-from .gain import LEAST_COSINE, over_lobe
-from .grating import LAST_NODE, Grating, GratingGrid, fractions
+from .gain import LEAST_COSINE, fade, fades, over_lobe
+from .grating import Grating, GratingGrid, fractions
 from .grid import LAST_ANGLE
 from .transport import Orders, lobe_means, lobes
 
@@ -35,8 +35,6 @@ Array = NDArray[np.float32]
 
 #: Of what reciprocity takes, directions above 1 lose at most this share of theirs before all do.
 GIVEN = 0.1
-#: Kirchhoff's spikes reach as far, in ξ beyond a whole number, and from `LAST_NODE` on.
-SPIKE = 0.02
 
 
 class OrderGain(Protocol):
@@ -72,14 +70,16 @@ class Chains:
     gain: OrderGain
     sign: int = 1
 
-    def shares(self, first: Real, second: Real, last: int, steepest: bool = False) -> Real:
+    def shares(
+        self, first: Real, second: Real, last: int, steepest: bool = False, faded: bool = False
+    ) -> Real:
         """M (..., last + 1, last + 3), from ξ = (k + first, last − k + second), any one shape.
 
         To l = −1 … last + 1: of lobes just beyond the horizon a part is above it. Where the chain
         would be wider than the hemisphere it is that of the longest wavelength that has it.
 
         steepest : what comes along the horizon is taken to be as close to it as the grids end, not
-        as a lobe there is on the mean.
+        as a lobe there is on the mean. faded : whether by `gain.fade`.
         """
         first, second = first[..., None, None], second[..., None, None]
         width = last + first + second
@@ -102,11 +102,16 @@ class Chains:
         across = np.hypot(x, np.sqrt(y_squared)) * radius
         turn = (x * x_o - y_squared) / np.maximum(across, 1e-12)
         turn = np.arccos(np.clip(turn, -1.0, 1.0))
-        gain = self.gain.at(cos_i, cos_o, turn)
+
+        def at(cos_i: Real, cos_o: Real, turn: Real) -> Real:
+            found = self.gain.at(cos_i, cos_o, turn)
+            return found * fade(cos_i, cos_o) if faded else found
+
+        gain = at(cos_i, cos_o, turn)
         cos_i, cos_o, pole = np.broadcast_arrays(cos_i, cos_o, pole, turn)[:3]
         near = cos_o * pole > 1.001
         end = np.full(np.count_nonzero(near), LEAST_COSINE)
-        at_horizon = self.gain.at(cos_i[near], end, turn[near]) * LEAST_COSINE
+        at_horizon = at(cos_i[near], end, turn[near]) * LEAST_COSINE
         gain[near] = over_lobe(gain[near], at_horizon, cos_o[near], pole[near])
         return np.asarray(power * share * gain)
 
@@ -135,9 +140,12 @@ class Chains:
         shares, at, found, starts = [], [], [], [0]
         for last in range(units + 1):
             m, k = self.shares(first, second, last, True), np.arange(last + 1)
+            raw = m.sum(axis=-1)
+            if fades(self.gain.model):
+                m = self.shares(first, second, last, True, True)
             row, column = places[:, None] + nodes * k, places[:, None] + nodes * (last - k)
             at.append(np.broadcast_arrays(row[:, None], column))
-            found.append(self._limits(m, first, second, last))
+            found.append(self._limits(raw, m.sum(axis=-1), first, second, last))
             shares.append(m)
             starts.append(starts[-1] + count**2 * (last + 1))
         here = GratingGrid(self.grating, rows, 2e3 * np.pi / self.gain.wavenumber).at(*_flat(at))
@@ -153,21 +161,18 @@ class Chains:
         )
         return Samples(page, here, lambda values: matrix @ here(values), *_flat(found))
 
-    def _limits(self, shares: Real, first: Real, second: Real, last: int) -> tuple[Real, Real]:
+    def _limits(
+        self, raw: Real, faded: Real, first: Real, second: Real, last: int
+    ) -> tuple[Real, Real]:
         """As `fit.limits`, as far as reciprocity lets them be."""
         g, k = self._step(last + first + second)[..., None], np.arange(last + 1)
         ends = (k + first[..., None]) * (last - k + second[..., None])
-        raw = shares.sum(axis=-1)
-        low, high = limits(raw, g * np.sqrt(ends))
+        low, high = limits(raw, g * np.sqrt(ends), faded)
         lacking = np.maximum(low.sum(axis=-1) - high.sum(axis=-1).T, 0.0)[..., None]
         gives = low * np.clip((raw - 1.0) / (GAINS - 1.0), 0.0, 1.0)
         give = gives.sum(axis=-1)[..., None]
         low = low - gives * np.minimum(lacking / np.maximum(give, 1e-12), GIVEN)
-        low *= balance(low.sum(axis=-1), high.sum(axis=-1).T)[..., None]
-        if self.gain.model == "kirchhoff":
-            near = [(f < SPIKE) | (f > LAST_NODE) for f in (first, second)]
-            low = np.where((near[0] | near[1])[..., None], 0.0, low)
-        return low, high
+        return low * balance(low.sum(axis=-1), high.sum(axis=-1).T)[..., None], high
 
     def _step(self, width: Real) -> Real:
         """g, of chains wider than the hemisphere that of the longest wavelength that has them."""
@@ -185,11 +190,6 @@ class Chains:
             for ends in ((first, second), (second, first))
         ]
         return balance(*totals)
-
-
-def places_amid(nodes: int, model: str) -> Real:
-    """Nodes and amid them, and where Kirchhoff's albedo has its spikes."""
-    return np.append(0.5 * np.arange(2 * nodes), (0.25, 0.75) if model == "kirchhoff" else [])
 
 
 def balance(total: Real, other: Real) -> Real:

@@ -29,9 +29,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...optics.fresnel import Filmed
 from ..table import DiffractionTable
-from .chains import Chains, places_amid
+from .chains import Chains
 from .fit import FEW_ORDERS, MANY_ORDERS, SPIKES, Pace, Samples, fitted, limits, parallel
-from .gain import GRAZING, Gain
+from .gain import Gain, fades
 from .grating import Grating, GratingGrid
 from .grid import DirectionGrid
 from .transport import Orders, Transport
@@ -61,8 +61,6 @@ LARGEST = 1.5
 #: along the tracks of a surface, of one wavelength and of many, which look at the same nodes;
 #: albedos of directions that mirror each other in the tracks' plane differ by less.
 ACROSS, ALONG, EVEN = (1, 2), (5, 3), 0.01
-#: Beyond `gain.GRAZING` this share of an albedo that has faded will do.
-FADED = 0.8
 
 
 @dataclass(frozen=True)
@@ -121,7 +119,7 @@ class Conservation:
     ----------
     albedo : of the model as it is.
     scale : s, or None where the albedo is at most 1; what Kirchhoff's is scaled from is faded
-        (`gain.fade`), unless it is a grating's.
+        (`gain.fade`).
     """
 
     albedo: DirectionalTable
@@ -154,7 +152,7 @@ def conservation(
         return Conservation(albedo, maps.of_chains(replace(grating, nodes=NODES), wavelengths))
     if (grating := maps.tracks(wavelengths)) is not None:
         nodes = min(TRACK_NODES, TRACK_ROWS // (grating.units(low) + 1))
-        grating = replace(grating, nodes=nodes, alone=False)
+        grating = replace(grating, nodes=nodes)
     return Conservation(albedo, maps.of_directions(grating, wavelengths))
 
 
@@ -261,7 +259,7 @@ class _Maps:
 
     @property
     def fades(self) -> bool:
-        return fades(self.orders.grating, self.model)
+        return fades(self.model)
 
     def at(
         self,
@@ -299,7 +297,7 @@ class _Maps:
         rows, count = grating.rows(float(wavelengths[0])), grating.nodes
 
         def one(page: float, wavelength: float, gain: Gain, nodes: bool) -> Samples:
-            places = np.arange(0.0, count) if nodes else places_amid(count, self.model)
+            places = np.arange(0.0, count, 1.0 if nodes else 0.5)
             # longer chains are beyond the horizon at all wavelengths that a page is for
             units = grating.units(float(wavelengths[max(math.ceil(page) - 1, 0)]))
             return Chains(self.orders, grating, gain).samples(rows, units, page, places)
@@ -320,13 +318,11 @@ class _Maps:
             grid, ones = table.grid_at(wavelength), table.values[0]
             if grating is not None:  # directions that mirror these lie amid them then
                 phi = phi + 0.25 * (phi[1] - phi[0])
-            raw = found = self.orders.of_gain(theta, phi, gain, grid)
-            low, high = limits(raw(ones), np.cos(theta[:, None]))
+            found = self.orders.of_gain(theta, phi, gain, grid, self.fades)
+            faded = raw = found(ones)
             if self.fades:
-                found = self.orders.of_gain(theta, phi, gain, grid, True)
-                # what has faded is not to be made up for
-                faded = np.where(np.cos(theta) < GRAZING, FADED * found(ones).T, np.inf).T
-                low = np.minimum(low, faded)
+                raw = self.orders.of_gain(theta, phi, gain, grid)(ones)
+            low, high = limits(raw, np.cos(theta[:, None]), faded)
             return Samples(page, grid.interpolation(theta[:, None], phi), found, low, high)
 
         return self._fitted(table, one, SPIKES if self.fades else MANY_ORDERS)
@@ -371,11 +367,6 @@ def _ones(grating: Grating | None, wavelengths: Real) -> DirectionalTable:
     rows = grating.rows(float(wavelengths[0])) if grating else 0
     shape = (rows, rows) if grating else (SCALE.polar + 1, SCALE.azimuthal)
     return DirectionalTable(wavelengths, np.ones((len(wavelengths), *shape), np.float32), grating)
-
-
-def fades(grating: Grating | None, model: str) -> bool:
-    """Whether what is scaled has `gain.fade`: Kirchhoff's, but for orders of a grating alone."""
-    return model == "kirchhoff" and (grating is None or not grating.alone)
 
 
 def _between(grid: DirectionGrid, polar: int, azimuthal: int) -> tuple[Real, Real]:

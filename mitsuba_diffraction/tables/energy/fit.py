@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from . import gain
 from .grid import Interpolation
 
 Real = NDArray[np.float64]
@@ -31,6 +32,8 @@ TOLERANCE, LEAST, MOST = 0.006, 0.98, 0.994
 GAINS = 1.02
 #: From this polar angle on, part of a lobe is below the horizon: there so much less will do.
 GRAZING, LESS = math.cos(math.radians(81.0)), 0.1
+#: Where light fades so much of what is left of it will do.
+FADED = 0.8
 #: s is at most this.
 LARGEST = 1.5
 #: What is taken at last: so often by the root of it, then by all.
@@ -58,13 +61,17 @@ FEW_ORDERS, MANY_ORDERS = Pace(40, 0.9, 0.0, 0.997), Pace(24, 0.5, 0.6, 0.997)
 SPIKES = replace(MANY_ORDERS, ceiling=0.992)
 
 
-def limits(raw: Real | Array, cosine: Real) -> tuple[Real, Real]:
-    """Least and most that an albedo is to be conserved as, from what it is, and its cosθ."""
+def limits(raw: Real | Array, cosine: Real, faded: Real | Array) -> tuple[Real, Real]:
+    """Least and most that an albedo is to be conserved as, from what it is, and its cosθ.
+
+    faded : what it is by `gain.fade`, if it has that: nothing is to make up for it.
+    """
     raw = np.maximum(raw, 1e-6)  # quadrature may fall below 0
     least = np.minimum(
         (1.0 - TOLERANCE) * raw, np.interp(raw, (1.0, GAINS), (1.0 - TOLERANCE, LEAST))
     )
     low = np.minimum(least, MOST) * np.where(cosine < GRAZING, 1.0 - LESS, 1.0)
+    low = np.where(cosine < gain.GRAZING, np.minimum(low, FADED * faded), low)
     return low, np.minimum((1.0 + TOLERANCE) * raw, MOST)
 
 

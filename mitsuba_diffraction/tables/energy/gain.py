@@ -83,6 +83,8 @@ class Gain:
 
     def between(self, cos_i: Real, cos_o: Real, turn: Real) -> Real:
         """`ratio`, linear between a table's nodes, at (cosθi, cosθo, φo − φi); all broadcast."""
+        if self.index is None:
+            return np.ones(())
         fine = (POLAR_FINE - 1) / (0.5 * np.pi)
         places = [np.arccos(np.minimum(cosine, 1.0)) * fine for cosine in (cos_i, cos_o)]
         column = (np.cos(turn) + 1.0) * (0.5 * (AZIMUTH_FINE - 1))
@@ -178,3 +180,8 @@ def fade(cos_i: ArrayLike, cos_o: ArrayLike) -> Real:
     """
     one, other = np.minimum(cos_i, GRAZING), np.minimum(cos_o, GRAZING)
     return np.asarray((np.minimum(one, other) / np.maximum(one, other)) ** 2)
+
+
+def fades(model: str) -> bool:
+    """Whether what is scaled has `fade`: Kirchhoff's."""
+    return model == "kirchhoff"

@@ -46,14 +46,12 @@ class Grating:
     axis : unit vector in the patch along which heights change.
     spacing : |q| of the first order, rad/µm.
     nodes, last : of a `GratingGrid`, from one whole ξ to the next; and where those of the root end.
-    alone : whether the surface has no other orders.
     """
 
     axis: tuple[float, float]
     spacing: float
     nodes: int = NODES
     last: float = LAST_NODE
-    alone: bool = True
 
     def units(self, shortest: float) -> int:
         """Whole numbers that ξ passes at the shortest wavelength (nm)."""

@@ -22,7 +22,7 @@ from .grid import LAST_ANGLE
 from .links import Medium
 
 #: Raised whenever the computation changes.
-VERSION = 13
+VERSION = 14
 
 #: Height scales are n/steps: this phase (rad) changes at most in between. The power of an order
 #: bends by a fiftieth then, and by less at grazing angles, where there is most to take.
@@ -35,10 +35,10 @@ _PROBES = 24
 
 _SETTINGS = (
     VERSION, str(made.FINE), str(made.COARSE), str(made.SCALE), made.COARSE_WAVELENGTHS,
-    made.TARGET, made.LARGEST, made.ACROSS, made.ALONG, made.EVEN, made.FADED, made.NODES,
+    made.TARGET, made.LARGEST, made.ACROSS, made.ALONG, made.EVEN, made.NODES,
     made.TRACK_NODES, made.TRACK_ROWS, made.WAVELENGTHS, made.FILM_WAVELENGTHS,
-    chains.GIVEN, chains.SPIKE,
-    *(fit.TOLERANCE, fit.LEAST, fit.MOST, fit.GAINS, fit.GRAZING, fit.LESS, fit.GENTLE),
+    chains.GIVEN,
+    *(fit.TOLERANCE, fit.LEAST, fit.MOST, fit.GAINS, fit.GRAZING, fit.LESS, fit.FADED, fit.GENTLE),
     fit.FEW, str(fit.FEW_ORDERS), str(fit.MANY_ORDERS), str(fit.SPIKES), grating.DENSE,
     grating.NODES, grating.LAST_NODE, grating.ENDS, grating.MOST_UNITS,
     gain.POLAR_NODES, gain.AZIMUTH_NODES, gain.GRAZING,

@@ -38,7 +38,7 @@ def test_spreading_is_the_transposed_of_interpolation():
 
 def test_limits_hold_what_is_asked_for():
     raw = np.linspace(0.01, 2.0, 400)
-    low, high = limits(raw, np.ones_like(raw))
+    low, high = limits(raw, np.ones_like(raw), raw)
     below = raw <= 1.0
     assert np.all(low <= high)
     assert np.all(low[below] >= 0.99 * raw[below])
@@ -53,7 +53,7 @@ def test_a_fit_moves_what_is_beyond_its_limits_alone():
     grid = DirectionGrid(8, 4)
     raw = np.where(np.arange(9)[:, None] < 5, 0.8, 1.3) * np.ones((9, 4))
     here = grid.interpolation(grid.theta[:, None], grid.phi)
-    samples = Samples(0.0, here, lambda s: raw * s, *limits(raw, np.ones((9, 1))))
+    samples = Samples(0.0, here, lambda s: raw * s, *limits(raw, np.ones((9, 1)), raw))
     s = fitted(np.ones((1, 9, 4), np.float32), [samples], FEW_ORDERS)[0]
     assert np.all(s[:5] == 1.0)
     kept = s[5:] ** 2 * raw[5:]
