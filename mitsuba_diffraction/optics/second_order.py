@@ -15,7 +15,9 @@ spectrum of (∂_l h)² exp(−iQh). For unpolarised light the power of the firs
 
 s the share of small slope in the model (`blend.weight`). c knows directions
 and index alone, is symmetric in ωi and ωo and even in the azimuth between them. It is for
-dielectrics: on metals surface plasmons are a pole of M that no such form has. Lengths over 2π/λ.
+dielectrics: on metals surface plasmons are a pole of M that no such form has. Towards the normal,
+where there is little to gain, the form errs by more than that: c is faded by `obliqueness`, a
+choice by rigorous solutions (docs/validation.md). Lengths over 2π/λ.
 
 r tells hills from pits: with l along an order's q and t across it, r_l = a* D_l/|a|² of the spectra
 of exp(−iκh) and (∂_l h)² exp(−iκh), r_t likewise. A power spectrum knows |a|² alone. Of many orders
@@ -181,7 +183,14 @@ def slope_coefficients(wi: ArrayLike, wo: ArrayLike, index: complex) -> Complex:
     right = np.einsum("nm,nmi,nm->ni", weight, products, onto)
     found = np.linalg.solve(matrix + _RIDGE * trace * np.eye(2), right[..., None])[..., 0]
     power = np.sum(np.abs(first) ** 2, axis=(1, 2))
-    return np.asarray(-0.25 * kappa[:, 0, 0] * found / power[:, None])
+    faded = obliqueness(incident[2], outgoing[:, 2])[:, None]
+    return np.asarray(-0.25 * faded * kappa[:, 0, 0] * found / power[:, None])
+
+
+def obliqueness(cos_i: ArrayLike, cos_o: ArrayLike) -> Real:
+    """What c is multiplied by: 0 along the normal to 1 from 45° of both directions on."""
+    mean = 0.5 * (np.asarray(cos_i, np.float64) + np.asarray(cos_o, np.float64))
+    return np.asarray(np.minimum(1.0, 2.0 * (1.0 - mean**2)))
 
 
 @lru_cache(maxsize=16)

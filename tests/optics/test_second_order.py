@@ -12,6 +12,7 @@ from mitsuba_diffraction.optics.second_order import (
     along,
     factor,
     interpolated,
+    obliqueness,
     slope_coefficients,
 )
 from tests.directions import polar, rough_patch
@@ -92,3 +93,12 @@ def test_along_and_across_turn_with_the_order():
     assert x == pytest.approx(products[:, 0])
     expected = products @ [0.36, 0.96, 0.64]
     assert lengthwise == pytest.approx(expected)
+
+
+def test_it_fades_towards_the_normal_and_not_in_oblique_light():
+    cosines = np.cos(np.radians([0.0, 20.0, 45.0, 60.0, 89.0]))
+    faded = obliqueness(cosines[:, None], cosines)
+    assert faded[0, 0] == 0.0
+    assert np.all(np.diff(faded, axis=0) >= 0.0)  # the steeper, the less
+    assert np.array_equal(faded, faded.T)
+    assert faded[2:, 2:] == pytest.approx(1.0)

@@ -48,7 +48,7 @@ def test_orders_have_the_reference_s_power(variant, ours, theirs):
     light = coloured()
     first, both = (reference(light, second_order=second, **theirs) for second in (False, True))
     change = np.abs(both - first).sum()
-    assert change > 0.004 * first.sum()
+    assert change > 0.002 * first.sum()  # light in a coat is steeper
     # c is interpolated between angles, r between κ
     found = load(**{"tolerance": 1e-4, **ours})
     assert np.abs(brdf_values(found, *light) - both).sum() < 0.12 * change

@@ -246,10 +246,16 @@ def beneath(plate: Any, wo: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize(
-    ("name", "method"), [("llvm_ad_rgb", "lut"), ("llvm_ad_spectral", "spectral")]
+    ("name", "method", "material"),
+    [
+        ("llvm_ad_rgb", "lut", {"int_ior": 1.58}),
+        ("llvm_ad_spectral", "spectral", {"int_ior": 2.2, "coat_ior": 1.2}),
+    ],
 )
 @pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
-def test_light_diffracted_twice_is_the_plugins(gl: Any, name: str, method: str) -> None:
+def test_light_diffracted_twice_is_the_plugins(
+    gl: Any, name: str, method: str, material: dict[str, float]
+) -> None:
     mi.set_variant(name)
     pits = md.gratings.cd(4.0, 80)  # whose orders have an r each
     turns = np.radians([50, 62, 74, 86, 98, 110])
@@ -257,8 +263,8 @@ def test_light_diffracted_twice_is_the_plugins(gl: Any, name: str, method: str) 
     for second in (False, True):
         bsdf = mi.load_dict(
             md.bsdf_dict(
-                pits, coherence_width=12, int_ior=1.58, height_scale=0.9,
-                energy_conserving=False, second_order=second,
+                pits, coherence_width=12, height_scale=0.9, energy_conserving=False,
+                second_order=second, **material,
             )
         )  # fmt: skip
         made = Renderer(mi.load_dict(under_a_sun(bsdf, turned(turns[0]))), context=gl)
@@ -271,9 +277,9 @@ def test_light_diffracted_twice_is_the_plugins(gl: Any, name: str, method: str) 
         expected.append(np.array([reflected(bsdf, turned(turn)) for turn in turns]))
         made.release()
     first, change = off(found[0], expected[0]), expected[1] - expected[0]
-    assert np.abs(change).sum() > 0.1 * np.abs(expected[0]).sum()
-    # half floats of r and c, besides what the first order's table is off by
-    assert off(found[1] - found[0], change) < first + 2e-3
+    assert np.abs(change).sum() > 0.02 * np.abs(expected[0]).sum()
+    # besides what the first order's table is off by: half floats of r and c, lobes at two points
+    assert off(found[1] - found[0], change) < first + 4e-3
 
 
 def off(found: NDArray[np.float64], exact: NDArray[np.float64]) -> float:
