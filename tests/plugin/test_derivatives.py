@@ -25,7 +25,8 @@ PIGMENT = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.4}}
 #: Parameter, what makes it appear, where to take the derivative, and half the step of differences.
 PARAMETERS = {
     "height_scale": ({"material": "none"}, 0.9, 2e-3),
-    "orientation": ({"material": "none"}, 20.0, 0.05),
+    # the bound of R = 1 has 16 nodes from one order to the next: a wider step straddles more kinks
+    "orientation": ({"material": "none"}, 20.0, 0.02),
     "eta": ({"int_ior": 1.5}, 1.6, 1e-3),
     "eta.value": ({"eta": 0.9, "k": 6.0}, 0.9, 1e-3),
     "k.value": ({"eta": 0.9, "k": 6.0}, 6.0, 1e-2),
