@@ -134,13 +134,12 @@ second_order : boolean [true where it can be]
 energy_conserving : boolean [true]
     Where the model reflects more than it gets, multiplies it by s(ωi) s(ωo), a scale of directions
     found for this table, model, material and each wavelength, so that no more is reflected than
-    comes in: reciprocal. Kirchhoff's model fades within 9° of the horizon as well, but for
-    gratings. Dielectrics gain nothing and are as they are; blazed metal gratings lose some of the
-    light of directions that gain nothing, too (docs/energy.md has figures). `false` is the model as
-    it is, for checks. The scale takes a second or more the first time, and is kept in the cache. It
-    follows height_scale, interpolated between a few: an optimisation waits where it enters such an
-    interval for the first time. For its derivative, enable that of height_scale before
-    parameters.update().
+    comes in: reciprocal. Kirchhoff's model fades within 5° of the horizon as well. Dielectrics gain
+    nothing and are as they are; blazed metal gratings lose some of the light of directions that
+    gain nothing, too (docs/energy.md has figures). `false` is the model as it is, for checks. The
+    scale takes a second or more the first time, and is kept in the cache. It follows height_scale,
+    interpolated between a few: an optimisation waits where it enters such an interval for the first
+    time. For its derivative, enable that of height_scale before parameters.update().
 shadowing : string [none]
     `vcavity`: the surface shadows itself like long V-shaped grooves (Torrance and Sparrow 1967);
     `none`.

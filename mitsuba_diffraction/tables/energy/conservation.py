@@ -11,9 +11,9 @@ symmetric kernel to given sums (Sinkhorn and Knopp 1967), by the iteration s ←
 with M of `transport`. What is left to do:
 
 - Between the grid's directions and wavelengths an order may appear or vanish (a Rayleigh anomaly).
-  So the albedo is looked at between them too, and s lowered around where it is above 1.
+  So the albedo is looked at between them too, and s fitted there as well (`fit`).
 - Gratings have few orders and so the most of both, and they are solved otherwise: by chains of
-  directions, on a grid whose nodes lie where orders appear (`chains`, `grating`, `fit`). So are
+  directions, on a grid whose nodes lie where orders appear (`chains`, `grating`). So are
   surfaces whose strong orders are a grating's, but without chains.
 """
 
@@ -47,9 +47,10 @@ SCALE, FINE, COARSE = DirectionGrid(40, 120), DirectionGrid(40, 60), DirectionGr
 #: Wavelengths of a scale, without a film and with one, whose fringes albedos follow, and of that
 #: albedo; in variants of one wavelength there is one.
 WAVELENGTHS, FILM_WAVELENGTHS, COARSE_WAVELENGTHS = 8, 16, 4
-#: Of the scale of a grating, and of tracks, with weak orders beside it, at most: nodes, as in
-#: `Grating`, and rows, of which there are to be no more than is looked at.
-NODES, TRACK_NODES, TRACK_ROWS = 12, 16, 120
+#: Nodes of a grating's scale, as in `Grating`: at least; and at most, of Kirchhoff's steep albedos
+#: or of tracks, with weak orders beside it, as many as so many rows have: more than is looked at
+#: would be too many.
+NODES, MOST_NODES, SPIKES_ROWS, TRACK_ROWS = 12, 16, 160, 120
 #: Nothing is scaled where the albedo is at most this: the rest is for what lies between directions.
 TARGET = 0.99
 #: Sweeps until nothing changes any more.
@@ -149,9 +150,11 @@ def conservation(
     filmed = isinstance(index(albedo.wavelengths), Filmed)
     wavelengths = _wavelengths(low, high, FILM_WAVELENGTHS if filmed else WAVELENGTHS)
     if (grating := maps.orders.grating) is not None:
-        return Conservation(albedo, maps.of_chains(replace(grating, nodes=NODES), wavelengths))
+        most = SPIKES_ROWS // (grating.units(low) + 1) if maps.fades else 0
+        nodes = max(NODES, min(MOST_NODES, most))
+        return Conservation(albedo, maps.of_chains(replace(grating, nodes=nodes), wavelengths))
     if (grating := maps.tracks(wavelengths)) is not None:
-        nodes = min(TRACK_NODES, TRACK_ROWS // (grating.units(low) + 1))
+        nodes = min(MOST_NODES, TRACK_ROWS // (grating.units(low) + 1))
         grating = replace(grating, nodes=nodes)
     return Conservation(albedo, maps.of_directions(grating, wavelengths))
 

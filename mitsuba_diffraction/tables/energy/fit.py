@@ -33,7 +33,7 @@ GAINS = 1.02
 #: From this polar angle on, part of a lobe is below the horizon: there so much less will do.
 GRAZING, LESS = math.cos(math.radians(81.0)), 0.1
 #: Where light fades so much of what is left of it will do.
-FADED = 0.8
+FADED = 0.4
 #: s is at most this.
 LARGEST = 1.5
 #: What is taken at last: so often by the root of it, then by all.

@@ -36,7 +36,7 @@ _PROBES = 24
 _SETTINGS = (
     VERSION, str(made.FINE), str(made.COARSE), str(made.SCALE), made.COARSE_WAVELENGTHS,
     made.TARGET, made.LARGEST, made.ACROSS, made.ALONG, made.EVEN, made.NODES,
-    made.TRACK_NODES, made.TRACK_ROWS, made.WAVELENGTHS, made.FILM_WAVELENGTHS,
+    made.MOST_NODES, made.SPIKES_ROWS, made.TRACK_ROWS, made.WAVELENGTHS, made.FILM_WAVELENGTHS,
     chains.GIVEN,
     *(fit.TOLERANCE, fit.LEAST, fit.MOST, fit.GAINS, fit.GRAZING, fit.LESS, fit.FADED, fit.GENTLE),
     fit.FEW, str(fit.FEW_ORDERS), str(fit.MANY_ORDERS), str(fit.SPIKES), grating.DENSE,

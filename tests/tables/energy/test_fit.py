@@ -9,7 +9,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.tables.energy import conservation as energy
 from mitsuba_diffraction.tables.energy.fit import FEW_ORDERS, Samples, fitted, limits
 from mitsuba_diffraction.tables.energy.grid import DirectionGrid
-from tests.tables.energy.test_conservation import ALUMINIUM, grating, index_of, rough
+from tests.tables.energy.test_conservation import MATERIALS, grating, index_of, rough
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
 
@@ -61,15 +61,17 @@ def test_a_fit_moves_what_is_beyond_its_limits_alone():
     assert kept.max() <= FEW_ORDERS.ceiling
 
 
+@pytest.mark.parametrize("material", ["aluminium", "perfect"])
 @pytest.mark.parametrize(
     ("field", "width", "wavelengths"),
     [(grating(0.3), 65.0, (500.0, 600.0)), (pits(), 38.4, (550.0, 550.0))],
     ids=["grating", "pits"],
 )
-def test_what_is_above_1_is_taken_and_nothing_else(field, width, wavelengths):
-    """At directions, and of the grating wavelengths, beside the scale's, of aluminium."""
+def test_what_is_above_1_is_taken_and_nothing_else(field, width, wavelengths, material):
+    """At directions, and of the grating wavelengths, beside the scale's."""
     table = md.DiffractionTable.build(field, coherence_width=width)
-    arguments = (table, 1.0, "small_slope", index_of(ALUMINIUM))
+    model, index = MATERIALS[material]
+    arguments = (table, 1.0, model, index_of(index))
     found = energy.conservation(*arguments, wavelengths)
     assert found.scale is not None
     assert found.scale.grating is not None
