@@ -33,17 +33,8 @@ def test_on_keratin_in_oblique_light_goals_are_met(sides):
         assert 0 < default <= goal < kirchhoff
 
 
-def test_on_keratin_what_is_worse_than_kirchhoff_is_listed_and_nearly_exact(sides):
-    text = goals.keratin(sides)
-    assert "the default in the first order is so in 0, " in text
-    worse = [line.split("|")[1:] for line in text.splitlines() if "° |" in line]
-    assert f" in {len(worse)}:" in text
-    for label, angle, *values in worse:
-        kirchhoff, first, default = (float(value.strip(" %")) for value in values[:3])
-        # two waves alone are in between there, and the closed form is of all of a plane
-        assert label.strip().startswith("sinusoidal")
-        assert angle.strip() == "0°"
-        assert first < 1.1 * kirchhoff < default < kirchhoff + 0.1
+def test_on_keratin_nothing_is_worse_than_kirchhoff_by_more_than_a_tenth(sides):
+    assert "changed it is in 0 of 104 gratings" in goals.keratin(sides)
 
 
 def test_on_aluminium_few_gratings_are_worse_and_by_little(cases):

@@ -58,9 +58,8 @@ def test_sinusoids_in_any_mount_and_crossed_gratings_are_nearly_exact(keratin):
     for c in keratin:
         if c.case.surface.kind in ("sinusoid", "crossed"):
             assert c.by_model["small_slope"] < 0.03, c.case
-            # or worse by little, where both are as good as exact; see test_models
-            assert c.by_model["small_slope"] < c.by_model["kirchhoff"] + 1e-3, c.case
-            assert c.by_model["first_order"] < c.by_model["kirchhoff"] + 5e-4, c.case
+            # or worse by little, where both are as good as exact
+            assert c.by_model["small_slope"] < c.by_model["kirchhoff"] + 5e-4, c.case
             for new, old in zip(c.polarised["small_slope"], c.polarised["kirchhoff"], strict=True):
                 assert new < old, c.case
 
