@@ -7,6 +7,7 @@ import pytest
 pytest.importorskip("distributed")
 
 from mitsuba_diffraction import cluster
+from mitsuba_diffraction.cluster import tasks
 from tests.coarse import vectors_of
 
 
@@ -23,3 +24,13 @@ def workers_vectors(own_vectors):
     before = vectors_of(own_vectors)
     yield
     vectors_of(before)
+
+
+@pytest.fixture(autouse=True)
+def own_scenes():
+    """A scene that a worker keeps between tasks is let go of in this process.
+
+    Dr.Jit's replay of a frozen function that was recorded beside it would end the process.
+    """
+    yield
+    tasks._scene.cache_clear()
