@@ -55,7 +55,8 @@ In oblique light it takes most of the error on a CD, whose pits are all of one k
 takes a quarter if each order has its own ratios, and a tenth from a whole patch: one window's
 speckle has ratios of its own, which cells of many orders have not. What is left beyond the second
 order's own error, above, is in waves in between that fade, which the closed form leaves out. At
-normal incidence there is nothing to gain. It is not for metals, where surface plasmons are a pole
+normal incidence there is nothing to gain, and there the coefficients are faded out: without that,
+four sinusoids were worse than by Kirchhoff. It is not for metals, where surface plasmons are a pole
 that no such form has.
 
 The mean of either direction is no way to the second order without a film: it leaves the cuts of
