@@ -8,6 +8,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 import pytest
+from tests.plugin.test_through import BELOW, INDICES, SIDES, OneSide, both, sampled
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.tables.energy import sides
@@ -20,7 +21,6 @@ from tests.plugin import test_chi2
 from tests.plugin.conftest import runs
 from tests.plugin.test_chi2 import SMALL, Case, chi_square
 from tests.plugin.test_model import pairs
-from tests.plugin.test_through import BELOW, INDICES, SIDES, OneSide, both, sampled
 from tests.plugin.test_variants import evaluate
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
