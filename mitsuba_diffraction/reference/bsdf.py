@@ -164,13 +164,18 @@ def btdf(
         jones = np.asarray((1 - s) * jones + s * through.small_slope(above, inside, eta))
     if thin:
         jones = through.out_of_sheet(jones, above, below, eta)
+    screens = [np.exp(1j * one * field.heights) for one in kappa]
+    places = -k[:, None] * total[:, :2]
     power = [
-        screen_power(np.exp(1j * one * field.heights), field.pixel_size, x, y, sigma, coherence)
-        for one, (x, y) in zip(kappa, -k[:, None] * total[:, :2], strict=True)
+        screen_power(screen, field.pixel_size, x, y, sigma, coherence)
+        for screen, (x, y) in zip(screens, places, strict=True)
     ]
-    cosines = -4 * above[:, 2] * eta * inside[:, 2]
-    factor = cosines / ((lam * 1e-3) ** 2 * np.pi * sigma**2 * total[:, 2] ** 2)
-    return np.where(lit, factor * boundary.unpolarised(jones) * power, 0.0)
+    lobe = 4 * np.pi**2 * sigma**4 * np.exp(-(sigma**2) * np.sum(places**2, axis=1))
+    flat = np.minimum(np.abs([screen.mean() for screen in screens]) ** 2 * lobe, power)
+    cosines = -4 * above[:, 2] * eta * inside[:, 2] / np.maximum(total[:, 2] ** 2, 1e-12)
+    found = cosines * boundary.unpolarised(jones) * (power - flat)
+    found += boundary.unpolarised(through.order_0(above, below, eta, thin=thin)) * flat
+    return np.where(lit, found / ((lam * 1e-3) ** 2 * np.pi * sigma**2), 0.0)
 
 
 def _measured(

@@ -10,7 +10,7 @@ from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from mitsuba_diffraction.tables.energy.conservation import FINE
-from mitsuba_diffraction.tables.energy.powers import power_series
+from mitsuba_diffraction.tables.powers import power_series
 from mitsuba_diffraction.tables.energy.transport import Orders
 from tests.directions import rough_patch
 
