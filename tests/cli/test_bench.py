@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +13,8 @@ from mitsuba_diffraction.analysis.bench import evaluation, figures, scenes
 from mitsuba_diffraction.analysis.bench.contenders import ratio, rounds_of
 from mitsuba_diffraction.analysis.bench.figures import Goal, Plan, Row, Section
 from mitsuba_diffraction.cli import main
-from tests.directions import rough_patch
+from tests.support import ROOT
+from tests.support.directions import rough_patch
 
 # 96 pixels are 4.7 µm, 1/14 of the coherence window: wide taps, but no time to speak of
 TINY = Plan(
@@ -29,7 +29,7 @@ TINY = Plan(
     reference_spp=2,
     map_resolution=8,
 )
-SCENES = Path(__file__).parents[2] / "scenes"
+SCENES = ROOT / "scenes"
 
 
 @pytest.fixture(scope="module", autouse=True)
