@@ -17,9 +17,9 @@ from PIL import Image
 import mitsuba_diffraction as md
 from mitsuba_diffraction.cli import main
 from scenes.make.__main__ import main as make_mesh
-from tests.clone import small_clone
-from tests.instruments import nanoscope
-from tests.test_docs import PAGES, blocks, spans, typed
+from tests.support.clone import small_clone
+from tests.support.instruments import nanoscope
+from tests.support.pages import PAGES, blocks, spans, typed
 
 NOT_RUN = {"view", "tradeoff", "compare", "plan", "--plan"}
 

@@ -20,7 +20,7 @@ from mitsuba_diffraction.analysis.tradeoff.accuracy import (
 )
 from mitsuba_diffraction.analysis.tradeoff.measuring import Measured, Setting, rows, settings
 from mitsuba_diffraction.analysis.tradeoff.report import Budget, recommended
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 PATCH = rough_patch((48, 48), (0.1, 0.1), 0.25)
 WIDTH = 4.5

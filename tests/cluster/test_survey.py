@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import gratings
-from tests.cli.conftest import run  # noqa: F401
-from tests.coarse import coarse_energy
-from tests.conftest import ROOT
+from tests.support import ROOT
+from tests.support.coarse import coarse_energy
 
 AFM = ROOT.parent / "shared" / "afm"
 OPTIONS = (
@@ -44,7 +43,7 @@ def scans(tmp_path, monkeypatch):
     return [*sorted(measured), *(tmp_path / f"{name}.npy" for name in (*made, "damaged"))]
 
 
-def test_a_survey_on_two_workers_and_what_is_new_in_the_next(client, scans, run, tmp_path):  # noqa: F811
+def test_a_survey_on_two_workers_and_what_is_new_in_the_next(client, scans, run, tmp_path):
     client.run(coarse_energy)
     command = "survey", *OPTIONS, "--scheduler", client.scheduler.address
     ran = run(*command, *scans[:-2], scans[-1])

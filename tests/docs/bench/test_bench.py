@@ -13,7 +13,7 @@ import pytest
 from docs.make.bench import evaluation, figures, scenes
 from docs.make.bench.__main__ import main
 from docs.make.bench.figures import Goal, Plan, Row, Section
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 pytestmark = pytest.mark.thorough
 

@@ -6,16 +6,16 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ..tables.energy.conservation import DirectionalTable
-from ..tables.energy.links import Medium
-from ..tables.energy.sides import gathered
-from ..tables.energy.store import SidesEnergy
-from ..tables.table import DiffractionTable
-from .direction_lookup import DirectionLookup, scales_of
-from .fresnel import Dielectric
-from .layers import plain
-from .pair import in_patch
-from .roles import Colour, Float, Mask, Rotation, Vector3f
+from ...tables.energy.conservation import DirectionalTable
+from ...tables.energy.links import Medium
+from ...tables.energy.sides import gathered
+from ...tables.energy.store import SidesEnergy
+from ...tables.table import DiffractionTable
+from ..direction_lookup import DirectionLookup, scales_of
+from ..directions import in_patch
+from ..fresnel import Dielectric
+from ..layers import plain
+from ..types import Colour, Float, Mask, Rotation, Vector3f
 
 #: Indices are rounded to this: an optimisation of one waits rarely, and sees s as constant.
 INDEX_STEP = 0.01

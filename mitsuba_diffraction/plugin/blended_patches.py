@@ -33,9 +33,10 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
-from .changing import Bounded, arrays_within
 from .memory import index_between
-from .roles import (
+from .parameter_changes import Bounded, arrays_within
+from .textures import is_attribute, is_bitmap, require_raw
+from .types import (
     BSDF,
     Callback,
     Context,
@@ -49,7 +50,6 @@ from .roles import (
     Vector2f,
     Vector3f,
 )
-from .textures import is_attribute, is_bitmap, require_raw
 
 _PREFIX = "weight_"
 #: A sum of such weights is far from the largest number there is.

@@ -17,7 +17,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..tables.table import DiffractionTable
-from .roles import Callback, Float
+from .types import Callback, Float
 
 _OURS = __name__.rpartition(".")[0]
 

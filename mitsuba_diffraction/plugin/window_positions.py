@@ -22,9 +22,9 @@ import drjit as dr
 import mitsuba as mi
 
 from ..tables.table import DiffractionTable
+from .directions import in_patch
 from .memory import index_between
-from .pair import in_patch
-from .roles import Float, Interaction, Rotation, Vector2f
+from .types import Float, Interaction, Rotation, Vector2f
 
 TILINGS = ("periodic", "random")
 #: Corners are numbered from minus this on: single precision has twice as many whole numbers.

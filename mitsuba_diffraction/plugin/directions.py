@@ -9,7 +9,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from .roles import Float, Interaction, Mask, Rotation, Vector2f, Vector3f
+from .types import Float, Interaction, Mask, Rotation, Vector2f, Vector3f
 
 SHADOWINGS = ("none", "vcavity")
 

@@ -15,20 +15,12 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from .boundary import Boundary, Jones, Kirchhoff, SmallSlope, mueller
-from .crossing import (
-    Crossing,
-    Sides,
-    Turned,
-    crossing_axes,
-    first_order,
-    out_of_sheet,
-    tangent_plane,
-)
-from .fresnel import Dielectric, Inside, squared
-from .layers import CoatedPair, transmittances
-from .pair import Pair, Place, from_patch
-from .roles import (
+from ..boundary import Boundary, Jones, Kirchhoff, SmallSlope, mueller
+from ..directions import Pair, Place, from_patch
+from ..fresnel import Dielectric, Inside, squared
+from ..layers import CoatedPair, transmittances
+from ..sampling import EVEN, direction_of, with_even_share
+from ..types import (
     BSDF,
     Colour,
     Context,
@@ -41,8 +33,16 @@ from .roles import (
     Vector2f,
     Vector3f,
 )
-from .sampling import EVEN, direction_of, with_even_share
-from .sides import SidesModel
+from .crossing import (
+    Crossing,
+    Sides,
+    Turned,
+    crossing_axes,
+    first_order,
+    out_of_sheet,
+    tangent_plane,
+)
+from .energy import SidesModel
 
 _LEAST_SHARE = 0.1
 #: Of a dielectric over the medium above it.

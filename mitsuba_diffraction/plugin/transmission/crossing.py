@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from .boundary import LEVEL, Jones, turn, turned
-from .fresnel import root
-from .layers import transmittances
-from .pair import Pair, Place, in_patch
-from .roles import Float, Interaction, Mask, Rotation, Vector3f
+from ..boundary import LEVEL, Jones, turn, turned
+from ..directions import Pair, Place, in_patch
+from ..fresnel import root
+from ..layers import transmittances
+from ..types import Float, Interaction, Mask, Rotation, Vector3f
 
 #: Least |w|: where n cosθt and cosθi are alike ⟨|P|²⟩/w² has a limit, but 0/0 has none.
 _LEAST_W = 1e-3
