@@ -6,7 +6,7 @@ import mitsuba as mi
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.geometry import sigma_of
-from tests.directions import lit_pairs, rough_patch
+from tests.support.directions import lit_pairs, rough_patch
 
 #: 4.76 × 5.28 µm, gentle, its pixels and its numbers of them unequal: nothing is symmetric.
 PATCH = rough_patch((66, 56), (0.085, 0.08), 0.08)

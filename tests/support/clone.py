@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from tests.conftest import ROOT
+from tests.support import ROOT
 
 #: One patch for all scenes, whose table is made once.
 SMALL = {"resx": "12", "resy": "10", "patch": "../precompute/elaphe_like.toml"}

@@ -6,7 +6,7 @@ import numpy as np
 
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor
-from tests.directions import lit_pairs, rough_patch
+from tests.support.directions import lit_pairs, rough_patch
 
 #: 5.04 × 4.8 µm; WIDTH is nearly that wide.
 PATCH = rough_patch((64, 63), (0.08, 0.075), 0.25)

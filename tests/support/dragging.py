@@ -1,6 +1,6 @@
 """Time per picture while a page's camera or light is dragged, in a browser without a graphics card.
 
-    python -m tests.realtime.web.dragging snake.html
+    python -m tests.support.dragging snake.html
 
 A picture's time is from the start of its drawing until a pixel of it can be read from the screen's
 own framebuffer; intervals are those between pictures; processor time is that of all the browser's
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import psutil
 
-from tests.realtime.web.conftest import BROWSERS, FLAGS, Tab
+from tests.support.browser import BROWSERS, FLAGS, Tab
 
 _WATCH = """() => {
     window.pictures = [];
@@ -46,7 +46,7 @@ _MOVE = """async ([moves, shiftKey]) => {
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Drag, and print what it took."""
-    parser = argparse.ArgumentParser(prog="python -m tests.realtime.web.dragging")
+    parser = argparse.ArgumentParser(prog="python -m tests.support.dragging")
     parser.add_argument("page", type=Path, help="written by export-viewer")
     parser.add_argument("--size", nargs=2, type=int, default=(1280, 800), metavar="PIXELS")
     parser.add_argument("--moves", type=int, default=80)

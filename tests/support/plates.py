@@ -8,7 +8,7 @@ import mitsuba as mi
 import numpy as np
 
 import mitsuba_diffraction as md
-from tests.directions import Array, rough_patch, uniform_directions
+from tests.support.directions import Array, rough_patch, uniform_directions
 
 PATCH = rough_patch((48, 50), (0.1, 0.1), 0.12)
 OTHER = rough_patch((40, 44), (0.12, 0.1), 0.3, seed=2)
