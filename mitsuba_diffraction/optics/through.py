@@ -125,7 +125,8 @@ def flat_transmittances(cosine: ArrayLike, index: float, thin: bool, side: int) 
     thin : whether below is beyond the flat other side of a sheet (`out_of_sheet`).
     side : 0 above the surface, 1 below.
     """
-    back = np.abs(np.stack(amplitudes(cosine, 1.0 / index if side and not thin else index))) ** 2
+    relative = 1.0 / index if side and not thin else index
+    back = np.minimum(np.abs(np.stack(amplitudes(cosine, relative))) ** 2, 1.0)
     return np.asarray((1.0 - back) / (1.0 + back) if thin else 1.0 - back)
 
 

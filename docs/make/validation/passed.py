@@ -17,9 +17,8 @@ from mitsuba_diffraction.analysis.energy import PASSED, sides_summary
 from mitsuba_diffraction.heights.recipes import Recipe
 from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
-from mitsuba_diffraction.tables.energy.conservation import DirectionalTable
-from mitsuba_diffraction.tables.energy.links import Medium
-from mitsuba_diffraction.tables.energy.sides import Sides
+from mitsuba_diffraction.tables.energy.grid import DirectionalTable
+from mitsuba_diffraction.tables.energy.transmission import Medium, Sides
 
 from . import rayleigh, spread
 from .cases import FEW_WAVELENGTHS, KERATIN, Grating

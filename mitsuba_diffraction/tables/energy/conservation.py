@@ -156,11 +156,12 @@ class _Maps:
         """Find s."""
         settings = self.orders.settings
         grid = _grid(settings)
+        largest = np.interp(np.degrees(grid.theta), (70.0, 80.0), (settings.largest, 1.0))
 
         def at_nodes(each: tuple[Transport, Transport]) -> Array:
             raw, transport = each
             aim = np.minimum(raw(grid.ones), np.float32(settings.target))
-            return scaled(transport, aim, grid.theta[:, None], settings)
+            return scaled(transport, aim, largest[:, None], settings.sweeps)
 
         raw = self.at(wavelengths, grid.theta, grid.phi, grid)
         faded = raw

@@ -17,16 +17,15 @@ Floats = NDArray[np.floating[Any]]
 
 
 def scaled(
-    transport: Callable[[Any], Floats], aim: Floats, theta: Real, settings: EnergySettings
+    transport: Callable[[Any], Floats], aim: Floats, largest: Real | float, sweeps: int
 ) -> Array:
     """Return s such that s Ms is `aim`, by the iteration of Sinkhorn and Knopp (1967).
 
     transport : M, a symmetric kernel's sums for weights on a grid.
-    theta : polar angles of the grid, rad, that broadcast to the aim.
+    largest : upper limit of s.
     """
     s = np.ones_like(aim, np.float32)
-    largest = np.interp(np.degrees(theta), (70.0, 80.0), (settings.largest, 1.0))
-    for _ in range(settings.sweeps):
+    for _ in range(sweeps):
         s = s * np.sqrt(aim / np.maximum(s * transport(s), 1e-6))
         s = np.minimum(s, largest).astype(np.float32)
     return s

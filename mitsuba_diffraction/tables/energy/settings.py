@@ -26,7 +26,7 @@ class EnergySettings:
     threshold : an albedo that is nowhere above needs no scale.
     target : albedos above are scaled to this; what is left to 1 is for what lies between nodes.
     ceiling : most that is left between nodes.
-    largest : of a scale up to 70°; from 80° on it is at most 1, since part of a lobe is below the
+    largest : of a scale; of all light at most 1 from 80° on, since part of a lobe is below the
         horizon there, and what is above reaches across directions of very different scales.
     close : R + T that differs from 1 by less needs no scale.
     passes : how often scales are lowered where an albedo between nodes is above the ceiling.
@@ -34,7 +34,7 @@ class EnergySettings:
 
     polar: int = 40
     azimuthal: int = 60
-    wavelengths: int = 10
+    wavelengths: int = 16
     film_wavelengths: int = 16
     coarse_polar: int = 20
     coarse_azimuthal: int = 30
@@ -47,7 +47,7 @@ class EnergySettings:
     sweeps: int = 12
     threshold: float = 0.99
     target: float = 0.992
-    ceiling: float = 0.997
+    ceiling: float = 1.001
     largest: float = 1.5
     close: float = 5e-4
     passes: int = 4

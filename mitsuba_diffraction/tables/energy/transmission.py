@@ -43,9 +43,6 @@ POLAR, AZIMUTHS = 91, 33
 FARTHEST = 2.0
 #: Where order 0 has less of the light, it is not changed.
 FAINT = 1e-4
-#: R + T is to be 1 up to this polar angle (rad); beyond, ever less is brought back, by so much a
-#: radian, since part of a lobe is below the horizon there.
-CERTAIN, FALL = float(np.radians(75.5)), 1.0
 _DOWN = np.array([1.0, 1.0, -1.0])
 
 
@@ -125,7 +122,7 @@ class Link:
         def passed(cos_i: float, cos_o: Real, turn: Real) -> Real:
             n, thin = self.medium.index, self.medium.thin
             shares = [
-                through.flat_transmittances(np.asarray(cosine), n, thin, side)
+                through.flat_transmittances(np.atleast_1d(cosine), n, thin, side)
                 for side, cosine in ((self.came, cos_i), (self.left, cos_o))
             ]
             return np.asarray(np.mean(np.sqrt(shares[0] * shares[1]), axis=0))
@@ -159,7 +156,7 @@ class Link:
 
     def powers(self, cos_i: Real, cos_o: Real, cos_turn: Real) -> Real:
         """4 qi² qo² times the powers of both models' matrices and of their product, (3, …)."""
-        cos_i, cos_o = np.maximum(cos_i, LEAST_COSINE), np.maximum(cos_o, LEAST_COSINE)
+        cos_i, cos_o = (np.clip(cosine, LEAST_COSINE, 1.0) for cosine in (cos_i, cos_o))
         sin_i, sin_o = np.sqrt(1.0 - cos_i**2), np.sqrt(1.0 - cos_o**2)
         across = np.sqrt(1.0 - cos_turn**2)
         first = [sin_i, 0.0, cos_i], [sin_o * cos_turn, sin_o * across, cos_o]
@@ -280,19 +277,17 @@ class Sides:
         """Find c above and below; None where R + T is 1 as it is."""
         grid, settings = self._grid, self.settings
         wavelengths = wavelengths_of(wavelength_range, settings.wavelengths)
-        ones, theta = np.stack([grid.ones] * 2), grid.theta[:, None]
+        ones = np.stack([grid.ones] * 2)
 
         def solved(wavelength: float) -> Array:
             sums = self._sums(grid.theta, grid.phi, wavelength)
             zeroth = sums.zeroth(ones)
             total = sums.orders + zeroth
-            off = np.abs(total - 1.0)[:, grid.theta <= CERTAIN]
-            if off.max() < settings.close:
+            if np.abs(total - 1.0).max() < settings.close:
                 return ones
-            least = np.minimum(total, 1.0 - FALL * np.maximum(theta - CERTAIN, 0.0))
-            wanted = np.where(theta <= CERTAIN, 1.0, np.clip(total, least, 1.0)) - sums.orders
             most = settings.largest**2
-            c = scaled(sums.zeroth, np.clip(wanted, zeroth / most, zeroth * most), theta, settings)
+            wanted = np.clip(1.0 - sums.orders, zeroth / most, zeroth * most)
+            c = scaled(sums.zeroth, wanted, settings.largest, settings.sweeps)
             return np.where(zeroth > FAINT, c, np.float32(1.0))
 
         scale = np.stack(parallel(solved, wavelengths.tolist()))
@@ -304,13 +299,14 @@ class Sides:
     def _excess(self, wavelength: float) -> Callable[[Array], Array]:
         """Factor by which order 0 between nodes is too large, for `lowered`."""
         grid, most = self._grid, self.settings.largest**2
+        ceiling = np.float32(self.settings.ceiling)
         theta, phi = grid.middles(1)
         sums = self._sums(theta, phi, wavelength)
         here = grid.interpolation(theta[:, None], phi)
 
         def of_page(c: Array) -> Array:
             zeroth = np.stack([here(side) for side in c]) * sums.zeroth(c)
-            room = np.maximum(1.0 - sums.orders, 0.0)
+            room = np.maximum(ceiling - sums.orders, 0.0)
             factor = np.clip(zeroth / np.maximum(room, 1e-6), 1.0, most)
             return np.where(zeroth > FAINT, factor, 1.0).astype(np.float32)
 

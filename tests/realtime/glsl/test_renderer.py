@@ -21,7 +21,7 @@ from mitsuba_diffraction.realtime.comparison.measures import regions
 from mitsuba_diffraction.realtime.comparison.truth import box_sensor, seen, with_lights
 from mitsuba_diffraction.realtime.glsl.context import check_version, headless_context
 from mitsuba_diffraction.realtime.glsl.renderer import Renderer
-from mitsuba_diffraction.tables.energy.conservation import FINE
+from mitsuba_diffraction.tables.energy.grid import FINE
 from tests.support.lanes import interaction, spectra, vectors
 
 pytestmark = pytest.mark.usefixtures("coarse")

@@ -9,7 +9,7 @@ from scipy.special import jv
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.tables.colour.table import ColourTable
-from mitsuba_diffraction.tables.energy.conservation import FINE
+from mitsuba_diffraction.tables.energy.grid import FINE
 from mitsuba_diffraction.tables.powers import power_series
 from mitsuba_diffraction.tables.energy.transport import Orders
 from tests.support.directions import rough_patch
