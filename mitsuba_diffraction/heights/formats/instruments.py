@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import DiffractionError, DiffractionWarning
+from ...errors import DiffractionError, warn
 from ..field import check_pixel_count
 from . import RawHeights, first_line
 
@@ -84,11 +84,9 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
         finally:
             reader.close()
     if others:
-        warnings.warn(
+        warn(
             f"{shown} has several height channels; {chosen.name!r} was taken, channel= chooses "
-            f"another: {others}",
-            DiffractionWarning,
-            stacklevel=2,
+            f"another: {others}"
         )
     raw.notes = (note,)
     return raw
