@@ -10,8 +10,8 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.settings import SCENE_SETTINGS
-from tests.directions import polar, rough_patch
-from tests.lanes import evaluated, refusal
+from tests.support.directions import polar, rough_patch
+from tests.support.lanes import evaluated, refusal
 
 #: 2.56 × 2.4 µm and gentle, so that nothing warns of it.
 PATCH = rough_patch((30, 32), (0.08, 0.08), 0.03)

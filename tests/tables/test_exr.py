@@ -16,7 +16,7 @@ import pytest
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.tables.exr import ATTRIBUTE, read_document
 from mitsuba_diffraction.tables.table import FORMAT_VERSION
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 PATCH = rough_patch((24, 21), (0.08, 0.09), 0.2)
 #: Every layout of coefficients: half and single floats, one component and two, intervals.

@@ -17,7 +17,7 @@ from mitsuba_diffraction import (
 )
 from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables import store
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 PATCH = rough_patch((20, 20), (0.08, 0.08), 0.1)
 ARGUMENTS = {"coherence_width": 1.6}

@@ -8,16 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_diffraction import HeightField
-
 from .compare import GRAZING
 from .model import efficiencies, jones_of, shares
 from .patch_solutions import Solved, solved
-from .patches import KINDS, MEASURED, PatchCase, Surface, cell, patch_index, whole_patch
+from .patches import KINDS, PatchCase, cell, patch_index, ratios_of
 
 _MODELS = ("kirchhoff", "small_slope_alone", "first_order", "small_slope")
 _POLARISED = ("kirchhoff", "first_order", "small_slope")
-_GRATINGS = ("sinusoid", "crossed")
 
 
 @dataclass(frozen=True)
@@ -35,12 +32,11 @@ class PatchComparison:
 
 
 def compared(material: str, kinds: Sequence[str] = KINDS) -> list[PatchComparison]:
-    """The cases that are kept of surfaces of these kinds, without those of the measured patch where
-    that is not here."""
+    """Compare the stored solutions of surfaces of these kinds."""
     return [
         _compare(solution)
         for solution in solved(material)[0]
-        if solution.case.surface.kind in kinds and is_here(solution.case)
+        if solution.case.surface.kind in kinds
     ]
 
 
@@ -59,7 +55,7 @@ def agreements() -> list[PatchAgreement]:
     second = {solution.case: solution for solution in solved("keratin", "coupled_wave")[0]}
     found = []
     for first in solved("keratin")[0]:
-        if first.case not in second or not is_here(first.case):
+        if first.case not in second:
             continue
         field, other = cell(first.case.surface), second[first.case]
         powers, others = (
@@ -80,11 +76,6 @@ def _numbers(solution: Solved) -> list[tuple[int, int]]:
     return [(int(mx), int(my)) for mx, my in solution.rows[["mx", "my"]]]
 
 
-def is_here(case: PatchCase) -> bool:
-    """Whether a case's surface can be had: the measured patch may be missing."""
-    return case.surface.kind != "elaphe" or MEASURED.is_file()
-
-
 def _compare(solution: Solved) -> PatchComparison:
     case, field = solution.case, cell(solution.case.surface)
     wi, wo = solution.wi, solution.wo(field)
@@ -94,7 +85,7 @@ def _compare(solution: Solved) -> PatchComparison:
     truth = solution.efficiency(field)[keep]
     light, sigma = (field, index, wi, wo, case.wavelength), max(field.extent)  # lobes are separate
     found = {
-        model: efficiencies(*light, model, sigma=sigma, patch=patch_of(case.surface))
+        model: efficiencies(*light, model, sigma=sigma, ratios=ratios_of(case.surface))
         for model in _MODELS
     }
     found = {model: power[keep] for model, power in found.items()}
@@ -109,11 +100,6 @@ def _compare(solution: Solved) -> PatchComparison:
     return PatchComparison(
         case, by_model, polarised, float(solution.rows["change"][keep].sum() / truth.sum())
     )
-
-
-def patch_of(surface: Surface) -> HeightField:
-    """What a table of the surface is made of: a grating's cell, or the patch that a cut is from."""
-    return cell(surface) if surface.kind in _GRATINGS else whole_patch(surface)
 
 
 def _deviation(power: NDArray[np.float64], truth: NDArray[np.float64]) -> float:

@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from .cells import is_here, patch_of
 from .model import efficiencies, second_order
 from .patch_solutions import Solved, solved
-from .patches import KINDS, cell, patch_index
+from .patches import GRATINGS, KINDS, cell, patch_index, ratios_of
 from .second_order import GROUPS, Case, scored
 
 #: The model without the factor, with ratios of each order, and with those that a table holds.
@@ -27,11 +26,11 @@ def factored_cases(kinds: Sequence[str] = KINDS, models: Sequence[str] = MODELS)
     """
     for solution in solved("keratin")[0]:
         surface = solution.case.surface
-        if surface.kind in kinds and is_here(solution.case):
+        if surface.kind in kinds:
             group = f"{GROUPS[surface.kind]}, slope {surface.slope:.2g}"
             case = _case(group, solution, models)
             yield case
-            if patch_of(surface) is not cell(surface):
+            if surface.kind not in GRATINGS:
                 yield replace(case, group=f"{group}, from {solution.case.theta:g}°")
 
 
@@ -43,7 +42,7 @@ def _case(group: str, solution: Solved, models: Sequence[str]) -> Case:
     light = field, index, wi, wo, wavelength
     first = efficiencies(field, complex(index), *light[2:], "first_order", sigma=max(field.extent))
     powers = {MODELS[0]: first}
-    for name, patch in ((MODELS[1], field), (MODELS[2], patch_of(surface))):
+    for name, ratios in ((MODELS[1], None), (MODELS[2], ratios_of(surface))):
         if name in models:
-            powers[name] = first * second_order(*light, patch)
+            powers[name] = first * second_order(*light, ratios)
     return scored(group, powers, solution.efficiency(field), wo, orders)

@@ -26,7 +26,6 @@ from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.optics.second_order import Perturbation
 
 from .cases import index_of
-from .cells import is_here
 from .compare import GRAZING, scans_of
 from .crossed import is_crossed
 from .model import in_plane
@@ -110,7 +109,7 @@ def cases_of_cells(material: str, kinds: Sequence[str] = KINDS) -> Iterator[Case
     """The kept solutions of cells of these kinds."""
     for one in solved(material)[0]:
         surface = one.case.surface
-        if surface.kind in kinds and is_here(one.case):
+        if surface.kind in kinds:
             field, index = cell(surface), patch_index(material, one.case.wavelength)
             orders = np.stack([one.rows["mx"], one.rows["my"]], axis=1).astype(np.int64)
             light = field, index, one.case.wavelength, one.wi, one.wo(field), orders

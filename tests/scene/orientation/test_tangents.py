@@ -16,7 +16,7 @@ from mitsuba_diffraction.scene.orientation.directions import direction_field
 from mitsuba_diffraction.scene.orientation.files import load_mesh, write_ply
 from mitsuba_diffraction.scene.orientation.tangents import check_tangents
 from mitsuba_diffraction.scene.orientation.trimesh import TriangleMesh, grid_faces, oriented_mesh
-from tests.conftest import ROOT
+from tests.support import ROOT
 
 PLY = b"""ply
 format binary_little_endian 1.0
