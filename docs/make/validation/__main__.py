@@ -48,17 +48,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     patches.add_argument("--solver", choices=("coupled_wave", "rayleigh"), default="rayleigh")
     patches.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
     patches.set_defaults(run=_patches)
-<<<<<<< HEAD
-    coated = commands.add_parser("coated", help="solve gratings under a coat")
-=======
     measured = commands.add_parser("measured", help="cut the measured scale")
     measured.add_argument("patch", type=Path, help="the measured scale, in an image")
     measured.add_argument("--pixel-size", type=float, default=65 / 1332, metavar="MICROMETRES")
     measured.add_argument("--max-height", type=float, default=0.375, metavar="MICROMETRES")
     measured.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
     measured.set_defaults(run=_measured, progress=False)
-    coated = commands.add_parser("coated", help="make those under a coat anew")
->>>>>>> main
+    coated = commands.add_parser("coated", help="solve gratings under a coat")
     coated.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
     coated.set_defaults(run=_coated)
     films = commands.add_parser("films", help="solve gratings under a film")
