@@ -51,7 +51,7 @@ package: setup .venv/browser  ## build wheel and sdist, and test them in an empt
 # with a patch of your own: make bench MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"
 bench: setup  ## measure speed and noise: docs/benchmarks.md
 	@mkdir -p out
-	@$(RUN) bench $(MEASURED) --json out/bench.json
+	@$(PYTHON3) -m docs.make.bench $(if $(MEASURED),--measured $(MEASURED)) --json out/bench.json
 	@$(PYTHON3) -m docs.make.figures.tables speed out/bench.json
 
 # a measured patch beside the look-alikes: make figures MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"

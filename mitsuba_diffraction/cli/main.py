@@ -18,7 +18,6 @@ from typing import NoReturn
 from ..errors import DiffractionError, shortened
 from ..streams import own_program
 from . import (
-    bench,
     brdf_map,
     evaluate,
     info,
@@ -29,6 +28,7 @@ from . import (
     survey,
     sweep,
     tangents,
+    tradeoff,
 )
 from .console import (
     INTERRUPTED,
@@ -45,8 +45,8 @@ from .report import check_writable
 COMMANDS = (
     precompute.add_parser, info.add_parser, tangents.add_parser, plan.add_parser,
     render.add_parser, brdf_map.add_parser, evaluate.add_parser, survey.add_parser,
-    sweep.add_parser, bench.add_tradeoff, realtime.add_compare, realtime.add_view,
-    realtime.add_export_viewer, realtime.add_export_shader, bench.add_bench,
+    sweep.add_parser, tradeoff.add_parser, realtime.add_compare, realtime.add_view,
+    realtime.add_export_viewer, realtime.add_export_shader,
 )  # fmt: skip
 
 FAILED = 1

@@ -136,7 +136,7 @@ def test_a_folder_without_measurements_is_refused(tmp_path, capsys):
 
 
 def test_the_command_measures_and_recommends(tmp_path, monkeypatch, capsys):
-    from mitsuba_diffraction.cli import bench as command
+    from mitsuba_diffraction.cli import tradeoff as command
     from mitsuba_diffraction.cli.main import main
 
     np.save(tmp_path / "heights.npy", PATCH.heights)

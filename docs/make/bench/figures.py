@@ -1,11 +1,8 @@
-"""How much is measured, on which machine; rows with goals as text and data; two runs compared."""
+"""Sizes of a run; rows with goals as text and data; two runs compared."""
 
 from __future__ import annotations
 
-import importlib.metadata
 import json
-import os
-import platform
 import resource
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,14 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ...errors import DiffractionError
-
-#: µm: the patch of 1332² pixels is as wide as the default coherence window.
-PIXEL = 65.0 / 1332
-#: The numbers that directions and wavelengths are drawn with.
-SEED = 20140113
-
-_PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit", "numpy", "scipy")
+from mitsuba_diffraction.errors import DiffractionError
 
 
 @dataclass(frozen=True)
@@ -135,7 +125,7 @@ def read_run(path: Path) -> dict[str, Any]:
         raise DiffractionError(f"cannot read '{path}': {error.strerror}") from error
     except (ValueError, KeyError, TypeError):
         pass
-    raise DiffractionError(f"'{path}' is not what bench --json writes; give such a file")
+    raise DiffractionError(f"'{path}' is not what docs.make.bench --json writes; give such a file")
 
 
 def compared(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
@@ -160,27 +150,6 @@ def _numbers(run: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str, str], flo
         for row in section["rows"]:
             for column, value in row["values"].items():
                 yield (name, row["name"], column), value
-
-
-def describe_machine() -> dict[str, Any]:
-    """Processor, cores, load of the last minute, memory, and versions of all that computes."""
-    import drjit as dr
-
-    from ...cluster.tasks import processor
-    from ...plugin.llvm import loaded_llvm_version
-
-    llvm = loaded_llvm_version()
-    return {
-        "processor": processor(),
-        "cores": len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count(),
-        "threads of Dr.Jit": dr.thread_count(),
-        "load": round(os.getloadavg()[0], 2),
-        "memory": f"{os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 1e9:.1f} GB",
-        "system": platform.platform(),
-        "python": platform.python_version(),
-        **{name: importlib.metadata.version(name) for name in _PACKAGES},
-        "llvm": ".".join(map(str, llvm)) if llvm else None,
-    }
 
 
 def peak_memory() -> int:

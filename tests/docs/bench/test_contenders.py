@@ -7,20 +7,20 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.analysis.bench.contenders import (
+from docs.make.bench.contenders import (
     DEFAULT,
     TAYLOR,
     THESIS,
-    Queries,
     bare_gathers,
     bsdf_factories,
     build_tables,
 )
-from mitsuba_diffraction.analysis.bench.figures import Plan
+from docs.make.bench.figures import Plan
+from mitsuba_diffraction.analysis.timing import Queries
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.tables.window import base_bin, first_tap
 
-pytestmark = pytest.mark.usefixtures("coarse")
+pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
 
 
 @pytest.fixture(scope="module")

@@ -14,10 +14,12 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ...optics.colour import delta_e, linear_srgb, response
-from ...progress import Progress
-from ...tables.colour.table import ColourTable
-from ..maps.result import Light
+from mitsuba_diffraction.analysis.maps.result import Light
+from mitsuba_diffraction.analysis.timing import Queries, kernel_seconds, ratio, rounds_of
+from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
+from mitsuba_diffraction.progress import Progress
+from mitsuba_diffraction.tables.colour.table import ColourTable
+
 from .contenders import (
     ALUMINIUM,
     COARSE,
@@ -28,14 +30,10 @@ from .contenders import (
     ON_SURFACE,
     ONE_WINDOW,
     THESIS,
-    Queries,
     Tables,
     bare_gathers,
     bsdf_factories,
     is_slow,
-    kernel_seconds,
-    ratio,
-    rounds_of,
 )
 from .figures import Goal, Plan, Row, Section
 from .scenes import pigment, rays, snake

@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 
 import mitsuba_diffraction as md  # before Mitsuba: it chooses Dr.Jit's LLVM
-from mitsuba_diffraction.analysis.bench.scenes import draws_by_cosine
+from docs.make.bench.scenes import draws_by_cosine
 
 import mitsuba as mi  # isort: skip
 import drjit as dr  # isort: skip
 import numpy as np  # isort: skip
 
-pytestmark = pytest.mark.usefixtures("coarse")
+pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
 
 
 def drawn(bsdf, count=1 << 14):

@@ -1,11 +1,11 @@
-"""Measurements of speed and memory; `mitsuba-diffraction bench` prints them.
+"""Measurements of speed and memory, printed by `python -m docs.make.bench`.
 
 Contents
 --------
-sections     all of them, part by part, on every backend that is here
-figures      how much is measured, and on which machine; rows with goals; two runs side by side
+sections     all measurements, part by part, on every backend of this machine
+figures      sizes of a run; rows with goals; two runs side by side
 build        tables, each built in a process of its own, whose memory is measured
-contenders   BSDFs to compare, the bare gathers and the thesis' look-up among them, and timing
+contenders   BSDFs to compare, the bare gathers and the thesis' look-up among them
 evaluation   `eval`, `sample` and `pdf` of all of them; RGB variants beside spectral ones
 scenes       what is rendered: noise beside sampling by the cosine, and the time of whole pictures
 """
@@ -17,8 +17,9 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
-from ...heights.field import HeightField
-from ...progress import Progress
+from mitsuba_diffraction.heights.field import HeightField
+from mitsuba_diffraction.progress import Progress
+
 from .figures import Plan, Section
 
 __all__ = ["sections"]
@@ -51,7 +52,8 @@ def sections(
         return
     import drjit as dr
 
-    from ...scene.load import set_variant
+    from mitsuba_diffraction.scene.load import set_variant
+
     from .contenders import build_tables
     from .evaluation import measure_colours, measure_eval, measure_sampling
     from .scenes import measure_efficiency, measure_noise, measure_snake

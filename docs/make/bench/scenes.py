@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import statistics
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -13,13 +14,15 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from ...errors import DiffractionError
-from ...plugin.power import PowerModel
-from ...plugin.sampling import EVEN
-from ...progress import Progress
-from ..maps.result import Light
-from .contenders import Tables, ratio, rounds_of
-from .figures import SEED, Goal, Plan, Row, Section
+from mitsuba_diffraction.analysis.maps.result import Light
+from mitsuba_diffraction.analysis.timing import SEED, ratio, rounds_of
+from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
+from mitsuba_diffraction.plugin.power import PowerModel
+from mitsuba_diffraction.plugin.sampling import EVEN
+from mitsuba_diffraction.progress import Progress
+
+from .contenders import Tables
+from .figures import Goal, Plan, Row, Section
 
 #: Of noise: angle of incidence in degrees, relative standard deviation that one sample may have.
 _GOALS = {0.0: 0.6, 45.0: 0.8, 75.0: 1.2}
@@ -90,10 +93,12 @@ def snake(bsdf: Any, scenes: Path, width: int, height: int, light: dict[str, Any
 
 
 def snake_scene(scenes: Path, tables: Tables, **parameters: str) -> Any:
-    """`snake.xml` with the default table."""
+    """`snake.xml` with the default table, without warnings of how far the model holds for it."""
     file = scenes / "snake.xml"
     _check_there(file)
-    return mi.load_file(str(file), patch=str(tables.paths["default"]), **parameters)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DiffractionWarning)
+        return mi.load_file(str(file), patch=str(tables.paths["default"]), **parameters)
 
 
 def skin_of(scene: Any) -> Any:
@@ -329,7 +334,7 @@ def measure_snake(plan: Plan, tables: Tables, scenes: Path, progress: Progress) 
 
 
 def render_seconds(scene: Any, plan: Plan) -> float:
-    """How long one picture takes, compiling included where it is the first."""
+    """Seconds to render one picture; the first call includes kernel compilation."""
     start = time.perf_counter()
     dr.eval(mi.render(scene, spp=plan.spp))
     dr.sync_thread()

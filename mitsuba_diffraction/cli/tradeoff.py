@@ -1,101 +1,25 @@
-"""`bench` and `tradeoff`: speed and memory, side by side in one run, and against accuracy."""
+"""`mitsuba-diffraction tradeoff`: accuracy against speed and memory."""
 
 from __future__ import annotations
 
 import argparse
-import sys
-import tempfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ..errors import DiffractionError
 from ..scene.load import set_variant
 from . import options
-from .console import Bar, say_warning
-from .options import number_between, path_ending_in
+from .console import Bar
+from .options import number_between
 from .report import check_writable, save_json, save_report
 
-PARTS = ("build", "eval", "sample", "snake", "noise", "efficiency", "colours")
 #: Pixels of the default patch, pairs of directions, calls at once, timed rounds, depths.
 _FULL, _QUICK = (1332, 240, 1 << 19, 7, 14), (400, 160, 1 << 17, 5, 9)
 
 
-def add_bench(subparsers: options.Subparsers) -> None:
+def add_parser(subparsers: options.Subparsers) -> None:
     parser = options.add_command(
-        subparsers, "bench", bench, "measure speed and memory",
-        "Measure what tables cost to build, and what evaluation costs beside Mitsuba's "
-        "roughconductor and other baselines, all in one run: compare its ratios, and its "
-        "times only on an idle machine.",
-    )  # fmt: skip
-    parser.add_argument("--quick", action="store_true", help="fewer, smaller and shorter runs")
-    options.add_json(parser, "every single measurement")
-    parser.add_argument(
-        "--against", metavar="FILE", type=path_ending_in(".json"),
-        help="compare with an earlier run, written by --json",
-    )  # fmt: skip
-    parser.add_argument("--only", choices=PARTS, help="measure only this")
-    parser.add_argument(
-        "--scenes", metavar="FOLDER", type=Path, default=Path("scenes"),
-        help="where the project's scenes are, for its snake; default: scenes",
-    )  # fmt: skip
-    options.add_own_patch(parser)
-
-
-def bench(args: argparse.Namespace) -> int:
-    """Measure and print, and return the exit code; a missed goal is no failure."""
-    options.check_own_patch(args)
-    from ..analysis.bench.figures import compared, read_run
-
-    earlier = read_run(args.against) if args.against is not None else None
-    parts = (args.only,) if args.only else PARTS
-    if not {"snake", "efficiency", "colours"}.isdisjoint(parts):
-        _check_scenes(args.scenes)
-    from tqdm import tqdm
-
-    from ..analysis.bench import figures, sections
-    from ..analysis.bench.figures import describe_machine
-
-    chosen = figures.QUICK if args.quick else figures.FULL
-    machine = describe_machine()
-    print("; ".join(f"{name} {value}" for name, value in machine.items()), flush=True)
-    if machine["load"] > 0.5 * machine["cores"]:
-        say_warning("the machine is busy: trust the ratios, not the times")
-    measured = []
-    with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder, Bar(args) as bar:
-        for section in sections(
-            parts, chosen, Path(folder), bar, args.scenes, options.own_patch(args)
-        ):
-            tqdm.write("\n".join(["", *section.lines()]))  # above the progress bar
-            sys.stdout.flush()
-            measured.append(section)
-    goals = [goal for section in measured for goal in section.goals]
-    if goals:
-        print(f"\n{sum(goal.met for goal in goals)} of {len(goals)} goals met")
-    data = {
-        "machine": machine,
-        "plan": asdict(chosen),
-        "sections": [section.plain() for section in measured],
-    }
-    if earlier is not None:
-        print(f"\nnow / {args.against}")
-        print("\n".join(compared(earlier, data)))
-    save_report(args, data)
-    return 0
-
-
-def _check_scenes(folder: Path) -> None:
-    """Before anything is measured."""
-    if not (folder / "snake.xml").is_file():
-        raise DiffractionError(
-            f"'{folder / 'snake.xml'}' does not exist; name the folder of the project's scenes "
-            "with --scenes, or measure a part without them: --only build, eval, sample or noise"
-        )
-
-
-def add_tradeoff(subparsers: options.Subparsers) -> None:
-    parser = options.add_command(
-        subparsers, "tradeoff", tradeoff,
+        subparsers, "tradeoff", run,
         "measure accuracy against speed and memory, setting by setting",
         "Build a patch's table with many settings and measure each: its error against the "
         "integral in double precision, the colours' ΔE2000, the time of eval beside "
@@ -113,10 +37,6 @@ def add_tradeoff(subparsers: options.Subparsers) -> None:
         help="a measured error of at most this; default: 1e-3",
     )  # fmt: skip
     budget.add_argument(
-        "--tolerance", action=options.Renamed,
-        now="is the error that a table is built to; the budget of this command is --max-error",
-    )  # fmt: skip
-    budget.add_argument(
         "--memory", metavar="MB", type=number_between(0.0, 1e6), help="a table of at most this"
     )
     budget.add_argument(
@@ -127,11 +47,12 @@ def add_tradeoff(subparsers: options.Subparsers) -> None:
     options.add_own_patch(parser)
 
 
-def tradeoff(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
     """Measure, write and recommend, and return the exit code."""
     options.check_own_patch(args)
     check_writable(args.output / "tradeoff.json", make_folder=True)
-    from ..analysis.bench.figures import PIXEL, describe_machine
+    from ..analysis.machine import describe_machine
+    from ..analysis.timing import PIXEL
     from ..analysis.tradeoff import (
         Budget,
         measure,

@@ -6,10 +6,7 @@ No warning tells how far the model holds for the patch: here it is there to be l
 from __future__ import annotations
 
 import contextlib
-import os
-import statistics
-import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,103 +17,16 @@ import numpy as np
 from mitsuba.python import tensor_io
 from numpy.typing import NDArray
 
-from ...errors import DiffractionWarning
-from ...heights import gratings
-from ...heights.field import HeightField
-from ...plugin.lookup import DeviceTable
-from ...plugin.memory import upload
-from ...plugin.restricted import device_table
-from ...progress import Progress
-from ...tables.table import DiffractionTable
-from .figures import PIXEL, SEED, Plan
+from mitsuba_diffraction.analysis.timing import PIXEL, Queries, quiet_bsdf
+from mitsuba_diffraction.heights import gratings
+from mitsuba_diffraction.heights.field import HeightField
+from mitsuba_diffraction.plugin.lookup import DeviceTable
+from mitsuba_diffraction.plugin.restricted import device_table
+from mitsuba_diffraction.progress import Progress
+from mitsuba_diffraction.tables.table import DiffractionTable
+from mitsuba_diffraction.thesis.term_images import thesis_bsdf
 
-#: Calls before the first that counts: the first compiles, the second finds the processor awake.
-WARM_UP = 2
-
-
-def kernel_seconds(call: Callable[[], Any]) -> float:
-    """Time that the kernels of one call take, without what Python needs to put them together."""
-    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
-        dr.kernel_history_clear()
-        dr.eval(call())
-        dr.sync_thread()
-        return sum(entry["execution_time"] for entry in dr.kernel_history()) * 1e-3
-
-
-def rounds_of(
-    calls: Mapping[str, Callable[[], float]], rounds: int, done: Callable[[int, int], None]
-) -> dict[str, list[float]]:
-    """Seconds of every call in every round; each round goes through all of them in turn.
-
-    So background load affects all candidates alike, and ratios within a round can be trusted.
-    """
-    seconds: dict[str, list[float]] = {name: [] for name in calls}
-    for n in range(WARM_UP + rounds):
-        for name, call in calls.items():
-            took = call()
-            if n >= WARM_UP:
-                seconds[name].append(took)
-        done(n + 1, WARM_UP + rounds)
-    return seconds
-
-
-def ratio(a: Sequence[float], b: Sequence[float]) -> float:
-    """Median over the rounds of a/b."""
-    return statistics.median(x / y for x, y in zip(a, b, strict=True))
-
-
-def saved_bsdf(table: str | os.PathLike[str], **parameters: Any) -> Any:
-    """The plugin with a table."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DiffractionWarning)
-        return mi.load_dict({"type": "diffraction", "table": str(table), **parameters})
-
-
-def thesis_bsdf(table: str | os.PathLike[str], **parameters: Any) -> Any:
-    """The same, looked up by `TermImages`; the table is a coherent Taylor series."""
-    bsdf = saved_bsdf(table, **parameters)
-    bsdf.power.device = TermImages(bsdf.table)
-    return bsdf
-
-
-class TermImages(DeviceTable):
-    """A coherent Taylor table as the thesis keeps it, an image of complex numbers a term.
-
-    For every wavelength and every term, the 3 × 3 texels around the asked frequency are fetched
-    from that term's image, weighted by the Gaussian window, and added up. `plugin.lookup` can hold
-    the same series, but keeps all terms of one bin together. Only `window_sum` differs.
-    """
-
-    def __init__(self, table: DiffractionTable) -> None:
-        super().__init__(table)
-        images = np.moveaxis(table.coefficients[0], -1, 0)  # (terms, ny, nx, re and im)
-        self._images = upload(mi.Float, np.ascontiguousarray(images))
-
-    def window_sum(self, qx: Any, qy: Any, kappa: Any, windows: Any = ()) -> Any:
-        """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`)."""
-        grid, expansion = self.grid, self.expansion
-        x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
-        first, weight_x, weight_y = self._place(x, y, mi.UInt32(0))
-        weights = [
-            (grid.index(0, row, column), weight_x(column) * weight_y(row))
-            for row in range(grid.taps[1])
-            for column in range(grid.taps[0])
-        ]
-        lobe = dr.exp(-grid.exponents[0] * dr.square(x) - grid.exponents[1] * dr.square(y))
-        order_0 = mi.Complex2f(*(lobe * c for c in self.series.at(kappa)[2]))
-        scaled = kappa * expansion.half_range
-
-        def of_term(n: Any, image: Any, weight: Any, total: Any) -> tuple[Any, ...]:
-            weight *= scaled / mi.Float(n)  # xⁿ/n!
-            windowed = mi.Complex2f(0.0)
-            for offset, gaussian in weights:
-                windowed += gaussian * dr.gather(mi.Complex2f, self._images, image + offset)
-            return n + 1, image + grid.index(1, 0, 0), weight, total + weight * windowed
-
-        state = (mi.UInt32(1), first, mi.Float(1.0), order_0)
-        total = dr.while_loop(state, lambda n, *_: n <= expansion.terms, of_term)[3]
-        return dr.squared_norm(total)
-
+from .figures import Plan
 
 ALUMINIUM = "roughconductor, Al"
 DEFAULT = "diffraction, the defaults"
@@ -143,7 +53,7 @@ class Tables:
 
     def bsdf(self, name: str, **parameters: Any) -> Any:
         """The plugin with one of the tables, in the current variant."""
-        return saved_bsdf(self.paths[name], **parameters)
+        return quiet_bsdf(self.paths[name], **parameters)
 
     def load(self, name: str) -> DiffractionTable:
         """One of the tables."""
@@ -213,36 +123,6 @@ def bsdf_factories(tables: Tables) -> dict[str, Callable[[], Any]]:
 def is_slow(name: str) -> bool:
     """Whether fewer calls do, for the sake of the user's time."""
     return name in (THESIS, TAYLOR)
-
-
-@dataclass(frozen=True)
-class Queries:
-    """Random questions to a BSDF, evaluated and in memory."""
-
-    si: Any
-    wo: Any
-    sample1: Any
-    sample2: Any
-
-    @classmethod
-    def random(cls, lanes: int) -> Queries:
-        """Directions uniform over the hemisphere, wavelengths as Mitsuba draws them, any place."""
-        random = mi.PCG32(size=lanes, initstate=SEED)
-
-        def hemisphere() -> Any:
-            pair = mi.Point2f(random.next_float32(), random.next_float32())
-            return mi.warp.square_to_uniform_hemisphere(pair)
-
-        si = dr.zeros(mi.SurfaceInteraction3f, lanes)
-        si.wi = hemisphere()
-        wo = hemisphere()
-        if mi.is_spectral:
-            si.wavelengths = mi.sample_rgb_spectrum(mi.sample_shifted(random.next_float32()))[0]
-        sample1 = random.next_float32()
-        sample2 = mi.Point2f(random.next_float32(), random.next_float32())
-        si.uv = mi.Point2f(random.next_float32(), random.next_float32())
-        dr.eval(si, wo, sample1, sample2)
-        return cls(si, wo, sample1, sample2)
 
 
 def bare_gathers(table: DiffractionTable, queries: Queries) -> Callable[[], Any]:
