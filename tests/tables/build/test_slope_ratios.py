@@ -21,6 +21,8 @@ from tests.support.directions import rough_patch
 FEW = rough_patch((24, 30), (0.1, 0.11), 0.2)
 MANY = gratings.elaphe_like(extent=20.0, pixels=100, seed=3)
 SETTINGS = TableSettings(height_scale_max=1.0)
+#: Only the change of colours depends on it.
+ROUGHNESS = roughness_of([FEW], 40.0)
 #: Half floats.
 ROUNDED = 2e-3
 
@@ -30,7 +32,7 @@ def ratios(*patches: HeightField, **changed: object) -> SlopeRatios:
 
 
 def of_table(patches, settings: TableSettings) -> SlopeRatios:
-    return slope_ratios(patches, settings, roughness_of(patches, 40.0))
+    return slope_ratios(patches, settings, ROUGHNESS)
 
 
 def exact(field: HeightField, order: tuple[int, int], kappa: float) -> np.ndarray:
