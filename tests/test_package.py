@@ -13,8 +13,7 @@ from pathlib import Path
 import pytest
 
 import mitsuba_diffraction as md
-
-ROOT = Path(__file__).parents[1]
+from tests.support import ROOT
 
 backend = pytest.importorskip("hatchling.builders.wheel", reason="the build backend is missing")
 
@@ -84,7 +83,7 @@ def test_the_wheel_declares_command_and_plugin(wheel):
         metadata = archive.read(f"{name}METADATA").decode()
     assert "mitsuba-diffraction = _mitsuba_diffraction:main" in entry_points
     assert "diffraction = mitsuba_diffraction.plugin.bsdf" in entry_points
-    assert "diffraction_mix = mitsuba_diffraction.plugin.mix" in entry_points
+    assert "diffraction_mix = mitsuba_diffraction.plugin.blended_patches" in entry_points
     assert f"\nVersion: {md.__version__}\n" in metadata
     for extra in ("afm", "gl", "view", "notebooks"):
         assert f"\nProvides-Extra: {extra}\n" in metadata

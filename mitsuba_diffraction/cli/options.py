@@ -330,17 +330,6 @@ def add_json(parser: argparse.ArgumentParser, what: str = "the figures", **more:
     )
 
 
-class Renamed(argparse.Action):
-    """An option of earlier versions: refused with the name that it has now."""
-
-    def __init__(self, option_strings: Sequence[str], dest: str, now: str) -> None:
-        super().__init__(option_strings, argparse.SUPPRESS, nargs="?", help=argparse.SUPPRESS)
-        self._now = now
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        parser.error(f"argument {self.option_strings[0]}: {self._now}")
-
-
 def _option(name: str) -> str:
     return f"--{name.replace('_', '-')}"
 

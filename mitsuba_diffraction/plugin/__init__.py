@@ -3,32 +3,30 @@
 Contents
 --------
 bsdf            `Diffraction`, the plugin; its docstring is docs/parameters.md
-mix             `DiffractionMix`, several surfaces in one by weights
+blended_patches  the plugin `diffraction_mix`: several surfaces in one, by weights
 registration    both are registered in every variant
 dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives
 parameters      read from Mitsuba's Properties, checked
 properties      words, flags and numbers from them, refused by name; what elements are called
 materials       what the surface is made of: indices, coat, film, model
-changing        a parameter that changes and what it refuses; what `dr.freeze` must know of a BSDF
+parameter_changes  changeable parameters, their checks; what `dr.freeze` must know of a BSDF
 sources         from what a scene names to a table, built once
 textures        height scale and orientation that vary; whether a mesh has what its BSDF reads
-roles           what arguments are, one name a role
-pair            a pair of directions in the patch's frame, and how V-shaped grooves shadow it
+types           names of the types of arguments
+directions      a pair of directions in the patch's frame, and how V-shaped grooves shadow it
 power           the diffracted power at single wavelengths
 lookup          a table inside a kernel: `DeviceTable`, and the weights of its terms at a κ
 sampling        directions drawn where the orders are
 restricted      a planned table, and its coarse cells beyond
 rgb             power and look-up in the RGB variants' colours
-places          where on the patch the window sits at a point of the surface
+window_positions  where on the patch the window sits at a point of the surface
 energy          the bound of the albedo that conserves energy
 direction_lookup  tabulated functions of direction inside a kernel
 boundary        what the material makes of the light, with its polarisation
 second_order    what light diffracted twice makes of orders
 fresnel         what dielectric, conductor or mirror reflect; fields at an interface or a film
-through         both sides of a dielectric or of a thin sheet
-sides           what makes both sides add up to 1
-crossing        pairs of directions that are not both above, and what the material makes of them
+transmission    light that goes through a dielectric or a thin sheet
 layers          a clear coat, a thin film, and how much light reaches what lies beneath
 memory          arrays in the variant's memory, and reading them
 """

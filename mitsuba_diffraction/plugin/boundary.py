@@ -18,6 +18,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..optics.blend import NODES_PER_OCTAVE, RoughnessTable
+from .directions import Pair, Place
 from .fresnel import (
     Conductor,
     Dielectric,
@@ -33,8 +34,7 @@ from .fresnel import (
 )
 from .layers import CoatedPair, UnderFilm, bounced, transmittances
 from .memory import index_between, read_record, upload
-from .pair import Pair, Place
-from .roles import Float, Interaction, Mask, Number, Spectrum, Vector3f
+from .types import Float, Interaction, Mask, Number, Spectrum, Vector3f
 
 #: The first is the default of a material with an index.
 MODELS = ("small_slope", "kirchhoff")

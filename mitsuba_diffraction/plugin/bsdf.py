@@ -212,15 +212,18 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from ..tables.energy.conservation import DirectionalTable
 from .boundary import Boundary, Kirchhoff
-from .changing import Bounded, arrays_within, marks
+from .directions import Pair, from_patch, in_patch, vcavity
 from .energy import EnergyModel
 from .fresnel import tinted
 from .layers import CoatedPair, Transmission, UnderFilm
 from .llvm import require_loaded_llvm
-from .pair import Pair, from_patch, in_patch, vcavity
+from .parameter_changes import Bounded, arrays_within, marks
 from .parameters import read_parameters
 from .power import power_model
-from .roles import (
+from .sampling import EVEN, direction_of, with_even_share
+from .sources import TableProvider, from_cache
+from .textures import LEAST_SCALE, PLACED, VaryingHeightScale
+from .types import (
     BSDF,
     Callback,
     Colour,
@@ -234,9 +237,6 @@ from .roles import (
     Vector2f,
     Vector3f,
 )
-from .sampling import EVEN, direction_of, with_even_share
-from .sources import TableProvider, from_cache
-from .textures import LEAST_SCALE, PLACED, VaryingHeightScale
 
 #: The component of a context that asks for all of them.
 _ALL = 0xFFFFFFFF

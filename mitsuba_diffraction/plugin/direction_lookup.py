@@ -17,7 +17,7 @@ from ..tables.energy.conservation import DirectionalTable
 from ..tables.energy.grating import DENSE, ENDS, Grating
 from ..tables.energy.grid import SHARE, DirectionGrid
 from .memory import index_between, read_record, upload
-from .roles import Buffer, Float, Index, Vector2f
+from .types import Buffer, Float, Index, Vector2f
 
 Array = NDArray[np.float32]
 #: Directions of a grating's s in RGB, whose channels are means over wavelengths.

@@ -26,10 +26,10 @@ from ..tables.energy.store import Energy, mean_exponents
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, Kirchhoff
 from .direction_lookup import DirectionLookup, alike, between, scales_of
+from .directions import Pair
 from .fresnel import Inside, Perfect, Reflectance
 from .layers import UnderFilm, plain
-from .pair import Pair
-from .roles import Colour, Float, Vector2f
+from .types import Colour, Float, Vector2f
 
 Array = NDArray[np.float32]
 #: Of wavelengths (n,).

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from ..optics import fresnel
 from ..optics.colour import metal_tint
-from .changing import Bounded, children
-from .roles import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Spectrum, Texture
+from .parameter_changes import Bounded, children
+from .types import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Spectrum, Texture
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,10 @@ from scipy.interpolate import CubicSpline
 
 from ..optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from ..optics.geometry import wavenumber
-from .changing import Bounded
+from .directions import Pair
 from .fresnel import Conductor, Dielectric, Filmed, Reflectance, amplitudes, squared
-from .pair import Pair
-from .roles import Callback, Colour, Float, Interaction, Mask, Number, Vector3f
+from .parameter_changes import Bounded
+from .types import Callback, Colour, Float, Interaction, Mask, Number, Vector3f
 
 
 class CoatedPair(Pair):

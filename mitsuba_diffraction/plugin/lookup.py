@@ -22,8 +22,8 @@ from ..tables.layout import Record, cells_of, functions_at
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
 from .memory import PACKET, index_between, packet_size, read_packets, read_record, upload
-from .places import Window
-from .roles import Float, Index, Mask, Packet, Rotation
+from .types import Float, Index, Mask, Packet, Rotation
+from .window_positions import Window
 
 #: A parabola through three points on a cell of phase h leaves max|f'''| h³/192 (Chebyshev nodes);
 #: this share of the tolerance is what the cells may add.

@@ -15,8 +15,8 @@ from .boundary import MODELS, Boundary, Kirchhoff, SmallSlope
 from .fresnel import Conductor, Dielectric, Perfect, Reflectance
 from .layers import COHERENCE, LAYERINGS, LEAST_THROUGH, UnderFilm
 from .properties import choice, flag, number
-from .roles import Properties, Texture
-from .through import LEAST_INDEX
+from .transmission.sides import LEAST_INDEX
+from .types import Properties, Texture
 
 #: Of mono variants, nm.
 DEFAULT_WAVELENGTH = 550.0

@@ -7,7 +7,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from .roles import Buffer, Float, Index, Kind, Mask, Packet
+from .types import Buffer, Float, Index, Kind, Mask, Packet
 
 #: Largest number of floats that one packet load fetches.
 PACKET = 16

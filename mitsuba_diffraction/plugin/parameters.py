@@ -19,6 +19,7 @@ from ..optics.second_order import SlopeRatios
 from ..settings import COHERENCES, SCENE_SETTINGS, SURFACE, checked
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, SmallSlope
+from .directions import SHADOWINGS
 from .fresnel import Conductor, Dielectric, Perfect, Reflectance
 from .layers import LAYERINGS, Blend, Layering, Transmission, UnderCoat, UnderFilm
 from .materials import (
@@ -30,12 +31,8 @@ from .materials import (
     under_film,
     warn_of_film,
 )
-from .pair import SHADOWINGS
-from .places import TILINGS, Places
 from .properties import choice, flag, kind_of, number
-from .roles import BSDF, Properties
 from .second_order import SecondOrder, material_of_second_order
-from .sides import SidesModel
 from .sources import (
     TableProvider,
     from_cache,
@@ -45,7 +42,10 @@ from .sources import (
     table_of_heights,
 )
 from .textures import ConstantOrientation, Orientation, OrientationTexture, VaryingHeightScale
-from .through import Through
+from .transmission.energy import SidesModel
+from .transmission.sides import Through
+from .types import BSDF, Properties
+from .window_positions import TILINGS, Places
 
 SOURCES = ("heightfield", "table", "data")
 READING = tuple(field.name for field in fields(LoadOptions))

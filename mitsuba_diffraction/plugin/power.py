@@ -13,13 +13,13 @@ import drjit as dr
 import mitsuba as mi
 
 from ..tables.table import DiffractionTable
-from .crossing import Crossing
-from .pair import Pair, Place
-from .places import Places, Window
+from .directions import Pair, Place
 from .restricted import device_table
 from .rgb import rgb_power
-from .roles import Colour, Float, Index, Interaction, Vector2f
 from .sampling import order_sampler
+from .transmission.crossing import Crossing
+from .types import Colour, Float, Index, Interaction, Vector2f
+from .window_positions import Places, Window
 
 
 class PowerModel(Protocol):

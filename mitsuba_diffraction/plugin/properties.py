@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError
-from .roles import BSDF, Properties
+from .types import BSDF, Properties
 
 
 def choice(props: Properties, name: str, choices: tuple[str, ...]) -> str:

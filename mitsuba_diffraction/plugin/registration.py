@@ -7,7 +7,7 @@ import sys
 
 import mitsuba as mi
 
-_PLUGINS = (f"{__package__}.bsdf", f"{__package__}.mix")
+_PLUGINS = (f"{__package__}.bsdf", f"{__package__}.blended_patches")
 
 
 def register(old: str | None, new: str | None) -> None:

@@ -13,8 +13,8 @@ import numpy as np
 
 from ..tables.table import DiffractionTable
 from .lookup import DeviceTable, within
-from .places import Window
-from .roles import Float, Index
+from .types import Float, Index
+from .window_positions import Window
 
 _uploaded: weakref.WeakKeyDictionary[DiffractionTable, dict[str, DeviceTable | RestrictedTable]] = (
     weakref.WeakKeyDictionary()

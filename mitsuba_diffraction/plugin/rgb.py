@@ -20,12 +20,12 @@ from ..tables.colour.proposals import BANDED, BANDS, LOBES, colour_proposals
 from ..tables.colour.table import PACKET, TERMS, ColourTable
 from ..tables.store import cached_colours
 from ..tables.table import DiffractionTable
-from .crossing import Crossing
+from .directions import Pair, Place
 from .lookup import series_interval, series_weights
 from .memory import index_between, read, read_record, upload
-from .pair import Pair, Place
-from .roles import Buffer, Colour, Float, Index, Interaction, Vector2f
 from .sampling import BELOW_ONE, invert, order_0_share
+from .transmission.crossing import Crossing
+from .types import Buffer, Colour, Float, Index, Interaction, Vector2f
 
 
 class PolarCoordinates:

@@ -24,7 +24,7 @@ import numpy as np
 from ..tables.sampling import BANDED, SHIFT, proposals
 from ..tables.table import DiffractionTable
 from .memory import float_of_bits, index_between, read, upload
-from .roles import Buffer, Float, Index, Vector2f, Vector3f
+from .types import Buffer, Float, Index, Vector2f, Vector3f
 
 #: Share of the samples drawn evenly over the hemisphere.
 EVEN = 0.03

@@ -17,12 +17,12 @@ from ..errors import DiffractionError
 from ..optics.second_order import LIMIT, NODES, SlopeRatios, coefficient_table
 from ..settings import COHERENCES
 from .boundary import MODELS, SmallSlope
+from .directions import Pair
 from .fresnel import Dielectric, Reflectance
 from .layers import LAYERINGS
 from .memory import index_between, read_record, upload
-from .pair import Pair
 from .properties import flag
-from .roles import Float, Index, Kind, Number, Properties
+from .types import Float, Index, Kind, Number, Properties
 
 #: Indices are rounded to this, for c.
 INDEX_STEP = 0.01

@@ -13,10 +13,10 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
-from .changing import Bounded
 from .memory import index_between
+from .parameter_changes import Bounded
 from .properties import name_of
-from .roles import Callback, Float, Interaction, Mask, Rotation, Texture
+from .types import Callback, Float, Interaction, Mask, Rotation, Texture
 
 #: What `meshes.write_ply` calls a field of directions.
 ORIENTATION = "vertex_orientation"

@@ -11,7 +11,7 @@ from PIL import Image
 
 from mitsuba_diffraction import DiffractionWarning, HeightField
 from mitsuba_diffraction.heights.read import LoadOptions
-from tests.heights.formats.refusals import refusal
+from tests.support.refusals import refusal
 
 HEIGHTS = np.random.default_rng(3).normal(size=(6, 5))
 

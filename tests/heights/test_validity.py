@@ -8,7 +8,7 @@ import pytest
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.validity import edge_lines
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 SHORTEST = 0.36
 Y, X = np.mgrid[0:128, 0:128]

@@ -15,7 +15,7 @@ from mitsuba_diffraction.optics.second_order import (
     obliqueness,
     slope_coefficients,
 )
-from tests.directions import polar, rough_patch
+from tests.support.directions import polar, rough_patch
 
 KERATIN = 1.56
 

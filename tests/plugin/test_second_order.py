@@ -10,8 +10,8 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics import blend, second_order
 from mitsuba_diffraction.optics.geometry import sigma_of, wavenumber
-from tests.directions import lit_pairs, polar, rough_patch
-from tests.lanes import brdf_values, interaction, refusal, vectors
+from tests.support.directions import lit_pairs, polar, rough_patch
+from tests.support.lanes import brdf_values, interaction, refusal, vectors
 
 # a patch this small is beyond what the model likes; that is not the point here
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")

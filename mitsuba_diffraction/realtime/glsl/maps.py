@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.colour import linear_srgb, response
-from ...plugin.changing import children
 from ...plugin.memory import upload
+from ...plugin.parameter_changes import children
 
 Array = NDArray[np.float64]
 #: Wavelengths (n,) in nm, and values (n,).

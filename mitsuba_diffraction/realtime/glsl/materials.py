@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...optics.colour import RGB_WAVELENGTHS
 from ...optics.geometry import wavenumber
-from ...plugin.changing import children
+from ...plugin.parameter_changes import children
 from ...tables.table import DiffractionTable
 from .maps import Map, Spectrum, axis_map, colour_map, evaluated, raw_picture
 from .packing import (

@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
-from ...plugin.pair import Pair
+from ...plugin.directions import Pair
 from ...plugin.properties import own_id
-from ...plugin.roles import (
+from ...plugin.sampling import share_sampler
+from ...plugin.types import (
     BSDF,
     Colour,
     Context,
@@ -32,7 +33,6 @@ from ...plugin.roles import (
     Spectrum,
     Vector2f,
 )
-from ...plugin.sampling import share_sampler
 from ...settings import TableSettings
 from ...tables.store import cached_table, table_key
 from ...tables.table import DiffractionTable

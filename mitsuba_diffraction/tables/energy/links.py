@@ -191,7 +191,7 @@ class Face(Link):
 
 
 class Returned(Link):
-    """What the flat side of a sheet sends back through the structure (`plugin.through`)."""
+    """What the flat side of a sheet sends back through the structure (`plugin.transmission`)."""
 
     def width(self, cos_i: Real | float, cos_o: Real) -> Real:
         n = self.medium.index

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.heights.field import HeightField
-from tests.heights.formats.refusals import refusal
-from tests.instruments import nanoscope
+from tests.support.instruments import nanoscope
+from tests.support.refusals import refusal
 
 surface_topography = pytest.importorskip(
     "SurfaceTopography", reason="instrument files need the extra afm"

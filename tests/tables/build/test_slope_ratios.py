@@ -14,7 +14,7 @@ from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.build.slope_ratios import slope_ratios
 from mitsuba_diffraction.tables.build.windows import windows_of
 from mitsuba_diffraction.tables.document import described, document_of, plain
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 #: Of few orders, and of many; not square.
 FEW = rough_patch((24, 30), (0.1, 0.11), 0.2)

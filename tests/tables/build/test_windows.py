@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.ndimage import gaussian_filter
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.heights import field as field_module
@@ -12,15 +11,7 @@ from mitsuba_diffraction.heights import preprocess, seams
 from mitsuba_diffraction.heights.validity import edge_lines
 from mitsuba_diffraction.tables.build import windows as module
 from mitsuba_diffraction.tables.build.windows import Windows
-
-PIXEL = 0.1
-SETTINGS = {"coherence_width": 6.0, "tolerance": 0.02, "wavelength_range": (500.0, 600.0)}
-
-
-def rough(n=480, seed=1):
-    """Heights of a random periodic surface, (n, n) in µm."""
-    heights = gaussian_filter(np.random.default_rng(seed).standard_normal((n, n)), 4, mode="wrap")
-    return 0.05 * heights / heights.std()
+from tests.support.scans import PIXEL, SETTINGS, rough
 
 
 @pytest.fixture(scope="module")

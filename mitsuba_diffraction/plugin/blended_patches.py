@@ -1,0 +1,339 @@
+"""The Mitsuba BSDF plugin `diffraction_mix`: several surfaces in one, by weights.
+
+Back and belly of a snake, worn scales and fresh ones: f = Σ w f / Σ w over its nested BSDFs. A
+surface is evaluated only where its weight is above 0, and one that is alone at a point is drawn
+from and evaluated once; `blendbsdf` evaluates both everywhere.
+
+NAME : BSDF ∂
+    Two surfaces or more, each with a name.
+weight_NAME : float or texture ∂ [what the others leave of 1]
+    Of the surface of that name, at least 0: a number, a bitmap (raw) or another texture or mesh
+    attribute of one channel. One surface may have none. All must not be 0 at one point; where mesh
+    attributes are, it is black.
+
+    <bsdf type="diffraction_mix">
+        <bsdf type="diffraction" name="back"> ... </bsdf>
+        <bsdf type="diffraction" name="belly"> ... </bsdf>
+        <texture type="bitmap" name="weight_back">
+            <string name="filename" value="back.png"/>
+            <boolean name="raw" value="true"/>
+        </texture>
+    </bsdf>
+"""
+
+from __future__ import annotations
+
+import functools
+import operator
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ..errors import DiffractionError
+from .memory import index_between
+from .parameter_changes import Bounded, arrays_within
+from .textures import is_attribute, is_bitmap, require_raw
+from .types import (
+    BSDF,
+    Callback,
+    Context,
+    Float,
+    Interaction,
+    Mask,
+    Properties,
+    Sample,
+    Spectrum,
+    Texture,
+    Vector2f,
+    Vector3f,
+)
+
+_PREFIX = "weight_"
+#: A sum of such weights is far from the largest number there is.
+_MOST_WEIGHT = 1e6
+#: Points a side of the unit square of UV coordinates at which weights are checked.
+_POINTS = 32
+#: The component of a context that asks for all of them.
+_ALL = 0xFFFFFFFF
+
+#: Values and densities of one of the surfaces, in a context of its own, where the mask is true.
+Ask = Callable[[BSDF, Context, Mask], Sequence[Any]]
+
+
+class DiffractionMix(mi.BSDF):
+    """Several BSDFs, by weights that vary over the surface."""
+
+    #: To who draws without Mitsuba, as `Diffraction.only_traced`.
+    only_traced = "a mix of surfaces"
+
+    def __init__(self, props: Properties) -> None:
+        super().__init__(props)
+        objects = dict(props.objects())
+        self.bsdfs = {name: one for name, one in objects.items() if isinstance(one, mi.BSDF)}
+        self.weights = _weights(props, list(self.bsdfs), objects)
+        self._held = list(self.bsdfs.values())  # where `dr.freeze` finds them
+        components = [one.flags(n) for one in self._held for n in range(one.component_count())]
+        self.m_components = components  # at once: what it gives back is a copy
+        self.m_flags = functools.reduce(operator.or_, components)
+        self.parameters_changed([])
+        self._check_sums()
+
+    # ------------------------------------------------------------------ Mitsuba's interface
+
+    def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
+        """f·cosθo per wavelength."""
+        weights = [self._weights_at(si, _wide(active, si, wo.z))]
+        return self._sum(ctx, weights, lambda one, own, on: [one.eval(own, si, wo, on)], "v")[0]
+
+    def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
+        """Density of `sample` per solid angle."""
+        shares = [self._shares(ctx, self._weights_at(si, _wide(active, si, wo.z)))]
+        return self._sum(ctx, shares, lambda one, own, on: [one.pdf(own, si, wo, on)], "d")[0]
+
+    def eval_pdf(
+        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
+    ) -> tuple[Spectrum, Float]:
+        """`eval` and `pdf` at once."""
+        weights = self._weights_at(si, _wide(active, si, wo.z))
+        both = [weights, self._shares(ctx, weights)]
+        value, density = self._sum(
+            ctx, both, lambda one, own, on: one.eval_pdf(own, si, wo, on), "vd"
+        )
+        return value, density
+
+    def sample(
+        self,
+        ctx: Context,
+        si: Interaction,
+        sample1: Float,
+        sample2: Vector2f,
+        active: Mask = True,
+    ) -> tuple[Sample, Spectrum]:
+        """A direction drawn from one of the surfaces, and f·cosθo of all over their density.
+
+        Lobes of one direction are that surface's alone.
+        """
+        weights = self._weights_at(si, _wide(active, si, sample1, sample2.x))
+        shares = self._shares(ctx, weights)
+        result, value = dr.zeros(mi.BSDFSample3f), mi.Spectrum(0.0)
+        chosen, weight, share = mi.UInt32(_ALL), mi.Float(0.0), mi.Float(0.0)
+        lower = mi.Float(0.0)
+        for n, one, own, first in self._asked(ctx):
+            mine = (shares[n] > 0.0) & (sample1 >= lower) & (sample1 < lower + shares[n])
+            left = (sample1 - lower) * dr.rcp(dr.select(mine, shares[n], 1.0))
+            lower = lower + shares[n]
+            draw = functools.partial(_drawn, one, own, si, left, sample2)
+            drawn, of_drawn = _where(mine, draw, (result, value))
+            result, value = dr.select(mine, drawn, result), dr.select(mine, of_drawn, value)
+            result.sampled_component += dr.select(mine, mi.UInt32(first), 0)
+            chosen = dr.select(mine, mi.UInt32(n), chosen)
+            weight = dr.select(mine, weights[n], weight)
+            share = dr.select(mine, shares[n], share)
+        smooth = ~mi.has_flag(result.sampled_type, mi.BSDFFlags.Delta) & (result.pdf > 0.0)
+        others, density = self._sum(
+            ctx,
+            [weights, shares],
+            lambda one, own, on: one.eval_pdf(own, si, result.wo, on),
+            "vd",
+            lambda n: smooth & (chosen != n),
+        )
+        total = value * (weight * result.pdf) + others
+        result.pdf = dr.fma(share, result.pdf, density)
+        lit = result.pdf > 0.0
+        return result, dr.select(lit, total * dr.rcp(dr.select(lit, result.pdf, 1.0)), 0.0)
+
+    def eval_diffuse_reflectance(self, si: Interaction, active: Mask = True) -> Spectrum:
+        """What a denoiser takes for the surface's colour."""
+        weights = [self._weights_at(si, _wide(active, si))]
+        ask: Ask = lambda one, own, on: [one.eval_diffuse_reflectance(si, on)]  # noqa: E731
+        return self._sum(mi.BSDFContext(), weights, ask, "v")[0]
+
+    def traverse(self, callback: Callback) -> None:
+        """Expose surfaces and weights."""
+        for name, one in self.bsdfs.items():
+            callback.put(name, one, mi.ParamFlags.Differentiable)
+        for name, weight in self.weights.items():
+            if isinstance(weight, Bounded):
+                weight.traverse(callback)
+            elif weight is not None:
+                callback.put(_PREFIX + name, weight, mi.ParamFlags.Differentiable)
+
+    def parameters_changed(self, keys: list[str]) -> None:
+        """Check what changed, and keep it out of the kernels' code."""
+        numbers = [one for one in self.weights.values() if isinstance(one, Bounded)]
+        refused = [line for line in (one.settle() for one in numbers) if line]
+        self._for_freezing = arrays_within(list(self.weights.values()))
+        if refused:
+            raise DiffractionError("; ".join(refused))
+
+    def to_string(self) -> str:
+        """All parameters, for people."""
+        lines = [f"  {name} = {one},\n" for name, one in self.bsdfs.items()]
+        lines += [f"  {_PREFIX}{name} = {_text(one)},\n" for name, one in self.weights.items()]
+        return f"DiffractionMix[\n{''.join(lines)}]"
+
+    # ------------------------------------------------------------------ the weights
+
+    def _weights_at(self, si: Interaction, active: Mask) -> list[Float]:
+        """Of each surface, of sum 1; 0 where it is not active or they are all 0."""
+        given = [_weight_at(weight, si, active) for weight in self.weights.values()]
+        rest = dr.maximum(1.0 - sum(one for one in given if one is not None), 0.0)
+        found = [rest if one is None else one for one in given]
+        total: Float = sum(found, mi.Float(0.0))
+        some = mi.Mask(active) & (total > 0.0)
+        scale = dr.select(some, dr.rcp(dr.select(some, total, 1.0)), 0.0)
+        return [one * scale for one in found]
+
+    def _shares(self, ctx: Context, weights: list[Float]) -> list[Float]:
+        """Of the samples: the weights, or all where a component of one surface is asked for."""
+        if ctx.component == _ALL:
+            return weights
+        return [dr.select(one > 0.0, mi.Float(1.0), 0.0) for one in weights]
+
+    def _asked(self, ctx: Context) -> Iterator[tuple[int, BSDF, Context, int]]:
+        """Number, surface, context of its own, and its first component."""
+        first = 0
+        for n, one in enumerate(self._held):
+            if ctx.component == _ALL:
+                yield n, one, ctx, first
+            elif first <= ctx.component < first + one.component_count():
+                own = mi.BSDFContext(ctx.mode, ctx.type_mask, ctx.component - first)
+                yield n, one, own, 0
+            first += one.component_count()
+
+    def _sum(
+        self,
+        ctx: Context,
+        shares: Sequence[list[Float]],
+        ask: Ask,
+        kinds: str,
+        where: Callable[[int], Mask] = lambda n: True,
+    ) -> list[Any]:
+        """Σ over surfaces of their shares times what they are asked, "v"alues and "d"ensities."""
+        nothing = [mi.Spectrum(0.0) if kind == "v" else mi.Float(0.0) for kind in kinds]
+        totals = list(nothing)
+        for n, one, own, _ in self._asked(ctx):
+            on = mi.Mask((shares[0][n] > 0.0) & where(n))
+            found = _where(on, functools.partial(ask, one, own), nothing)
+            totals = [
+                total + dr.select(on, part * share[n], 0.0)
+                for total, part, share in zip(totals, found, shares, strict=True)
+            ]
+        return totals
+
+    def _check_sums(self) -> None:
+        """Refuse weights that are all 0 somewhere on the unit square of UV coordinates."""
+        if any(one is None or is_attribute(one) for one in self.weights.values()):
+            return
+        totals = [sum(self._weights_at(si, True), mi.Float(0.0)) for si in _square()]
+        if min(dr.slice(dr.min(total)) for total in totals) == 0.0:
+            names = ", ".join(_PREFIX + name for name in self.weights)
+            raise DiffractionError(
+                f"{names} are all 0 somewhere; leave out that of a surface, which gets the rest"
+            )
+
+
+def _wide(active: Mask, si: Interaction, *arrays: Float) -> Mask:
+    """The mask, as wide as what is computed where it is true: Dr.Jit ends the process otherwise."""
+    for one in (si.wi.z, *arrays):
+        active = mi.Mask(active) & dr.isfinite(one)
+    return active
+
+
+def _drawn(
+    one: BSDF, own: Context, si: Interaction, sample1: Float, sample2: Vector2f, on: Mask
+) -> Sequence[Any]:
+    return one.sample(own, si, sample1, sample2, on)
+
+
+def _where(on: Mask, ask: Callable[[Mask], Sequence[Any]], otherwise: Sequence[Any]) -> Any:
+    """What is asked where it is on; kernels skip it where none of their lanes are."""
+    if not dr.is_jit_v(mi.Float):
+        return ask(on) if on else otherwise
+    # copies: Dr.Jit makes what comes out of both branches of what the one returned
+    return dr.if_stmt(
+        (), on, lambda: tuple(ask(on)), lambda: tuple(type(one)(one) for one in otherwise)
+    )
+
+
+def _weights(
+    props: Properties, names: list[str], objects: dict[str, Any]
+) -> dict[str, Bounded | Texture | None]:
+    """By surface; None for what the others leave.
+
+    Raises
+    ------
+    DiffractionError
+        For names that do not fit, and for weights that are none.
+    """
+    if len(names) < 2:
+        raise DiffractionError(f"diffraction_mix takes two nested BSDFs or more, got {len(names)}")
+    given = [name for name in props.keys() if name.startswith(_PREFIX)]  # noqa: SIM118
+    known = [_PREFIX + name for name in names]
+    for name in props.keys():  # noqa: SIM118 - Properties is no mapping
+        if name not in (*known, *names, "id"):
+            raise DiffractionError(
+                f"unknown parameter '{name}' of diffraction_mix; its surfaces are "
+                f"{', '.join(names)}, and their weights {', '.join(known)}"
+            )
+    if len(given) < len(names) - 1:
+        missing = ", ".join(name for name in known if name not in given)
+        raise DiffractionError(f"give weights for all surfaces but one; there is no {missing}")
+    return {name: _weight(props, _PREFIX + name, objects) for name in names}
+
+
+def _weight(props: Properties, name: str, objects: dict[str, Any]) -> Bounded | Texture | None:
+    if name not in props:
+        return None
+    if name not in objects:
+        try:
+            number = float(props.get(name))
+        except (TypeError, ValueError):
+            number = np.nan
+        refusal = f"{name}={props.get(name)!r} must be between 0 and {_MOST_WEIGHT:g}"
+        if not 0.0 <= number <= _MOST_WEIGHT:
+            raise DiffractionError(refusal)
+        return Bounded(
+            name, number, 0.0, _MOST_WEIGHT,
+            lambda wrong: f"{name}={wrong:g} must be between 0 and {_MOST_WEIGHT:g}",
+        )  # fmt: skip
+    texture = objects[name]
+    require_raw(texture, name, "weights")
+    if is_bitmap(texture):
+        least = float(np.array(mi.traverse(texture)["data"], float).min())
+    elif is_attribute(texture):
+        least = 0.0
+    else:
+        least = min(dr.slice(dr.min(texture.eval_1(si, True))) for si in _square())
+    if not least >= 0.0:  # also refuses NaN
+        raise DiffractionError(f"{name}: its least number is {least:g}; weights are at least 0")
+    return texture
+
+
+def _weight_at(weight: Bounded | Texture | None, si: Interaction, active: Mask) -> Float | None:
+    if weight is None or isinstance(weight, Bounded):
+        return weight and weight.value
+    return index_between(weight.eval_1(si, active), 0.0, _MOST_WEIGHT)
+
+
+def _text(weight: Bounded | Texture | None) -> str:
+    if weight is None:
+        return "the rest"
+    if isinstance(weight, Bounded):
+        return f"{dr.slice(weight.value):g}"
+    return " ".join(str(weight).split())
+
+
+def _square() -> Iterator[Interaction]:
+    """Hits at points of the unit square of UV coordinates; one by one in scalar variants."""
+    places = (np.indices((_POINTS, _POINTS)).reshape(2, -1).astype(np.float32) + 0.5) / _POINTS
+    for part in [places] if dr.is_jit_v(mi.Float) else places.T.tolist():
+        si = dr.zeros(mi.SurfaceInteraction3f)
+        si.uv = mi.Point2f(part)
+        yield si
+
+
+mi.register_bsdf("diffraction_mix", DiffractionMix)

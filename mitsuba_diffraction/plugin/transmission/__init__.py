@@ -1,0 +1,8 @@
+"""Light that goes through a dielectric, or through a thin sheet with one structured side (Dr.Jit).
+
+Contents
+--------
+sides     value, density and samples of light on both sides
+crossing  pairs of directions that are not both above the surface, and their Jones matrices
+energy    scales of directions by which reflected and transmitted light add up to 1
+"""

@@ -1,0 +1,179 @@
+"""`diffraction_mix`: surfaces by weights, each evaluated only where it has one."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction.realtime.glsl.scene import read_scene
+from tests.support.directions import rough_patch
+from tests.support.gentle import PATCH, WIDTH, pairs
+from tests.support.lanes import interaction, refusal, spectra, vectors
+
+OTHER = rough_patch((60, 60), (0.08, 0.08), 0.1, seed=3)
+RAW = {"material": "none", "energy_conserving": False, "coherence_width": WIDTH}
+PIGMENTED = {"int_ior": 1.5, "pigment": {"type": "conductor"}, "energy_conserving": False}
+WEIGHTS = np.array([[1.0, 0.0], [0.25, 0.6]], np.float32)
+UV = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]], np.float32)
+
+
+def bitmap(values=WEIGHTS, **more):
+    """A raw bitmap of weights, not interpolated."""
+    data = mi.TensorXf(np.ascontiguousarray(values[..., None]))
+    return {"type": "bitmap", "raw": True, "data": data, "filter_type": "nearest"} | more
+
+
+def surfaces():
+    """Two, with other orders, one over a mirror."""
+    pigmented = PIGMENTED | {"coherence_width": WIDTH}
+    return {"back": md.bsdf_dict(PATCH, **RAW), "belly": md.bsdf_dict(OTHER, **pigmented)}
+
+
+def mix(**weights):
+    return mi.load_dict({"type": "diffraction_mix", **surfaces(), **weights})
+
+
+def hits(wi, lam, uv):
+    si = interaction(wi, lam[:, None])
+    si.uv = mi.Point2f(*(np.ascontiguousarray(c) for c in np.broadcast_to(uv, (len(wi), 2)).T))
+    return si
+
+
+def test_it_is_the_mean_of_its_surfaces_by_weight(variant):
+    wi, wo, lam = pairs(100)
+    alone = [mi.load_dict(one) for one in surfaces().values()]
+    both = mix(weight_back=bitmap())
+    context, uv = mi.BSDFContext(), np.resize(UV, (100, 2))
+    si, out, w = hits(wi, lam, uv), vectors(wo), np.resize(WEIGHTS.ravel(), 100)
+    values, densities = zip(*(one.eval_pdf(context, si, out) for one in alone), strict=True)
+    found = (
+        *both.eval_pdf(context, si, out),
+        both.eval(context, si, out),
+        both.pdf(context, si, out),
+    )
+    dr.eval(values, densities, found)  # one kernel instead of eight
+    value = w[:, None] * spectra(values[0]) + (1 - w[:, None]) * spectra(values[1])
+    density = w * np.array(densities[0]) + (1 - w) * np.array(densities[1])
+    for one, expected in (
+        (spectra(found[0]), value), (spectra(found[2]), value),
+        (np.array(found[1]), density), (np.array(found[3]), density),
+    ):  # fmt: skip
+        assert one == pytest.approx(expected, rel=1e-5, abs=1e-6 * float(expected.max()))
+
+
+@pytest.mark.parametrize("component", [0xFFFFFFFF, 0, 1, 2])
+def test_samples_add_up_to_the_value(variant, component):
+    """∫ f cosθ dω by samples, mirrors included, against that of each surface by weight."""
+    wi, _, lam = pairs(1)
+    n = 40_000
+    rng = np.random.default_rng(1)
+    si = hits(np.repeat(wi, n, axis=0), np.repeat(lam, n), UV[2])
+    numbers = mi.Float(rng.random(n)), mi.Point2f(*rng.random((2, n)).astype(np.float32))
+
+    def albedo(bsdf, component=component):
+        context = mi.BSDFContext(mi.TransportMode.Radiance, 0xFFFFFFFF, component)
+        _, weight = bsdf.sample(context, si, *numbers)
+        return spectra(weight)[:, 0]
+
+    both, (back, belly) = mix(weight_back=bitmap()), map(mi.load_dict, surfaces().values())
+    found = albedo(both)
+    parts = {0: [(0.25, back, 0)], 1: [(0.75, belly, 0)], 2: [(0.75, belly, 1)]}
+    whole = [(0.25, back, 0xFFFFFFFF), (0.75, belly, 0xFFFFFFFF)]
+    expected = sum(w * albedo(one, c).mean() for w, one, c in parts.get(component, whole))
+    # standard errors of both
+    assert found.mean() == pytest.approx(expected, abs=5.0 * found.std() / np.sqrt(n))
+
+
+def test_densities_are_those_of_the_samples(variant):
+    wi, _, lam = pairs(1)
+    si = hits(np.repeat(wi, 500, axis=0), np.repeat(lam, 500), UV[3])
+    rng = np.random.default_rng(2)
+    both, context = mix(weight_back=bitmap()), mi.BSDFContext()
+    drawn, weight = both.sample(
+        context, si, mi.Float(rng.random(500)), mi.Point2f(*rng.random((2, 500)).astype(np.float32))
+    )
+    value, density = both.eval_pdf(context, si, drawn.wo)
+    dr.eval(drawn, weight, value, density)  # one kernel instead of five
+    smooth = np.array(~mi.has_flag(drawn.sampled_type, mi.BSDFFlags.Delta)) & (drawn.pdf > 0.0)
+    assert np.array(density)[smooth] == pytest.approx(np.array(drawn.pdf)[smooth], rel=1e-4)
+    found = (spectra(weight) * np.array(drawn.pdf)[:, None])[smooth]
+    assert found == pytest.approx(spectra(value)[smooth], rel=1e-3, abs=1e-4 * float(found.max()))
+    assert set(np.array(drawn.sampled_component)) == {0, 1, 2}
+
+
+def test_derivatives_with_respect_to_weights_and_what_is_mixed(variant):
+    wi, wo, lam = pairs(40)
+    both, out = mix(weight_back=0.4), vectors(wo)
+    parameters, si = mi.traverse(both), hits(wi, lam, UV[0])
+
+    def total():
+        parameters.update()
+        return dr.sum(both.eval(mi.BSDFContext(), si, out)[0])
+
+    for name, value, step in (("weight_back", 0.4, 0.05), ("back.height_scale", 1.0, 0.02)):
+        ends = []
+        for end in (value + step, value - step):
+            parameters[name] = mi.Float(end)
+            ends.append(total()[0])
+        dr.enable_grad(given := mi.Float(value))
+        parameters[name] = given
+        found = total()
+        dr.forward_from(given)
+        slope = (ends[0] - ends[1]) / (2.0 * step)
+        assert dr.grad(found)[0] == pytest.approx(slope, rel=1e-2)  # curvature and rounding
+        parameters[name] = mi.Float(value)
+    parameters["weight_back"] = mi.Float(-1.0)
+    with pytest.raises(md.DiffractionError, match="weight_back=-1 must be between 0"):
+        parameters.update()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({}, "there is no weight_back, weight_belly"),
+        ({"weight_back": -0.5}, "weight_back=-0.5 must be between 0"),
+        ({"weight_back": "much"}, "weight_back='much' must be"),
+        ({"weight_back": lambda: bitmap(-WEIGHTS)}, "its least number is -1"),
+        ({"weight_back": lambda: bitmap(WEIGHTS * np.nan)}, "its least number is nan"),
+        ({"weight_back": lambda: bitmap(raw=False)}, "takes weights for colours"),
+        (
+            {"weight_back": 0.0, "weight_belly": 0.0},
+            "weight_back, weight_belly are all 0 somewhere",
+        ),
+        ({"weight_back": bitmap, "weight_belly": 0.0}, "are all 0 somewhere"),
+        ({"weight_side": 1.0, "weight_back": 1.0}, "unknown parameter 'weight_side'"),
+        ({"weight_back": 1.0, "height_scale": 1.0}, "its surfaces are back, belly"),
+        ({"belly": None, "weight_back": 1.0}, "takes two nested BSDFs or more, got 1"),
+    ],
+)
+def test_weights_that_mean_nothing_are_refused(some_variant, parameters, said):
+    made = {k: v() if callable(v) else v for k, v in (surfaces() | parameters).items()}
+    given = {k: v for k, v in made.items() if v is not None}
+    assert said in refusal(lambda: mi.load_dict({"type": "diffraction_mix", **given}))
+
+
+def test_shaders_refuse_it(some_variant):
+    sensor = {"type": "perspective", "film": {"type": "hdrfilm"}}
+    scene = {"type": "scene", "disk": {"type": "disk", "bsdf": mix(weight_back=0.5)}, "s": sensor}
+    with pytest.raises(md.DiffractionError, match=r"a mix of surfaces of .* path tracer"):
+        read_scene(mi.load_dict(scene))
+
+
+@pytest.mark.parametrize("name", ["scalar_spectral", "llvm_ad_spectral_polarized"])
+def test_other_variants_mix_too(name):
+    try:
+        mi.set_variant(name)
+        both, back = mix(weight_back=bitmap()), mi.load_dict(surfaces()["back"])
+        si = dr.zeros(mi.SurfaceInteraction3f)
+        si.wi, si.uv = mi.Vector3f(0.0, 0.0, 1.0), mi.Point2f(UV[0].tolist())
+        si.wavelengths = 550.0 if mi.is_spectral else []
+        sample, weight = both.sample(mi.BSDFContext(), si, 0.3, mi.Point2f(0.2, 0.6))
+        its, expected = back.sample(mi.BSDFContext(), si, 0.3, mi.Point2f(0.2, 0.6))
+        assert np.array(sample.wo).ravel() == pytest.approx(np.array(its.wo).ravel(), rel=1e-6)
+        one, other = (np.array(mi.unpolarized_spectrum(w)).ravel() for w in (weight, expected))
+        assert one == pytest.approx(other, rel=1e-5)
+    finally:
+        mi.set_variant("llvm_ad_spectral")

@@ -1,0 +1,239 @@
+"""`coherence="surface"`: the window where the light falls, against the reference and its mean."""
+
+from __future__ import annotations
+
+import re
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction.optics.geometry import kirchhoff_factor, sigma_of
+from tests.support.directions import lit_pairs, uniform_directions
+from tests.support.gentle import PATCH, WIDTH, load
+from tests.support.lanes import interaction, refusal, spectra, vectors
+
+ON_SURFACE = {"coherence": "surface", "uv_scale": 10.0}
+
+
+def values_at(bsdf, wi, wo, lam, uv, v_axis=1.0):
+    """f of one wavelength a pair (n,), at UV coordinates (n, 2), where v runs along ±t."""
+    si = interaction(wi, lam[:, None])
+    si.uv = mi.Point2f(*(np.ascontiguousarray(c, np.float32) for c in np.transpose(uv)))
+    si.dp_du, si.dp_dv = mi.Vector3f(0.01, 0, 0), mi.Vector3f(0, 0.01 * v_axis, 0)
+    found = spectra(bsdf.eval(mi.BSDFContext(), si, vectors(wo)))
+    return found[np.arange(len(lam)), np.arange(len(lam)) % 4] / wo[:, 2]
+
+
+def places(n, seed=0):
+    """UV coordinates, exact in single precision."""
+    return np.random.default_rng(seed).uniform(-3.0, 3.0, (n, 2)).astype(np.float32).astype(float)
+
+
+def relative(found, exact, light, near):
+    """Σ|f − exact| / Σ exact of ⟨|P|²⟩ near order 0 and elsewhere, as the tolerance has it."""
+    factor = kirchhoff_factor(*light, sigma_of(WIDTH))
+    difference, size = np.abs(found - exact) / factor, exact / factor
+    return [difference[m].sum() / size[m].sum() for m in (near, ~near)]
+
+
+@pytest.mark.parametrize("basis", ["svd", "taylor"])
+def test_every_place_is_the_reference_s(variant, basis):
+    *light, near = lit_pairs(PATCH, sigma_of(WIDTH), 400, 2)
+    uv = places(400)
+    bsdf = load(**ON_SURFACE, basis=basis)
+    exact = md.reference.brdf(
+        PATCH, *light, coherence_width=WIDTH, coherence="surface", place=10.0 * uv
+    )
+    assert max(relative(values_at(bsdf, *light, uv), exact, light, near)) < 1e-3
+
+
+@pytest.mark.parametrize("taps", [None, 12])
+def test_places_follow_scale_orientation_and_the_side_that_v_runs_to(variant, taps, tmp_path):
+    wi, wo, lam, near = lit_pairs(PATCH, sigma_of(WIDTH), 200, 3)
+    table = md.DiffractionTable.build(PATCH, coherence_width=WIDTH, coherence="patch", taps=taps)
+    table.save(tmp_path / "patch.exr")
+    turned = {"orientation": 90.0, "coherence": "surface", "uv_scale": "10, 20"}
+    bsdf = mi.load_dict(
+        {"type": "diffraction", "table": str(tmp_path / "patch.exr"), "material": "none",
+         "energy_conserving": False, **turned}
+    )  # fmt: skip
+    uv = places(200)
+    # at 90° the patch's x is t, which v runs against, and its y is −s
+    place = np.stack([-20.0 * uv[:, 1], -10.0 * uv[:, 0]], axis=1)
+    to_patch = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    frame = (wi @ to_patch, wo @ to_patch, lam)
+    exact = md.reference.brdf(
+        PATCH, *frame, coherence_width=WIDTH, coherence="surface", place=place
+    )
+    found = values_at(bsdf, wi, wo, lam, uv, v_axis=-1.0)
+    assert max(relative(found, exact, frame, near)) < 1e-3
+
+
+def test_positions_in_the_world_are_those_of_uv_where_these_are_even(variant):
+    wi, wo, lam, _ = lit_pairs(PATCH, sigma_of(WIDTH), 100, 3)
+    uv = places(100)
+    by_uv = values_at(load(**ON_SURFACE), wi, wo, lam, uv)
+    world = load(coherence="surface", world_scale=1000.0)  # dp_du is 0.01
+    # single precision: 1e-6 of 30 µm are 1e-4 rad between orders of a window
+    assert values_at(world, wi, wo, lam, uv) == pytest.approx(
+        by_uv, rel=1e-2, abs=1e-4 * by_uv.max()
+    )
+
+
+def grain():
+    """Gaussian noise, 16 µm wide, whose speckle away from the mirror direction is Gaussian too."""
+    noise = np.fft.fft2(np.random.default_rng(4).normal(size=(128, 128)))
+    q = 2 * np.pi * np.fft.fftfreq(128, 0.125)
+    smooth = np.exp(-0.25 * 0.3**2 * (q[:, None] ** 2 + q**2))
+    heights = np.fft.ifft2(noise * smooth).real
+    return md.HeightField(heights * (0.02 / heights.std()), 0.125)
+
+
+@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+@pytest.mark.parametrize("tiling", ["periodic", "random"])
+def test_the_mean_is_the_ensemble_s_and_the_contrast_that_of_independent_windows(variant, tiling):
+    given = {"coherence_width": 3.0, "tolerance": 3e-3}
+    directions, each = 300, 256
+    rng = np.random.default_rng(5)
+    wi, wo = uniform_directions(directions, rng, 0.5), uniform_directions(directions, rng, 0.5)
+    off = np.hypot(*(wi + wo)[:, :2].T) > 0.6  # of the mirror direction, by 9 of the lobe's widths
+    wi, wo = wi[off], wo[off]
+    lam = rng.uniform(400.0, 700.0, len(wi))
+    mean = values_at(load(grain(), **given), wi, wo, lam, np.zeros((len(wi), 2)))
+    many = (np.repeat(part, each, axis=0) for part in (wi, wo, lam))
+    uv = rng.uniform(0.0, 1600.0, (len(wi) * each, 2))  # 1000 × 1000 patches
+    found = values_at(load(grain(), **given, **ON_SURFACE, tiling=tiling), *many, uv)
+    relative = found.reshape(-1, each) / mean[:, None]
+    # 70 000 places, of a deviation of 1 each: a standard error of 0.004
+    assert relative.mean() == pytest.approx(1.0, abs=0.01)
+    for n in (1, 4, 16):
+        contrast = relative.reshape(len(wi), -1, n).mean(axis=2).std()
+        assert contrast == pytest.approx(1 / np.sqrt(n), rel=0.05)
+
+
+def hits(wi, uv):
+    """Surface interactions at UV coordinates."""
+    si = dr.zeros(mi.SurfaceInteraction3f, len(wi))
+    si.wi, si.sh_frame = vectors(wi), mi.Frame3f(mi.Normal3f(0, 0, 1))
+    si.uv = mi.Point2f(*(np.ascontiguousarray(c, np.float32) for c in uv.T))
+    return si
+
+
+def test_random_tiles_do_not_repeat_and_periodic_ones_do(mono):
+    wi, wo, _, _ = lit_pairs(PATCH, sigma_of(WIDTH), 100, 3)
+    here, again = hits(wi, places(100)), hits(wi, places(100) + np.array(PATCH.extent) / 10.0)
+    for tiling, alike in (("periodic", True), ("random", False)):
+        bsdf = load(**ON_SURFACE, tiling=tiling)
+        one, other = (
+            np.array(bsdf.eval(mi.BSDFContext(), si, vectors(wo))[0]) for si in (here, again)
+        )
+        assert np.allclose(one, other, rtol=1e-2, atol=1e-4 * one.max()) == alike
+
+
+def test_directions_and_albedo_are_those_of_the_mean(mono):
+    wi, wo, _, _ = lit_pairs(PATCH, sigma_of(WIDTH), 100, 3)
+    given = {"int_ior": 1.5, "pigment": {"type": "diffuse"}}
+    both = [load(**one | given) for one in (ON_SURFACE, {})]
+    si, context = hits(wi, places(100)), mi.BSDFContext(mi.TransportMode.Radiance, 0xFFFFFFFF, 0)
+    one, other = (np.array(bsdf.pdf(context, si, vectors(wo))) for bsdf in both)
+    # two tables of the same orders, each to its tolerance; cells have 8 bits
+    assert one == pytest.approx(other, rel=0.02, abs=1e-3 * float(other.max()))
+    one, other = (bsdf.reflected_ratio(1.0).values for bsdf in both)
+    assert one == pytest.approx(other, rel=2e-3)
+
+
+def test_kernels_of_other_coherences_know_no_places(mono):
+    wi, wo, _, _ = lit_pairs(PATCH, sigma_of(WIDTH), 60, 3)
+
+    def operations(bsdf, si):
+        value = bsdf.eval(mi.BSDFContext(), si, vectors(wo))
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            dr.eval(value)
+            (made,) = (one for one in dr.kernel_history() if "hash" in one)
+        return made["operation_count"]
+
+    anywhere, nowhere = hits(wi, places(60)), hits(wi, places(60))
+    nowhere.uv = dr.zeros(mi.Point2f)  # of which nothing is compiled
+    for parameters, alike in (({}, True), ({"coherence": "patch"}, True), (ON_SURFACE, False)):
+        bsdf = load(**parameters)
+        assert (operations(bsdf, anywhere) == operations(bsdf, nowhere)) == alike
+
+
+def test_derivatives_with_respect_to_heights_are_those_of_differences(mono):
+    wi, wo, _, _ = lit_pairs(PATCH, sigma_of(WIDTH), 60, 3)
+    parameters = mi.traverse(bsdf := load(**ON_SURFACE, tiling="random"))
+    si = hits(wi, places(60))
+
+    def total(scale):
+        parameters["height_scale"] = scale
+        parameters.update()
+        return dr.sum(bsdf.eval(mi.BSDFContext(), si, vectors(wo))[0])
+
+    difference = (total(mi.Float(1.02)) - total(mi.Float(0.98)))[0] / 0.04
+    dr.enable_grad(scale := mi.Float(1.0))
+    found = total(scale)
+    dr.forward_from(scale)
+    # the rounding and curvature of a difference over 4 %
+    assert dr.grad(found)[0] == pytest.approx(difference, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({"coherence": "surface"}, "takes one of uv_scale, .* got none"),
+        (ON_SURFACE | {"world_scale": 1.0}, "got uv_scale and world_scale"),
+        (ON_SURFACE | {"uv_scale": -1.0}, "uv_scale=-1.0 must be one number or two"),
+        (ON_SURFACE | {"uv_scale": "1, 2, 3"}, "must be one number or two"),
+        (ON_SURFACE | {"uv_scale": 1e9}, "at most 1e\\+07"),
+        ({"coherence": "surface", "world_scale": "10, 20"}, "must be one number of µm"),
+        (ON_SURFACE | {"tiling": "hexagons"}, "choose one of periodic, random"),
+        ({"coherence": "place"}, "choose one of ensemble, patch, surface"),
+    ],
+)
+def test_what_says_nothing_of_places_is_refused(some_variant, parameters, said):
+    assert re.search(said, refusal(lambda: load(**parameters)))
+
+
+def test_variants_without_wavelengths_refuse_places():
+    try:
+        mi.set_variant("scalar_rgb")
+        assert "variant scalar_rgb has none" in refusal(lambda: load(**ON_SURFACE))
+    finally:
+        mi.set_variant("llvm_ad_spectral")
+
+
+@pytest.mark.parametrize("name", ["scalar_spectral", "llvm_ad_mono", "llvm_ad_spectral_polarized"])
+def test_other_variants_see_the_same_places(name):
+    wi, wo, lam, _ = lit_pairs(PATCH, sigma_of(WIDTH), 1, 3)
+    uv, given = places(1), {"coherence_width": WIDTH, "coherence": "surface"}
+    exact = md.reference.brdf(PATCH, wi, wo, lam, place=10.0 * uv, **given)
+    try:
+        mi.set_variant(name)
+        bsdf = load(**ON_SURFACE, wavelength=float(lam[0]))
+        si = dr.zeros(mi.SurfaceInteraction3f)
+        si.wi, si.uv = mi.Vector3f(wi[0].tolist()), mi.Point2f(uv[0].tolist())
+        si.sh_frame, si.dp_dv = mi.Frame3f([0, 0, 1]), mi.Vector3f(0, 1, 0)
+        si.wavelengths = float(lam[0]) if mi.is_spectral else []
+        value = mi.unpolarized_spectrum(
+            bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(wo[0].tolist()))
+        )
+        # one lobe alone, of average brightness: a few times the tolerance
+        found = np.array(value).ravel()[0]
+        assert found == pytest.approx(exact[0] * wo[0, 2], rel=5e-3)
+    finally:
+        mi.set_variant("llvm_ad_spectral")
+
+
+def test_a_table_of_powers_has_no_places(some_variant, tmp_path):
+    md.DiffractionTable.build(PATCH, coherence_width=WIDTH).save(tmp_path / "table.exr")
+    said = refusal(
+        lambda: mi.load_dict(
+            {"type": "diffraction", "table": str(tmp_path / "table.exr"), **ON_SURFACE}
+        )
+    )
+    assert "coherence=ensemble" in said
+    assert "precompute --coherence patch'" in said

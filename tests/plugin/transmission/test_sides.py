@@ -1,0 +1,211 @@
+"""Light that goes through: values, both sides, samples, sums, derivatives, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import reference
+from mitsuba_diffraction.optics.fresnel import reflectance
+from mitsuba_diffraction.tables.energy import sides
+from tests.support.chi_square import DISPERSED, ROUGH, SMALL, Case, chi_square
+from tests.support.directions import as_single, rough_patch
+from tests.support.lanes import evaluated, interaction, refusal, spectra, vectors
+from tests.support.layered import PATCH, WIDTH, load, pairs
+from tests.support.transmitting import BELOW, INDICES, SIDES, OneSide, both, sampled
+from tests.support.variants import evaluate, runs
+
+
+@pytest.mark.parametrize("kind", SIDES)
+@pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
+def test_values_are_the_reference_s_in_both_directions(some_variant, kind, model):
+    wi, wo, lam = (a[:120] for a in pairs())
+    wo, bsdf = as_single(wo * BELOW), both(model=model, **SIDES[kind])
+    exact = np.stack(
+        [
+            reference.btdf(
+                PATCH, wi, wo, one,
+                coherence_width=WIDTH, model=model, eta=1.5, thin=kind == "sheet",
+            )
+            for one in lam.T
+        ],
+        axis=1,
+    )  # fmt: skip
+    # radiance in the dielectric is n² times as large
+    denser = 2.25 if kind == "dielectric" else 1.0
+    for there, back, factor in ((wi, wo, 1.0), (wo, wi, denser)):
+        found = evaluated(bsdf, there, back, lam)
+        expected = factor * exact * np.abs(back[:, 2:])
+        # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
+        assert found == pytest.approx(expected, rel=1e-3, abs=1e-5 * expected.max())
+
+
+@pytest.mark.parametrize("kind", SIDES)
+def test_above_it_reflects_what_it_does_alone_and_below_as_from_within(some_variant, kind):
+    wi, wo, lam = pairs(60)
+    found = evaluated(both(**SIDES[kind]), wi, wo, lam)
+    alone = evaluated(both(second_order=False), wi, wo, lam)
+    if kind == "dielectric":
+        assert found == pytest.approx(alone, rel=1e-4, abs=1e-6 * alone.max())
+    else:  # and what the flat side sends back
+        assert np.all(found >= alone * (1 - 1e-4) - 1e-6 * alone.max())
+    from_below = evaluated(both(**SIDES[kind]), wi * BELOW, wo * BELOW, lam)
+    # seen from below, the heights are turned over
+    turned = md.HeightField(-PATCH.heights, PATCH.pixel_size)
+    if kind == "sheet":
+        # as a structure of air under a coat of the sheet's index
+        coated = {"eta": 1.0, "k": 0.0, "coat_ior": 1.5}
+        expected = evaluated(load(turned, **coated), wi, wo, lam)
+        assert from_below == pytest.approx(expected, rel=2e-3, abs=1e-4 * expected.max())
+
+
+@pytest.mark.parametrize("kind", SIDES)
+def test_reciprocity(some_variant, kind):
+    wi, wo, lam = pairs()
+    bsdf = both(**SIDES[kind])
+    for first, second, factor in (
+        (wi, wo * BELOW, 2.25 if kind == "dielectric" else 1.0),
+        (wi, wo, 1.0),
+        (wi * BELOW, wo * BELOW, 1.0),
+    ):
+        there = evaluated(bsdf, first, second, lam) / np.abs(second[:, 2:])
+        back = evaluated(bsdf, second, first, lam) / np.abs(first[:, 2:])
+        assert factor * there == pytest.approx(back, rel=2e-4, abs=2e-6 * back.max())
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("kind", "theta"),
+    [("dielectric", 40.0), ("dielectric", 150.0), ("sheet", 60.0), ("sheet", 130.0)],
+)
+def test_the_density_is_that_of_the_samples_on_both_sides(some_variant, kind, theta, side):
+    case = Case(ROUGH, theta, DISPERSED, SMALL | INDICES | SIDES[kind])
+    test = chi_square(OneSide(case.load(), side), case, samples=1 << 19)
+    assert test.run(0.01, 8, quiet=True), test.messages
+    assert test.histogram_sum[0] > 0.01, test.messages
+
+
+@pytest.mark.parametrize("kind", SIDES)
+def test_of_gentle_surfaces_both_sides_add_up_to_all_light(some_variant, kind):
+    gentle = rough_patch((240, 240), (0.09, 0.09), 0.03, 1.0)
+    bsdf = both(**SIDES[kind], coherence_width=20.0, field=gentle)
+    for theta in (0.0, 45.0, 75.0):
+        weights, reflected = sampled(bsdf, theta)
+        error = 3 * weights.std() / np.sqrt(len(weights))
+        # a lobe of 20 µm is spread over 5° at 75°, where transmittance bends
+        assert 0.98 - error < weights.mean() < 1.0 + error + (0.01 if theta > 70 else 0.002)
+        if theta < 70:
+            flat = float(reflectance(np.cos(np.radians(theta)), 1.5))
+            expected = flat if kind == "dielectric" else 2 * flat / (1 + flat)
+            assert weights[reflected].sum() / len(weights) == pytest.approx(expected, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("kind", "theta", "lengths", "width"),
+    # chains of directions are solved of the last, whose lobes are narrow
+    [
+        ("dielectric", 60.0, (2.5, 0.08), 20.0),
+        ("sheet", 70.0, (2.5, 0.08), 20.0),
+        ("sheet", 75.0, (1.1, 0.06), 40.0),
+    ],
+)
+def test_conserved_both_sides_add_up_to_all_light(
+    some_variant, kind, theta, lengths, width, monkeypatch
+):
+    monkeypatch.setattr(sides, "WAVELENGTHS", (3, 3))  # one of them near 550 nm
+    period, depth = lengths
+    size = {"periods": math.ceil(width / period), "pixels_per_period": math.ceil(period / 0.0895)}
+    grating = md.gratings.sinusoidal(period, depth, **size)
+    common = {"field": grating, "coherence_width": width, **SIDES[kind]}
+    raw, conserved = (sampled(both(energy_conserving=e, **common), theta)[0] for e in (False, True))
+    error = 3 * raw.std() / np.sqrt(len(raw))
+    # first order gains light, and a sheet loses what is beyond its critical angle
+    assert raw.mean() > 1.0 + error if kind == "dielectric" else raw.mean() < 0.99 - error
+    assert 0.98 - error < conserved.mean() < 1.001 + error
+
+
+@pytest.mark.parametrize("kind", SIDES)
+def test_of_a_component_alone_there_is_that_share_of_the_whole(some_variant, kind):
+    wi, wo, lam = (a[:40] for a in pairs())
+    bsdf = both(**SIDES[kind])
+    si = interaction(wi, lam)
+    for outgoing, component in ((wo, 0), (wo * BELOW, 1)):
+        alone, other = (
+            mi.BSDFContext(mi.TransportMode.Radiance, int(mi.BSDFFlags.All), n)
+            for n in (component, 1 - component)
+        )
+        whole = spectra(bsdf.eval(mi.BSDFContext(), si, vectors(outgoing)))
+        assert spectra(bsdf.eval(alone, si, vectors(outgoing))) == pytest.approx(whole)
+        assert np.all(spectra(bsdf.eval(other, si, vectors(outgoing))) == 0.0)
+
+
+@pytest.mark.parametrize("name", ["scalar_rgb", "scalar_spectral", "llvm_ad_mono", "llvm_ad_rgb"])
+@pytest.mark.parametrize("kind", SIDES)
+def test_variants_evaluate_what_they_sample(name, kind):
+    if not runs(name):
+        pytest.skip(f"{name}: Dr.Jit finds no device for it")
+    mi.set_variant(name)
+    wi, wo, _ = pairs(12)
+    lam = np.full((len(wi), 4), 600.0)
+    samples = np.random.default_rng(2).random((len(wi), 3))
+    bsdf = both(wavelength=600.0, **SIDES[kind])
+    wo = as_single(wo * BELOW)
+    value, pdf, again, pdf_again, *_ = evaluate(bsdf, wi, wo, as_single(samples), lam)
+    assert np.all(np.isfinite(value))
+    assert again == pytest.approx(value, rel=1e-5)
+    assert pdf_again == pytest.approx(pdf, rel=1e-5)
+    if not mi.is_rgb:
+        exact = -wo[:, 2] * reference.btdf(
+            PATCH, wi, wo, 600.0,
+            coherence_width=WIDTH, model="small_slope", eta=1.5, thin=kind == "sheet",
+        )  # fmt: skip
+        assert value[:, 0] == pytest.approx(exact, rel=1e-3, abs=1e-5 * float(exact.max()))
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "at", "step"),
+    [("dielectric", "eta", 1.5, 1e-3), ("sheet", "height_scale", 0.9, 2e-3)],
+)
+def test_derivatives_are_those_of_differences(some_variant, kind, name, at, step):
+    wi, wo, lam = (a[:60] for a in pairs())
+    si, outgoing = interaction(wi, lam), vectors(wo * BELOW)
+    bsdf = both(**SIDES[kind], height_scale=0.9)
+    parameters = mi.traverse(bsdf)
+
+    def values(value: float, differentiable: bool = False) -> Any:
+        parameters[name] = mi.Float(value)
+        if differentiable:
+            dr.enable_grad(parameters[name])
+        parameters.update()
+        return bsdf.eval(mi.BSDFContext(), si, outgoing)
+
+    low, high = (spectra(values(at + s)) for s in (-step, step))
+    value = values(at, differentiable=True)
+    dr.forward(parameters[name])
+    derivative, differences = spectra(dr.grad(value)), (high - low) / (2 * step)
+    assert np.abs(derivative - differences).sum() < 1e-2 * np.abs(differences).sum()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "line"),
+    [
+        ({"transmission": True, "material": "Al"}, "which the material 'conductor[Al]' does not"),
+        ({"thin": True, "material": "none"}, "thin=true lets light through"),
+        ({"transmission": True, "int_ior": 1.0, "ext_ior": 1.5}, "turn the surface round"),
+        ({"thin": True, "transmission": False}, "leave transmission=false out"),
+        ({"thin": True, "pigment": {"type": "diffuse"}}, "a nested BSDF exclude each other"),
+        ({"transmission": True, "coat_ior": 1.4}, "coat_ior exclude each other"),
+        ({"transmission": True, "coat_ior": 1.5}, "coat_ior exclude each other"),
+        ({"thin": True, "film_ior": 1.4, "film_thickness": 100.0}, "film_ior exclude each other"),
+        ({"thin": True, "shadowing": "vcavity"}, "shadowing=vcavity exclude each other"),
+        ({"thin": 1.0}, "thin=1.0 must be true or false"),
+    ],
+)
+def test_what_cannot_be_is_one_line(some_variant, parameters, line):
+    assert line in refusal(lambda: load(**parameters))
