@@ -193,8 +193,6 @@ def add_table(group: Group, names: Sequence[str] = _TABLE, **defaults: str) -> N
                 "metavar": item.metavar,
                 "type": whole_number(1) if item.type is int else item.type,
             }
-        if item.type is bool:
-            kind = {"action": argparse.BooleanOptionalAction}
         if isinstance(item.metavar, tuple):
             kind["nargs"] = len(item.metavar)
         default = defaults.get(name, item.default_text)

@@ -207,10 +207,10 @@ def _check_agreement(
         "windows": table.settings.windows,
     }
     asked = dict(asked)
-    if asked.pop("second_order", None) and table.slope_ratios is None:
+    if asked.pop("second_order", None) is True and table.slope_ratios is None:
         raise DiffractionError(
-            f"second_order=true asks for what the table '{path}' does not hold; leave it out, or "
-            "build the table without '--no-second-order', for an ensemble"
+            f"second_order=true needs slope ratios, which the table '{path}' does not hold; leave "
+            "it out, or build the table with '--second-order true', for coherence='ensemble'"
         )
     for name, value in asked.items():
         if value != own[name] and not (name == "basis" and value == "auto"):
