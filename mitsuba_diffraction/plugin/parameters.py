@@ -230,7 +230,7 @@ def _table(
     if is_auto(given_settings.get("coherence_width", 0.0)):
         del given_settings["coherence_width"]
     asked = {name: checked(name, value) for name, value in given_settings.items()}
-    options = LoadOptions.of(**{name: props.get(name) for name in READING if name in props})
+    options = LoadOptions.parse(**{name: props.get(name) for name in READING if name in props})
     value = props.get(given[0])
     if given[0] == "data":
         heights = heights_of_tensor(value, options)

@@ -170,7 +170,7 @@ def _warn(table: DiffractionTable, name: str | None = None) -> None:
 
 
 def _file_digest(path: Path, options: LoadOptions) -> str:
-    return key_of(options.given(), _sha256(path))
+    return key_of(options.specified(), _sha256(path))
 
 
 def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
@@ -179,7 +179,7 @@ def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
     if recipe.generator is not None:
         files += sorted(Path(gratings.__file__).parent.glob("*.py"))
     arguments = [dict(one) for one in recipe.arguments]
-    options_of_both = [recipe.options.given(), options.given()]
+    options_of_both = [recipe.options.specified(), options.specified()]
     return key_of(options_of_both, recipe.generator, arguments, *map(_sha256, files))
 
 
@@ -219,7 +219,7 @@ def _check_agreement(
                 f"{_remedy(name)}, or build another table with 'mitsuba-diffraction precompute "
                 f"--{name.replace('_', '-')} {value}'"
             )
-    for name, value in options.given().items():
+    for name, value in options.specified().items():
         raise DiffractionError(
             f"{name}={value} is for height fields, but '{path}' is a table and has its own; "
             f"leave {name} out, or say 'auto'"
