@@ -85,7 +85,7 @@ parameters: setup  ## make docs/parameters.md from the plugin's docstring
 notebooks: setup  ## run the notebooks, and keep what they show in their files
 	@$(PYTHON3) -m docs.make.figures.notebooks
 
-validation: setup  ## compare the model with rigorous solutions: docs/validation.md
+validation: setup  ## compare the model with rigorous solutions: docs/validation.md and docs/validation/
 	@$(PYTHON3) -m docs.make.validation report -o docs
 
 SURFACES := sinusoidal blazed cd cd_pits dvd_pits elaphe_like xenopeltis_like

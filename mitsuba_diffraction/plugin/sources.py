@@ -157,7 +157,7 @@ def _built(
 
 
 def _file_digest(path: Path, options: LoadOptions) -> str:
-    return key_of(options.given(), _sha256(path))
+    return key_of(options.specified(), _sha256(path))
 
 
 def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
@@ -166,7 +166,7 @@ def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
     if recipe.generator is not None:
         files += sorted(Path(gratings.__file__).parent.glob("*.py"))
     arguments = [dict(one) for one in recipe.arguments]
-    options_of_both = [recipe.options.given(), options.given()]
+    options_of_both = [recipe.options.specified(), options.specified()]
     return key_of(options_of_both, recipe.generator, arguments, *map(_sha256, files))
 
 
@@ -194,10 +194,10 @@ def _check_agreement(
         "windows": table.settings.windows,
     }
     asked = dict(asked)
-    if asked.pop("second_order", None) and table.slope_ratios is None:
+    if asked.pop("second_order", None) is True and table.slope_ratios is None:
         raise DiffractionError(
-            f"second_order=true asks for what the table '{path}' does not hold; leave it out, or "
-            "build the table without '--no-second-order', for an ensemble"
+            f"second_order=true needs slope ratios, which the table '{path}' does not hold; leave "
+            "it out, or build the table with '--second-order true', for coherence='ensemble'"
         )
     for name, value in asked.items():
         if value != own[name] and not (name == "basis" and value == "auto"):
@@ -206,7 +206,7 @@ def _check_agreement(
                 f"{_remedy(name)}, or build another table with 'mitsuba-diffraction precompute "
                 f"--{name.replace('_', '-')} {value}'"
             )
-    for name, value in options.given().items():
+    for name, value in options.specified().items():
         raise DiffractionError(
             f"{name}={value} is for height fields, but '{path}' is a table and has its own; "
             f"leave {name} out, or say 'auto'"

@@ -258,7 +258,7 @@ def test_a_source_is_needed(some_variant):
     [
         (np.zeros(4), "data: heights"),
         (np.zeros((4, 4, 3)), "data: heights"),
-        (np.zeros((1, 1)), "data: 1 x 1 pixels are no patch of surface; at least 2 x 2"),
+        (np.zeros((1, 1)), "at least 2 x 2"),
         (np.full((4, 4), np.nan), "data: no height is a finite number; the patch is empty"),
     ],
     ids=["a line", "three channels", "one pixel", "all NaN"],
