@@ -41,9 +41,9 @@ Real = NDArray[np.float64]
 def slope_ratios(patches: Sequence[HeightField], settings: TableSettings) -> SlopeRatios:
     """r of patches, as far as the table has orders; four transforms for each κ that is summed."""
     q_limit = q_limit_of(settings.wavelength_range)
-    reach = tuple(min(q, q_limit) for q in settings.q_max or (q_limit, q_limit))
+    reach = tuple(min(q, q_limit) for q in settings.frequency_limit or (q_limit, q_limit))
     first, last = q_limit * FIRST, q_limit * settings.height_scale_max
-    last = max(2.0 * first, min(last, settings.kappa_max or last))
+    last = max(2.0 * first, last)
     spacing = [2.0 * np.pi / length for length in next(sections(patches))[0].extent]
     few = [step >= 0.5 * CELL * q_limit for step in spacing]
     cell = [step if own else CELL * q_limit for own, step in zip(few, spacing, strict=True)]
