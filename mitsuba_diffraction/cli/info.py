@@ -73,11 +73,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
-    from ..heights.formats import existing_file
+    from ..files import readable_file
     from ..heights.read import is_recipe
     from ..tables.exr import is_table
 
-    existing_file(file)
+    readable_file(file)
     if is_recipe(file):
         return _recipe(file, args)
     if file.suffix.lower() in (*_MESHES, *_OTHER_MESHES):

@@ -16,6 +16,7 @@ from importlib.metadata import version
 from typing import NoReturn
 
 from ..errors import DiffractionError, shortened
+from ..files import check_name
 from ..streams import own_program
 from . import (
     brdf_map,
@@ -62,7 +63,12 @@ class _Parser(argparse.ArgumentParser):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 done, 1 failed, 2 usage, 130 Ctrl-C."""
     try:
+        for text in sys.argv[1:] if argv is None else argv:
+            check_name(text)
         args = build_parser().parse_args(argv)
+    except DiffractionError as error:
+        say_error(str(error))
+        return FAILED
     except SystemExit as stop:  # argparse: --help, --version and usage errors
         return _code_of(stop)
     with own_program(), warnings_in_one_line(), ended_at_once():

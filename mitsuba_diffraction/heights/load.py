@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 
+from ..files import readable_file
 from .field import HeightField
-from .formats import existing_file
 from .lengths import Crop, Height, PixelSize
 from .read import LoadOptions, kind_of, read_heights, treat
 from .recipes import Recipe
@@ -74,7 +74,7 @@ def load(
 
 def load_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightField:
     """Read and treat a height field; parameters and errors as in `load`."""
-    file = existing_file(path)
+    file = readable_file(path)
     if kind_of(file) == "recipe":
         return Recipe.load(file).field(options)
     return read_heights(file, options)

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import DiffractionError, DiffractionWarning
+from ..files import readable_file
 from . import preprocess
 from .field import HeightField
-from .formats import RawHeights, existing_file
+from .formats import RawHeights
 from .formats.grids import read_npy, read_text
 from .formats.images import is_park_tiff, read_exr, read_image
 from .formats.instruments import read_instrument
@@ -127,7 +128,7 @@ _SAME_SIZE = 1e-3
 
 def read_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightField:
     """Read and treat the heights of a file; parameters and errors as in `HeightField.load`."""
-    file = existing_file(path)
+    file = readable_file(path)
     raw, measured = _read(file, options.channel)
     field = _settle(raw, file, options)
     if measured and options.level in (None, "none"):

@@ -23,10 +23,11 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError
+from ..files import read_text
 from ..settings import RECIPE_SETTINGS, checked
 from . import gratings
 from .field import HeightField
-from .formats import existing_file, first_line
+from .formats import first_line
 from .read import LoadOptions, is_recipe, read_heights, treat
 
 LOAD_KEYS = tuple(option.name for option in fields(LoadOptions))
@@ -34,9 +35,6 @@ _OWN_KEYS = ("source", "generator", "arguments", "seeds", "output")
 _KEYS = (*_OWN_KEYS, *LOAD_KEYS, *RECIPE_SETTINGS)
 # What makes no sense for heights that are computed.
 _SOURCE_ONLY = ("pixel_size", "max_height", "height_unit", "channel", "fill")
-
-# Recipes are a few lines; a file beyond this is something else with the suffix .toml.
-_LARGEST_RECIPE = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,7 @@ class Recipe:
             If the file cannot be read, is no TOML, has a key that is unknown, of the wrong type or
             contradicted by another, or names a generator that does not exist.
         """
-        file = existing_file(path)
+        file = Path(path)
         shown = repr(str(file))
         content = _parse(file, shown)
         for key in content:
@@ -151,15 +149,9 @@ def options_and_settings(
 
 def _parse(file: Path, shown: str) -> dict[str, Any]:
     try:
-        if file.stat().st_size > _LARGEST_RECIPE:
-            raise DiffractionError(f"{shown} is too large for a recipe; is it one?")
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except UnicodeDecodeError as error:
-        raise DiffractionError(f"{shown} is not a recipe: it is not text (UTF-8)") from error
+        return tomllib.loads(read_text(file))
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise DiffractionError(f"{shown} is not a recipe (TOML): {first_line(error)}") from error
-    except OSError as error:
-        raise DiffractionError(f"cannot read {shown}: {error.strerror}") from error
 
 
 def _sources(content: Mapping[str, Any], file: Path, shown: str) -> tuple[Path, ...]:

@@ -12,9 +12,9 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError, DiffractionWarning
+from ..files import readable_file
 from ..heights import gratings
 from ..heights.field import HeightField
-from ..heights.formats import existing_file
 from ..heights.load import load_heights
 from ..heights.read import LoadOptions, is_recipe, treat
 from ..heights.recipes import Recipe
@@ -175,7 +175,7 @@ def _file_digest(path: Path, options: LoadOptions) -> str:
 
 def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
     """Changes when the recipe's heights may: its own text, its sources, or the generators."""
-    files = [existing_file(source) for source in recipe.sources]
+    files = [readable_file(source) for source in recipe.sources]
     if recipe.generator is not None:
         files += sorted(Path(gratings.__file__).parent.glob("*.py"))
     arguments = [dict(one) for one in recipe.arguments]
@@ -184,7 +184,7 @@ def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
 
 
 def _sha256(path: Path) -> str:
-    with open(existing_file(path), "rb") as file:
+    with open(readable_file(path), "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 

@@ -267,7 +267,7 @@ def test_files_that_are_not_there_or_not_heights(some_variant, tmp_path):
     (tmp_path / "empty.png").write_bytes(b"")
     assert "empty.png" in refusal(loads(heightfield=str(tmp_path / "empty.png"), pixel_size=0.1))
     assert str(tmp_path) in refusal(loads(heightfield=str(tmp_path)))
-    assert "no such file" in refusal(loads(table=str(tmp_path / "no.exr")))
+    assert "does not exist" in refusal(loads(table=str(tmp_path / "no.exr")))
     text = refusal(loads(heightfield="none.exr"))
     assert "heightfield: 'none.exr' does not exist; looked for it in '" in text
     assert repr(str(Path.cwd())) in text

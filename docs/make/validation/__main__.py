@@ -5,6 +5,7 @@ python -m docs.make.validation solve perfect      # minutes to an hour; extra `v
 python -m docs.make.validation groups             # deviations by material, profile and slope
 python -m docs.make.validation passed             # R + T of the recipes; some minutes
 python -m docs.make.validation patches keratin    # in two dimensions; a minute
+python -m docs.make.validation measured FILE      # cut the measured scale, see data/
 python -m docs.make.validation coated             # under a coat; half an hour; extra `validation`
 python -m docs.make.validation films              # under a film; seconds
 """
@@ -51,6 +52,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     patches.add_argument("--solver", choices=("coupled_wave", "rayleigh"), default="rayleigh")
     patches.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
     patches.set_defaults(run=_patches)
+    measured = commands.add_parser("measured", help="cut the measured scale anew")
+    measured.add_argument("patch", type=Path, help="the measured scale, in an image")
+    measured.add_argument("--pixel-size", type=float, default=65 / 1332, metavar="MICROMETRES")
+    measured.add_argument("--max-height", type=float, default=0.375, metavar="MICROMETRES")
+    measured.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
+    measured.set_defaults(run=_measured, progress=False)
     coated = commands.add_parser("coated", help="make those under a coat anew")
     coated.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
     coated.set_defaults(run=_coated)
@@ -124,6 +131,16 @@ def _patches(args: argparse.Namespace) -> int:
     with Bar(args, unit=" cases") as bar:
         rows = solve_patches(args.material, args.solver, path, bar)
     print(f"wrote {os.fspath(path)}: {len(rows)} orders")
+    return 0
+
+
+def _measured(args: argparse.Namespace) -> int:
+    from mitsuba_diffraction import HeightField
+
+    from .patches import measured_cuts, save_measured
+
+    patch = HeightField.load(args.patch, pixel_size=args.pixel_size, max_height=args.max_height)
+    print(f"wrote {save_measured(measured_cuts(patch), args.output)}")
     return 0
 
 

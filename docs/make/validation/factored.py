@@ -16,9 +16,8 @@ from .goals import Sides, models_of, singles
 from .markdown import percent, table
 from .model import DEFAULT, efficiencies, second_order, share_of
 from .models import ANGLES, banded, of_te, of_tm
-from .patch_sections import is_here, patch_of
 from .patch_solutions import Solved, solved
-from .patches import KINDS, cell, patch_index
+from .patches import GRATINGS, KINDS, cell, patch_index, ratios_of
 from .rayleigh import Real
 from .second_order import GROUPS, Case, rows_of, scored
 
@@ -133,11 +132,11 @@ def factored_cases(kinds: Sequence[str] = KINDS, models: Sequence[str] = MODELS)
     """
     for one in solved("keratin")[0]:
         surface = one.case.surface
-        if surface.kind in kinds and is_here(one.case):
+        if surface.kind in kinds:
             group = f"{GROUPS[surface.kind]}, slope {surface.slope:.2g}"
             found = _case(group, one, models)
             yield found
-            if patch_of(surface) is not cell(surface):
+            if surface.kind not in GRATINGS:
                 yield replace(found, group=f"{group}, from {one.case.theta:g}°")
 
 
@@ -159,9 +158,9 @@ def _case(group: str, one: Solved, models: Sequence[str]) -> Case:
         ALONE[0]: gentle,
         ALONE[1]: gentle * np.exp(mean),
     }
-    for name, patch in ((MODELS[1], field), (MODELS[2], patch_of(surface))):
+    for name, ratios in ((MODELS[1], None), (MODELS[2], ratios_of(surface))):
         if name in models:
-            powers[name] = first * second_order(*light, patch)
+            powers[name] = first * second_order(*light, ratios)
     return scored(group, powers, one.efficiency(field), wo, orders)
 
 

@@ -8,19 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_diffraction import HeightField
-
 from .compare import GRAZING
 from .markdown import percent, table
 from .model import efficiencies, jones_of, shares
 from .patch_solutions import RESOLUTIONS, Solved, solved
-from .patches import KINDS, MEASURED, PatchCase, Surface, cell, patch_index, whole_patch
+from .patches import KINDS, PatchCase, cell, patch_index, ratios_of
 
 _MODELS = ("kirchhoff", "small_slope_alone", "first_order", "small_slope")
 _SHOWN = ("kirchhoff", "small_slope_alone", "small_slope")
 _POLARISED = ("kirchhoff", "first_order", "small_slope")
 _ANGLES = (0.0, 30.0, 60.0)
-_GRATINGS = ("sinusoid", "crossed")
 
 
 @dataclass(frozen=True)
@@ -38,12 +35,11 @@ class PatchComparison:
 
 
 def compared(material: str, kinds: Sequence[str] = KINDS) -> list[PatchComparison]:
-    """The cases that are kept of surfaces of these kinds, without those of the measured patch where
-    that is not here."""
+    """The cases that are kept of surfaces of these kinds."""
     return [
         _compare(solution)
         for solution in solved(material)[0]
-        if solution.case.surface.kind in kinds and is_here(solution.case)
+        if solution.case.surface.kind in kinds
     ]
 
 
@@ -97,8 +93,6 @@ def goal(comparisons: Sequence[PatchComparison]) -> str:
         and c.case.surface.slope == 0.2
         and c.case.material == "keratin"
     ]
-    if not cuts:
-        return "The cuts of scales are not here."
     found = [[one[model] for one in cuts] for model in ("small_slope", "first_order", "kirchhoff")]
     default, first, kirchhoff = (f"{percent(_mean(one))}, {percent(max(one))}" for one in found)
     return (
@@ -165,7 +159,7 @@ def agreements() -> list[PatchAgreement]:
     second = {solution.case: solution for solution in solved("keratin", "coupled_wave")[0]}
     found = []
     for first in solved("keratin")[0]:
-        if first.case not in second or not is_here(first.case):
+        if first.case not in second:
             continue
         field, other = cell(first.case.surface), second[first.case]
         powers, others = (
@@ -186,11 +180,6 @@ def _numbers(solution: Solved) -> list[tuple[int, int]]:
     return [(int(mx), int(my)) for mx, my in solution.rows[["mx", "my"]]]
 
 
-def is_here(case: PatchCase) -> bool:
-    """Whether a case's surface can be had: the measured patch may be missing."""
-    return case.surface.kind != "elaphe" or MEASURED.is_file()
-
-
 def _compare(solution: Solved) -> PatchComparison:
     case, field = solution.case, cell(solution.case.surface)
     wi, wo = solution.wi, solution.wo(field)
@@ -200,7 +189,7 @@ def _compare(solution: Solved) -> PatchComparison:
     truth = solution.efficiency(field)[keep]
     light, sigma = (field, index, wi, wo, case.wavelength), max(field.extent)  # lobes are separate
     found = {
-        model: efficiencies(*light, model, sigma=sigma, patch=patch_of(case.surface))
+        model: efficiencies(*light, model, sigma=sigma, ratios=ratios_of(case.surface))
         for model in _MODELS
     }
     found = {model: power[keep] for model, power in found.items()}
@@ -215,11 +204,6 @@ def _compare(solution: Solved) -> PatchComparison:
     return PatchComparison(
         case, by_model, polarised, float(solution.rows["change"][keep].sum() / truth.sum())
     )
-
-
-def patch_of(surface: Surface) -> HeightField:
-    """What a table of the surface is made of: a grating's cell, or the patch that a cut is from."""
-    return cell(surface) if surface.kind in _GRATINGS else whole_patch(surface)
 
 
 def _deviation(power: NDArray[np.float64], truth: NDArray[np.float64]) -> float:

@@ -31,7 +31,6 @@ from .crossed import is_crossed
 from .markdown import percent, table
 from .model import in_plane
 from .models import MATERIALS
-from .patch_sections import is_here
 from .patch_solutions import solved
 from .patches import KINDS, cell, patch_index
 from .rayleigh import Complex, Real, Waves
@@ -157,7 +156,7 @@ def cases_of_cells(material: str, kinds: Sequence[str] = KINDS) -> Iterator[Case
     """The kept solutions of cells of these kinds."""
     for one in solved(material)[0]:
         surface = one.case.surface
-        if surface.kind in kinds and is_here(one.case):
+        if surface.kind in kinds:
             field, index = cell(surface), patch_index(material, one.case.wavelength)
             orders = np.stack([one.rows["mx"], one.rows["my"]], axis=1).astype(np.int64)
             light = field, index, one.case.wavelength, one.wi, one.wo(field), orders

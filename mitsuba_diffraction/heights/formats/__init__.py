@@ -9,14 +9,10 @@ instruments  their files (extra `afm`)
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-
-from ...errors import DiffractionError
 
 
 @dataclass
@@ -32,36 +28,6 @@ class RawHeights:
     unit: float | None = 1.0  # µm in one unit of the values; None if the file says no length
     # that unit as the file states it; "" if the values are in µm because files of this kind are
     stated: str = ""
-
-
-def existing_file(path: str | os.PathLike[str]) -> Path:
-    """Path of a file that is there, is a file, can be opened and has content.
-
-    Raises
-    ------
-    DiffractionError
-        Otherwise, with what is wrong.
-    """
-    shown = repr(os.fspath(path))
-    try:
-        file = Path(path)
-        if file.is_dir():
-            raise DiffractionError(f"{shown} is a folder, not a height field; name a file in it")
-        if file.exists() and not file.is_file():  # opening a pipe would wait for its writer
-            raise DiffractionError(f"{shown} is a pipe or a device; write what it gives to a file")
-        with file.open("rb") as stream:
-            first = stream.read(1)
-    except DiffractionError:
-        raise
-    except FileNotFoundError as error:
-        raise DiffractionError(f"{shown} does not exist; check the path") from error
-    except OSError as error:
-        raise DiffractionError(f"cannot read {shown}: {error.strerror}") from error
-    except ValueError as error:  # a null character in the name
-        raise DiffractionError(f"cannot read {shown}: {error}") from error
-    if not first:
-        raise DiffractionError(f"{shown} is empty (0 bytes)")
-    return file
 
 
 def first_line(error: BaseException) -> str:
