@@ -332,6 +332,7 @@ def _table(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> DiffractionT
     """What an attempt made, with all that a table knows of itself."""
     patches, settings = wanted.patches, wanted.settings
     limit = None if wanted.frequency_limit == (wanted.q_limit,) * 2 else wanted.frequency_limit
+    settings = replace(settings, frequency_limit=limit)
     return DiffractionTable(
         coefficients=attempt.coefficients,
         order_0=attempt.order_0,
@@ -339,7 +340,7 @@ def _table(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> DiffractionT
         expansion=attempt.expansion,
         grid=replace(attempt.grid, trims=setting.trims),
         spacing=wanted.spacing,
-        settings=replace(settings, frequency_limit=limit),
+        settings=settings,
         error=attempt.measured,
         roughness=roughness_of(patches, wanted.q_limit),
         source=describe(patches, settings, setting.taps),
