@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionError, warn
 from ..files import readable_file
 from ..heights import gratings
 from ..heights.field import HeightField
@@ -115,7 +114,12 @@ def table_of_file(
                 Recipe.of_file(path, options),
             )
         )
-    _warn(table)
+    if table.limited:
+        x, y = table.frequency_limit
+        warn(
+            f"{path.name}: the table ends at the frequencies {x:.4g} along x and {y:.4g} rad/µm "
+            "along y (frequency_limit): light that the surface sends beyond is missing"
+        )
     return table
 
 
@@ -165,9 +169,7 @@ def table_of_heights(
 ) -> DiffractionTable:
     """The table of a height field."""
     digest = heights.digest() + (" cut out" if heights.cut_out else "")  # warned of otherwise
-    table = provider(_request(digest, lambda: [heights], asked, height_scale, None))
-    _warn(table, heights.name)
-    return table
+    return provider(_request(digest, lambda: [heights], asked, height_scale, None))
 
 
 def _request(
@@ -193,17 +195,8 @@ def _request(
     return TableRequest(digest, settings, height_scale, build, recipe)
 
 
-def _warn(table: DiffractionTable, name: str | None = None) -> None:
-    """Say what a table remembers; of heights called `name`, whoever had it built."""
-    for line in table.source.get("warnings", ()):
-        own = f"{table.source.get('name', '')}: "
-        if name is not None and line.startswith(own):
-            line = f"{name}: {line.removeprefix(own)}"
-        warnings.warn(line, DiffractionWarning, stacklevel=2)
-
-
 def _file_digest(path: Path, options: LoadOptions) -> str:
-    return key_of(options.given(), _sha256(path))
+    return key_of(options.specified(), _sha256(path))
 
 
 def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
@@ -212,7 +205,7 @@ def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
     if recipe.generator is not None:
         files += sorted(Path(gratings.__file__).parent.glob("*.py"))
     arguments = [dict(one) for one in recipe.arguments]
-    options_of_both = [recipe.options.given(), options.given()]
+    options_of_both = [recipe.options.specified(), options.specified()]
     return key_of(options_of_both, recipe.generator, arguments, *map(_sha256, files))
 
 
@@ -240,10 +233,10 @@ def _check_agreement(
         "windows": table.settings.windows,
     }
     asked = dict(asked)
-    if asked.pop("second_order", None) and table.slope_ratios is None:
+    if asked.pop("second_order", None) is True and table.slope_ratios is None:
         raise DiffractionError(
-            f"second_order=true asks for what the table '{path}' does not hold; leave it out, or "
-            "build the table without '--no-second-order', for an ensemble"
+            f"second_order=true needs slope ratios, which the table '{path}' does not hold; leave "
+            "it out, or build the table with '--second-order true', for coherence='ensemble'"
         )
     for name, value in asked.items():
         if value != own[name] and not (name == "basis" and value == "auto"):
@@ -252,7 +245,7 @@ def _check_agreement(
                 f"{_remedy(name)}, or build another table with 'mitsuba-diffraction precompute "
                 f"--{name.replace('_', '-')} {value}'"
             )
-    for name, value in options.given().items():
+    for name, value in options.specified().items():
         raise DiffractionError(
             f"{name}={value} is for height fields, but '{path}' is a table and has its own; "
             f"leave {name} out, or say 'auto'"

@@ -15,6 +15,7 @@ import mitsuba as mi
 
 from ...errors import DiffractionError
 from ...heights.recipes import Recipe
+from ...optics.second_order_change import applies
 from ...plugin.sources import TableRequest
 from ...settings import RECIPE_SETTINGS, TableSettings
 from ...tables.table import DiffractionTable
@@ -22,8 +23,8 @@ from .lookups import Lookups
 from .paths import TracedPaths, trace
 from .recording import Session
 
-#: Settings that limit a table.
-LIMITS = ("frequency_limit", "height_scale_max")
+#: Settings that a plan chooses.
+CHOSEN = ("frequency_limit", "height_scale_max", "second_order")
 #: Share of a table's size above which a limited one is not worth it.
 WORTH = 0.8
 
@@ -147,11 +148,13 @@ def plan_table(recorded: RecordedTable, tolerance: float) -> PlannedTable:
     # a series in κ has as many terms as before, so that the size follows the area
     if limit[0] * limit[1] > WORTH * whole.q_limit**2:
         return unlimited
-    request = recorded.request
+    request, ratios = recorded.request, whole.slope_ratios
     settings = replace(
         request.settings,
         frequency_limit=(_rounded(limit[0]), _rounded(limit[1])),
         height_scale_max=request.height_scale,
+        # decided by all orders, not by those within the limit
+        second_order=ratios is not None and applies(request.settings.second_order, ratios),
     )
     table = request.cached(settings)
     if table.nbytes > WORTH * whole.nbytes:
@@ -235,7 +238,7 @@ def _limited(request: TableRequest, recipe: Recipe) -> TableSettings:
     settings = TableSettings(**recipe.table)
     for name in RECIPE_SETTINGS:
         theirs, ours = getattr(settings, name), getattr(request.settings, name)
-        if name not in LIMITS and theirs != ours:
+        if name not in CHOSEN and theirs != ours:
             raise DiffractionError(
                 f"{name}={theirs} of '{recipe.path}' is {ours} in the scene; plan this scene"
             )

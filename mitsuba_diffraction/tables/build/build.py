@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import DiffractionError
+from ...errors import DiffractionError, warn
 from ...heights.field import HeightField
 from ...heights.validity import units_warning
 from ...optics.geometry import sigma_of
@@ -208,7 +208,7 @@ def build_table(
     taps: int | None = None,
     frequency_limit: float | tuple[float, float] | None = None,
     windows: str | float | None = None,
-    second_order: bool | None = None,
+    second_order: str | bool = "auto",
     progress: Progress | None = None,
 ) -> DiffractionTable:
     """Tabulate a height field to a tolerance, and measure that it is met.
@@ -251,12 +251,15 @@ def build_with(
     check_units(scans)
     try:
         check_window(patches[0].extent, settings)
-        return _built(_Wanted(patches, settings), progress or silent)
+        table = _built(_Wanted(patches, settings), progress or silent)
     except DiffractionError as error:
         questions = [question for patch in scans if (question := units_warning(patch))]
         if not questions:
             raise
         raise DiffractionError(f"{error}; or {questions[0]}") from error
+    for line in table.source.get("warnings", ()):
+        warn(line)
+    return table
 
 
 def _built(wanted: _Wanted, tell: Progress) -> DiffractionTable:
@@ -333,6 +336,7 @@ def _table(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> DiffractionT
     patches, settings = wanted.patches, wanted.settings
     limit = None if wanted.frequency_limit == (wanted.q_limit,) * 2 else wanted.frequency_limit
     settings = replace(settings, frequency_limit=limit)
+    roughness = roughness_of(patches, wanted.q_limit)
     return DiffractionTable(
         coefficients=attempt.coefficients,
         order_0=attempt.order_0,
@@ -342,9 +346,9 @@ def _table(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> DiffractionT
         spacing=wanted.spacing,
         settings=settings,
         error=attempt.measured,
-        roughness=roughness_of(patches, wanted.q_limit),
+        roughness=roughness,
         source=describe(patches, settings, setting.taps),
-        slope_ratios=slope_ratios(patches, settings) if settings.second_order else None,
+        slope_ratios=slope_ratios(patches, settings, roughness) if settings.second_order else None,
     )
 
 

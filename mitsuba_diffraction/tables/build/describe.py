@@ -43,12 +43,6 @@ def describe(
     small = window_warning(first, coherence_width)
     if small:
         warnings.append(small)
-    if settings.frequency_limit is not None:
-        x, y = settings.frequency_limit
-        warnings.append(
-            f"{first.name}: the table ends at the frequencies {x:.4g} along x and {y:.4g} rad/µm "
-            "along y (frequency_limit): light that the surface sends beyond is missing"
-        )
     if taps[0] * taps[1] > _SLOW:
         warnings.append(
             f"{first.name}: the patch of {first.extent[0]:.4g} × {first.extent[1]:.4g} µm is so "
