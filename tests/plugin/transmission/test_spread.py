@@ -8,7 +8,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 import pytest
-from tests.plugin.test_through import BELOW, INDICES, SIDES, OneSide, both, sampled
+from tests.plugin.transmission.test_sides import BELOW, INDICES, SIDES, OneSide, both, sampled
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.tables.energy import sides
