@@ -8,7 +8,6 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 import pytest
-from tests.plugin.transmission.test_sides import BELOW, INDICES, SIDES, OneSide, both, sampled
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.tables.energy import sides
@@ -22,6 +21,7 @@ from tests.plugin.conftest import runs
 from tests.plugin.test_chi2 import SMALL, Case, chi_square
 from tests.plugin.test_model import pairs
 from tests.plugin.test_variants import evaluate
+from tests.plugin.transmission.test_sides import BELOW, INDICES, SIDES, OneSide, both, sampled
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
 
