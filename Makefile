@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks validation energy realtime lint clean help
+.PHONY: setup demo test test-all fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks validation energy realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -32,8 +32,12 @@ demo: setup  ## tabulate a snake scale, render three scenes with it, the snake i
 	@echo "Compare out/snake.png and out/snake_other_light.png: the colours move with the sun."
 
 # one thread for linear algebra in each of the two processes
-test: setup .venv/browser  ## run the tests
-	@OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest -n 2 --dist worksteal
+PYTEST := OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest -n 2 --dist worksteal
+test: setup .venv/browser  ## run the quick tests, of every part: three minutes
+	@$(PYTEST) -m "not thorough"
+
+test-all: setup .venv/browser  ## run all tests: ten minutes
+	@$(PYTEST)
 
 # for as long as you like: make fuzz SECONDS=600; the same cases again: make fuzz SEED=1
 fuzz: setup  ## try random surfaces, damaged files and command lines for a minute
@@ -47,7 +51,7 @@ package: setup .venv/browser  ## build wheel and sdist, and test them in an empt
 # with a patch of your own: make bench MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"
 bench: setup  ## measure speed and noise: docs/benchmarks.md
 	@mkdir -p out
-	@$(RUN) bench $(MEASURED) --json out/bench.json
+	@$(PYTHON3) -m docs.make.bench $(if $(MEASURED),--measured $(MEASURED)) --json out/bench.json
 	@$(PYTHON3) -m docs.make.figures.tables speed out/bench.json
 
 # a measured patch beside the look-alikes: make figures MEASURED="scale.png --pixel-size 0.0488 --max-height 0.375"
@@ -81,7 +85,7 @@ parameters: setup  ## make docs/parameters.md from the plugin's docstring
 notebooks: setup  ## run the notebooks, and keep what they show in their files
 	@$(PYTHON3) -m docs.make.figures.notebooks
 
-validation: setup  ## compare the model with rigorous solutions: docs/validation.md
+validation: setup  ## compare the model with rigorous solutions: docs/validation.md and docs/validation/
 	@$(PYTHON3) -m docs.make.validation report -o docs
 
 SURFACES := sinusoidal blazed cd cd_pits dvd_pits elaphe_like xenopeltis_like
@@ -118,4 +122,4 @@ clean:  ## remove .venv, out and all caches
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 help:
-	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile | expand -t 20
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile | expand -t 20

@@ -109,10 +109,13 @@ def _windows(value: Any) -> str | float | None:
     return "auto" if value == "auto" else _between(0.0, math.inf)(value)
 
 
-def _flag(value: Any) -> bool | None:
-    if value is not None and not isinstance(value, bool):
+def _auto_or_flag(value: Any) -> str | bool:
+    words: dict[Any, str | bool] = {"auto": "auto", "true": True, "false": False}
+    if isinstance(value, bool):
+        return value
+    if value not in words:
         raise ValueError
-    return value
+    return words[value]
 
 
 def _choices(*names: str) -> dict[str, Any]:
@@ -140,8 +143,9 @@ class TableSettings:
     kappa_max : largest k·w·height_scale that is, rad/µm; None likewise.
     windows : width in µm of the overlapping windows that a wide scan is cut into, whose powers are
         averaged (`tables.build.windows`); "auto" for twice the coherence width; None for the whole.
-    second_order : whether to tabulate what tells hills from pits as well
-        (`tables.build.slope_ratios`); None for True in an ensemble, but for basis "taylor".
+    second_order : whether light is multiplied by the second order of small slope: True, False, or
+        "auto" for where it changes colours enough (`optics.second_order_change`). Unless False, the
+        table holds the slope ratios. "auto" is False for coherence "patch" and basis "taylor".
 
     Raises
     ------
@@ -189,17 +193,16 @@ class TableSettings:
         metavar="auto|W", text="the scan as a whole", type=str,
     )  # fmt: skip
 
-    second_order: bool | None = _setting(
-        None, _flag, "the second order of small slope, or what it needs", "true or false",
-        text="true for coherence ensemble, but for basis taylor", type=bool,
+    second_order: str | bool = _setting(
+        "auto", _auto_or_flag, "the second order of small slope; auto applies it where it changes "
+        "colours by 5 %% or more", "auto, true or false", metavar="auto|true|false", type=str,
     )  # fmt: skip
 
     def __post_init__(self) -> None:
         for name in _BY_NAME:
             object.__setattr__(self, name, checked(name, getattr(self, name)))
-        if self.second_order is None:
-            wanted = not self.coherent and self.basis != "taylor"
-            object.__setattr__(self, "second_order", wanted)
+        if self.second_order == "auto" and (self.coherent or self.basis == "taylor"):
+            object.__setattr__(self, "second_order", False)
 
     @property
     def coherent(self) -> bool:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import collections
 import gc
 import os
+import re
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import hypothesis
@@ -14,11 +16,9 @@ import pytest
 
 import mitsuba_diffraction  # noqa: F401 - first of all: it chooses the LLVM that Dr.Jit loads
 from mitsuba_diffraction.tables.store import VARIABLE
-
-ROOT = Path(__file__).resolve().parent.parent
-
-#: The variants that the plugin supports; the second needs a GPU.
-VARIANTS = ("llvm_ad_spectral", "cuda_ad_spectral")
+from tests.support import ROOT
+from tests.support.command_line import Ran
+from tests.support.variants import VARIANTS, obstacle
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -92,7 +92,7 @@ def own_vectors() -> Iterator[int]:
 
     Child processes have these.
     """
-    from tests.coarse import vectors_of
+    from tests.support.coarse import vectors_of
 
     before = vectors_of(8)
     vectors_of(min(8, before))
@@ -103,7 +103,7 @@ def own_vectors() -> Iterator[int]:
 @pytest.fixture(scope="module")
 def coarse() -> Iterator[None]:
     """Energy conserved coarsely, for modules that do not ask how well it is."""
-    from tests.coarse import coarse_energy
+    from tests.support.coarse import coarse_energy
 
     with pytest.MonkeyPatch.context() as patch:
         coarse_energy(patch.setattr)
@@ -117,17 +117,6 @@ def shared_afm() -> Path:
     if not folder.is_dir():
         pytest.skip(f"measured patches are not here: {folder}")
     return folder
-
-
-def obstacle(variant: str) -> str | None:
-    """Why a variant does not run on this machine, or None if it does."""
-    import drjit as dr
-    import mitsuba as mi
-
-    if variant not in mi.variants():
-        return f"this Mitsuba has no variant {variant}"
-    backend = dr.JitBackend.CUDA if variant.startswith("cuda") else dr.JitBackend.LLVM
-    return None if dr.has_backend(backend) else f"{variant}: Dr.Jit finds no device for it"
 
 
 @pytest.fixture(scope="session", params=VARIANTS)
@@ -158,3 +147,36 @@ def some_variant() -> str:
         pytest.skip(f"none of {', '.join(VARIANTS)} runs on this machine")
     mi.set_variant(name)
     return name
+
+
+@pytest.fixture
+def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., Ran]:
+    """`run(*arguments)`: main() in this process."""
+
+    from mitsuba_diffraction.cli import main
+
+    def call(*arguments: object) -> Ran:
+        code = main([str(a) for a in arguments])
+        return Ran(code, *capfd.readouterr())
+
+    return call
+
+
+@pytest.fixture
+def scene(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The module's SCENE as room.xml, in a folder that is the current one."""
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / "room.xml"
+    file.write_text(request.module.SCENE)
+    return file
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Count the skipped tests by reason, all variants of a backend in one line."""
+    counts: collections.Counter[str] = collections.Counter()
+    for report in terminalreporter.getreports("skipped"):
+        reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longreprtext
+        reason = re.sub(r"\b(cuda|llvm|scalar)_\w+", r"\1_*", reason.removeprefix("Skipped: "))
+        counts[reason] += 1
+    for reason, count in counts.most_common():
+        terminalreporter.write_line(f"skipped {count:4d}: {reason}")

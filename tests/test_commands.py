@@ -1,7 +1,7 @@
 """The commands that README and docs show run, in their order, on small patches and pictures.
 
 What is not run here: `make`, `pip` and `apt`, which set up what runs these tests; `view`, which
-opens a window; `bench`, `tradeoff`, `compare` and `plan`, which take long at their smallest, and
+opens a window; `tradeoff`, `compare` and `plan`, which take long at their smallest, and
 are run smaller still by their own tests. test_docs.py checks what these would be given.
 """
 
@@ -17,11 +17,11 @@ from PIL import Image
 import mitsuba_diffraction as md
 from mitsuba_diffraction.cli import main
 from scenes.make.__main__ import main as make_mesh
-from tests.clone import small_clone
-from tests.instruments import nanoscope
-from tests.test_docs import PAGES, blocks, spans, typed
+from tests.support.clone import small_clone
+from tests.support.instruments import nanoscope
+from tests.support.pages import PAGES, blocks, spans, typed
 
-NOT_RUN = {"view", "bench", "tradeoff", "compare", "plan", "--plan"}
+NOT_RUN = {"view", "tradeoff", "compare", "plan", "--plan"}
 
 # as small as commands may be asked to be; the last option of a name counts
 SMALL = {

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import re
-import shlex
 import tomllib
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
@@ -18,50 +16,18 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.scene.parameters import parameters_of
 from scenes.make.__main__ import build_parser as meshes_parser
-from tests.clone import small_clone
+from tests.support import ROOT
+from tests.support.clone import small_clone
+from tests.support.pages import FENCE, PAGES, blocks, spans, typed
 
 pytestmark = pytest.mark.usefixtures("coarse")
 
-ROOT = Path(__file__).parents[1]
 DENOISER = importlib.util.find_spec("pyoidn") is not None
 PACKAGE = Path(md.__file__).parent
-PAGES = {
-    path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
-    for path in (
-        *(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CHANGELOG.md")),
-        *sorted((ROOT / "docs").glob("*.md")),
-    )
-}
-# what the notebooks say between their cells; test_notebooks.py runs these
-PAGES |= {
-    path.relative_to(ROOT).as_posix(): "\n\n".join(
-        "".join(cell["source"])
-        for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]
-        if cell["cell_type"] == "markdown"
-    )
-    for path in sorted((ROOT / "notebooks").glob("*.ipynb"))
-}
-TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
+TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
-_FENCE = re.compile(r"^ *```(\w*)\n(.*?)^ *```$", re.M | re.S)
 _COMMAND = re.compile(r"(\.venv/bin/)?(mitsuba-diffraction|python -m|make) ")
-
-
-def blocks(page: str, language: str) -> list[str]:
-    """Code blocks of a page, in that language."""
-    return [text for name, text in _FENCE.findall(PAGES[page]) if name == language]
-
-
-def spans(page: str) -> list[str]:
-    """Code within a page's sentences, on one line each."""
-    return [" ".join(s.split()) for s in re.findall(r"`([^`]+)`", _FENCE.sub("", PAGES[page]))]
-
-
-def typed(text: str) -> list[list[str]]:
-    """The words of each command of a shell block."""
-    lines = text.replace("\\\n", " ").splitlines()
-    return [words for line in lines if (words := shlex.split(line, comments=True))]
 
 
 COMMANDS = [
@@ -145,7 +111,7 @@ def options_of(parser) -> set[str]:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_linked_files_exist(page):
-    text = _FENCE.sub("", PAGES[page])
+    text = FENCE.sub("", PAGES[page])
     absent = []
     for target in re.findall(r"\]\(([^)\s]+)\)", text):
         if "://" in target:
@@ -174,7 +140,7 @@ def slug(heading: str) -> str:
 
 def test_no_code_block_escapes():
     for page in PAGES:
-        found = _FENCE.findall(PAGES[page])
+        found = FENCE.findall(PAGES[page])
         # drawings; commands and configurations of Dask
         drawn = {"ARCHITECTURE.md": {""}, "docs/cluster.md": {"text", "toml"}}.get(page, set())
         assert {language for language, _ in found} <= {"sh", "python", "xml", "json"} | drawn, page

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import ast
+from collections.abc import Iterator
 from pathlib import Path
 
 import grimp
 import pytest
 from importlinter.cli import EXIT_STATUS_SUCCESS, lint_imports
 
-ROOT = Path(__file__).parents[1]
+from tests.support import ROOT
+
 PACKAGE = "mitsuba_diffraction"
+TESTS = sorted((ROOT / "tests").rglob("*.py"))
 
 
 @pytest.fixture(scope="module")
@@ -56,3 +60,35 @@ def test_no_modules_import_each_other_in_a_circle(imports):
 
 def test_circles_are_found():
     assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == [{"b", "c"}]
+
+
+def imported(file: Path) -> Iterator[str]:
+    """Modules of the tests that a file imports."""
+    for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name.startswith("tests."))
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            if node.module == "tests":
+                yield from (f"tests.{alias.name}" for alias in node.names)
+            elif node.module.startswith("tests."):
+                yield node.module
+
+
+def test_tests_import_helpers_and_never_one_another():
+    wrong = [
+        f"{file.relative_to(ROOT)} imports {name}"
+        for file in TESTS
+        for name in imported(file)
+        # the fuzz is a program of several modules
+        if name.split(".")[1] != "support" and not ("fuzz" in file.parts and "fuzz" in name)
+    ]
+    assert not wrong
+
+
+def test_the_tier_of_a_file_is_one_line_at_its_top():
+    for file in TESTS:
+        lines = [line for line in file.read_text("utf-8").splitlines() if "mark.thorough" in line]
+        if lines and file != Path(__file__):
+            assert len(lines) == 1, file
+            # alone, or first among other marks
+            assert lines[0].replace("[", "").startswith("pytestmark = pytest.mark.thorough"), file

@@ -15,8 +15,9 @@ import pytest
 from docs.make.figures.notebooks import execute, main
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.heights import gratings
-from tests.conftest import ROOT, obstacle
-from tests.instruments import nanoscope
+from tests.support import ROOT
+from tests.support.instruments import nanoscope
+from tests.support.variants import obstacle
 
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 
@@ -122,7 +123,7 @@ def smaller(path: Path, folder: Path) -> Path:
             cell.source = cell.source.replace(old, new)
     first = next(cell for cell in notebook.cells if cell.cell_type == "code")
     first.source = (
-        "from tests.coarse import coarse_energy, vectors_of\n"
+        "from tests.support.coarse import coarse_energy, vectors_of\n"
         f"coarse_energy()\nvectors_of(8)\n{first.source}"
     )
     nbformat.write(notebook, folder / path.name)

@@ -13,8 +13,7 @@ from pathlib import Path
 import pytest
 
 import mitsuba_diffraction as md
-
-ROOT = Path(__file__).parents[1]
+from tests.support import ROOT
 
 backend = pytest.importorskip("hatchling.builders.wheel", reason="the build backend is missing")
 

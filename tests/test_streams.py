@@ -9,7 +9,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.streams import own_program, without_chatter
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 
 @pytest.fixture

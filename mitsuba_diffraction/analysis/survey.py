@@ -34,7 +34,8 @@ import numpy as np
 from ..atomic import atomic_path
 from ..cluster.jobs import each
 from ..cluster.tasks import Failed, Lacking, SceneFiles
-from ..errors import DiffractionError, DiffractionWarning, one_line, quoted
+from ..errors import DiffractionError, DiffractionWarning, one_line
+from ..files import read_text, readable_file
 from ..heights.field import HeightField
 from ..heights.load import load_heights
 from ..heights.read import LoadOptions, is_recipe
@@ -86,8 +87,8 @@ def treatments_of(
     if path is None:
         return []
     try:
-        content = tomllib.loads(Path(path).read_text("utf-8"))
-    except (OSError, ValueError) as error:
+        content = tomllib.loads(read_text(path))
+    except tomllib.TOMLDecodeError as error:
         raise DiffractionError(f"cannot read '{path}': {one_line(str(error))}") from error
     return [(pattern, _treatment(f"'{path}': [{pattern!r}]", v)) for pattern, v in content.items()]
 
@@ -127,7 +128,7 @@ class Job:
     @property
     def key(self) -> str:
         """Changes when the row may."""
-        treatment = [self.treatment.options.given(), dict(self.treatment.settings)]
+        treatment = [self.treatment.options.specified(), dict(self.treatment.settings)]
         own = (VERSION, self.theta, self.resolution, self.variant.partition("_")[2])
         return key_of("survey", self.files.digest, treatment, *own)[:32]
 
@@ -309,9 +310,7 @@ def run_survey(
 
 
 def _files_of(file: Path) -> SceneFiles:
-    if not file.is_file():
-        raise DiffractionError(f"{quoted(str(file))} does not exist, or is no file; check the path")
-    found = SceneFiles.of(file, {})
+    found = SceneFiles.of(readable_file(file), {})
     if is_recipe(file):
         Recipe.load(file)
     return found

@@ -11,7 +11,7 @@ render                 a scene to a picture; `render --frames`: pictures of a sc
 brdf_map               the hemisphere of view directions, by the BSDF or by a method
 evaluate, sweep        the methods of the thesis
 survey                 many scans: a row, a table and a map each
-bench                  `bench` and `tradeoff`: accuracy, speed and memory
+tradeoff               accuracy against speed and memory
 realtime               `view` and `compare`, `export-viewer` and `export-shader`: drawn by shaders
 options                options that several commands share, declared once, and their types
 workers                options of commands that may run on many processes

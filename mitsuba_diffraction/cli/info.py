@@ -73,11 +73,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
-    from ..heights.formats import existing_file
+    from ..files import readable_file
     from ..heights.read import is_recipe
     from ..tables.exr import is_table
 
-    existing_file(file)
+    readable_file(file)
     if is_recipe(file):
         return _recipe(file, args)
     if file.suffix.lower() in (*_MESHES, *_OTHER_MESHES):
@@ -175,7 +175,7 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     return {
         "kind": "recipe",
         **({"generator": recipe.generator} if recipe.generator else {}),
-        "options": recipe.options.given(),
+        "options": recipe.options.specified(),
         "table": table,
         "output": str(recipe.output),
         "output exists": recipe.output.is_file(),

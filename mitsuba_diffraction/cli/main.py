@@ -16,9 +16,9 @@ from importlib.metadata import version
 from typing import NoReturn
 
 from ..errors import DiffractionError, shortened
+from ..files import check_name
 from ..streams import own_program
 from . import (
-    bench,
     brdf_map,
     evaluate,
     info,
@@ -29,6 +29,7 @@ from . import (
     survey,
     sweep,
     tangents,
+    tradeoff,
 )
 from .console import (
     INTERRUPTED,
@@ -45,8 +46,8 @@ from .report import check_writable
 COMMANDS = (
     precompute.add_parser, info.add_parser, tangents.add_parser, plan.add_parser,
     render.add_parser, brdf_map.add_parser, evaluate.add_parser, survey.add_parser,
-    sweep.add_parser, bench.add_tradeoff, realtime.add_compare, realtime.add_view,
-    realtime.add_export_viewer, realtime.add_export_shader, bench.add_bench,
+    sweep.add_parser, tradeoff.add_parser, realtime.add_compare, realtime.add_view,
+    realtime.add_export_viewer, realtime.add_export_shader,
 )  # fmt: skip
 
 FAILED = 1
@@ -62,7 +63,12 @@ class _Parser(argparse.ArgumentParser):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code: 0 done, 1 failed, 2 usage, 130 Ctrl-C."""
     try:
+        for text in sys.argv[1:] if argv is None else argv:
+            check_name(text)
         args = build_parser().parse_args(argv)
+    except DiffractionError as error:
+        say_error(str(error))
+        return FAILED
     except SystemExit as stop:  # argparse: --help, --version and usage errors
         return _code_of(stop)
     with own_program(), warnings_in_one_line(), ended_at_once():

@@ -138,7 +138,7 @@ def load_options(args: argparse.Namespace) -> LoadOptions:
     """
     from ..heights.read import LoadOptions
 
-    return LoadOptions.of(**{name: getattr(args, name) for name in _HEIGHTS})
+    return LoadOptions.parse(**{name: getattr(args, name) for name in _HEIGHTS})
 
 
 def given_for_heights(args: argparse.Namespace) -> list[str]:
@@ -193,8 +193,6 @@ def add_table(group: Group, names: Sequence[str] = _TABLE, **defaults: str) -> N
                 "metavar": item.metavar,
                 "type": whole_number(1) if item.type is int else item.type,
             }
-        if item.type is bool:
-            kind = {"action": argparse.BooleanOptionalAction}
         if isinstance(item.metavar, tuple):
             kind["nargs"] = len(item.metavar)
         default = defaults.get(name, item.default_text)
@@ -328,17 +326,6 @@ def add_json(parser: argparse.ArgumentParser, what: str = "the figures", **more:
     parser.add_argument(
         "--json", metavar="FILE", type=path_ending_in(".json"), help=f"write {what} as JSON", **more
     )
-
-
-class Renamed(argparse.Action):
-    """An option of earlier versions: refused with the name that it has now."""
-
-    def __init__(self, option_strings: Sequence[str], dest: str, now: str) -> None:
-        super().__init__(option_strings, argparse.SUPPRESS, nargs="?", help=argparse.SUPPRESS)
-        self._now = now
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        parser.error(f"argument {self.option_strings[0]}: {self._now}")
 
 
 def _option(name: str) -> str:

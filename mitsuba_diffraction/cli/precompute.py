@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionWarning
+from ..optics.second_order_change import applies
 from . import options
 from .console import Bar
 from .report import check_outputs, save_report
@@ -134,6 +135,17 @@ def _built(
         return table, work.summary()
 
 
+def _second_order_line(table: DiffractionTable) -> str:
+    """Say by how much the second order changes the table's colours, and whether it is applied."""
+    asked, ratios = table.settings.second_order, table.slope_ratios
+    assert ratios is not None
+    word = "applied" if applies(asked, ratios) else "left out"
+    return (
+        f"the second order changes colours by {100 * ratios.change:.2g} % (n = 1.5, light from "
+        f"60°): {word} by second_order={str(asked).lower()}"
+    )
+
+
 def _report(
     fields: Sequence[HeightField], table: DiffractionTable, output: Path, seconds: float
 ) -> Iterator[tuple[str, str]]:
@@ -175,6 +187,8 @@ def _report(
         f"other orders; tolerance {table.tolerance:g}"
     )
     yield "error", error
+    if table.slope_ratios is not None:
+        yield "", _second_order_line(table)
     # kibibytes on Linux; of the whole process, which is what has to fit
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     yield "cost", f"{seconds:.1f} s, {peak / 1e9:.2g} GB of memory at most"

@@ -23,38 +23,37 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import DiffractionError
+from ..files import read_text
 from ..settings import RECIPE_SETTINGS, checked
 from . import gratings
 from .field import HeightField
-from .formats import existing_file, first_line
+from .formats import first_line
 from .read import LoadOptions, is_recipe, read_heights, treat
 
 LOAD_KEYS = tuple(option.name for option in fields(LoadOptions))
 _OWN_KEYS = ("source", "generator", "arguments", "seeds", "output")
 _KEYS = (*_OWN_KEYS, *LOAD_KEYS, *RECIPE_SETTINGS)
-# What makes no sense for heights that are computed.
+# Options of files, refused beside a generator.
 _SOURCE_ONLY = ("pixel_size", "max_height", "height_unit", "channel", "fill")
-
-# Recipes are a few lines; a file beyond this is something else with the suffix .toml.
-_LARGEST_RECIPE = 1_000_000
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """One recipe, checked."""
+    """Checked content of one recipe file."""
 
-    path: Path  # The recipe's own file
-    sources: tuple[Path, ...]  # Files of heights; empty if a generator makes them
-    generator: str | None  # Name of a function of `mitsuba_diffraction.heights.gratings`, or `None`
-    arguments: tuple[Mapping[str, Any], ...]  # Its keyword arguments, one mapping per patch
-    options: LoadOptions  # How sources are read and all patches treated
-    table: Mapping[str, Any]  # The fields of `TableSettings` that the recipe sets, checked
-    # Where the table goes; by default the recipe's name with .exr in the current folder
+    path: Path  # the recipe file
+    sources: tuple[Path, ...]  # files of heights; empty with a generator
+    generator: str | None  # name of a function of `mitsuba_diffraction.heights.gratings`, or `None`
+    # keyword arguments of the generator, one mapping per patch
+    arguments: tuple[Mapping[str, Any], ...]
+    options: LoadOptions  # how sources are read and all patches treated
+    table: Mapping[str, Any]  # fields of `TableSettings` that the recipe sets, checked
+    # path of the table; by default the recipe's name with .exr in the current folder
     output: Path
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Recipe:
-        """Read and check a recipe; heights are not read or made yet.
+        """Read and check a recipe; heights are neither read nor generated yet.
 
         Raises
         ------
@@ -62,7 +61,7 @@ class Recipe:
             If the file cannot be read, is no TOML, has a key that is unknown, of the wrong type or
             contradicted by another, or names a generator that does not exist.
         """
-        file = existing_file(path)
+        file = Path(path)
         shown = repr(str(file))
         content = _parse(file, shown)
         for key in content:
@@ -95,28 +94,28 @@ class Recipe:
         )
 
     def fields(self, options: LoadOptions | None = None) -> list[HeightField]:
-        """All patches of the recipe; `options` take precedence over the recipe's own.
+        """Read or generate all patches; `options` take precedence over the recipe's options.
 
         Raises
         ------
         DiffractionError
             If a source cannot be read, or the generator refuses an argument.
         """
-        given = options or LoadOptions()
+        overrides = options or LoadOptions()
+        merged = self.options.updated(overrides)
         if self.generator is None:
-            return [read_heights(file, self.options.updated(given)) for file in self.sources]
+            return [read_heights(file, merged) for file in self.sources]
         for key in _SOURCE_ONLY:
-            if getattr(given, key) is not None:
+            if getattr(overrides, key) is not None:
                 raise DiffractionError(
                     f"{str(self.path)!r} makes its heights with {self.generator!r}; {key} "
                     "contradicts it: change the recipe's [arguments] instead"
                 )
-        make: Callable[..., HeightField] = getattr(gratings, self.generator)
-        treatment = self.options.updated(given)
-        return [treat(self._made(make, arguments), treatment) for arguments in self.arguments]
+        generator: Callable[..., HeightField] = getattr(gratings, self.generator)
+        return [treat(self._generate(generator, values), merged) for values in self.arguments]
 
     def field(self, options: LoadOptions | None = None) -> HeightField:
-        """The only patch of the recipe.
+        """Read or generate the only patch of the recipe.
 
         Raises
         ------
@@ -131,9 +130,12 @@ class Recipe:
             )
         return self.fields(options)[0]
 
-    def _made(self, make: Callable[..., HeightField], arguments: Mapping[str, Any]) -> HeightField:
+    def _generate(
+        self, generator: Callable[..., HeightField], arguments: Mapping[str, Any]
+    ) -> HeightField:
+        """Call the generator; its errors name the recipe."""
         try:
-            return make(**arguments)
+            return generator(**arguments)
         except DiffractionError as error:
             raise DiffractionError(f"{str(self.path)!r}: [arguments]: {error}") from error
 
@@ -141,31 +143,29 @@ class Recipe:
 def options_and_settings(
     content: Mapping[str, Any], where: str
 ) -> tuple[LoadOptions, dict[str, Any]]:
-    """How heights are read, and the fields of `TableSettings` that are set, checked one by one."""
+    """Check the reading options and the fields of `TableSettings` in a recipe's content."""
     try:
-        options = LoadOptions.of(**{key: content[key] for key in LOAD_KEYS if key in content})
+        options = LoadOptions.parse(**{key: content[key] for key in LOAD_KEYS if key in content})
         return options, {k: checked(k, content[k]) for k in RECIPE_SETTINGS if k in content}
     except DiffractionError as error:
         raise DiffractionError(f"{where}: {error}") from error
 
 
 def _parse(file: Path, shown: str) -> dict[str, Any]:
+    """Read a TOML file."""
     try:
-        if file.stat().st_size > _LARGEST_RECIPE:
-            raise DiffractionError(f"{shown} is too large for a recipe; is it one?")
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except UnicodeDecodeError as error:
-        raise DiffractionError(f"{shown} is not a recipe: it is not text (UTF-8)") from error
+        return tomllib.loads(read_text(file))
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise DiffractionError(f"{shown} is not a recipe (TOML): {first_line(error)}") from error
-    except OSError as error:
-        raise DiffractionError(f"cannot read {shown}: {error.strerror}") from error
 
 
 def _sources(content: Mapping[str, Any], file: Path, shown: str) -> tuple[Path, ...]:
+    """Return the paths of the files of heights, relative to the recipe's folder."""
     for key in ("arguments", "seeds"):
         if key in content:
-            raise DiffractionError(f"{shown}: {key} belongs to a generator, and source is a file")
+            raise DiffractionError(
+                f"{shown}: {key} is for a generator, and source is a file; leave {key} out"
+            )
     source = content["source"]
     names = source if isinstance(source, list) else [source]
     if not names or not all(isinstance(name, str) and name for name in names):
@@ -174,18 +174,17 @@ def _sources(content: Mapping[str, Any], file: Path, shown: str) -> tuple[Path, 
         )
     for name in names:
         if is_recipe(name):
-            raise DiffractionError(
-                f"{shown}: source: {name!r} is a recipe itself; name the file of heights"
-            )
+            raise DiffractionError(f"{shown}: source: {name!r} is a recipe; name a file of heights")
     return tuple(file.parent / name for name in names)
 
 
 def _arguments(content: Mapping[str, Any], shown: str) -> tuple[Mapping[str, Any], ...]:
+    """Check the generator and return its keyword arguments, one mapping for each patch."""
     for key in _SOURCE_ONLY:
         if key in content:
             raise DiffractionError(
-                f"{shown}: {key} belongs to a source, and a generator makes these heights; use "
-                "its [arguments]"
+                f"{shown}: {key} is for a source, and the heights come from a generator; use its "
+                "[arguments]"
             )
     name = content["generator"]
     if not isinstance(name, str) or name not in gratings.__all__:
@@ -213,12 +212,13 @@ def _arguments(content: Mapping[str, Any], shown: str) -> tuple[Mapping[str, Any
             f"{shown}: seeds: expected a list of different whole numbers, got {seeds!r}"
         )
     if "seed" not in parameters or "seed" in arguments:
-        why = "seed is given too" if "seed" in arguments else f"{name!r} takes no seed"
+        why = "seed is set, too" if "seed" in arguments else f"{name!r} has no parameter seed"
         raise DiffractionError(f"{shown}: seeds: {why}; leave one out")
     return tuple({**arguments, "seed": seed} for seed in seeds)
 
 
 def _output(content: Mapping[str, Any], file: Path, shown: str) -> Path:
+    """Return the path of the recipe's table."""
     if "output" not in content:
         return Path(f"{file.stem}.exr")
     output = content["output"]

@@ -120,17 +120,18 @@ model : string [small_slope]
     where the surface is rough at the scale of an order; polarised variants have its Mueller
     matrices. `kirchhoff`: the tangent plane, also the default of material `none`, which has no
     index, and of layering `thesis`.
-second_order : boolean [true where it can be]
-    Multiplies orders by what light diffracted twice makes of them (Voronovich 1994, the second
-    order of small slope as a factor of directions and of the heights' slopes). Of light from 60° it
-    takes the error of colours on a CD's pits from a third to a tenth, on scales by a tenth to a
-    quarter, at normal incidence nothing (docs/validation.md). It can be where a dielectric denser
-    than what is above it reflects, bare or under a coat, by model `small_slope`, in an ensemble,
-    and the table holds what it takes, as tables of ensembles do unless told not to (`precompute
-    --no-second-order`); not of light that goes through, films or layering `thesis`. Polarised
-    variants multiply matrices by the factor of unpolarised light. Order 0, the directions drawn and
-    the light that goes on to what lies beneath are as without it. Coefficients follow the index in
-    steps of 0.01. `true` elsewhere is refused, `false` leaves it out.
+second_order : string or boolean [auto]
+    Multiplies orders by the second order of small slope (Voronovich 1994), a factor of directions
+    and of the heights' slopes. `auto` applies it if the table changes colours by 5 % or more: of
+    discs and blazed gratings, not of skins. `true` applies it wherever it is known: light that a
+    dielectric denser than the medium above it reflects, bare or under a coat, by model
+    `small_slope`, in an ensemble, without layering `thesis`; elsewhere it is refused. `false`
+    leaves it out. The change is measured when the table is built, for index 1.5 in light from 60°
+    and heights as they are (`mitsuba-diffraction info`). For light from 60° it lowers the error of
+    colours on a CD's pits from a third to a tenth (docs/validation.md). Polarised variants
+    multiply matrices by the factor for unpolarised light. Order 0, sampled directions and the
+    light for what lies beneath are the same without it. Coefficients follow the index in steps of
+    0.01.
 energy_conserving : boolean [true]
     Where the model reflects more than it gets, multiplies it by s(ωi) s(ωo), a scale of directions
     found for this table, model, material and each wavelength, so that no more is reflected than

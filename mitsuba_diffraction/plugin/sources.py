@@ -12,9 +12,9 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError, DiffractionWarning
+from ..files import readable_file
 from ..heights import gratings
 from ..heights.field import HeightField
-from ..heights.formats import existing_file
 from ..heights.load import load_heights
 from ..heights.read import LoadOptions, is_recipe, treat
 from ..heights.recipes import Recipe
@@ -170,21 +170,21 @@ def _warn(table: DiffractionTable, name: str | None = None) -> None:
 
 
 def _file_digest(path: Path, options: LoadOptions) -> str:
-    return key_of(options.given(), _sha256(path))
+    return key_of(options.specified(), _sha256(path))
 
 
 def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
     """Changes when the recipe's heights may: its own text, its sources, or the generators."""
-    files = [existing_file(source) for source in recipe.sources]
+    files = [readable_file(source) for source in recipe.sources]
     if recipe.generator is not None:
         files += sorted(Path(gratings.__file__).parent.glob("*.py"))
     arguments = [dict(one) for one in recipe.arguments]
-    options_of_both = [recipe.options.given(), options.given()]
+    options_of_both = [recipe.options.specified(), options.specified()]
     return key_of(options_of_both, recipe.generator, arguments, *map(_sha256, files))
 
 
 def _sha256(path: Path) -> str:
-    with open(existing_file(path), "rb") as file:
+    with open(readable_file(path), "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
@@ -207,10 +207,10 @@ def _check_agreement(
         "windows": table.settings.windows,
     }
     asked = dict(asked)
-    if asked.pop("second_order", None) and table.slope_ratios is None:
+    if asked.pop("second_order", None) is True and table.slope_ratios is None:
         raise DiffractionError(
-            f"second_order=true asks for what the table '{path}' does not hold; leave it out, or "
-            "build the table without '--no-second-order', for an ensemble"
+            f"second_order=true needs slope ratios, which the table '{path}' does not hold; leave "
+            "it out, or build the table with '--second-order true', for coherence='ensemble'"
         )
     for name, value in asked.items():
         if value != own[name] and not (name == "basis" and value == "auto"):
@@ -219,7 +219,7 @@ def _check_agreement(
                 f"{_remedy(name)}, or build another table with 'mitsuba-diffraction precompute "
                 f"--{name.replace('_', '-')} {value}'"
             )
-    for name, value in options.given().items():
+    for name, value in options.specified().items():
         raise DiffractionError(
             f"{name}={value} is for height fields, but '{path}' is a table and has its own; "
             f"leave {name} out, or say 'auto'"

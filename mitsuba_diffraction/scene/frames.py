@@ -13,6 +13,7 @@ from typing import Any
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, DiffractionWarning
+from ..files import refuse_pipe
 from ..progress import Progress
 from .load import load_scene, preview_samples, sensor_of, shrink
 from .parameters import files_of
@@ -48,6 +49,7 @@ class Frame:
         """
         if not self.png.exists():
             return MISSING
+        refuse_pipe(self.png)
         before = _settings_in(self.png)
         if before is None:
             raise DiffractionError(

@@ -17,9 +17,10 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from ..errors import DiffractionError, DiffractionWarning, one_line
+from ..files import readable_file
 from ..plugin.properties import name_of
 from ..plugin.textures import check_attributes
-from .parameters import check_parameters
+from .parameters import check_parameters, refuse_pipes
 
 _SOURCE_LINE = re.compile(r"\[[\w./]+\.(?:cpp|h|py):\d+\]\s*")
 _LOADING = re.compile(
@@ -82,10 +83,8 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
 
     from ..plugin import registration  # noqa: F401  registers the plugin
 
-    if file.is_dir():
-        raise DiffractionError(f"'{file}' is a folder, not a scene; name an XML file in it")
-    if not file.exists():
-        raise DiffractionError(f"'{file}' does not exist; check the path")
+    readable_file(file)
+    refuse_pipes(file, parameters)
     check_parameters(file, parameters)
     for name in _TAKEN:
         if name in parameters:

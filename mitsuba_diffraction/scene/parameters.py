@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import difflib
 import math
+import os
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import DiffractionError, quoted
+from ..files import refuse_pipe
 
 _REFERENCE = re.compile(r"\$(\w+)")
 # Mitsuba stops at 15 includes within each other.
@@ -60,8 +62,21 @@ def parameters_of(
     return found if _collect(scene, dict(given or {}), found, 0) else None
 
 
+def refuse_pipes(scene: Path, given: Mapping[str, str]) -> None:
+    """Raise a DiffractionError if the scene names a pipe or a device, for which Mitsuba waits."""
+    _walk(scene, given, with_sources=False)
+
+
 def files_of(scene: Path, given: Mapping[str, str] | None = None) -> list[Path]:
-    """The scene, its includes, and every file that one of them or a recipe among those names."""
+    """List the scene, its includes, and every file named by one of them or by a recipe they name.
+
+    Raises a DiffractionError if one is a pipe or a device, or a recipe is wrong.
+    """
+    return _walk(scene, given, with_sources=True)
+
+
+def _walk(scene: Path, given: Mapping[str, str] | None, with_sources: bool) -> list[Path]:
+    """List the files that a scene names, with those that recipes among them name if asked."""
     from ..heights.read import is_recipe
     from ..heights.recipes import Recipe
 
@@ -71,10 +86,11 @@ def files_of(scene: Path, given: Mapping[str, str] | None = None) -> list[Path]:
     waiting = [scene]
     while waiting:
         file = waiting.pop()
-        if file in found or not file.is_file():
+        refuse_pipe(file)
+        if file in found or not os.path.isfile(file):  # Path.is_file() raises for long names
             continue
         found[file] = None
-        if is_recipe(file):
+        if with_sources and is_recipe(file):
             waiting += Recipe.load(file).sources
         if file.suffix.lower() != ".xml":
             continue
@@ -91,7 +107,7 @@ def _collect(
     file: Path, given: Mapping[str, str], found: dict[str, str | None], depth: int
 ) -> bool:
     """Add the parameters of one file to `found`; whether it and its includes could be read."""
-    if depth > _DEEPEST:
+    if depth > _DEEPEST or not file.is_file():
         return False
     try:
         root = ElementTree.parse(file).getroot()

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import quoted
 from ..optics.blend import RoughnessTable
-from ..optics.second_order import SlopeRatios
+from ..optics.slope_ratios import SlopeRatios
 from ..settings import BASES, MAX_TAPS, MAX_TERMS, TableSettings
 from .expansion import KINDS, Expansion
 from .layout import Grid
@@ -68,6 +68,7 @@ def _ratios_of(ratios: SlopeRatios) -> dict[str, Any]:
         "kappa": ratios.kappa,
         "shape": ratios.values.shape,
         "values": base64.b64encode(halves.tobytes()).decode("ascii"),
+        "change": ratios.change,
     }
 
 
@@ -274,7 +275,7 @@ def _roughness(fields: Mapping[str, Any]) -> RoughnessTable:
 
 
 def _ratios(fields: Mapping[str, Any]) -> SlopeRatios:
-    names = ("cell", "orders", "kappa", "shape", "values")
+    names = ("cell", "orders", "kappa", "shape", "values", "change")
     _names(fields, names, names)
     orders, shape = _two(fields["orders"], "orders"), _list(fields["shape"], "shape")
     _require(all(isinstance(one, bool) for one in orders), "orders")
@@ -291,6 +292,7 @@ def _ratios(fields: Mapping[str, Any]) -> SlopeRatios:
         (orders[0], orders[1]),
         kappa,
         values.view(np.complex64).reshape(shape),
+        _number(fields["change"], "change", 0.0, 2.0),
     )
 
 

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
+from ..files import readable_file
 from ..streams import without_chatter
 from .document import Described, described, document_of, plain
 from .expansion import Expansion
@@ -116,10 +117,10 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
 def is_table(path: str | os.PathLike[str]) -> bool:
     """Whether a file is a table, of whatever version; False if it cannot be read."""
     try:
-        with open(path, "rb") as stream:
+        with readable_file(path).open("rb") as stream:
             if stream.read(len(EXR_BEGINS)) != EXR_BEGINS:
                 return False
-    except (OSError, ValueError):
+    except (OSError, DiffractionError):
         return False  # whoever reads it says why it cannot be
     return read_document(path) is not None
 
@@ -216,9 +217,7 @@ def _read(
     path: str | os.PathLike[str], what: Callable[[OpenEXR.File], Any], header_only: bool = False
 ) -> Any:
     """Part of an EXR file."""
-    if not Path(path).is_file():
-        why = "it is a folder" if Path(path).is_dir() else "there is no such file"
-        raise DiffractionError(f"cannot read '{path}': {why}")
+    readable_file(path)
     try:
         with without_chatter():
             return what(OpenEXR.File(str(path), separate_channels=True, header_only=header_only))

@@ -173,6 +173,8 @@ def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
 
 
 def _read(path: Path, title: str) -> Record:
+    if not path.is_file():
+        raise FileNotFoundError
     content = np.fromfile(path, np.uint8)
     if content[:_HEAD].tobytes() != _head(title, [content[_HEAD:]]):
         raise ValueError("its checksum or its key is another's")

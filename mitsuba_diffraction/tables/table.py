@@ -15,13 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import DiffractionError
 from ..optics.blend import RoughnessTable
 from ..optics.geometry import sigma_of, wavenumber
-from ..optics.second_order import SlopeRatios
+from ..optics.second_order_change import applies
+from ..optics.slope_ratios import SlopeRatios
 from ..settings import TableSettings
 from .expansion import Expansion
 from .layout import Grid
 
 #: Raised whenever what the coefficients mean changes; tables of another version are refused.
-FORMAT_VERSION = 4
+FORMAT_VERSION = 5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -211,11 +212,20 @@ class DiffractionTable:
             "taps": list(self.grid.taps),
             "orders": [nx, ny],
             **self._restriction(),
-            **({} if self.slope_ratios is None else {"second_order": True}),
+            "second_order": self._second_order(),
             "components": components,
             "precision": str(self.coefficients.dtype),
             "memory_mb": round(self.nbytes / 1e6, 2),
             "source": dict(self.source),
+        }
+
+    def _second_order(self) -> dict[str, Any] | bool:
+        if self.slope_ratios is None:
+            return False
+        return {
+            "asked": self.settings.second_order,
+            "applied": applies(self.settings.second_order, self.slope_ratios),
+            "changes_colours_by": self.slope_ratios.change,
         }
 
     def _restriction(self) -> dict[str, Any]:

@@ -281,7 +281,8 @@ def time_compiled(
     """
     import mitsuba as mi
 
-    from ..analysis.bench.contenders import saved_bsdf, thesis_bsdf
+    from ..analysis.timing import quiet_bsdf
+    from .term_images import thesis_bsdf
 
     common: dict[str, Any] = {
         "coherence_width": coherence_width, "tolerance": tolerance, "wavelength_range": _RANGE,
@@ -311,7 +312,7 @@ def time_compiled(
         full.table.save(flss)
         mi.set_variant(f"{backend}_ad_rgb")
         raw: dict[str, Any] = {"material": "none", "energy_conserving": False}
-        best = seconds({"colours": saved_bsdf(own, **raw)})
+        best = seconds({"colours": quiet_bsdf(own, **raw)})
         mi.set_variant(f"{backend}_ad_spectral")
-        best |= seconds({"spectral": saved_bsdf(own, **raw), "flss": thesis_bsdf(flss, **raw)})
+        best |= seconds({"spectral": quiet_bsdf(own, **raw), "flss": thesis_bsdf(flss, **raw)})
     return Compiled(best["spectral"], best["colours"], best["flss"])

@@ -10,7 +10,7 @@ from scipy import ndimage
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError, HeightField, design, reference
-from tests.directions import Array, polar, rough_patch, uniform_directions
+from tests.support.directions import Array, polar, rough_patch, uniform_directions
 
 #: Odd and even numbers of pixels that are not square; heights of several radians of phase.
 SMALL = rough_patch((12, 15), (0.13, 0.15), 0.3)

@@ -22,11 +22,8 @@ from mitsuba_diffraction.analysis.survey import (
     treatments_of,
 )
 from mitsuba_diffraction.optics.colour import response
-from tests.cli.conftest import run
 
 pytestmark = pytest.mark.usefixtures("coarse")
-
-__all__ = ["run"]
 
 PERIOD, PIXEL = 1.6, 0.1
 SMALL = {"coherence_width": 6.0, "tolerance": 0.05}

@@ -20,7 +20,7 @@ from mitsuba_diffraction.analysis.tradeoff.accuracy import (
 )
 from mitsuba_diffraction.analysis.tradeoff.measuring import Measured, Setting, rows, settings
 from mitsuba_diffraction.analysis.tradeoff.report import Budget, recommended
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 PATCH = rough_patch((48, 48), (0.1, 0.1), 0.25)
 WIDTH = 4.5
@@ -136,7 +136,7 @@ def test_a_folder_without_measurements_is_refused(tmp_path, capsys):
 
 
 def test_the_command_measures_and_recommends(tmp_path, monkeypatch, capsys):
-    from mitsuba_diffraction.cli import bench as command
+    from mitsuba_diffraction.cli import tradeoff as command
     from mitsuba_diffraction.cli.main import main
 
     np.save(tmp_path / "heights.npy", PATCH.heights)

@@ -7,41 +7,12 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from mitsuba_diffraction.cli import main
-
-ROOT = Path(__file__).resolve().parents[2]
-
-
-class Ran(NamedTuple):
-    """What a run gave: exit code, stdout, stderr."""
-
-    code: int
-    out: str
-    err: str
-
-    def failed_in_one_line(self) -> str:
-        """Check that the run failed with one line on stderr and nothing else; the line."""
-        assert self.code == 1, self
-        assert self.out == ""
-        (line,) = self.err.splitlines()
-        assert line.startswith("mitsuba-diffraction: error: ")
-        return line
-
-
-@pytest.fixture
-def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., Ran]:
-    """`run(*arguments)`: main() in this process."""
-
-    def call(*arguments: object) -> Ran:
-        code = main([str(a) for a in arguments])
-        return Ran(code, *capfd.readouterr())
-
-    return call
+from tests.support import ROOT
+from tests.support.command_line import Ran
 
 
 @pytest.fixture
@@ -78,15 +49,6 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder.mkdir()
     monkeypatch.chdir(folder)
     return folder
-
-
-@pytest.fixture
-def scene(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The module's SCENE as room.xml, in a folder that is the current one."""
-    monkeypatch.chdir(tmp_path)
-    file = tmp_path / "room.xml"
-    file.write_text(request.module.SCENE)
-    return file
 
 
 @pytest.fixture

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support import ROOT
+
 CODE = """
 import argparse
 from mitsuba_diffraction.cli import Bar
@@ -22,7 +24,6 @@ with Bar(argparse.Namespace(progress=None), delay=0) as bar:
         bar(n, 20, "working")
 """
 
-ROOT = Path(__file__).parents[2]
 ENTRY = ROOT / "_mitsuba_diffraction.py"
 
 #: Seconds: far from the ten minutes that the main thread would take.

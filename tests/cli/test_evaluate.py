@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from mitsuba_diffraction.cli.options import METHODS
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 QUICK = [
     "--pixel-size", "0.08", "--coherence-width", "12", "--step", "40", "--angle-step", "0.5",

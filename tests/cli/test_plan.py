@@ -8,7 +8,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 # A plate seen from above in light from 20°, with next to no sky.
 SCENE = """<scene version="3.5.0">

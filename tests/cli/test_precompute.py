@@ -44,9 +44,9 @@ def test_the_second_order_is_held_unless_the_recipe_or_the_options_say_no(run, r
     text = recipe.read_text()
     for line, options, held in (
         ("", [], True),
-        ("", ["--no-second-order"], False),
+        ("", ["--second-order", "false"], False),
         ("second_order = false", [], False),
-        ("second_order = false", ["--second-order"], True),
+        ("second_order = false", ["--second-order", "true"], True),
     ):
         recipe.write_text(f"{text}\n{line}")
         assert run("precompute", recipe, "-o", "out.exr", *options).code == 0

@@ -168,7 +168,7 @@ def test_triangles_too_coarse_for_a_field_are_said(run, here):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["none.obj", "-o", "a.ply"], "mesh 'none.obj': there is no such file"),
+        (["none.obj", "-o", "a.ply"], "'none.obj' does not exist"),
         (["bare.obj", "-o", "no/a.ply"], "cannot write 'no/a.ply'"),
     ],
 )

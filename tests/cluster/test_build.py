@@ -18,8 +18,7 @@ from mitsuba_diffraction.cluster.jobs import OrderedMap, build_on_workers  # noq
 from mitsuba_diffraction.settings import TableSettings  # noqa: E402
 from mitsuba_diffraction.tables.build import windows as windows_module  # noqa: E402
 from mitsuba_diffraction.tables.build.windows import Windows  # noqa: E402
-from tests.cli.conftest import run  # noqa: E402, F401
-from tests.tables.build.test_windows import PIXEL, SETTINGS, rough  # noqa: E402
+from tests.support.scans import PIXEL, SETTINGS, rough  # noqa: E402
 
 WANTED = TableSettings(windows="auto", **SETTINGS)
 
@@ -120,7 +119,7 @@ def test_a_late_worker_with_another_version_is_named(monkeypatch):
         list(OrderedMap(_Workers(1))(abs, [1]))
 
 
-def test_without_windows_there_is_nothing_for_workers(scan, run, tmp_path):  # noqa: F811
+def test_without_windows_there_is_nothing_for_workers(scan, run, tmp_path):
     with pytest.raises(DiffractionError, match="windows=auto"):
         cluster.build(scan, client=None, **SETTINGS)
     np.save(tmp_path / "scan.npy", scan.heights)
@@ -129,7 +128,7 @@ def test_without_windows_there_is_nothing_for_workers(scan, run, tmp_path):  # n
     assert "--windows" in ran.err.splitlines()[-1]
 
 
-def test_the_command_builds_the_same_table_on_one_worker(scan, alone, run, tmp_path, monkeypatch):  # noqa: F811
+def test_the_command_builds_the_same_table_on_one_worker(scan, alone, run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     np.save("scan.npy", scan.heights)
     ran = run(

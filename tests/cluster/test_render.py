@@ -26,8 +26,8 @@ from mitsuba_diffraction.cluster.frames import Film, Kept, Wanted  # noqa: E402
 from mitsuba_diffraction.cluster.tasks import Lacking, run_task  # noqa: E402
 from mitsuba_diffraction.scene import passes  # noqa: E402
 from mitsuba_diffraction.scene.load import load_scene, set_variant  # noqa: E402
-from tests.cli.conftest import ROOT, run  # noqa: E402, F401
-from tests.cli.room import SCENE, pixels  # noqa: E402
+from tests.support import ROOT  # noqa: E402
+from tests.support.room import SCENE, pixels  # noqa: E402
 
 VARIANT = "llvm_ad_rgb"
 SPP = 24
@@ -344,7 +344,7 @@ def test_damaged_sums_are_rendered_again(scene, tmp_path):
     assert task not in kept
 
 
-def test_the_command_renders_on_a_cluster(client, scene, expected, run, tmp_path):  # noqa: F811
+def test_the_command_renders_on_a_cluster(client, scene, expected, run, tmp_path):
     address = client.scheduler.address
     ran = run(
         "render", scene, "-m", VARIANT, "-s", SPP, "--seed", 3, "--scheduler", address,
@@ -363,7 +363,7 @@ def test_the_command_renders_on_a_cluster(client, scene, expected, run, tmp_path
     assert len(report["where"]) == 1
 
 
-def test_the_command_renders_frames_on_a_cluster(client, scene, run, monkeypatch):  # noqa: F811
+def test_the_command_renders_frames_on_a_cluster(client, scene, run, monkeypatch):
     monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", client.scheduler.address)
     z = '<default name="z" value="4"/><default name="spp"'
     scene.write_text(SCENE.replace("0,0,4", "0,0,$z").replace('<default name="spp"', z))

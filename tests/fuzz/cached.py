@@ -18,8 +18,8 @@ from mitsuba_diffraction.tables import store
 from mitsuba_diffraction.tables.energy import store as energy
 from mitsuba_diffraction.tables.energy.conservation import Conservation, DirectionalTable
 from mitsuba_diffraction.tables.store import VARIABLE, Record, kept
-from tests.directions import rough_patch
 from tests.fuzz.damage import damaged
+from tests.support.directions import rough_patch
 
 _KEY = "5" * 64
 

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 from PIL import Image
@@ -23,8 +22,9 @@ from mitsuba_diffraction.scene.planning.plan import Plan
 from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.document import described
 from mitsuba_diffraction.tables.exr import read_document
-from tests.directions import rough_patch
-from tests.instruments import nanoscope
+from tests.support.directions import rough_patch
+from tests.support.instruments import nanoscope
+from tests.support.looked_up import look_up_in_plugin, use_table
 
 _MOST = 500  # characters of a message
 _MOST_NUMBERS = 10**6  # of a table
@@ -212,7 +212,7 @@ def check_scene(rng: np.random.Generator) -> None:
             return
         for shape in loaded.shapes():
             if shape.bsdf() is not None and "Diffraction[" in str(shape.bsdf()):
-                _look_up_in_plugin(shape.bsdf())
+                look_up_in_plugin(shape.bsdf())
 
 
 def _check(rng: np.random.Generator, names: list[str], use: Callable[[Path], object]) -> None:
@@ -234,48 +234,6 @@ def _check_line(error: md.DiffractionError) -> None:
 def _use_plan(path: Path) -> None:
     for limits in Plan.load(path).limits().values():
         TableSettings(coherence_width=2.0, **limits)
-
-
-def use_table(path: Path) -> None:
-    table = md.DiffractionTable.load(path)
-    _look_up(table)
-    mi.set_variant("scalar_spectral")  # where reading outside of an array is an error
-    scene = {"type": "diffraction", "table": str(path), "energy_conserving": False}
-    try:
-        bsdf = mi.load_dict({**scene, "material": "none"})
-    except RuntimeError as error:
-        assert "DiffractionError: " in str(error), str(error)[-200:]
-        return
-    _look_up_in_plugin(bsdf)
-
-
-def _look_up_in_plugin(bsdf: Any) -> None:
-    """Values, densities and samples are finite and not negative."""
-    rng = np.random.default_rng(2)
-    context, si = mi.BSDFContext(), dr.zeros(mi.SurfaceInteraction3f)
-    for _ in range(4):
-        wi, wo = (np.append(p, np.sqrt(1.0 - p @ p)) for p in rng.uniform(-0.7, 0.7, (2, 2)))
-        si.wi, si.wavelengths = mi.Vector3f(wi), mi.Spectrum(rng.uniform(360.0, 830.0, 4))
-        si.sh_frame = mi.Frame3f(mi.Normal3f(0, 0, 1))
-        value, density = bsdf.eval_pdf(context, si, mi.Vector3f(wo))
-        drawn, weight = bsdf.sample(context, si, rng.random(), mi.Point2f(rng.random(2)))
-        numbers = np.array([*value, density, drawn.pdf, *weight])
-        assert np.isfinite(numbers).all(), "not finite in the plugin"
-        assert (numbers >= 0.0).all(), "negative in the plugin"
-        assert numbers[:4].max() < 1e9, "too bright in the plugin"
-
-
-def _look_up(table: md.DiffractionTable) -> None:
-    rng = np.random.default_rng(1)
-    wi, wo = rng.normal(size=(2, 16, 3))
-    for w in (wi, wo):
-        w[:, 2] = np.abs(w[:, 2]) + 0.1
-        w /= np.linalg.norm(w, axis=1)[:, None]
-    low, high = table.wavelength_range
-    value = table.brdf(wi, wo, rng.uniform(low, high, 16))
-    assert np.isfinite(value).all()
-    assert (value >= 0.0).all()
-    assert value.max() < 1e9
 
 
 def _use_heights(path: Path) -> None:

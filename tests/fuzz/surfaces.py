@@ -11,8 +11,8 @@ import numpy as np
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor, sigma_of
-from tests.directions import lit_pairs
-from tests.lanes import brdf_values
+from tests.support.directions import lit_pairs
+from tests.support.lanes import brdf_values
 
 _PAIRS, _MANY = 40, 1500
 #: Errors are measured at some pairs of directions, tolerances hold for sums over thousands; single

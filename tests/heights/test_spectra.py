@@ -19,7 +19,7 @@ from mitsuba_diffraction.heights.spectra import (
     order_powers,
     profile,
 )
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 
 def test_the_spectrum_integrates_to_the_variance():

@@ -8,7 +8,7 @@ import pytest
 from mitsuba_diffraction import gratings
 from mitsuba_diffraction.optics import blend, boundary
 from mitsuba_diffraction.optics.blend import NODES_PER_OCTAVE, ScaleRoughness
-from tests.directions import polar, rough_patch
+from tests.support.directions import polar, rough_patch
 
 PATCH = rough_patch((40, 56), (0.11, 0.09), 0.3)
 

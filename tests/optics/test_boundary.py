@@ -7,19 +7,10 @@ import pytest
 
 from mitsuba_diffraction.optics import boundary, fresnel
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor
-from tests.directions import polar, uniform_directions
+from tests.support.directions import polar
+from tests.support.matrices import MATRICES, REVERSED, pairs
 
 INDICES = (1.5, 0.8, 0.65 + 5.6j)
-MATRICES = (boundary.small_slope, boundary.kirchhoff)
-#: Reversed light has its s axis reversed, its p axis as it was.
-REVERSED = np.array([[1, -1], [-1, 1]])
-
-
-def pairs(count: int = 300) -> tuple[np.ndarray, np.ndarray]:
-    """Directions not quite at the horizon, where Kirchhoff's matrix has a pole."""
-    directions = uniform_directions(2 * count, np.random.default_rng(2), lowest=0.05)
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    return directions[:count], directions[count:]
 
 
 @pytest.mark.parametrize("index", INDICES)

@@ -8,7 +8,7 @@ import pytest
 from mitsuba_diffraction.optics.boundary import small_slope
 from mitsuba_diffraction.optics.coat import refracted, transmitted
 from mitsuba_diffraction.optics.fresnel import amplitudes
-from tests.directions import polar
+from tests.support.directions import polar
 
 
 def test_refraction_is_snell_s():

@@ -7,8 +7,8 @@ import pytest
 
 from mitsuba_diffraction.optics import boundary, fresnel
 from mitsuba_diffraction.optics.fresnel import Filmed
-from tests.directions import polar
-from tests.optics.test_boundary import MATRICES, REVERSED, pairs
+from tests.support.directions import polar
+from tests.support.matrices import MATRICES, REVERSED, pairs
 
 MATERIALS = (1.5, 0.8, 0.65 + 5.6j)
 FILMS = (1.45, 0.7, 2.4 + 0.1j)

@@ -13,7 +13,7 @@ from mitsuba_diffraction.optics.geometry import (
     sigma_of,
     wavenumber,
 )
-from tests.directions import polar
+from tests.support.directions import polar
 
 angles = st.tuples(st.floats(0.0, 89.9), st.floats(-180.0, 180.0))
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.optics import boundary, fresnel, through
-from tests.directions import polar
-from tests.optics.test_boundary import pairs
+from tests.support.directions import polar
+from tests.support.matrices import pairs
 
 MATRICES = (through.small_slope, through.kirchhoff)
 N = 1.5

@@ -8,14 +8,7 @@ import drjit as dr
 import mitsuba as mi
 import pytest
 
-ALL = [name for name in mi.variants() if name.startswith(("scalar", "llvm", "cuda"))]
-
-
-def runs(name: str) -> bool:
-    """Whether the machine runs a variant."""
-    if name.startswith("cuda"):
-        return bool(dr.has_backend(dr.JitBackend.CUDA))
-    return name.startswith("scalar") or bool(dr.has_backend(dr.JitBackend.LLVM))
+from tests.support.variants import ALL, runs
 
 
 @pytest.fixture(params=ALL)

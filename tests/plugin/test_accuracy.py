@@ -15,8 +15,8 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor, sigma_of
-from tests.directions import lit_pairs, rough_patch
-from tests.lanes import brdf_values
+from tests.support.directions import lit_pairs, rough_patch
+from tests.support.lanes import brdf_values
 
 # measured and made surfaces alike may be steeper than the model likes; that is not the point here
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")

@@ -6,10 +6,10 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from tests.conftest import obstacle
-from tests.directions import polar
-from tests.lanes import interaction, spectra
-from tests.plugin.gentle import load
+from tests.support.directions import polar
+from tests.support.gentle import load
+from tests.support.lanes import interaction, spectra
+from tests.support.variants import obstacle
 
 PIGMENT = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.5}}
 COLOURED = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.5, 0.1, 0.05]}}

@@ -10,9 +10,9 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.optics import fresnel
 from mitsuba_diffraction.tables.energy.conservation import DirectionalTable
 from mitsuba_diffraction.tables.energy.store import Energy
-from tests.directions import polar
-from tests.lanes import evaluated, interaction, lanes, spectra, vectors
-from tests.plugin.gentle import load, pairs
+from tests.support.directions import polar
+from tests.support.gentle import load, pairs
+from tests.support.lanes import evaluated, interaction, lanes, spectra, vectors
 
 
 def test_what_is_not_reflected_reaches_the_nested_bsdf(variant):

@@ -9,9 +9,9 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.realtime.glsl.scene import read_scene
-from tests.directions import rough_patch
-from tests.lanes import interaction, refusal, spectra, vectors
-from tests.plugin.gentle import PATCH, WIDTH, pairs
+from tests.support.directions import rough_patch
+from tests.support.gentle import PATCH, WIDTH, pairs
+from tests.support.lanes import interaction, refusal, spectra, vectors
 
 OTHER = rough_patch((60, 60), (0.08, 0.08), 0.1, seed=3)
 RAW = {"material": "none", "energy_conserving": False, "coherence_width": WIDTH}

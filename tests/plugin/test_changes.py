@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from tests.lanes import brdf_values, interaction, spectra, vectors
-from tests.plugin.gentle import load, pairs
+from tests.support.gentle import load, pairs
+from tests.support.lanes import brdf_values, interaction, spectra, vectors
 
 
 def test_what_may_change_is_listed(some_variant):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import drjit as dr
@@ -10,18 +9,15 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.fresnel import reflectance
-from tests.directions import Array, as_single, polar
-from tests.lanes import evaluated, interaction, refusal
-from tests.plugin.conftest import ALL, runs
-from tests.plugin.test_model import PATCH, WIDTH, pairs
-from tests.plugin.test_variants import evaluate
+from tests.support.directions import Array, as_single, polar
+from tests.support.lanes import evaluated, interaction, refusal
+from tests.support.layered import FLAT, PATCH, WIDTH, assert_values_are_the_reference_s, load, pairs
+from tests.support.variants import ALL, evaluate, runs
 
-FLAT = md.HeightField(np.zeros((40, 40)), 0.08)
 COATED = {
     "metal": ({"eta": 0.9, "k": 6.0, "coat_ior": 1.58}, {"eta": 0.9, "k": 6.0, "coat": 1.58}),
     "dielectric": (
@@ -29,37 +25,6 @@ COATED = {
         {"eta": 1.7, "coat": 1.4},
     ),
 }
-
-
-def load(field: md.HeightField = PATCH, **parameters: Any) -> Any:
-    raw = {"energy_conserving": False, "coherence_width": WIDTH, "tolerance": 1e-4}
-    return mi.load_dict(md.bsdf_dict(field, **(raw | parameters)))
-
-
-def assert_values_are_the_reference_s(
-    model: str,
-    ours: dict[str, Any],
-    theirs: dict[str, Any],
-    ratio: Callable[..., NDArray[np.float64]] | None = None,
-) -> None:
-    """The plugin with some parameters against the reference with its own.
-
-    ratio : of what the plugin has tabulated beside the heights' table over the exact.
-    """
-    wi, wo, lam = (a[:120] for a in pairs())
-    bsdf = load(model=model, **ours)
-    found = evaluated(bsdf, wi, wo, lam)
-    if ratio is not None:
-        found = found / ratio(bsdf.table, wi, wo, lam)
-    exact = np.stack(
-        [
-            reference.brdf(PATCH, wi, wo, one, coherence_width=WIDTH, model=model, **theirs)
-            for one in lam.T
-        ],
-        axis=1,
-    ) * wo[:, 2:]  # fmt: skip
-    # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
-    assert found == pytest.approx(exact, rel=1e-3, abs=1e-5 * exact.max())
 
 
 @pytest.mark.parametrize("kind", COATED)

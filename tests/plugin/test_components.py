@@ -14,9 +14,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from tests.directions import polar
-from tests.lanes import lanes, refusal, vectors
-from tests.plugin.gentle import load
+from tests.support.directions import polar
+from tests.support.gentle import load
+from tests.support.lanes import lanes, refusal, vectors
 
 THETA = 35.0
 FLAGS = mi.BSDFFlags

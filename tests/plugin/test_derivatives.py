@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from tests.directions import Array, uniform_directions
-from tests.lanes import interaction, lanes, spectra, vectors
+from tests.support.directions import Array, uniform_directions
+from tests.support.lanes import interaction, lanes, spectra, vectors
 
 # a steep grating bends light further than the model likes; that is not the point here
 pytestmark = [

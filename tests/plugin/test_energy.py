@@ -7,8 +7,8 @@ import pytest
 
 import mitsuba_diffraction as md  # before Mitsuba: it chooses Dr.Jit's LLVM
 from mitsuba_diffraction.optics.geometry import wavenumber
-from tests.directions import polar
-from tests.lanes import lanes
+from tests.support.directions import polar
+from tests.support.lanes import lanes
 
 import mitsuba as mi  # isort: skip
 import drjit as dr  # isort: skip

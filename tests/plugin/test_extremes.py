@@ -8,9 +8,9 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import HeightField
-from tests.directions import as_single, polar, rough_patch
-from tests.lanes import evaluated
-from tests.plugin.gentle import load
+from tests.support.directions import as_single, polar, rough_patch
+from tests.support.gentle import load
+from tests.support.lanes import evaluated
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
 

@@ -23,12 +23,10 @@ from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.optics.mean_second_order import limited, mean_gain
 from mitsuba_diffraction.plugin.layers import Channels
 from mitsuba_diffraction.tables.energy.film import exponents
-from tests.directions import as_single, polar
-from tests.lanes import evaluated, interaction, refusal
-from tests.plugin.conftest import runs
-from tests.plugin.test_coat import FLAT, assert_values_are_the_reference_s, load
-from tests.plugin.test_model import PATCH, WIDTH, pairs
-from tests.plugin.test_variants import evaluate
+from tests.support.directions import as_single, polar
+from tests.support.lanes import evaluated, interaction, refusal
+from tests.support.layered import FLAT, PATCH, WIDTH, assert_values_are_the_reference_s, load, pairs
+from tests.support.variants import evaluate, runs
 
 Array = NDArray[Any]
 OXIDE = {"film_ior": 1.77, "film_thickness": 250.0}

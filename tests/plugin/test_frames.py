@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from tests.directions import polar
-from tests.lanes import brdf_values, evaluated
-from tests.plugin.gentle import PATCH, load, pairs
+from tests.support.directions import polar
+from tests.support.gentle import PATCH, load, pairs
+from tests.support.lanes import brdf_values, evaluated
 
 
 def test_orientation_turns_the_patch_anticlockwise(variant):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from tests.directions import as_single, polar, uniform_directions
-from tests.lanes import evaluated, interaction, spectra
+from tests.support.directions import as_single, polar, uniform_directions
+from tests.support.lanes import evaluated, interaction, spectra
 
 FLAT = md.HeightField(np.zeros((30, 30)), 0.08)
 WIDTH = 2.4

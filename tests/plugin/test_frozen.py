@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from tests.lanes import interaction, lanes, vectors
-from tests.plugin.plates import (
+from tests.support.lanes import interaction, lanes, vectors
+from tests.support.plates import (
     OTHER,
     PATCH,
     RAW,

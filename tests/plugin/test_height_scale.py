@@ -11,9 +11,9 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.plugin.textures import check_attributes
-from tests.directions import polar
-from tests.lanes import refusal, vectors
-from tests.plugin.gentle import load, pairs
+from tests.support.directions import polar
+from tests.support.gentle import load, pairs
+from tests.support.lanes import refusal, vectors
 
 FACTORS = np.array([[0.25, 1.25], [0.8, 0.0]], np.float32)
 #: Middles of the texels.

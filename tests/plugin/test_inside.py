@@ -9,9 +9,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from tests.directions import as_single, polar
-from tests.lanes import evaluated, interaction, spectra, vectors
-from tests.plugin.plates import (
+from tests.support.directions import as_single, polar
+from tests.support.lanes import evaluated, interaction, spectra, vectors
+from tests.support.plates import (
     OTHER,
     PATCH,
     WAVELENGTHS,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md  # before Mitsuba: it chooses Dr.Jit's LLVM
-from tests.directions import polar, uniform_directions
+from tests.support.directions import polar, uniform_directions
 
 import mitsuba as mi  # isort: skip
 import drjit as dr  # isort: skip

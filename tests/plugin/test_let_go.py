@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.optics.colour import response
-from tests.conftest import obstacle
-from tests.directions import rough_patch
-from tests.plugin.plates import diffraction, grey, plate, rendered, scene
+from tests.support.directions import rough_patch
+from tests.support.plates import diffraction, grey, plate, rendered, scene
+from tests.support.variants import obstacle
 
 # coarse pixels keep the tables small; that is not the point here
 pytestmark = [

@@ -12,13 +12,10 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.colour import RGB_WAVELENGTHS, linear_srgb, response
-from tests.directions import Array, as_single, rough_patch, uniform_directions
-from tests.lanes import evaluated, refusal
-from tests.plugin.conftest import ALL, runs
-from tests.plugin.test_variants import evaluate
+from tests.support.lanes import evaluated, refusal
+from tests.support.layered import PATCH, WIDTH, pairs
+from tests.support.variants import ALL, evaluate, runs
 
-PATCH = rough_patch((40, 44), (0.09, 0.09), 0.14, 0.8)
-WIDTH = 3.0
 MATERIALS = {
     "dielectric": ({}, 1.5 / 1.000277, 0.0),
     "less dense": ({"int_ior": 1.0, "ext_ior": 1.4}, 1.0 / 1.4, 0.0),
@@ -32,20 +29,6 @@ def load(**parameters: Any) -> Any:
     # the second order is interpolated between angles, and has tests of its own
     raw |= {"second_order": False}
     return mi.load_dict(md.bsdf_dict(PATCH, **(raw | parameters)))
-
-
-def pairs(n: int = 200) -> tuple[Array, Array, Array]:
-    """wi, wo (n, 3) and wavelengths (n, 4): at all angles, and where a plane is any plane."""
-    rng = np.random.default_rng(8)
-    wi, wo = uniform_directions(n, rng, 0.03), uniform_directions(n, rng, 0.03)
-    near = slice(0, n // 2)
-    wo[near] = wi[near] * [-1, -1, 1] + rng.normal(0.0, 0.03, (n // 2, 3))
-    wi[0], wo[1], wi[2], wi[3], wi[4] = (0, 0, 1), (0, 0, 1), wo[2], wo[3] + (1e-5, 0, 0), (0, 0, 1)
-    wo[4] = wi[4]
-    wi, wo = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in (wi, wo))
-    good = (wi[:, 2] > 0.02) & (wo[:, 2] > 0.02)
-    lam = as_single(rng.uniform(400.0, 700.0, (n, 4)))
-    return as_single(wi[good]), as_single(wo[good]), lam[good]
 
 
 @pytest.mark.parametrize("kind", MATERIALS)
@@ -118,7 +101,7 @@ def test_reciprocity(some_variant, kind):
 def test_derivatives_are_difference_quotients(some_variant, key):
     wi, wo, lam = (a[5:40] for a in pairs())
     bsdf = load(height_scale=1.0)
-    from tests.lanes import interaction, vectors
+    from tests.support.lanes import interaction, vectors
 
     si, out = interaction(wi, lam), vectors(wo)
     parameters = mi.traverse(bsdf)

@@ -6,8 +6,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from tests.lanes import evaluated, refusal
-from tests.plugin.gentle import load, pairs
+from tests.support.gentle import load, pairs
+from tests.support.lanes import evaluated, refusal
 
 
 def bitmap(degrees, raw=True, channels=3, levels=None):

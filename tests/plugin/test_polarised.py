@@ -11,8 +11,8 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
-from tests.directions import Array, as_single, polar, rough_patch, uniform_directions
-from tests.plugin.test_variants import interaction, runs
+from tests.support.directions import Array, as_single, polar, rough_patch, uniform_directions
+from tests.support.variants import interaction, runs
 
 PATCH = rough_patch((40, 44), (0.09, 0.09), 0.1, 0.6)
 WIDTH = 3.0

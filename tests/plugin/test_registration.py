@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from tests.conftest import ROOT
-from tests.lanes import evaluated
-from tests.plugin.gentle import PATCH, WIDTH, load, pairs
+from tests.support import ROOT
+from tests.support.gentle import PATCH, WIDTH, load, pairs
+from tests.support.lanes import evaluated
 
 XML = """<scene version="3.0.0">
   <integrator type="path"><integer name="max_depth" value="3"/></integrator>

@@ -9,8 +9,8 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.plugin.restricted import device_table
-from tests.directions import polar, rough_patch, uniform_directions
-from tests.lanes import evaluated, interaction, lanes, refusal, vectors
+from tests.support.directions import polar, rough_patch, uniform_directions
+from tests.support.lanes import evaluated, interaction, lanes, refusal, vectors
 
 #: Of coarse pixels: small tables. The plugin warns of that, and this is not about that.
 PATCH = rough_patch((64, 64), (0.3, 0.3), 0.2)

@@ -14,9 +14,9 @@ import pytest
 from scipy import stats
 
 import mitsuba_diffraction as md
-from tests.directions import polar, rough_patch
-from tests.lanes import interaction, lanes, spectra, vectors
-from tests.plugin import gentle
+from tests.support import gentle
+from tests.support.directions import polar, rough_patch
+from tests.support.lanes import interaction, lanes, spectra, vectors
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning"),

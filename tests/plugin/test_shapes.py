@@ -9,8 +9,8 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.plugin.lookup import _UNROLLED_TAPS
 from mitsuba_diffraction.plugin.restricted import device_table
-from tests.directions import rough_patch
-from tests.lanes import lanes
+from tests.support.directions import rough_patch
+from tests.support.lanes import lanes
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
 VARIANTS = ("scalar_spectral", "llvm_ad_mono", "llvm_ad_spectral")

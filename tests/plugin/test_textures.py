@@ -8,7 +8,7 @@ import pytest
 from mitsuba_diffraction import DiffractionError, bsdf_dict
 from mitsuba_diffraction.plugin.textures import check_attributes
 from mitsuba_diffraction.realtime.glsl.scene import read_scene
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 PATCH = rough_patch((30, 32), (0.08, 0.08), 0.03)
 ON_SURFACE = {"coherence": "surface", "uv_scale": 10.0, "coherence_width": 2.4}

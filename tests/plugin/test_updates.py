@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from tests.directions import Array
-from tests.lanes import interaction, spectra, vectors
-from tests.plugin.gentle import PATCH, WIDTH, pairs
+from tests.support.directions import Array
+from tests.support.lanes import interaction, spectra, vectors
+from tests.support.gentle import PATCH, WIDTH, pairs
 
 pytestmark = pytest.mark.usefixtures("mono")
 

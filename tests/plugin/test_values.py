@@ -9,9 +9,9 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.geometry import wavenumber
-from tests.directions import polar
-from tests.lanes import brdf_values, evaluated, interaction, spectra, vectors
-from tests.plugin.gentle import load, pairs
+from tests.support.directions import polar
+from tests.support.gentle import load, pairs
+from tests.support.lanes import brdf_values, evaluated, interaction, spectra, vectors
 
 
 @pytest.mark.parametrize("basis", ["svd", "chebyshev", "taylor"])

@@ -14,8 +14,8 @@ from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
 from mitsuba_diffraction.plugin import fresnel
 from mitsuba_diffraction.tables.colour.table import ColourTable
-from tests.directions import Array, as_single, rough_patch, uniform_directions
-from tests.plugin.conftest import runs
+from tests.support.directions import Array, as_single, rough_patch, uniform_directions
+from tests.support.variants import evaluate, interaction, runs
 
 WIDTH = 8.0  # µm
 HEIGHTS = rough_patch((90, 100), (0.085, 0.09), 0.2, 0.9)
@@ -35,58 +35,6 @@ def pairs(seed: int = 3) -> tuple[Array, Array, Array]:
     wo[near, :2] = -wi[near, :2] + rng.normal(0.0, 0.03, (N // 2, 2))
     wo[near, 2] = np.sqrt(np.maximum(1.0 - (wo[near, :2] ** 2).sum(axis=1), 0.01))
     return wi, as_single(wo / np.linalg.norm(wo, axis=1)[:, None]), rng.random((N, 3))
-
-
-def interaction(wi: Array, wavelengths: Array) -> Any:
-    """At one direction (3,) in scalar variants, at (n, 3) of them elsewhere."""
-    si = dr.zeros(mi.SurfaceInteraction3f, 1 if wi.ndim == 1 else len(wi))
-    si.wi = mi.Vector3f(*wi.T.tolist()) if wi.ndim == 1 else mi.Vector3f(wi.T)
-    si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
-    if mi.is_spectral:
-        si.wavelengths = mi.UnpolarizedSpectrum(wavelengths.T)
-    return si
-
-
-def evaluate(
-    bsdf: Any,
-    wi: Array,
-    wo: Array,
-    samples: Array,
-    wavelengths: Array,
-    component: int | None = None,
-) -> list[Array]:
-    """Value (n, channels), pdf, value again, pdf again; then sampled wo, pdf, weight."""
-    context = mi.BSDFContext(mi.TransportMode.Radiance, int(mi.BSDFFlags.All), component)
-
-    def once(si: Any, wo: Any, one: Any, two: Any) -> list[Array]:
-        together = bsdf.eval_pdf(context, si, wo)
-        sample, weight = bsdf.sample(context, si, one, two)
-        parts = [
-            mi.unpolarized_spectrum(bsdf.eval(context, si, wo)),
-            bsdf.pdf(context, si, wo),
-            mi.unpolarized_spectrum(together[0]),
-            together[1],
-            sample.wo,
-            sample.pdf,
-            mi.unpolarized_spectrum(weight),
-        ]
-        dr.eval(parts)  # one kernel instead of six, all of which would hold most of the model
-        return [np.array(part, float).T for part in parts]
-
-    if dr.is_jit_v(mi.Float):
-        si = interaction(wi, wavelengths)
-        two = mi.Point2f(samples[:, 1:].T)
-        return once(si, mi.Vector3f(wo.T), mi.Float(samples[:, 0]), two)
-    rows = [
-        once(
-            interaction(wi[n], wavelengths[n]),
-            mi.Vector3f(wo[n].tolist()),
-            float(samples[n, 0]),
-            mi.Point2f(samples[n, 1:].tolist()),
-        )
-        for n in range(len(wi))
-    ]
-    return [np.array(column) for column in zip(*rows, strict=True)]
 
 
 def expected(wi: Array, wo: Array, wavelengths: Array) -> Array:

@@ -11,9 +11,9 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor, sigma_of
-from tests.directions import lit_pairs, uniform_directions
-from tests.lanes import interaction, refusal, spectra, vectors
-from tests.plugin.gentle import PATCH, WIDTH, load
+from tests.support.directions import lit_pairs, uniform_directions
+from tests.support.gentle import PATCH, WIDTH, load
+from tests.support.lanes import interaction, refusal, spectra, vectors
 
 ON_SURFACE = {"coherence": "surface", "uv_scale": 10.0}
 

@@ -12,7 +12,7 @@ from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics import fresnel
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor, sigma_of, wavenumber
 from mitsuba_diffraction.reference import screen_power
-from tests.directions import polar, riemann_power, rough_patch, uniform_directions
+from tests.support.directions import polar, riemann_power, rough_patch, uniform_directions
 
 FLAT = HeightField(np.zeros((32, 32)), 0.08)
 #: Odd and even numbers of pixels, not square, nor are the pixels; 1.95 × 1.8 µm.

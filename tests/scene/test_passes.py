@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.scene.passes import Stop, render_passes, samples_per_pass
-from tests.cli.room import QUICK, SCENE, pixels
+from tests.support.room import QUICK, SCENE, pixels
 
 
 def passes(scene, *, spp, size, stop=None, progress=lambda *_: None):

@@ -21,7 +21,7 @@ from scenes.make.anatomy import Anatomy
 from scenes.make.scales import Scales
 from scenes.make.snake import Snake, build
 from scenes.make.spine import coil
-from tests.conftest import ROOT
+from tests.support import ROOT
 
 
 @pytest.fixture(scope="module", params=["keeled", "smooth", "hose"])

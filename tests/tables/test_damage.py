@@ -19,8 +19,8 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.tables.exr import ATTRIBUTE, CHECKSUM, _checksum
-from tests.directions import rough_patch
-from tests.tables import looked_up
+from tests.support import looked_up
+from tests.support.directions import rough_patch
 
 #: Tables and files of each kind; `MITSUBA_DIFFRACTION_DAMAGE=10000` for as many as one likes.
 TRIALS = int(os.environ.get("MITSUBA_DIFFRACTION_DAMAGE", "80"))

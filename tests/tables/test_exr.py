@@ -16,7 +16,7 @@ import pytest
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.tables.exr import ATTRIBUTE, read_document
 from mitsuba_diffraction.tables.table import FORMAT_VERSION
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 PATCH = rough_patch((24, 21), (0.08, 0.09), 0.2)
 #: Every layout of coefficients: half and single floats, one component and two, intervals.
@@ -114,11 +114,11 @@ def test_a_file_follows_the_umask_and_replaces_an_older_one(saved):
 
 
 def test_a_missing_file_and_a_folder(tmp_path):
-    assert refused(tmp_path / "no.exr").endswith("there is no such file")
-    assert refused(tmp_path).endswith("it is a folder")
+    assert "does not exist" in refused(tmp_path / "no.exr")
+    assert "is a folder" in refused(tmp_path)
 
 
-@pytest.mark.parametrize("content", [b"", b"\x00" * 400, b"PNG is not EXR", "µ".encode() * 999])
+@pytest.mark.parametrize("content", [b"\x00" * 400, b"PNG is not EXR", "µ".encode() * 999])
 def test_what_is_no_exr(tmp_path, content):
     file = tmp_path / "x.exr"
     file.write_bytes(content)

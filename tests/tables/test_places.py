@@ -7,8 +7,8 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, reference
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor
-from tests.directions import lit_pairs
-from tests.tables.patches import DEFAULTS, PATCH, WIDTH
+from tests.support.directions import lit_pairs
+from tests.support.patches import DEFAULTS, PATCH, WIDTH
 
 
 @pytest.mark.parametrize("basis", ["svd", "taylor"])

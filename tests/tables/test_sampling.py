@@ -8,7 +8,7 @@ import pytest
 from mitsuba_diffraction import DiffractionTable, HeightField
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.tables.sampling import BANDED, BANDS, density_of, proposals
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 PATCH = rough_patch((50, 41), (0.08, 0.09), 0.2)
 

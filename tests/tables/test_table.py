@@ -9,8 +9,8 @@ import pytest
 
 from mitsuba_diffraction import DiffractionTable, HeightField, reference
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor
-from tests.directions import lit_pairs, polar, rough_patch
-from tests.tables.patches import DEFAULTS, PATCH, WIDTH
+from tests.support.directions import lit_pairs, polar, rough_patch
+from tests.support.patches import DEFAULTS, PATCH, WIDTH
 
 
 def test_a_table_does_not_guess_outside_its_range():

@@ -6,7 +6,6 @@ import contextlib
 import io
 import json
 import re
-from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
@@ -16,9 +15,10 @@ from scipy.special import jv
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.tables.exr import read_document
 from mitsuba_diffraction.tables.table import FORMAT_VERSION
-from tests.directions import rough_patch
+from tests.support import ROOT
+from tests.support.directions import rough_patch
 
-PAGE = (Path(__file__).parents[2] / "docs" / "table-format.md").read_text("utf-8")
+PAGE = (ROOT / "docs" / "table-format.md").read_text("utf-8")
 WRITER, READER = re.findall(r"^```python\n(.*?)^```$", PAGE, re.M | re.S)
 
 PATCH = rough_patch((24, 21), (0.08, 0.09), 0.2)

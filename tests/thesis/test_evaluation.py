@@ -21,7 +21,7 @@ from mitsuba_diffraction.thesis.evaluation import (
     thesis_fit,
     window_fits,
 )
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 WAVELENGTHS = np.arange(380.0, 781.0, 20.0)
 ANGLES = np.linspace(-75.0, 30.0, 1051)

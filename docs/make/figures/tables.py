@@ -1,6 +1,6 @@
 """Tables of docs/benchmarks.md, accuracy.md, plan.md and energy.md, from what commands measured.
 
-mitsuba-diffraction bench --json out/bench.json
+python -m docs.make.bench --json out/bench.json
 python -m docs.make.figures.tables speed out/bench.json
 
 Likewise `tradeoff` of the folder that `tradeoff -o` writes, `plan` of `plan --json`, and `energy`
@@ -236,7 +236,7 @@ class Part:
 
 
 PARTS = {
-    "speed": Part(speed, ("docs/benchmarks.md",), "bench --json", "run make bench"),
+    "speed": Part(speed, ("docs/benchmarks.md",), "docs.make.bench --json", "run make bench"),
     "tradeoff": Part(tradeoff, ("docs/accuracy.md",), "tradeoff", "run make tradeoff",
                      ("tradeoff.png", "depth.png")),
     "plan": Part(plan, ("docs/benchmarks.md", "docs/plan.md"), "plan --json", "run make plan"),

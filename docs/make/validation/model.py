@@ -23,10 +23,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.optics import blend, boundary
+from mitsuba_diffraction.optics.colour import SHORTEST
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
-from mitsuba_diffraction.optics.second_order import SlopeRatios, factor, interpolated
-from mitsuba_diffraction.settings import TableSettings
-from mitsuba_diffraction.tables.build.slope_ratios import slope_ratios
+from mitsuba_diffraction.optics.second_order import factor, interpolated
+from mitsuba_diffraction.optics.slope_ratios import CellGrid, CellSums, SlopeRatios
 
 from .cases import PIXELS, Grating, index_of, order_sines
 
@@ -77,7 +77,7 @@ def efficiencies(
     *,
     sigma: float,
     coat: float | None = None,
-    patch: HeightField | None = None,
+    ratios: SlopeRatios | None = None,
 ) -> NDArray[np.float64]:
     """η of the orders of a periodic surface that leave along `wo`, for unpolarised light.
 
@@ -87,7 +87,7 @@ def efficiencies(
     wi, wo : (3,) and (n, 3), unit vectors away from the surface.
     model : of `MODELS`.
     sigma : of a window (µm) through which the lobes are separate.
-    patch : whose table's ratios the second order has; the surface's own by default.
+    ratios : slope ratios of the second order; the surface's own by default.
     """
     width = WIDTHS_PER_SIGMA * sigma
     per_brdf = np.pi / (sigma * float(wavenumber(wavelength))) ** 2
@@ -95,7 +95,7 @@ def efficiencies(
         return per_brdf * reference.brdf(field, wi, wo, wavelength, coherence_width=width)
     if model == DEFAULT and not index.imag and coat is None:
         first = efficiencies(field, index, wi, wo, wavelength, "first_order", sigma=sigma)
-        return first * second_order(field, index.real, wi, wo, wavelength, patch)
+        return first * second_order(field, index.real, wi, wo, wavelength, ratios)
     known = DEFAULT if model in (DEFAULT, "first_order") else "kirchhoff"
     brdf = per_brdf * reference.brdf(
         field, wi, wo, wavelength,
@@ -149,19 +149,21 @@ def second_order(
     wi: NDArray[np.float64],
     wo: NDArray[np.float64],
     wavelength: float,
-    patch: HeightField | None = None,
+    ratios: SlopeRatios | None = None,
 ) -> NDArray[np.float64]:
     """What the default multiplies orders of a dielectric by, (n,); arguments as `efficiencies`."""
     total = float(wavenumber(wavelength)) * (wi + wo)
-    ratios = _ratios(patch or field).at(total[:, :2], total[:, 2])
-    ratios[np.hypot(*total[:, :2].T) < 1e-6] = 0.0  # order 0 is the first order's
+    places = (ratios or _ratios(field)).at(total[:, :2], total[:, 2])
+    places[np.hypot(*total[:, :2].T) < 1e-6] = 0.0  # order 0 is the first order's
     share = share_of(field, index, wi, wo, wavelength)
-    return factor(interpolated(index, wi, wo), ratios, share)
+    return factor(interpolated(index, wi, wo), places, share)
 
 
 @cache
 def _ratios(patch: HeightField) -> SlopeRatios:
-    return slope_ratios([patch], TableSettings(height_scale_max=1.0))
+    q_limit = 2.0 * float(wavenumber(SHORTEST))
+    grid = CellGrid.of(patch.extent, patch.rms_height, q_limit, (q_limit, q_limit), q_limit)
+    return CellSums.of([(patch, np.ones((1, 1)))], grid).ratios()
 
 
 @cache

@@ -91,7 +91,7 @@ def solve_patches(
     Raises
     ------
     DiffractionError
-        If the solver or the measured patch is not here, or the file cannot be written.
+        If the solver is not here, or the file cannot be written.
     """
     tell = progress or silent
     cases, made = patch_cases(material), about(material, solver)

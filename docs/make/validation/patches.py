@@ -11,20 +11,26 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_diffraction import HeightField, gratings
-from mitsuba_diffraction.errors import DiffractionError
+from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.heights.preprocess import periodic_smooth
+from mitsuba_diffraction.optics.second_order import SlopeRatios
+from mitsuba_diffraction.settings import TableSettings
+from mitsuba_diffraction.tables.build.slope_ratios import slope_ratios
 
 from .cases import ALUMINIUM, KERATIN
 
 KINDS = ("sinusoid", "crossed", "elaphe", "elaphe_like", "cd_pits")
+#: Kinds whose cell is the whole surface, not a cut of a patch.
+GRATINGS = ("sinusoid", "crossed")
 
-#: The measured patch that cuts are made of; it is no part of the project.
-MEASURED = Path(__file__).parents[3].parent / "shared" / "afm" / "elaphe-65um.png"
+#: Cuts of the measured patch, which is no part of the project, and slope ratios of all of it.
+_MEASURED = "measured_scale.npz"
 
 #: Pixels along each side of a cut or a crossed grating, and along a sinusoid.
 PIXELS = 64
@@ -62,6 +68,15 @@ class PatchCase:
     wavelength: float
     theta: float
     phi: float
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Heights of a cut and its side, both in µm, and slope ratios of the whole patch."""
+
+    heights: NDArray[np.float64]
+    side: float
+    ratios: SlopeRatios
 
 
 #: Slopes of the sinusoids are those of 2.5/0.05 and 1.6/0.1 µm.
@@ -104,13 +119,7 @@ def patch_index(material: str, wavelength: float) -> complex:
 
 @cache
 def cell(surface: Surface) -> HeightField:
-    """Heights of a surface, mean 0.
-
-    Raises
-    ------
-    DiffractionError
-        If it is cut from the measured patch and that is not there.
-    """
+    """Heights of a surface, mean 0."""
     if surface.kind == "sinusoid":
         line = np.cos(2 * np.pi * np.arange(_LINE) / _LINE)[None, :]
         depth = surface.slope * surface.size * np.sqrt(2) / np.pi
@@ -120,18 +129,77 @@ def cell(surface: Surface) -> HeightField:
         line = np.cos(2 * np.pi * np.arange(PIXELS) / PIXELS)
         heights = line[None, :] + line[:, None]
         side = surface.size
+    elif surface.kind == "elaphe":
+        heights, side = _measured()[surface.name].heights, _measured()[surface.name].side
     else:
-        heights, side = _cut(surface)
+        heights, side = _cut(surface, _source(surface))
     heights = heights - heights.mean()
     heights *= surface.slope / _slope(heights, side)
     return HeightField(heights, side / PIXELS, name=surface.name)
 
 
 @cache
-def whole_patch(surface: Surface) -> HeightField:
+def ratios_of(surface: Surface) -> SlopeRatios:
+    """Slope ratios of the surface's table: those of a grating's cell, or of the patch of a cut."""
+    if surface.kind == "elaphe":
+        return _measured()[surface.name].ratios
+    return _ratios(cell(surface) if surface.kind in GRATINGS else _whole(surface, _source(surface)))
+
+
+def measured_cuts(patch: HeightField) -> dict[str, Cut]:
+    """Cuts of the measured scale, by the names of their surfaces."""
+    return {
+        surface.name: Cut(*_cut(surface, patch), _ratios(_whole(surface, patch)))
+        for surface in SURFACES.values()
+        if surface.kind == "elaphe"
+    }
+
+
+def save_measured(cuts: dict[str, Cut], folder: Path) -> Path:
+    """Write the cuts of the measured scale, and return the file."""
+    parts: dict[str, NDArray[Any]] = {}
+    for n, cut in enumerate(cuts.values()):
+        ratios = cut.ratios
+        # tables keep 16 bits of a ratio
+        halves = ratios.values.astype(np.complex64).view(np.float32).astype(np.float16)
+        parts |= {
+            f"heights_{n}": cut.heights.astype(np.float32), f"side_{n}": np.array(cut.side),
+            f"cell_{n}": np.array(ratios.cell), f"kappa_{n}": np.array(ratios.kappa),
+            f"orders_{n}": np.array(ratios.orders), f"values_{n}": halves,
+        }  # fmt: skip
+    path = folder / _MEASURED
+    with atomic_path(path) as temporary, open(temporary, "wb") as file:
+        np.savez_compressed(file, names=np.array(list(cuts)), **parts)
+    return path
+
+
+@cache
+def _measured() -> dict[str, Cut]:
+    """Cuts of the measured scale, from the file that is kept."""
+    with np.load(Path(__file__).parent / "data" / _MEASURED) as parts:
+        return {
+            str(name): Cut(
+                parts[f"heights_{n}"].astype(float),
+                float(parts[f"side_{n}"]),
+                SlopeRatios(
+                    tuple(parts[f"cell_{n}"]),
+                    tuple(parts[f"orders_{n}"]),
+                    tuple(parts[f"kappa_{n}"]),
+                    parts[f"values_{n}"].astype(np.float32).view(np.complex64),
+                ),
+            )
+            for n, name in enumerate(parts["names"])
+        }
+
+
+def _ratios(patch: HeightField) -> SlopeRatios:
+    return slope_ratios([patch], TableSettings(height_scale_max=1.0))
+
+
+def _whole(surface: Surface, patch: HeightField) -> HeightField:
     """The patch that a cut is from, smoothed and scaled as the cut is, mean 0."""
-    cut, side = _cut(surface)
-    field = periodic_smooth(_source(surface.kind))
+    cut, side = _cut(surface, patch)
+    field = periodic_smooth(patch)
     ny, nx = field.shape
     qx, qy = (2 * np.pi * np.fft.fftfreq(n, field.pixel_size[0]) for n in (nx, ny))
     weight = np.exp(-0.5 * (qx**2 + qy[:, None] ** 2) * _SMOOTHING**2)
@@ -152,26 +220,22 @@ def _cases(material: str) -> Iterator[PatchCase]:
                 yield PatchCase(surface, material, wavelength, theta, phi)
 
 
-def _cut(surface: Surface) -> tuple[NDArray[np.float64], float]:
+def _cut(surface: Surface, patch: HeightField) -> tuple[NDArray[np.float64], float]:
     """Heights (`PIXELS`, `PIXELS`) of a cut, periodic and smooth, and its side in µm."""
-    field = _source(surface.kind)
-    pixel = field.pixel_size[0]
+    pixel = patch.pixel_size[0]
     count = 2 * round(surface.size / pixel / 2)
     row, column = surface.place
-    piece = field.heights[row : row + count, column : column + count]
-    periodic = periodic_smooth(HeightField(piece, field.pixel_size))
+    piece = patch.heights[row : row + count, column : column + count]
+    periodic = periodic_smooth(HeightField(piece, patch.pixel_size))
     side = count * pixel
     return _smoothed(periodic.heights, side), side
 
 
-def _source(kind: str) -> HeightField:
-    if kind == "elaphe_like":
+def _source(surface: Surface) -> HeightField:
+    """The generated patch that a surface is cut from."""
+    if surface.kind == "elaphe_like":
         return gratings.elaphe_like(extent=20.0, pixels=410, seed=1)
-    if kind == "cd_pits":
-        return gratings.cd(extent=64.0, pixels=1312, seed=0)
-    if not MEASURED.is_file():
-        raise DiffractionError(f"the measured patch is not here: {MEASURED}")
-    return HeightField.load(MEASURED, pixel_size=65 / 1332, max_height=0.375)
+    return gratings.cd(extent=64.0, pixels=1312, seed=0)
 
 
 def _smoothed(heights: NDArray[np.float64], side: float) -> NDArray[np.float64]:

@@ -21,7 +21,7 @@ from ...progress import Progress, silent
 from ...tables.build.coefficients import half_scale
 from ...tables.colour.table import power_colour_difference
 from ...tables.table import DiffractionTable, q_limit_of
-from ..bench.contenders import Queries, kernel_seconds, ratio, rounds_of, saved_bsdf
+from ..timing import Queries, kernel_seconds, quiet_bsdf, ratio, rounds_of
 from .accuracy import Sample
 
 
@@ -164,7 +164,7 @@ def measure(
         with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder:
             file = Path(folder) / "table.exr"
             table.save(file)
-            bsdf = saved_bsdf(file, energy_conserving=False)
+            bsdf = quiet_bsdf(file, energy_conserving=False)
         calls[setting.name] = partial(bsdf.eval, context, queries.si, queries.wo)
         sample = samples[mode]
         loss = power_colour_difference(finest[mode], table)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError, one_line
+from ...files import read_bytes, readable_file
 from ...plugin.textures import ORIENTATION
 from .trimesh import TriangleMesh
 
@@ -41,7 +42,7 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[Floats, Floats | None, Floa
     Raises
     ------
     DiffractionError
-        If there is no such file, or it is no mesh of these kinds.
+        If the file cannot be read, or is no mesh of these kinds.
     """
     file = Path(path)
     kind = KINDS.get(file.suffix.lower())
@@ -49,8 +50,7 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[Floats, Floats | None, Floa
         raise DiffractionError(
             f"mesh '{file}': its name must end in {', '.join(KINDS)}; convert it to PLY or OBJ"
         )
-    if not file.is_file():
-        raise DiffractionError(f"mesh '{file}': there is no such file")
+    readable_file(file)
     _need_variant()
     vertices, faces = _vertices_and_faces(file, kind)
     if not len(faces):
@@ -86,7 +86,7 @@ def _vertices_and_faces(file: Path, kind: str) -> tuple[int, Ints]:
 def has_own_normals(path: str | os.PathLike[str]) -> bool:
     """Whether the file of a mesh itself holds vertex normals; else Mitsuba makes smooth ones."""
     file = Path(path)
-    content = file.read_bytes()
+    content = read_bytes(file)
     if file.suffix.lower() == ".ply":
         header = content[: content.find(b"end_header")]
         return re.search(rb"^property\s+\w+\s+nx\s*$", header, re.MULTILINE) is not None
@@ -114,7 +114,7 @@ def _read(file: Path, kind: str, face_normals: bool) -> mi.Mesh:
 
 def load_orientation(path: str | os.PathLike[str]) -> Floats | None:
     """The attribute vertex_orientation of a mesh that `load_mesh` reads, (n, 2), or None."""
-    file = Path(path)
+    file = readable_file(path)
     mesh = _load(file, KINDS[file.suffix.lower()], face_normals=False)
     if not mesh.has_attribute(ORIENTATION):
         return None

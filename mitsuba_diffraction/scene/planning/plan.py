@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError, quoted
+from ...files import read_text
 from ...optics.colour import delta_e, linear_srgb
 from ...optics.geometry import wavenumber
 from ...tables.table import DiffractionTable
@@ -219,10 +220,8 @@ class Plan:
         Raises a DiffractionError if the file is missing, no plan, damaged, or of another version.
         """
         try:
-            document = json.loads(Path(path).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise DiffractionError(f"cannot read '{path}': {error.strerror}") from error
-        except (ValueError, RecursionError) as error:
+            document = json.loads(read_text(path))
+        except (json.JSONDecodeError, RecursionError) as error:
             raise DiffractionError(f"'{path}' is no plan: it is no JSON; {_REMEDY}") from error
         if not isinstance(document, dict) or document.get("kind") != _KIND:
             raise DiffractionError(f"'{path}' is JSON but no plan; {_REMEDY}")

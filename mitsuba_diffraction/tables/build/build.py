@@ -216,7 +216,7 @@ def build_table(
     q_max: float | tuple[float, float] | None = None,
     kappa_max: float | None = None,
     windows: str | float | None = None,
-    second_order: bool | None = None,
+    second_order: str | bool = "auto",
     crop: float | tuple[float, float] | None = None,
     progress: Progress | None = None,
 ) -> DiffractionTable:
@@ -360,6 +360,7 @@ def _table(
     """What an attempt made, with all that a table knows of itself."""
     patches, settings = wanted.patches, wanted.settings
     everywhere = wanted.q_max == (q_limit_of(settings.wavelength_range),) * 2
+    roughness = roughness_of(patches, q_limit_of(settings.wavelength_range))
     return DiffractionTable(
         coefficients=attempt.coefficients,
         order_0=attempt.order_0,
@@ -369,10 +370,10 @@ def _table(
         spacing=wanted.spacing,
         settings=replace(settings, q_max=None if everywhere else wanted.q_max),
         error=attempt.measured,
-        roughness=roughness_of(patches, q_limit_of(settings.wavelength_range)),
+        roughness=roughness,
         source=describe(patches, settings, setting.taps),
         coarse=None if wanted.whole else coarse_table(patches, settings, tell),
-        slope_ratios=slope_ratios(patches, settings) if settings.second_order else None,
+        slope_ratios=slope_ratios(patches, settings, roughness) if settings.second_order else None,
     )
 
 

@@ -11,7 +11,7 @@ from PIL import Image
 
 from mitsuba_diffraction.analysis import maps
 from mitsuba_diffraction.analysis.maps import Light, brdf_map
-from tests.analysis.maps.surfaces import centres, mirror
+from tests.support.mapped import centres, mirror
 
 # Patches here are small and tiled, and the flat ones coarse: the warnings are right, but known.
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")

@@ -8,7 +8,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError, HeightField
 from mitsuba_diffraction.analysis.maps import brdf_map
-from tests.analysis.maps.surfaces import plugin
+from tests.support.mapped import plugin
 
 # Patches here are small and tiled, and the flat ones coarse: the warnings are right, but known.
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")

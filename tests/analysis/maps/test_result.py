@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.analysis.maps import Bands, brdf_map
-from tests.analysis.maps.surfaces import GRATING, mirror, plugin
+from tests.support.mapped import GRATING, mirror, plugin
 
 
 @given(st.floats(0.1, 500), st.floats(300, 500), st.floats(0.1, 500))

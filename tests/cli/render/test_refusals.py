@@ -8,7 +8,7 @@ import mitsuba as mi
 import pytest
 
 from mitsuba_diffraction.cli.main import build_parser
-from tests.cli.room import QUICK, SCENE
+from tests.support.room import QUICK, SCENE
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from tests.cli.room import QUICK, SCENE, pixels, png
+from tests.support.room import QUICK, SCENE, pixels, png
 
 
 def test_an_exr_and_a_png_are_written_and_named(run, scene):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from docs.make.figures import cluster, pages
-from tests.conftest import ROOT
+from tests.support import ROOT
 
 COSTS = cluster.Costs(work=10.0, spread=1.0, scheduler=0.001, client=0.1, transfer=0.05)
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 from PIL import Image
 
 from docs.make.figures import evaluation, pages
 from mitsuba_diffraction import DiffractionError
+from tests.support import ROOT
 
-DOCS = Path(__file__).parents[3] / "docs"
+DOCS = ROOT / "docs"
 
 
 def test_the_page_is_made_by_one_command(tmp_path, capsys):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +14,8 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.scene.parameters import parameters_of
 from scenes.make.__main__ import build_parser as meshes_parser
+from tests.support import ROOT
 
-ROOT = Path(__file__).parents[3]
 DOCS = ROOT / "docs"
 
 # Half white, half black.

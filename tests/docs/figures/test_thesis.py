@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from PIL import Image
 
 from docs.make.figures import pages, thesis
 from mitsuba_diffraction.cli.options import METHODS
 from mitsuba_diffraction.thesis.sweeps import SWEEPS
+from tests.support import ROOT
 
-DOCS = Path(__file__).parents[3] / "docs"
+DOCS = ROOT / "docs"
 
 
 def test_the_table_of_methods_is_made_by_one_command(tmp_path, capsys, some_variant):

@@ -11,8 +11,8 @@ from docs.make.validation.closed_forms import ANGLES, deviations, order_power
 from docs.make.validation.model import in_plane
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor, wavenumber
-from tests.directions import as_single
-from tests.lanes import brdf_values
+from tests.support.directions import as_single
+from tests.support.lanes import brdf_values
 
 
 @pytest.mark.parametrize(("period", "depth"), [(1.1, 0.4), (2.5, 0.1)])

@@ -8,7 +8,7 @@ import pytest
 from docs.make.validation import passed, rayleigh, spread
 from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.optics import boundary
-from tests.directions import polar
+from tests.support.directions import polar
 
 
 @pytest.mark.parametrize("grating", passed.GRATINGS[:4], ids=str)

@@ -9,14 +9,18 @@ import pytest
 
 from docs.make.validation import crossed, rayleigh
 from docs.make.validation.cases import Grating, index_of
-from docs.make.validation.patch_sections import PatchComparison, agreements, compared
+from docs.make.validation.cells import PatchComparison, agreements, compared
 from docs.make.validation.patch_solutions import SOLVERS, solve_case, solved
-from docs.make.validation.patches import KINDS, MEASURED, SURFACES, PatchCase, cell
+from docs.make.validation.patches import (
+    SURFACES,
+    PatchCase,
+    cell,
+    measured_cuts,
+    ratios_of,
+)
 from docs.make.validation.solutions import shipped
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.optics import boundary, fresnel
-
-HERE = [kind for kind in KINDS if kind != "elaphe" or MEASURED.is_file()]
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +28,7 @@ def keratin() -> list[PatchComparison]:
     return compared("keratin")
 
 
-@pytest.mark.parametrize("surface", [s for s in SURFACES.values() if s.kind in HERE], ids=str)
+@pytest.mark.parametrize("surface", SURFACES.values(), ids=str)
 def test_a_cell_has_its_slope_and_no_seam(surface):
     field = cell(surface)
     assert field.heights.mean() == pytest.approx(0, abs=1e-12)
@@ -36,11 +40,20 @@ def test_a_cell_has_its_slope_and_no_seam(surface):
 
 def test_the_orders_of_a_kept_solution_carry_what_a_dielectric_reflects():
     for solution in solved("keratin")[0]:
-        if solution.case.surface.kind not in HERE:
-            continue
         field = cell(solution.case.surface)
         assert np.all(solution.wo(field)[:, 2] > 0)
         assert 0.03 < solution.efficiency(field).sum() < 0.12  # flat: 0.048 to 0.099
+
+
+def test_what_is_kept_of_the_measured_scale_is_what_it_gives(shared_afm):
+    patch = HeightField.load(shared_afm / "elaphe-65um.png", pixel_size=65 / 1332, max_height=0.375)
+    for name, cut in measured_cuts(patch).items():
+        heights = cell(SURFACES[name]).heights
+        scaled = (cut.heights - cut.heights.mean()) * np.ptp(heights) / np.ptp(cut.heights)
+        assert heights == pytest.approx(scaled, abs=1e-6)  # µm; single precision
+        kept = ratios_of(SURFACES[name])
+        assert kept.values == pytest.approx(cut.ratios.values, rel=1e-3, abs=1e-3)  # 16 bits
+        assert (kept.cell, kept.kappa) == pytest.approx((cut.ratios.cell, cut.ratios.kappa))
 
 
 def test_cuts_of_scales_meet_the_goals(keratin):
@@ -146,11 +159,10 @@ def test_two_solvers_agree_on_keratin_within_what_layers_and_harmonics_still_cha
 
 def test_what_is_kept_of_aluminium_has_converged_and_reflects_what_aluminium_does():
     for solution in solved("aluminium")[0]:
-        if solution.case.surface.kind in HERE:
-            power = solution.efficiency(cell(solution.case.surface))
-            assert 0.88 < power.sum() < 0.93  # flat: 0.90 to 0.92
-            coloured = (solution.rows["mx"] != 0) | (solution.rows["my"] != 0)
-            assert solution.rows["change"][coloured].sum() < 0.02 * power[coloured].sum()
+        power = solution.efficiency(cell(solution.case.surface))
+        assert 0.88 < power.sum() < 0.93  # flat: 0.90 to 0.92
+        coloured = (solution.rows["mx"] != 0) | (solution.rows["my"] != 0)
+        assert solution.rows["change"][coloured].sum() < 0.02 * power[coloured].sum()
 
 
 def test_the_solver_agrees_with_what_is_kept():

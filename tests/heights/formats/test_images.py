@@ -15,7 +15,7 @@ from PIL import Image
 
 from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.heights.field import HeightField
-from tests.heights.formats.refusals import refusal
+from tests.support.refusals import refusal
 
 RNG = np.random.default_rng(5)
 BYTES = RNG.integers(0, 256, (5, 7), dtype=np.uint8)

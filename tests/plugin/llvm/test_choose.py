@@ -11,7 +11,7 @@ import pytest
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.plugin import llvm
 from mitsuba_diffraction.plugin.llvm import VARIABLE, Library
-from tests.plugin.llvm.machine import installed, only, python
+from tests.support.machine import installed, only, python
 
 
 def test_19_is_chosen_before_newer_ones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -9,7 +9,7 @@ import pytest
 
 from mitsuba_diffraction.plugin import llvm
 from mitsuba_diffraction.plugin.llvm import VARIABLE, Library
-from tests.plugin.llvm.machine import only
+from tests.support.machine import only
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mitsuba_diffraction.plugin.llvm import OLDEST, VARIABLE
-from tests.plugin.llvm.machine import HERE, python
+from tests.support.machine import HERE, python
 
 KERNELS = """
 import drjit as dr

@@ -9,28 +9,17 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.fresnel import reflectance
 from mitsuba_diffraction.tables.energy import sides
-from tests.directions import Array, as_single, polar, rough_patch
-from tests.lanes import evaluated, interaction, refusal, spectra, vectors
-from tests.plugin import test_chi2
-from tests.plugin.conftest import runs
-from tests.plugin.test_chi2 import SMALL, Case, chi_square
-from tests.plugin.test_coat import load
-from tests.plugin.test_model import PATCH, WIDTH, pairs
-from tests.plugin.test_variants import evaluate
-
-INDICES = {"int_ior": 1.5, "ext_ior": 1.0}
-SIDES = {"dielectric": {"transmission": True}, "sheet": {"thin": True}}
-BELOW = np.array([1, 1, -1])
-
-
-def both(**parameters: Any) -> Any:
-    return load(**INDICES, **parameters)
+from tests.support.chi_square import DISPERSED, ROUGH, SMALL, Case, chi_square
+from tests.support.directions import as_single, rough_patch
+from tests.support.lanes import evaluated, interaction, refusal, spectra, vectors
+from tests.support.layered import PATCH, WIDTH, load, pairs
+from tests.support.transmitting import BELOW, INDICES, SIDES, OneSide, both, sampled
+from tests.support.variants import evaluate, runs
 
 
 @pytest.mark.parametrize("kind", SIDES)
@@ -90,62 +79,16 @@ def test_reciprocity(some_variant, kind):
         assert factor * there == pytest.approx(back, rel=2e-4, abs=2e-6 * back.max())
 
 
-class OneSide:
-    """A BSDF whose directions on one side are as if above, and on the other none."""
-
-    def __init__(self, bsdf: Any, side: float) -> None:
-        self._bsdf, self._turn = bsdf, mi.Vector3f(1.0, 1.0, side)
-
-    def sample(self, context: Any, si: Any, one: Any, two: Any) -> Any:
-        found, weight = self._bsdf.sample(context, si, one, two)
-        found.wo = found.wo * self._turn
-        found.pdf = dr.select(found.wo.z > 0.0, found.pdf, 0.0)
-        return found, weight
-
-    def pdf(self, context: Any, si: Any, wo: Any) -> Any:
-        return dr.select(wo.z > 0.0, self._bsdf.pdf(context, si, wo * self._turn), 0.0)
-
-
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize(
     ("kind", "theta"),
     [("dielectric", 40.0), ("dielectric", 150.0), ("sheet", 60.0), ("sheet", 130.0)],
 )
-def test_the_density_is_that_of_the_samples_on_both_sides(
-    some_variant, monkeypatch, kind, theta, side
-):
-    monkeypatch.setattr(test_chi2, "SAMPLES", 1 << 19)
-    case = Case(test_chi2.ROUGH, theta, test_chi2.DISPERSED, SMALL | INDICES | SIDES[kind])
-    test = chi_square(OneSide(case.load(), side), case)
+def test_the_density_is_that_of_the_samples_on_both_sides(some_variant, kind, theta, side):
+    case = Case(ROUGH, theta, DISPERSED, SMALL | INDICES | SIDES[kind])
+    test = chi_square(OneSide(case.load(), side), case, samples=1 << 19)
     assert test.run(0.01, 8, quiet=True), test.messages
     assert test.histogram_sum[0] > 0.01, test.messages
-
-
-def sampled(
-    bsdf: Any, theta: float, count: int = 1 << 15, azimuth: float = 20.0
-) -> tuple[Array, Array]:
-    """Weights of samples at 550 nm, and which are reflected."""
-    si = interaction(np.tile(as_single(polar(theta, azimuth)), (count, 1)), 550.0)
-    rng = mi.PCG32(count)
-    one, two = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
-    context = mi.BSDFContext(mi.TransportMode.Importance)
-    found, weight = bsdf.sample(context, si, one, two)
-    value, pdf = bsdf.eval_pdf(context, si, found.wo)
-    dr.eval(found, weight, value, pdf)  # one kernel instead of five
-    valid = np.array(found.pdf) > 0
-    # not pytest.approx, which takes half a second for so many numbers
-    assert_allclose(np.array(found.pdf)[valid], np.array(pdf)[valid], rtol=1e-4)
-    weights = np.array(weight, float)[0]
-    expected = np.array(value, float)[0][valid]
-    assert_allclose((weights * np.array(pdf))[valid], expected, rtol=5e-4, atol=5e-7)
-    transmits = int(mi.BSDFFlags.GlossyTransmission)
-    passed = np.array(found.sampled_type) == transmits
-    assert np.all(np.array(found.sampled_component) == passed)
-    down = theta < 90.0
-    assert np.all((np.array(found.wo.z)[valid & passed] < 0.0) == down)
-    eta = 1.0 if "thin" in str(bsdf) else 1.5 if down else 1 / 1.5
-    assert np.array(found.eta)[passed][0] == pytest.approx(eta)
-    return weights, ~passed
 
 
 @pytest.mark.parametrize("kind", SIDES)

@@ -13,15 +13,13 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.tables.energy import sides
 from mitsuba_diffraction.tables.energy import store as kept
 from mitsuba_diffraction.tables.energy.links import Medium
-from tests.coarse import coarse_energy
-from tests.directions import as_single
-from tests.lanes import evaluated
-from tests.plugin import test_chi2
-from tests.plugin.conftest import runs
-from tests.plugin.test_chi2 import SMALL, Case, chi_square
-from tests.plugin.test_model import pairs
-from tests.plugin.test_variants import evaluate
-from tests.plugin.transmission.test_sides import BELOW, INDICES, SIDES, OneSide, both, sampled
+from tests.support.chi_square import DISPERSED, SMALL, Case, chi_square
+from tests.support.coarse import coarse_energy
+from tests.support.directions import as_single
+from tests.support.lanes import evaluated
+from tests.support.layered import pairs
+from tests.support.transmitting import BELOW, INDICES, SIDES, OneSide, both, sampled
+from tests.support.variants import evaluate, runs
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
 
@@ -73,13 +71,12 @@ def test_the_density_is_that_of_samples_that_are_spread(
     some_variant, monkeypatch, kind, theta, side
 ):
     coarse_energy(monkeypatch.setattr)
-    monkeypatch.setattr(test_chi2, "SAMPLES", 1 << 19)
     parameters = SMALL | INDICES | SIDES[kind] | {"energy_conserving": True}
     grating = md.gratings.blazed(2.0, 0.3, periods=3, pixels_per_period=24)
-    case = Case(grating, theta, test_chi2.DISPERSED, parameters)
+    case = Case(grating, theta, DISPERSED, parameters)
     bsdf = case.load()
     assert bsdf.through.balance.spreads
-    test = chi_square(OneSide(bsdf, side), case)
+    test = chi_square(OneSide(bsdf, side), case, samples=1 << 19)
     assert test.run(0.01, 8, quiet=True), test.messages
 
 

@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField
-from mitsuba_diffraction.realtime.glsl.context import Bindings, compile_program, headless_context
-from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
+from mitsuba_diffraction.realtime.glsl.context import headless_context
 
 
 @pytest.fixture(scope="session")
@@ -51,22 +49,3 @@ def table_file(table: DiffractionTable, tmp_path_factory: pytest.TempPathFactory
     file = tmp_path_factory.mktemp("table") / "rough.exr"
     table.save(file)
     return file
-
-
-def probed(gl: Any, method: str, packed: Packed, places: NDArray[Any]) -> NDArray[np.float64]:
-    """A method's colours (n, 3) at places (n, 4): u, v, z and the cosine at the half vector."""
-    picture = np.ascontiguousarray(places[None], np.float32)
-    parts = packed | Packed(
-        (Texture("places", picture),), {"light_colour": np.ones((4, 3), np.float32)}
-    )
-    program = compile_program(gl, method, parts.definitions, vertex="whole.vert", main="probe.frag")
-    bindings = Bindings(gl, parts)
-    target = gl.texture((len(places), 1), 4, dtype="f4")
-    frame = gl.framebuffer([target])
-    frame.use()
-    bindings.use(program)
-    gl.vertex_array(program, []).render(vertices=3)
-    result = np.frombuffer(target.read(), np.float32).reshape(-1, 4)[:, :3].astype(float)
-    for thing in (bindings, frame, target, program):
-        thing.release()
-    return result

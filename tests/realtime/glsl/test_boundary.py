@@ -22,9 +22,8 @@ from mitsuba_diffraction.realtime.glsl.packing import (
 )
 from mitsuba_diffraction.realtime.glsl.texels import Packed, Texture
 from mitsuba_diffraction.tables.colour.table import ColourTable
-from tests.directions import as_single, uniform_directions
-from tests.realtime.glsl.conftest import probed
-from tests.realtime.glsl.test_methods import DAYLIGHT, PERFECT, difference
+from tests.support.directions import as_single, uniform_directions
+from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed
 
 METAL = (np.array([360.0, 830.0]), np.array([1.4, 0.4]), np.array([2.0, 5.0]))
 DIELECTRIC = Packed(uniforms={"eta": 1.5}, definitions={"SURFACE_KIND": "1"})

@@ -48,10 +48,7 @@ from mitsuba_diffraction.tables import store
 from mitsuba_diffraction.tables.colour.table import ColourTable, colour_difference
 from mitsuba_diffraction.tables.energy.conservation import FINE, DirectionalTable
 from mitsuba_diffraction.thesis.methods import make
-from tests.realtime.glsl.conftest import probed
-
-DAYLIGHT = [(np.array([360.0, 830.0]), np.ones(2))]
-PERFECT = Packed(definitions={"SURFACE_KIND": "0"})
+from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed
 
 
 def places(n: int, seed: int = 1) -> NDArray[np.float64]:
@@ -75,11 +72,6 @@ def summed(table: DiffractionTable, at: NDArray[np.float64], lit: Any = None) ->
         weights *= lit(lam)[:, None]
     k = 2e3 * np.pi / lam[:, None]
     return table.window_sum(k * at[:, 0], k * at[:, 1], k * at[:, 2]).T @ weights
-
-
-def difference(found: NDArray[Any], exact: NDArray[Any]) -> float:
-    """Relative L1 error."""
-    return float(np.abs(found - exact).sum() / np.abs(exact).sum())
 
 
 @pytest.mark.parametrize("coherence", ["ensemble", "patch"])

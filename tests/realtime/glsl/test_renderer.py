@@ -22,7 +22,7 @@ from mitsuba_diffraction.realtime.comparison.truth import box_sensor, seen, with
 from mitsuba_diffraction.realtime.glsl.context import check_version, headless_context
 from mitsuba_diffraction.realtime.glsl.renderer import Renderer
 from mitsuba_diffraction.tables.energy.conservation import FINE
-from tests.lanes import interaction, spectra, vectors
+from tests.support.lanes import interaction, spectra, vectors
 
 pytestmark = pytest.mark.usefixtures("coarse")
 

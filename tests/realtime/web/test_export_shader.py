@@ -20,7 +20,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.realtime.glsl.export import export_shader, make_shader
-from tests.realtime.web.conftest import PATIENCE
+from tests.support.browser import PATIENCE
 
 THREE = "three@0.187.0"
 SITE = "http://shader.test/"

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.optics.colour import delta_e
-from tests.realtime.web.conftest import Tab
-from tests.realtime.web.pictures import of_the_desktop, picture
+from tests.support.browser import Tab
+from tests.support.pictures import of_the_desktop, picture
 
 SIZE = (240, 180)
 PHONE = (390, 844)

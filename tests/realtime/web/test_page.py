@@ -14,7 +14,7 @@ from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.realtime.web import Viewer
 from mitsuba_diffraction.realtime.web.export import MAX_BYTES, Page, make_page
-from tests.realtime.web.pictures import picture
+from tests.support.pictures import picture
 
 
 @pytest.fixture(scope="module")

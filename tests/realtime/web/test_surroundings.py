@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.realtime.web.export import make_page
-from tests.realtime.web.conftest import SIZE, Tab
-from tests.realtime.web.pictures import of_the_desktop, picture
+from tests.support.browser import SIZE, Tab
+from tests.support.pictures import of_the_desktop, picture
 
 SAMPLES = 16
 

@@ -29,7 +29,7 @@ from mitsuba_diffraction.scene.planning.plan import (
     quantiles,
     wavelengths_needed,
 )
-from tests.directions import polar, rough_patch
+from tests.support.directions import polar, rough_patch
 
 # Of coarse pixels: small tables. The plugin warns of that, and this is not about that.
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")

@@ -9,8 +9,8 @@ from scipy.special import jv
 from mitsuba_diffraction import DiffractionTable, HeightField, reference
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.optics.geometry import kirchhoff_factor
-from tests.directions import lit_pairs, rough_patch
-from tests.tables.patches import DEEP, DEFAULTS, PATCH, WIDTH, relative_error
+from tests.support.directions import lit_pairs, rough_patch
+from tests.support.patches import DEEP, DEFAULTS, PATCH, WIDTH, relative_error
 
 
 @pytest.mark.parametrize(

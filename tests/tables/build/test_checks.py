@@ -16,8 +16,8 @@ from mitsuba_diffraction import (
 )
 from mitsuba_diffraction.tables.build import build
 from mitsuba_diffraction.tables.build.choose import taylor_rounding
-from tests.directions import rough_patch
-from tests.tables.patches import DEEP, DEFAULTS, PATCH
+from tests.support.directions import rough_patch
+from tests.support.patches import DEEP, DEFAULTS, PATCH
 
 
 def refused(**arguments):

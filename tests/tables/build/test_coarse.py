@@ -12,7 +12,7 @@ from mitsuba_diffraction.tables.colour.table import ColourTable
 from mitsuba_diffraction.tables.energy.conservation import FINE
 from mitsuba_diffraction.tables.energy.powers import power_series
 from mitsuba_diffraction.tables.energy.transport import Orders
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 #: 19.2 µm wide: a coarse cell holds five by five orders. Nyquist's frequency is 10.5 rad/µm.
 PATCH = rough_patch((64, 64), (0.3, 0.3), 0.25, correlation=0.2)

@@ -9,7 +9,7 @@ from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.reference import screen_power
 from mitsuba_diffraction.tables.build.error import FLOOR, NEAR, alternate, worst
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 #: Odd and even, not square, nor are the pixels: 5.04 × 4.55 µm.
 PATCH = rough_patch((65, 56), (0.09, 0.07), 0.35)

@@ -8,7 +8,7 @@ from scipy.special import jv
 
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.tables.build.spectrum import Spectrum
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 PATCH = rough_patch((70, 81), (0.08, 0.07), 0.3)  # one even and one odd number of pixels
 SINGLE = 1e-6  # float32: phases of a few radians times 6e-8, and a transform of 2¹² points

@@ -4,23 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.ndimage import gaussian_filter
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.heights import field as field_module
-from mitsuba_diffraction.heights import preprocess
+from mitsuba_diffraction.heights import preprocess, seams
 from mitsuba_diffraction.heights.validity import edge_lines
 from mitsuba_diffraction.tables.build import windows as module
 from mitsuba_diffraction.tables.build.windows import Windows
-
-PIXEL = 0.1
-SETTINGS = {"coherence_width": 6.0, "tolerance": 0.02, "wavelength_range": (500.0, 600.0)}
-
-
-def rough(n=480, seed=1):
-    """Heights of a random periodic surface, (n, n) in µm."""
-    heights = gaussian_filter(np.random.default_rng(seed).standard_normal((n, n)), 4, mode="wrap")
-    return 0.05 * heights / heights.std()
+from tests.support.scans import PIXEL, SETTINGS, rough
 
 
 @pytest.fixture(scope="module")
@@ -147,6 +138,7 @@ def test_large_fields_have_the_same_statistics_in_parts(monkeypatch, tmp_path):
     assert parts.rms_slope == pytest.approx(whole.rms_slope, rel=1e-12)
     assert parts.rms_height == pytest.approx(whole.rms_height, rel=1e-12)
     monkeypatch.setattr(preprocess, "LARGE", 1)
+    monkeypatch.setattr(seams, "LARGE", 1)
     level = parts.treated(level="plane")
     assert "RMS change" in level.history[-1]
     lines = edge_lines(parts, 0.4)

@@ -13,7 +13,7 @@ from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
 from mitsuba_diffraction.tables.colour import table as colour_table
 from mitsuba_diffraction.tables.colour.table import ColourTable
 from mitsuba_diffraction.tables.store import VARIABLE, cached_colours, colour_record, colours_of
-from tests.directions import Array, rough_patch
+from tests.support.directions import Array, rough_patch
 
 WIDTH = 10.0  # µm: wide lobes, which small tables hold
 

@@ -9,7 +9,7 @@ from mitsuba_diffraction.optics import mean_second_order
 from mitsuba_diffraction.optics.blend import ScaleRoughness
 from mitsuba_diffraction.optics.fresnel import Filmed
 from mitsuba_diffraction.tables.energy.film import exponents
-from tests.directions import rough_patch
+from tests.support.directions import rough_patch
 
 RANGE = (400.0, 700.0)
 

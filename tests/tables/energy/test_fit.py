@@ -9,7 +9,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.tables.energy import conservation as energy
 from mitsuba_diffraction.tables.energy.fit import FEW_ORDERS, Samples, fitted, limits
 from mitsuba_diffraction.tables.energy.grid import DirectionGrid
-from tests.tables.energy.test_conservation import MATERIALS, grating, index_of, rough
+from tests.support.reflecting import MATERIALS, grating, index_of, rough
 
 pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
 

@@ -7,9 +7,8 @@ import pytest
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.thesis import methods
-from tests.directions import rough_patch
-
-WIDTH = 12.0
+from tests.support.directions import rough_patch
+from tests.support.thesis import WIDTH
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionError
 from mitsuba_diffraction.thesis import methods
-from tests.directions import polar
+from tests.support.directions import polar
 
 
 def test_light_from_below_is_none(rough, of_rough):

@@ -13,8 +13,8 @@ from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.thesis import methods
 from mitsuba_diffraction.thesis.methods import Gain
 from mitsuba_diffraction.thesis.methods.method import trapezoid_rule
-from tests.directions import lit_pairs, polar, uniform_directions
-from tests.thesis.methods.conftest import WIDTH
+from tests.support.directions import lit_pairs, polar, uniform_directions
+from tests.support.thesis import WIDTH
 
 
 @pytest.mark.parametrize(("name", "coherence"), [("default", "ensemble"), ("flss", "patch")])

@@ -14,8 +14,8 @@ from mitsuba_diffraction.optics.geometry import sigma_of
 from mitsuba_diffraction.thesis import methods
 from mitsuba_diffraction.thesis.methods import Gain, OrdersOnly, estimate_periods
 from mitsuba_diffraction.thesis.methods.periodic import copies
-from tests.directions import lit_pairs, polar, rough_patch
-from tests.thesis.methods.conftest import WIDTH
+from tests.support.directions import lit_pairs, polar, rough_patch
+from tests.support.thesis import WIDTH
 
 
 @settings(max_examples=20)

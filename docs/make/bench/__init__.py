@@ -1,0 +1,77 @@
+"""Measurements of speed and memory, printed by `python -m docs.make.bench`.
+
+Contents
+--------
+sections     all measurements, part by part, on every backend of this machine
+figures      sizes of a run; rows with goals; two runs side by side
+build        tables, each built in a process of its own, whose memory is measured
+contenders   BSDFs to compare, the bare gathers and the thesis' look-up among them
+evaluation   `eval`, `sample` and `pdf` of all of them; RGB variants beside spectral ones
+scenes       what is rendered: noise beside sampling by the cosine, and the time of whole pictures
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Collection, Iterable, Iterator
+from functools import partial
+from pathlib import Path
+
+from mitsuba_diffraction.heights.field import HeightField
+from mitsuba_diffraction.progress import Progress
+
+from .figures import Plan, Section
+
+__all__ = ["sections"]
+
+
+def sections(
+    parts: Collection[str],
+    plan: Plan,
+    folder: Path,
+    progress: Progress,
+    scenes: Path,
+    patch: HeightField | None = None,
+) -> Iterator[Section]:
+    """Measure the parts that are asked for, one after the other.
+
+    Parameters
+    ----------
+    parts : of `PARTS`.
+    plan : how much is measured.
+    folder : for temporary files.
+    progress : called as progress(done, total, text).
+    scenes : folder of the project's scenes.
+    patch : evaluated instead of the plan's own.
+    """
+    if "build" in parts:
+        from .build import measure_builds
+
+        yield measure_builds(plan, folder, progress)
+    if set(parts) <= {"build"}:
+        return
+    import drjit as dr
+
+    from mitsuba_diffraction.scene.load import set_variant
+
+    from .contenders import build_tables
+    from .evaluation import measure_colours, measure_eval, measure_sampling
+    from .scenes import measure_efficiency, measure_noise, measure_snake
+
+    tables = build_tables(plan, folder, progress, patch)
+    for backend in ("llvm", "cuda"):
+        if not dr.has_backend(getattr(dr.JitBackend, backend.upper())):
+            continue
+        set_variant(f"{backend}_ad_spectral")
+        measured: dict[str, Callable[[], Iterable[Section]]] = {
+            "eval": lambda: [measure_eval(plan, tables, progress)],
+            "sample": lambda: measure_sampling(plan, tables, progress),
+            "snake": lambda: [measure_snake(plan, tables, scenes, progress)],
+            "noise": lambda: [measure_noise(plan, tables, progress)],
+            "efficiency": lambda: [measure_efficiency(plan, tables, scenes, progress)],
+            "colours": partial(measure_colours, plan, tables, scenes, backend, progress),
+        }
+        for part, measure in measured.items():
+            if part in parts:
+                yield from measure()
+                gc.collect()  # the next part's kernels would hold the code of BSDFs of this one

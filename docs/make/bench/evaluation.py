@@ -1,0 +1,295 @@
+"""`eval`, `sample` and `pdf` of all contenders, random directions; RGB variants beside spectral."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from mitsuba_diffraction.analysis.maps.result import Light
+from mitsuba_diffraction.analysis.timing import Queries, kernel_seconds, ratio, rounds_of
+from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
+from mitsuba_diffraction.progress import Progress
+from mitsuba_diffraction.tables.colour.table import ColourTable
+
+from .contenders import (
+    ALUMINIUM,
+    COARSE,
+    DEFAULT,
+    DEFAULT_AL,
+    KIRCHHOFF,
+    KIRCHHOFF_AL,
+    ON_SURFACE,
+    ONE_WINDOW,
+    THESIS,
+    Tables,
+    bare_gathers,
+    bsdf_factories,
+    is_slow,
+)
+from .figures import Goal, Plan, Row, Section
+from .scenes import pigment, rays, snake
+
+FLOOR = "bare gathers of the defaults"
+_TIMES = "ns/call"
+_EVAL = "× eval"
+_BASELINES = {
+    "× roughconductor": ALUMINIUM, "× defaults": DEFAULT, "× patch": ONE_WINDOW, "× gathers": FLOOR,
+}  # fmt: skip
+
+#: What reflects, and whether the goals are for it.
+MATERIALS: dict[str, tuple[dict[str, Any], bool]] = {
+    "dielectric 1.5": ({}, True),
+    "none": ({"material": "none"}, True),
+    "aluminium": ({"material": "Al"}, True),
+    "gold": ({"material": "Au"}, False),
+}
+# Of the comparison of colours.
+_LIGHTS = ((0.0, 0.0), (30.0, 0.0), (30.0, 90.0), (60.0, 45.0))
+_STEP = 2.5  # nm
+_SUN = (-0.4, 0.6, 0.8)  # towards it
+_RAYS = 4  # along each side of a pixel
+_COLUMNS = ("mean ΔE2000", "99th percentile", "pixels")
+
+
+def measure_eval(plan: Plan, tables: Tables, progress: Progress) -> Section:
+    """Nanoseconds for `eval` of four wavelengths, of every contender and of the bare gathers."""
+    queries = {slow: _queries(plan, slow) for slow in (False, True)}
+    context = mi.BSDFContext()
+    calls: dict[str, Callable[[], Any]] = {}
+    lanes: dict[str, int] = {}
+    for name, make in bsdf_factories(tables).items():
+        bsdf = make()
+        asked = queries[is_slow(name)]
+        lanes[name] = len(asked.sample1)
+        calls[name] = partial(bsdf.eval, context, asked.si, asked.wo)
+        if name == DEFAULT:
+            calls[FLOOR] = bare_gathers(bsdf.table, queries[False])
+            lanes[FLOOR] = lanes[name]
+    times = _nanoseconds(plan, calls, lanes, "eval", progress)
+    to_rough = ratio(times[DEFAULT], times[ALUMINIUM])
+    to_thesis = ratio(times[THESIS], times[DEFAULT])
+    to_kirchhoff = ratio(times[DEFAULT], times[KIRCHHOFF])
+    metals = ratio(times[DEFAULT_AL], times[KIRCHHOFF_AL])
+    goals = {
+        DEFAULT: [
+            Goal("at most 4× roughconductor", to_rough <= 4.0),
+            Goal("within 1.5× of bare gathers", ratio(times[DEFAULT], times[FLOOR]) <= 1.5),
+            Goal("at most 1.15× kirchhoff", to_kirchhoff <= 1.15),
+        ],
+        DEFAULT_AL: [Goal("at most 1.25× kirchhoff", metals <= 1.25)],
+        COARSE: [Goal("at most 3× roughconductor", ratio(times[COARSE], times[ALUMINIUM]) <= 3.0)],
+        ON_SURFACE: [
+            Goal("at most 1.5× patch", ratio(times[ON_SURFACE], times[ONE_WINDOW]) <= 1.5)
+        ],
+        THESIS: [Goal("at least 30× the defaults", to_thesis >= 30.0)],
+    }
+    return _section(f"eval: {_conditions(plan, tables)}", times, lanes, goals)
+
+
+def measure_sampling(plan: Plan, tables: Tables, progress: Progress) -> list[Section]:
+    """Nanoseconds for `sample`, `eval_pdf` and `pdf`, beside those of `eval` in the same rounds."""
+    queries = _queries(plan, False)
+    context, factories = mi.BSDFContext(), bsdf_factories(tables)
+    drawing = (context, queries.si, queries.sample1, queries.sample2)
+    calls: dict[str, Callable[[], Any]] = {}
+    names = (ALUMINIUM, DEFAULT, DEFAULT_AL)
+    for name in names:
+        bsdf = factories[name]()
+        calls[f"sample {name}"] = partial(bsdf.sample, *drawing)
+        for what in ("eval", "eval_pdf", "pdf"):
+            calls[f"{what} {name}"] = partial(getattr(bsdf, what), context, queries.si, queries.wo)
+    lanes = dict.fromkeys(calls, plan.lanes)
+    times = _nanoseconds(plan, calls, lanes, "eval, sample and pdf", progress)
+    sections = []
+    for what, most in (("sample", 1.5), ("eval_pdf", 1.15), ("pdf", None)):
+        own = {name: times[f"{what} {name}"] for name in names}
+        evals = {name: ratio(own[name], times[f"eval {name}"]) for name in names}
+        goals = {
+            name: [Goal(f"at most {most:g}× eval", evals[name] <= most)]
+            for name in (DEFAULT, DEFAULT_AL)
+            if most is not None
+        }
+        title = f"{what}: {_conditions(plan, tables)}"
+        found = _section(title, own, dict.fromkeys(own, plan.lanes), goals)
+        for row in found.rows:
+            row.values[_EVAL] = evals[row.name]
+        sections.append(replace(found, columns=(*found.columns, _EVAL)))
+    return sections
+
+
+def _queries(plan: Plan, slow: bool) -> Queries:
+    return Queries.random(plan.slow_lanes if slow else plan.lanes)
+
+
+def _nanoseconds(
+    plan: Plan,
+    calls: dict[str, Callable[[], Any]],
+    lanes: dict[str, int],
+    what: str,
+    progress: Progress,
+) -> dict[str, list[float]]:
+    timed = {name: partial(kernel_seconds, call) for name, call in calls.items()}
+    seconds = rounds_of(timed, plan.rounds, lambda done, total: progress(done, total, what))
+    return {name: [1e9 * s / lanes[name] for s in taken] for name, taken in seconds.items()}
+
+
+def _conditions(plan: Plan, tables: Tables) -> str:
+    wavelengths = len(mi.Spectrum(0.0))
+    return (
+        f"{mi.variant()}, {plan.lanes} random pairs of directions, {wavelengths} wavelengths a "
+        f"call, {tables.patch} pixels; kernels alone, medians of {plan.rounds} "
+        "rounds through all rows, ratios within a round"
+    )
+
+
+def _section(
+    title: str,
+    times: dict[str, list[float]],
+    lanes: dict[str, int],
+    goals: Mapping[str, Sequence[Goal]],
+) -> Section:
+    baselines = {heading: name for heading, name in _BASELINES.items() if name in times}
+    rows = []
+    for name, taken in times.items():
+        values: dict[str, float | None] = {_TIMES: statistics.median(taken)}
+        for heading, baseline in baselines.items():
+            values[heading] = ratio(taken, times[baseline])
+        raw = {"ns": taken, "lanes": lanes[name]}
+        rows.append(Row(name, values, goals.get(name, ()), raw))
+    return Section(title, (_TIMES, *baselines), rows)
+
+
+def measure_colours(
+    plan: Plan, tables: Tables, scenes: Path, backend: str, progress: Progress
+) -> list[Section]:
+    """Differences between the RGB and the spectral variant, then size, time and speed.
+
+    Leaves the spectral variant set.
+    """
+    rgb, spectral = f"{backend}_ad_rgb", f"{backend}_ad_spectral"
+    rows = []
+    total = len(MATERIALS) + 2
+    for n, (name, (parameters, strict)) in enumerate(MATERIALS.items()):
+        progress(n, total, "colours")
+        # energy conservation is the same factor in both
+        values = [
+            _map(tables, variant, {**parameters, "energy_conserving": False}, plan.map_resolution)
+            for variant in (spectral, rgb)
+        ]
+        rows.append(_difference(f"map, {name}", values[0], values[1], strict))
+    progress(len(MATERIALS), total, "colours")
+    skins: dict[str, dict[str, Any]] = {
+        "snake in the sun, none": {"material": "none"},
+        "snake in the sun, pigment beneath": {"pigment": pigment(scenes)},
+    }
+    for name, skin in skins.items():
+        values = [_snake(plan, tables, scenes, skin, variant) for variant in (spectral, rgb)]
+        rows.append(_difference(name, values[0], values[1], True))
+    progress(total - 1, total, "colours")
+    differences = Section(
+        f"colours: {rgb} against {spectral} at {_STEP:g} nm, {plan.map_resolution}² directions of "
+        f"view for each of {len(_LIGHTS)} of the light; and the snake",
+        _COLUMNS,
+        rows,
+    )
+    cost = _cost(plan, tables, rgb, spectral)
+    progress(total, total, "colours")
+    return [differences, cost]
+
+
+def _difference(name: str, reference: Any, other: Any, strict: bool) -> Row:
+    found = delta_e(reference, other)
+    found = found[np.isfinite(found)]
+    mean, high = float(found.mean()), float(np.percentile(found, 99.0))
+    goals = [Goal("mean at most 1", mean <= 1.0), Goal("99 % at most 3", high <= 3.0)]
+    values = (mean, high, float(found.size))
+    return Row(name, dict(zip(_COLUMNS, values, strict=True)), goals if strict else [])
+
+
+def _map(tables: Tables, variant: str, parameters: dict[str, Any], resolution: int) -> Any:
+    """Linear sRGB of f (n, 3) at points of the hemisphere's disc, for all lights."""
+    mi.set_variant(variant)
+    bsdf = tables.bsdf("default", **parameters)
+    x, y = np.meshgrid(*[(np.arange(resolution) + 0.5) * (2.0 / resolution) - 1.0] * 2)
+    squared = x**2 + y**2
+    inside = squared < 0.97**2
+    wo = np.stack([x[inside], y[inside], np.sqrt(1.0 - squared[inside])])
+    wi = np.stack([Light(*light).direction for light in _LIGHTS], axis=1)
+    si = dr.zeros(mi.SurfaceInteraction3f, wo.shape[1] * len(_LIGHTS))
+    si.wi = mi.Vector3f(np.repeat(wi, wo.shape[1], axis=1).astype(np.float32))
+    wo = np.tile(wo, len(_LIGHTS))
+    return _colours(bsdf, si, mi.Vector3f(wo.astype(np.float32))) / wo[2][:, None]
+
+
+def _colours(bsdf: Any, si: Any, wo: Any) -> Any:
+    """Linear sRGB (n, 3) of f·cosθo, in either variant."""
+    context = mi.BSDFContext()
+    if mi.is_rgb:
+        return np.array(bsdf.eval(context, si, wo), float).T
+    wavelengths = np.arange(360.0 + 0.5 * _STEP, 830.0, _STEP).reshape(-1, len(mi.Spectrum(0.0)))
+    xyz = np.zeros((dr.width(wo), 3))
+    for group in wavelengths:
+        si.wavelengths = mi.Spectrum(group.tolist())
+        dr.make_opaque(si.wavelengths)
+        xyz += np.array(bsdf.eval(context, si, wo), float).T @ response(group) * _STEP
+    return linear_srgb(xyz)
+
+
+def _snake(plan: Plan, tables: Tables, scenes: Path, skin: dict[str, Any], variant: str) -> Any:
+    """Linear sRGB (n, 3) of the pixels of a snake in the sun, at the same points in each variant.
+
+    Not path-traced: the glints of the narrow lobes leave a noise of ΔE 1.5 even at 2048 samples
+    a pixel. And not in the light of `scenes`: Mitsuba's RGB variants make its sun and sky 4 to
+    6 % brighter than the spectral ones do, whatever they shine on.
+    """
+    mi.set_variant(variant)
+    scene = snake(
+        tables.bsdf("default", **skin), scenes, plan.resolution // 2, plan.resolution // 3, {}
+    )
+    pixels, ray = rays(scene, _RAYS)
+    si = scene.ray_intersect(ray)
+    sun = si.to_local(mi.Vector3f(_SUN) / dr.norm(mi.Vector3f(_SUN)))
+    colours = _colours(scene.shapes()[0].bsdf(), si, sun)
+    seen = np.array(si.is_valid(), bool).reshape(pixels, -1).all(axis=1)
+    return colours.reshape(pixels, -1, 3).mean(axis=1)[seen]
+
+
+def _cost(plan: Plan, tables: Tables, rgb: str, spectral: str) -> Section:
+    start = time.perf_counter()
+    table = ColourTable.build(tables.load("default"))
+    built = time.perf_counter() - start
+    calls: dict[str, list[float]] = {}
+    for variant in (rgb, spectral):
+        mi.set_variant(variant)
+        bsdf = tables.bsdf("default")
+        queries = Queries.random(plan.lanes)
+        call = partial(bsdf.eval, mi.BSDFContext(), queries.si, queries.wo)
+        calls |= rounds_of(
+            {variant: partial(kernel_seconds, call)}, plan.rounds, lambda done, total: None
+        )
+    nanoseconds = {
+        variant: 1e9 * statistics.median(taken) / plan.lanes for variant, taken in calls.items()
+    }
+    times = nanoseconds[rgb] / nanoseconds[spectral]
+    megabytes = table.nbytes / 1e6
+    columns = ("MB", "s to build", "eval, ns/call", "× spectral")
+    goals = [
+        Goal("at most 64 MB", megabytes <= 64.0),
+        Goal("60 s", built <= 60.0),
+        Goal("0.5× spectral", times <= 0.5),
+    ]
+    values = (megabytes, built, nanoseconds[rgb], times)
+    return Section(
+        "colour table: of the defaults, what the RGB variants look up",
+        columns,
+        [Row(tables.patch, dict(zip(columns, values, strict=True)), goals, {"ns": nanoseconds})],
+    )

@@ -1,0 +1,341 @@
+"""Scenes to measure with; noise beside drawing directions by the cosine; time of whole pictures."""
+
+from __future__ import annotations
+
+import statistics
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from mitsuba_diffraction.analysis.maps.result import Light
+from mitsuba_diffraction.analysis.timing import SEED, ratio, rounds_of
+from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning
+from mitsuba_diffraction.plugin.power import PowerModel
+from mitsuba_diffraction.plugin.sampling import EVEN
+from mitsuba_diffraction.progress import Progress
+
+from .contenders import Tables
+from .figures import Goal, Plan, Row, Section
+
+#: Of noise: angle of incidence in degrees, relative standard deviation that one sample may have.
+_GOALS = {0.0: 0.6, 45.0: 0.8, 75.0: 1.2}
+_AZIMUTHS = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)
+_WAVELENGTHS = (450.0, 550.0, 650.0)
+#: Samples a pixel of the rendering in which bright pixels are looked for.
+_FIREFLY_SPP = 64
+# Of the snake's scene.
+_COLUMNS = ("ms", "ns/sample", "× roughconductor")
+_SKIN, _ROUGH = "the skin diffracts, pigment beneath", "the skin is roughconductor, Al"
+
+
+def furnace(bsdf: Any, resolution: int) -> Any:
+    """A ball that fills the picture's circle, under the same light from everywhere."""
+    return mi.load_dict(
+        {
+            **_frame(
+                mi.ScalarTransform4f().look_at(origin=[0, -3, 0], target=[0, 0, 0], up=[0, 0, 1]),
+                resolution,
+                resolution,
+            ),
+            "body": {"type": "sphere", "bsdf": bsdf},
+            "light": {"type": "constant", "radiance": {"type": "d65"}},
+        }
+    )
+
+
+def window() -> dict[str, Any]:
+    """A dim sky, dark ground, and a bright window of 20 × 20 degrees."""
+    return {
+        "light": {
+            "type": "envmap",
+            "bitmap": mi.Bitmap(_window_map()),
+            "to_world": mi.ScalarTransform4f().rotate([1, 0, 0], 90),
+        }
+    }
+
+
+def pigment(scenes: Path) -> dict[str, Any]:
+    """The snake's own colours, to lie beneath the diffracting surface."""
+    file = scenes / "textures" / "elaphe.png"
+    _check_there(file)
+    scale = mi.ScalarTransform4f().scale([0.05, 1.0, 1.0])
+    return {
+        "type": "diffuse",
+        "reflectance": {"type": "bitmap", "filename": str(file), "to_uv": scale},
+    }
+
+
+def snake(bsdf: Any, scenes: Path, width: int, height: int, light: dict[str, Any]) -> Any:
+    """The coiled snake without the ground."""
+    mesh = scenes / "meshes" / "elaphe.ply"
+    _check_there(mesh)
+    above = mi.ScalarTransform4f().look_at(
+        origin=[2.3, -32, 26], target=[1.4, -0.7, 0.6], up=[0, 0, 1]
+    )
+    return mi.load_dict(
+        {
+            **_frame(above @ mi.ScalarTransform4f().scale([9.0, 9.0, 1.0]), width, height),
+            "body": {
+                "type": "ply",
+                "filename": str(mesh),
+                "bsdf": {"type": "twosided", "bsdf": bsdf},
+            },
+            **light,
+        }
+    )
+
+
+def snake_scene(scenes: Path, tables: Tables, **parameters: str) -> Any:
+    """`snake.xml` with the default table, without warnings of how far the model holds for it."""
+    file = scenes / "snake.xml"
+    _check_there(file)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DiffractionWarning)
+        return mi.load_file(str(file), patch=str(tables.paths["default"]), **parameters)
+
+
+def skin_of(scene: Any) -> Any:
+    """The snake in its scene."""
+    return next(shape for shape in scene.shapes() if shape.id() == "snake")
+
+
+def pixels_of(scene: Any, shape: Any) -> Any:
+    """Which pixels see the shape at their centre, (height, width) of bool."""
+    width, height = scene.sensors()[0].film().crop_size()
+    _, ray = rays(scene, 1)
+    found = scene.ray_intersect_preliminary(ray)
+    seen = found.is_valid() & (found.shape == mi.ShapePtr(shape))
+    return np.array(seen, bool).reshape(height, width)
+
+
+def rays(scene: Any, side: int) -> tuple[int, Any]:
+    """Number of pixels, and side² rays through each of them, one pixel after the other."""
+    sensor = scene.sensors()[0]
+    width, height = sensor.film().crop_size()
+    index = dr.arange(mi.UInt32, width * height * side**2)
+    pixel, part = index // side**2, index % side**2
+    position = mi.Point2f(
+        (mi.Float(pixel % width) + (mi.Float(part % side) + 0.5) / side) / width,
+        (mi.Float(pixel // width) + (mi.Float(part // side) + 0.5) / side) / height,
+    )
+    return width * height, sensor.sample_ray(0.0, 0.5, position, mi.Point2f(0.5))[0]
+
+
+def _check_there(file: Path) -> None:
+    if not file.is_file():
+        raise DiffractionError(
+            f"'{file}' does not exist; run this where the project's scenes are, or name their "
+            "folder with --scenes"
+        )
+
+
+def _frame(to_world: Any, width: int, height: int) -> dict[str, Any]:
+    return {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": 4},
+        "sensor": {
+            "type": "orthographic",
+            "to_world": to_world,
+            "film": {
+                "type": "hdrfilm",
+                "width": width,
+                "height": height,
+                "component_format": "float32",
+                "rfilter": {"type": "box"},
+            },
+            "sampler": {"type": "independent"},
+        },
+    }
+
+
+def _window_map(rows: int = 128) -> np.ndarray[Any, np.dtype[np.float32]]:
+    """Latitude-longitude map (rows, 2 rows, 3) of the `window`."""
+    light = np.full((rows, 2 * rows, 3), 0.5, np.float32)
+    light[rows // 2 :] = 0.05
+    degree = rows / 180.0
+    top, left = int(35 * degree), int(200 * degree)
+    light[top : top + int(20 * degree), left : left + int(20 * degree)] = 30.0
+    return light
+
+
+def measure_noise(plan: Plan, tables: Tables, progress: Progress) -> Section:
+    """Relative standard deviation of one sample's estimate of the directional albedo."""
+    ours = tables.bsdf("default", material="none", energy_conserving=False)
+    cosine = draws_by_cosine(tables.bsdf("default", material="none", energy_conserving=False))
+    columns = ("least", "median", "most", "largest weight", "by the cosine")
+    rows = []
+    for n, (theta, goal) in enumerate(_GOALS.items()):
+        progress(n, len(_GOALS), "noise")
+        found = [
+            _deviation(ours, theta, phi, wavelength, plan.lanes)
+            for phi in _AZIMUTHS
+            for wavelength in _WAVELENGTHS
+        ]
+        deviations = [deviation for deviation, _ in found]
+        values = (
+            min(deviations),
+            float(np.median(deviations)),
+            max(deviations),
+            max(weight for _, weight in found),
+            _deviation(cosine, theta, 0.0, 550.0, plan.lanes)[0],
+        )
+        rows.append(
+            Row(
+                f"{theta:g}°",
+                dict(zip(columns, values, strict=True)),
+                [Goal(f"at most {goal:g}", max(deviations) <= goal)],
+                {"standard deviations": deviations},
+            )
+        )
+    progress(len(_GOALS), len(_GOALS), "noise")
+    title = (
+        "noise: relative standard deviation of one sample's albedo, R = 1, raw Kirchhoff, "
+        f"{len(_AZIMUTHS)} azimuths of the light and {len(_WAVELENGTHS)} wavelengths from "
+        f"{_WAVELENGTHS[0]:g} to {_WAVELENGTHS[-1]:g} nm"
+    )
+    return Section(title, columns, rows)
+
+
+def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> Section:
+    """Variance × time of pictures, against drawing by the cosine; and pixels far too bright."""
+    size = plan.resolution
+    columns = ("variance × time, ratio", "variance, ratio", "time, ratio", "brightest pixel, ratio")
+
+    def bsdf() -> Any:
+        return tables.bsdf("default", material="none")
+
+    cases: dict[str, Callable[[Any], Any]] = {
+        "white furnace": lambda b: furnace(b, size // 2),
+        "snake under a window": lambda b: snake(b, scenes, size // 2, size // 3, window()),
+    }
+    rows = []
+    for n, (name, make) in enumerate(cases.items()):
+        progress(n, len(cases), name)
+        ours, cosine = make(bsdf()), make(draws_by_cosine(bsdf()))
+        pixels = pixels_of(ours, ours.shapes()[0])
+        variance, seconds = _variance_and_time(ours, pixels, plan)
+        cosine_variance, cosine_seconds = _variance_and_time(cosine, pixels, plan)
+        ratio = cosine_variance * cosine_seconds / (variance * seconds)
+        brightest = _brightest(ours, pixels, plan)
+        values = (ratio, cosine_variance / variance, cosine_seconds / seconds, brightest)
+        goals = [Goal("at least 100×", ratio >= 100.0)]
+        if name.startswith("snake"):
+            goals.append(Goal("brightest within 5×", brightest <= 5.0))
+        rows.append(Row(name, dict(zip(columns, values, strict=True)), goals))
+    progress(len(cases), len(cases), "efficiency")
+    title = (
+        "efficiency: drawing by the cosine over our own, path integrator, material=none, variance "
+        f"of the body's pixels; their brightest at {_FIREFLY_SPP} samples a pixel over that at "
+        f"{plan.reference_spp}"
+    )
+    return Section(title, columns, rows)
+
+
+def draws_by_cosine(bsdf: Any) -> Any:
+    """The same plugin, whose directions are drawn from the cosine lobe instead of the orders."""
+
+    def draw(si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
+        even = mi.warp.square_to_uniform_hemisphere(sample2)
+        return dr.select(sample1 < EVEN, even, mi.warp.square_to_cosine_hemisphere(sample2))
+
+    bsdf._draw, bsdf.power = draw, _ByCosine(bsdf.power)
+    return bsdf
+
+
+class _ByCosine:
+    """A power model with another density."""
+
+    def __init__(self, power: PowerModel) -> None:
+        self.power, self.wavenumbers, self.flat = power.power, power.wavenumbers, power.flat
+
+    def density(self, pair: Any, height_scale: Any, si: Any) -> Any:
+        return mi.warp.square_to_cosine_hemisphere_pdf(pair.outer.wo)
+
+    def both(self, pair: Any, height_scale: Any, drawing_scale: Any, si: Any) -> Any:
+        return self.power(pair, height_scale, si), self.density(pair, drawing_scale, si)
+
+
+def _deviation(
+    bsdf: Any, theta: float, phi: float, wavelength: float, lanes: int
+) -> tuple[float, float]:
+    """Relative standard deviation of the weights, and the largest of them."""
+    si = dr.zeros(mi.SurfaceInteraction3f, lanes)
+    si.wi = mi.Vector3f(*(float(c) for c in Light(theta, phi).direction))
+    si.wavelengths = mi.Spectrum(wavelength)
+    random = mi.PCG32(size=lanes, initstate=SEED)
+    numbers = [random.next_float32() for _ in range(3)]
+    _, weight = bsdf.sample(mi.BSDFContext(), si, numbers[0], mi.Point2f(numbers[1], numbers[2]))
+    weights = np.array(weight[0], float)
+    return float(weights.std() / weights.mean()), float(weights.max())
+
+
+def _variance_and_time(scene: Any, pixels: Any, plan: Plan) -> tuple[float, float]:
+    """Mean over the pixels of the luminance's variance between renderings, and seconds for one."""
+    pictures, seconds = [], []
+    for seed in range(-1, 2 * plan.rounds):  # the first compiles
+        start = time.perf_counter()
+        picture = mi.render(scene, spp=plan.spp, seed=seed + 1)
+        dr.eval(picture)
+        dr.sync_thread()
+        if seed >= 0:
+            seconds.append(time.perf_counter() - start)
+            pictures.append(_luminance(picture)[pixels])
+    return float(np.var(pictures, axis=0, ddof=1).mean()), float(np.median(seconds))
+
+
+def _brightest(scene: Any, pixels: Any, plan: Plan) -> float:
+    """Brightest pixel of a fast rendering over the brightest of a converged one."""
+
+    def brightest(spp: int, seeds: Sequence[int]) -> float:
+        mean = np.mean([_luminance(mi.render(scene, spp=spp, seed=s)) for s in seeds], axis=0)
+        return float(mean[pixels].max())
+
+    passes = max(1, plan.reference_spp // 256)
+    converged = brightest(plan.reference_spp // passes, range(1000, 1000 + passes))
+    return brightest(_FIREFLY_SPP, [SEED]) / converged
+
+
+def _luminance(picture: Any) -> Any:
+    rgb = np.array(picture)[..., :3]
+    return rgb @ np.array([0.2126, 0.7152, 0.0722])
+
+
+def measure_snake(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> Section:
+    """Time to render the snake's scene as it is, and with `roughconductor` for its skin."""
+    size = {"resx": str(2 * plan.resolution), "resy": str(5 * plan.resolution // 4)}
+    made = {name: snake_scene(scenes, tables, **size) for name in (_SKIN, _ROUGH)}
+    rough = mi.load_dict({"type": "twosided", "b": {"type": "roughconductor", "material": "Al"}})
+    skin_of(made[_ROUGH]).set_bsdf(rough)
+    covered = pixels_of(made[_SKIN], skin_of(made[_SKIN])).mean()
+    calls = {name: partial(render_seconds, scene, plan) for name, scene in made.items()}
+    rounds = max(3, plan.rounds // 2)
+    seconds = rounds_of(calls, rounds, lambda done, total: progress(done, total, "snake"))
+    rows = []
+    samples = int(size["resx"]) * int(size["resy"]) * plan.spp
+    for name, taken in seconds.items():
+        median = statistics.median(taken)
+        to_rough = ratio(taken, seconds[_ROUGH])
+        values = (1e3 * median, 1e9 * median / samples, to_rough)
+        goals = [Goal("at most 2.5×", to_rough <= 2.5)] if name == _SKIN else []
+        rows.append(Row(name, dict(zip(_COLUMNS, values, strict=True)), goals, {"seconds": taken}))
+    title = (
+        f"snake: {mi.variant()}, scenes/snake.xml, {size['resx']} × {size['resy']} pixels, "
+        f"{100 * covered:.0f} % of them snake, {plan.spp} samples per pixel; medians of {rounds} "
+        "rounds"
+    )
+    return Section(title, _COLUMNS, rows)
+
+
+def render_seconds(scene: Any, plan: Plan) -> float:
+    """Seconds to render one picture; the first call includes kernel compilation."""
+    start = time.perf_counter()
+    dr.eval(mi.render(scene, spp=plan.spp))
+    dr.sync_thread()
+    return time.perf_counter() - start

@@ -1,0 +1,38 @@
+"""Pieces of Markdown: tables, and numbers with as many digits as they deserve."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """A table whose columns but the first are aligned to the right."""
+    lines = [header, ["---", *["---:"] * (len(header) - 1)], *rows]
+    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
+
+
+def percent(value: float) -> str:
+    """Per cent with two digits; NaN is a dash."""
+    if math.isnan(value):
+        return "–"
+    share = 100 * value
+    if 0 < abs(share) < 0.01:
+        return "< 0.01 %"
+    text = f"{share:.0f} %" if abs(share) >= 9.95 else f"{share:.2g} %"
+    return text.replace("-", "−")
+
+
+def angle(degrees: float) -> str:
+    """An angle in degrees, with a true minus sign."""
+    return f"{degrees:g}°".replace("-", "−")
+
+
+def joined(values: Sequence[float]) -> str:
+    """Numbers as a sentence has them: 1, 2 and 3."""
+    return ", ".join(f"{value:g}" for value in values[:-1]) + f" and {values[-1]:g}"
+
+
+def sentence_case(text: str) -> str:
+    """Text with its first letter in upper case."""
+    return text[:1].upper() + text[1:]

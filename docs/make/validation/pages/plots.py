@@ -1,0 +1,220 @@
+"""Pictures of docs/validation.md."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
+
+from ..cases import PROFILES, Grating
+from ..compare import Comparison, angles_of, gratings_of, table_of
+from ..limits import GENTLE_ERROR, STEEP_ERROR, rms_slope
+from ..statistics import Statistics
+from .markdown import percent
+
+_SMALLEST = 1e-4  # deviations below it are drawn on it
+
+
+def slopes_figure(kirchhoff: dict[str, Comparison], default: dict[str, Comparison]) -> Figure:
+    """Deviation of the colours of sinusoids against RMS slope, at every angle, by material."""
+    figure, axes = _figure(11.5, 4.8, len(default))
+    for panel, (material, blend) in zip(axes, default.items(), strict=True):
+        sinusoids = gratings_of(blend, "sinusoidal")
+        slopes = np.array([rms_slope(grating) for grating in sinusoids])
+        angles = angles_of(blend.where(profile="sinusoidal"))
+        for part, marker, fill, name in (
+            (kirchhoff[material], "s", "none", "Kirchhoff"),
+            (blend, "o", None, "default"),
+        ):
+            measure = functools.partial(Comparison.deviation, colours=True)
+            table = np.maximum(table_of(part, sinusoids, angles, measure), _SMALLEST)
+            for column, (theta, colour) in enumerate(
+                zip(angles, _shades(len(angles)), strict=True)
+            ):
+                panel.loglog(
+                    slopes, table[:, column], marker, ms=5, color=colour, mfc=fill,
+                    label=f"{name}, {theta:g}°",
+                )  # fmt: skip
+        for slope, error in ((GENTLE_SLOPE, GENTLE_ERROR), (STEEP_SLOPE, STEEP_ERROR)):
+            panel.axvline(slope, color="black", lw=0.8, ls=":")
+            panel.axhline(error, color="black", lw=0.8, ls="--")
+            panel.annotate(
+                percent(error), (0.021, error), xytext=(0, 3), textcoords="offset points",
+                fontsize=8,
+            )  # fmt: skip
+        panel.set(
+            xlabel="RMS slope", title=material, xlim=(0.02, 1), ylim=(0.7 * _SMALLEST, 2),
+            ylabel="deviation of colours, Σ |model − rigorous| / Σ rigorous",
+        )  # fmt: skip
+        panel.set_xticks(
+            [0.02, 0.05, 0.1, 0.2, 0.5, 1], labels=["0.02", "0.05", "0.1", "0.2", "0.5", "1"]
+        )
+        panel.set_xticks([], minor=True)
+        panel.grid(alpha=0.2)
+        panel.legend(title="model, incidence", loc="lower right", fontsize=8)
+    figure.suptitle(
+        "Sinusoids beside the integral method. Dotted: where warnings begin; "
+        f"deviations below {percent(_SMALLEST)} are drawn at it"
+    )
+    return figure
+
+
+def orders_figure(comparison: Comparison, gratings: list[Grating], theta: float) -> Figure:
+    """Efficiencies of the strongest orders against wavelength: both polarisations and the model."""
+    figure, axes = _figure(4.6 * len(gratings), 4.4, len(gratings))
+    for panel, grating in zip(axes, gratings, strict=True):
+        part = comparison.where(
+            profile=grating.profile, period=grating.period, depth=grating.depth, theta=theta
+        )
+        rows = part.solutions.rows
+        strongest = sorted(
+            {int(m) for m in rows["order"]},
+            key=lambda m: -float(part.rigorous[rows["order"] == m].max()),
+        )
+        if theta == 0.0 and grating.profile != "blazed":  # ±m are equal
+            strongest = [m for m in strongest if m >= 0]
+        for n, order in enumerate(sorted(strongest[:3])):
+            of_order = rows["order"] == order
+            at = np.argsort(rows["wavelength"][of_order])
+            wavelength = rows["wavelength"][of_order][at]
+            colour = f"C{n}"
+            for polarisation, style in (("te", "--"), ("tm", ":")):
+                panel.plot(wavelength, rows[polarisation][of_order][at], style, color=colour, lw=1)
+            mean, model = part.rigorous[of_order][at], part.model[of_order][at]
+            panel.plot(wavelength, mean, "-", color=colour, label=f"m = {order}")
+            panel.plot(wavelength, model, "o", color=colour, ms=5, mfc="none")
+        panel.set(
+            xlabel="wavelength (nm)", ylabel="efficiency", ylim=(0, None),
+            title=_title(grating),
+        )  # fmt: skip
+        panel.title.set_fontsize(10)
+        panel.legend(fontsize=8)
+        panel.grid(alpha=0.2)
+    figure.suptitle(
+        f"Perfect conductor, incidence {theta:g}°: rigorous TE (dashed), TM (dotted), "
+        "mean (solid); model (circles)"
+    )
+    return figure
+
+
+def scatter_figure(comparisons: list[Comparison]) -> Figure:
+    """Every order's efficiency by the model against the rigorous one, by material and profile."""
+    figure, axes = _figure(4.4 * len(comparisons), 4.6, len(comparisons))
+    for panel, comparison in zip(axes, comparisons, strict=True):
+        counted = comparison.counted
+        profile = comparison.solutions.rows["profile"]
+        gentle = _gentle(comparison)
+        # edges first: sinusoids would lie beneath them
+        for n, name in reversed(list(enumerate(PROFILES))):
+            for keep, marker, alpha in ((~gentle, ".", 0.15), (gentle, "o", 0.7)):
+                chosen = counted & (profile == n) & keep
+                label = name if marker == "o" else None
+                panel.loglog(
+                    comparison.rigorous[chosen], comparison.model[chosen], marker, color=f"C{n}",
+                    ms=2.5, alpha=alpha, mew=0, label=label,
+                )  # fmt: skip
+        low, high = 1e-6, 1.5
+        panel.plot([low, high], [low, high], color="black", lw=0.8)
+        panel.set(
+            xlim=(low, high), ylim=(low, high), title=_MODEL_OF[comparison.material],
+            xlabel="rigorous efficiency", ylabel="model",
+        )  # fmt: skip
+        panel.set_aspect("equal")
+        panel.grid(alpha=0.2)
+        panel.legend(fontsize=8, markerscale=2, loc="upper left")
+    figure.suptitle(
+        f"Every order, unpolarised; strong colours: depth/period up to "
+        f"{_GENTLE_RATIO:g}, incidence up to 30°"
+    )
+    return figure
+
+
+def statistics_figure(statistics: Statistics) -> Figure:
+    """Specular loss, scattered lobes and the mean of patches, with error bars."""
+    figure, axes = _figure(14.0, 4.4, 3)
+    _specular(axes[0], statistics)
+    _lobes(axes[1], statistics)
+    _offsets(axes[2], statistics)
+    return figure
+
+
+def _specular(axes: Axes, statistics: Statistics) -> None:
+    x = np.linspace(0, 2.6, 200)
+    axes.semilogy(x, np.exp(-(x**2)), color="black", lw=1, label="exp(−(κ·rms)²)")
+    points = statistics.specular
+    axes.errorbar(
+        points.kappa_rms, points.power.mean, 2 * points.power.error, fmt="o", ms=4,
+        label=f"{points.surfaces} surfaces, ± 2 standard errors",
+    )  # fmt: skip
+    axes.semilogy(points.kappa_rms, points.exact, "_", ms=14, color="C3", label="with scattering")
+    axes.set(xlabel="κ·rms", ylabel="mean power of order 0, |a₀|²", title="specular loss")
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.2)
+
+
+def _lobes(axes: Axes, statistics: Statistics) -> None:
+    for n, lobe in enumerate(statistics.lobes):
+        axes.semilogy(lobe.fine_angles, lobe.fine_exact, color=f"C{n}", lw=1)
+        axes.errorbar(
+            lobe.angles, lobe.measured.mean, 2 * lobe.measured.error, fmt="o", ms=3,
+            color=f"C{n}", label=f"rms {1000 * lobe.roughness.rms:g} nm",
+        )  # fmt: skip
+    lobe = statistics.lobes[0]
+    axes.set(
+        xlabel="exit angle (°)", ylabel="BRDF (1/sr)", ylim=(1e-4, None),
+        title=f"incidence {lobe.theta:g}°, {lobe.wavelength:g} nm, T = "
+        f"{lobe.roughness.correlation:g} µm",
+    )  # fmt: skip
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.2)
+
+
+def _offsets(axes: Axes, statistics: Statistics) -> None:
+    offsets = statistics.offsets
+    ratio = offsets.patches.mean / offsets.ensemble
+    axes.axhline(1, color="black", lw=1)
+    axes.errorbar(
+        offsets.angles, ratio, 2 * offsets.patches.error / offsets.ensemble, fmt="o", ms=4
+    )
+    axes.set(
+        xlabel="exit angle (°)", ylabel="mean of patches / ensemble, ± 2 standard errors",
+        title=f"windows at {offsets.count} random places",
+    )  # fmt: skip
+    axes.grid(alpha=0.2)
+
+
+#: A perfect conductor has no index, and Kirchhoff's model.
+_MODEL_OF = {
+    "perfect": "perfect conductor, Kirchhoff",
+    "keratin": "keratin, default model",
+    "aluminium": "aluminium, default model",
+}
+
+_GENTLE_RATIO = 0.05  # depth/period; of a sinusoid, an RMS slope of 0.11
+
+
+def _gentle(comparison: Comparison) -> NDArray[np.bool_]:
+    rows = comparison.solutions.rows
+    ratio = rows["depth"].astype(float) / rows["period"]
+    return (ratio <= _GENTLE_RATIO) & (np.abs(rows["theta"]) <= 30)
+
+
+def _title(grating: Grating) -> str:
+    edges = grating.profile != "sinusoidal"  # with a slope beyond what pixels can tell
+    return str(grating) if edges else f"{grating}, RMS slope {rms_slope(grating):.2f}"
+
+
+def _shades(n: int) -> NDArray[np.float64]:
+    from matplotlib import colormaps
+
+    return np.asarray(colormaps["viridis"](np.linspace(0, 0.9, n)))
+
+
+def _figure(width: float, height: float, panels: int) -> tuple[Figure, list[Axes]]:
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, list(figure.subplots(1, panels, squeeze=False)[0])

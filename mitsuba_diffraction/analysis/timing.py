@@ -1,0 +1,90 @@
+"""Times of kernels, compared fairly: random queries, rounds through all candidates, ratios."""
+
+from __future__ import annotations
+
+import os
+import statistics
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from ..errors import DiffractionWarning
+
+#: Pixel size in µm of the patches that are timed: 1332 pixels span the default coherence window.
+PIXEL = 65.0 / 1332
+#: Seed of the random directions and wavelengths.
+SEED = 20140113
+#: Calls before the first that counts: the first compiles, the second finds the processor awake.
+WARM_UP = 2
+
+
+def kernel_seconds(call: Callable[[], Any]) -> float:
+    """Execution time of the kernels that one call launches, without tracing in Python."""
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        dr.eval(call())
+        dr.sync_thread()
+        return sum(entry["execution_time"] for entry in dr.kernel_history()) * 1e-3
+
+
+def rounds_of(
+    calls: Mapping[str, Callable[[], float]], rounds: int, done: Callable[[int, int], None]
+) -> dict[str, list[float]]:
+    """Seconds of every call in every round; each round goes through all of them in turn.
+
+    So background load affects all candidates alike, and ratios within a round can be trusted.
+    """
+    seconds: dict[str, list[float]] = {name: [] for name in calls}
+    for n in range(WARM_UP + rounds):
+        for name, call in calls.items():
+            elapsed = call()
+            if n >= WARM_UP:
+                seconds[name].append(elapsed)
+        done(n + 1, WARM_UP + rounds)
+    return seconds
+
+
+def ratio(a: Sequence[float], b: Sequence[float]) -> float:
+    """Median over the rounds of a/b."""
+    return statistics.median(x / y for x, y in zip(a, b, strict=True))
+
+
+def quiet_bsdf(table: str | os.PathLike[str], **parameters: Any) -> Any:
+    """Load the plugin with a table, without warnings about how far the model holds for it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DiffractionWarning)
+        return mi.load_dict({"type": "diffraction", "table": str(table), **parameters})
+
+
+@dataclass(frozen=True)
+class Queries:
+    """Random queries of a BSDF, evaluated and in memory."""
+
+    si: Any
+    wo: Any
+    sample1: Any
+    sample2: Any
+
+    @classmethod
+    def random(cls, lanes: int) -> Queries:
+        """Draw directions uniformly, wavelengths as Mitsuba does, and any place on the surface."""
+        random = mi.PCG32(size=lanes, initstate=SEED)
+
+        def hemisphere() -> Any:
+            pair = mi.Point2f(random.next_float32(), random.next_float32())
+            return mi.warp.square_to_uniform_hemisphere(pair)
+
+        si = dr.zeros(mi.SurfaceInteraction3f, lanes)
+        si.wi = hemisphere()
+        wo = hemisphere()
+        if mi.is_spectral:
+            si.wavelengths = mi.sample_rgb_spectrum(mi.sample_shifted(random.next_float32()))[0]
+        sample1 = random.next_float32()
+        sample2 = mi.Point2f(random.next_float32(), random.next_float32())
+        si.uv = mi.Point2f(random.next_float32(), random.next_float32())
+        dr.eval(si, wo, sample1, sample2)
+        return cls(si, wo, sample1, sample2)

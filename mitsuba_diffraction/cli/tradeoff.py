@@ -1,0 +1,117 @@
+"""`mitsuba-diffraction tradeoff`: accuracy against speed and memory."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from ..scene.load import set_variant
+from . import options
+from .console import Bar
+from .options import number_between
+from .report import check_writable, save_json, save_report
+
+#: Pixels of the default patch, pairs of directions, calls at once, timed rounds, depths.
+_FULL, _QUICK = (1332, 240, 1 << 19, 7, 14), (400, 160, 1 << 17, 5, 9)
+
+
+def add_parser(subparsers: options.Subparsers) -> None:
+    parser = options.add_command(
+        subparsers, "tradeoff", run,
+        "measure accuracy against speed and memory, setting by setting",
+        "Build a patch's table with many settings and measure each: its error against the "
+        "integral in double precision, the colours' ΔE2000, the time of eval beside "
+        "roughconductor, memory and build time. Writes the figures as CSV and JSON, a plot of "
+        "error against time, and one of error against depth; recommends a setting.",
+    )  # fmt: skip
+    options.add_output(parser, "where files go; default: tradeoff", default=Path("tradeoff"))
+    parser.add_argument("--quick", action="store_true", help="fewer settings, a smaller patch")
+    options.add_table(
+        parser, ["coherence_width"], coherence_width="65, or the default patch's width if less"
+    )
+    budget = parser.add_argument_group("recommend a setting with")
+    budget.add_argument(
+        "--max-error", metavar="E", type=number_between(0.0, 1.0),
+        help="a measured error of at most this; default: 1e-3",
+    )  # fmt: skip
+    budget.add_argument(
+        "--memory", metavar="MB", type=number_between(0.0, 1e6), help="a table of at most this"
+    )
+    budget.add_argument(
+        "--time", metavar="X", type=number_between(0.0, 1e6),
+        help="an eval that takes at most X times as long as roughconductor's",
+    )  # fmt: skip
+    options.add_json(parser)
+    options.add_own_patch(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure, write and recommend, and return the exit code."""
+    options.check_own_patch(args)
+    check_writable(args.output / "tradeoff.json", make_folder=True)
+    from ..analysis.machine import describe_machine
+    from ..analysis.timing import PIXEL
+    from ..analysis.tradeoff import (
+        Budget,
+        measure,
+        measure_depths,
+        measure_wavelengths,
+        recommended,
+        settings,
+    )
+    from ..analysis.tradeoff.accuracy import Sample
+    from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain, save_csv
+    from ..heights import gratings
+
+    side, pairs, lanes, rounds, depths = _QUICK if args.quick else _FULL
+    width = args.coherence_width or (65.0 if args.heights else min(65.0, side * PIXEL))
+    field = options.own_patch(args)
+    if field is None:
+        field = gratings.elaphe_like(side * PIXEL, side)
+    set_variant("llvm_ad_spectral")
+    with Bar(args) as bar:
+        results = measure(
+            field,
+            list(settings(args.quick)),
+            coherence_width=width,
+            pairs=pairs,
+            lanes=lanes,
+            rounds=rounds,
+            progress=bar,
+        )
+        best = recommended(results, Budget(*_budget(args).values()))
+        from ..tables.table import DiffractionTable
+
+        finest = DiffractionTable.build(field, coherence_width=width, tolerance=1e-4)
+        sample = Sample.of(field, width, "ensemble", min(pairs, 160), bar)
+        spectral = measure_wavelengths(finest, sample.wi, sample.wo)
+        deep = measure_depths(depths, bar)
+    args.output.mkdir(parents=True, exist_ok=True)
+    title = (
+        f"{field.name}, {field.heights.shape[1]} × {field.heights.shape[0]} pixels, {width:g} µm"
+    )
+    draw_trade(results, args.output / "tradeoff.png", title)
+    draw_depths(deep, args.output / "depth.png")
+    document: dict[str, Any] = {
+        "patch": title,
+        "machine": describe_machine(),
+        "recommended": {"setting": best.setting.name, "budget": _budget(args)},
+        "spectral": asdict(spectral),
+    }
+    document |= plain(results, deep)
+    save_json(args.output / "tradeoff.json", document)
+    save_csv(args.output / "tradeoff.csv", document["settings"])
+    save_report(args, document)
+    print("\n".join(lines(results, spectral, best, _budget(args))))
+    print(f"wrote {args.output / 'tradeoff'}.json, .csv, .png and depth.png")
+    return 0
+
+
+def _budget(args: argparse.Namespace) -> dict[str, float | None]:
+    """What is asked for; the default tolerance, if nothing is."""
+    given = {"tolerance": args.max_error, "megabytes": args.memory, "relative": args.time}
+    if all(value is None for value in given.values()):
+        given["tolerance"] = 1e-3
+    return given

@@ -1,0 +1,61 @@
+"""The thesis' look-up of a Taylor series: one image of complex numbers per term."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from ..analysis.timing import quiet_bsdf
+from ..plugin.lookup import DeviceTable
+from ..plugin.memory import upload
+from ..tables.table import DiffractionTable
+
+
+def thesis_bsdf(table: str | os.PathLike[str], **parameters: Any) -> Any:
+    """Load the plugin with a coherent Taylor table that `TermImages` looks up."""
+    bsdf = quiet_bsdf(table, **parameters)
+    bsdf.power.device = TermImages(bsdf.table)
+    return bsdf
+
+
+class TermImages(DeviceTable):
+    """A coherent Taylor table as the thesis stores it: an image of complex numbers per term.
+
+    For every wavelength and every term, the 3 × 3 texels around the frequency are gathered from
+    that term's image, weighted by the Gaussian window, and added up. `plugin.lookup` can hold the
+    same series, but stores all terms of one bin together. Only `window_sum` differs.
+    """
+
+    def __init__(self, table: DiffractionTable) -> None:
+        super().__init__(table)
+        images = np.moveaxis(table.coefficients[0], -1, 0)  # (terms, ny, nx, re and im)
+        self._images = upload(mi.Float, np.ascontiguousarray(images))
+
+    def window_sum(self, qx: Any, qy: Any, kappa: Any, windows: Any = ()) -> Any:
+        """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`)."""
+        grid, expansion = self.grid, self.expansion
+        x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
+        first, weight_x, weight_y = self._place(x, y, mi.UInt32(0))
+        weights = [
+            (grid.index(0, row, column), weight_x(column) * weight_y(row))
+            for row in range(grid.taps[1])
+            for column in range(grid.taps[0])
+        ]
+        lobe = dr.exp(-grid.exponents[0] * dr.square(x) - grid.exponents[1] * dr.square(y))
+        order_0 = mi.Complex2f(*(lobe * c for c in self.series.at(kappa)[2]))
+        scaled = kappa * expansion.half_range
+
+        def of_term(n: Any, image: Any, weight: Any, total: Any) -> tuple[Any, ...]:
+            weight *= scaled / mi.Float(n)  # xⁿ/n!
+            windowed = mi.Complex2f(0.0)
+            for offset, gaussian in weights:
+                windowed += gaussian * dr.gather(mi.Complex2f, self._images, image + offset)
+            return n + 1, image + grid.index(1, 0, 0), weight, total + weight * windowed
+
+        state = (mi.UInt32(1), first, mi.Float(1.0), order_0)
+        total = dr.while_loop(state, lambda n, *_: n <= expansion.terms, of_term)[3]
+        return dr.squared_norm(total)

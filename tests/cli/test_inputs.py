@@ -1,0 +1,117 @@
+"""Commands look at their inputs before they open them: no pipe is waited for, no name crashes."""
+
+from __future__ import annotations
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+SCENE = """<scene version="3.0.0">
+  <default name="width" value="8"/>
+  <integrator type="path"/>
+  <sensor type="perspective">
+    <film type="hdrfilm"><integer name="width" value="$width"/></film>
+  </sensor>
+  {}
+</scene>
+"""
+
+
+@pytest.fixture
+def alarm():
+    """An alarm that fails the test if a command waits for somebody to write into a pipe."""
+
+    def waits(*_: object) -> None:
+        pytest.fail("it waits for somebody to write into the pipe")
+
+    before = signal.signal(signal.SIGALRM, waits)
+    signal.alarm(60)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "arguments"),  # {} is the pipe
+    [
+        ("", "brdf-map {}"),
+        ("", "export-shader {}"),
+        ("", "info {}"),
+        (".exr", "info {}"),
+        (".toml", "info {}"),
+        (".ply", "info {}"),
+        (".npy", "precompute {}"),
+        (".toml", "precompute {}"),
+        (".exr", "evaluate {}"),
+        ("", "sweep method {}"),
+        ("", "tradeoff {}"),
+        (".ply", "tangents -o a.ply {}"),
+        (".xml", "render -m scalar_rgb {}"),
+        (".xml", "plan {}"),
+        (".xml", "compare {}"),
+        (".xml", "export-viewer {} a.html"),
+    ],
+    ids=str,
+)
+def test_a_pipe_is_refused_at_once(run, here, alarm, suffix, arguments):
+    os.mkfifo(f"pipe{suffix}")
+    pipe = f"pipe{suffix}"
+    ran = run(*(argument.format(pipe) for argument in arguments.split()))
+    assert "pipe or a device" in ran.failed_in_one_line()
+
+
+@pytest.mark.parametrize(
+    "element",
+    [
+        '<shape type="ply"><string name="filename" value="pipe"/></shape>',
+        '<include filename="pipe"/>',
+        '<shape type="sphere"><bsdf type="diffraction">'
+        '<string name="heightfield" value="pipe"/></bsdf></shape>',
+    ],
+    ids=["mesh", "include", "heights"],
+)
+def test_a_pipe_that_a_scene_names_is_refused_at_once(run, here, alarm, element):
+    os.mkfifo("pipe")
+    Path("a.xml").write_text(SCENE.format(element))
+    ran = run("render", "a.xml", "-m", "scalar_rgb")
+    assert "pipe or a device" in ran.failed_in_one_line()
+
+
+def test_a_pipe_for_a_frame_or_a_table_of_treatments_is_refused_at_once(run, here, alarm, heights):
+    Path("a.xml").write_text(SCENE.format(""))
+    Path("frames").mkdir()
+    os.mkfifo("frames/frame_0000.png")
+    ran = run(
+        "render", "a.xml", "--frames", 2, "--turn", "width", "-o", "frames", "-m", "scalar_rgb"
+    )
+    assert "pipe or a device" in ran.failed_in_one_line()
+    os.mkfifo("pipe.toml")
+    ran = run("survey", heights, "--treatments", "pipe.toml")
+    assert "pipe or a device" in ran.failed_in_one_line()
+
+
+def test_a_long_value_in_a_scene_is_not_taken_for_a_file(run, here):
+    Path("a.xml").write_text(SCENE.format('<string name="note" value="' + 300 * "a" + '"/>'))
+    ran = run("render", "a.xml", "-m", "scalar_rgb", "-s", 1)
+    assert "File name too long" not in ran.err
+
+
+@pytest.mark.parametrize("command", ["render", "info", "precompute", "brdf-map", "survey"])
+def test_a_name_that_is_no_utf_8_is_refused_in_one_line(child, tmp_path, command):
+    name = os.fsdecode(b"caf\xe9.xml")
+    (tmp_path / name).write_text(SCENE.format(""))
+    line = child([command, name]).failed_in_one_line()
+    assert "caf" in line
+    assert "UTF-8" in line
+
+
+def test_loading_a_scene_whose_name_is_no_utf_8_is_refused(here):
+    from mitsuba_diffraction import DiffractionError
+    from mitsuba_diffraction.scene.load import load_scene
+
+    file = Path(os.fsdecode(b"caf\xe9.xml"))
+    file.write_text(SCENE.format(""))
+    with pytest.raises(DiffractionError, match="UTF-8"):
+        load_scene(file, {})

@@ -1,0 +1,129 @@
+"""`python -m docs.make.bench` prints and writes every measurement; no test is about speed."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from docs.make.bench import evaluation, figures, scenes
+from docs.make.bench.__main__ import main
+from docs.make.bench.figures import Goal, Plan, Row, Section
+from tests.support.directions import rough_patch
+
+pytestmark = pytest.mark.thorough
+
+# 96 pixels are 4.7 µm, 1/14 of the coherence window: wide taps, but no time to speak of
+TINY = Plan(
+    pixels=96,
+    more_pixels=(),
+    other_tables=False,
+    lanes=64,
+    slow_lanes=32,
+    rounds=2,
+    resolution=12,
+    spp=2,
+    reference_spp=2,
+    map_resolution=8,
+)
+SCENES = Path(__file__).parents[3] / "scenes"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def tiny(coarse):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figures, "QUICK", TINY)
+        # as many as the other pictures have: another number is another kernel
+        patch.setattr(scenes, "_FIREFLY_SPP", TINY.spp)
+        patch.setattr(evaluation, "MATERIALS", {"none": evaluation.MATERIALS["none"]})
+        yield
+
+
+@pytest.fixture(scope="module")
+def measured(tiny, tmp_path_factory):
+    """The file of one run of all parts, and its output."""
+    file = tmp_path_factory.mktemp("bench") / "bench.json"
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        assert main(["--quick", "--json", str(file), "--scenes", str(SCENES)]) == 0
+    return file, printed.getvalue()
+
+
+def refused(capsys, *arguments: object) -> str:
+    """The only line on stderr of a run that fails before it measures."""
+    assert main([str(a) for a in arguments]) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    (line,) = err.splitlines()
+    return line
+
+
+def test_everything_is_measured_and_written(measured):
+    file, printed = measured
+    parts = (
+        "build",
+        "eval",
+        "sample",
+        "eval_pdf",
+        "pdf",
+        "snake",
+        "noise",
+        "efficiency",
+        "colours",
+    )
+    for part in ("processor", "gathers", *(f"{part}:" for part in parts)):
+        assert part in printed
+    data = json.loads(file.read_text(encoding="utf-8"))
+    assert data["machine"]["cores"] >= 1
+    build, evaluation = data["sections"][:2]
+    for row in build["rows"]:
+        assert row["peak_bytes"] > row["imported_bytes"] > 0
+        assert max(row["table"]["measured_error"].values()) <= row["table"]["tolerance"]
+    for row in evaluation["rows"]:
+        assert len(row["ns"]) == TINY.rounds
+        assert min(row["ns"]) > 0
+
+
+def test_a_part_alone_is_compared_number_by_number(measured, capsys):
+    file, _ = measured
+    assert main(["--quick", "--only", "build", "--against", str(file)]) == 0
+    out = capsys.readouterr().out
+    # the same heights: the same error
+    assert "1.00×  build: 96² pixels, the defaults: error/tolerance:" in out
+    assert "eval" not in out.split("now /")[0]
+
+
+def test_a_file_of_another_kind_is_refused_before_measuring(tmp_path, capsys):
+    file = tmp_path / "bench.json"
+    file.write_text("{}", encoding="utf-8")
+    assert str(file) in refused(capsys, "--quick", "--only", "build", "--against", file)
+
+
+def test_a_measured_patch_replaces_the_default(tmp_path, capsys):
+    file = tmp_path / "mine.npy"
+    np.save(file, rough_patch((40, 48), (0.1, 0.1), 0.2).heights)
+    arguments = ["--measured", str(file), "--pixel-size", "0.1", "--quick", "--only", "noise"]
+    assert main(arguments) == 0
+    assert "75°" in capsys.readouterr().out
+
+
+def test_missing_scenes_are_named(tmp_path, capsys):
+    line = refused(capsys, "--quick", "--only", "snake", "--scenes", tmp_path)
+    assert str(tmp_path) in line
+    assert "--scenes" in line
+
+
+def test_an_unwritable_file_is_refused_before_measuring(tmp_path, capsys):
+    file = tmp_path / "missing" / "bench.json"
+    assert str(file) in refused(capsys, "--quick", "--json", file)
+
+
+def test_a_missed_goal_is_said():
+    rows = [Row("a", {"s": 5.0}, [Goal("at most 4 s", False)]), Row("b", {"s": None})]
+    lines = list(Section("title", ["s"], rows).lines())
+    assert lines[2].split() == ["a", "5.00", "at", "most", "4", "s:", "MISSED"]
+    assert lines[3].strip() == "b"

@@ -1,0 +1,78 @@
+"""The baselines of `bench` compute what they claim to, so that comparing times is fair."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from docs.make.bench.contenders import (
+    DEFAULT,
+    TAYLOR,
+    THESIS,
+    bare_gathers,
+    bsdf_factories,
+    build_tables,
+)
+from docs.make.bench.figures import Plan
+from mitsuba_diffraction.analysis.timing import Queries
+from mitsuba_diffraction.optics.geometry import wavenumber
+from mitsuba_diffraction.tables.window import base_bin, first_tap
+
+pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
+
+
+@pytest.fixture(scope="module")
+def factories(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("tables")
+    tables = build_tables(Plan(pixels=160), folder, lambda done, total, text: None)
+    return bsdf_factories(tables)
+
+
+@pytest.fixture
+def queries(variant):
+    return Queries.random(500)
+
+
+def test_an_image_a_term_is_the_same_series(factories, queries):
+    values = [
+        np.array(factories[name]().eval(mi.BSDFContext(), queries.si, queries.wo))
+        for name in (THESIS, TAYLOR)
+    ]
+    # 37 terms in another order, in single precision
+    assert np.abs(values[0] - values[1]).sum() < 1e-5 * values[1].sum()
+
+
+def test_bare_gathers_read_what_a_look_up_reads(factories, queries):
+    bsdf = factories[DEFAULT]()
+    table = bsdf.table
+    total = np.array(queries.si.wi + queries.wo, np.float32).astype(float)
+    expected = np.zeros(total.shape[1])
+    for wavelength in np.array(queries.si.wavelengths, float):
+        k = wavenumber(wavelength)
+        interval = table.expansion.interval(k * total[2])
+        first = [
+            base_bin(k * total[axis] / table.spacing[axis], taps) + first_tap(taps)
+            for axis, taps in enumerate(table.grid.taps)
+        ]
+        column, row = (f.astype(int) + n for f, n in zip(first, table.grid.last, strict=True))
+        for j in range(table.grid.taps[1]):
+            for i in range(table.grid.taps[0]):
+                bins = table.coefficients[interval, row + j, column + i].astype(float)
+                expected += bins.sum(axis=(1, 2))
+    gathered = np.array(bare_gathers(table, queries)())
+    off = np.abs(gathered - expected) > 1e-5 * np.abs(expected).max()
+    # in single precision a few of the 4 × 500 look-ups fall into the neighbouring bin
+    assert off.mean() < 0.01
+
+
+def test_the_measured_surface_reflects_what_its_file_says(factories, queries):
+    values = np.array(factories["measured"]().eval(mi.BSDFContext(), queries.si, queries.wo))
+    np.testing.assert_allclose(values, 1.0, rtol=1e-6)  # single precision
+
+
+def test_queries_do_not_change(queries):
+    again = Queries.random(500)
+    assert dr.all(again.wo == queries.wo, axis=None)
+    assert dr.all((queries.si.wi.z > 0) & (queries.wo.z > 0))

@@ -1,0 +1,34 @@
+"""What a clone's folder holds, with patches and pictures so small that what runs there is quick."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from tests.support import ROOT
+
+#: One patch for all scenes, whose table is made once.
+SMALL = {"resx": "12", "resy": "10", "patch": "../precompute/elaphe_like.toml"}
+
+
+def small_clone(folder: Path) -> Path:
+    """Scenes, their meshes and textures, and recipes; `folder` again."""
+    (folder / "scenes").mkdir()
+    for part in ("meshes", "textures"):
+        (folder / "scenes" / part).symlink_to(ROOT / "scenes" / part)
+    for scene in (ROOT / "scenes").glob("*.xml"):
+        text = scene.read_text(encoding="utf-8")
+        for name, value in SMALL.items():
+            text = re.sub(f'(<default name="{name}" value=)"[^"]*"', rf'\1"{value}"', text)
+        (folder / "scenes" / scene.name).write_text(text, encoding="utf-8")
+    (folder / "precompute").mkdir()
+    for recipe in (ROOT / "precompute").glob("*.toml"):
+        text = recipe.read_text(encoding="utf-8")
+        if recipe.stem.endswith("_like"):  # a coarser and smaller patch of its kind
+            text = re.sub(r"extent = .*", "extent = 4.0", text)
+            text = re.sub(r"pixels = .*", "pixels = 80", text)
+            text = f"coherence_width = 4.0\n{text}"
+        elif recipe.stem == "blazed":
+            text = f"{text}periods = 4\nrows = 16\n"
+        (folder / "precompute" / recipe.name).write_text(text, encoding="utf-8")
+    return folder

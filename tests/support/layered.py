@@ -1,0 +1,67 @@
+"""A patch as a coat, a film or transmission is tried on, and the reference beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import reference
+from tests.support.directions import Array, as_single, rough_patch, uniform_directions
+from tests.support.lanes import evaluated
+
+PATCH = rough_patch((40, 44), (0.09, 0.09), 0.14, 0.8)
+WIDTH = 3.0
+
+
+def pairs(n: int = 200) -> tuple[Array, Array, Array]:
+    """wi, wo (n, 3) and wavelengths (n, 4): at all angles, and where a plane is any plane."""
+    rng = np.random.default_rng(8)
+    wi, wo = uniform_directions(n, rng, 0.03), uniform_directions(n, rng, 0.03)
+    near = slice(0, n // 2)
+    wo[near] = wi[near] * [-1, -1, 1] + rng.normal(0.0, 0.03, (n // 2, 3))
+    wi[0], wo[1], wi[2], wi[3], wi[4] = (0, 0, 1), (0, 0, 1), wo[2], wo[3] + (1e-5, 0, 0), (0, 0, 1)
+    wo[4] = wi[4]
+    wi, wo = (w / np.linalg.norm(w, axis=1, keepdims=True) for w in (wi, wo))
+    good = (wi[:, 2] > 0.02) & (wo[:, 2] > 0.02)
+    lam = as_single(rng.uniform(400.0, 700.0, (n, 4)))
+    return as_single(wi[good]), as_single(wo[good]), lam[good]
+
+
+FLAT = md.HeightField(np.zeros((40, 40)), 0.08)
+
+
+def load(field: md.HeightField = PATCH, **parameters: Any) -> Any:
+    raw = {"energy_conserving": False, "coherence_width": WIDTH, "tolerance": 1e-4}
+    return mi.load_dict(md.bsdf_dict(field, **(raw | parameters)))
+
+
+def assert_values_are_the_reference_s(
+    model: str,
+    ours: dict[str, Any],
+    theirs: dict[str, Any],
+    ratio: Callable[..., NDArray[np.float64]] | None = None,
+) -> None:
+    """The plugin with some parameters against the reference with its own.
+
+    ratio : of what the plugin has tabulated beside the heights' table over the exact.
+    """
+    wi, wo, lam = (a[:120] for a in pairs())
+    bsdf = load(model=model, **ours)
+    found = evaluated(bsdf, wi, wo, lam)
+    if ratio is not None:
+        found = found / ratio(bsdf.table, wi, wo, lam)
+    exact = np.stack(
+        [
+            reference.brdf(PATCH, wi, wo, one, coherence_width=WIDTH, model=model, **theirs)
+            for one in lam.T
+        ],
+        axis=1,
+    ) * wo[:, 2:]  # fmt: skip
+    # the table's tolerance where light is scarce; 1e-3 of every value elsewhere
+    assert found == pytest.approx(exact, rel=1e-3, abs=1e-5 * exact.max())

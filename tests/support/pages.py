@@ -1,0 +1,43 @@
+"""Text of README, docs and notebooks: code blocks, spans and commands."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+
+from tests.support import ROOT
+
+PAGES = {
+    path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
+    for path in (
+        *(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CHANGELOG.md")),
+        *sorted((ROOT / "docs").rglob("*.md")),
+    )
+}
+# what the notebooks say between their cells; test_notebooks.py runs these
+PAGES |= {
+    path.relative_to(ROOT).as_posix(): "\n\n".join(
+        "".join(cell["source"])
+        for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]
+        if cell["cell_type"] == "markdown"
+    )
+    for path in sorted((ROOT / "notebooks").glob("*.ipynb"))
+}
+FENCE = re.compile(r"^ *```(\w*)\n(.*?)^ *```$", re.M | re.S)
+
+
+def blocks(page: str, language: str) -> list[str]:
+    """Code blocks of a page, in that language."""
+    return [text for name, text in FENCE.findall(PAGES[page]) if name == language]
+
+
+def spans(page: str) -> list[str]:
+    """Code within a page's sentences, on one line each."""
+    return [" ".join(s.split()) for s in re.findall(r"`([^`]+)`", FENCE.sub("", PAGES[page]))]
+
+
+def typed(text: str) -> list[list[str]]:
+    """The words of each command of a shell block."""
+    lines = text.replace("\\\n", " ").splitlines()
+    return [words for line in lines if (words := shlex.split(line, comments=True))]

@@ -1,0 +1,26 @@
+"""Patches that tables are built of, and how far a table is from the reference."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mitsuba_diffraction import reference
+from mitsuba_diffraction.optics.geometry import kirchhoff_factor
+from tests.support.directions import lit_pairs, rough_patch
+
+#: 5.04 × 4.8 µm; WIDTH is nearly that wide.
+PATCH = rough_patch((64, 63), (0.08, 0.075), 0.25)
+WIDTH = 4.5
+#: Several wavelengths deep.
+DEEP = rough_patch((64, 64), (0.08, 0.08), 1.2)
+DEFAULTS = {"coherence_width": WIDTH}
+
+
+def relative_error(table, field, n=400, seed=1):
+    """Σ|table − reference| / Σ reference of ⟨|P|²⟩, near order 0 and elsewhere."""
+    wi, wo, lam, near = lit_pairs(field, table.sigma, n, seed)
+    factor = kirchhoff_factor(wi, wo, lam, table.sigma)
+    width = table.coherence_width
+    exact = reference.brdf(field, wi, wo, lam, coherence_width=width, coherence=table.coherence)
+    difference = np.abs(table.brdf(wi, wo, lam) - exact) / factor
+    return [difference[m].sum() / (exact / factor)[m].sum() for m in (near, ~near)]

@@ -1,0 +1,85 @@
+"""Variants of Mitsuba, which of them run here, and BSDFs evaluated in any of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+
+from tests.support.directions import Array
+
+#: The variants that the plugin supports; the second needs a GPU.
+VARIANTS = ("llvm_ad_spectral", "cuda_ad_spectral")
+
+
+def obstacle(variant: str) -> str | None:
+    """Why a variant does not run on this machine, or None if it does."""
+    if variant not in mi.variants():
+        return f"this Mitsuba has no variant {variant}"
+    backend = dr.JitBackend.CUDA if variant.startswith("cuda") else dr.JitBackend.LLVM
+    return None if dr.has_backend(backend) else f"{variant}: Dr.Jit finds no device for it"
+
+
+#: All that this package supports and this Mitsuba has.
+ALL = [name for name in mi.variants() if name.startswith(("scalar", "llvm", "cuda"))]
+
+
+def runs(name: str) -> bool:
+    """Whether the machine runs a variant."""
+    if name.startswith("cuda"):
+        return bool(dr.has_backend(dr.JitBackend.CUDA))
+    return name.startswith("scalar") or bool(dr.has_backend(dr.JitBackend.LLVM))
+
+
+def interaction(wi: Array, wavelengths: Array) -> Any:
+    """At one direction (3,) in scalar variants, at (n, 3) of them elsewhere."""
+    si = dr.zeros(mi.SurfaceInteraction3f, 1 if wi.ndim == 1 else len(wi))
+    si.wi = mi.Vector3f(*wi.T.tolist()) if wi.ndim == 1 else mi.Vector3f(wi.T)
+    si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
+    if mi.is_spectral:
+        si.wavelengths = mi.UnpolarizedSpectrum(wavelengths.T)
+    return si
+
+
+def evaluate(
+    bsdf: Any,
+    wi: Array,
+    wo: Array,
+    samples: Array,
+    wavelengths: Array,
+    component: int | None = None,
+) -> list[Array]:
+    """Value (n, channels), pdf, value again, pdf again; then sampled wo, pdf, weight."""
+    context = mi.BSDFContext(mi.TransportMode.Radiance, int(mi.BSDFFlags.All), component)
+
+    def once(si: Any, wo: Any, one: Any, two: Any) -> list[Array]:
+        together = bsdf.eval_pdf(context, si, wo)
+        sample, weight = bsdf.sample(context, si, one, two)
+        parts = [
+            mi.unpolarized_spectrum(bsdf.eval(context, si, wo)),
+            bsdf.pdf(context, si, wo),
+            mi.unpolarized_spectrum(together[0]),
+            together[1],
+            sample.wo,
+            sample.pdf,
+            mi.unpolarized_spectrum(weight),
+        ]
+        dr.eval(parts)  # one kernel instead of six, all of which would hold most of the model
+        return [np.array(part, float).T for part in parts]
+
+    if dr.is_jit_v(mi.Float):
+        si = interaction(wi, wavelengths)
+        two = mi.Point2f(samples[:, 1:].T)
+        return once(si, mi.Vector3f(wo.T), mi.Float(samples[:, 0]), two)
+    rows = [
+        once(
+            interaction(wi[n], wavelengths[n]),
+            mi.Vector3f(wo[n].tolist()),
+            float(samples[n, 0]),
+            mi.Point2f(samples[n, 1:].tolist()),
+        )
+        for n in range(len(wi))
+    ]
+    return [np.array(column) for column in zip(*rows, strict=True)]
