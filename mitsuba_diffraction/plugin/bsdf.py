@@ -437,7 +437,6 @@ class Diffraction(mi.BSDF):
     def refusals(self) -> Iterator[str | None]:
         """See `Changing.refusals`."""
         yield self._optical_refusal()
-        yield self._second_order_refusal()
         if self._varying is not None:
             yield self._varying.refusal()
         if isinstance(self.fresnel, UnderFilm):
@@ -483,15 +482,6 @@ class Diffraction(mi.BSDF):
             getattr(self.boundary.material, "reflects_all", False),  # other kernels
             getattr(self.boundary.material, "channels", None),
             getattr(self.boundary.material, "tint", None) is None,
-        )
-
-    def _second_order_refusal(self) -> str | None:
-        """Reason why the second order is not for the present index, or None."""
-        if self._second_order is None or dr.all(dr.detach(self.boundary.material.eta) >= 1.0):
-            return None
-        return (
-            f"eta={dr.slice(self.boundary.material.eta):g} must be at least 1 with the second "
-            "order; load the plugin anew with second_order=false"
         )
 
     def _optical_refusal(self) -> str | None:

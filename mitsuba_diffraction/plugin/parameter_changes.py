@@ -108,7 +108,8 @@ class ObjectValues:
             allowed = np.isfinite(numbers) & (numbers >= low) & (numbers <= high)
             if not allowed.all():
                 range_ = f"between {low:g} and {high:g}" if bounds else "finite"
-                return f"{self._name}.{key}={numbers[~allowed][0]:g} must be {range_}"
+                name = self._name if key in _VALUES else f"{self._name}.{key}"
+                return f"{name}={numbers[~allowed][0]:g} must be {range_}"
         return None
 
     def restore(self) -> None:
