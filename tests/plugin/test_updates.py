@@ -11,8 +11,8 @@ import pytest
 
 import mitsuba_diffraction as md
 from tests.support.directions import Array
-from tests.support.lanes import interaction, spectra, vectors
 from tests.support.gentle import PATCH, WIDTH, pairs
+from tests.support.lanes import interaction, spectra, vectors
 
 pytestmark = pytest.mark.usefixtures("mono")
 
