@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import warnings
 
 import drjit as dr
 import mitsuba as mi
 
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionError, warn
 from ..tables.table import DiffractionTable
 from .boundary import MODELS, Boundary, Kirchhoff, SmallSlope
 from .fresnel import INDEX_PARTS, INDICES, Conductor, Dielectric, Perfect, Reflectance
@@ -151,12 +150,10 @@ def warn_of_film(material: Reflectance | UnderFilm, table: DiffractionTable, sca
     index, thickness = material.numbers()
     rms = scale * math.sqrt(float(table.roughness.nodes.max()))
     if 2.0 * index.real * thickness * rms > ROUGH:
-        warnings.warn(
+        warn(
             f"film_thickness={thickness:g} nm on a metal of RMS height {1e3 * rms:.0f} nm: beside "
             "rigorous solutions, expect the colours to be off by more than 10 % beyond 45° from "
-            "the normal (docs/validation.md)",
-            DiffractionWarning,
-            stacklevel=2,
+            "the normal (docs/validation.md)"
         )
 
 
