@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionError
 from ..files import readable_file
 from ..heights import gratings
 from ..heights.field import HeightField
@@ -89,7 +88,6 @@ def table_of_file(
             height_scale,
             provider,
         )
-    _warn(table)
     return table
 
 
@@ -139,9 +137,7 @@ def table_of_heights(
 ) -> DiffractionTable:
     """The table of a height field."""
     digest = heights.digest() + (" cut out" if heights.cut_out else "")  # warned of otherwise
-    table = _built(digest, lambda: [heights], asked, height_scale, provider)
-    _warn(table, heights.name)
-    return table
+    return _built(digest, lambda: [heights], asked, height_scale, provider)
 
 
 def _built(
@@ -158,15 +154,6 @@ def _built(
 
     most = min(HEIGHT_SCALE_ROOM * max(1.0, height_scale), MAX_HEIGHT_SCALE)
     return provider(digest, TableSettings(**asked, height_scale_max=most), build)
-
-
-def _warn(table: DiffractionTable, name: str | None = None) -> None:
-    """Say what a table remembers; of heights called `name`, whoever had it built."""
-    for line in table.source.get("warnings", ()):
-        own = f"{table.source.get('name', '')}: "
-        if name is not None and line.startswith(own):
-            line = f"{name}: {line.removeprefix(own)}"
-        warnings.warn(line, DiffractionWarning, stacklevel=2)
 
 
 def _file_digest(path: Path, options: LoadOptions) -> str:

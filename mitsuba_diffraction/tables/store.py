@@ -14,7 +14,6 @@ import json
 import math
 import os
 import threading
-import warnings
 import weakref
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from dataclasses import asdict, dataclass
@@ -26,7 +25,7 @@ import platformdirs
 from numpy.typing import NDArray
 
 from ..atomic import atomic_path, remove_abandoned
-from ..errors import DiffractionError, DiffractionWarning, one_line
+from ..errors import DiffractionError, one_line, warn
 from ..heights.validity import TEXTS_VERSION
 from ..settings import TableSettings
 from .build import coarse
@@ -162,11 +161,7 @@ def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
     except OSError:
         return None
     except (ValueError, LookupError, TypeError, MemoryError, RecursionError) as error:
-        warnings.warn(
-            f"'{path}' in the cache is damaged ({one_line(str(error))[:100]}) and made again",
-            DiffractionWarning,
-            stacklevel=2,
-        )
+        warn(f"'{path}' in the cache is damaged ({one_line(str(error))[:100]}) and made again")
         with contextlib.suppress(OSError):
             path.unlink()
         return None

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import DiffractionError, DiffractionWarning
+from ...errors import DiffractionError, warn
 from ...heights.field import HeightField
 from ...heights.validity import units_warning
 from ...optics.geometry import sigma_of
@@ -136,8 +135,6 @@ class _Ticks:
         self._tell(self.done, self.total, text)
 
 
-T = TypeVar("T")
-
 #: What series may use up of what the taps leave of the tolerance.
 SERIES_SHARE = 0.8
 #: What the taps may use up, if leaving out corners then still meets the tolerance.
@@ -217,7 +214,6 @@ def build_table(
     kappa_max: float | None = None,
     windows: str | float | None = None,
     second_order: str | bool = "auto",
-    crop: float | tuple[float, float] | None = None,
     progress: Progress | None = None,
 ) -> DiffractionTable:
     """Tabulate a height field to a tolerance, and measure that it is met.
@@ -230,7 +226,6 @@ def build_table(
     q_max, kappa_max, windows, second_order : see `settings.TableSettings`. Beyond `q_max` or
         `kappa_max` a table of coarse cells answers, which is right on average
         (`tables.build.coarse`).
-    crop : the former name of `q_max`, in rad/µm; heights have a treatment of that name, in µm.
     progress : called as progress(done, total, text) while it works.
 
     Raises
@@ -239,8 +234,6 @@ def build_table(
         If a parameter is out of range, or the tolerance cannot be met: the text names the
         error to expect and what would meet it.
     """
-    if crop is not None:
-        q_max = _former_name(crop, q_max)
     settings = TableSettings(
         coherence_width, coherence, basis, tolerance, terms, taps, wavelength_range,
         height_scale_max, checked("q_max", q_max), kappa_max, windows, second_order,
@@ -265,24 +258,15 @@ def build_with(
     check_units(scans)
     try:
         check_window(patches[0].extent, settings)
-        return _built(_Wanted(patches, settings), progress or silent)
+        table = _built(_Wanted(patches, settings), progress or silent)
     except DiffractionError as error:
         questions = [question for patch in scans if (question := units_warning(patch))]
         if not questions:
             raise
         raise DiffractionError(f"{error}; or {questions[0]}") from error
-
-
-def _former_name(crop: T, q_max: T | None) -> T:
-    if q_max is not None:
-        raise DiffractionError("crop is the former name of q_max; give q_max alone")
-    warnings.warn(
-        f"crop={crop} of a table is its largest spatial frequency in rad/µm, now called q_max; to "
-        "keep the middle of a patch, in µm, crop the heights: heights.treated(crop=…)",
-        DiffractionWarning,
-        stacklevel=3,
-    )
-    return crop
+    for line in table.source.get("warnings", ()):
+        warn(line)
+    return table
 
 
 def _built(wanted: _Wanted, tell: Progress) -> DiffractionTable:
