@@ -17,6 +17,8 @@ import drjit as dr
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.thorough
+
 distributed = pytest.importorskip("distributed")
 
 from mitsuba_diffraction import DiffractionError, cluster  # noqa: E402

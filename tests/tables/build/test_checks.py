@@ -18,6 +18,8 @@ from mitsuba_diffraction.tables.build.choose import taylor_rounding
 from tests.support.directions import rough_patch
 from tests.support.patches import DEEP, DEFAULTS, PATCH
 
+pytestmark = pytest.mark.thorough
+
 
 def refused(**arguments):
     """The one line with which a table of PATCH, or of heights=…, is refused."""
@@ -120,7 +122,7 @@ def test_what_a_wide_patch_is_advised_to_do_helps():
     text = refused(heights=wide, coherence_width=1.5)
     assert "crop the heights, for instance to 1.5 µm" in text
     table = DiffractionTable.build(wide.treated(crop=1.5), coherence_width=1.5)
-    assert table.coarse is None
+    assert not table.limited
 
 
 def test_a_series_too_short_for_any_number_of_intervals_is_refused():
