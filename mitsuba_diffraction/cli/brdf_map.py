@@ -20,7 +20,7 @@ _KEPT = "that of the table or recipe, else "
 _TABLE = {
     "coherence_width": f"{_KEPT}65", "coherence": f"{_KEPT}ensemble", "basis": f"{_KEPT}auto",
     "tolerance": f"{_KEPT}1e-3", "terms": "as many as the tolerance needs",
-    "second_order": "true where it can be",
+    "second_order": f"{_KEPT}auto",
 }  # fmt: skip
 # Options that are parameters of the BSDF, by the plugin's own names.
 _SURFACE = ("material", "int_ior", "coat_ior", "model", "orientation", "height_scale")

@@ -138,7 +138,7 @@ def load_options(args: argparse.Namespace) -> LoadOptions:
     """
     from ..heights.read import LoadOptions
 
-    return LoadOptions.of(**{name: getattr(args, name) for name in _HEIGHTS})
+    return LoadOptions.parse(**{name: getattr(args, name) for name in _HEIGHTS})
 
 
 def given_for_heights(args: argparse.Namespace) -> list[str]:
@@ -193,8 +193,6 @@ def add_table(group: Group, names: Sequence[str] = _TABLE, **defaults: str) -> N
                 "metavar": item.metavar,
                 "type": whole_number(1) if item.type is int else item.type,
             }
-        if item.type is bool:
-            kind = {"action": argparse.BooleanOptionalAction}
         if isinstance(item.metavar, tuple):
             kind["nargs"] = len(item.metavar)
         default = defaults.get(name, item.default_text)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import resource
 import time
-import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import DiffractionWarning
+from ..errors import warn
+from ..optics.second_order_change import applies
 from . import options
 from .console import Bar
 from .report import check_outputs, save_report
@@ -99,15 +99,12 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
     cut_out = (field for field in fields if field.cut_out and settings.windows is None)
     said = [line for field in cut_out for line in edge_lines(field, shortest)]
     for line in said:
-        warnings.warn(line, DiffractionWarning, stacklevel=1)
+        warn(line)
     with Bar(args) as bar:
         table, workers = _built(args, fields, settings, bar)
         if by_recipe:
             output.parent.mkdir(parents=True, exist_ok=True)
         table.save(output)
-    for line in table.source.get("warnings", ()):
-        if line not in said:
-            warnings.warn(line, DiffractionWarning, stacklevel=1)
     print(f"{', '.join(map(str, sources))} -> {output}")
     for label, text in _report(fields, table, output, time.perf_counter() - start):
         print(f"  {label:<6} {text}")
@@ -132,6 +129,17 @@ def _built(
     with client_of(args) as client:
         table, work = build_on_workers(fields, settings, client, bar)
         return table, work.summary()
+
+
+def _second_order_line(table: DiffractionTable) -> str:
+    """Say by how much the second order changes the table's colours, and whether it is applied."""
+    asked, ratios = table.settings.second_order, table.slope_ratios
+    assert ratios is not None
+    word = "applied" if applies(asked, ratios) else "left out"
+    return (
+        f"the second order changes colours by {100 * ratios.change:.2g} % (n = 1.5, light from "
+        f"60°): {word} by second_order={str(asked).lower()}"
+    )
 
 
 def _report(
@@ -175,6 +183,8 @@ def _report(
         f"other orders; tolerance {table.tolerance:g}"
     )
     yield "error", error
+    if table.slope_ratios is not None:
+        yield "", _second_order_line(table)
     # kibibytes on Linux; of the whole process, which is what has to fit
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     yield "cost", f"{seconds:.1f} s, {peak / 1e9:.2g} GB of memory at most"

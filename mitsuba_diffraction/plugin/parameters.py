@@ -15,7 +15,6 @@ from ..errors import DiffractionError
 from ..heights.field import HeightField
 from ..heights.lengths import is_auto, numbers_of
 from ..heights.read import LoadOptions
-from ..optics.second_order import SlopeRatios
 from ..settings import COHERENCES, SCENE_SETTINGS, SURFACE, checked
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, SmallSlope
@@ -32,7 +31,7 @@ from .materials import (
     warn_of_film,
 )
 from .properties import choice, flag, kind_of, number
-from .second_order import SecondOrder, material_of_second_order
+from .second_order import SecondOrder, material_of_second_order, ratios_of_second_order
 from .sources import (
     TableProvider,
     from_cache,
@@ -53,6 +52,10 @@ READING = tuple(field.name for field in fields(LoadOptions))
 PLACING = ("uv_scale", "world_scale", "tiling")
 #: µm: beyond, single precision holds places on the surface to no better than 1 µm.
 MOST_UV_SCALE = 1e7
+ABSORBED = (
+    "film_k makes a film that absorbs, over a nested BSDF, which would get that light; leave "
+    "film_k out, or remove the nested BSDF"
+)
 NAMES = (
     *SOURCES,
     *READING,
@@ -162,17 +165,14 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     wavelength = _wavelength(props, table)
     reflectance = under_film(props, material, wavelength, table.wavelength_range[0])
     if nested is not None and isinstance(reflectance, UnderFilm) and reflectance.numbers()[0].imag:
-        raise DiffractionError(
-            "film_k makes a film that absorbs, over a nested BSDF, which would get that light; "
-            "leave film_k out, or remove the nested BSDF"
-        )
+        raise DiffractionError(ABSORBED)
     flat: Reflectance | UnderCoat | UnderFilm = reflectance
     if coat is not None and not isinstance(material, Perfect):
         flat = UnderCoat(material, coat)
     warn_of_film(reflectance, table, largest)
     boundary = boundary_of(props, reflectance, table)
     second_order = None
-    ratios = None if second is None else _ratios(table, "second_order" in props)
+    ratios = None if second is None else ratios_of_second_order(props, table)
     if second is not None and ratios is not None and isinstance(boundary, SmallSlope):
         second_order = SecondOrder(second, boundary, ratios)
     conserving, through = flag(props, "energy_conserving", True), None
@@ -200,16 +200,6 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
         optical=optical,
         second_order=second_order,
     )
-
-
-def _ratios(table: DiffractionTable, asked: bool) -> SlopeRatios | None:
-    """What the second order takes, of ensembles; None of tables that do not hold it."""
-    if asked and (table.grid.coherent or table.slope_ratios is None):
-        raise DiffractionError(
-            "second_order=true needs a table of coherence='ensemble' that holds what it needs: "
-            "'mitsuba-diffraction precompute' without '--no-second-order'"
-        )
-    return None if table.grid.coherent else table.slope_ratios
 
 
 def _height_scale(props: Properties) -> float | VaryingHeightScale:
@@ -241,7 +231,7 @@ def _table(
     if is_auto(given_settings.get("coherence_width", 0.0)):
         del given_settings["coherence_width"]
     asked = {name: checked(name, value) for name, value in given_settings.items()}
-    options = LoadOptions.of(**{name: props.get(name) for name in READING if name in props})
+    options = LoadOptions.parse(**{name: props.get(name) for name in READING if name in props})
     value = props.get(given[0])
     if given[0] == "data":
         heights = heights_of_tensor(value, options)

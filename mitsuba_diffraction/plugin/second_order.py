@@ -14,8 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiffractionError
-from ..optics.second_order import LIMIT, NODES, SlopeRatios, coefficient_table
-from ..settings import COHERENCES
+from ..optics.second_order import LIMIT, NODES, coefficient_table
+from ..optics.second_order_change import applies
+from ..optics.slope_ratios import SlopeRatios
+from ..settings import COHERENCES, checked
+from ..tables.table import DiffractionTable
 from .boundary import MODELS, SmallSlope
 from .directions import Pair
 from .fresnel import Dielectric, Reflectance
@@ -31,14 +34,14 @@ _NORMAL = 1.0 - 1e-7
 
 
 def material_of_second_order(props: Properties, material: Reflectance) -> Dielectric | None:
-    """The material, unless it is not for it, or it is not wanted.
+    """Return the dielectric that the second order may apply to, or None.
 
     Raises
     ------
     DiffractionError
-        If it is asked for, of what it is not for.
+        If `second_order` is no such setting, or true where the second order is not known.
     """
-    wanted = flag(props, "second_order", True)
+    asked = checked("second_order", props.get("second_order", "auto"))
     dielectric = material if isinstance(material, Dielectric) else None
     defaults = {"model": MODELS[0], "coherence": COHERENCES[0], "layering": LAYERINGS[0]}
     excluded = [
@@ -48,12 +51,36 @@ def material_of_second_order(props: Properties, material: Reflectance) -> Dielec
         *(f"{name}=true" for name in ("thin", "transmission") if flag(props, name, False)),
         *(["an index below that of the medium above"] if _is_below(dielectric) else []),
     ]
-    if excluded and wanted and "second_order" in props:
+    if excluded and asked is True:
         raise DiffractionError(
             "second_order=true is for light that a dielectric reflects, by model='small_slope' and "
             f"coherence='ensemble', not for {excluded[0]}; leave one out"
         )
-    return dielectric if wanted and not excluded else None
+    return dielectric if asked and not excluded else None
+
+
+def ratios_of_second_order(props: Properties, table: DiffractionTable) -> SlopeRatios | None:
+    """Return the table's slope ratios if the second order applies to it, or None.
+
+    The scene's `second_order` wins over that of the table; "auto" decides by the table's change of
+    colours.
+
+    Raises
+    ------
+    DiffractionError
+        If the scene says true and the table has no slope ratios.
+    """
+    ratios, asked = table.slope_ratios, table.settings.second_order
+    if "second_order" in props:
+        asked = checked("second_order", props.get("second_order"))
+    if ratios is None or table.grid.coherent:
+        if asked is True:
+            raise DiffractionError(
+                "second_order=true needs a table of coherence='ensemble' with slope ratios; build "
+                "it with 'mitsuba-diffraction precompute' and '--second-order auto' or 'true'"
+            )
+        return None
+    return ratios if applies(asked, ratios) else None
 
 
 def _is_below(dielectric: Dielectric | None) -> bool:

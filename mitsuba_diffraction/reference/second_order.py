@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from ..heights.field import HeightField
 from ..optics.geometry import diffraction_coordinates, wavenumber
-from ..optics.second_order import Slopes, along, factor, slope_coefficients
+from ..optics.second_order import factor, slope_coefficients
+from ..optics.slope_ratios import Slopes, along
 from .integral import plane_waves
 
 Complex = NDArray[np.complex128]

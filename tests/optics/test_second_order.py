@@ -8,14 +8,12 @@ import pytest
 from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.optics.second_order import (
     Perturbation,
-    Slopes,
-    along,
     factor,
     interpolated,
     obliqueness,
     slope_coefficients,
 )
-from tests.support.directions import polar, rough_patch
+from tests.support.directions import polar
 
 KERATIN = 1.56
 
@@ -67,32 +65,6 @@ def test_power_grows_to_2_25_at_most():
     assert found[0] == pytest.approx(1.1**2 + 0.2**2)
     assert found[1] <= 2.25 + 1e-12
     assert factor(np.ones((2, 2)), ratios, 0.0) == pytest.approx(1.0)
-
-
-def test_slopes_are_those_of_the_surface_and_of_walls_nothing_is_left():
-    x = 2 * np.pi * np.arange(64) / 64
-    gentle = Slopes.of(0.05 * np.sin(x)[None, :] * np.ones((8, 1)), (2.5 / 64, 0.1))
-    q = 2 * np.pi / 2.5
-    slope = 0.05 * q * np.cos(x) / (1 + (q / 23) ** 2)
-    assert gentle.products[0] == pytest.approx(np.tile(slope**2, (8, 1)), abs=1e-12)
-    assert gentle.products[1:] == pytest.approx(0.0, abs=1e-12)
-    assert gentle.gate > 0.98
-    wall = np.tile(0.1 * (x < np.pi), (8, 1))
-    # ρ falls with the pixels, as the walls' own slopes grow
-    assert Slopes.of(wall, (2.5 / 64, 0.1)).gate > Slopes.of(wall, (0.25 / 64, 0.1)).gate < 0.1
-    assert Slopes.of(np.zeros((8, 8)), (0.1, 0.1)).products == pytest.approx(0.0)
-
-
-def test_along_and_across_turn_with_the_order():
-    patch = rough_patch((12, 15), (0.13, 0.15), 0.3)
-    products = Slopes.of(patch.heights, patch.pixel_size).products.reshape(3, -1).T
-    q = np.array([0.6, 0.8])
-    lengthwise, across = along(np.broadcast_to(q, (len(products), 2)), products + 0j).T
-    assert lengthwise + across == pytest.approx(products[:, 0] + products[:, 2])
-    x, _ = along(np.tile([2.0, 0.0], (len(products), 1)), products + 0j).T
-    assert x == pytest.approx(products[:, 0])
-    expected = products @ [0.36, 0.96, 0.64]
-    assert lengthwise == pytest.approx(expected)
 
 
 def test_it_fades_towards_the_normal_and_not_in_oblique_light():

@@ -14,14 +14,17 @@ from tests.support.directions import lit_pairs, polar, rough_patch
 from tests.support.lanes import brdf_values, interaction, refusal, vectors
 
 # a patch this small is beyond what the model likes; that is not the point here
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+pytestmark = [
+    pytest.mark.thorough,
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+]
 
 #: Of 1.7 × 1.76 µm, its orders far apart under the window.
 PATCH = rough_patch((22, 20), (0.085, 0.08), 0.1)
 WIDTH = 16.0
 KERATIN = {
     "int_ior": 1.56, "ext_ior": 1.0, "coherence_width": WIDTH, "tolerance": 1e-3,
-    "energy_conserving": False,
+    "energy_conserving": False, "second_order": True,
 }  # fmt: skip
 
 
@@ -54,17 +57,23 @@ def test_orders_have_the_reference_s_power(variant, ours, theirs):
     assert np.abs(brdf_values(found, *light) - both).sum() < 0.12 * change
 
 
-def test_it_is_there_unless_told_otherwise_or_unknown(variant):
-    told = {"first": {"second_order": False}, "": {}, "same": {"second_order": True}}
-    of = {name: brdf_values(load(**parameters), *coloured()) for name, parameters in told.items()}
-    assert np.array_equal(of[""], of["same"])
-    assert np.abs(of[""] - of["first"]).sum() > 0.01 * of["first"].sum()
+def test_auto_applies_it_where_it_changes_the_table_s_colours(variant):
+    light = coloured()
+    grooves = md.gratings.lamellar(1.6, 0.125, duty=0.6875, periods=1, pixels_per_period=32)
+    for field, applied in ((PATCH, False), (grooves, True)):
+        auto, told = (load(field, second_order=second) for second in ("auto", applied))
+        assert (auto.table.slope_ratios.change >= 0.05) is applied
+        assert (auto.second_order_index == 1.56) is applied
+        assert np.array_equal(brdf_values(auto, *light), brdf_values(told, *light))
+
+
+def test_auto_leaves_out_what_it_is_not_known_for(variant):
     for one in (
         {"model": "kirchhoff"}, {"coherence": "patch"}, {"thin": True}, {"transmission": True},
         {"film_ior": 1.6, "film_thickness": 100.0}, {"int_ior": 1.0, "ext_ior": 1.5},
         {"material": "Al", "int_ior": None, "ext_ior": None},
     ):  # fmt: skip
-        bsdf = load(**one)
+        bsdf = load(second_order="auto", **one)
         assert "second order" not in bsdf.model
         assert bsdf.table.slope_ratios is None  # nothing is built for nothing
 
@@ -190,13 +199,13 @@ def test_what_it_is_not_for_is_refused_by_name(variant, changed, named):
 
 
 def test_a_table_without_it_is_refused_with_what_makes_one(variant, tmp_path):
-    for name, asked in (("without.exr", False), ("with.exr", None)):
+    for name, asked in (("without.exr", False), ("with.exr", True)):
         md.DiffractionTable.build(PATCH, coherence_width=WIDTH, second_order=asked).save(
             tmp_path / name
         )
-    asked = {"coherence_width": None, "tolerance": None}
-    line = refusal(lambda: load(str(tmp_path / "without.exr"), second_order=True, **asked))
-    assert "--no-second-order" in line
+    asked = {"coherence_width": None, "tolerance": None, "second_order": None}
+    line = refusal(lambda: load(str(tmp_path / "without.exr"), **asked | {"second_order": True}))
+    assert "--second-order" in line
     light = coloured()
     assert brdf_values(load(str(tmp_path / "without.exr"), **asked), *light) == pytest.approx(
         brdf_values(load(second_order=False), *light), rel=1e-3, abs=1e-6
@@ -205,7 +214,7 @@ def test_a_table_without_it_is_refused_with_what_makes_one(variant, tmp_path):
     assert brdf_values(from_file, *light) == pytest.approx(
         brdf_values(load(), *light), rel=1e-3, abs=1e-6
     )
-    without = load(str(tmp_path / "with.exr"), second_order=False, **asked)
+    without = load(str(tmp_path / "with.exr"), **asked | {"second_order": False})
     assert (without.second_order_index, from_file.second_order_index) == (None, 1.56)
 
 

@@ -23,10 +23,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.optics import blend, boundary
+from mitsuba_diffraction.optics.colour import SHORTEST
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
-from mitsuba_diffraction.optics.second_order import SlopeRatios, factor, interpolated
-from mitsuba_diffraction.settings import TableSettings
-from mitsuba_diffraction.tables.build.slope_ratios import slope_ratios
+from mitsuba_diffraction.optics.second_order import factor, interpolated
+from mitsuba_diffraction.optics.slope_ratios import CellGrid, CellSums, SlopeRatios
 
 from .cases import PIXELS, Grating, index_of, order_sines
 
@@ -153,15 +153,18 @@ def second_order(
 ) -> NDArray[np.float64]:
     """What the default multiplies orders of a dielectric by, (n,); arguments as `efficiencies`."""
     total = float(wavenumber(wavelength)) * (wi + wo)
-    places = (ratios or _ratios(field)).at(total[:, :2], total[:, 2])
+    places = (ratios or slope_ratios(field)).at(total[:, :2], total[:, 2])
     places[np.hypot(*total[:, :2].T) < 1e-6] = 0.0  # order 0 is the first order's
     share = share_of(field, index, wi, wo, wavelength)
     return factor(interpolated(index, wi, wo), places, share)
 
 
 @cache
-def _ratios(patch: HeightField) -> SlopeRatios:
-    return slope_ratios([patch], TableSettings(height_scale_max=1.0))
+def slope_ratios(patch: HeightField) -> SlopeRatios:
+    """Return the slope ratios of a patch that tiles the plane."""
+    q_limit = 2.0 * float(wavenumber(SHORTEST))
+    grid = CellGrid.of(patch.extent, patch.rms_height, q_limit, (q_limit, q_limit), q_limit)
+    return CellSums.of([(patch, np.ones((1, 1)))], grid).ratios()
 
 
 @cache

@@ -20,11 +20,11 @@ from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
 from mitsuba_diffraction.tables.energy.grid import DirectionalTable
 from mitsuba_diffraction.tables.energy.transmission import Medium, Sides
 
-from . import rayleigh, spread
+from . import rayleigh
 from .cases import FEW_WAVELENGTHS, KERATIN, Grating
 from .compare import GRAZING
-from .markdown import percent, table
 from .model import lobe_sigma
+from .pages.markdown import percent, table
 
 Real = NDArray[np.float64]
 
@@ -84,10 +84,9 @@ def _kept(
     sides, scale = _scale(grating, wavelength)
     ends = (theta, phi), (np.arccos(-found.wo[:, 2]), np.arctan2(found.wo[:, 1], found.wo[:, 0]))
     product = np.ones(len(found.wo))
-    for n, one in enumerate((scale or [])[:4]):
-        changes = product * sides.at(one, n % 2, *ends[n % 2], wavelength)
-        zeroth = (found.order == 0).all(axis=1)
-        product = np.where(zeroth | (n > 1), changes, product)  # c is order 0's alone
+    for side, table in enumerate(scale or []):
+        changes = product * table.at(*ends[side], wavelength)
+        product = np.where((found.order == 0).all(axis=1), changes, product)  # order 0 alone
     return product
 
 
@@ -146,39 +145,14 @@ A lossless dielectric has 1:
 
 {table(["surface", "light", *(f"{theta:g}°" for theta in PASSED)], sums(surfaces))}
 
-The recipes of `precompute/`, coherent over the default 65 µm, up to 75°; *spread* is the largest
-share of single directions' light (`python -m docs.make.validation passed` prints this table):
+The recipes of `precompute/`, coherent over the default 65 µm, up to 75°
+(`python -m docs.make.validation passed` prints this table):
 
 {wide(recipes)}
 
-The aim is 0.98 to 1.001. Sheets reach it. Scales take 0.3 MB, of gratings' sheets 4 to 25. These
-are sums over orders. A path tracer found the sheet of `blazed` between 0.982 and 1.010 in 60 random
-directions and wavelengths (noise 0.0015), those of `cd` and `dvd_pits` between 0.985 and 1.001 in
-50, within 0.013, 0.004 and 0.003 of the sums, when scales had ten nodes from order to order instead
-of fourteen. The sums take the scale in the middle of a lobe, across which it bends amid kinks: of
-18 directions picked there one was at 1.035.
-
-Between the scale's directions and wavelengths R + T is looked at too: the scale is lowered where
-that is above 1, and more is spread where it is below 0.985. Orders come and go there. Of a sheet
-that is a grating the nodes lie where they do, if its lobes are narrow; if they are not and light is
-lacking, its directions are finer. Of an interface they cannot: orders come up at its upper side
-where (c − x)/g is whole and at its lower one where (c' − x)/g is, c² = 1 − y², c'² = n² − y², and
-no grid of two whole numbers has both. So light from within a
-grating meets kinks between nodes, narrower than a cell, and loses 2 to 4 % there in single
-directions, on steep walls more. A third to a half more nodes along angles and azimuths bring `cd`
-from 0.91 to 0.937 at least, before anything is spread, in twice the time: they are not spent.
-
-What s, which multiplies colours and is at most 1.5, leaves out is spread over all directions where
-some is missing, if R + T is below 0.98 in 3 % of the directions between nodes: it is the blazed
-grating's, and interfaces' from within. It cannot be order 0's: what is missing along one direction,
-and not along those that order 0 goes to, no reciprocal model can give to order 0.
-
-{spread.section()}
-
-So it is not: what is missing is in the strong orders, each of them too weak by some per cent. A
-grating has no light between its orders, so what is spread keeps the account of energy and no more,
-and s, which keeps it too, does not bring orders closer to the rigorous ones on slopes like these.
-`energy_conserving=false` leaves orders as they are."""
+Order 0 alone is scaled, so colours are as the model has them; where order 0 has too little light,
+what is missing stays missing, and what is too much stays too much. `energy_conserving=false` leaves
+order 0 as it is."""
 
 
 def wide(recipes: Sequence[Path] = PRECOMPUTE) -> str:
@@ -188,16 +162,14 @@ def wide(recipes: Sequence[Path] = PRECOMPUTE) -> str:
         built = DiffractionTable.build(recipe.fields(), **recipe.table)
         cells = []
         for _, found in sorted(sides_summary(built).items(), reverse=True):  # sheets first
-            spread = found.pop("spread, largest")
             for kept in (False, True):
                 ends = [
                     span for key, spans in found.items() if ("conserved" in key) == kept
                     for one in spans.values() for span in one
                 ]  # fmt: skip
                 cells.append(_span([min(ends), max(ends)]))
-            cells.append(f"{spread:.3f}")
         rows.append([recipe.path.stem, *cells])
-    whats = "as it is", "default", "spread"
+    whats = "as it is", "default"
     kinds = [f"{kind}, {what}" for kind in ("sheet", "dielectric") for what in whats]
     return table(["recipe", *kinds], rows)
 

@@ -13,7 +13,8 @@ from ...optics.blend import NODES_PER_OCTAVE, RoughnessTable
 from ...optics.colour import RGB_WAVELENGTHS, linear_srgb, metal_tint, response
 from ...optics.fresnel import reflectance
 from ...optics.geometry import wavenumber
-from ...optics.second_order import LIMIT, NODES, SlopeRatios, coefficient_table
+from ...optics.second_order import LIMIT, NODES, coefficient_table
+from ...optics.slope_ratios import SlopeRatios
 from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
 from ...tables.energy.gain import GRAZING

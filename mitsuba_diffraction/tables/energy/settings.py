@@ -15,6 +15,8 @@ class EnergySettings:
     Attributes
     ----------
     polar, azimuthal : cells of the grid that scales are tabulated on.
+    side_polar, side_wavelengths : of the scale of both sides of a dielectric, whose light bends
+        quickly towards the critical angle.
     wavelengths, film_wavelengths : of a scale; under a film, whose fringes albedos follow, more. In
         variants of one wavelength there is one.
     coarse_polar, coarse_azimuthal, coarse_wavelengths : of the albedo of the model as it is, which
@@ -34,6 +36,8 @@ class EnergySettings:
 
     polar: int = 40
     azimuthal: int = 60
+    side_polar: int = 80
+    side_wavelengths: int = 8
     wavelengths: int = 16
     film_wavelengths: int = 16
     coarse_polar: int = 20

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from ...optics import blend, boundary, coat, fresnel, through
 from ...optics.blend import RoughnessTable
@@ -270,13 +271,13 @@ class Sides:
         # κ of light that stays within is larger by the index
         self._orders = Orders(table, height_scale * medium.index, self.settings, apart=True)
         self._level = self._orders.level()
-        self._grid = DirectionGrid(self.settings.polar, self.settings.azimuthal)
+        self._grid = DirectionGrid(self.settings.side_polar, self.settings.azimuthal)
         self._powers: dict[tuple[Link, bytes], Real] = {}
 
     def scale(self, wavelength_range: tuple[float, float]) -> list[DirectionalTable] | None:
         """Find c above and below; None where R + T is 1 as it is."""
         grid, settings = self._grid, self.settings
-        wavelengths = wavelengths_of(wavelength_range, settings.wavelengths)
+        wavelengths = wavelengths_of(wavelength_range, settings.side_wavelengths)
         ones = np.stack([grid.ones] * 2)
 
         def solved(wavelength: float) -> Array:
@@ -288,7 +289,9 @@ class Sides:
             most = settings.largest**2
             wanted = np.clip(1.0 - sums.orders, zeroth / most, zeroth * most)
             c = scaled(sums.zeroth, wanted, settings.largest, settings.sweeps)
-            return np.where(zeroth > FAINT, c, np.float32(1.0))
+            c = np.where(zeroth > FAINT, c, np.float32(1.0))
+            # what lies within one row, as a lobe at the critical angle, is left to itself
+            return np.asarray(median_filter(c, (1, 3, 1), mode="nearest"))
 
         scale = np.stack(parallel(solved, wavelengths.tolist()))
         if np.all(scale == 1.0):
@@ -347,10 +350,12 @@ class Sides:
     def _ways(self, link: Link, theta: Real, k: float) -> list[Way]:
         """The way of light along a link, for each polar angle of incidence (rad)."""
         orders = self._level if link.flat else self._orders
-        key = link, theta.tobytes()
-        if key not in self._powers:  # the same at all wavelengths
-            self._powers[key] = link.powers(*link.nodes(theta))
-        tables = link.tables(self._powers[key], theta, k, orders)
+        tables = np.zeros((len(theta), 2, 2))
+        if orders.has_weak or len(orders.mixture.frequency):
+            key = link, theta.tobytes()
+            if key not in self._powers:  # the same at all wavelengths
+                self._powers[key] = link.powers(*link.nodes(theta))
+            tables = link.tables(self._powers[key], theta, k, orders)
         came, left = (self._medium.measured(side) for side in (link.came, link.left))
         per_w = k / self._medium.index  # heights of the orders are larger by the index
         least = orders.mixture.kappa_step / per_w

@@ -9,8 +9,9 @@ import pytest
 
 from mitsuba_diffraction import DiffractionTable, HeightField, gratings
 from mitsuba_diffraction.errors import DiffractionError
-from mitsuba_diffraction.optics.second_order import SlopeRatios, Slopes, along
+from mitsuba_diffraction.optics.slope_ratios import SlopeRatios, Slopes, along
 from mitsuba_diffraction.settings import TableSettings
+from mitsuba_diffraction.tables.build.describe import roughness_of
 from mitsuba_diffraction.tables.build.slope_ratios import slope_ratios
 from mitsuba_diffraction.tables.build.windows import windows_of
 from mitsuba_diffraction.tables.document import described, document_of, plain
@@ -19,15 +20,19 @@ from tests.support.directions import rough_patch
 #: Of few orders, and of many; not square.
 FEW = rough_patch((24, 30), (0.1, 0.11), 0.2)
 MANY = gratings.elaphe_like(extent=20.0, pixels=100, seed=3)
-SETTINGS = TableSettings(second_order=True, height_scale_max=1.0)
+SETTINGS = TableSettings(height_scale_max=1.0)
+#: Only the change of colours depends on it.
+ROUGHNESS = roughness_of([FEW], 40.0)
 #: Half floats.
 ROUNDED = 2e-3
 
 
 def ratios(*patches: HeightField, **changed: object) -> SlopeRatios:
-    return slope_ratios(
-        patches, TableSettings(second_order=True, **{"height_scale_max": 1.0, **changed})
-    )
+    return of_table(patches, TableSettings(**{"height_scale_max": 1.0, **changed}))
+
+
+def of_table(patches, settings: TableSettings) -> SlopeRatios:
+    return slope_ratios(patches, settings, ROUGHNESS)
 
 
 def exact(field: HeightField, order: tuple[int, int], kappa: float) -> np.ndarray:
@@ -92,17 +97,17 @@ def test_several_patches_and_windows_have_the_mean():
     wide = HeightField(np.tile(MANY.heights, (4, 4)), MANY.pixel_size)
     cut = windows_of([wide], TableSettings(16.0, windows="auto"))
     assert len(cut) > 1
-    found, whole = slope_ratios(cut, SETTINGS), ratios(MANY)
+    found, whole = of_table(cut, SETTINGS), ratios(MANY)
     q = np.random.default_rng(1).uniform(-6.0, 6.0, (200, 2))
     expected = whole.at(q, 20.0)
     # seams fade; neighbouring orders are seen through the window's lobe
     assert np.abs(found.at(q, 20.0) - expected).mean() < 0.2 * np.abs(expected).mean()
 
 
-def test_a_restricted_table_has_it_as_far_as_it_has_orders():
-    whole, cut = ratios(MANY), ratios(MANY, q_max=(16.0, 9.0), kappa_max=20.0)
-    assert cut.values.nbytes < 0.2 * whole.values.nbytes
-    assert cut.kappa == (whole.kappa[0], 20.0)
+def test_a_limited_table_has_it_as_far_as_it_has_orders():
+    whole, cut = ratios(MANY), ratios(MANY, frequency_limit=(16.0, 9.0))
+    assert cut.values.nbytes < 0.4 * whole.values.nbytes
+    assert cut.kappa == whole.kappa
     for q in ([4.0, 1.0], [-5.0, 2.0], [0.0, -4.0]):  # and the cells about
         place = np.round(np.array(q) / whole.cell) * whole.cell
         expected = whole.at(place, whole.kappa[0])
@@ -112,13 +117,14 @@ def test_a_restricted_table_has_it_as_far_as_it_has_orders():
 
 def test_ensembles_have_it_unless_told_otherwise():
     for given, expected in (
-        ({}, True),
+        ({}, "auto"),
         ({"coherence": "patch"}, False),
         ({"basis": "taylor"}, False),
     ):
-        assert TableSettings(**given).second_order is expected
+        assert TableSettings(**given).second_order == expected
         for asked in (False, True):
             assert TableSettings(**given, second_order=asked).second_order is asked
+    assert TableSettings(second_order="true").second_order is True
 
 
 def test_a_table_keeps_it_in_its_file_unless_told_not_to(tmp_path):
@@ -132,7 +138,7 @@ def test_a_table_keeps_it_in_its_file_unless_told_not_to(tmp_path):
     loaded = DiffractionTable.load(tmp_path / "with.exr")
     assert loaded.digest() == table.digest() != plain.digest()
     assert np.array_equal(loaded.slope_ratios.values, table.slope_ratios.values)
-    again = DiffractionTable.load(tmp_path / "without.exr")  # as all files of before
+    again = DiffractionTable.load(tmp_path / "without.exr")
     assert again.slope_ratios is None
     assert again.settings == plain.settings
     assert again.digest() == plain.digest()
@@ -144,6 +150,7 @@ def test_a_table_keeps_it_in_its_file_unless_told_not_to(tmp_path):
 @pytest.mark.parametrize(
     ("name", "value"),
     [
+        ("change", -0.1),
         ("cell", [0.0, 1.0]),
         ("orders", [1, 0]),
         ("kappa", [9.0, 3.0]),
@@ -156,7 +163,7 @@ def test_a_table_keeps_it_in_its_file_unless_told_not_to(tmp_path):
 def test_of_a_damaged_file_it_is_refused(name, value):
     table = DiffractionTable.build(FEW, second_order=True, coherence_width=6.0, tolerance=0.01)
     document = document_of(table)
-    assert table.summary()["second_order"]
+    assert table.summary()["second_order"]["applied"] is True
     described(json.loads(json.dumps(document, default=plain)))
     document["slope_ratios"][name] = value
     with pytest.raises(ValueError, match=r".+"):
@@ -164,14 +171,14 @@ def test_of_a_damaged_file_it_is_refused(name, value):
 
 
 def test_other_words_than_true_and_false_are_refused():
-    with pytest.raises(DiffractionError, match="must be true or false"):
+    with pytest.raises(DiffractionError, match="must be auto, true or false"):
         TableSettings(second_order="yes")
 
 
 def test_few_transforms_do_for_low_heights_whose_ratios_go_with_one_over_kappa(monkeypatch):
     low = HeightField(0.3 * MANY.heights, MANY.pixel_size)
     found = ratios(low)
-    monkeypatch.setattr("mitsuba_diffraction.tables.build.slope_ratios.BETWEEN", 0.01)
+    monkeypatch.setattr("mitsuba_diffraction.optics.slope_ratios.BETWEEN", 0.01)
     every = ratios(low)  # each node summed
     assert found.values.shape == every.values.shape
     inside = (..., slice(10, 21), slice(10, 21))
