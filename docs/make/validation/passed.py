@@ -6,7 +6,7 @@ That takes a fraction of a second a grating, and is done when the page is made; 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +17,6 @@ from mitsuba_diffraction.analysis.energy import PASSED, sides_summary
 from mitsuba_diffraction.heights.recipes import Recipe
 from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
-from mitsuba_diffraction.tables.energy.grid import DirectionalTable
-from mitsuba_diffraction.tables.energy.transmission import Medium, Sides
 
 from . import rayleigh
 from .cases import FEW_WAVELENGTHS, KERATIN, Grating
@@ -36,7 +34,7 @@ GRATINGS = tuple(
 ANGLES = (0.0, 30.0, 60.0, 75.0)
 #: Azimuths of the light: across the grooves, between, along.
 AZIMUTHS = (0.0, 35.0, 90.0)
-MODELS = ("kirchhoff", "small_slope", "small_slope, conserved")
+MODELS = ("kirchhoff", "small_slope")
 #: Beside those whose orders are compared.
 SURFACES = {
     "sinusoid 2.5/0.08 µm": partial(gratings.sinusoidal, 2.5, 0.08, periods=8),
@@ -68,36 +66,11 @@ def orders_of(
     sigma = lobe_sigma(grating)
     btdf = reference.btdf(
         field, wi, found.wo, wavelength,
-        eta=KERATIN, coherence_width=WIDTHS_PER_SIGMA * sigma, model=model.split(",")[0],
+        eta=KERATIN, coherence_width=WIDTHS_PER_SIGMA * sigma, model=model,
     )  # fmt: skip
-    if model == MODELS[-1]:
-        btdf = btdf * _kept(grating, wavelength, polar, turn, found)
     per_btdf = np.pi / (sigma * float(wavenumber(wavelength))) ** 2
     coloured = (found.order != 0).any(axis=1) & (-found.wo[:, 2] > np.cos(np.radians(GRAZING)))
     return per_btdf * btdf, exact, coloured.astype(float)
-
-
-def _kept(
-    grating: Grating, wavelength: float, theta: float, phi: float, found: rayleigh.Orders
-) -> Real:
-    """What orders are multiplied by where energy is conserved."""
-    sides, scale = _scale(grating, wavelength)
-    ends = (theta, phi), (np.arccos(-found.wo[:, 2]), np.arctan2(found.wo[:, 1], found.wo[:, 0]))
-    product = np.ones(len(found.wo))
-    for side, table in enumerate(scale or []):
-        changes = product * table.at(*ends[side], wavelength)
-        product = np.where((found.order == 0).all(axis=1), changes, product)  # order 0 alone
-    return product
-
-
-@lru_cache
-def _scale(grating: Grating, wavelength: float) -> tuple[Sides, list[DirectionalTable] | None]:
-    width = WIDTHS_PER_SIGMA * lobe_sigma(grating)
-    table = DiffractionTable.build(
-        grating.heights(_PIXELS), coherence_width=width, height_scale_max=KERATIN
-    )
-    sides = Sides(table, 1.0, Medium(KERATIN, "small_slope", thin=False))
-    return sides, sides.scale((wavelength, wavelength))
 
 
 def deviation(grating: Grating, theta: float, azimuth: float, model: str) -> float:
@@ -130,13 +103,13 @@ def section(gratings: Sequence[Grating] = GRATINGS) -> str:
 
 Orders that go through (`transmission`), from above into keratin, against Rayleigh's expansion, with
 light across the grooves (azimuth 0°), between and along them; steepest slopes from 0.03 to 0.2.
-Deviation of colours within {GRAZING:g}° of the normal, Kirchhoff's model / `small_slope` as it is /
-with energy conserved, the default:
+Deviation of colours within {GRAZING:g}° of the normal, Kirchhoff's model / `small_slope`, the
+default; conserving energy does not change them:
 
 {table(header, rows)}
 
 At slopes up to 0.1 the default is within {percent(worst[0.0])} in light along the normal, and
-within {percent(max(worst.values()))} up to 75°: energy is conserved by order 0, which is no colour.
+within {percent(max(worst.values()))} up to 75°.
 What a thin sheet does besides is Fresnel's: its other side is flat.
 
 Reflected and transmitted light by `small_slope` as it is → by default, coherent over 20 µm, of an
