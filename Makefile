@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test test-all fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks validation energy realtime lint clean help
+.PHONY: setup demo test test-all fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks site validation energy realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -85,7 +85,12 @@ parameters: setup  ## make docs/parameters.md from the plugin's docstring
 notebooks: setup  ## run the notebooks, and keep what they show in their files
 	@$(PYTHON3) -m docs.make.figures.notebooks
 
-validation: setup  ## compare the model with rigorous solutions: docs/validation.md
+# mkdocs loads the hooks of docs/make/site from here
+site: setup  ## build the pages with an API reference: out/site/index.html
+	@PYTHONPATH=. NO_MKDOCS_2_WARNING=1 $(PYTHON3) -W ignore -m mkdocs build --strict --quiet
+	@echo "Open out/site/index.html"
+
+validation: setup  ## compare the model with rigorous solutions: docs/validation.md and docs/validation/
 	@$(PYTHON3) -m docs.make.validation report -o docs
 
 SURFACES := sinusoidal blazed cd cd_pits dvd_pits elaphe_like xenopeltis_like

@@ -21,6 +21,11 @@ from tests.support.command_line import Ran
 from tests.support.variants import VARIANTS, obstacle
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Allow the package's own warnings, which follow from a test's surface; others are errors."""
+    config.addinivalue_line("filterwarnings", "ignore::mitsuba_diffraction.DiffractionWarning")
+
+
 @pytest.fixture(scope="session", autouse=True)
 def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """The cache of tables, for this session alone: tests never touch the user's.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from fnmatch import fnmatch
 from pathlib import Path
 
 import grimp
@@ -92,3 +93,9 @@ def test_the_tier_of_a_file_is_one_line_at_its_top():
             assert len(lines) == 1, file
             # alone, or first among other marks
             assert lines[0].replace("[", "").startswith("pytestmark = pytest.mark.thorough"), file
+
+
+def test_no_test_file_lies_where_pytest_does_not_look(pytestconfig):
+    patterns = pytestconfig.getini("norecursedirs")
+    for folder in {part for file in TESTS for part in file.relative_to(ROOT).parts[:-1]}:
+        assert not any(fnmatch(folder, pattern) for pattern in patterns), folder

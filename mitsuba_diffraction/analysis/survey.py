@@ -128,7 +128,7 @@ class Job:
     @property
     def key(self) -> str:
         """Changes when the row may."""
-        treatment = [self.treatment.options.given(), dict(self.treatment.settings)]
+        treatment = [self.treatment.options.specified(), dict(self.treatment.settings)]
         own = (VERSION, self.theta, self.resolution, self.variant.partition("_")[2])
         return key_of("survey", self.files.digest, treatment, *own)[:32]
 

@@ -175,7 +175,7 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     return {
         "kind": "recipe",
         **({"generator": recipe.generator} if recipe.generator else {}),
-        "options": recipe.options.given(),
+        "options": recipe.options.specified(),
         "table": table,
         "output": str(recipe.output),
         "output exists": recipe.output.is_file(),

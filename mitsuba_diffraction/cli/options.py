@@ -138,7 +138,7 @@ def load_options(args: argparse.Namespace) -> LoadOptions:
     """
     from ..heights.read import LoadOptions
 
-    return LoadOptions.of(**{name: getattr(args, name) for name in _HEIGHTS})
+    return LoadOptions.parse(**{name: getattr(args, name) for name in _HEIGHTS})
 
 
 def given_for_heights(args: argparse.Namespace) -> list[str]:

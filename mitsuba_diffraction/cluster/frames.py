@@ -8,7 +8,6 @@ import math
 import os
 import tempfile
 import time
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -17,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..atomic import atomic_path
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionError, warn
 from ..progress import Progress, silent
 from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink
 from ..scene.passes import Result, Stop, developed, groups_of, passes_of
@@ -76,10 +75,6 @@ def render(
     DiffractionError
         If a worker is of no use, or a task fails: with frame, passes and worker.
     """
-
-    def warn(line: str) -> None:
-        warnings.warn(line, DiffractionWarning, stacklevel=2)
-
     name = set_variant(variant)
     with tempfile.TemporaryDirectory() as temporary, Stop() as stop:
         film = Film(

@@ -3,15 +3,16 @@
 Contents
 --------
 HeightField  heights in µm on a grid that tiles the plane (in `field`)
-load         from any file to a `HeightField`
-read         `LoadOptions`; which reader, which units, which treatment
-formats      the readers, by kind of file
-recipes      TOML files that say where heights come from and what is made of them
+load         a `HeightField` from any file
+read         `LoadOptions`; choice of reader, units and treatments
+formats      readers, by kind of file
+recipes      TOML files that name the source of heights and the settings of their table
 preprocess   treatments of heights: crop, fill, level, clip, make periodic
-gratings     height fields that are made, not measured
-validity     where a patch leaves the model or its own resolution
-spectra      the spectrum of heights, and the powers of their orders
-lengths      lengths, counts and other numbers as users give them
+seams        steps of height where the edges of tiled patches meet
+gratings     height fields computed from formulas
+validity     warnings where a patch leaves the model or its own resolution
+spectra      spectrum of heights, and powers of their orders
+lengths      checks of lengths, counts and other numbers that users write
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from .validity import validity
 
 __all__ = ["HeightField"]
 
-# Modules that build on the class; it shall not import them
+# Attached here: their modules import the class, so the class cannot import them.
 HeightField.load = staticmethod(load)
 HeightField.treated = treated
 HeightField.validity = validity

@@ -19,29 +19,29 @@ FloatArray = npt.NDArray[np.float64]
 
 # 16384² pixels, 2 GiB of heights: beyond it no table could be built in the memory of a workstation.
 MAX_PIXELS = 2**28
-#: Beyond so many pixels statistics are added up by so many rows.
+#: Statistics of fields with more than LARGE pixels are summed over blocks of ROWS rows.
 LARGE, ROWS = 2**25, 256
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class HeightField:
-    """Heights of one patch, which tiles the plane.
+    """Heights of one patch of surface, which tiles the plane.
 
     Parameters
     ----------
     heights
         Heights in µm, shape (ny, nx), at least 2 × 2, finite. `heights[iy, ix]` lies at
-        x = ix·dx, y = iy·dy. They are copied, and read-only afterwards. Only differences matter:
-        where a constant offset takes them beyond 10 mm, their mean is subtracted.
+        x = ix·dx, y = iy·dy. They are copied, and read-only afterwards. Only differences of height
+        matter: where a constant offset takes heights beyond 10 mm, their mean is subtracted.
     pixel_size
         µm, one number for square pixels or a pair (dx, dy); "0.05" and "0.05, 0.1" also work.
     name
-        What to call the patch in messages, for instance its file.
+        Name of the patch in messages, for instance its file.
     history
-        One line per treatment that the heights have had (levelling, filling, ...), oldest first.
+        One line per treatment of the heights (levelling, filling, ...), oldest first.
     cut_out
-        The patch is a part of a larger surface, as a file's or a cropped one: opposite edges need
-        not meet, and `validity` says if they do not.
+        Whether the patch is a part of a larger surface, as a scan or a cropped patch is: opposite
+        edges need not meet, and `validity` warns if they do not.
 
     Raises
     ------
@@ -56,10 +56,10 @@ class HeightField:
     history: tuple[str, ...] = field(default=(), kw_only=True)
     cut_out: bool = field(default=False, kw_only=True)
 
-    # Set by the package `heights`, since what they do builds on this class
-    load: ClassVar[Callable[..., HeightField]]  #: from a file: `load.load`
-    treated: ClassVar[Callable[..., HeightField]]  #: after treatments: `load.treated`
-    validity: ClassVar[Callable[..., list[str]]]  #: where the model ends: `validity.validity`
+    # The package `heights` sets these: their modules import this class.
+    load: ClassVar[Callable[..., HeightField]]  #: `load.load`: read a file
+    treated: ClassVar[Callable[..., HeightField]]  #: `load.treated`: apply treatments
+    validity: ClassVar[Callable[..., list[str]]]  #: `validity.validity`: warn of the model's limits
 
     def __init__(
         self,
@@ -93,7 +93,7 @@ class HeightField:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Size of the patch (Lx, Ly) in µm, the period with which it tiles the plane."""
+        """Size (Lx, Ly) of the patch in µm: the periods of the tiling."""
         ny, nx = self.shape
         dx, dy = self.pixel_size
         return nx * dx, ny * dy
@@ -114,9 +114,9 @@ class HeightField:
 
     @cached_property
     def rms_slope(self) -> float:
-        """Root-mean-square of |∇h|, dimensionless, from differences of neighbours in the patch.
+        """Root-mean-square of |∇h|, dimensionless, from differences of neighbouring samples.
 
-        The seams between tiles are left out: their steps are not part of the surface.
+        Steps at the seams between tiles are left out: they are not part of the surface.
         """
         dx, dy = self.pixel_size
         if self.heights.size > LARGE:
@@ -131,15 +131,15 @@ class HeightField:
             + _mean_square(np.diff(self.heights, axis=0)) / dy**2
         )
 
-    def _blocks(self, more: int = 0) -> Iterator[FloatArray]:
-        """Some rows at a time, and `more` of the next, so that no copy is as large as the field."""
+    def _blocks(self, overlap: int = 0) -> Iterator[FloatArray]:
+        """Yield blocks of `ROWS` rows, each with `overlap` rows of the next block."""
         for start in range(0, self.shape[0], ROWS):
-            yield self.heights[start : start + ROWS + more]
+            yield self.heights[start : start + ROWS + overlap]
 
     def changed(
         self, heights: npt.ArrayLike, line: str, *, cut_out: bool | None = None
     ) -> HeightField:
-        """The patch with other heights on the same pixels, and one more line of `history`."""
+        """Return the patch with other heights on the same pixels and `line` added to `history`."""
         return HeightField(
             heights,
             self.pixel_size,
@@ -155,11 +155,11 @@ class HeightField:
         return content.hexdigest()
 
     def digest(self) -> str:
-        """SHA-256 of the heights and the pixel size, in hexadecimal: equal for equal content."""
+        """Return the SHA-256 of shape, pixel size and heights in hexadecimal."""
         return self._digest
 
     def summary(self) -> dict[str, Any]:
-        """What the patch is, as plain numbers and strings; lengths in µm."""
+        """Return name, size, statistics and history as plain numbers and strings; lengths in µm."""
         return {
             "name": self.name,
             "shape": list(self.shape),
@@ -182,22 +182,23 @@ class HeightField:
 
 
 def check_pixel_count(ny: int, nx: int, name: str) -> None:
-    """Refuse a shape before memory is spent on it: too small to be a surface, or too large."""
+    """Refuse a shape that is too small or too large, before memory is allocated for it."""
     if ny < 2 or nx < 2:
-        raise DiffractionError(
-            f"{name}: {nx} x {ny} pixels are no patch of surface; at least 2 x 2 are needed"
-        )
+        raise DiffractionError(f"{name}: {nx} x {ny} pixels are too few; at least 2 x 2 are needed")
     if ny * nx > MAX_PIXELS:
         raise DiffractionError(
-            f"{name}: {nx} x {ny} pixels are more than the {MAX_PIXELS} supported "
+            f"{name}: {nx} x {ny} pixels are more than the {MAX_PIXELS} that are supported "
             f"(about {math.isqrt(MAX_PIXELS)}²); crop the file or use coarser pixels"
         )
 
 
 def _checked_heights(heights: npt.ArrayLike, name: str) -> tuple[FloatArray, float]:
-    """Check and copy to a read-only C-ordered float64 array; one that is all this is not copied.
+    """Check heights and copy them to a read-only C-ordered float64 array, unless they are one.
 
-    With it comes the offset that was subtracted, µm.
+    Returns
+    -------
+    FloatArray, float
+        The heights, and the constant offset that was subtracted from them, µm.
     """
     if np.ma.isMaskedArray(heights) and np.ma.is_masked(heights):
         raise DiffractionError(f"{name}: heights have masked points; fill them first")
@@ -215,8 +216,8 @@ def _checked_heights(heights: npt.ArrayLike, name: str) -> tuple[FloatArray, flo
         )
     ny, nx = array.shape
     check_pixel_count(ny, nx, name)
-    owned = array is heights and array.base is None and not array.flags.writeable
-    if not (owned and array.dtype == np.float64 and array.flags.c_contiguous):
+    immutable = array is heights and array.base is None and not array.flags.writeable
+    if not (immutable and array.dtype == np.float64 and array.flags.c_contiguous):
         array = np.array(array, dtype=np.float64, order="C")
         array.setflags(write=False)
     low, high = float(array.min()), float(array.max())  # NaN if any height is
@@ -236,6 +237,7 @@ def _checked_heights(heights: npt.ArrayLike, name: str) -> tuple[FloatArray, flo
 
 
 def _describe_missing(array: FloatArray) -> str:
+    """Return how many heights are NaN or infinite, for an error message."""
     if not np.isfinite(array).any():
         return "no height is a finite number; the patch is empty"
     return (

@@ -1,4 +1,4 @@
-"""Lengths (µm) and counts that users give, as numbers or strings, checked at the door."""
+"""Checks of the lengths (µm), counts and seeds that users write as numbers or strings."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ import numpy as np
 
 from ..errors import DiffractionError, quoted
 
-# A pixel below the size of an atom or a height above 10 mm is a mistake of units, not a sample.
+# Limits in µm: a pixel below the size of an atom or a height above 10 mm is a mistake of units.
 SHORTEST_PIXEL = 1e-5
 LONGEST_PIXEL = 1e3
 LONGEST_HEIGHT = 1e4
 
-#: µm in one of each unit that heights may come in; names after NFKC, which unites µ and μ, Å and Å.
+#: µm per unit of length that files may state; names after NFKC, which unites µ and μ, Å and Å.
 UNITS = {
     "m": 1e6, "cm": 1e4, "mm": 1e3, "\u03bcm": 1.0, "um": 1.0, "nm": 1e-3, "pm": 1e-6,
     "\u00c5": 1e-4,
@@ -30,14 +30,14 @@ Height = float | str
 
 
 def pixel_size_of(value: PixelSize | None, where: str = "pixel_size") -> tuple[float, float] | None:
-    """Pixel size (dx, dy) in µm from a number, a pair, "0.05", "0.05, 0.1", or "auto".
+    """Return the pixel size (dx, dy) in µm from a number, a pair, "0.05", "0.05, 0.1", or "auto".
 
-    `None` and "auto" give `None`: the file has to know.
+    `None` and "auto" give `None`: the file has to state it.
 
     Raises
     ------
     DiffractionError
-        If it is none of these; `where` names the parameter.
+        If the value is none of these; `where` names the parameter.
     """
     if is_auto(value):
         return None
@@ -46,14 +46,14 @@ def pixel_size_of(value: PixelSize | None, where: str = "pixel_size") -> tuple[f
         f"to {LONGEST_PIXEL:g}, or 'auto'"
     )
     lengths = numbers_of(value) or ()
-    known = len(lengths) in (1, 2)
-    if not known or min(lengths) < SHORTEST_PIXEL or max(lengths) > LONGEST_PIXEL:
+    counted = len(lengths) in (1, 2)
+    if not counted or min(lengths) < SHORTEST_PIXEL or max(lengths) > LONGEST_PIXEL:
         raise DiffractionError(f"{expected}; got {quoted(value)}")
     return lengths[0], lengths[-1]
 
 
 def height_of(value: Height | None) -> float | None:
-    """Height in µm, above 0, from a number or a numeric string; `None` and "auto" give `None`."""
+    """Return a height in µm, above 0, from a number or numeric string; `None` for "auto"."""
     if is_auto(value):
         return None
     lengths = numbers_of(value) or ()
@@ -66,12 +66,12 @@ def height_of(value: Height | None) -> float | None:
 
 
 def micrometres_of(unit: str) -> float | None:
-    """How many µm one `unit` of length is; `None` if it is none that is known."""
+    """Return how many µm one `unit` of length is, or `None` if the unit is unknown."""
     return UNITS.get(unicodedata.normalize("NFKC", unit.strip()))
 
 
 def height_unit_of(value: str | None) -> str | None:
-    """A unit of length; `None` and "auto" give `None`: the file has to know."""
+    """Check a unit of length; `None` and "auto" give `None`: the file has to state it."""
     if is_auto(value):
         return None
     if not isinstance(value, str) or micrometres_of(value) is None:
@@ -83,9 +83,9 @@ def height_unit_of(value: str | None) -> str | None:
 
 
 def crop_of(value: Crop | None) -> tuple[float, float] | None:
-    """Size (width, height) in µm from a number, a pair, "20" or "20, 10".
+    """Return the size (width, height) in µm from a number, a pair, "20" or "20, 10".
 
-    `None` and "none" give `None`: all of the patch.
+    `None` and "none" give `None`: no crop.
     """
     if value is None or (isinstance(value, str) and value.strip() == "none"):
         return None
@@ -99,12 +99,12 @@ def crop_of(value: Crop | None) -> tuple[float, float] | None:
 
 
 def is_auto(value: object) -> bool:
-    """Whether a value is left to the file."""
+    """Return whether a value is `None` or "auto": the file has to state it."""
     return value is None or (isinstance(value, str) and value.strip().lower() == "auto")
 
 
 def numbers_of(value: object) -> tuple[float, ...] | None:
-    """Plain floats of a number, a numeric string or a short sequence; `None` if it is neither."""
+    """Return the floats in a number, numeric string or short sequence, or `None` for others."""
     parts: list[object]
     if isinstance(value, str):
         parts = [part for part in re.split(r"[,\s]+", value.strip()) if part]
@@ -139,9 +139,10 @@ Counts = int | Sequence[int]
 
 
 def number_between(value: float, where: str, least: float, most: float, unit: str = "") -> float:
-    """`value` as a float between `least` and `most`, ends included, or one line that says why not.
+    """Check that `value` is a number from `least` to `most` and return it as a float.
 
-    `where` is the function and parameter, "elaphe_like: depth"; `unit` is what to call it, " µm".
+    `where` names function and parameter in the error, "elaphe_like: depth"; `unit` is for instance
+    " µm".
     """
     ok = isinstance(value, numbers.Real) and not isinstance(value, bool)
     if not ok or not least <= float(value) <= most:  # NaN fails too
@@ -153,7 +154,7 @@ def number_between(value: float, where: str, least: float, most: float, unit: st
 
 
 def count_between(value: int, where: str, least: int, most: int) -> int:
-    """`value` as an int between `least` and `most`, ends included."""
+    """Check that `value` is a whole number from `least` to `most` and return it as an int."""
     ok = isinstance(value, numbers.Integral) and not isinstance(value, bool)
     if not ok or not least <= int(value) <= most:
         raise DiffractionError(
@@ -163,7 +164,7 @@ def count_between(value: int, where: str, least: int, most: int) -> int:
 
 
 def length_pair(value: Lengths, where: str, least: float, most: float) -> tuple[float, float]:
-    """(along x, along y) in µm from one length for both or a pair."""
+    """Return lengths (along x, along y) in µm from one length for both or a pair."""
     first, second = _pair(value, where)
     return (
         number_between(first, where, least, most, " µm"),
@@ -172,17 +173,18 @@ def length_pair(value: Lengths, where: str, least: float, most: float) -> tuple[
 
 
 def count_pair(value: Counts, where: str, least: int, most: int) -> tuple[int, int]:
-    """(along x, along y) from one count for both or a pair."""
+    """Return counts (along x, along y) from one count for both or a pair."""
     first, second = _pair(value, where)
     return count_between(first, where, least, most), count_between(second, where, least, most)
 
 
 def seed_of(value: int, where: str) -> int:
-    """A seed for NumPy's generators: a whole number from 0 to 2⁶³ − 1."""
+    """Check a seed of NumPy's generators: a whole number from 0 to 2⁶³ − 1."""
     return count_between(value, where, 0, 2**63 - 1)
 
 
 def _pair(value: object, where: str) -> tuple[Any, Any]:
+    """Return both elements of a pair, or a single value twice; the values are not checked."""
     if not isinstance(value, (list, tuple)):
         return value, value
     if len(value) != 2:

@@ -1,4 +1,4 @@
-"""Height fields from any file that holds heights, and after treatments."""
+"""Loading a height field from any file, and treating one in memory."""
 
 from __future__ import annotations
 
@@ -48,14 +48,14 @@ def load(
         Crop to a central region (µm): one number for a square, a pair
         (width, height), or a string of either.
     fill
-        What becomes of points without data: "nearest" or "harmonic" (see `missing`); by
-        default they are refused.
+        Method to fill points without data: "nearest" or "harmonic" (see
+        `preprocess.fill_missing`); by default they are refused.
     level
         "plane" subtracts the best plane, "lines" aligns the scan lines first; default "none".
     clip
-        Cut heights off beyond this many robust standard deviations; default not at all.
+        Clip heights to this many robust standard deviations; default not at all.
     periodic
-        "smooth" or "taper" make the patch fit itself at the seams; default "none". The
+        "smooth" or "taper" make opposite edges of the patch meet; default "none". The
         treatments are applied in the order crop, fill, level, clip, periodic, and each leaves a
         line in `history`.
 
@@ -63,9 +63,9 @@ def load(
     ------
     DiffractionError
         If the file cannot be read as heights, a length is missing or contradicts the file, or
-        an option does not fit.
+        an option has no valid value.
     """
-    options = LoadOptions.of(
+    options = LoadOptions.parse(
         pixel_size=pixel_size, max_height=max_height, height_unit=height_unit, channel=channel,
         crop=crop, fill=fill, level=level, clip=clip, periodic=periodic,
     )  # fmt: skip
@@ -88,13 +88,13 @@ def treated(
     clip: float | str | None = None,
     periodic: str | None = None,
 ) -> HeightField:
-    """The same patch after treatments of its heights; parameters and order as in `load`.
+    """Return the patch with its heights treated; parameters and order as in `load`.
 
     Points without data are filled while loading, since a HeightField has none.
 
     Raises
     ------
     DiffractionError
-        If an option does not fit, or `clip` finds nothing to measure outliers by.
+        If an option has no valid value, or `clip` finds more than half of the heights equal.
     """
-    return treat(field, LoadOptions.of(crop=crop, level=level, clip=clip, periodic=periodic))
+    return treat(field, LoadOptions.parse(crop=crop, level=level, clip=clip, periodic=periodic))

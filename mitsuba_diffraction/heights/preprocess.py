@@ -1,6 +1,6 @@
-"""Treatments of heights before a table is made of them: crop, fill, level, clip, make periodic.
+"""Treatments of heights before their table is built: crop, fill, level, clip, make periodic.
 
-Each but filling takes a `HeightField` and gives a new one, with a line in its `history` that says
+Each treatment but filling returns a new `HeightField`, whose `history` has one more line that says
 what changed.
 
 References
@@ -14,7 +14,7 @@ Proceedings of the IEEE 66, 51-83 (1978): the Tukey (cosine-tapered) window.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -23,36 +23,38 @@ from scipy.sparse import linalg
 
 from ..errors import DiffractionError
 from .field import LARGE, ROWS, FloatArray, HeightField
+from .seams import seam_share, seam_step
 
 Size = tuple[float, float]
 
 FILLS = ("nearest", "harmonic")
 
-# Above this share the filling, not the sample, would decide the picture.
+# Largest share of points without data that may be filled: beyond half, the filling and not the
+# sample would decide the picture.
 LARGEST_SHARE = 0.5
 # Makes the median absolute deviation of normally distributed heights their standard deviation:
 # 1/Φ⁻¹(3/4) (Hampel, Journal of the American Statistical Association 69, 1974).
 _MAD_TO_SIGMA = 1.4826
-#: An edge of the surface's own, as gratings have, is found inside the patch, too.
-OWN_STEP = 2.0
 # Width of the taper on each side, as a share of the patch: Tukey's α is twice this.
 TAPER_SHARE = 0.1
 
 
-def middle(shape: tuple[int, int], pixel_size: Size, size: Size, name: str) -> tuple[slice, slice]:
-    """Rows and columns of the middle of a patch.
+def central_slices(
+    shape: tuple[int, int], pixel_size: Size, size: Size, name: str
+) -> tuple[slice, slice]:
+    """Return the slices of rows and columns of the central region of a patch.
 
     Parameters
     ----------
-    shape : (ny, nx).
+    shape : (ny, nx) of the patch.
     pixel_size : (dx, dy), µm.
-    size : (width, height) that is wanted, µm, met to half a pixel.
-    name : what to call the patch in errors.
+    size : (width, height) of the region, µm, met to half a pixel.
+    name : name of the patch in errors.
 
     Raises
     ------
     DiffractionError
-        If that is more than there is, or less than two pixels.
+        If the region is larger than the patch, or less than two pixels wide or high.
     """
     slices = []
     for count, pixel, length in zip(shape, pixel_size[::-1], size[::-1], strict=True):
@@ -70,7 +72,7 @@ def middle(shape: tuple[int, int], pixel_size: Size, size: Size, name: str) -> t
 
 
 def crop_line(before: tuple[int, int], after: tuple[int, int], pixel_size: Size) -> str:
-    """What to say of a crop between shapes (ny, nx)."""
+    """Return the history line of a crop from shape `before` to shape `after`, both (ny, nx)."""
     (dx, dy), (ny, nx) = pixel_size, after
     return (
         f"cropped to the middle {nx * dx:.4g} x {ny * dy:.4g} µm of "
@@ -80,8 +82,8 @@ def crop_line(before: tuple[int, int], after: tuple[int, int], pixel_size: Size)
 
 
 def crop(field: HeightField, size: Size) -> HeightField:
-    """The central region of `size` = (width, height) in µm; its edges need not meet any more."""
-    rows, columns = middle(field.shape, field.pixel_size, size, field.name)
+    """Crop to the central region of `size` = (width, height), µm, and mark the patch `cut_out`."""
+    rows, columns = central_slices(field.shape, field.pixel_size, size, field.name)
     heights = field.heights[rows, columns]
     if heights.shape == field.shape:
         return field
@@ -90,7 +92,7 @@ def crop(field: HeightField, size: Size) -> HeightField:
 
 
 def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[FloatArray, str]:
-    """Replace NaN by heights made from the points around.
+    """Replace NaN by heights interpolated or extended from the points around.
 
     Parameters
     ----------
@@ -100,7 +102,7 @@ def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[Fl
         "nearest": the height of a nearest measured point. "harmonic": the membrane spanned over
         each gap, ∇²h = 0 with the measured border and free edges of the patch. `None` refuses.
     name
-        What to call the patch in errors.
+        Name of the patch in errors.
 
     Returns
     -------
@@ -114,7 +116,7 @@ def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[Fl
     """
     missing = np.isnan(heights)
     count = int(np.count_nonzero(missing))
-    if count == 0 or np.isinf(heights).any():  # which HeightField refuses, and no gap continues
+    if count == 0 or np.isinf(heights).any():  # HeightField refuses infinite heights
         return heights, ""
     share = f"{count} of {heights.size} points ({count / heights.size:.2g} of all)"
     if count == heights.size:
@@ -133,7 +135,7 @@ def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[Fl
 
 
 def _nearest(heights: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
-    """Height of the nearest measured point, by the exact Euclidean distance transform."""
+    """Fill with the height of the nearest measured point (exact Euclidean distance transform)."""
     rows, columns = ndimage.distance_transform_edt(
         missing, return_distances=False, return_indices=True
     )
@@ -162,12 +164,12 @@ def _harmonic(start: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
         known = ~missing[r, c]
         measured[inside[known]] += start[r[known], c[known]]
         links.append((inside[~known], index[r[~known], c[~known]]))
-    at, neighbour = (np.concatenate(ends) for ends in zip(*links, strict=True))
-    adjacency = sparse.coo_array((np.ones(at.size), (at, neighbour)), shape=(count, count))
+    point, neighbour = (np.concatenate(ends) for ends in zip(*links, strict=True))
+    adjacency = sparse.coo_array((np.ones(point.size), (point, neighbour)), shape=(count, count))
     laplacian = (sparse.diags_array(degree) - adjacency).tocsr()
     if not np.any(laplacian @ start[missing] - measured):
-        return start  # solved, which conjugate gradients divide by
-    # Heights come as float32 at best, 1e-7 of their size; solving far below that gains nothing.
+        return start  # conjugate gradients would divide by this residual of 0
+    # rtol: heights are stored as float32 at best, 1e-7 of their size; 1e-9 is well below that
     solution, failed = linalg.cg(
         laplacian, measured, x0=start[missing], rtol=1e-9, maxiter=10 * (ny + nx)
     )
@@ -179,7 +181,7 @@ def _harmonic(start: FloatArray, missing: npt.NDArray[np.bool_]) -> FloatArray:
 
 
 def plane_of(field: HeightField) -> tuple[float, float]:
-    """Slopes (∂h/∂x, ∂h/∂y) of the plane that fits the heights best, by least squares.
+    """Return the slopes (∂h/∂x, ∂h/∂y) of the least-squares plane.
 
     On a full grid the centred coordinates are orthogonal, so each slope is a plain projection.
     """
@@ -190,75 +192,76 @@ def plane_of(field: HeightField) -> tuple[float, float]:
 
 
 def plane_rise(field: HeightField) -> float:
-    """How much the best plane rises across the patch, µm."""
+    """Return the rise of the least-squares plane across the patch, µm."""
     slope_x, slope_y = plane_of(field)
     return math.hypot(slope_x * field.extent[0], slope_y * field.extent[1])
 
 
 def level_plane(field: HeightField) -> HeightField:
     """Subtract the least-squares plane; the mean height stays."""
-    heights, tilt_x, tilt_y = _without_plane(field)
-    what = f"plane removed: it rose {tilt_x:.3g} µm along x and {tilt_y:.3g} µm along y"
-    return field.changed(heights, what + rms_change(field, heights))
+    level = _without_plane(field)
+    line = f"plane removed: it rose {level.rise_x:.3g} µm along x and {level.rise_y:.3g} µm along y"
+    return field.changed(level.heights, line + rms_change(field, level.heights))
 
 
 def level_lines(field: HeightField) -> HeightField:
-    """Subtract each row's median (scan lines run along x), then the plane that is left.
+    """Subtract the median of each row (scan lines run along x), then the remaining plane.
 
-    What is alike along a whole row is lost with the offsets: ridges parallel to x, above all.
+    Ridges parallel to x are lost with the rows' offsets.
     """
     medians = np.median(field.heights, axis=1)
     aligned = HeightField(
         field.heights - (medians - medians.mean())[:, None], field.pixel_size, name=field.name
     )
-    heights, tilt_x, tilt_y = _without_plane(aligned)
-    what = (
+    level = _without_plane(aligned)
+    line = (
         f"scan lines aligned by their medians, which scattered by {medians.std():.3g} µm RMS, and "
-        f"the plane removed, which rose {tilt_x:.3g} µm along x and {tilt_y:.3g} µm along y"
+        f"the plane removed, which rose {level.rise_x:.3g} µm along x and {level.rise_y:.3g} µm "
+        "along y"
     )
-    return field.changed(heights, what + rms_change(field, heights))
+    return field.changed(level.heights, line + rms_change(field, level.heights))
 
 
 def clip_outliers(field: HeightField, sigmas: float) -> HeightField:
-    """Cut off heights further than `sigmas` robust standard deviations from the median.
+    """Clip heights to `sigmas` robust standard deviations around the median.
 
-    The deviation is 1.4826 times the median absolute deviation, which dust does not move.
+    The robust standard deviation is 1.4826 times the median absolute deviation, which a few points
+    of dust do not change.
 
     Raises
     ------
     DiffractionError
-        If `sigmas` is not at least 1, or more than half of the heights are equal, so that there is
-        no deviation to measure outliers by.
+        If `sigmas` is below 1, or more than half of the heights are equal: the deviation is 0 then.
     """
     if not 1 <= sigmas < math.inf:
         raise DiffractionError(
             f"clip: expected how many standard deviations to keep, at least 1, got {sigmas!r}"
         )
-    middle = float(np.median(field.heights))
-    sigma = _MAD_TO_SIGMA * float(np.median(np.abs(field.heights - middle)))
+    median = float(np.median(field.heights))
+    sigma = _MAD_TO_SIGMA * float(np.median(np.abs(field.heights - median)))
     if sigma == 0 and field.range > 0:
         raise DiffractionError(
-            f"{field.name}: clip cannot tell outliers, as more than half of the heights are equal; "
+            f"{field.name}: clip finds no outliers, since more than half of the heights are equal; "
             "leave clip out"
         )
-    heights = np.clip(field.heights, middle - sigmas * sigma, middle + sigmas * sigma)
+    heights = np.clip(field.heights, median - sigmas * sigma, median + sigmas * sigma)
     moved = np.abs(heights - field.heights)
     points = np.count_nonzero(moved)
     limit = f"{sigmas:g} robust standard deviations of {sigma:.3g} µm"
-    what = (
+    line = (
         f"{points} of {heights.size} points clipped to {limit}, "
         f"the furthest by {moved.max():.3g} µm"
         if points
         else f"nothing to clip: all points are within {limit}"
     )
-    return field.changed(heights, what + rms_change(field, heights))
+    return field.changed(heights, line + rms_change(field, heights))
 
 
 def rms_change(field: HeightField, heights: FloatArray) -> str:
-    """The end of a history line: RMS change of height, not counting an offset."""
+    """Return the end of a history line: RMS change of height, a constant offset left out."""
     if heights.size <= LARGE:
         change = float((heights - field.heights).std())
-    else:  # in parts, without a copy
+    else:  # by blocks of rows, so that no copy is as large as the field
         starts = range(0, len(heights), ROWS)
         rows = [slice(start, start + ROWS) for start in starts]
         mean = float(heights.mean()) - float(field.heights.mean())
@@ -267,17 +270,25 @@ def rms_change(field: HeightField, heights: FloatArray) -> str:
     return f"; RMS change {change:.3g} µm"
 
 
-def _without_plane(field: HeightField) -> tuple[FloatArray, float, float]:
-    """Heights without the best plane, and its rise across the patch along x and y in µm."""
+class _Levelled(NamedTuple):
+    """Heights without their least-squares plane, and the plane's rise across the patch, µm."""
+
+    heights: FloatArray
+    rise_x: float
+    rise_y: float
+
+
+def _without_plane(field: HeightField) -> _Levelled:
+    """Subtract the least-squares plane."""
     (x, y), (slope_x, slope_y) = _centred(field), plane_of(field)
     heights = field.heights - slope_x * x
     heights -= (slope_y * y)[:, None]
     heights.setflags(write=False)  # so that a HeightField need not copy it
-    return heights, slope_x * field.extent[0], slope_y * field.extent[1]
+    return _Levelled(heights, slope_x * field.extent[0], slope_y * field.extent[1])
 
 
 def _centred(field: HeightField) -> tuple[FloatArray, ...]:
-    """Coordinates (nx,) and (ny,) in µm, 0 in the middle."""
+    """Return coordinates (nx,) and (ny,) of the samples, µm, 0 in the middle."""
     return tuple(
         (np.arange(count, dtype=np.float64) - (count - 1) / 2) * pixel
         for count, pixel in zip(field.shape[::-1], field.pixel_size, strict=True)
@@ -287,7 +298,7 @@ def _centred(field: HeightField) -> tuple[FloatArray, ...]:
 def periodic_smooth(field: HeightField) -> HeightField:
     """Keep the periodic component of the heights and drop the smooth one (Moisan 2011).
 
-    The smooth component s explains the steps at the seams and is as smooth as can be inside: its
+    The smooth component s has the steps at the seams and is otherwise as smooth as possible: its
     periodic Laplacian is v, the steps placed on the border pixels (Moisan's equation 11), so
     ŝ = v̂ / (Laplacian's eigenvalues), with mean 0. Differences along x and y are weighted by
     1/dx² and 1/dy², so that pixels need not be square.
@@ -306,7 +317,7 @@ def periodic_smooth(field: HeightField) -> HeightField:
     along_y = 2 * np.cos(2 * np.pi * np.fft.fftfreq(ny)) - 2
     along_x = 2 * np.cos(2 * np.pi * np.fft.rfftfreq(nx)) - 2
     eigenvalues = wy * along_y[:, None] + wx * along_x
-    eigenvalues[0, 0] = 1  # the mean, which v does not have
+    eigenvalues[0, 0] = 1  # v has mean 0
     spectrum = np.fft.rfft2(v) / eigenvalues
     spectrum[0, 0] = 0
     smooth = np.fft.irfft2(spectrum, s=(ny, nx))
@@ -314,12 +325,12 @@ def periodic_smooth(field: HeightField) -> HeightField:
 
 
 def periodic_taper(field: HeightField) -> HeightField:
-    """Let the heights fade to their mean along the borders with a Tukey window.
+    """Blend the heights into their mean along the borders with a Tukey window.
 
-    A tenth of the patch on each side is faded; it turns flat there and so reflects more like a
-    mirror.
+    The window spans a tenth of the patch on each side; the patch is flat there and reflects more
+    like a mirror.
     """
-    from scipy.signal.windows import tukey  # half of what importing the package would take
+    from scipy.signal.windows import tukey  # importing it takes half of the package's import time
 
     mean = field.heights.mean()
     # every other sample of a window of 2n + 1: taken at the pixels' centres, near 0 at both ends
@@ -331,73 +342,11 @@ def periodic_taper(field: HeightField) -> HeightField:
     )
 
 
-def seam_step(field: HeightField) -> float:
-    """RMS step of height across the seams, µm: last row to first row, last column to first."""
-    h = field.heights
-    steps = np.concatenate([h[0] - h[-1], h[:, 0] - h[:, -1]])
-    return float(np.sqrt(np.mean(steps**2)))
-
-
 def _reported(field: HeightField, heights: FloatArray, what: str) -> HeightField:
+    """Return the patch with periodic heights; its history line has the steps before and after."""
     after = HeightField(heights, field.pixel_size)
     line = (
         f"{what}: RMS step at the seams {seam_step(field):.3g} -> {seam_step(after):.3g} µm, "
         f"{seam_share(field):.2g} -> {seam_share(after):.2g} of the mean-square slope"
     )
     return field.changed(after.heights, line + rms_change(field, heights))
-
-
-@dataclass(frozen=True)
-class Seam:
-    """Steps along one axis, µm: RMS over the seam, and the largest RMS over a line inside.
-
-    `rise` is the mean of last minus first; `slope` and `inside` are sums of squared slopes over
-    the seam and between neighbours.
-    """
-
-    step: float
-    largest: float
-    rise: float
-    slope: float
-    inside: float
-
-    @property
-    def foreign(self) -> bool:
-        """Whether the surface has no such step inside."""
-        return self.step > OWN_STEP * self.largest
-
-
-def seam_share(field: HeightField) -> float:
-    """Share of the mean-square slope, seams included, that the steps at the seams are.
-
-    A patch that fits itself has about (1/nx + 1/ny)/2, a flat one 0.
-    """
-    seams = seams_of(field)
-    slope, inside = (sum(getattr(s, name) for s in seams) for name in ("slope", "inside"))
-    return float(slope / (slope + inside)) if slope > 0 else 0.0
-
-
-def seams_of(field: HeightField) -> tuple[Seam, Seam]:
-    """The seams across which x goes on, and y."""
-    dx, dy = field.pixel_size
-    return seam_along(field.heights.T, dx), seam_along(field.heights, dy)
-
-
-def seam_along(h: FloatArray, pixel: float) -> Seam:
-    """The seam between the last and the first row."""
-    rows = len(h) if h.size <= LARGE else ROWS
-    within = np.concatenate(
-        [
-            np.mean(np.diff(h[start : start + rows + 1], axis=0) ** 2, axis=1)
-            for start in range(0, len(h) - 1, rows)
-        ]
-    )
-    across = float(np.mean((h[-1] - h[0]) ** 2))
-    lines = h.shape[1] / pixel**2
-    return Seam(
-        step=math.sqrt(across),
-        largest=math.sqrt(float(within.max())),
-        rise=float(np.mean(h[-1] - h[0])),
-        slope=across * lines,
-        inside=float(within.sum()) * lines,
-    )

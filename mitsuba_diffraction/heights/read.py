@@ -1,20 +1,19 @@
-"""From any file that holds heights to a HeightField: which reader, which units, which treatment."""
+"""Reading heights: checked options, choice of the reader, units, gaps and treatments."""
 
 from __future__ import annotations
 
 import math
 import numbers
 import os
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionError, warn
 from ..files import readable_file
 from . import preprocess
 from .field import HeightField
@@ -30,11 +29,7 @@ PERIODICS = {"smooth": preprocess.periodic_smooth, "taper": preprocess.periodic_
 
 @dataclass(frozen=True)
 class LoadOptions:
-    """Parameters of `HeightField.load`, checked; `None` leaves a thing as the file has it.
-
-    Made with `LoadOptions.of`, which raises a DiffractionError that names the parameter and the
-    choices if a value does not fit.
-    """
+    """Checked parameters of `HeightField.load`; `None` means the file's value, or no treatment."""
 
     pixel_size: tuple[float, float] | None = None
     max_height: float | None = None
@@ -47,28 +42,35 @@ class LoadOptions:
     periodic: str | None = None
 
     @classmethod
-    def of(cls, **given: Any) -> LoadOptions:
-        """Check the values as users write them, see `load.load`, and settle their types."""
-        return cls(**{name: _CHECKS[name](value) for name, value in given.items()})
+    def parse(cls, **options: Any) -> LoadOptions:
+        """Check options as users write them (see `load.load`) and convert their types.
+
+        Raises
+        ------
+        DiffractionError
+            If a value is not valid; the message names the parameter and the choices.
+        """
+        return cls(**{name: _CHECKS[name](value) for name, value in options.items()})
 
     def updated(self, other: LoadOptions) -> LoadOptions:
-        """These options, with those that `other` sets in their place."""
-        given = {f.name: getattr(other, f.name) for f in fields(other)}
-        return replace(self, **{name: value for name, value in given.items() if value is not None})
+        """Return these options, replaced by those that `other` sets."""
+        return replace(self, **other.specified())
 
-    def given(self) -> dict[str, Any]:
-        """The options that were set, by name."""
+    def specified(self) -> dict[str, Any]:
+        """Return the options that are set, by name."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         return {name: value for name, value in values.items() if value is not None}
 
 
 def _channel(value: object) -> str | int | None:
+    """Check the name or index of a channel."""
     if isinstance(value, bool) or not isinstance(value, (str, int, type(None))):
         raise DiffractionError(f"channel: expected a channel's name or index, got {value!r}")
     return value
 
 
 def _choice(value: object, name: str, choices: tuple[str, ...]) -> str | None:
+    """Check that parameter `name` has one of its choices."""
     if value is None:
         return None
     if not isinstance(value, str) or value not in choices:
@@ -79,7 +81,7 @@ def _choice(value: object, name: str, choices: tuple[str, ...]) -> str | None:
 
 
 def _sigmas(value: object) -> float | None:
-    """How many standard deviations to keep: a number or numeric string of at least 1."""
+    """Check the number of standard deviations to keep: a number or numeric string from 1 on."""
     if value is None or (isinstance(value, str) and value.strip() == "none"):
         return None
     try:
@@ -107,7 +109,7 @@ _CHECKS: dict[str, Callable[[Any], Any]] = {
     "periodic": partial(_choice, name="periodic", choices=("none", *PERIODICS)),
 }
 
-# What files begin with. Content decides before the suffix does, so a misnamed file still loads.
+# First bytes of files. Content decides before the suffix does, so that a misnamed file still loads.
 _MAGIC = (
     (b"\x89PNG\r\n\x1a\n", "image"),
     (b"II*\0", "tiff"),
@@ -122,7 +124,7 @@ _SUFFIX = {
     ".toml": "recipe",
 }  # fmt: skip
 
-# A file that states its pixel size wins over a parameter by no more than printing rounds it.
+# Relative difference up to which a pixel size given by the user equals the file's: rounding.
 _SAME_SIZE = 1e-3
 
 
@@ -130,21 +132,21 @@ def read_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightFi
     """Read and treat the heights of a file; parameters and errors as in `HeightField.load`."""
     file = readable_file(path)
     raw, measured = _read(file, options.channel)
-    field = _settle(raw, file, options)
+    field = _to_field(raw, file, options)
     if measured and options.level in (None, "none"):
-        rise = preprocess.plane_rise(field)  # seams repeat it
+        rise = preprocess.plane_rise(field)
         line = f"not levelled: the best plane rises {rise:.3g} µm across the patch"
         field = field.changed(field.heights, line)
-    return treat(field, replace(options, crop=None))  # cropped before gaps were filled
+    return treat(field, replace(options, crop=None))  # `_to_field` crops before it fills gaps
 
 
 def is_recipe(path: str | os.PathLike[str]) -> bool:
-    """Whether a path names a recipe: by its suffix, .toml."""
+    """Return whether a path names a recipe: its suffix is .toml."""
     return Path(path).suffix.lower() == ".toml"
 
 
 def kind_of(file: Path) -> str:
-    """What a file holds, by its content, else its suffix: "recipe" or a reader's name."""
+    """Return the kind of a file by its content, else its suffix: "recipe" or a reader's name."""
     with file.open("rb") as stream:
         head = stream.read(8)
     for magic, kind in _MAGIC:
@@ -156,7 +158,7 @@ def kind_of(file: Path) -> str:
 
 
 def _read(file: Path, channel: str | int | None) -> tuple[RawHeights, bool]:
-    """Heights of a file, and whether an instrument wrote it."""
+    """Read the heights of a file; also return whether an instrument wrote it."""
     kind = kind_of(file)
     if kind == "jpeg":
         raise DiffractionError(
@@ -175,32 +177,39 @@ def _read(file: Path, channel: str | int | None) -> tuple[RawHeights, bool]:
     return reader(file), False
 
 
-def _settle(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
-    """Combine what the file says with what the user says, who is right, and refuse gaps."""
+def _to_field(raw: RawHeights, file: Path, options: LoadOptions) -> HeightField:
+    """Scale to µm, crop and fill the heights of a file; the user's lengths override the file's."""
     shown = repr(str(file))
-    scale, pixel_size, overrides = _lengths(raw, shown, options)
-    with np.errstate(over="ignore", invalid="ignore"):  # damage, which is found below
-        values = raw.values if scale == 1.0 else raw.values * np.float64(scale)
-    notes = (*raw.notes, *overrides)
+    lengths = _lengths(raw, shown, options)
+    with np.errstate(over="ignore", invalid="ignore"):  # HeightField refuses infinite heights
+        values = raw.values if lengths.scale == 1.0 else raw.values * np.float64(lengths.scale)
+    notes = (*raw.notes, *lengths.overrides)
     if options.crop is not None:
         before = (values.shape[0], values.shape[1])
-        values = values[preprocess.middle(before, pixel_size, options.crop, shown)]
+        region = preprocess.central_slices(before, lengths.pixel_size, options.crop, shown)
+        values = values[region]
         if values.shape != before:
             after = (values.shape[0], values.shape[1])
-            notes = (*notes, preprocess.crop_line(before, after, pixel_size))
+            notes = (*notes, preprocess.crop_line(before, after, lengths.pixel_size))
     heights = np.ascontiguousarray(values, dtype=np.float64)
     method = None if options.fill == "none" else options.fill
     heights, note = preprocess.fill_missing(heights, method, shown)
     if heights.base is None and heights is not raw.values:
-        heights.setflags(write=False)  # ours alone: HeightField need not copy it
+        heights.setflags(write=False)  # nothing else refers to it: HeightField need not copy it
     history = (*notes, note) if note else notes
-    return HeightField(heights, pixel_size, name=file.name, history=history, cut_out=True)
+    return HeightField(heights, lengths.pixel_size, name=file.name, history=history, cut_out=True)
 
 
-def _lengths(
-    raw: RawHeights, shown: str, options: LoadOptions
-) -> tuple[float, tuple[float, float], list[str]]:
-    """µm of one unit of the values, the pixel size in µm, and what the options override."""
+class _Lengths(NamedTuple):
+    """Lengths of a file's heights once the user's options are applied."""
+
+    scale: float  # µm per unit of the values
+    pixel_size: tuple[float, float]  # µm
+    overrides: list[str]  # one line for each length of the file that an option overrides
+
+
+def _lengths(raw: RawHeights, shown: str, options: LoadOptions) -> _Lengths:
+    """Combine the lengths of the file with those of the options; warn of overrides."""
     pixel_size = options.pixel_size or raw.pixel_size
     scale, lines = _height_scale(raw, shown, options, pixel_size is None)
     if pixel_size is None:
@@ -212,14 +221,14 @@ def _lengths(
             f"{pixel_size[1]:.6g} µm, not {stated[0]:.6g} x {stated[1]:.6g} µm"
         )
     for line in lines:
-        warnings.warn(f"{shown}: {line}", DiffractionWarning, stacklevel=2)
-    return scale, pixel_size, lines
+        warn(f"{shown}: {line}")
+    return _Lengths(scale, pixel_size, lines)
 
 
 def _height_scale(
     raw: RawHeights, shown: str, options: LoadOptions, lacks_pixel: bool
 ) -> tuple[float, list[str]]:
-    """µm of one unit of the values, and what the options override."""
+    """Return µm per unit of the values, and one line for each override of the file's unit."""
     max_height, unit = options.max_height, options.height_unit
     if unit is not None and (raw.relative or max_height is not None):
         raise DiffractionError(
@@ -241,20 +250,22 @@ def _height_scale(
         with np.errstate(over="ignore"):
             span = float(np.ptp(known)) if known.size else 0.0
         if not span > 0.0:
-            raise DiffractionError(f"{shown} is flat: there is nothing that max_height could scale")
+            raise DiffractionError(f"{shown} is flat: max_height cannot scale it; leave it out")
         line = f"max_height overrides the file's unit{stated}: heights span {max_height:g} µm"
         return max_height / span, [line]
     if raw.unit is None:
-        what = f"states heights in {raw.stated!r}, no length" if raw.stated else "states no unit"
+        unit_stated = (
+            f"states the unit {raw.stated!r}, not a length," if raw.stated else "states no unit"
+        )
         raise DiffractionError(
-            f"{shown} {what} for its heights; give height_unit, and pixel_size in µm if that is "
-            "missing, too, for instance --height-unit nm --pixel-size 0.05"
+            f"{shown} {unit_stated} for its heights; give height_unit, and pixel_size in µm if "
+            "that is missing, too, for instance --height-unit nm --pixel-size 0.05"
         )
     return raw.unit, []
 
 
 def _missing_lengths(shown: str, height: bool, pixel: bool) -> DiffractionError:
-    """What to say of an image that lacks the height of white, or of heights without pixel size."""
+    """Return the error of a file without the height of white, or without pixel size, or both."""
     known = (
         (height, "how high white is", "max_height", "0.375"),
         (pixel, "how large a pixel is", "pixel_size", "0.05"),
@@ -271,7 +282,7 @@ def _missing_lengths(shown: str, height: bool, pixel: bool) -> DiffractionError:
 
 
 def treat(field: HeightField, options: LoadOptions) -> HeightField:
-    """Crop, level, clip and make periodic: dust stands out from a level surface only."""
+    """Crop, level, clip and make periodic, in this order: clipping needs a level surface."""
     if options.crop is not None:
         field = preprocess.crop(field, options.crop)
     if options.level not in (None, "none"):

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import difflib
 import inspect
+import json
 import os
 import tomllib
 from collections.abc import Callable, Mapping
@@ -22,6 +23,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from ..atomic import atomic_path
 from ..errors import DiffractionError
 from ..files import read_text
 from ..settings import RECIPE_SETTINGS, checked
@@ -33,26 +35,27 @@ from .read import LoadOptions, is_recipe, read_heights, treat
 LOAD_KEYS = tuple(option.name for option in fields(LoadOptions))
 _OWN_KEYS = ("source", "generator", "arguments", "seeds", "output")
 _KEYS = (*_OWN_KEYS, *LOAD_KEYS, *RECIPE_SETTINGS)
-# What makes no sense for heights that are computed.
+# Options of files, refused beside a generator.
 _SOURCE_ONLY = ("pixel_size", "max_height", "height_unit", "channel", "fill")
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """One recipe, checked."""
+    """Checked content of one recipe file."""
 
-    path: Path  # The recipe's own file
-    sources: tuple[Path, ...]  # Files of heights; empty if a generator makes them
-    generator: str | None  # Name of a function of `mitsuba_diffraction.heights.gratings`, or `None`
-    arguments: tuple[Mapping[str, Any], ...]  # Its keyword arguments, one mapping per patch
-    options: LoadOptions  # How sources are read and all patches treated
-    table: Mapping[str, Any]  # The fields of `TableSettings` that the recipe sets, checked
-    # Where the table goes; by default the recipe's name with .exr in the current folder
+    path: Path  # the recipe file
+    sources: tuple[Path, ...]  # files of heights; empty with a generator
+    generator: str | None  # name of a function of `mitsuba_diffraction.heights.gratings`, or `None`
+    # keyword arguments of the generator, one mapping per patch
+    arguments: tuple[Mapping[str, Any], ...]
+    options: LoadOptions  # how sources are read and all patches treated
+    table: Mapping[str, Any]  # fields of `TableSettings` that the recipe sets, checked
+    # path of the table; by default the recipe's name with .exr in the current folder
     output: Path
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Recipe:
-        """Read and check a recipe; heights are not read or made yet.
+        """Read and check a recipe; heights are neither read nor generated yet.
 
         Raises
         ------
@@ -92,29 +95,68 @@ class Recipe:
             output=_output(content, file, shown),
         )
 
+    @classmethod
+    def of_file(cls, path: Path, options: LoadOptions) -> Recipe:
+        """The recipe of one file of heights, which no file holds yet."""
+        return cls(path, (path,), None, (), options, {}, Path(f"{path.stem}.exr"))
+
+    def describes_heights_of(self, other: Recipe) -> bool:
+        """Whether both recipes name the same sources, or generator, and treatments."""
+        return self._heights() == other._heights()
+
+    def _heights(self) -> tuple[Any, ...]:
+        sources = [source.resolve() for source in self.sources]
+        return sources, self.generator, list(self.arguments), self.options
+
+    def save(self, path: Path, comment: str) -> None:
+        """Write the recipe, with paths relative to the file; `comment` stands above it.
+
+        Raises
+        ------
+        DiffractionError
+            If the file cannot be written.
+        """
+        content: dict[str, Any] = {}
+        arguments = [dict(one) for one in self.arguments]
+        if self.generator is None:
+            sources = [os.path.relpath(source, path.parent) for source in self.sources]
+            content["source"] = sources[0] if len(sources) == 1 else sources
+        else:
+            content["generator"] = self.generator
+            if len(arguments) > 1:  # which differ by their seeds alone
+                content["seeds"] = [one.pop("seed") for one in arguments]
+        content |= {**self.options.specified(), **self.table, "output": f"{path.stem}.exr"}
+        lines = [f"# {line}" for line in comment.splitlines()]
+        lines += [f"{name} = {_toml(value)}" for name, value in content.items()]
+        if arguments and arguments[0]:
+            lines += ["", "[arguments]"]
+            lines += [f"{name} = {_toml(value)}" for name, value in arguments[0].items()]
+        with atomic_path(path) as temporary:
+            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
     def fields(self, options: LoadOptions | None = None) -> list[HeightField]:
-        """All patches of the recipe; `options` take precedence over the recipe's own.
+        """Read or generate all patches; `options` take precedence over the recipe's options.
 
         Raises
         ------
         DiffractionError
             If a source cannot be read, or the generator refuses an argument.
         """
-        given = options or LoadOptions()
+        overrides = options or LoadOptions()
+        merged = self.options.updated(overrides)
         if self.generator is None:
-            return [read_heights(file, self.options.updated(given)) for file in self.sources]
+            return [read_heights(file, merged) for file in self.sources]
         for key in _SOURCE_ONLY:
-            if getattr(given, key) is not None:
+            if getattr(overrides, key) is not None:
                 raise DiffractionError(
                     f"{str(self.path)!r} makes its heights with {self.generator!r}; {key} "
                     "contradicts it: change the recipe's [arguments] instead"
                 )
-        make: Callable[..., HeightField] = getattr(gratings, self.generator)
-        treatment = self.options.updated(given)
-        return [treat(self._made(make, arguments), treatment) for arguments in self.arguments]
+        generator: Callable[..., HeightField] = getattr(gratings, self.generator)
+        return [treat(self._generate(generator, values), merged) for values in self.arguments]
 
     def field(self, options: LoadOptions | None = None) -> HeightField:
-        """The only patch of the recipe.
+        """Read or generate the only patch of the recipe.
 
         Raises
         ------
@@ -129,25 +171,37 @@ class Recipe:
             )
         return self.fields(options)[0]
 
-    def _made(self, make: Callable[..., HeightField], arguments: Mapping[str, Any]) -> HeightField:
+    def _generate(
+        self, generator: Callable[..., HeightField], arguments: Mapping[str, Any]
+    ) -> HeightField:
+        """Call the generator; its errors name the recipe."""
         try:
-            return make(**arguments)
+            return generator(**arguments)
         except DiffractionError as error:
             raise DiffractionError(f"{str(self.path)!r}: [arguments]: {error}") from error
+
+
+def _toml(value: Any) -> str:
+    """A TOML value: a string, a boolean, a number or a list of them."""
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_toml, value))}]"
+    # JSON's strings, booleans and finite numbers are TOML's
+    return json.dumps(value, ensure_ascii=False)
 
 
 def options_and_settings(
     content: Mapping[str, Any], where: str
 ) -> tuple[LoadOptions, dict[str, Any]]:
-    """How heights are read, and the fields of `TableSettings` that are set, checked one by one."""
+    """Check the reading options and the fields of `TableSettings` in a recipe's content."""
     try:
-        options = LoadOptions.of(**{key: content[key] for key in LOAD_KEYS if key in content})
+        options = LoadOptions.parse(**{key: content[key] for key in LOAD_KEYS if key in content})
         return options, {k: checked(k, content[k]) for k in RECIPE_SETTINGS if k in content}
     except DiffractionError as error:
         raise DiffractionError(f"{where}: {error}") from error
 
 
 def _parse(file: Path, shown: str) -> dict[str, Any]:
+    """Read a TOML file."""
     try:
         return tomllib.loads(read_text(file))
     except (tomllib.TOMLDecodeError, RecursionError) as error:
@@ -155,9 +209,12 @@ def _parse(file: Path, shown: str) -> dict[str, Any]:
 
 
 def _sources(content: Mapping[str, Any], file: Path, shown: str) -> tuple[Path, ...]:
+    """Return the paths of the files of heights, relative to the recipe's folder."""
     for key in ("arguments", "seeds"):
         if key in content:
-            raise DiffractionError(f"{shown}: {key} belongs to a generator, and source is a file")
+            raise DiffractionError(
+                f"{shown}: {key} is for a generator, and source is a file; leave {key} out"
+            )
     source = content["source"]
     names = source if isinstance(source, list) else [source]
     if not names or not all(isinstance(name, str) and name for name in names):
@@ -166,18 +223,17 @@ def _sources(content: Mapping[str, Any], file: Path, shown: str) -> tuple[Path, 
         )
     for name in names:
         if is_recipe(name):
-            raise DiffractionError(
-                f"{shown}: source: {name!r} is a recipe itself; name the file of heights"
-            )
+            raise DiffractionError(f"{shown}: source: {name!r} is a recipe; name a file of heights")
     return tuple(file.parent / name for name in names)
 
 
 def _arguments(content: Mapping[str, Any], shown: str) -> tuple[Mapping[str, Any], ...]:
+    """Check the generator and return its keyword arguments, one mapping for each patch."""
     for key in _SOURCE_ONLY:
         if key in content:
             raise DiffractionError(
-                f"{shown}: {key} belongs to a source, and a generator makes these heights; use "
-                "its [arguments]"
+                f"{shown}: {key} is for a source, and the heights come from a generator; use its "
+                "[arguments]"
             )
     name = content["generator"]
     if not isinstance(name, str) or name not in gratings.__all__:
@@ -205,12 +261,13 @@ def _arguments(content: Mapping[str, Any], shown: str) -> tuple[Mapping[str, Any
             f"{shown}: seeds: expected a list of different whole numbers, got {seeds!r}"
         )
     if "seed" not in parameters or "seed" in arguments:
-        why = "seed is given too" if "seed" in arguments else f"{name!r} takes no seed"
+        why = "seed is set, too" if "seed" in arguments else f"{name!r} has no parameter seed"
         raise DiffractionError(f"{shown}: seeds: {why}; leave one out")
     return tuple({**arguments, "seed": seed} for seed in seeds)
 
 
 def _output(content: Mapping[str, Any], file: Path, shown: str) -> Path:
+    """Return the path of the recipe's table."""
     if "output" not in content:
         return Path(f"{file.stem}.exr")
     output = content["output"]

@@ -1,4 +1,4 @@
-"""Power spectra of height fields and of the light that they reflect, for comparisons.
+"""Power spectra of height fields and of the light that they reflect.
 
 Frequencies are in 1/µm along x and y, as `numpy.fft.fftfreq` gives them; arrays of spectra have
 frequency (0, 0) in the middle (`numpy.fft.fftshift`).
@@ -18,44 +18,44 @@ from .field import HeightField
 
 FloatArray = npt.NDArray[np.float64]
 
-#: A peak of a grating stands this much above the median of all directions at its frequency, and of
+#: Least ratio of a grating's peak to the median of all directions at its frequency, and to that of
 #: lower frequencies in its direction. Rough surfaces reach 20 by chance, snakes' fingers 1e4.
 CONTRAST = 50.0
-#: A peak with less of the variance than this is a detail of the surface, not what it is made of.
+#: Least share of the variance that a grating holds; peaks with less are details of the surface.
 LEAST_SHARE = 0.1
-# Share of the variance that does not change along an axis from which on a patch is a profile.
+# Share of the variance that is constant along one axis, from which on a patch is a profile.
 _PROFILE = 0.9
-# Fewer periods than this in a patch are not told from its tilt and bending.
+# Fewer periods than this in a patch cannot be told from its tilt and bending.
 _FEWEST_PERIODS = 2.5
-# Peaks closer in direction than this are harmonics or the irregularity of one grating, degrees.
+# Peaks closer in direction than this, degrees, are harmonics or irregularities of one grating.
 _SAME = 15.0
-# Frequencies below a peak that it is compared with: it is so many times theirs.
+# Background along a peak's direction: frequencies that are the peak's divided by these factors.
 _BESIDE = (1.25, 2.0)
-# Peaks that are looked at.
+# Number of peaks that are examined, strongest first.
 _CANDIDATES = 12
 # Around a peak: bins of a Hann window's main lobe, and the spread of an irregular grating's
 # frequency (relative) and direction (radians).
 _LOBE, _SPREAD, _FAN = 2, 0.12, math.radians(8)
-# Pixels a side beyond which the central region says enough.
+# Pixels a side of the central region that is examined in larger patches.
 _LARGEST = 1024
 
 
 def frequencies(field: HeightField) -> tuple[FloatArray, FloatArray]:
-    """Frequencies (nx,) along x and (ny, 1) along y of a spectrum of `field`, 1/µm."""
+    """Return the frequencies (nx,) along x and (ny, 1) along y of a spectrum of `field`, 1/µm."""
     (ny, nx), (dx, dy) = field.shape, field.pixel_size
     fx, fy = np.fft.fftfreq(nx, dx), np.fft.fftfreq(ny, dy)
     return np.fft.fftshift(fx), np.fft.fftshift(fy)[:, None]
 
 
 def height_spectrum(field: HeightField) -> FloatArray:
-    """Two-sided power spectral density of the heights, (ny, nx) in µm⁴.
+    """Return the two-sided power spectral density of the heights, (ny, nx) in µm⁴.
 
-    Its integral over frequencies is the variance. A Hann window, normalised to mean square 1, keeps
-    the seams of a measured patch out (Welch, 1967); it is put on periodic ones too, so that they
-    compare.
+    The integral over frequencies is the variance. A Hann window, normalised to mean square 1,
+    suppresses the seams of a measured patch (Welch, 1967); periodic patches are windowed, too, so
+    that spectra can be compared.
     """
     (ny, nx), (dx, dy) = field.shape, field.pixel_size
-    # without the zeros at its ends, which would be all of a patch of two rows
+    # without the zeros at the window's ends, which would be the whole window of two rows
     window = np.hanning(ny + 2)[1:-1, None] * np.hanning(nx + 2)[1:-1]
     window /= np.sqrt(np.mean(window**2))
     amplitude = np.fft.fft2((field.heights - field.heights.mean()) * window)
@@ -64,7 +64,7 @@ def height_spectrum(field: HeightField) -> FloatArray:
 
 @dataclass(frozen=True)
 class Periodicity:
-    """A grating that a patch holds."""
+    """Period and direction of a grating in a patch, and its share of the variance."""
 
     period: float  # µm, from one groove to the next, across them
     direction: float  # degrees from x towards y across the grooves, −89.5 to 90.5
@@ -75,13 +75,13 @@ class Periodicity:
 
 
 def dominant_periods(field: HeightField, most: int = 3) -> list[Periodicity]:
-    """The gratings that stand out of a patch's spectrum, the one with most of the variance first.
+    """Find at most `most` gratings in a patch's spectrum, the largest share of variance first.
 
-    A peak counts that stands `CONTRAST` times above its surroundings and holds `LEAST_SHARE` of the
-    variance; its frequency is the centre of mass of what is around it.
-    Of peaks in one direction, as harmonics are, the strongest is taken. What repeats less than two
-    and a half times counts only if the heights hardly change along the other axis: the patch tiles
-    the plane, so such a profile is a grating.
+    A peak is a grating if it is `CONTRAST` times above its surroundings and holds `LEAST_SHARE` of
+    the variance. The frequency is the centre of mass of the power around the peak. Of several peaks
+    in one direction, such as harmonics, only the strongest counts. A grating has two and a half
+    periods at least, unless the heights hardly change along the other axis: the patch tiles the
+    plane, so such a profile is a grating.
     """
     central = field.heights[tuple(_central(n) for n in field.shape)]
     patch = HeightField(central, field.pixel_size)
@@ -94,11 +94,11 @@ def dominant_periods(field: HeightField, most: int = 3) -> list[Periodicity]:
     repeats = np.hypot(fx * width, fy * height)
     half = (fy > 0) | ((fy == 0) & (fx > 0))
     left = np.where(half & (repeats >= _FEWEST_PERIODS), power, 0.0)
-    found: list[Periodicity] = []
+    gratings: list[Periodicity] = []
     for _ in range(_CANDIDATES):
         iy, ix = np.unravel_index(left.argmax(), left.shape)
         highest = float(left[iy, ix])
-        if len(found) == most or not highest > 0.0:
+        if len(gratings) == most or not highest > 0.0:
             break
         peak = np.array([fx[iy, ix], fy[iy, ix]])
         rows, columns = np.abs(np.arange(ny) - iy), np.abs(np.arange(nx) - ix)
@@ -107,7 +107,7 @@ def dominant_periods(field: HeightField, most: int = 3) -> list[Periodicity]:
         across = (fx * peak[1] - fy * peak[0]) / (peak @ peak)
         near |= (np.abs(along - 1) < _SPREAD) & (np.abs(across) < _FAN * along)
         weight = power[near]
-        share = 2.0 * float(weight.sum()) / total  # and its mirror image
+        share = 2.0 * float(weight.sum()) / total  # twice: the mirror image holds as much
         centre = np.array([weight @ fx[near], weight @ fy[near]]) / weight.sum()
         aside = np.hypot((fx - along * peak[0]) * width, (fy - along * peak[1]) * height)
         line = aside < _LOBE + 1
@@ -117,16 +117,16 @@ def dominant_periods(field: HeightField, most: int = 3) -> list[Periodicity]:
         background = [float(np.median(power[part])) for part in (ring, beside) if part.any()]
         repeated = np.hypot(*(centre * (width, height))) >= _FEWEST_PERIODS
         if share >= LEAST_SHARE and repeated and highest > CONTRAST * max(background, default=0.0):
-            found.append(_periodicity(centre, min(share, 1.0)))
+            gratings.append(_periodicity(centre, min(share, 1.0)))
             explained = line | (np.abs(across) <= math.tan(math.radians(_SAME)) * np.abs(along))
             left[explained] = power[explained] = 0.0
         else:
             left[near] = 0.0
-    return sorted(found, key=lambda one: -one.share) or _repeated_profile(field)
+    return sorted(gratings, key=lambda grating: -grating.share) or _repeated_profile(field)
 
 
 def _repeated_profile(field: HeightField) -> list[Periodicity]:
-    """The grating of a patch whose heights change along one axis only, however few its periods."""
+    """Return the grating of a patch whose heights change along one axis only, if they do."""
     for axis, direction in ((1, 0.0), (0, 90.0)):
         profile = field.heights.mean(axis=1 - axis)
         share = float(profile.var() / field.heights.var())
@@ -137,21 +137,23 @@ def _repeated_profile(field: HeightField) -> list[Periodicity]:
 
 
 def _central(count: int) -> slice:
+    """Return the slice of the central `_LARGEST` of `count` samples."""
     kept = min(count, _LARGEST)
     return slice((count - kept) // 2, (count - kept) // 2 + kept)
 
 
 def _periodicity(frequency: FloatArray, share: float) -> Periodicity:
+    """Convert a frequency (fx, fy) in 1/µm to a period and a direction."""
     direction = math.degrees(math.atan2(frequency[1], frequency[0]))
     direction -= 180.0 * math.ceil((direction - 90.5) / 180.0)  # the same grooves seen from x
     return Periodicity(float(1.0 / np.hypot(*frequency)), round(direction, 2) + 0.0, share)
 
 
 def order_powers(field: HeightField, wavelength: float) -> FloatArray:
-    """Share of the light in every order |a_j(κ)|², (ny, nx), at normal incidence and exit.
+    """Return the share |a_j(κ)|² of the light in each order j, (ny, nx), at normal incidence.
 
-    a_j(κ) = mean(exp(iκh)·exp(i q_j·x)) with κ = 4π/λ, `wavelength` λ in nm; order j > 0 is turned
-    towards +x, as by facets that descend that way, and the shares add up to 1 (Parseval).
+    a_j(κ) = mean(exp(iκh)·exp(i q_j·x)) with κ = 4π/λ, `wavelength` λ in nm. Orders j > 0 are
+    turned towards +x, as by facets that descend towards +x. The shares add up to 1 (Parseval).
     """
     kappa = 4 * np.pi / (wavelength / 1000)
     amplitude = np.fft.ifft2(np.exp(1j * kappa * field.heights))  # +i, divided by the number
@@ -164,10 +166,10 @@ def profile(
     edges: FloatArray,
     direction: Literal["all", "x", "y"] = "all",
 ) -> FloatArray:
-    """Mean of a spectrum (ny, nx) over rings of frequency between `edges` (n + 1,): shape (n,).
+    """Average a spectrum (ny, nx) over rings of frequency between `edges` (n + 1,): shape (n,).
 
-    With a direction, only where frequencies along it are at least twice those across; empty rings
-    are NaN.
+    With a `direction`, only frequencies that are at least twice as high along it as across it
+    count. Empty rings are NaN.
     """
     fx, fy = frequencies(field)
     ring = np.digitize(np.hypot(fx, fy), edges)
@@ -183,11 +185,11 @@ def profile(
 
 
 def far_field(field: HeightField, wavelength: float, size: int = 201) -> FloatArray:
-    """Light of one wavelength over the hemisphere, for light along the normal, per unit of (u, v).
+    """Return the light of one wavelength over the hemisphere, per unit of (u, v).
 
-    Order j goes to (u, v) = λ·(fx, fy), the direction's sine along x and y. Neighbouring orders are
-    smoothed (σ 1.5), about what a coherence window as wide as the patch does; factors of the angle
-    alone are left out.
+    Light comes along the normal. Order j goes to (u, v) = λ·(fx, fy), the direction's sine along x
+    and y. Neighbouring orders are smoothed (σ 1.5), about as by a coherence window as wide as the
+    patch; factors that depend on the angle alone are left out.
 
     Returns
     -------

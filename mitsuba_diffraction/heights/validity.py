@@ -1,4 +1,4 @@
-"""Where a patch leaves the model, or its own resolution."""
+"""Warnings of a patch that leaves the model's range or does not resolve its surface."""
 
 from __future__ import annotations
 
@@ -6,48 +6,49 @@ import math
 from collections.abc import Sequence
 
 from .field import HeightField
-from .preprocess import level_plane, plane_of, plane_rise, seams_of
+from .preprocess import level_plane, plane_of, plane_rise
+from .seams import seams_of
 
 #: RMS slopes up to which the default model's colours are within 5 % and 20 % of rigorous solutions,
-#: for sinusoids of keratin and aluminium in light up to 60° from the normal: docs/validation.md has
-#: the rule and the table, docs/make/validation/limits.py the computation (0.139 and 0.356), of
-#: which these are rounded down.
+#: for sinusoids of keratin and aluminium in light up to 60° from the normal. docs/validation.md has
+#: the rule and the table; docs/make/validation/limits.py computes 0.139 and 0.356, rounded down
+#: here.
 GENTLE_SLOPE = 0.13
 STEEP_SLOPE = 0.35
 
-#: Heights whose whole range is below a tenth of an atom's radius are usually metres taken for µm.
+#: Range of heights, µm, a tenth of an atom's radius: smaller ones are usually metres taken for µm.
 SMALLEST_RANGE = 1e-5
 
-#: Steeper than any surface that is a height field, 84°: nanometres taken for µm.
+#: RMS slope of 84°, steeper than any surface that is a height field: nanometres taken for µm.
 IMPOSSIBLE_SLOPE = 10.0
-#: Pixels in µm beyond which at most a tenth of the directions is known at 380 nm; scans have some
-#: nm to a few hundred.
+#: Pixel size in µm beyond which the patch resolves at most a tenth of the directions at 380 nm.
+#: Scans have pixels of some nm to a few hundred.
 COARSEST_PIXEL = 2.0
 
-#: A plane that rises by λ/8 tilts the reflected wave by λ/4, Rayleigh's limit of what can be left
-#: alone: a flat patch then sends 19 % of its mirror light, 1 − sinc²(1/4), into other orders.
+#: A plane that rises by λ/8 tilts the reflected wave by λ/4, Rayleigh's limit for a negligible
+#: aberration: a flat patch then sends 19 % of its mirror light, 1 − sinc²(1/4), into other orders.
 QUARTER_WAVE = 8.0
-#: Below this share of the RMS height a best plane is what any rough patch has by chance.
+#: A plane that rises by less than this part of the RMS height occurs by chance in rough patches.
 CHANCE = 0.5
-#: What levelling leaves of a ramp in 8-bit grey is 0.4 % of its RMS height: a patch of which no
-#: more is left is one facet, a whole period of a blazed grating, and its seams are the steps.
+#: Levelling a ramp stored in 8-bit grey leaves 0.4 % of its RMS height. A patch of which less than
+#: this is left is one facet, a whole period of a blazed grating: its seams are the grating's steps.
 FACET = 0.01
-#: Share of the mean-square slope from which on seams are said. For gentle heights it is their share
-#: of the light outside the mirror direction, weighted with the square of the angle's sine.
+#: Share of the mean-square slope from which on seams are reported. For gentle heights it is the
+#: seams' share of the light outside the mirror direction, weighted with the angle's squared sine.
 SEAM_SHARE = 0.1
 
-# No window narrower than this has directions to speak of, µm: a wavelength and a half.
+# Narrowest useful coherence window, µm: a wavelength and a half.
 _NARROWEST = 1.0
 
-# A patch this much smaller than the coherence width is worth a warning.
+# A patch narrower than this fraction of the coherence width is reported.
 _SMALLER = 0.9
 
-#: Texts that tables keep in a cache are those of this version: raise it with any of them.
-TEXTS_VERSION = 2
+#: Version of the texts, which cached tables store: raise it when a text changes.
+TEXTS_VERSION = 3
 
 
 def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830.0)) -> list[str]:
-    """Say where a patch leaves the model or its own resolution; an empty list is fine.
+    """Return warnings where a patch leaves the model or its own resolution; empty if it does not.
 
     Parameters
     ----------
@@ -61,19 +62,19 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
     lines = []
     if field.rms_slope > IMPOSSIBLE_SLOPE:
         lines.append(
-            f"{field.name}: RMS slope {field.rms_slope:.2g} is no surface's: {units_warning(field)}"
+            f"{field.name}: RMS slope {field.rms_slope:.2g} is impossible for a surface: "
+            f"{units_warning(field)}"
         )
     elif field.rms_slope > STEEP_SLOPE:
         lines.append(
-            f"{field.name}: RMS slope {field.rms_slope:.2g} is above {STEEP_SLOPE:g}: beside "
-            "rigorous solutions, the colours are off by more than 20 % on slopes this steep, and "
-            "by up to all of the light on steeper ones"
+            f"{field.name}: RMS slope {field.rms_slope:.2g} is above {STEEP_SLOPE:g}: colours "
+            "differ from rigorous solutions by more than 20 %, on steeper surfaces completely"
         )
     elif field.rms_slope > GENTLE_SLOPE:
         lines.append(
-            f"{field.name}: RMS slope {field.rms_slope:.2g} is above {GENTLE_SLOPE:g}: beside "
-            "rigorous solutions, expect the colours to be off by 5 to 20 % in light 60° from the "
-            "normal, by less in steeper light, by more at edges and with model='kirchhoff'"
+            f"{field.name}: RMS slope {field.rms_slope:.2g} is above {GENTLE_SLOPE:g}: expect "
+            "colours to differ from rigorous solutions by 5 to 20 % in light 60° from the normal, "
+            "by less nearer to the normal, by more at edges and with model='kirchhoff'"
         )
     coarse = max(field.pixel_size)
     if coarse > shortest / 4:
@@ -81,7 +82,7 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
         reach = shortest / (2 * coarse)
         lines.append(
             f"{field.name}: pixels of {coarse:.3g} µm are coarser than a quarter of the "
-            f"shortest wavelength, which is {shortest / 4:.3g} µm: nothing is known of directions "
+            f"shortest wavelength, which is {shortest / 4:.3g} µm: they do not resolve directions "
             f"with |sinθi + sinθo| above {reach:.2g} at {shortest * 1000:g} nm"
             + (f"; {units_warning(field)}" if coarse > COARSEST_PIXEL else "")
         )
@@ -96,7 +97,7 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
 
 
 def edge_lines(field: HeightField, shortest: float) -> list[str]:
-    """What to say of a patch whose opposite edges need not meet: tilt, then the seams that stay.
+    """Return warnings of a patch whose opposite edges need not meet: of its tilt and its seams.
 
     Parameters
     ----------
@@ -114,7 +115,7 @@ def edge_lines(field: HeightField, shortest: float) -> list[str]:
     if level.rms_height < FACET * field.rms_height:
         return []
     lines = []
-    judged, once = field, ""
+    without_tilt, levelled = field, ""
     if _tilted(field, level, shortest):
         slope_x, slope_y = plane_of(field)
         turn = math.degrees(2 * math.atan(math.hypot(slope_x, slope_y)))
@@ -123,40 +124,44 @@ def edge_lines(field: HeightField, shortest: float) -> list[str]:
             f"the patch and turns the mirror direction by {turn:.2g}°; try level=plane "
             "(--level plane)"
         )
-        judged, once = level, " even once levelled"
-    seams = seams_of(judged)
-    foreign = [seam for seam in seams if seam.foreign]
-    slope = sum(seam.slope for seam in foreign)
-    inside = sum(seam.inside for seam in seams)
+        without_tilt, levelled = level, " even after levelling"
+    seams = seams_of(without_tilt)
+    defects = [seam for seam in seams if seam.defect]
+    slope = sum(seam.slope for seam in defects)
+    inside = sum(seam.slope_inside for seam in seams)
     if slope > SEAM_SHARE * (slope + inside):
-        worst = max(foreign, key=lambda seam: seam.slope)
+        worst = max(defects, key=lambda seam: seam.slope)
         share = slope / (slope + inside)
-        times = f"{worst.step / worst.largest:.2g} times" if worst.largest > 0 else "unlike"
+        largest = worst.largest_inside
+        compared = (
+            f"{worst.step / largest:.2g} times the largest step between neighbours inside"
+            if largest > 0
+            else "with no step between neighbours inside"
+        )
         lines.append(
-            f"{field.name}: opposite edges differ by {worst.step:.3g} µm RMS{once}, {times} the "
-            f"largest step between neighbours inside: the patch tiles the surface, and its seams, "
-            f"{share:.0%} of the mean-square slope, diffract as a grating of their own; try "
-            "periodic=smooth (--periodic smooth)"
+            f"{field.name}: opposite edges differ by {worst.step:.3g} µm RMS{levelled}, "
+            f"{compared}: the patch tiles the surface, and its seams, {share:.0%} of the "
+            "mean-square slope, diffract like a grating; try periodic=smooth (--periodic smooth)"
         )
     return lines
 
 
 def _tilted(field: HeightField, level: HeightField, shortest: float) -> bool:
-    """Whether the best plane is a tilt that matters, along one axis at least.
+    """Return whether the least-squares plane is a relevant tilt along one axis at least.
 
-    A tilt raises one edge over the opposite one by what it rises. The plane that fits a few
-    periods of a grating does not: their edges meet, or differ by a step as inside.
+    A tilt raises one edge over the opposite one by the plane's rise. The plane that fits a few
+    periods of a grating does not: the edges meet, or differ by a step that occurs inside, too.
     """
     least = max(shortest / QUARTER_WAVE, CHANCE * level.rms_height)
     for slope, length, seam in zip(plane_of(field), field.extent, seams_of(field), strict=True):
         rise = slope * length
-        if abs(rise) > least and abs(seam.rise - rise) < 0.5 * abs(seam.rise) and seam.foreign:
+        if abs(rise) > least and abs(seam.rise - rise) < 0.5 * abs(seam.rise) and seam.defect:
             return True
     return False
 
 
 def units_warning(field: HeightField) -> str:
-    """Whether lengths are nanometres taken for µm, as a question; "" if nothing speaks for it."""
+    """Return a question whether lengths are nanometres taken for µm, or "" if they look right."""
     coarse = max(field.pixel_size)
     if coarse > COARSEST_PIXEL:
         return f"is the pixel size of {coarse:.4g} µm in nm? Then divide it by 1000"
@@ -169,22 +174,22 @@ def units_warning(field: HeightField) -> str:
 
 
 def window_warning(field: HeightField, coherence_width: float) -> str:
-    """What to say of a patch that is smaller than the coherence window; "" of others."""
+    """Return a warning of a patch that is smaller than the coherence window, or ""."""
     width, height = field.extent
     if min(width, height) >= _SMALLER * coherence_width:
         return ""
     fitting = _two_digits(min(width, height))
-    advice = f"take coherence_width={fitting:g} (--coherence-width {fitting:g}) or a larger patch"
+    advice = f"use coherence_width={fitting:g} (--coherence-width {fitting:g}) or a larger patch"
     if fitting < _NARROWEST:
-        advice = "take a larger patch, or check its pixel size, which is in µm"
+        advice = "use a larger patch, or check its pixel size, which is in µm"
     return (
         f"{field.name}: the patch of {width:.4g} × {height:.4g} µm is smaller than the coherence "
-        f"width of {coherence_width:g} µm: it is tiled, and its repetition shows as a grating of "
-        f"its own; if it is none, {advice}"
+        f"width of {coherence_width:g} µm: its repetition diffracts like a grating; unless the "
+        f"surface is periodic, {advice}"
     )
 
 
 def _two_digits(length: float) -> float:
-    """The largest number of two digits that is not above a length."""
+    """Round a length down to two digits."""
     unit = 10.0 ** (math.floor(math.log10(length)) - 1)
     return float(f"{math.floor(length / unit * (1 + 1e-9)) * unit:.2g}")

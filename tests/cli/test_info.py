@@ -34,7 +34,7 @@ def test_json_has_the_numbers(run, heights):
     # a sine's amplitude over √2, over two whole periods
     assert data["rms_height"] == pytest.approx(0.02 / np.sqrt(2), rel=1e-6)
     (small,) = data["warnings"]  # the default window is 65 µm
-    assert "take coherence_width=6 (--coherence-width 6)" in small
+    assert "coherence_width=6 (--coherence-width 6)" in small
 
 
 def test_treatments_are_listed(run, heights):

@@ -96,7 +96,7 @@ def test_gentle_well_sampled_patch_is_valid():
 @pytest.mark.parametrize(
     ("heights", "pixel", "word"),
     [
-        (0.015 * np.arange(8), 0.05, "off by 5 to 20 %"),
+        (0.015 * np.arange(8), 0.05, "5 to 20 %"),
         (0.02 * np.arange(8), 0.05, "more than 20 %"),
         (0.002 * np.arange(8), 0.0901, "coarser than a quarter"),  # λ/4 = 0.09 µm
         (2e-9 * np.arange(8), 0.05, "metres"),

@@ -115,7 +115,7 @@ def test_seeds_are_several_patches(folder):
         ("source = 3", ["source", "3"]),
         ("source = []", ["source", "[]"]),
         ('source = ""', ["source"]),
-        ('source = "patch.toml"', ["recipe itself"]),
+        ('source = "patch.toml"', ["source", "is a recipe"]),
         ('source = "a.npy"\n[arguments]\nseed = 1', ["arguments"]),
         ('source = "a.npy"\nseeds = [1]', ["seeds"]),
         ('source = "a.npy"\npixel_size = 0', ["pixel_size", "0"]),

@@ -81,7 +81,7 @@ def test_contradictions_and_unknown_units_are_refused(text, tmp_path):
     assert "height_unit: expected a unit of length" in refusal(text, height_unit="V")
     np.save(tmp_path / "flat.npy", np.zeros((4, 4)))
     assert "is flat" in refusal(tmp_path / "flat.npy", max_height=1, pixel_size=0.1)
-    assert LoadOptions.of(height_unit="auto").height_unit is None
+    assert LoadOptions.parse(height_unit="auto").height_unit is None
 
 
 @pytest.mark.parametrize("offset", [76e3, -1e9])

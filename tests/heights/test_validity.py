@@ -42,9 +42,9 @@ def test_seams_are_said_until_they_are_mended(turned):
 
 def test_the_seams_of_a_tilted_patch_are_those_that_levelling_leaves():
     _, line = edge_lines(cut_out(SCALE + 0.01 * X), SHORTEST)
-    assert "even once levelled" in line
+    assert "even after levelling" in line
     (alone,) = edge_lines(cut_out(SCALE + 0.01 * X).treated(level="plane"), SHORTEST)
-    assert line.replace(" even once levelled", "") == alone
+    assert line.replace(" even after levelling", "") == alone
 
 
 def test_a_tilt_below_a_quarter_wave_is_left_alone():

@@ -19,7 +19,7 @@ from mitsuba_diffraction.tables.energy.links import Medium
 from mitsuba_diffraction.tables.energy.sides import Sides
 
 from . import rayleigh
-from .markdown import percent, table
+from .pages.markdown import percent, table
 
 Real = NDArray[np.float64]
 

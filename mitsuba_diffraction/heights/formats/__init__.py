@@ -1,10 +1,10 @@
-"""Readers of height files, by kind, and what they take out of a file: `RawHeights`.
+"""Readers of height files, by kind; each returns `RawHeights`.
 
 Contents
 --------
 images       PNG, BMP, TIFF and EXR
 grids        grids of numbers: NPY, TXT, CSV
-instruments  their files (extra `afm`)
+instruments  files of scanning-probe instruments (extra `afm`)
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 @dataclass
 class RawHeights:
-    """Heights as one file holds them, before lengths and treatments are settled."""
+    """Heights in a file's own unit, before the user's lengths and treatments are applied."""
 
     # (ny, nx), y upwards (`values[0]` is y = 0), in `unit`, or in [0, 1] if `relative`; points
     # without data are NaN
@@ -26,11 +26,10 @@ class RawHeights:
     relative: bool = False  # the values are fractions of a full scale that the file does not know
     notes: tuple[str, ...] = ()  # one line per choice that the reader made
     unit: float | None = 1.0  # µm in one unit of the values; None if the file says no length
-    # that unit as the file states it; "" if the values are in µm because files of this kind are
-    stated: str = ""
+    stated: str = ""  # name of that unit in the file; "" if the format implies µm
 
 
 def first_line(error: BaseException) -> str:
-    """The first line of an exception's text, for quoting a library inside a one-line message."""
+    """Return the first line of an exception's text, to quote a library in a one-line message."""
     lines = str(error).strip().splitlines()
     return lines[0][:200] if lines else type(error).__name__

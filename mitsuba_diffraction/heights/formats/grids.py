@@ -7,6 +7,7 @@ import re
 import tokenize
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +17,7 @@ from ..field import MAX_PIXELS, check_pixel_count
 from ..lengths import micrometres_of
 from . import RawHeights, first_line
 
-_BLOCK = 1 << 22  # values
+_BLOCK = 1 << 22  # values that are copied at a time
 
 _MISSING = {"", "nan", "na", "n/a", "bad", "none", "null", "-", "--", "inf", "-inf"}
 # Lines that Gwyddion and others put above an exported matrix: "# Width: 10.00 µm".
@@ -25,9 +26,9 @@ _VALUES = re.compile(r"[#;%\s]*Value units\s*[:=]\s*(\S+)\s*$", re.IGNORECASE)
 
 
 def read_npy(path: Path) -> RawHeights:
-    """Read heights in µm from an NPY file of shape (ny, nx), taken as it is: row 0 is y = 0.
+    """Read heights in µm from an NPY file of shape (ny, nx); row 0 is y = 0.
 
-    The file is mapped, so that a header that claims more than is there takes no memory; pickled
+    The file is memory-mapped, so that a header with too large a shape allocates nothing; pickled
     objects, which could run code, are refused.
 
     Raises
@@ -62,10 +63,10 @@ def read_npy(path: Path) -> RawHeights:
 
 
 def _copied(path: Path, values: np.ndarray) -> np.ndarray:
-    """The values, read-only; mapped anew for some rows at a time, which lets go of those before."""
+    """Copy the values to a read-only array; mapping each block anew releases the previous one."""
     result = np.empty(values.shape, np.float64)
     rows = max(1, _BLOCK // values.shape[1])
-    # signalling NaNs, as damage makes them; what is no number is looked for later
+    # damaged files may hold signalling NaNs; `fill_missing` handles them
     with np.errstate(invalid="ignore"):
         for start in range(0, len(result), rows):
             mapped = np.load(path, mmap_mode="r", allow_pickle=False)
@@ -85,7 +86,7 @@ def read_text(path: Path) -> RawHeights:
     Raises
     ------
     DiffractionError
-        If a line does not fit: not a number, too few or too many; units that are not lengths.
+        If a cell is not a number, rows differ in length, or a unit is not a length.
     """
     shown = repr(str(path))
     try:
@@ -101,7 +102,8 @@ def read_text(path: Path) -> RawHeights:
     pixel_size: tuple[float, float] | None
     if np.isnan(values[:, -1]).all():
         values = values[:, :-1]  # a separator at the end of every line, not a column
-    (unit, stated), size = _header_sizes(header, shown)
+    header_values = _read_header(header, shown)
+    size = header_values.size
     ny, nx = values.shape
     if nx < 2 or ny < 2:
         raise DiffractionError(
@@ -111,10 +113,13 @@ def read_text(path: Path) -> RawHeights:
         values, pixel_size = _from_points(values, shown)
     else:
         pixel_size = (size[0] / nx, size[1] / ny) if size else None
-    return RawHeights(values[::-1], pixel_size, unit=unit, stated=stated)
+    return RawHeights(
+        values[::-1], pixel_size, unit=header_values.unit, stated=header_values.stated
+    )
 
 
 def _parse(lines: Iterable[str], shown: str) -> tuple[list[list[float]], list[str]]:
+    """Split text into rows of numbers and the header's lines."""
     rows: list[list[float]] = []
     header: list[str] = []
     split: Callable[[str], list[str]] | None = None
@@ -142,7 +147,7 @@ def _parse(lines: Iterable[str], shown: str) -> tuple[list[list[float]], list[st
 
 
 def _splitter(line: str) -> Callable[[str], list[str]]:
-    """How to take lines like this one apart."""
+    """Return the function that splits lines with the separators of `line` into cells."""
     if ";" in line:
         return lambda text: text.replace(",", ".").split(";")
     if "\t" in line.strip():
@@ -153,6 +158,7 @@ def _splitter(line: str) -> Callable[[str], list[str]]:
 
 
 def _number(cell: str, line: int, shown: str) -> float:
+    """Convert a cell of line number `line` to a float; NaN where data is missing."""
     word = cell.strip()
     if word.lower() in _MISSING:
         return math.nan
@@ -165,41 +171,53 @@ def _number(cell: str, line: int, shown: str) -> float:
         ) from error
 
 
-def _header_sizes(
-    header: list[str], shown: str
-) -> tuple[tuple[float, str], tuple[float, float] | None]:
-    """The unit of the heights in µm and by name, and (width, height) of the patch in µm."""
-    unit = 1.0, ""
+class _Header(NamedTuple):
+    """Unit of the heights and size of the patch that a text file's header states."""
+
+    unit: float = 1.0  # µm per unit of the heights
+    stated: str = ""  # name of the unit
+    size: tuple[float, float] | None = None  # (width, height), µm
+
+
+def _read_header(header: list[str], shown: str) -> _Header:
+    """Read the unit of the heights and the size of the patch from the header's lines."""
+    unit, stated = 1.0, ""
     sizes: dict[str, float] = {}
     for line in header:
         if match := _VALUES.match(line):
-            unit = _factor(match[1], shown), match[1]
+            unit, stated = _factor(match[1], shown), match[1]
         elif match := _SIZE.match(line):
             try:
                 sizes[match[1].lower()] = float(match[2]) * _factor(match[3], shown)
             except ValueError as error:
                 raise DiffractionError(f"{shown}: {line.strip()!r} is not a size") from error
     if len(sizes) < 2:
-        return unit, None
+        return _Header(unit, stated)
     size = sizes["width"], sizes["height"]
     if not all(math.isfinite(s) and s > 0 for s in size):
         raise DiffractionError(f"{shown} states a size of {size[0]:g} x {size[1]:g} µm")
-    return unit, size
+    return _Header(unit, stated, size)
 
 
 def _factor(unit: str, shown: str) -> float:
-    known = micrometres_of(unit)
-    if known is None:
+    """Return how many µm one `unit` is."""
+    micrometres = micrometres_of(unit)
+    if micrometres is None:
         raise DiffractionError(
             f"{shown}: {unit!r} is not a unit of length; expected one of m, mm, µm, nm, pm, Å"
         )
-    return known
+    return micrometres
 
 
 def _from_points(
     points: npt.NDArray[np.float64], shown: str
 ) -> tuple[npt.NDArray[np.float64], tuple[float, float]]:
-    """Arrange points (n, 3) of x, y, height into a grid, first row the largest y."""
+    """Arrange points (n, 3) of x, y, height into a grid, first row the largest y.
+
+    Returns
+    -------
+    heights (ny, nx), pixel size (dx, dy) in µm
+    """
     uneven = DiffractionError(
         f"{shown} has three columns, which are read as x, y and height, but its points do not "
         "form a uniform grid; interpolate them to one first"
@@ -211,13 +229,13 @@ def _from_points(
     if min(xs.size, ys.size) < 2 or xs.size * ys.size != len(points):
         raise uneven
     steps = np.diff(xs), np.diff(ys)
-    # printed with few digits, a uniform grid is uneven by its rounding: 1 % of a step is no more
+    # coordinates printed with few digits are rounded: up to 1 % of a step is uniform
     if any(np.ptp(step) > 0.01 * step.mean() for step in steps):
         raise uneven
     grid = np.full((ys.size, xs.size), np.nan)
-    taken = np.zeros(grid.shape, dtype=bool)
-    taken[iy, ix] = True
-    if not taken.all():
+    occupied = np.zeros(grid.shape, dtype=bool)
+    occupied[iy, ix] = True
+    if not occupied.all():
         raise uneven
     grid[iy, ix] = points[:, 2]
     return grid[::-1], (float(steps[0].mean()), float(steps[1].mean()))

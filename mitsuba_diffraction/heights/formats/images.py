@@ -18,7 +18,7 @@ from ...streams import without_chatter
 from ..field import check_pixel_count
 from . import RawHeights, first_line
 
-# Full scale of Pillow's integer modes, and how people call the colour ones.
+# Full scale of Pillow's integer modes, and names of the colour modes in messages.
 _FULL_SCALE = {"1": 1, "L": 255, "I;16": 65535, "I;16L": 65535, "I;16B": 65535, "I;16N": 65535}
 _COLOUR = {
     "P": "palette colours", "PA": "palette colours", "LA": "a transparency channel",
@@ -27,7 +27,7 @@ _COLOUR = {
     "YCbCr": "colours (YCbCr)", "LAB": "colours (Lab)", "HSV": "colours (HSV)",
 }  # fmt: skip
 
-# What Pillow's decoders raise on damaged files, found by feeding them random bytes.
+# Exceptions that Pillow's decoders raise on damaged files.
 _DAMAGED = (
     OSError, ValueError, SyntaxError, TypeError, KeyError, IndexError, AttributeError, EOFError,
     OverflowError, MemoryError, NotImplementedError, RuntimeError, ZeroDivisionError, struct.error,
@@ -41,9 +41,8 @@ _PARK_TAG = 50432
 def read_image(path: Path) -> RawHeights:
     """Read a grey PNG, BMP or TIFF of 1, 8 or 16 bits (relative) or 32-bit float (µm).
 
-    Eight-bit colours are read where red, green and blue are alike and nothing is transparent.
-
-    The image's top row is the largest y, so rows are flipped.
+    Eight-bit colours are read if red, green and blue are equal and no pixel is transparent. The
+    image's top row is the largest y, so rows are flipped.
 
     Raises
     ------
@@ -71,20 +70,21 @@ def read_image(path: Path) -> RawHeights:
 
 
 def is_park_tiff(path: Path) -> bool:
-    """Whether a TIFF is a Park Systems instrument file, a picture with heights in private tags."""
+    """Return whether a TIFF is an instrument file of Park Systems, with heights in private tags."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
             with Image.open(path, formats=("TIFF",)) as image:
                 return _PARK_TAG in image.tag_v2  # type: ignore[attr-defined]
         except (*_DAMAGED, Image.DecompressionBombError):
-            return False  # reading it as an image will say what is wrong
+            return False  # `read_image` reports the damage
 
 
 def _heights_of(image: Image.Image, shown: str) -> RawHeights:
+    """Decode an opened image."""
     check_pixel_count(image.height, image.width, shown)
     mode = image.mode
-    if mode == "I" and image.format == "PNG":  # how Pillow before 10.3 calls 16-bit grey
+    if mode == "I" and image.format == "PNG":  # Pillow's name of 16-bit grey before 10.3
         mode = "I;16"
     if getattr(image, "n_frames", 1) != 1:
         raise DiffractionError(f"{shown} has {image.n_frames} pages; save the height image alone")  # type: ignore[attr-defined]
@@ -102,9 +102,8 @@ def _heights_of(image: Image.Image, shown: str) -> RawHeights:
 
 
 def _grey_levels(image: Image.Image, shown: str) -> npt.NDArray[np.uint8]:
-    """Levels of a picture that holds grey as colours, as screenshots do: red, green, blue alike."""
-    what = _COLOUR[image.mode]
-    deep = ";16" in repr(getattr(image, "tile", ""))  # Pillow keeps eight bits of them
+    """Return the levels of a grey picture that is stored in colours, as screenshots are."""
+    deep = ";16" in repr(getattr(image, "tile", ""))  # Pillow reads only eight bits of these
     colours = np.asarray(image.convert("RGBA"))
     grey = colours[..., 0]
     alike = np.array_equal(grey, colours[..., 1]) and np.array_equal(grey, colours[..., 2])
@@ -116,26 +115,26 @@ def _grey_levels(image: Image.Image, shown: str) -> npt.NDArray[np.uint8]:
         if not alike
         else "part of it is transparent"
         if not opaque
-        else "of 16 bits each, of which 8 would be read"
+        else "they have 16 bits each, of which only 8 can be read"
     )
     raise DiffractionError(
-        f"{shown} has {what}, and heights are one grey channel: {why}; export the heights as 8- or "
-        "16-bit greyscale or as numbers, or, if it is grey but for a tint, convert it with Pillow: "
-        "image.convert('L')"
+        f"{shown} has {_COLOUR[image.mode]}, and heights are one grey channel: {why}; export the "
+        "heights as 8- or 16-bit greyscale or as numbers, or, if the picture is grey with a tint, "
+        "convert it with Pillow: image.convert('L')"
     )
 
 
 def read_exr(path: Path, channel: str | None = None) -> RawHeights:
     """Read an EXR with one channel of heights in µm; the top row is the largest y.
 
-    `channel` names the channel to take where there are several. OpenEXR decodes the whole file for
-    it, so files of several parts are refused, and so is what would take too much memory.
+    `channel` names one of several channels. OpenEXR decodes all channels and parts, so files of
+    several parts and files that need too much memory are refused.
 
     Raises
     ------
     DiffractionError
-        If it is not an EXR, is damaged, has no pixels, several parts, or several channels and no
-        choice.
+        If the file is not an EXR, is damaged, has no pixels, several parts, or several channels
+        while `channel` is `None`.
     """
     shown = repr(str(path))
     try:
@@ -150,7 +149,7 @@ def read_exr(path: Path, channel: str | None = None) -> RawHeights:
             pixels = file.channels()[chosen].pixels
     except DiffractionError:
         raise
-    # OpenEXR raises plain RuntimeError and ValueError; the others come of headers that lie
+    # OpenEXR raises RuntimeError and ValueError; damaged headers cause the others
     except (RuntimeError, ValueError, OSError, KeyError, IndexError, TypeError, MemoryError) as e:
         raise DiffractionError(f"{shown} is not a readable EXR image: {first_line(e)}") from e
     if pixels is None or pixels.ndim != 2:
@@ -159,7 +158,7 @@ def read_exr(path: Path, channel: str | None = None) -> RawHeights:
 
 
 def _only_header(path: Path, shown: str) -> dict[str, Any]:
-    """Header of the only part."""
+    """Read the header of an EXR that has one part."""
     with without_chatter():
         file = OpenEXR.File(str(path), header_only=True)
     if len(file.parts) > 1:
@@ -171,6 +170,7 @@ def _only_header(path: Path, shown: str) -> dict[str, Any]:
 
 
 def _choose_channel(names: list[str], channel: str | None, shown: str) -> str:
+    """Return the channel that the user names, or the only one."""
     listed = ", ".join(repr(name) for name in names[:8]) + (", ..." if len(names) > 8 else "")
     if channel is not None:
         if channel not in names:
@@ -179,6 +179,6 @@ def _choose_channel(names: list[str], channel: str | None, shown: str) -> str:
     if len(names) != 1:
         raise DiffractionError(
             f"{shown} has {len(names)} channels ({listed}); heights are one channel: name it with "
-            "channel (a table of diffraction goes where a table is asked for)"
+            "channel (if the file is a diffraction table, pass it as table)"
         )
     return names[0]

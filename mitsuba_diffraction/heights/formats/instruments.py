@@ -1,4 +1,4 @@
-"""Scanning-probe instrument files, through the package SurfaceTopography (extra `afm`)."""
+"""Reader of scanning-probe instrument files; uses SurfaceTopography (extra `afm`)."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import math
 import re
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import DiffractionError, DiffractionWarning
+from ...errors import DiffractionError, warn
 from ..field import check_pixel_count
 from . import RawHeights, first_line
 
@@ -32,8 +32,8 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
         A file of any format that SurfaceTopography recognises by content: NanoScope, Gwyddion, IBW,
         NID, MI, X3P, JPK, WSxM, ...
     channel
-        Index or name of the channel. By default the one that holds heights; if several do, the
-        first, and a warning lists them.
+        Index or name of the channel; by default the first that holds heights. A warning lists the
+        others if there are any.
 
     Returns
     -------
@@ -43,14 +43,14 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
     Raises
     ------
     DiffractionError
-        If the package is missing, the format is not recognised, the file is damaged, the units are
-        unknown or not lengths, nothing in it is a height, or the data is a line scan or not on a
+        If SurfaceTopography is missing, the format is unknown, the file is damaged, the units are
+        unknown or not lengths, no channel holds heights, or the data is a line scan or not on a
         uniform grid.
     """
     shown = repr(str(path))
     with warnings.catch_warnings():
-        # Readers warn of fields they do not know, and of optional packages that they can do
-        # without; what matters here is checked below.
+        # Readers warn of unknown fields and missing optional packages; units and sizes are checked
+        # below.
         warnings.simplefilter("ignore")
         try:
             from SurfaceTopography.Exceptions import CannotDetectFileFormat
@@ -60,8 +60,8 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
                 f"{shown} is read as an instrument file, which needs SurfaceTopography: "
                 "pip install 'mitsuba_diffraction[afm]'"
             ) from error
-        # Some forty readers of binary formats raise whatever damaged data trips over, from
-        # struct.error to AssertionError; each becomes one line with its cause attached.
+        # On damaged data, some forty readers of binary formats raise anything from struct.error to
+        # AssertionError; each becomes one line with its cause attached.
         try:
             reader = open_topography(str(path))
         except CannotDetectFileFormat as error:
@@ -73,8 +73,8 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
         except Exception as error:
             raise DiffractionError(f"{shown} cannot be read: {first_line(error)}") from error
         try:
-            chosen, note, others = _choose(list(reader.channels), channel, shown)
-            raw = _read_channel(reader, chosen, shown)
+            choice = _choose(list(reader.channels), channel, shown)
+            raw = _read_channel(reader, choice.channel, shown)
         except DiffractionError:
             raise
         except Exception as error:
@@ -83,58 +83,66 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
             ) from error
         finally:
             reader.close()
-    if others:
-        warnings.warn(
-            f"{shown} has several height channels; {chosen.name!r} was taken, channel= chooses "
-            f"another: {others}",
-            DiffractionWarning,
-            stacklevel=2,
+    if choice.others:
+        warn(
+            f"{shown} has several height channels; {choice.channel.name!r} is read; choose another "
+            f"with channel: {choice.others}"
         )
-    raw.notes = (note,)
+    raw.notes = (choice.note,)
     return raw
 
 
-def _choose(channels: list[Any], wanted: str | int | None, shown: str) -> tuple[Any, str, str]:
-    """Channel to read, a line that says which, and the other height channels if there are any."""
+class _Choice(NamedTuple):
+    """Channel to read, its line in the history, and a list of all height channels if several."""
+
+    channel: Any
+    note: str
+    others: str
+
+
+def _choose(channels: list[Any], requested: str | int | None, shown: str) -> _Choice:
+    """Choose the requested channel, or the first that holds heights."""
     if not channels:
         raise DiffractionError(f"{shown} has no channel")
     listed = _list(channels)
-    if wanted is not None:
-        chosen = _named(channels, wanted, shown)
-        return chosen, f"channel {chosen.name!r}, chosen among {listed}", ""
+    if requested is not None:
+        channel = _named(channels, requested, shown)
+        return _Choice(channel, f"channel {channel.name!r}, chosen among {listed}", "")
     heights = [c for c in channels if _is_height(c) and not _NOT_HEIGHT.search(c.name)]
-    if not heights:  # whose units the user may know
+    if not heights:  # without units, which the user may know
         heights = [c for c in channels if c.dim == 2 and _units(c) == (None, None)]
     if not heights:
         raise _why_none(channels, shown)
     note = f"channel {heights[0].name!r}"
     if len(channels) > 1:
         note += f", the {'first' if len(heights) > 1 else 'only'} height channel among {listed}"
-    return heights[0], note, _list(heights) if len(heights) > 1 else ""
+    return _Choice(heights[0], note, _list(heights) if len(heights) > 1 else "")
 
 
 def _list(channels: list[Any]) -> str:
+    """List indices and names of channels for a message, twelve at most."""
     text = ", ".join(f"{c.index} {c.name!r}" for c in channels[:12])
     return text + (", ..." if len(channels) > 12 else "")
 
 
-def _named(channels: list[Any], wanted: str | int, shown: str) -> Any:
-    matches = [c for c in channels if c.name == wanted]
-    if not matches and isinstance(wanted, str):
-        matches = [c for c in channels if c.name.casefold() == wanted.casefold()]
-    if not matches and re.fullmatch(r"\s*\d{1,6}\s*", str(wanted)):
-        matches = [c for c in channels if c.index == int(wanted)]
+def _named(channels: list[Any], name: str | int, shown: str) -> Any:
+    """Return the channel with this name, exact or in other case, or with this index."""
+    matches = [c for c in channels if c.name == name]
+    if not matches and isinstance(name, str):
+        matches = [c for c in channels if c.name.casefold() == name.casefold()]
+    if not matches and re.fullmatch(r"\s*\d{1,6}\s*", str(name)):
+        matches = [c for c in channels if c.index == int(name)]
     if not matches:
-        raise DiffractionError(f"{shown}: channel {wanted!r} is not one of {_list(channels)}")
+        raise DiffractionError(f"{shown}: channel {name!r} is not one of {_list(channels)}")
     if len(matches) > 1:
         raise DiffractionError(
-            f"{shown}: several channels are called {wanted!r}; give the index: {_list(channels)}"
+            f"{shown}: several channels are called {name!r}; give the index: {_list(channels)}"
         )
     return matches[0]
 
 
 def _why_none(channels: list[Any], shown: str) -> DiffractionError:
-    """What keeps every channel from being a height map."""
+    """Return the error of a file without any channel of heights."""
     if all(c.dim == 1 for c in channels):
         return DiffractionError(f"{shown} holds line scans; a height field needs a map (ny, nx)")
     if all(c.is_uniform is False for c in channels):
@@ -142,13 +150,13 @@ def _why_none(channels: list[Any], shown: str) -> DiffractionError:
             f"{shown} is not on a uniform grid; interpolate its points to one first"
         )
     return DiffractionError(
-        f"{shown} has no height channel among {_list(channels)}; if one of them holds heights "
-        "after all, name it with channel"
+        f"{shown} has no height channel among {_list(channels)}; if one of them holds heights, "
+        "name it with channel"
     )
 
 
 def _units(channel: Any) -> tuple[str | None, str | None]:
-    """Units (lateral, height) that a channel states; a length for both is one string there."""
+    """Return the units (lateral, height) of a channel; one string stands for both."""
     unit = channel.unit
     if isinstance(unit, (tuple, list)):
         return unit[0], unit[-1]
@@ -156,7 +164,7 @@ def _units(channel: Any) -> tuple[str | None, str | None]:
 
 
 def _in_micrometres(unit: str | None) -> float | None:
-    """How many µm one `unit` is; `None` if it is not a unit of length."""
+    """Return how many µm one `unit` is, or `None` if it is not a unit of length."""
     from SurfaceTopography.Support.UnitConversion import (
         get_unit_conversion_factor,
         is_length_unit,
@@ -168,6 +176,7 @@ def _in_micrometres(unit: str | None) -> float | None:
 
 
 def _is_height(channel: Any) -> bool:
+    """Return whether a channel is a map of heights in units of length."""
     lateral, height = _units(channel)
     return (
         channel.dim != 1
@@ -178,7 +187,7 @@ def _is_height(channel: Any) -> bool:
 
 
 def _check_map(source: Any, what: str) -> None:
-    """Refuse a channel or topography that is no map on a uniform grid."""
+    """Refuse a channel or topography that is a line scan or not on a uniform grid."""
     if source.dim == 1:
         raise DiffractionError(f"{what} is a line scan; a height field needs a map (ny, nx)")
     if source.is_uniform is False:
@@ -186,6 +195,7 @@ def _check_map(source: Any, what: str) -> None:
 
 
 def _read_channel(reader: Any, channel: Any, shown: str) -> RawHeights:
+    """Read heights, pixel size and unit of one channel."""
     what = f"{shown}, channel {channel.name!r}"
     _check_map(channel, what)
     sized = channel.physical_sizes is not None
@@ -194,7 +204,7 @@ def _read_channel(reader: Any, channel: Any, shown: str) -> RawHeights:
         check_pixel_count(ny, nx, what)
     options = {} if sized else {"physical_sizes": (1.0, 1.0)}
     topography = reader.topography(channel_index=channel.index, **options)
-    _check_map(topography, what)  # some readers know only now
+    _check_map(topography, what)  # some readers know the grid only after reading
     lateral, height = _units(channel)
     lateral_scale = _in_micrometres(lateral)
     values = np.ma.filled(np.ma.asarray(topography.heights(), dtype=np.float64), np.nan)

@@ -1,7 +1,10 @@
-"""Height fields that are made, not measured.
+"""Height fields computed from formulas and seeds.
 
-`ideal`: gratings with closed-form diffraction, for checks. `scales`: look-alikes of snake scales.
-`discs`: the tracks of CDs and DVDs.
+Contents
+--------
+ideal   gratings with closed-form diffraction
+scales  look-alikes of snake scales
+discs   tracks of CDs and DVDs
 """
 
 from __future__ import annotations

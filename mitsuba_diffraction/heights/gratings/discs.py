@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -37,19 +38,19 @@ _GROWTH = 1.455785
 
 @dataclass(frozen=True)
 class Format:
-    """What a disc is made of; lengths in µm."""
+    """Sizes of a disc's pits and their tolerances; lengths in µm."""
 
     name: str
-    bit: float  # channel bit along the track
-    width: float  # of a pit, half way down
+    bit: float  # length of a channel bit along the track
+    width: float  # width of a pit, half way down
     slope: float  # horizontal length of a pit's wall
-    jitter: float  # rms of a pit's ends along the track
-    wander: float  # rms of a pit across the track
-    roughness: float  # rms of land and pits
+    jitter: float  # rms displacement of a pit's ends along the track
+    wander: float  # rms displacement of a pit across the track
+    roughness: float  # rms roughness of land and pits
 
 
 # Walls rise at 50° to 60° over the depth. Pits of a DVD are placed within 7 nm across the track, a
-# figure of AFM quality control; a CD is given a little more.
+# figure of AFM quality control; 10 nm is assumed for a CD.
 CD = Format(
     name="cd", bit=0.27766, width=0.5, slope=0.1, jitter=0.015, wander=0.01, roughness=0.002
 )
@@ -67,24 +68,25 @@ def cd(
     track_pitch: float = 1.6,
     irregularity: float = 1.0,
 ) -> HeightField:
-    """Patch of a pressed compact disc: tracks along x, so that colours spread along y.
+    """Generate a patch of a pressed compact disc: tracks along x, colours spread along y.
 
     Parameters
     ----------
     extent
-        Size in µm, one length or (along x, along y), 4 to 500. Tracks are moved apart or together
-        so that a whole number of them fits, and channel bits likewise, so that the patch tiles;
-        64 µm holds 40 tracks of 1.6 µm.
+        Size in µm, one length or (along x, along y), 4 to 500. The pitch of tracks and the length
+        of channel bits are adjusted so that whole numbers of them fit and the patch tiles; 64 µm
+        holds 40 tracks of 1.6 µm.
     pixels
         Samples, one count or (along x, along y). Pixels above 0.1 µm do not resolve pits.
     seed
-        A whole number; every seed is other data.
+        A whole number; each seed encodes different data.
     depth
-        From the mean land, at this height, to the mean bottom of a pit, at 0, µm.
+        Height of the mean land above the mean bottom of a pit, which is at 0, µm.
     track_pitch
-        µm, at most half of the extent along y.
+        Distance between tracks, µm, at most half of the extent along y.
     irregularity
-        Jitter of pits' ends, wander of tracks, roughness; 1 as on a good disc, 0 none.
+        Factor of the jitter of pits' ends, the wander of tracks and the roughness; 1 is a good
+        disc, 0 a perfect one.
 
     Raises
     ------
@@ -103,7 +105,7 @@ def dvd(
     track_pitch: float = 0.74,
     irregularity: float = 1.0,
 ) -> HeightField:
-    """Patch of a pressed DVD, one layer: tracks along x; 65.12 µm holds 88 of 0.74 µm.
+    """Generate a patch of a pressed DVD, one layer: tracks along x; 65.12 µm holds 88 of 0.74 µm.
 
     Parameters and errors as in `cd`.
     """
@@ -119,47 +121,49 @@ def _disc(
     track_pitch: float,
     irregularity: float,
 ) -> HeightField:
-    """Draw a patch of a disc; parameters as in `cd`."""
-    who = disc.name
-    size = length_pair(extent, f"{who}: extent", 4.0, 500.0)
-    nx, ny = count_pair(pixels, f"{who}: pixels", 8, 4096)
-    full = number_between(depth, f"{who}: depth", 0.0, 10.0, " µm")
-    # tracks closer than a pit is wide would merge
-    pitch = number_between(track_pitch, f"{who}: track_pitch", 1.2 * disc.width, size[1] / 2, " µm")
-    amount = number_between(irregularity, f"{who}: irregularity", 0.0, 3.0)
-    streams = np.random.SeedSequence(seed_of(seed, f"{who}: seed")).spawn(2)
+    """Check the parameters, which are those of `cd`, and draw a patch of a disc."""
+    name = disc.name
+    size = length_pair(extent, f"{name}: extent", 4.0, 500.0)
+    nx, ny = count_pair(pixels, f"{name}: pixels", 8, 4096)
+    full = number_between(depth, f"{name}: depth", 0.0, 10.0, " µm")
+    # pits of tracks that are closer than 1.2 widths would merge
+    least = 1.2 * disc.width
+    pitch = number_between(track_pitch, f"{name}: track_pitch", least, size[1] / 2, " µm")
+    amount = number_between(irregularity, f"{name}: irregularity", 0.0, 3.0)
+    streams = np.random.SeedSequence(seed_of(seed, f"{name}: seed")).spawn(2)
     data, texture = (np.random.default_rng(stream) for stream in streams)
     tracks = round(size[1] / pitch)
     x = np.arange(nx, dtype=np.float64) * (size[0] / nx)
     drawn = [_track(data, disc, size[0], x, amount) for _ in range(tracks)]
     ahead, aside, half = (np.stack(parts) for parts in zip(*drawn, strict=True))
-    place = np.arange(ny) * (tracks / ny)  # in tracks
-    track = np.floor(place).astype(np.intp)  # which begins at its land; its centre is half way
+    place = np.arange(ny) * (tracks / ny)  # y in track pitches
+    track = np.floor(place).astype(np.intp)  # a track's centre is half a pitch from its start
     across = ((place - track - 0.5) * (size[1] / tracks))[:, None] - aside[track]
     outside = np.hypot(ahead[track], across) - half[track]
     relief = ramp(-disc.slope / 2, disc.slope / 2, outside)
     heights = full * relief + amount * disc.roughness * grain(texture, size, (ny, nx), (0.05, 0.05))
-    return HeightField(rounded(heights), (size[0] / nx, size[1] / ny), name=who)
+    return HeightField(rounded(heights), (size[0] / nx, size[1] / ny), name=name)
+
+
+class _NearestPit(NamedTuple):
+    """Stadium-shaped pit nearest to each x of a track, µm, arrays (nx,)."""
+
+    ahead: FloatArray  # distance along the track to the stadium's axis
+    aside: FloatArray  # position of the axis across the track
+    half: FloatArray  # radius of the stadium
 
 
 def _track(
     rng: Rng, disc: Format, length: float, x: FloatArray, irregularity: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The pit nearest to each x (nx,) on a track around the patch, as a stadium.
-
-    Returns
-    -------
-    ahead, aside, half
-        µm, each (nx,): the distance along the track to the stadium's axis, where the axis lies
-        across the track, and the stadium's radius.
-    """
+) -> _NearestPit:
+    """Draw the pits of one track of `length` µm, which is closed, and return the nearest ones."""
     runs = _runs(rng, round(length / disc.bit))
     bit = length / runs.sum()
     ends = np.cumsum(runs) * bit + length * rng.random()
     n = runs.size // 2
     jitter = irregularity * disc.jitter * rng.standard_normal((2, n))
-    begin, end = ends[0::2] + jitter[0], ends[1::2] + jitter[1]  # pits and lands take turns
-    # long pits come out a little wider, and none like another
+    begin, end = ends[0::2] + jitter[0], ends[1::2] + jitter[1]  # pits and lands alternate
+    # pits vary in width, and long ones are a little wider
     half = 0.5 * disc.width * (1 + irregularity * 0.03 * rng.standard_normal(n))
     half *= 1 + irregularity * 0.05 * (runs[1::2] / 5 - 1).clip(-1, 1)
     axis = np.maximum((end - begin) / 2 - half, 0)  # half the length of the stadium's axis
@@ -168,11 +172,11 @@ def _track(
     ahead = np.maximum(np.abs(offset) - axis, 0)
     nearest = (ahead - half).argmin(axis=1)
     aside = irregularity * disc.wander * rng.standard_normal(n)
-    return ahead[np.arange(x.size), nearest], aside[nearest], half[nearest]
+    return _NearestPit(ahead[np.arange(x.size), nearest], aside[nearest], half[nearest])
 
 
 def _runs(rng: Rng, bits: int) -> npt.NDArray[np.int64]:
-    """An even number of run lengths, 3 to 11, that add up to `bits`, at least 6."""
+    """Draw an even number of run lengths, 3 to 11, that add up to `bits`, at least 6."""
     lengths = np.arange(_SHORTEST_RUN, _LONGEST_RUN + 1)
     chance = _GROWTH ** -lengths.astype(np.float64)
     chance /= chance.sum()

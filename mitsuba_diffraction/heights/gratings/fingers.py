@@ -1,9 +1,9 @@
-"""The fingers of a scale: where they stand, in columns that wander and end, and their shape.
+"""Fingers of a snake's scale: their positions in irregular columns, and their shape.
 
 The microstructure of many snakes' scales is a staircase of flat cells whose rear edges are drawn
-out into fingers that lie over the next cell. Here a sheet is one row of such fingers around the
-torus of the patch; the fingers point to +y. Sheets are laid over one another, as a probe feels them
-that cannot see beneath.
+out into fingers that lie over the next cell. A sheet is one row of such fingers around the torus of
+the patch; the fingers point to +y. The heights are the upper envelope of all sheets, which is what
+a probe measures.
 """
 
 from __future__ import annotations
@@ -16,53 +16,53 @@ import numpy.typing as npt
 
 from .noise import FloatArray, Pair, Rng, sample_field, smooth_field
 
-# Sweeps that even out the columns around an inserted one, and the one after which columns that are
-# still too close to another are taken out. Enough for what remains to be spread over a few columns.
+# Sweeps that even out the columns around an inserted one, enough to spread the gap over a few
+# columns, and the sweep after which columns too close to their neighbour are removed.
 _SWEEPS = 60
 _THINNING = 40
 
-# A sheet is drawn until it is this many lengths from its tips; by then others lie over it.
+# Drawn length of a sheet, in finger lengths from the tips; other sheets cover it from there on.
 _DRAWN = 2.35
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How regular the rows and columns are; lengths in µm.
+    """Lattice of fingers and its irregularities; lengths in µm.
 
     `sway`, `wave` and `rise` are standard deviations of fields that vary over several fingers,
-    `jitter_x` and `jitter_y` those of single tips. A column differs from the next more than a
-    finger from the next one in its column.
+    `jitter_x` and `jitter_y` those of single tips. Fingers vary more from column to column than
+    along a column.
     """
 
-    pitch: float  # between columns
-    row_pitch: float  # between rows
-    sway: float  # of columns, sideways
-    wave: float  # of rows, along the fingers
+    pitch: float  # distance between columns
+    row_pitch: float  # distance between rows
+    sway: float  # displacement of columns along x
+    wave: float  # displacement of rows along y
     wave_reach: tuple[float, float]  # correlation length of `wave`, in columns and in rows
     jitter_x: float
     jitter_y: float
-    rise: float  # of fingers, up and down
+    rise: float  # height of fingers
     faults: float  # columns that begin and end inside the patch, per µm²
 
     def scaled(self, irregularity: float) -> Layout:
-        """The same lattice, its irregularities multiplied."""
+        """Return the same lattice with its irregularities multiplied."""
         names = ("sway", "wave", "jitter_x", "jitter_y", "rise", "faults")
         return replace(self, **{name: irregularity * getattr(self, name) for name in names})
 
 
 @dataclass(frozen=True)
 class Row:
-    """One sheet's fingers, from left to right around the patch; arrays (n,), µm."""
+    """Fingers of one sheet, from left to right around the patch; arrays (n,), µm."""
 
-    x: FloatArray  # tips, ascending
-    y: FloatArray  # tips
-    lean: FloatArray  # how far the axis moves towards +x per µm from the tip towards −y
+    x: FloatArray  # x of tips, ascending
+    y: FloatArray  # y of tips
+    lean: FloatArray  # displacement of the axis towards +x per µm from the tip towards −y
     length: FloatArray  # from tip to the tip line of the row below
     rise: FloatArray  # height of the finger above the others
 
 
 def lay_out(rng: Rng, extent: Pair, layout: Layout) -> list[Row]:
-    """Rows of fingers that fill the patch of `extent` (Lx, Ly), lowest y first."""
+    """Draw rows of fingers that fill the patch of `extent` (Lx, Ly), lowest y first."""
     width, height = extent
     n_rows = max(1, round(height / layout.row_pitch))
     step = height / n_rows
@@ -78,7 +78,7 @@ def lay_out(rng: Rng, extent: Pair, layout: Layout) -> list[Row]:
     rises = _along_rows(rise, extent, columns)
     rows = []
     for r, x in enumerate(columns):
-        below = r - 1  # of the first row, the last one, a patch's height lower
+        below = r - 1  # below the first row is the last one, a patch's height lower
         near = _nearest(x, columns[below], width)
         drop = tips[r] - tips[below][near] + (height if r == 0 else 0.0)
         length = np.clip(drop, 0.5 * step, 1.7 * step)
@@ -89,7 +89,7 @@ def lay_out(rng: Rng, extent: Pair, layout: Layout) -> list[Row]:
 
 
 def _columns(rng: Rng, extent: Pair, n_rows: int, layout: Layout) -> list[FloatArray]:
-    """Tips' x per row: even columns and extra ones that last for some rows, then swayed."""
+    """Draw the tips' x for each row: even columns and extra ones over some rows, then displaced."""
     width, height = extent
     extra = round(layout.faults * width * height)
     starts = rng.integers(0, n_rows, size=extra)
@@ -114,7 +114,7 @@ def _columns(rng: Rng, extent: Pair, n_rows: int, layout: Layout) -> list[FloatA
 
 
 def _along_rows(field: FloatArray, extent: Pair, rows: list[FloatArray]) -> list[FloatArray]:
-    """Values of a periodic field at the tips of every row, before rows are bent."""
+    """Sample a periodic field at the tips of every row, before rows are displaced."""
     sizes = [x.size for x in rows]
     y = np.repeat(np.arange(len(rows)) * (extent[1] / len(rows)), sizes)
     values = sample_field(field, extent, np.concatenate(rows), y)
@@ -122,7 +122,7 @@ def _along_rows(field: FloatArray, extent: Pair, rows: list[FloatArray]) -> list
 
 
 def _relaxed(rows: list[FloatArray], r: int, width: float, pitch: float) -> FloatArray:
-    """A row's tips, moved towards even gaps and towards the tips above and below."""
+    """Move a row's tips towards even gaps and towards the tips above and below."""
     x = rows[r]
     right = np.append(x[1:], x[0] + width)
     left = np.append(x[-1] - width, x[:-1])
@@ -135,21 +135,21 @@ def _relaxed(rows: list[FloatArray], r: int, width: float, pitch: float) -> Floa
 
 
 def _thinned(x: FloatArray, width: float, least: float) -> FloatArray:
-    """A row's tips without those that stand closer than `least` to the one on the left."""
+    """Remove the tips of a row that are closer than `least` to their left neighbour."""
     close = np.diff(x, prepend=x[-1] - width) < least
-    close &= ~np.roll(close, 1)  # of three that are close, the one in the middle goes
+    close &= ~np.roll(close, 1)  # of three close tips, only the middle one is removed
     return x[~close] if close.any() and not close.all() else x
 
 
 def _nearest(x: FloatArray, others: FloatArray, width: float) -> npt.NDArray[np.intp]:
-    """Index of the nearest of `others` (ascending) to each x, around the patch."""
+    """Return the index of the nearest of `others` (ascending) to each x, around the patch."""
     around = np.concatenate([others[-1:] - width, others, others[:1] + width])
     place = np.searchsorted((around[1:] + around[:-1]) / 2, x)
     return (place - 1) % others.size
 
 
 def _around(difference: FloatArray, width: float) -> FloatArray:
-    """The shortest way from one x to another around the patch."""
+    """Return the shortest difference between two x around the patch."""
     return difference - width * np.round(difference / width)
 
 
@@ -163,33 +163,33 @@ class Blade:
 
     notch: float  # where the notches end, in t
     tip_width: float  # half width just behind the rounded tip, over the pitch
-    taper: float  # how much it widens from there to the notch, the flare at the notch left out
+    taper: float  # increase of that half width up to the notch, without the flare at the notch
     tip_round: float  # length of the rounded tip, in t
-    tip_drop: float  # how much lower the crest is at the tip than in the middle
-    root_drop: float  # the same at t = 1
-    side_drop: float  # from the crest to the edge
-    root_side: float  # the same at t = 1
+    tip_drop: float  # descent of the crest from the middle to the tip
+    root_drop: float  # descent of the crest from the middle to t = 1
+    side_drop: float  # descent from the crest to the edge
+    root_side: float  # descent from the crest to the edge at t = 1
     floor: float  # depth of the sheet beneath the next row, at t = 1
-    floor_slope: float  # how much deeper at t = 2
+    floor_slope: float  # additional depth at t = 2
     pocket: float  # additional depth of the floor where the next notch ends
-    sink: float  # where the sheet begins to go under, in t
-    lag: float  # how much later its crest does
-    dive: float  # how long it takes to reach the floor
+    sink: float  # t where the edge of the sheet begins to descend to the floor
+    lag: float  # delay in t of the crest's descent
+    dive: float  # length in t of the descent to the floor
     wall: float  # steepest descent at an edge: the probe's flank, not the finger's
 
 
 def overlay(
     rows: list[Row], extent: Pair, serration: FloatArray, blade: Blade
 ) -> tuple[FloatArray, FloatArray]:
-    """Upper envelope of all sheets over the patch and the distance to the next edge above.
+    """Compute the upper envelope of all sheets and the distance of the floor from the fingers.
 
-    `serration` (ny, nx) displaces edges sideways, in µm; its shape is that of the results.
+    `serration` (ny, nx), µm, displaces edges sideways; the results have its shape.
 
     Returns
     -------
     heights, distance
-        µm, both (ny, nx). Heights are 0 on a crest; the distance is measured across, from the floor
-        between two fingers to the nearer of them, and 0 on fingers.
+        µm, both (ny, nx). Heights are 0 on a crest. The distance is measured along x from the floor
+        between two fingers to the nearer one, and 0 on fingers.
     """
     ny, nx = serration.shape
     distance = np.zeros((ny, nx))
@@ -209,7 +209,7 @@ def _lay(
     serration: FloatArray,
     blade: Blade,
 ) -> None:
-    """Lay one row's sheet over `heights` (ny, nx), and note where its fingers leave gaps."""
+    """Raise `heights` (ny, nx) to one row's sheet, and add its gaps to `distance`."""
     ny, nx = heights.shape
     width, dy = extent[0], extent[1] / ny
     n = row.x.size
@@ -257,9 +257,10 @@ def _profile(
     serration: FloatArray,
     blade: Blade,
 ) -> tuple[FloatArray, FloatArray]:
-    """Height of a sheet relative to its crest, and how far outside a finger's sides, µm.
+    """Return the height of a sheet relative to its crest, and the distance from a finger's side.
 
-    u is the distance from the finger's axis over the pitch, 0 to ½; t as in `Blade`.
+    Both are in µm. u is the distance from the finger's axis over the pitch, 0 to ½; t is that of
+    `Blade`.
     """
     behind = np.maximum(t, 0.0)
     rounded = 1 - np.minimum(behind / blade.tip_round, 1)
@@ -290,6 +291,6 @@ def _profile(
 
 
 def ramp(low: float, high: float, value: FloatArray) -> FloatArray:
-    """0 below `low`, 1 above `high`, smooth between (Hermite's cubic)."""
+    """Return 0 below `low`, 1 above `high` and Hermite's cubic between them."""
     s = np.clip((value - low) / (high - low), 0.0, 1.0)
     return s * s * (3 - 2 * s)

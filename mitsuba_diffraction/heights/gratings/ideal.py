@@ -1,4 +1,4 @@
-"""Ideal gratings, whose orders are known in closed form.
+"""Ideal gratings, whose orders have powers in closed form.
 
 With φ = κ·depth, the power of order m (light turned towards +x for m > 0) is
 
@@ -20,7 +20,7 @@ from ...errors import DiffractionError
 from ..field import MAX_PIXELS, HeightField, check_pixel_count
 from ..lengths import count_between, number_between, pixel_size_of
 
-# Periods are repeated until the patch is about as wide as the default coherence window, µm.
+# Width of a patch where `periods` is not set, µm: about the default coherence window.
 _USUAL_WIDTH = 65.0
 
 Axis = Literal["x", "y"]
@@ -35,7 +35,7 @@ def sinusoidal(
     pixels_per_period: int = 32,
     rows: int | None = None,
 ) -> HeightField:
-    """Grating of height depth/2·(1 + cos(2πx/period)).
+    """Generate a sinusoidal grating of height depth/2·(1 + cos(2πx/period)).
 
     Parameters
     ----------
@@ -46,11 +46,11 @@ def sinusoidal(
     axis
         Direction along which the height changes.
     periods
-        How many periods the patch holds; by default as many as come closest to 65 µm.
+        Number of periods in the patch; by default the width is as close as possible to 65 µm.
     pixels_per_period
         Samples per period; pixels are square.
     rows
-        Samples across, along which nothing changes; by default the patch is square.
+        Samples along the grooves; by default the patch is square.
 
     Raises
     ------
@@ -72,11 +72,11 @@ def blazed(
     pixels_per_period: int = 64,
     rows: int | None = None,
 ) -> HeightField:
-    """Sawtooth grating that descends (or ascends) towards +x, or +y with `axis="y"`.
+    """Generate a sawtooth grating that descends (or ascends) towards +x, or +y with `axis="y"`.
 
-    The n-th of N samples is depth·n/N high, not depth·n/(N − 1): the step back spans one pixel too,
-    and only then is the slope depth/period. Parameters and errors as in `sinusoidal`; `depth` is
-    the height of the ideal tooth, of which (N − 1)/N is sampled.
+    The n-th of N samples is depth·n/N high, not depth·n/(N − 1): the step back spans one pixel,
+    too, so the slope is depth/period. Parameters and errors as in `sinusoidal`; `depth` is the
+    height of the ideal tooth, of which (N − 1)/N is sampled.
     """
     n = _samples(pixels_per_period, "blazed")
     profile = np.arange(n) / n
@@ -99,7 +99,7 @@ def lamellar(
     pixels_per_period: int = 64,
     rows: int | None = None,
 ) -> HeightField:
-    """Rectangular grating: ridges of width duty·period and height `depth`, rounded to whole pixels.
+    """Generate a rectangular grating: ridges of width duty·period, in whole pixels, and `depth`.
 
     Parameters and errors as in `sinusoidal`; `duty` must leave at least one pixel high and one low.
     """
@@ -123,7 +123,7 @@ def _grating(
     periods: int | None,
     rows: int | None,
 ) -> HeightField:
-    """Repeat one period's `profile` (N,), heights in [0, 1], along `axis` and stretch it across."""
+    """Repeat the `profile` (N,) of one period, 0 to 1, along `axis` and scale it to `depth`."""
     length = number_between(period, f"{kind}: period", 1e-3, 1e4, " µm")
     height = number_between(depth, f"{kind}: depth", 0, 1e3, " µm")
     if axis not in ("x", "y"):
@@ -142,4 +142,5 @@ def _grating(
 
 
 def _samples(pixels_per_period: int, kind: str) -> int:
+    """Check the number of samples per period."""
     return count_between(pixels_per_period, f"{kind}: pixels_per_period", 2, 65536)

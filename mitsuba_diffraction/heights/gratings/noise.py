@@ -1,4 +1,4 @@
-"""Random fields that tile: the part of a natural surface that has no pattern."""
+"""Periodic random fields: the irregular part of a natural surface."""
 
 from __future__ import annotations
 
@@ -10,21 +10,20 @@ from scipy.ndimage import gaussian_filter, map_coordinates, spline_filter1d
 
 FloatArray = npt.NDArray[np.float64]
 Rng = np.random.Generator
-#: Along x and y, µm: the size of a patch above all.
+#: Lengths along x and y, µm.
 Pair = tuple[float, float]
-#: (ny, nx) pixels.
+#: Numbers of pixels (ny, nx).
 Shape = tuple[int, int]
 
 
 def smooth_field(
     rng: Rng, extent: Pair, correlation: Pair, slope: float, detail: float = 4.0
 ) -> FloatArray:
-    """Periodic Gaussian field whose power falls as (1 + |ql|²)^(−slope/2), of unit variance.
+    """Draw a periodic Gaussian field of unit variance whose power is ∝ (1 + |ql|²)^(−slope/2).
 
     l is `correlation`, µm along x and y (von Kármán's spectrum, Progress in the statistical theory
-    of turbulence, 1948). The grid follows from the lengths, `detail` nodes for each, and not from
-    the pixels that the field is drawn on: a seed gives one surface at every resolution. The wave
-    without direction is left out, so the mean is 0.
+    of turbulence, 1948). The grid has `detail` nodes per correlation length and does not depend on
+    the pixels of the patch: a seed gives one surface at every resolution. The mean is 0.
 
     Returns
     -------
@@ -38,57 +37,57 @@ def smooth_field(
     amplitude = (1 + (qx * lx) ** 2 + (qy * ly) ** 2) ** (-slope / 4)
     amplitude[0, 0] = 0
     waves = np.fft.rfft2(rng.standard_normal((my, mx))) * amplitude
-    # white noise of variance 1 leaves a filter with the sum of its squared impulse response
+    # filtered white noise has the variance Σ (impulse response)²
     response = np.fft.irfft2(amplitude, (my, mx))
     return np.fft.irfft2(waves, (my, mx)) / math.sqrt(float((response**2).sum()))
 
 
 def sample_field(field: FloatArray, extent: Pair, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Values of a periodic `field` (my, mx) over `extent` at points in µm, by cubic splines."""
+    """Interpolate a periodic `field` (my, mx) over `extent` at points in µm, by cubic splines."""
     my, mx = field.shape
-    at = (y * (my / extent[1]), x * (mx / extent[0]))
-    return np.asarray(map_coordinates(field, at, order=3, mode="grid-wrap"))
+    indices = (y * (my / extent[1]), x * (mx / extent[0]))
+    return np.asarray(map_coordinates(field, indices, order=3, mode="grid-wrap"))
 
 
 def on_pixels(field: FloatArray, ny: int, nx: int) -> FloatArray:
-    """A periodic `field` (my, mx) on (ny, nx) pixels, by cubic splines."""
+    """Interpolate a periodic `field` (my, mx) on (ny, nx) pixels, by cubic splines."""
     my, mx = field.shape
     rows = _spline_rows(field, np.arange(ny) * (my / ny))
     return np.ascontiguousarray(_spline_rows(rows.T, np.arange(nx) * (mx / nx)).T)
 
 
-def _spline_rows(field: FloatArray, at: FloatArray) -> FloatArray:
-    """Rows of a periodic `field` (m, n) at fractional indices `at` (k,): shape (k, n)."""
+def _spline_rows(field: FloatArray, indices: FloatArray) -> FloatArray:
+    """Interpolate rows of a periodic `field` (m, n) at fractional `indices` (k,): shape (k, n)."""
     spline = spline_filter1d(field, order=3, axis=0, mode="grid-wrap")
-    base = np.floor(at).astype(np.intp)
-    f = (at - base)[:, None]
+    base = np.floor(indices).astype(np.intp)
+    f = (indices - base)[:, None]
     weights = (  # uniform cubic B-spline
         (1 - f) ** 3 / 6,
         (4 - 6 * f**2 + 3 * f**3) / 6,
         (1 + 3 * f + 3 * f**2 - 3 * f**3) / 6,
         f**3 / 6,
     )
-    result = np.zeros((at.size, field.shape[1]))
+    result = np.zeros((indices.size, field.shape[1]))
     for offset, weight in zip((-1, 0, 1, 2), weights, strict=True):
         result += weight * spline[(base + offset) % field.shape[0]]
     return result
 
 
 def grain(rng: Rng, extent: Pair, shape: Shape, size: Pair) -> FloatArray:
-    """White noise blurred to grains of `size` (σ along x, along y, µm), of unit variance.
+    """Draw white noise blurred to grains of `size` (σ along x, along y, µm), of unit variance.
 
-    Drawn per pixel, so a seed gives another texture at another resolution, with the same statistics
-    as long as the pixels are finer than the grains.
+    Noise is drawn per pixel, so a seed gives another texture at another resolution. The statistics
+    are the same while the pixels are finer than the grains.
     """
     ny, nx = shape
     sigma = (size[1] * ny / extent[1], size[0] * nx / extent[0])
     noise = gaussian_filter(rng.standard_normal(shape), sigma, mode="wrap", truncate=3)
-    kept = math.prod(_kept_variance(s, n) for s, n in zip(sigma, shape, strict=True))
-    return noise / math.sqrt(kept)
+    variance = math.prod(_filtered_variance(s, n) for s, n in zip(sigma, shape, strict=True))
+    return noise / math.sqrt(variance)
 
 
-def _kept_variance(sigma: float, n: int) -> float:
-    """Share of white noise's variance that the Gaussian filter leaves along an axis of n pixels."""
+def _filtered_variance(sigma: float, n: int) -> float:
+    """Return the variance of unit white noise after a Gaussian filter along n pixels."""
     impulse = np.zeros(n)
     impulse[0] = 1
     if sigma > 0:
@@ -97,9 +96,9 @@ def _kept_variance(sigma: float, n: int) -> float:
 
 
 def rounded(heights: FloatArray) -> FloatArray:
-    """Heights in µm to about a picometre, towards 0, so that another machine's sines do not show.
+    """Round heights in µm towards 0 to about a picometre: equal heights on every processor.
 
-    Rounding hides differences in the last bits except where a height lies within them of a step:
-    about one in ten billion.
+    Processors differ in the last bits of sines. A height that lies within them of a rounding step
+    still differs, about one in ten billion.
     """
     return np.trunc(heights * 2.0**20) * 2.0**-20

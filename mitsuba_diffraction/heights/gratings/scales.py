@@ -1,9 +1,9 @@
-"""Look-alikes of snake scales: overlapping fingers, as an atomic-force microscope sees them.
+"""Look-alikes of snake scales: overlapping fingers, as an atomic-force microscope measures them.
 
-The numbers of `elaphe_like` were fitted to one measured patch of *Elaphe guttata* (65 µm square,
+The parameters of `elaphe_like` are fitted to one measured patch of *Elaphe guttata* (65 µm square,
 0.375 µm full scale): the mean finger and the mean notch between two fingers, the distributions of
-heights and slopes, the statistics of the fingers' places, and the power spectrum. The patches tile
-without a seam, and one seed gives the same heights on every machine: they are rounded to a
+heights and slopes, the statistics of the fingers' positions, and the power spectrum. The patches
+tile without a seam. A seed gives the same heights on every machine: they are rounded to a
 picometre, which hides the last bits in which processors differ.
 """
 
@@ -30,30 +30,30 @@ from .noise import (
     smooth_field,
 )
 
-# Creases and bends are drawn on a grid of this many µm, whatever the pixels.
+# Grid spacing of creases and bends, µm, independent of the pixels.
 _COARSE = 0.3
 
 
 @dataclass(frozen=True)
 class Species:
-    """What a patch is made of; lengths in µm, densities per µm²."""
+    """Structures of a species' scale; lengths in µm, densities per µm²."""
 
     name: str
     layout: Layout
     blade: Blade
-    depth: float  # full scale that the heights below belong to
-    level: float  # where in it the mean height lies, 0 to 1
+    depth: float  # full scale to which the heights below refer
+    level: float  # mean height as a fraction of the full scale, 0 to 1
     fray: float  # rms displacement of edges from one scan line to the next
-    streak: float  # rms of the grooves along the floor between fingers
-    pore: float  # depth of the pores in it
-    fuzz: float  # rms of what has no structure
-    bend: float  # rms of the bending of the whole scale
-    bend_reach: Pair
+    streak: float  # rms height of the grooves along the floor between fingers
+    pore: float  # depth of the pores in the floor
+    fuzz: float  # rms height of white noise
+    bend: float  # rms height of the bending of the whole scale
+    bend_reach: Pair  # correlation length of the bending
     crease: float  # depth of creases
-    beads: float
-    debris: float
-    flakes: float
-    scratches: float
+    beads: float  # density
+    debris: float  # density of heaps
+    flakes: float  # density
+    scratches: float  # density
 
 
 ELAPHE = Species(
@@ -72,8 +72,8 @@ ELAPHE = Species(
     scratches=0.001,
 )  # fmt: skip
 
-# No measured patch was at hand: finger sizes as published for the project, heights and
-# irregularities those of Elaphe, reduced until the first order is as pure as the animal's colours.
+# Not fitted to a measured patch: finger sizes are published ones; heights and irregularities are
+# those of Elaphe, reduced until the first order is as pure as the animal's colours.
 XENOPELTIS = Species(
     name="xenopeltis_like",
     layout=Layout(
@@ -102,12 +102,11 @@ def elaphe_like(
     roughness: float = 1.0,
     dirt: float = 1.0,
 ) -> HeightField:
-    """Patch like the shed of a corn snake (*Elaphe guttata*).
+    """Generate a patch like the shed of a corn snake (*Elaphe guttata*).
 
-    Long overlapping fingers, 1.03 µm apart along x, in rows 3.03 µm apart along y; they lie along y
-    and point to +y, upwards in an image of the patch, as in the measured one (whose columns lean by
-    2°, the mounting's doing; these do not). A finger's crest is 0.065 to 0.13 µm above the floor
-    beside it, the whole patch spans some 0.35 µm.
+    Long overlapping fingers are 1.03 µm apart along x, in rows 3.03 µm apart along y. They lie
+    along y and point to +y, upwards in an image of the patch. A finger's crest is 0.065 to 0.13 µm
+    above the floor beside it; the whole patch spans some 0.35 µm.
 
     Parameters
     ----------
@@ -116,20 +115,20 @@ def elaphe_like(
         few per cent so that whole numbers of them fit.
     pixels
         Samples, one count or (along x, along y). Fingers, bends and dirt of one seed do not depend
-        on them, fine roughness does. Pixels above 0.1 µm lose the fingers' edges.
+        on the number; fine roughness does. Pixels above 0.1 µm do not resolve the fingers' edges.
     seed
-        A whole number; every seed is another piece of the same animal.
+        A whole number; each seed is another piece of the same animal.
     depth
-        Full scale, µm: the heights lie within [0, depth], which the highest dust and the deepest
-        pits about fill, and all of them are proportional to it.
+        Full scale, µm: the heights lie within [0, depth], from the deepest pits to the highest
+        dust, and are proportional to it.
     irregularity
-        How much fingers' places and heights vary; 1 as measured, 0 a perfect lattice.
+        Variation of fingers' positions and heights; 1 as measured, 0 a perfect lattice.
     bending
-        How much the whole scale is bent and creased; 1 as measured.
+        Bending and creases of the whole scale; 1 as measured, 0 none.
     roughness
-        Frayed edges, streaks, pores and fuzz; 1 as measured.
+        Frayed edges, streaks, pores and noise; 1 as measured, 0 none.
     dirt
-        Number of beads, crumbs, flakes and scratches; 1 as measured, 0 clean.
+        Number of beads, crumbs, flakes and scratches; 1 as measured, 0 none.
 
     Raises
     ------
@@ -151,12 +150,12 @@ def xenopeltis_like(
     roughness: float = 1.0,
     dirt: float = 1.0,
 ) -> HeightField:
-    """Patch like the scale of a sunbeam snake (*Xenopeltis unicolor*), the most iridescent one.
+    """Generate a patch like the scale of a sunbeam snake (*Xenopeltis unicolor*).
 
-    Short fingers, 0.6 µm apart along x, in wandering rows 1.5 µm apart along y. They point to +y.
-    More regular and cleaner than `elaphe_like`, so its colours are purer and, with the finer pitch,
-    farther apart. Parameters and errors as there. Not fitted to a measurement: sizes are
-    published ones, relief and irregularity are Elaphe's, reduced.
+    Short fingers, 0.6 µm apart along x, point to +y in irregular rows 1.5 µm apart along y. The
+    patch is more regular and cleaner than `elaphe_like`, so its colours are purer and, with the
+    finer pitch, farther apart. It is not fitted to a measurement: sizes are published ones, relief
+    and irregularity are Elaphe's, reduced. Parameters and errors as in `elaphe_like`.
     """
     amounts = (irregularity, bending, roughness, dirt)
     return _patch(XENOPELTIS, extent, pixels, seed, depth, amounts)
@@ -170,18 +169,18 @@ def _patch(
     depth: float,
     amounts: tuple[float, float, float, float],
 ) -> HeightField:
-    """Draw a patch of a species; parameters as in `elaphe_like`."""
-    who = species.name
-    size = length_pair(extent, f"{who}: extent", 2.0, 500.0)
-    nx, ny = count_pair(pixels, f"{who}: pixels", 8, 8192)
-    full = number_between(depth, f"{who}: depth", 0.0, 10.0, " µm")
+    """Check the parameters, which are those of `elaphe_like`, and draw a patch of a species."""
+    generator = species.name
+    size = length_pair(extent, f"{generator}: extent", 2.0, 500.0)
+    nx, ny = count_pair(pixels, f"{generator}: pixels", 8, 8192)
+    full = number_between(depth, f"{generator}: depth", 0.0, 10.0, " µm")
     names = ("irregularity", "bending", "roughness", "dirt")
     irregularity, bending, roughness, dirt = (
-        number_between(value, f"{who}: {name}", 0.0, 3.0)
+        number_between(value, f"{generator}: {name}", 0.0, 3.0)
         for name, value in zip(names, amounts, strict=True)
     )
-    # a stream each, so that leaving one ingredient out does not change the others
-    streams = np.random.SeedSequence(seed_of(seed, f"{who}: seed")).spawn(7)
+    # one random stream per structure, so that leaving one out does not change the others
+    streams = np.random.SeedSequence(seed_of(seed, f"{generator}: seed")).spawn(7)
     rngs = [np.random.default_rng(stream) for stream in streams]
     shape = ny, nx
     rows = lay_out(rngs[0], size, species.layout.scaled(irregularity))
@@ -193,14 +192,14 @@ def _patch(
     heights += scratches(rngs[6], size, shape, dirt * species.scratches)
     heights -= heights.mean()
     heights = full * np.clip(species.level + heights / species.depth, 0.0, 1.0)
-    return HeightField(rounded(heights), (size[0] / nx, size[1] / ny), name=who)
+    return HeightField(rounded(heights), (size[0] / nx, size[1] / ny), name=generator)
 
 
 def _surface(
     rng: Rng, extent: Pair, shape: Shape, rows: list[Row], species: Species, roughness: float
 ) -> FloatArray:
-    """Sheets with frayed edges, the streaks and pores of the floor, and fuzz, (ny, nx) in µm."""
-    # the probe meets an edge a little earlier or later on every scan line, which runs along x
+    """Draw sheets with frayed edges, streaks and pores of the floor, and noise, (ny, nx) in µm."""
+    # scan lines run along x, and the probe meets an edge a little earlier or later on each
     fray = roughness * species.fray * grain(rng, extent, shape, (0.08, 0.018))
     heights, gap = overlay(rows, extent, fray, species.blade)
     heights = gaussian_filter1d(heights, 0.024 * shape[1] / extent[0], axis=1, mode="wrap")
@@ -209,15 +208,15 @@ def _surface(
     streaks = grain(rng, extent, shape, (0.05, 0.35))
     heights += roughness * species.streak * streaks * (0.5 + floor)
     pores = grain(rng, extent, shape, (0.04, 0.05))
-    pores = np.maximum(pores, 0) * ramp(-0.5, 1.5, -streaks)  # they line up in the grooves
+    pores = np.maximum(pores, 0) * ramp(-0.5, 1.5, -streaks)  # pores lie in the grooves
     heights -= roughness * species.pore * pores * floor
     heights += roughness * species.fuzz * rng.standard_normal(shape)
     return heights
 
 
 def _bent(rng: Rng, extent: Pair, shape: Shape, species: Species) -> FloatArray:
-    """Bending of the whole scale and creases in it, (ny, nx) in µm."""
-    reach = 30.0  # µm, of creases
+    """Draw the bending of the whole scale and its creases, (ny, nx) in µm."""
+    reach = 30.0  # correlation length of creases, µm
     bend = smooth_field(rng, extent, species.bend_reach, 3.3, species.bend_reach[0] / _COARSE)
     fold = smooth_field(rng, extent, (reach, reach), 4.0, reach / _COARSE)
     strength = smooth_field(rng, extent, (reach, reach), 4.0, reach / _COARSE)
@@ -232,9 +231,9 @@ def _bent(rng: Rng, extent: Pair, shape: Shape, species: Species) -> FloatArray:
 def stamp(
     shape: Shape, extent: Pair, x: FloatArray, y: FloatArray, radius: FloatArray, height: FloatArray
 ) -> FloatArray:
-    """Upper envelope (ny, nx) of rounded bumps at (x, y) on the torus, µm; 0 between them.
+    """Draw the upper envelope (ny, nx) of rounded bumps at (x, y) on the torus, µm.
 
-    A bump is height·(1 − r²/radius²)², out to its radius.
+    A bump is height·(1 − r²/radius²)² within its radius; the envelope is 0 between bumps.
     """
     ny, nx = shape
     dx, dy = extent[0] / nx, extent[1] / ny
@@ -244,7 +243,7 @@ def stamp(
     across = np.arange(-min(reach_x, nx // 2), min(reach_x, nx // 2) + 1)
     along = np.arange(-min(reach_y, ny // 2), min(reach_y, ny // 2) + 1)[:, None]
     step = max(1, 2**22 // (across.size * along.size))
-    for first in range(0, x.size, step):  # no more than some 4 million points at a time
+    for first in range(0, x.size, step):  # at most some 4 million points at a time
         part = slice(first, first + step)
         cx, cy = x[part, None, None] / dx, y[part, None, None] / dy
         ix, iy = np.round(cx) + across, np.round(cy) + along
@@ -258,7 +257,7 @@ def stamp(
 
 
 def beads(rng: Rng, extent: Pair, shape: Shape, rows: list[Row], density: float) -> FloatArray:
-    """Small round beads that sit on the crests of fingers, in swarms; `density` per µm²."""
+    """Draw small round beads on the crests of fingers, in swarms; `density` per µm²."""
     names = ("x", "y", "length", "lean")
     tip_x, tip_y, length, lean = (
         np.concatenate([getattr(row, name) for row in rows]) for name in names
@@ -275,7 +274,7 @@ def beads(rng: Rng, extent: Pair, shape: Shape, rows: list[Row], density: float)
 
 
 def debris(rng: Rng, extent: Pair, shape: Shape, density: float) -> FloatArray:
-    """Crumbs, alone or in loose heaps up to 2 µm across; `density` of heaps per µm²."""
+    """Draw crumbs, alone or in loose heaps up to 2 µm across; `density` of heaps per µm²."""
     n = int(rng.poisson(density * extent[0] * extent[1]))
     spread = np.minimum(0.05 / (1 - rng.random(n)), 0.35)  # µm, heavy-tailed
     grains = rng.integers(1, 4, size=n) + np.floor(150 * spread**2).astype(np.int64)
@@ -287,7 +286,7 @@ def debris(rng: Rng, extent: Pair, shape: Shape, density: float) -> FloatArray:
 
 
 def flakes(rng: Rng, extent: Pair, shape: Shape, density: float) -> FloatArray:
-    """Particles with flat, tilted tops and straight, steep sides; `density` per µm²."""
+    """Draw particles with flat, tilted tops and straight, steep sides; `density` per µm²."""
     ny, nx = shape
     result = np.zeros(shape)
     for _ in range(int(rng.poisson(density * extent[0] * extent[1]))):
@@ -304,13 +303,13 @@ def flakes(rng: Rng, extent: Pair, shape: Shape, density: float) -> FloatArray:
         z = 0.22 + 0.1 * rng.random() + tilt[0] * u + tilt[1] * v
         for turn, radius in zip(turns, radii, strict=True):
             z = np.minimum(z, 1.2 * (radius - np.cos(turn) * u - np.sin(turn) * v))
-        at = np.ix_(iy.astype(np.intp) % ny, ix.astype(np.intp) % nx)
-        np.maximum.at(result, at, z)
+        covered = np.ix_(iy.astype(np.intp) % ny, ix.astype(np.intp) % nx)
+        np.maximum.at(result, covered, z)
     return result
 
 
 def scratches(rng: Rng, extent: Pair, shape: Shape, density: float) -> FloatArray:
-    """Thin broken lines, all at about the same angle; `density` per µm²."""
+    """Draw thin broken lines, all at about the same angle; `density` per µm²."""
     n = int(rng.poisson(density * extent[0] * extent[1]))
     angle = np.radians(48 + 6 * rng.standard_normal(n))
     length = np.minimum(10 + 25 * rng.random(n), max(extent))

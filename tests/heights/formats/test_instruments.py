@@ -76,7 +76,7 @@ def test_channels_of_one_name_need_the_index(tmp_path):
 def test_files_without_heights_say_what_they_have(tmp_path):
     assert "no height channel among 0 'Phase'" in refusal(write(tmp_path, [("Phase", "deg")]))
     path = write(tmp_path, [("Phase", "deg")])
-    assert "no length for its heights" in refusal(path, channel=0)
+    assert "height_unit" in refusal(path, channel=0)
 
 
 def test_treatments_are_applied_in_order_and_reported(tmp_path):

@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.heights.preprocess import (
-    periodic_smooth,
-    periodic_taper,
-    seam_share,
-    seam_step,
-)
+from mitsuba_diffraction.heights.preprocess import periodic_smooth, periodic_taper
+from mitsuba_diffraction.heights.seams import seam_share, seam_step
 
 Y, X = np.mgrid[0:48, 0:64]
 WAVES = 0.1 * np.cos(2 * np.pi * (3 * X / 64 + 2 * Y / 48))
