@@ -43,7 +43,6 @@ from ..heights.recipes import LOAD_KEYS, Recipe, options_and_settings
 from ..heights.spectra import dominant_periods
 from ..progress import Progress, silent
 from ..scene.load import error_of
-from ..scene.passes import Stop
 from ..settings import RECIPE_SETTINGS, TableSettings
 from ..tables.build.build import build_with
 from ..tables.store import cached_table, key_of
@@ -244,7 +243,6 @@ def run_survey(
     resolution: int = 160,
     threads: int = 0,
     client: Any = None,
-    stop: Stop | None = None,
     progress: Progress = silent,
 ) -> list[dict[str, Any]]:
     """Measure every scan that is not in the folder yet, and write what is known of all.
@@ -263,12 +261,11 @@ def run_survey(
     resolution : pixels of a map a side.
     threads : of Dr.Jit, in workers; 0 for one a core.
     client : `distributed.Client`, or None to do all in this process.
-    stop, progress : as in `scene.passes.render_passes`; progress counts scans.
+    progress : called as progress(scans done, scans in all, text).
 
     Returns
     -------
-    The rows, in the order of the files; those that failed have a `reason`. A run that was stopped
-    has rows for what is done.
+    The rows, in the order of the files; those that failed have a `reason`.
 
     Raises
     ------
@@ -295,16 +292,16 @@ def run_survey(
             rows[n] = known
     todo = list(jobs)
     progress(0, len(todo), "scans")
-    found = each(client, measure, [jobs[n] for n in todo], stop or Stop())
+    found = each(client, measure, [jobs[n] for n in todo])
     for done, (which, result) in enumerate(found, 1):
         n = todo[which]
         if isinstance(result, Failed):
             rows[n] = {"reason": f"{result.text} {result.worker}".strip()}
         else:
             rows[n] = _keep(scans, files[n], jobs[n], result)
+        _write_table(folder / TABLE, files, rows)  # whole if Ctrl-C ends the next one
         progress(done, len(todo), "scans")
-    named = [{"file": str(files[n]), **rows[n]} for n in sorted(rows)]
-    _write_table(folder / TABLE, named)
+    named = _write_table(folder / TABLE, files, rows)
     _write_sheets(folder, named)
     return named
 
@@ -341,7 +338,11 @@ def _keep(scans: Path, file: Path, job: Job, result: Measured) -> dict[str, Any]
     return row
 
 
-def _write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+def _write_table(
+    path: Path, files: Sequence[Path], rows_by_number: Mapping[int, Mapping[str, Any]]
+) -> list[dict[str, Any]]:
+    """Write the rows that are known, in the order of the files, and return them."""
+    rows = [{"file": str(files[n]), **rows_by_number[n]} for n in sorted(rows_by_number)]
     columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
     names = ["file", "reason", *(n for n in columns if n not in ("file", "reason"))]
     text = io.StringIO()
@@ -350,6 +351,7 @@ def _write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     writer.writerows(rows)
     with atomic_path(path) as temporary:
         temporary.write_text(text.getvalue(), "utf-8")
+    return rows
 
 
 def _write_sheets(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:

@@ -14,6 +14,8 @@ from mitsuba_diffraction import reference
 from tests.support.directions import Array, as_single, polar, rough_patch, uniform_directions
 from tests.support.variants import interaction, runs
 
+pytestmark = pytest.mark.thorough
+
 PATCH = rough_patch((40, 44), (0.09, 0.09), 0.1, 0.6)
 WIDTH = 3.0
 LAM = np.array([450.0, 520.0, 610.0, 680.0])

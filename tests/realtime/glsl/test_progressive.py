@@ -19,7 +19,10 @@ from mitsuba_diffraction.realtime.glsl.camera import Camera
 from mitsuba_diffraction.realtime.glsl.emitters import Emitters, emission
 from mitsuba_diffraction.realtime.glsl.renderer import Renderer
 
-pytestmark = pytest.mark.filterwarnings("ignore:the realtime picture does not show")
+pytestmark = [
+    pytest.mark.thorough,
+    pytest.mark.filterwarnings("ignore:the realtime picture does not show"),
+]
 
 #: A disc light of radius 0.5 at the height 6, and the edge of a screen at the height 2.
 RADIUS, HIGH, EDGE = 0.5, 6.0, 2.0
