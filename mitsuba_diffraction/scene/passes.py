@@ -33,7 +33,7 @@ _SHOWN_AS = {"RGB": "RGB", "RGBA": "RGBA", "XYZ": "RGB", "XYZA": "RGBA", "Y": "Y
 GROUP = 8
 
 # Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
-# wavefronts exhaust the memory. Fixed, so that a seed gives the same random numbers on every machine.
+# wavefronts exhaust the memory. Fixed, so that a seed gives the same random numbers everywhere.
 _SAMPLES = {"llvm": 2**21, "cuda": 2**24}
 
 
