@@ -125,7 +125,9 @@ def _of_mirror(
 ) -> Real:
     """The reference's BRDF of a flat patch, which checks all arguments."""
     flat = HeightField(np.zeros((2, 2)), 1.0)
-    return reference.brdf(flat, wi, wo, wavelength, coherence_width=width, eta=eta, k=k)
+    return reference.brdf(
+        flat, wi, wo, wavelength, coherence_width=width, model="kirchhoff", eta=eta, k=k
+    )
 
 
 def recover(

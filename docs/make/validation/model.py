@@ -100,6 +100,7 @@ def efficiencies(
     brdf = per_brdf * reference.brdf(
         field, wi, wo, wavelength,
         coherence_width=width, model=known, eta=index.real, k=index.imag, coat=coat,
+        second_order=False,
     )  # fmt: skip
     if model in (*reference.MODELS, "first_order"):
         return brdf
