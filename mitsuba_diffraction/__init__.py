@@ -6,7 +6,7 @@ HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
 maps               what a surface reflects in every direction, as pictures
-evaluation         a beam on a patch: maxima against the grating equation
+period_fit         periods of a patch from its response to a beam, by the grating equation
 tradeoff           accuracy against speed and memory, setting by setting
 glsl               the realtime renderer
 design             patches from their BRDF, reliefs for given colours
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from . import cluster
     from .analysis import design, maps, tradeoff
     from .realtime import comparison, glsl, web
-    from .thesis import evaluation
+    from .thesis import period_fit
 
 __version__ = version(__name__)
 __all__ = [
@@ -62,10 +62,10 @@ __all__ = [
     "cluster",
     "comparison",
     "design",
-    "evaluation",
     "glsl",
     "gratings",
     "maps",
+    "period_fit",
     "reference",
     "tradeoff",
     "web",
@@ -76,9 +76,9 @@ _ON_DEMAND = {
     "cluster": "cluster",
     "comparison": "realtime.comparison",
     "design": "analysis.design",
-    "evaluation": "thesis.evaluation",
     "glsl": "realtime.glsl",
     "maps": "analysis.maps",
+    "period_fit": "thesis.period_fit",
     "tradeoff": "analysis.tradeoff",
     "web": "realtime.web",
 }

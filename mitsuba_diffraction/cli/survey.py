@@ -55,9 +55,9 @@ def run(args: argparse.Namespace) -> int:
     own_options, settings = options.load_options(args), options.table_options(args)
     check_writable(args.output / "survey.csv", make_folder=True)
 
-    from ..analysis.survey import Treatment, run_survey, treatments_of
+    from ..analysis.survey import Treatment, load_treatments, run_survey
 
-    treatments = treatments_of(args.treatments)
+    treatments = load_treatments(args.treatments)
     start = time.perf_counter()
     variant = set_variant(args.mode or "llvm_ad_rgb")
     with mitsuba_warnings(), contextlib.ExitStack() as stack:
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
         with Bar(args, unit=" scans", delay=0) as bar, Stop() as stop:
             rows = run_survey(
                 args.files, args.output, treatments=treatments,
-                own=Treatment(own_options, settings), variant=variant, theta=args.theta,
+                common=Treatment(own_options, settings), variant=variant, theta=args.theta,
                 resolution=args.resolution, threads=worker_threads(args), client=client,
                 stop=stop, progress=bar,
             )  # fmt: skip
