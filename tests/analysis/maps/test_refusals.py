@@ -61,6 +61,6 @@ def test_a_variant_without_wavelengths_is_refused():
 )
 def test_an_rgb_variant_has_no_other_light(some_variant, asked):
     mi.set_variant(some_variant.replace("spectral", "rgb"))
-    with pytest.raises(DiffractionError, match="only the colours of the whole spectrum in dayl"):
+    with pytest.raises(DiffractionError, match="whole spectrum in daylight"):
         brdf_map(mi.load_dict({"type": "diffuse"}), resolution=8, **asked)
     mi.set_variant(some_variant)

@@ -96,7 +96,7 @@ def test_a_scene_without_a_light_to_compare_under_is_refused(run, scene, some_va
     light = SCENE[SCENE.index("  <emitter") : SCENE.index("</scene>")]
     scene.write_text(SCENE.replace(light, '  <emitter type="constant"/>\n'))
     line = run("compare", scene).failed_in_one_line()
-    assert "no light with a direction or place" in line
+    assert "no light with a direction or position" in line
     assert not Path("plate_compare").exists()
 
 
