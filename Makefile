@@ -6,7 +6,7 @@ PYTHON3 := .venv/bin/python
 RENDER  := $(RUN) render -D patch=../out/elaphe_like.exr
 
 .DEFAULT_GOAL := setup
-.PHONY: setup demo test test-all fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks validation energy realtime lint clean help
+.PHONY: setup demo test test-all fuzz package bench figures gallery evaluation methods sweeps tradeoff plan parameters notebooks site validation energy realtime lint clean help
 MAKEFLAGS += --no-print-directory
 
 setup: .venv/packages .venv/libraries  ## create .venv with the package, and an LLVM for Dr.Jit (default)
@@ -32,7 +32,8 @@ demo: setup  ## tabulate a snake scale, render three scenes with it, the snake i
 	@echo "Compare out/snake.png and out/snake_other_light.png: the colours move with the sun."
 
 # one thread for linear algebra in each of the two processes
-PYTEST := OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest -n 2 --dist worksteal
+# TIMES=1 prints what the processor time went into
+PYTEST := OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest -n 2 --dist worksteal $(if $(TIMES),--processor-time)
 test: setup .venv/browser  ## run the quick tests, of every part: three minutes
 	@$(PYTEST) -m "not thorough"
 
@@ -85,7 +86,12 @@ parameters: setup  ## make docs/parameters.md from the plugin's docstring
 notebooks: setup  ## run the notebooks, and keep what they show in their files
 	@$(PYTHON3) -m docs.make.figures.notebooks
 
-validation: setup  ## compare the model with rigorous solutions: docs/validation.md
+# mkdocs loads the hooks of docs/make/site from here
+site: setup  ## build the pages with an API reference: out/site/index.html
+	@PYTHONPATH=. NO_MKDOCS_2_WARNING=1 $(PYTHON3) -W ignore -m mkdocs build --strict --quiet
+	@echo "Open out/site/index.html"
+
+validation: setup  ## compare the model with rigorous solutions: docs/validation.md and docs/validation/
 	@$(PYTHON3) -m docs.make.validation report -o docs
 
 SURFACES := sinusoidal blazed cd cd_pits dvd_pits elaphe_like xenopeltis_like

@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 import re
+import sys
+import warnings
+from types import FrameType
+
+# Packages whose lines mean nothing to whoever reads a warning.
+_INTERNAL = ("mitsuba_diffraction", "mitsuba", "drjit")
 
 # Characters of a word or quotation, and of a message, at most.
 _WORD, _MESSAGE = 160, 500
@@ -22,6 +28,26 @@ class DiffractionError(ValueError):
 
 class DiffractionWarning(UserWarning):
     """The result is usable, but outside the range where the model or the data can be trusted."""
+
+
+def warn(text: str) -> None:
+    """Warn in the name of the first caller outside of the package, whose line is quoted.
+
+    Python quotes the line that warns, or one a fixed number of calls above it; a plugin is called
+    through Mitsuba, at any depth. Filters by module therefore see the module of the caller.
+    """
+    frame = sys._getframe(1)
+    while _is_internal(frame) and frame.f_back is not None:
+        frame = frame.f_back
+    warnings.warn_explicit(
+        one_line(text), DiffractionWarning, frame.f_code.co_filename, frame.f_lineno,
+        module=frame.f_globals.get("__name__"),
+        registry=frame.f_globals.setdefault("__warningregistry__", {}),
+    )  # fmt: skip
+
+
+def _is_internal(frame: FrameType) -> bool:
+    return str(frame.f_globals.get("__name__")).partition(".")[0] in _INTERNAL
 
 
 def shortened(text: str) -> str:

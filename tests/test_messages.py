@@ -1,8 +1,18 @@
-"""Messages keep what they say; only what is long in itself is cut."""
+"""Messages keep what they say, but for what is long in itself; warnings name the user's line."""
 
 from __future__ import annotations
 
-from mitsuba_diffraction.errors import DiffractionError
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mitsuba_diffraction.errors import DiffractionError, DiffractionWarning, warn
+from tests.support import ROOT
+
+PACKAGE = ROOT / "mitsuba_diffraction"
 
 
 def test_what_lies_between_two_quotations_is_not_cut():
@@ -15,3 +25,40 @@ def test_a_long_quotation_is_cut_in_its_middle():
     text = str(DiffractionError(f"name='{'a b ' * 100}' is too long"))
     assert len(text) < 200
     assert text.endswith("is too long")
+
+
+SCRIPT = """
+import numpy as np
+import mitsuba as mi
+import mitsuba_diffraction as md
+mi.set_variant("scalar_rgb")
+patch = md.HeightField(0.2 * np.random.default_rng(0).random((32, 32)), 0.08, name="steep")
+for _ in range(3):
+    mi.load_dict(md.bsdf_dict(patch, coherence_width=2.0))
+np.array([1e308]) * 10
+"""
+
+
+def test_a_script_is_warned_once_at_its_own_line(tmp_path):
+    (tmp_path / "script.py").write_text(SCRIPT)
+    ran = subprocess.run(
+        [sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, check=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "MITSUBA_DIFFRACTION_CACHE": str(tmp_path)},
+    )  # fmt: skip
+    ours = [line for line in ran.stderr.splitlines() if "steep: RMS slope" in line]
+    assert len(ours) == 1
+    assert ours[0].startswith(f"{tmp_path / 'script.py'}:8: DiffractionWarning: ")
+    assert str(ROOT) not in ran.stderr.replace(str(tmp_path), "")
+    assert "script.py:9: RuntimeWarning: overflow" in ran.stderr  # another package's, as ever
+
+
+def test_a_warning_is_one_line_of_its_own_kind():
+    with pytest.warns(DiffractionWarning, match="^steep slopes$") as caught:
+        warn("steep\n  slopes")
+    assert caught[0].filename == __file__
+
+
+def test_the_package_warns_through_one_function():
+    for file in Path(PACKAGE).rglob("*.py"):
+        if file.name != "errors.py":
+            assert "warnings.warn(" not in file.read_text("utf-8"), file

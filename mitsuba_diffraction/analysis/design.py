@@ -127,7 +127,9 @@ def _flat_brdf(
 ) -> Real:
     """Return the reference BRDF of a flat patch; checks all arguments."""
     flat = HeightField(np.zeros((2, 2)), 1.0)
-    return reference.brdf(flat, wi, wo, wavelength, coherence_width=width, eta=eta, k=k)
+    return reference.brdf(
+        flat, wi, wo, wavelength, coherence_width=width, model="kirchhoff", eta=eta, k=k
+    )
 
 
 def recover(

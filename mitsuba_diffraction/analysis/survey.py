@@ -44,7 +44,6 @@ from ..heights.recipes import LOAD_KEYS, Recipe, options_and_settings
 from ..heights.spectra import dominant_periods
 from ..progress import Progress, silent
 from ..scene.load import error_of
-from ..scene.passes import Stop
 from ..settings import RECIPE_SETTINGS, TableSettings
 from ..tables.build.build import build_with
 from ..tables.store import cached_table, key_of
@@ -248,7 +247,6 @@ def run_survey(
     resolution: int = 160,
     threads: int = 0,
     client: Any = None,
-    stop: Stop | None = None,
     progress: Progress = silent,
 ) -> list[dict[str, Any]]:
     """Measure every scan that the folder does not have yet, and write the results of all.
@@ -268,12 +266,11 @@ def run_survey(
     resolution : pixels a side of the maps.
     threads : threads of Dr.Jit in workers; 0 for one per core.
     client : `distributed.Client`, or None to measure in this process.
-    stop, progress : as in `scene.passes.render_passes`; progress counts scans.
+    progress : called as progress(scans done, scans in all, text).
 
     Returns
     -------
-    The rows, in the order of the files; rows of failed scans have a `reason`. A run that was
-    stopped returns the rows of measured scans.
+    The rows, in the order of the files; rows of failed scans have a `reason`.
 
     Raises
     ------
@@ -300,16 +297,16 @@ def run_survey(
             rows[n] = stored
     todo = list(jobs)
     progress(0, len(todo), "scans")
-    results = each(client, measure, [jobs[n] for n in todo], stop or Stop())
+    results = each(client, measure, [jobs[n] for n in todo])
     for done, (which, result) in enumerate(results, 1):
         n = todo[which]
         if isinstance(result, Failed):
             rows[n] = {"reason": f"{result.text} {result.worker}".strip()}
         else:
             rows[n] = _store(scans, files[n], jobs[n], result)
+        _write_table(folder / TABLE, files, rows)  # complete even if Ctrl-C ends the next scan
         progress(done, len(todo), "scans")
-    named = [{"file": str(files[n]), **rows[n]} for n in sorted(rows)]
-    _write_table(folder / TABLE, named)
+    named = _write_table(folder / TABLE, files, rows)
     _write_sheets(folder, named)
     return named
 
@@ -347,8 +344,11 @@ def _store(scans: Path, file: Path, job: Job, result: Measured) -> dict[str, Any
     return row
 
 
-def _write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write all rows as CSV, with the union of their columns."""
+def _write_table(
+    path: Path, files: Sequence[Path], rows_by_number: Mapping[int, Mapping[str, Any]]
+) -> list[dict[str, Any]]:
+    """Write the measured rows in the order of the files as CSV, and return them."""
+    rows = [{"file": str(files[n]), **rows_by_number[n]} for n in sorted(rows_by_number)]
     columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
     names = ["file", "reason", *(n for n in columns if n not in ("file", "reason"))]
     text = io.StringIO()
@@ -357,6 +357,7 @@ def _write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     writer.writerows(rows)
     with atomic_path(path) as temporary:
         temporary.write_text(text.getvalue(), "utf-8")
+    return rows
 
 
 def _write_sheets(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 import resource
 import time
-import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..errors import DiffractionWarning
+from ..errors import warn
 from ..optics.second_order_change import applies
 from . import options
 from .console import Bar
@@ -100,15 +99,12 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
     cut_out = (field for field in fields if field.cut_out and settings.windows is None)
     said = [line for field in cut_out for line in edge_lines(field, shortest)]
     for line in said:
-        warnings.warn(line, DiffractionWarning, stacklevel=1)
+        warn(line)
     with Bar(args) as bar:
         table, workers = _built(args, fields, settings, bar)
         if by_recipe:
             output.parent.mkdir(parents=True, exist_ok=True)
         table.save(output)
-    for line in table.source.get("warnings", ()):
-        if line not in said:
-            warnings.warn(line, DiffractionWarning, stacklevel=1)
     print(f"{', '.join(map(str, sources))} -> {output}")
     for label, text in _report(fields, table, output, time.perf_counter() - start):
         print(f"  {label:<6} {text}")

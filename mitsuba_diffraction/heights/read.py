@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import numbers
 import os
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -14,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionError, warn
 from ..files import readable_file
 from . import preprocess
 from .field import HeightField
@@ -222,7 +221,7 @@ def _lengths(raw: RawHeights, shown: str, options: LoadOptions) -> _Lengths:
             f"{pixel_size[1]:.6g} µm, not {stated[0]:.6g} x {stated[1]:.6g} µm"
         )
     for line in lines:
-        warnings.warn(f"{shown}: {line}", DiffractionWarning, stacklevel=2)
+        warn(f"{shown}: {line}")
     return _Lengths(scale, pixel_size, lines)
 
 

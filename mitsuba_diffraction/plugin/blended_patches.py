@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import functools
 import operator
+import weakref
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -34,7 +35,13 @@ import numpy as np
 
 from ..errors import DiffractionError
 from .memory import index_between
-from .parameter_changes import Bounded, arrays_within
+from .parameter_changes import (
+    Bounded,
+    Changing,
+    ObjectValues,
+    arrays_within,
+    take_changes,
+)
 from .textures import is_attribute, is_bitmap, require_raw
 from .types import (
     BSDF,
@@ -78,8 +85,17 @@ class DiffractionMix(mi.BSDF):
         components = [one.flags(n) for one in self._held for n in range(one.component_count())]
         self.m_components = components  # at once: what it gives back is a copy
         self.m_flags = functools.reduce(operator.or_, components)
-        self.parameters_changed([])
-        self._check_sums()
+        self.parameters = [
+            weight if isinstance(weight, Bounded) else ObjectValues(_PREFIX + name, weight)
+            for name, weight in self.weights.items()
+            if weight is not None
+        ]
+        for refused in self.refusals():
+            if refused:
+                raise DiffractionError(refused)
+        for one in self.together[1:]:
+            one.mix = weakref.ref(self)  # not a cycle, which would keep both
+        self.derive()
 
     # ------------------------------------------------------------------ Mitsuba's interface
 
@@ -162,12 +178,24 @@ class DiffractionMix(mi.BSDF):
                 callback.put(_PREFIX + name, weight, mi.ParamFlags.Differentiable)
 
     def parameters_changed(self, keys: list[str]) -> None:
-        """Check what changed, and keep it out of the kernels' code."""
-        numbers = [one for one in self.weights.values() if isinstance(one, Bounded)]
-        refused = [line for line in (one.settle() for one in numbers) if line]
+        """Take all changed weights, or none of them."""
+        take_changes(self, self.together)
+
+    @property
+    def together(self) -> list[Changing]:
+        """This BSDF, and all in it that are refused with it."""
+        return [self, *(one for one in self._held if hasattr(one, "mix"))]
+
+    def refusals(self) -> Iterator[str | None]:
+        """See `Changing.refusals`."""
+        for name, weight in self.weights.items():
+            if weight is not None and not isinstance(weight, Bounded):
+                yield _texture_refusal(_PREFIX + name, weight)
+        yield self._sum_refusal()
+
+    def derive(self) -> None:
+        """Collect what `dr.freeze` must know."""
         self._for_freezing = arrays_within(list(self.weights.values()))
-        if refused:
-            raise DiffractionError("; ".join(refused))
 
     def to_string(self) -> str:
         """All parameters, for people."""
@@ -224,16 +252,15 @@ class DiffractionMix(mi.BSDF):
             ]
         return totals
 
-    def _check_sums(self) -> None:
-        """Refuse weights that are all 0 somewhere on the unit square of UV coordinates."""
+    def _sum_refusal(self) -> str | None:
+        """Reason to refuse weights whose sum is 0 in places of the UV square, or None."""
         if any(one is None or is_attribute(one) for one in self.weights.values()):
-            return
+            return None
         totals = [sum(self._weights_at(si, True), mi.Float(0.0)) for si in _square()]
-        if min(dr.slice(dr.min(total)) for total in totals) == 0.0:
-            names = ", ".join(_PREFIX + name for name in self.weights)
-            raise DiffractionError(
-                f"{names} are all 0 somewhere; leave out that of a surface, which gets the rest"
-            )
+        if min(dr.slice(dr.min(total)) for total in totals) > 0.0:
+            return None
+        names = ", ".join(_PREFIX + name for name in self.weights)
+        return f"{names} are all 0 somewhere; leave out that of a surface, which gets the rest"
 
 
 def _wide(active: Mask, si: Interaction, *arrays: Float) -> Mask:
@@ -302,15 +329,20 @@ def _weight(props: Properties, name: str, objects: dict[str, Any]) -> Bounded | 
         )  # fmt: skip
     texture = objects[name]
     require_raw(texture, name, "weights")
+    return texture
+
+
+def _texture_refusal(name: str, texture: Texture) -> str | None:
+    """Reason why a texture's numbers are no weights, or None."""
+    if is_attribute(texture):
+        return None
     if is_bitmap(texture):
         least = float(np.array(mi.traverse(texture)["data"], float).min())
-    elif is_attribute(texture):
-        least = 0.0
     else:
         least = min(dr.slice(dr.min(texture.eval_1(si, True))) for si in _square())
-    if not least >= 0.0:  # also refuses NaN
-        raise DiffractionError(f"{name}: its least number is {least:g}; weights are at least 0")
-    return texture
+    if least >= 0.0:
+        return None
+    return f"{name}: its least number is {least:g}; weights are at least 0"
 
 
 def _weight_at(weight: Bounded | Texture | None, si: Interaction, active: Mask) -> Float | None:

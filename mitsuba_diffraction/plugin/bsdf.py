@@ -204,13 +204,15 @@ from __future__ import annotations
 
 import functools
 import operator
+import weakref
+from collections.abc import Iterator
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DiffractionError
 from ..tables.energy.conservation import DirectionalTable
 from .boundary import Boundary, Kirchhoff
 from .directions import Pair, from_patch, in_patch, vcavity
@@ -218,8 +220,8 @@ from .energy import EnergyModel
 from .fresnel import tinted
 from .layers import CoatedPair, Transmission, UnderFilm
 from .llvm import require_loaded_llvm
-from .parameter_changes import Bounded, arrays_within, marks
-from .parameters import read_parameters
+from .parameter_changes import Bounded, ObjectValues, arrays_within, marks, take_changes
+from .parameters import ABSORBED, read_parameters
 from .power import power_model
 from .sampling import EVEN, direction_of, with_even_share
 from .sources import TableProvider, from_cache
@@ -278,12 +280,18 @@ class Diffraction(mi.BSDF):
             components += [self.nested.flags(n) for n in range(self.nested.component_count())]
         self.m_components = components  # at once: what it gives back is a copy
         self.m_flags = functools.reduce(operator.or_, components)
-        self.parameters_changed([])
+        self.parameters = [*self._scale_changeable, *self.orientation.changeable]
+        self.parameters += self.fresnel.changeable
+        if self.nested is not None:
+            self.parameters.append(ObjectValues("nested", self.nested))
+        self.mix: weakref.ref[Any] | None = None
+        self.derive()
 
     def _set_height_scale(self, given: float | VaryingHeightScale, optical: float) -> None:
         """A bounded number; or factors that vary, of which `height_scale` is the largest."""
         if isinstance(given, VaryingHeightScale):
             self._scale: VaryingHeightScale | Bounded = given
+            self._scale_changeable = given.changeable
             self._varying: VaryingHeightScale | None = given
             self.height_scale: Float = mi.Float(given.high)
             return
@@ -292,6 +300,7 @@ class Diffraction(mi.BSDF):
             "height_scale", given, LEAST_SCALE, most, functools.partial(_scale_refusal, most)
         )
         self._scale, self._varying, self.height_scale = bounded, None, bounded.value
+        self._scale_changeable = (bounded,)
 
     # ------------------------------------------------------------------ Mitsuba's interface
 
@@ -414,17 +423,30 @@ class Diffraction(mi.BSDF):
             callback.put("nested", self.nested, mi.ParamFlags.Differentiable)
 
     def parameters_changed(self, keys: list[str]) -> None:
-        """Check what changed, and keep it out of the kernels' code.
+        """Take all changes, or none of them.
 
         Raises
         ------
         DiffractionError
-            If one is out of bounds, as a height_scale that the table does not serve: it keeps
-            the value that it had.
+            If a parameter is out of bounds, as a height_scale that the table does not serve. All
+            parameters then have their last values.
         """
-        changing = (self._scale, self.orientation, self.fresnel)
-        refused = [line for line in [one.settle() for one in changing] if line]
-        refused += self._optical_refusal()
+        mix = self.mix and self.mix()
+        take_changes(self, mix.together if mix else [self])
+
+    def refusals(self) -> Iterator[str | None]:
+        """See `Changing.refusals`."""
+        yield self._optical_refusal()
+        if self._varying is not None:
+            yield self._varying.refusal()
+        if isinstance(self.fresnel, UnderFilm):
+            yield self.fresnel.refusal()
+            if self.nested is not None and self.fresnel.numbers()[0].imag:
+                yield ABSORBED
+
+    def derive(self) -> None:
+        """Compute what depends on the parameters: scales of energy, and what `dr.freeze` sees."""
+        self.fresnel.derive()
         largest = dr.slice(dr.max(dr.detach(self.height_scale)))
         differentiable = dr.grad_enabled(self.height_scale)
         lowest = self._varying.range()[0] if self._varying else None
@@ -461,24 +483,22 @@ class Diffraction(mi.BSDF):
             getattr(self.boundary.material, "channels", None),
             getattr(self.boundary.material, "tint", None) is None,
         )
-        if refused:
-            raise DiffractionError("; ".join(refused))
 
-    def _optical_refusal(self) -> list[str]:
-        """What to say where heights and the index they are in are beyond the table."""
+    def _optical_refusal(self) -> str | None:
+        """Reason why heights times the index that they are in are beyond the table, or None."""
         medium = self.coat
         if self.through is not None:
             medium = self.through.material
         if medium is None:
-            return []
+            return None
         name = "coat" if self.coat else "int"
         optical = float(dr.slice(dr.max(dr.detach(self.height_scale * medium.eta))))
         if optical <= self.table.height_scale_max * (1.0 + 1e-6):
-            return []
-        return [
+            return None
+        return (
             f"height_scale times {'coat_' if self.coat else ''}eta is {optical:g}, beyond the "
             f"table's {self.table.height_scale_max:g}; load the plugin anew with that {name}_ior"
-        ]
+        )
 
     @property
     def model(self) -> str:

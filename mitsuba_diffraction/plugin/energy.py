@@ -7,7 +7,6 @@ it gets; T = 1 − a(ω) of a dielectric's own albedo goes on to what lies benea
 from __future__ import annotations
 
 import math
-import warnings
 from functools import partial
 from typing import Any
 
@@ -16,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import DiffractionWarning
+from ..errors import warn
 from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS, response
 from ..optics.mean_second_order import limited
@@ -116,12 +115,10 @@ class EnergyModel:
         largest = float(albedo.values[:, albedo.grid.theta <= math.radians(80.0)].max())
         if largest > 1.0 + MUCH:
             self._warned = True
-            warnings.warn(
+            warn(
                 f"the surface would reflect up to {100 * largest:.0f} % of the light within 80° of "
                 "the normal: what is above 100 % is taken (energy_conserving=false keeps it); its "
-                "orders are least certain there",
-                DiffractionWarning,
-                stacklevel=2,
+                "orders are least certain there"
             )
 
     def brightness(self, height_scale: float) -> Array | None:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..errors import DiffractionError
 from ..optics import fresnel
 from ..optics.colour import metal_tint
-from .parameter_changes import Bounded, children
+from .parameter_changes import Bounded, Changeable, ObjectValues, children
 from .types import BSDF, Callback, Colour, Float, Interaction, Mask, Number, Spectrum, Texture
 
 
@@ -122,8 +122,10 @@ def root(square: Number) -> Number:
     return mi.Complex2f(dr.select(travels, larger, smaller), dr.select(travels, smaller, larger))
 
 
-#: Ratios of refractive indices that are taken when one changes.
+#: Bounds of ratios of refractive indices: beyond, squares leave single precision's range.
 INDICES = (1e-3, 1e3)
+#: Bounds of the parts of a conductor's index.
+INDEX_PARTS = {"eta": INDICES, "k": (0.0, INDICES[1])}
 
 Array = NDArray[Any]
 #: Wavelengths of a metal's spectrum that its colour is made of, nm.
@@ -133,15 +135,17 @@ _VISIBLE = np.arange(380.0, 780.0)
 class Perfect:
     """R = 1 at every angle, `material="none"`."""
 
+    changeable: tuple[Changeable, ...] = ()
+
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R for the cosine (mi.Float) of the angle to the half vector, mi.UnpolarizedSpectrum."""
         return mi.UnpolarizedSpectrum(1.0)
 
     def traverse(self, callback: Callback) -> None:
-        """Nothing to expose."""
+        """Expose nothing."""
 
-    def settle(self) -> None:
-        """Nothing to settle."""
+    def derive(self) -> None:
+        """Derive nothing."""
 
     def __str__(self) -> str:
         return "none"
@@ -153,11 +157,12 @@ class Dielectric:
     Parameters
     ----------
     int_ior, ext_ior : indices, or names that Mitsuba knows.
-    name, least : of the ratio as a parameter, and the least that it may become.
+    name, least : name and smallest value of the ratio as a parameter.
 
     Attributes
     ----------
     eta : the ratio.
+    changeable : parameters that `traverse` exposes.
     reflects_all : whether there is total reflection: the medium above is the denser one.
     """
 
@@ -172,8 +177,9 @@ class Dielectric:
         eta = float(dr.slice(mi.traverse(probe)["eta"]))
         self._index = Bounded(name, eta, least, INDICES[1], partial(_ratio_refusal, name, least))
         self.eta = self._index.value
+        self.changeable = (self._index,)
         self.traverse = self._index.traverse
-        self.settle()
+        self.derive()
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R for the cosine of the angle to the half vector, the same at every wavelength."""
@@ -183,11 +189,9 @@ class Dielectric:
         """The relative index, one for all channels; complex where there is total reflection."""
         return [mi.Complex2f(self.eta, 0.0) if self.reflects_all else self.eta]
 
-    def settle(self) -> str | None:
-        """See `Bounded.settle`."""
-        refused = self._index.settle()
+    def derive(self) -> None:
+        """Find out whether there is total reflection, for which kernels differ."""
         self.reflects_all = bool(dr.slice(dr.detach(self.eta)) < 1.0)
-        return refused
 
     def __str__(self) -> str:
         return f"dielectric[eta = {dr.slice(self.eta):.5g}]"
@@ -222,8 +226,10 @@ class Inside:
 class Conductor:
     """Fresnel reflectance of a conductor, eta and k as textures over wavelength."""
 
-    def __init__(self, eta: Texture, k: Texture, name: str) -> None:
-        self.eta, self.k, self.name = eta, k, name
+    def __init__(self, eta: ObjectValues, k: ObjectValues, name: str) -> None:
+        self.eta: Texture = eta.thing
+        self.k: Texture = k.thing
+        self.name, self.changeable = name, (eta, k)
         self.medium: Dielectric | None = None  #: what lies above, if not air
         # of RGB's channels: the index over wavelengths, and as the channels have it
         self._spectrum: tuple[Array, Array] | None = None
@@ -239,7 +245,8 @@ class Conductor:
         objects = children(_load("conductor", material=material))
         if mi.is_monochromatic:
             objects = {name: _at(material, name, wavelength) for name in ("eta", "k")}
-        made = cls(objects["eta"], objects["k"], material)
+        parts = [ObjectValues(name, objects[name], INDEX_PARTS[name]) for name in INDEX_PARTS]
+        made = cls(*parts, material)
         if mi.is_rgb:
             index = _tabulated(material, "eta", _VISIBLE) + 1j * _tabulated(material, "k", _VISIBLE)
             made._spectrum = index, made._channels()
@@ -268,8 +275,8 @@ class Conductor:
         callback.put("eta", self.eta, mi.ParamFlags.Differentiable)
         callback.put("k", self.k, mi.ParamFlags.Differentiable)
 
-    def settle(self) -> None:
-        """The textures look after themselves; changed, they have no spectrum that is known."""
+    def derive(self) -> None:
+        """Tint the colours of a tabulated metal; a changed index has no known spectrum."""
         self.tint = None
         if self._spectrum is None or not np.array_equal(self._channels(), self._spectrum[1]):
             return

@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from ..optics.colour import RGB_WAVELENGTHS, linear_srgb, response
 from ..optics.geometry import wavenumber
 from .directions import Pair
-from .fresnel import Conductor, Dielectric, Filmed, Reflectance, amplitudes, squared
+from .fresnel import INDEX_PARTS, Conductor, Dielectric, Filmed, Reflectance, amplitudes, squared
 from .parameter_changes import Bounded
 from .types import Callback, Colour, Float, Interaction, Mask, Number, Vector3f
 
@@ -53,6 +53,7 @@ class UnderCoat:
 
     def __init__(self, material: Dielectric | Conductor, coat: Dielectric) -> None:
         self.material, self.coat = material, coat
+        self.changeable = (*material.changeable, *coat.changeable)
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """1 − T T / (1 − R R) of coat and material, for the cosine of the angle outside."""
@@ -69,10 +70,10 @@ class UnderCoat:
         self.material.traverse(callback)
         self.coat.traverse(callback)
 
-    def settle(self) -> str | None:
-        """See `Bounded.settle`."""
-        refused = [line for line in (self.material.settle(), self.coat.settle()) if line]
-        return "; ".join(refused) or None
+    def derive(self) -> None:
+        """Derive what depends on the indices of material and coat."""
+        self.material.derive()
+        self.coat.derive()
 
     def __str__(self) -> str:
         return f"{self.material} under coat[eta = {dr.slice(self.coat.eta):.5g}]"
@@ -149,6 +150,7 @@ class UnderFilm:
     k : its imaginary part.
     thickness : nm.
     wavelength : nm, of mono variants.
+    shortest : shortest wavelength that the table serves, nm.
     """
 
     def __init__(
@@ -158,15 +160,18 @@ class UnderFilm:
         k: float,
         thickness: float,
         wavelength: float,
+        shortest: float,
     ) -> None:
         self.material, self.film, self._fixed = material, film, mi.Float(wavelength)
         dr.make_opaque(self._fixed)
-        self._k = Bounded("film_k", k, 0.0, math.inf, _refusal)
-        self._thickness = Bounded("film_thickness", thickness, 0.0, COHERENCE, _refusal)
+        self._shortest = shortest
+        self._k = Bounded("film_k", k, *INDEX_PARTS["k"], _k_refusal)
+        self._thickness = Bounded("film_thickness", thickness, 0.0, math.inf, _thickness_refusal)
+        self.changeable = (*material.changeable, *film.changeable, self._k, self._thickness)
         self.k, self.thickness = self._k.value, self._thickness.value
         self.channels: Channels | None = None
         self._path = -1.0
-        self.settle()
+        self.derive()
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R of the flat film for the cosine of the angle of incidence, unpolarised."""
@@ -201,15 +206,30 @@ class UnderFilm:
         for one in (self.material, self.film, self._k, self._thickness):
             one.traverse(callback)
 
-    def settle(self) -> str | None:
-        """See `Bounded.settle`."""
-        changing = self.material, self.film, self._k, self._thickness
-        refused = [line for line in [one.settle() for one in changing] if line]
+    def refusal(self) -> str | None:
+        """Reason why the film is too thick to interfere or opaque, or None."""
+        index, thickness = self.numbers()
+        if 2.0 * index.real * thickness > COHERENCE:
+            return (
+                f"film_thickness={thickness:g} nm of index {index.real:.4g}: 2 n d must be at most "
+                f"{COHERENCE:g} nm, over which light is coherent (λ²/Δλ of a band of 25 nm at 550 "
+                "nm); a thicker layer is a coat: coat_ior"
+            )
+        if math.exp(-8.0 * math.pi * index.imag * thickness / self._shortest) < LEAST_THROUGH:
+            return (
+                f"film_k={index.imag:g} at film_thickness={thickness:g} nm absorbs all light on "
+                "its way to the material beneath; give the film's index as the material, eta and k"
+            )
+        return None
+
+    def derive(self) -> None:
+        """Derive what depends on indices and thickness: in RGB variants, the wavelengths summed."""
+        self.material.derive()
+        self.film.derive()
         path = 2.0 * plain(self.film.eta) * plain(self.thickness)
         # Fewer fringes need no other kernels
         if mi.is_rgb and path > self._path:
             self._path, self.channels = path, Channels.of(path)
-        return "; ".join(refused) or None
 
     def numbers(self) -> tuple[complex, float]:
         """The film's index and its thickness, nm."""
@@ -225,11 +245,13 @@ class UnderFilm:
         return f"{self.material} under film[eta = {index:.5g}, {thickness:.5g} nm]"
 
 
-def _refusal(value: float) -> str:
-    return (
-        f"film_k or film_thickness={value:g} must be at least 0, and the thickness at most "
-        f"{COHERENCE:g} nm"
-    )
+def _k_refusal(value: float) -> str:
+    low, high = INDEX_PARTS["k"]
+    return f"film_k={value:g} must be between {low:g} and {high:g}: the film's index is n + ik"
+
+
+def _thickness_refusal(value: float) -> str:
+    return f"film_thickness={value:g} nm must be at least 0"
 
 
 def _complex(index: Number) -> Number:

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-import warnings
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
 
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionError, warn
 from ..tables.table import DiffractionTable
 from .boundary import MODELS, Boundary, Kirchhoff, SmallSlope
-from .fresnel import Conductor, Dielectric, Perfect, Reflectance
-from .layers import COHERENCE, LAYERINGS, LEAST_THROUGH, UnderFilm
+from .fresnel import INDEX_PARTS, INDICES, Conductor, Dielectric, Perfect, Reflectance
+from .layers import LAYERINGS, UnderFilm
+from .parameter_changes import ObjectValues
 from .properties import choice, flag, number
 from .transmission.sides import LEAST_INDEX
-from .types import Properties, Texture
+from .types import Properties
 
 #: Of mono variants, nm.
 DEFAULT_WAVELENGTH = 550.0
@@ -54,7 +53,8 @@ def material_of(props: Properties, coat: Dielectric | None) -> Reflectance:
         metal.medium = coat
         return metal
     medium = _index(props, "ext_ior", 1.000277) if coat is None else _index(props, "coat_ior")
-    return Dielectric(_index(props, "int_ior", 1.5), medium)
+    least = LEAST_INDEX if _transmits(props) else INDICES[0]
+    return Dielectric(_index(props, "int_ior", 1.5), medium, least=least)
 
 
 def coat_of(props: Properties) -> Dielectric | None:
@@ -76,7 +76,7 @@ def coat_of(props: Properties) -> Dielectric | None:
 def passing_of(props: Properties, material: Reflectance) -> Dielectric | None:
     """The dielectric, if light is to go through it, which excludes much."""
     thin = flag(props, "thin", False)
-    if not flag(props, "transmission", thin):
+    if not _transmits(props):
         if thin:
             raise DiffractionError("thin=true lets light through; leave transmission=false out")
         return None
@@ -100,6 +100,10 @@ def passing_of(props: Properties, material: Reflectance) -> Dielectric | None:
             "round where the denser medium is above"
         )
     return material
+
+
+def _transmits(props: Properties) -> bool:
+    return flag(props, "transmission", flag(props, "thin", False))
 
 
 def under_film(
@@ -132,21 +136,11 @@ def under_film(
     medium = _index(props, "ext_ior", _above(props))
     film = Dielectric(_index(props, "film_ior"), medium, "film_eta")
     k, thickness = number(props, "film_k", 0.0), number(props, "film_thickness", 0.0)
-    if k < 0.0:
-        raise DiffractionError(f"film_k={k:g} must be at least 0: the film's index is n + ik")
-    path = 2.0 * float(dr.slice(film.eta)) * thickness
-    if not 0.0 <= path <= COHERENCE:
-        raise DiffractionError(
-            f"film_thickness={thickness:g} nm must be at least 0, and 2 n d at most "
-            f"{COHERENCE:g} nm, over which light is coherent (λ²/Δλ of a band of 25 nm at 550 nm); "
-            "a layer so thick is a coat: coat_ior"
-        )
-    if math.exp(-8.0 * math.pi * k * thickness / shortest) < LEAST_THROUGH:
-        raise DiffractionError(
-            f"film_k={k:g} at film_thickness={thickness:g} nm absorbs all light on its way to the "
-            "material beneath; give the film's index as the material, eta and k"
-        )
-    return UnderFilm(material, film, k, thickness, wavelength)
+    filmed = UnderFilm(material, film, k, thickness, wavelength, shortest)
+    for refused in (*(one.refusal() for one in filmed.changeable), filmed.refusal()):
+        if refused:
+            raise DiffractionError(refused)
+    return filmed
 
 
 def warn_of_film(material: Reflectance | UnderFilm, table: DiffractionTable, scale: float) -> None:
@@ -156,12 +150,10 @@ def warn_of_film(material: Reflectance | UnderFilm, table: DiffractionTable, sca
     index, thickness = material.numbers()
     rms = scale * math.sqrt(float(table.roughness.nodes.max()))
     if 2.0 * index.real * thickness * rms > ROUGH:
-        warnings.warn(
+        warn(
             f"film_thickness={thickness:g} nm on a metal of RMS height {1e3 * rms:.0f} nm: beside "
             "rigorous solutions, expect the colours to be off by more than 10 % beyond 45° from "
-            "the normal (docs/validation.md)",
-            DiffractionWarning,
-            stacklevel=2,
+            "the normal (docs/validation.md)"
         )
 
 
@@ -185,22 +177,15 @@ def _above(props: Properties) -> float:
     return 1.0 if any(name in props for name in ("material", "eta", "k")) else 1.000277
 
 
-def _index_part(props: Properties, name: str) -> Texture:
-    """Part of a complex index: a spectrum or texture whose numbers fit, as far as it shows them."""
+def _index_part(props: Properties, name: str) -> ObjectValues:
+    """Part of a complex index, a spectrum or texture whose values are checked where exposed."""
+    # A colour becomes a spectrum whose values are coefficients of any sign
+    coefficients = mi.is_spectral and props.type(name) == mi.Properties.Type.Color
     texture = props.get_unbounded_texture(name)
-    shown = mi.traverse(texture)
-    keys = {"values", "data"}
-    if not (mi.is_spectral and props.type(name) == mi.Properties.Type.Color):
-        keys.add("value")  # else coefficients of a spectrum
-    for key in keys.intersection(name for name, _ in shown):
-        values = np.ravel(np.array(shown[key], float))
-        wrong = values[~(np.isfinite(values) & (values >= 0.0) & ((values > 0.0) | (name == "k")))]
-        if wrong.size:
-            least = "at least 0" if name == "k" else "above 0"
-            raise DiffractionError(
-                f"{name}={wrong[0]:g} must be finite and {least}: the index is eta + ik"
-            )
-    return texture
+    part = ObjectValues(name, texture, None if coefficients else INDEX_PARTS[name])
+    if refused := part.refusal():
+        raise DiffractionError(f"{refused}: the index is eta + ik")
+    return part
 
 
 def _index(props: Properties, name: str, default: float = 1.0) -> float | str:

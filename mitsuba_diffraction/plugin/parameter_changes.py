@@ -1,4 +1,4 @@
-"""What changes between renderings: bounded parameters, and what `dr.freeze` must know of a BSDF.
+"""Changes of parameters between renderings, and what `dr.freeze` must know of a BSDF.
 
 A frozen function refuses arrays that it was not told of. Of a plugin written in Python, Dr.Jit sees
 the attributes: arrays, lists of them and Mitsuba's own objects, but not what plain Python objects
@@ -9,17 +9,34 @@ which are part of the recorded kernels: given another patch, it would go on with
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Protocol
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
+from ..errors import DiffractionError
 from ..tables.table import DiffractionTable
 from .types import Callback, Float
 
 _OURS = __name__.rpartition(".")[0]
+#: Names by which Mitsuba's spectra and textures expose their values.
+_VALUES = ("value", "values", "data")
+
+
+class Changeable(Protocol):
+    """A parameter that `mi.traverse` exposes, as `ParameterChanges` sees it."""
+
+    def refusal(self) -> str | None:
+        """Reason why the value that was set is not allowed, or None."""
+
+    def restore(self) -> None:
+        """Set the value that was last kept."""
+
+    def keep(self) -> None:
+        """Remember the present value as the one to restore."""
 
 
 class Bounded:
@@ -28,43 +45,144 @@ class Bounded:
     Parameters
     ----------
     name : for `mi.traverse`.
-    value : the first.
-    low, high : the least and the largest that are taken.
-    refusal : what to say of another one.
+    value : the first value.
+    low, high : the smallest and the largest value allowed.
+    message : the text of a refusal, from the value refused.
 
     Attributes
     ----------
-    high : as given.
-    value : mi.Float, the same object ever after: Mitsuba assigns to it.
+    value : mi.Float, always the same object: Mitsuba assigns to it.
     """
 
     def __init__(
-        self, name: str, value: float, low: float, high: float, refusal: Callable[[float], str]
+        self, name: str, value: float, low: float, high: float, message: Callable[[float], str]
     ) -> None:
         self.value: Float = mi.Float(value)
         self.high = high
-        self._name, self._low, self._refusal = name, low, refusal
-        self._last: Float = mi.Float(value)
+        self._name, self._low, self._message = name, low, message
+        self.keep()
 
-    def settle(self) -> str | None:
-        """Take the value given, as a variable, so that kernels stay; or say why it is refused."""
-        given = np.array(dr.detach(self.value), float).ravel()
-        wrong = given[~((given >= self._low) & (given <= self.high))]
-        if len(wrong):
-            if dr.is_jit_v(self.value):
-                mi.set_property(self.value, self._last)
-            return self._refusal(float(wrong[0]))
+    def refusal(self) -> str | None:
+        """See `Changeable.refusal`."""
+        numbers = np.array(dr.detach(self.value), float).ravel()
+        wrong = numbers[~((numbers >= self._low) & (numbers <= self.high))]
+        return self._message(float(wrong[0])) if len(wrong) else None
+
+    def restore(self) -> None:
+        """See `Changeable.restore`."""
+        if dr.is_jit_v(self.value):
+            mi.set_property(self.value, self._kept)
+
+    def keep(self) -> None:
+        """See `Changeable.keep`; also makes the value a variable of the kernels, not a literal."""
         dr.make_opaque(self.value)
-        self._last = mi.Float(dr.detach(self.value))
-        return None
+        self._kept: Float = mi.Float(dr.detach(self.value))
 
     def traverse(self, callback: Callback) -> None:
-        """Expose it."""
+        """Expose the number."""
         callback.put(self._name, self.value, mi.ParamFlags.Differentiable)
 
 
+class ObjectValues:
+    """All values of one of Mitsuba's objects: a spectrum, a texture or a nested BSDF.
+
+    Parameters
+    ----------
+    name : name of the parameter that holds the object.
+    thing : the object.
+    bounds : smallest and largest value allowed in spectra and textures; None allows any finite
+        number.
+    """
+
+    def __init__(self, name: str, thing: Any, bounds: tuple[float, float] | None = None) -> None:
+        self.thing = thing
+        self._name, self._bounds = name, bounds
+        self.keep()
+
+    def refusal(self) -> str | None:
+        """See `Changeable.refusal`."""
+        for key, value in mi.traverse(self.thing):
+            numbers = _numbers(value)
+            bounds = self._bounds if key.rpartition(".")[2] in _VALUES else None
+            low, high = bounds or (-np.inf, np.inf)
+            allowed = np.isfinite(numbers) & (numbers >= low) & (numbers <= high)
+            if not allowed.all():
+                range_ = f"between {low:g} and {high:g}" if bounds else "finite"
+                name = self._name if key in _VALUES else f"{self._name}.{key}"
+                return f"{name}={numbers[~allowed][0]:g} must be {range_}"
+        return None
+
+    def restore(self) -> None:
+        """See `Changeable.restore`."""
+        mi.traverse(self.thing).update({key: _copy(value) for key, value in self._kept.items()})
+
+    def keep(self) -> None:
+        """See `Changeable.keep`."""
+        self._kept = {key: _copy(value) for key, value in mi.traverse(self.thing)}
+
+
+class Changing(Protocol):
+    """A BSDF whose parameters change, as `take_changes` sees it.
+
+    Attributes
+    ----------
+    parameters : everything that its `traverse` exposes.
+    """
+
+    parameters: Sequence[Changeable]
+
+    def refusals(self) -> Iterator[str | None]:
+        """Reasons to refuse values that are allowed each by itself; None for none."""
+
+    def derive(self) -> None:
+        """Compute what depends on the parameters. It may refuse them too."""
+
+
+def take_changes(changed: Changing, together: Sequence[Changing]) -> None:
+    """Take all changes of a BSDF's parameters, or none of them.
+
+    Parameters
+    ----------
+    changed : the BSDF, whose derived quantities are computed.
+    together : all BSDFs that are refused together, this one among them: the surfaces of a mix.
+
+    Raises
+    ------
+    DiffractionError
+        With all that is refused. Everything is then as it was before.
+    """
+    try:
+        if refused := [line for one in together for line in _refused(one)]:
+            raise DiffractionError("; ".join(refused))
+        changed.derive()
+    except BaseException:  # an interrupted computation leaves nothing half done either
+        for one in together:
+            for parameter in one.parameters:
+                parameter.restore()
+            one.derive()
+        raise
+    for parameter in changed.parameters:
+        parameter.keep()
+
+
+def _refused(changed: Changing) -> list[str]:
+    refused = [line for one in changed.parameters if (line := one.refusal())]
+    return refused or [line for line in changed.refusals() if line]
+
+
+def _copy(value: Any) -> Any:
+    return type(value)(dr.detach(value) if dr.is_array_v(value) else value)
+
+
+def _numbers(value: Any) -> NDArray[np.float64]:
+    """All numbers of a value; none of transformations and the like."""
+    if dr.is_array_v(value):
+        return np.array(dr.detach(value), float).ravel()
+    return np.array([value] if isinstance(value, int | float) else [], float)
+
+
 def children(thing: Any) -> dict[str, Any]:
-    """The objects that one of Mitsuba's shows to `traverse`, by name."""
+    """Return the objects that one of Mitsuba's objects shows to `traverse`, by name."""
 
     class Collector(mi.TraversalCallback):
         def __init__(self) -> None:
@@ -82,7 +200,7 @@ def children(thing: Any) -> dict[str, Any]:
 
 
 def arrays_within(*holders: Any) -> list[Any]:
-    """All Dr.Jit arrays and Mitsuba objects that objects of this folder hold, each once.
+    """Return all Dr.Jit arrays and Mitsuba objects that objects of this folder hold, each once.
 
     They are the very objects, so that what Dr.Jit assigns to them the kernels see.
     """
@@ -94,7 +212,7 @@ def arrays_within(*holders: Any) -> list[Any]:
 
 
 def marks(table: DiffractionTable, *constants: object) -> list[Any]:
-    """Zeros whose types tell apart the kernels of one table and these constants from others'.
+    """Return zeros whose types tell apart the kernels of this table and these constants.
 
     Types, because Dr.Jit compares those, and stops comparing values once they have changed.
     """

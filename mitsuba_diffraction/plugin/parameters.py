@@ -52,6 +52,10 @@ READING = tuple(field.name for field in fields(LoadOptions))
 PLACING = ("uv_scale", "world_scale", "tiling")
 #: µm: beyond, single precision holds places on the surface to no better than 1 µm.
 MOST_UV_SCALE = 1e7
+ABSORBED = (
+    "film_k makes a film that absorbs, over a nested BSDF, which would get that light; leave "
+    "film_k out, or remove the nested BSDF"
+)
 NAMES = (
     *SOURCES,
     *READING,
@@ -161,10 +165,7 @@ def read_parameters(props: Properties, provider: TableProvider = from_cache) -> 
     wavelength = _wavelength(props, table)
     reflectance = under_film(props, material, wavelength, table.wavelength_range[0])
     if nested is not None and isinstance(reflectance, UnderFilm) and reflectance.numbers()[0].imag:
-        raise DiffractionError(
-            "film_k makes a film that absorbs, over a nested BSDF, which would get that light; "
-            "leave film_k out, or remove the nested BSDF"
-        )
+        raise DiffractionError(ABSORBED)
     flat: Reflectance | UnderCoat | UnderFilm = reflectance
     if coat is not None and not isinstance(material, Perfect):
         flat = UnderCoat(material, coat)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import DiffractionError
 from .memory import index_between
-from .parameter_changes import Bounded
+from .parameter_changes import Bounded, ObjectValues
 from .properties import name_of
 from .types import Callback, Float, Interaction, Mask, Rotation, Texture
 
@@ -119,8 +119,9 @@ class VaryingHeightScale:
             raise DiffractionError(
                 f"height_scale: {given}, {self.high:g}, must be above 0 and at most 1000"
             )
-        if refused := self.settle():
+        if refused := self.refusal():
             raise DiffractionError(refused)
+        self.changeable = (ObjectValues("height_scale", texture),)
 
     def range(self) -> tuple[float, float]:
         """The least and the largest factor there are, as far as is known."""
@@ -133,8 +134,8 @@ class VaryingHeightScale:
         """The factor at points of the surface."""
         return index_between(self.texture.eval_1(si, active), LEAST_SCALE, self.high)
 
-    def settle(self) -> str | None:
-        """See `Bounded.settle`."""
+    def refusal(self) -> str | None:
+        """Reason why the bitmap's factors are not allowed, or None."""
         low, high = self.range()
         if low >= 0.0 and high <= self.high * (1.0 + 1e-6):
             return None
@@ -161,7 +162,7 @@ class ConstantOrientation:
     def __init__(self, degrees: float) -> None:
         self._angle = Bounded("orientation", degrees, -MOST_DEGREES, MOST_DEGREES, _refusal)
         self.degrees = self._angle.value
-        self.traverse, self.settle = self._angle.traverse, self._angle.settle
+        self.traverse, self.changeable = self._angle.traverse, (self._angle,)
 
     def rotation(self, si: Interaction, active: Mask) -> Rotation:
         """(cos, sin) of the angle."""
@@ -185,6 +186,7 @@ class OrientationTexture:
 
     def __init__(self, texture: Texture) -> None:
         self.texture = texture
+        self.changeable = (ObjectValues("orientation", texture),)
         _check(texture)
 
     def rotation(self, si: Interaction, active: Mask) -> Rotation:
@@ -198,9 +200,6 @@ class OrientationTexture:
     def traverse(self, callback: Callback) -> None:
         """Expose the texture."""
         callback.put("orientation", self.texture, mi.ParamFlags.Differentiable)
-
-    def settle(self) -> None:
-        """The texture looks after itself."""
 
     def __str__(self) -> str:
         return " ".join(str(self.texture).split())

@@ -5,14 +5,13 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ..atomic import atomic_path
-from ..errors import DiffractionError, DiffractionWarning
+from ..errors import DiffractionError, warn
 from ..files import refuse_pipe
 from ..progress import Progress
 from .load import load_scene, preview_samples, sensor_of, shrink
@@ -115,9 +114,7 @@ def write_frame(frame: Frame, bitmap: Any, scene: Path, variant: str, with_exr: 
         )
     bad = count_bad(bitmap)
     if bad:
-        warnings.warn(
-            f"{frame.png}: {bad} pixels are not finite and black", DiffractionWarning, stacklevel=3
-        )
+        warn(f"{frame.png}: {bad} pixels are not finite and black")
     frame.png.parent.mkdir(parents=True, exist_ok=True)  # not for a scene that fails
     if with_exr:
         write_exr(bitmap, frame.exr, {"scene": str(scene), "variant": variant})

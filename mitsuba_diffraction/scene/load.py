@@ -11,12 +11,11 @@ traceback; warnings go to a logger of its own.
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Mapping
 from pathlib import Path, PurePath
 from typing import Any
 
-from ..errors import DiffractionError, DiffractionWarning, one_line
+from ..errors import DiffractionError, one_line, warn
 from ..files import readable_file
 from ..plugin.properties import name_of
 from ..plugin.textures import check_attributes
@@ -117,13 +116,11 @@ def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
         if shape.is_mesh() and not shape.has_vertex_texcoords()
     ]
     if lacking:
-        warnings.warn(
+        warn(
             f"no texture coordinates on {'; '.join(lacking)}: the patch's direction is arbitrary "
             "there and turns from triangle to triangle; give the mesh directions with "
             "'mitsuba-diffraction tangents', or unwrap it so that u runs the way the patch's x "
-            "axis shall",
-            DiffractionWarning,
-            stacklevel=2,
+            "axis shall"
         )
 
 

@@ -14,7 +14,6 @@ import json
 import math
 import os
 import threading
-import warnings
 import weakref
 from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from dataclasses import asdict, dataclass
@@ -26,10 +25,9 @@ import platformdirs
 from numpy.typing import NDArray
 
 from ..atomic import atomic_path, remove_abandoned
-from ..errors import DiffractionError, DiffractionWarning, one_line
+from ..errors import DiffractionError, one_line, warn
 from ..heights.validity import TEXTS_VERSION
 from ..settings import TableSettings
-from .build import coarse
 from .colour.build import PolarGrid
 from .colour.table import COLOUR_VERSION, ColourTable
 from .document import described, document_of, plain
@@ -156,23 +154,28 @@ def _locked(path: Path) -> Iterator[None]:
 def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
     """What a file holds; None if there is none, and with a warning if it is damaged."""
     try:
-        found = unpack(_read(path, title))
+        found = unpack(read_record(path, title))
         os.utime(path)  # recently used ones are kept longest
         return found
     except OSError:
         return None
     except (ValueError, LookupError, TypeError, MemoryError, RecursionError) as error:
-        warnings.warn(
-            f"'{path}' in the cache is damaged ({one_line(str(error))[:100]}) and made again",
-            DiffractionWarning,
-            stacklevel=2,
-        )
+        warn(f"'{path}' in the cache is damaged ({one_line(str(error))[:100]}) and made again")
         with contextlib.suppress(OSError):
             path.unlink()
         return None
 
 
-def _read(path: Path, title: str) -> Record:
+def read_record(path: Path, title: str) -> Record:
+    """Read what `write_record` wrote under this title, and check it.
+
+    Raises
+    ------
+    OSError
+        If there is no such file.
+    ValueError, LookupError, TypeError, MemoryError, RecursionError
+        If it is damaged, or has another title.
+    """
     if not path.is_file():
         raise FileNotFoundError
     content = np.fromfile(path, np.uint8)
@@ -190,20 +193,31 @@ def _read(path: Path, title: str) -> Record:
 
 
 def _keep(path: Path, title: str, record: Record) -> None:
+    try:
+        write_record(path, title, record)
+        _prune(path.parent)
+    except (DiffractionError, OSError):
+        return
+
+
+def write_record(path: Path, title: str, record: Record) -> None:
+    """Write a record in one piece: a line with title and SHA-256, JSON, and the arrays.
+
+    Raises
+    ------
+    DiffractionError
+        If it cannot be written.
+    """
     arrays = [np.ascontiguousarray(array) for array in record.arrays]
     described = [[array.dtype.str, array.shape] for array in arrays]
     text = json.dumps({"document": record.document, "arrays": described}).encode()
     texts = [np.frombuffer(t, np.uint8) for t in (str(len(text)).encode().ljust(_HEAD), text)]
     blocks = [*texts, *(array.reshape(-1).view(np.uint8) for array in arrays)]
     padded = [np.pad(block, (0, _aligned(block.size) - block.size)) for block in blocks]
-    try:
-        with atomic_path(path) as temporary, open(temporary, "wb") as file:
-            file.write(_head(title, padded))
-            for block in padded:
-                file.write(block.data)
-        _prune(path.parent)
-    except (DiffractionError, OSError):
-        return
+    with atomic_path(path) as temporary, open(temporary, "wb") as file:
+        file.write(_head(title, padded))
+        for block in padded:
+            file.write(block.data)
 
 
 def _head(title: str, blocks: Sequence[NDArray[np.uint8]]) -> bytes:
@@ -240,10 +254,7 @@ _COLOUR_NUMBERS = ("scale", "radius_end", "sigma")
 
 def table_key(digest: str, settings: TableSettings) -> str:
     """Name of the table of heights with this digest, built with these settings."""
-    cells: tuple[float, ...] = ()
-    if settings.q_max or settings.kappa_max:  # it goes on in cells that no setting tells of
-        cells = (coarse.CELL, coarse.FEWEST, coarse.STEP, coarse.TOLERANCE)
-    return key_of(FORMAT_VERSION, TEXTS_VERSION, digest, asdict(settings), cells)
+    return key_of(FORMAT_VERSION, TEXTS_VERSION, digest, asdict(settings))
 
 
 def cached_table(
@@ -256,15 +267,15 @@ def cached_table(
 
 def _table_record(table: DiffractionTable) -> Record:
     document = json.loads(json.dumps(document_of(table), default=plain))
-    return Record(document, [part.coefficients for part in table.parts])
+    return Record(document, [table.coefficients])
 
 
 def _table_of(record: Record) -> DiffractionTable:
     found = described(record.document)
-    shapes = [part.shape for part in found.parts]
-    if [array.shape for array in record.arrays] != shapes:
-        raise ValueError(f"arrays of other shapes than {shapes}")
-    return found.table(record.arrays)
+    (coefficients,) = record.arrays
+    if coefficients.shape != found.shape:
+        raise ValueError(f"coefficients of another shape than {found.shape}")
+    return found.table(coefficients)
 
 
 def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:

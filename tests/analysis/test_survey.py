@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import csv
 import math
+import os
+import signal
+import time
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +24,7 @@ from mitsuba_diffraction.analysis.survey import (
     run_survey,
     treatment_for,
 )
+from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.optics.colour import response
 
 pytestmark = pytest.mark.usefixtures("coarse")
@@ -46,9 +50,15 @@ def survey(scans, tmp_path):
     own = Treatment().updated(Treatment(settings=SMALL))
     options = load_treatments(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'))
 
-    def call(files=scans):
+    def call(files=scans, **more):
         return run_survey(
-            files, tmp_path / "out", treatments=options, common=own, resolution=32, theta=20.0
+            files,
+            tmp_path / "out",
+            treatments=options,
+            common=own,
+            resolution=32,
+            theta=20.0,
+            **more,
         )
 
     return call
@@ -192,3 +202,33 @@ def test_gratings_of_two_directions_are_both_found():
     assert (one.period, other.period) == pytest.approx((1.3, 2.1), rel=0.01)
     assert (one.direction, other.direction) == pytest.approx((0.0, 90.0), abs=1.0)
     assert (one.share, other.share) == pytest.approx((9 / 13, 4 / 13), abs=0.02)
+
+
+def test_an_interrupted_survey_has_the_rows_that_are_done(survey, tmp_path):
+    def interrupt(done, total, text):
+        if done == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        survey(progress=interrupt)
+    with (tmp_path / "out" / "survey.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [Path(row["file"]).stem for row in rows] == ["straight"]
+
+
+def test_ctrl_c_ends_the_command_within_a_scan(scans, tmp_path, monkeypatch, capfd):
+    def measure(job):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(60)
+
+    monkeypatch.setattr(module, "measure", measure)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    start = time.perf_counter()
+    try:
+        code = main(["survey", *map(str, scans), "--pixel-size", "0.1", "-o", str(tmp_path / "a")])
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert code == 130
+    assert time.perf_counter() - start < 30  # far from the minute that the scan would take
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "run the command again to go on" in line

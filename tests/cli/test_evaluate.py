@@ -18,7 +18,7 @@ QUICK = [
 ]  # fmt: skip
 
 
-pytestmark = pytest.mark.usefixtures("here")
+pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("here")]
 
 
 def test_picture_and_numbers_are_written_and_the_period_is_found(run, heights, here):

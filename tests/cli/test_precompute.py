@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionError, DiffractionTable
 from mitsuba_diffraction.cli.console import Bar
+from tests.support.room import SCENE
 
 # A table of 6 µm heights with these takes a tenth of a second.
 QUICK = ["--pixel-size", "0.08", "--coherence-width", "6"]
@@ -127,6 +129,13 @@ def test_a_warning_of_the_heights_is_said_once(run, heights, here):
     assert ran.code == 0
     (line,) = [line for line in ran.err.splitlines() if "coarser than a quarter" in line]
     assert line.startswith("mitsuba-diffraction: warning: ")
+    # of the table: only `info` says it again
+    assert "coarser than a quarter" in run("info", "grating.exr").out
+    surface = '<bsdf type="diffraction"><string name="table" value="grating.exr"/></bsdf>'
+    Path("a.xml").write_text(SCENE.replace('<bsdf type="diffuse"/>', surface))
+    rendered = run("render", "a.xml", "-m", "scalar_rgb", "-s", 1)
+    assert rendered.code == 0, rendered
+    assert "coarser than a quarter" not in rendered.err
 
 
 def test_progress_is_shown_where_asked_for(run, heights, here, monkeypatch):

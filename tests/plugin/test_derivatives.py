@@ -15,6 +15,7 @@ from tests.support.lanes import interaction, lanes, spectra, vectors
 
 # a steep grating bends light further than the model likes; that is not the point here
 pytestmark = [
+    pytest.mark.thorough,
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
     pytest.mark.usefixtures("coarse"),
 ]

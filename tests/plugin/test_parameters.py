@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import mitsuba as mi
@@ -10,6 +11,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.settings import SCENE_SETTINGS
+from mitsuba_diffraction.tables.store import VARIABLE
 from tests.support.directions import polar, rough_patch
 from tests.support.lanes import evaluated, refusal
 
@@ -135,26 +137,32 @@ def test_the_wavelength_of_mono_variants_is_theirs_alone(tmp_path):
 # ------------------------------------------------------------------------ warnings
 
 
-@pytest.mark.parametrize("times", [1, 2])
-def test_each_cause_for_concern_is_one_warning(some_variant, times):
+@pytest.fixture
+def empty_cache(tmp_path, monkeypatch):
+    """A cache in which no table is found."""
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "cache"))
+
+
+def test_a_table_is_warned_of_where_it_is_built_and_not_where_it_is_found(
+    some_variant, tmp_path, empty_cache
+):
     coarse = md.HeightField(PATCH.heights, 0.15, name="coarse")  # pixels above λ/4, and 4.5 µm
-    for _ in range(times):  # from the cache too
-        with pytest.warns(md.DiffractionWarning) as caught:
-            load(coarse, coherence_width=10.0)
-        lines = [str(w.message) for w in caught]
-        assert len(lines) == 2
-        assert sum("smaller than the coherence width of 10 µm" in line for line in lines) == 1
-        assert all("\n" not in line for line in lines)
+    with pytest.warns(md.DiffractionWarning) as caught:
+        bsdf = load(coarse, coherence_width=10.0)
+    lines = [str(w.message) for w in caught]
+    assert len(lines) == 2
+    assert sum("smaller than the coherence width of 10 µm" in line for line in lines) == 1
+    assert sum(line.startswith("coarse: pixels of 0.15 µm") for line in lines) == 1
+    bsdf.table.save(tmp_path / "coarse.exr")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        load(coarse, coherence_width=10.0)
+        loads(table=str(tmp_path / "coarse.exr"))()
 
 
-def test_a_patch_in_memory_keeps_its_name_in_warnings(some_variant):
-    for name in ("first", "second"):  # the second has the first one's table, from the cache
-        field = md.HeightField(PATCH.heights, 0.15, name=name)
-        with pytest.warns(md.DiffractionWarning, match=f"^{name}: pixels of 0.15 µm"):
-            load(field, coherence_width=4.0)
-
-
-def test_tilt_of_a_file_is_said_and_can_be_treated_in_the_scene(some_variant, tmp_path):
+def test_tilt_of_a_file_is_said_and_can_be_treated_in_the_scene(
+    some_variant, tmp_path, empty_cache
+):
     tilted = PATCH.heights + 0.004 * np.arange(PATCH.shape[1])
     np.save(tmp_path / "tilted.npy", tilted)
     given = {"heightfield": str(tmp_path / "tilted.npy"), "pixel_size": 0.08, **SMALL}

@@ -1,38 +1,34 @@
-"""How far the model can be trusted: rigorous solutions, closed forms and statistics beside it.
+"""Comparison of the model with rigorous solutions, closed forms and statistics.
 
-Not needed to use the package. `python -m docs.make.validation report` writes
-docs/validation.md from the solutions that come with the package; `solve` makes those anew, which
-needs the extra `validation`.
+Users of the package do not need it. `python -m docs.make.validation report` writes the pages from
+the solutions in data/; `solve`, `patches`, `coated` and `films` compute these, with the extra
+`validation`.
 
 Contents
 --------
-cases            which gratings, lights and materials
-integral         a rigorous solver: boundary integrals
-coupled_wave     another: coupled waves in layers
-solve            solutions of all cases, by both
+cases            gratings, lights and materials
+integral         rigorous solver: boundary integrals
+coupled_wave     rigorous solver: coupled waves in layers
+solve            solutions of all gratings, by both
 solutions        files of solutions
-second           the two solvers beside each other
+agreement        the two solvers beside each other
 patches          surfaces in two dimensions, in any plane of incidence
-rayleigh         a rigorous solver for them: Rayleigh's expansion
-crossed          another: coupled waves in layers
-patch_solutions  solutions of all of them
+rayleigh         rigorous solver in two dimensions: Rayleigh's expansion
+crossed          rigorous solver in two dimensions: coupled waves in layers
+patch_solutions  solutions in two dimensions
 coated           solutions of gratings under a coat
 filmed           solutions of gratings under a film
 passed           orders that go through a dielectric, and R + T of the recipes
-spread           where light goes that is spread there
-model            what the package says of the same surfaces
-compare          how far apart they are
-second_order     what the second order in slope would bring
-factored         what it brings the default as a factor
-limits           up to which slopes that is little
+model            order efficiencies by the package
+compare          deviations of the package from solutions of gratings
+models           deviations of Kirchhoff, small slope and their blend
+goals            goals of the default, and deviations beside them
+limits           slopes at which the package warns
+cells            deviations in two dimensions
+second_order     exact second order of small slope
+factored         second order as the factor that tables hold
 closed_forms     ideal gratings
 roughness        random surfaces of known mean diffraction
-statistics       checks with them, and windows at random places
-page             the page as a whole
-models           its section on Kirchhoff, small slope and their blend
-goals            what was asked of the default model, and what misses it
-patch_sections   its section on two dimensions
-sections         its other sections
-plots            its pictures
-markdown         its tables and numbers
+statistics       checks with random surfaces, and windows at random places
+pages            writers of docs/validation.md and docs/validation/
 """

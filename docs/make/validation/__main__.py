@@ -1,9 +1,8 @@
-"""Rigorous solutions, and the page that compares the model with them.
+"""Solve gratings rigorously, and write the pages that compare the model with the solutions.
 
 python -m docs.make.validation report -o docs
 python -m docs.make.validation solve perfect      # minutes to an hour; extra `validation`
-python -m docs.make.validation groups             # deviations by material, profile and slope
-python -m docs.make.validation passed             # R + T of the recipes; some minutes
+python -m docs.make.validation report gratings    # one page of docs/validation/
 python -m docs.make.validation patches keratin    # in two dimensions; a minute
 python -m docs.make.validation measured FILE      # cut the measured scale, see data/
 python -m docs.make.validation coated             # under a coat; half an hour; extra `validation`
@@ -23,7 +22,7 @@ from mitsuba_diffraction.errors import DiffractionError
 
 from .cases import MATERIALS
 
-# where the package keeps them
+# folder of the stored solutions
 _DATA = Path(__file__).parent / "data"
 
 
@@ -33,35 +32,32 @@ def main(argv: Sequence[str] | None = None) -> int:
         prog="python -m docs.make.validation", description=__doc__.split("\n")[0]
     )
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    report = commands.add_parser("report", help="write validation.md and its pictures")
+    report = commands.add_parser("report", help="write validation.md and docs/validation/")
+    report.add_argument("pages", metavar="PAGE", nargs="*", help="all of them by default")
     report.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=Path("docs"))
     report.add_argument("--quick", action="store_true", help="a small version, for tests")
     report.set_defaults(run=_report)
-    groups = commands.add_parser("groups", help="print deviations by material, profile and slope")
-    groups.set_defaults(run=_groups, progress=False)
-    passed = commands.add_parser("passed", help="print R + T of the recipes of precompute/")
-    passed.set_defaults(run=_passed, progress=False)
-    solve = commands.add_parser("solve", help="compute the rigorous solutions again")
+    solve = commands.add_parser("solve", help="solve gratings")
     solve.add_argument("material", choices=MATERIALS)
     solve.add_argument("--solver", choices=("integral", "coupled_wave"), default="integral")
     solve.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
     solve.add_argument("-j", "--jobs", metavar="N", type=_jobs, help="processes; all processors")
     solve.set_defaults(run=_solve)
-    patches = commands.add_parser("patches", help="make those in two dimensions anew")
+    patches = commands.add_parser("patches", help="solve cells in two dimensions")
     patches.add_argument("material", choices=("keratin", "aluminium"))
     patches.add_argument("--solver", choices=("coupled_wave", "rayleigh"), default="rayleigh")
     patches.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
     patches.set_defaults(run=_patches)
-    measured = commands.add_parser("measured", help="cut the measured scale anew")
+    measured = commands.add_parser("measured", help="cut the measured scale")
     measured.add_argument("patch", type=Path, help="the measured scale, in an image")
     measured.add_argument("--pixel-size", type=float, default=65 / 1332, metavar="MICROMETRES")
     measured.add_argument("--max-height", type=float, default=0.375, metavar="MICROMETRES")
     measured.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
     measured.set_defaults(run=_measured, progress=False)
-    coated = commands.add_parser("coated", help="make those under a coat anew")
+    coated = commands.add_parser("coated", help="solve gratings under a coat")
     coated.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
     coated.set_defaults(run=_coated)
-    films = commands.add_parser("films", help="make those under a film anew")
+    films = commands.add_parser("films", help="solve gratings under a film")
     films.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=_DATA)
     films.set_defaults(run=_films)
     for command in (report, solve, patches, coated, films):
@@ -81,29 +77,16 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _report(args: argparse.Namespace) -> int:
-    from .page import write_report
+    from .pages.report import PAGES, page_path, write_report
 
-    check_writable(args.output / "validation.md", make_folder=True)
+    names = args.pages or list(PAGES)
+    for name in names:
+        if name not in PAGES:
+            raise DiffractionError(f"page '{name}' is unknown; choose from {', '.join(PAGES)}")
+        check_writable(page_path(args.output, name), make_folder=True)
     with Bar(args) as bar:
-        print(f"wrote {write_report(args.output, quick=args.quick, progress=bar)}")
-    return 0
-
-
-def _groups(args: argparse.Namespace) -> int:
-    from . import goals, models, patch_sections
-    from .compare import compare
-
-    sides = models.compare_all({name: compare(name) for name in models.MATERIALS})
-    cuts = [c for material in models.MATERIALS for c in patch_sections.compared(material)]
-    sections = models.section(sides), goals.section(sides), patch_sections.section(cuts)
-    print(*sections, sep="\n\n")
-    return 0
-
-
-def _passed(args: argparse.Namespace) -> int:
-    from .passed import wide
-
-    print(wide())
+        paths = write_report(args.output, names, quick=args.quick, progress=bar)
+    print("\n".join(f"wrote {path}" for path in paths))
     return 0
 
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 
@@ -28,7 +28,6 @@ from mitsuba_diffraction.progress import Progress, silent
 from . import integral, rayleigh
 from .cases import ALUMINIUM, COAT, FEW_WAVELENGTHS, PROFILES, Grating, Scan, index_of, order_sines
 from .compare import compare
-from .markdown import percent, table
 from .model import efficiencies, in_plane, jones_of, lobe_sigma, shares
 from .solutions import ROW, Solutions, load, save_rows
 
@@ -134,58 +133,47 @@ def inner_orders(period: float, wavelength: float, theta: float) -> NDArray[np.i
     return np.arange(np.ceil((sine - COAT) / step), np.floor((sine + COAT) / step) + 1).astype(int)
 
 
-def section(gratings: Sequence[Grating] = GRATINGS) -> str:
-    """The section of docs/validation.md."""
-    rows = [
-        [grating, theta, *(percent(values[name]) for name in ("single", "left out", "bounced"))]
-        for grating, theta, values in deviations(gratings)
-    ]
-    header = ["grating", "incidence", "one passage", "share of the bounces", "with bounces"]
-    return f"""## Under a coat
+@dataclass(frozen=True)
+class CoatDeviation:
+    """Deviation of colours of the default under a coat, for light from one angle.
 
-Aluminium under polycarbonate (`coat_ior` {COAT:g}). The rigorous solutions are those of the
-interface inside the coat, as matrices between all orders there, which the coat's faces then
-transmit and send back, in powers (docs/make/validation/coated.py; sinusoids by Rayleigh's
-expansion, the others by `gratinglab`): *one passage* is light that is diffracted once, *with
-bounces* the whole series, also of the light that is reflected totally.
-Deviation of colours of the default model: from the first without its own bounces (G = 1), from the
-second as it is. *Share of the bounces* is what of the rigorous colours has come back from the face
-at least once: what a model without bounces would miss.
-
-{table(header, rows)}
-
-Refraction and transmission are right to within a few tenths of a per cent on gentle sinusoids,
-walls deviate as without a coat. Of the bounces, the model has those between two mirrors; what is
-left is light that is diffracted twice, much of it spread beyond the critical angle, all of which
-comes back and leaves from there: the steeper and the more oblique, the more."""
-
-
-def deviations(
-    gratings: Sequence[Grating] = GRATINGS,
-) -> list[tuple[str, str, dict[str, float]]]:
-    """Grating, incidence, and the default model's deviations of colours from what is kept.
-
-    From `single`, with light that is diffracted once in the coat, and from `bounced`; `left out` is
-    the share of the colours that `single` has not.
+    Attributes
+    ----------
+    theta : angle of incidence, degrees.
+    single : deviation for light that is diffracted once in the coat.
+    bounced : deviation for all light.
+    share : part of the rigorous colours that the coat's face has returned at least once.
     """
-    kept = {series: shipped_coated(series) for series in SERIES}
-    found = []
+
+    grating: Grating
+    theta: float
+    single: float
+    bounced: float
+    share: float
+
+
+def deviations(gratings: Sequence[Grating] = GRATINGS) -> list[CoatDeviation]:
+    """Compare the default with the stored solutions of these gratings."""
+    stored = {series: shipped_coated(series) for series in SERIES}
+    compared = []
     for grating in gratings:
         for theta in ANGLES:
             single, bounced = (
                 compare("aluminium", _of(part, grating, theta), "small_slope", COAT)
-                for part in kept.values()
+                for part in stored.values()
             )
             once = np.concatenate([_once(grating, theta, w) for w in FEW_WAVELENGTHS])
             coloured = bounced.counted & (bounced.solutions.rows["order"] != 0)
             share = 1 - single.rigorous[coloured].sum() / bounced.rigorous[coloured].sum()
-            values = {
-                "single": replace(single, model=once).deviation(colours=True),
-                "bounced": bounced.deviation(colours=True),
-                "left out": float(share),
-            }
-            found.append((str(grating), f"{theta:g}°", values))
-    return found
+            deviation = CoatDeviation(
+                grating,
+                theta,
+                replace(single, model=once).deviation(colours=True),
+                bounced.deviation(colours=True),
+                float(share),
+            )
+            compared.append(deviation)
+    return compared
 
 
 def shipped_coated(series: str) -> Solutions:

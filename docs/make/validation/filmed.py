@@ -14,10 +14,11 @@ of a wave (α_m, β) at the face z(x). Time exp(−iωt), lengths over 2π/λ.
 from __future__ import annotations
 
 import datetime
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,6 @@ from mitsuba_diffraction.progress import Progress, silent
 
 from .cases import ALUMINIUM, FEW_WAVELENGTHS, KERATIN, PROFILES, Grating, order_sines
 from .compare import GRAZING
-from .markdown import percent, table
 from .model import in_plane, lobe_sigma
 from .solutions import ROW, Solutions, load, save_rows
 
@@ -174,6 +174,23 @@ def deviations(stack: Stack, model: str) -> Real:
     return np.asarray(found[0] / found[1])
 
 
+@dataclass(frozen=True)
+class FilmDeviations:
+    """Deviations of colours under a film by three models, each (gratings, angles)."""
+
+    stack: Stack
+    kirchhoff: Real
+    first_order: Real
+    default: Real
+
+
+def compare_models(stack: Stack) -> FilmDeviations:
+    """Compare three models with the stored solutions of a film."""
+    return FilmDeviations(
+        stack, *(deviations(stack, model) for model in ("kirchhoff", FIRST, "small_slope"))
+    )
+
+
 def model_of(grating: Grating, stack: Stack, theta: float, wavelength: float, model: str) -> Real:
     """The model's efficiencies of the orders, for unpolarised light."""
     if model == FIRST:
@@ -200,60 +217,30 @@ def _of_mean(grating: Grating, stack: Stack, theta: float, wavelength: float) ->
     return np.asarray(found[:-1] * found[-1])
 
 
-def section(chosen: Sequence[Stack] = STACKS) -> str:
-    """The section of docs/validation.md."""
-    rows, worst = [], np.zeros(3)
-    for stack in chosen:
-        found = [deviations(stack, model) for model in ("kirchhoff", FIRST, "small_slope")]
-        worst = np.maximum(worst, [one.max() for one in found])
-        for grating, *all_three in zip(GRATINGS, *found, strict=True):
-            cells = [" / ".join(map(percent, one)) for one in zip(*all_three, strict=True)]
-            rows.append([stack.name, f"{grating.period:g}/{grating.depth:g} µm", *cells])
-    header = ["film", "sinusoid", *(f"{theta:g}°" for theta in ANGLES)]
-    stacks = "; ".join(f"{s.name}: {s.film:g}, {s.thickness:g} nm" for s in chosen)
-    return f"""## Under a film
+class Beyond(NamedTuple):
+    """Deviations under lacquer on a sinusoid of 2.5 µm at 60°; thickness in nm, depth in µm."""
 
-A film that follows the heights (`film_ior`, `film_k`, `film_thickness`), against Rayleigh's
-expansion at both of its faces (docs/make/validation/filmed.py), steepest slopes from 0.03 to 0.1.
-Index and thickness: {stacks}.
-Deviation of colours, Kirchhoff's model / small slope of first order / the default, which has the
-mean of the second order as well ([theory.md](theory.md#the-material)):
-
-{table(header, rows)}
-
-Asked was 10 %: at worst the default is {percent(worst[2])} off,
-the first order {percent(worst[1])}.
-
-The film's kernel is that of first-order perturbation of both faces, displaced alike, and as right
-on gentle slopes as the bare surface's. Of the lacquer the second order counts in oblique light:
-light that is diffracted twice meets the film's fringes at the order in between, and they are
-narrower in angle than the orders are apart. What is diffracted there and back is most of it, a
-factor of either direction alone. It takes the heights' spectrum, and has it from the roughness that
-a table keeps, as if it were isotropic; waves in between count as they are on another part of the
-fringes, so that films of wide fringes have little of it and bare surfaces none, where it brings
-nothing (see above).
-
-Beyond these: {_beyond()}.
-The plugin warns of such films, thick on metals that are rough beside them."""
+    thickness: float
+    depth: float
+    first_order: float
+    default: float
 
 
-def _beyond() -> str:
-    """Thicker films and higher gratings than those that are kept."""
+def beyond() -> list[Beyond]:
+    """Compare the model under thicker films and on deeper gratings than those that are stored."""
     lacquer, theta = STACKS[-1], ANGLES[-1]
-    found = []
+    compared = []
     for thickness, depth in ((700.0, 0.12), (1400.0, 0.05), (1400.0, 0.08)):
         stack, grating = replace(lacquer, thickness=thickness), Grating("sinusoidal", 2.5, depth)
-        exact = {w: solve(grating, stack, theta, w, _HARMONICS[-1]) for w in FEW_WAVELENGTHS}
         sums = np.zeros((2, 2))
-        for wavelength, powers in exact.items():
+        for wavelength in FEW_WAVELENGTHS:
+            exact = solve(grating, stack, theta, wavelength, _HARMONICS[-1]).mean(axis=0)
             counted = _counted(*order_sines(grating.period, wavelength, theta))
             for n, model in enumerate((FIRST, "small_slope")):
-                found_here = model_of(grating, stack, theta, wavelength, model)
-                off = np.abs(found_here - powers.mean(axis=0))[counted].sum()
-                sums[n] += off, powers.mean(axis=0)[counted].sum()
-        first, default = (percent(float(off / light)) for off, light in sums)
-        found.append(f"{thickness:g} nm on 2.5/{depth:g} µm {first} / {default}")
-    return f"lacquer at {theta:g}°, first order / default, {', '.join(found)}"
+                off = np.abs(model_of(grating, stack, theta, wavelength, model) - exact)[counted]
+                sums[n] += off.sum(), exact[counted].sum()
+        compared.append(Beyond(thickness, depth, *(float(off / light) for off, light in sums)))
+    return compared
 
 
 def _counted(orders: NDArray[np.int64], sines: Real) -> NDArray[np.bool_]:

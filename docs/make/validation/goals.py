@@ -1,16 +1,17 @@
-"""What is asked of the default model, and what it reaches against the rigorous solutions."""
+"""Goals of the default model, and its deviations from rigorous solutions beside them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .cases import PROFILES, Grating
+from .cells import PatchComparison
 from .compare import Comparison, angles_of, compare, gratings_of
-from .markdown import percent, table
 from .models import ANGLES, BANDS, banded, of_colours, within
 
 #: Largest deviation of colours on keratin at 60°, by profile and band of depth/period.
@@ -32,11 +33,11 @@ _SHARES = np.linspace(0.0, 1.0, 101)
 
 @dataclass(frozen=True)
 class Case:
-    """One angle on a grating, or on all of a band, by each model; deviations are of colours.
+    """Deviation of colours at one angle, of a grating or of all gratings of a band.
 
     Attributes
     ----------
-    gratings : of each grating its comparisons by model.
+    gratings : comparisons by model, for each grating.
     """
 
     label: str
@@ -45,36 +46,39 @@ class Case:
 
     def deviation(self, model: str) -> float:
         """Mean over the gratings."""
-        return float(np.mean([of_colours(one[model]) for one in self.gratings]))
+        return float(np.mean([of_colours(by_model[model]) for by_model in self.gratings]))
 
     @property
     def change(self) -> float:
-        """What the solver's last refinement changed, in the same measure."""
-        return float(np.mean([one["kirchhoff"].change() for one in self.gratings]))
+        """Change by the last refinement of the solver, in the same measure."""
+        return float(np.mean([by_model["kirchhoff"].change() for by_model in self.gratings]))
 
     @property
     def gain(self) -> float:
-        """By how much the default model is better than Kirchhoff."""
+        """Deviation of Kirchhoff minus that of the blend."""
         return self.deviation("kirchhoff") - self.deviation("small_slope")
 
     def with_one_share(self) -> tuple[float, float]:
-        """The share of small slope, the same in all orders, that deviates least, and how much."""
+        """Share of small slope, equal for all orders, with the least deviation, which is second."""
         by_share = [
-            [of_colours(replace(one["kirchhoff"], model=model)) for model in _by_share(one)]
-            for one in self.gratings
+            [
+                of_colours(replace(by_model["kirchhoff"], model=model))
+                for model in _by_share(by_model)
+            ]
+            for by_model in self.gratings
         ]
-        found = np.mean(by_share, axis=0)
-        return float(_SHARES[found.argmin()]), float(found.min())
+        mean = np.mean(by_share, axis=0)
+        return float(_SHARES[mean.argmin()]), float(mean.min())
 
     def with_any_shares(self) -> float:
-        """The deviation if each order had the share that is best for it: the bound of any blend."""
-        found = []
-        for one in self.gratings:
-            models, exact = _by_share(one), one["kirchhoff"].rigorous
+        """Deviation if each order had its own best share: the lower bound of any blend."""
+        deviations = []
+        for by_model in self.gratings:
+            models, exact = _by_share(by_model), by_model["kirchhoff"].rigorous
             nearest = np.abs(models - exact).argmin(axis=0)
             best = models[nearest, np.arange(len(exact))]
-            found.append(of_colours(replace(one["kirchhoff"], model=best)))
-        return float(np.mean(found))
+            deviations.append(of_colours(replace(by_model["kirchhoff"], model=best)))
+        return float(np.mean(deviations))
 
 
 def _by_share(models: Mapping[str, Comparison]) -> NDArray[np.float64]:
@@ -90,78 +94,94 @@ def _by_share(models: Mapping[str, Comparison]) -> NDArray[np.float64]:
     return np.asarray(lower + 4 * s * (1 - s) * half + upper)
 
 
-def section(sides: Sides) -> str:
-    """The goals, and where they are missed."""
-    parts = [keratin(sides)] if ("keratin", "small_slope") in sides else []
-    return "\n\n".join(["## Goals", *parts, no_worse(sides, "aluminium")])
+class Goal(NamedTuple):
+    """Goal on keratin at 60° for a profile and range of depth/period, and the deviations."""
+
+    profile: str
+    band: tuple[float, float]
+    goal: float
+    kirchhoff: float
+    first_order: float
+    second_order: float
 
 
-def keratin(sides: Sides) -> str:
-    """Goal and figure by profile and depth/period."""
-    kirchhoff, default = (
+def keratin_goals(sides: Sides) -> list[Goal]:
+    """Goals on gratings of keratin beside what each model reaches."""
+    kirchhoff, first, second = (
         {(profile, band): values[0] for profile, band, values in banded(part, [60.0])}
-        for part in (sides["keratin", "kirchhoff"], sides["keratin", "small_slope"])
+        for part in (sides["keratin", name] for name in ("kirchhoff", "first_order", "small_slope"))
     )
-    rows = [
-        [profile, f"{low:g} to {high:g}", *map(percent, (goal, default[key], kirchhoff[key]))]
+    return [
+        Goal(*key, goal, kirchhoff[key], first[key], second[key])
         for key, goal in KERATIN.items()
-        for profile, (low, high) in [key]
-        if key in default
+        if key in second
     ]
-    every = singles(models_of(sides, "keratin"))
-    worse = sum(_is_worse(case) for case in every)
-    return f"""Deviation of colours on keratin at 60° that was asked of the default model:
-
-{table(["grating", "depth/period", "goal", "default", "Kirchhoff"], rows)}
-
-Nowhere on keratin was it to be worse than Kirchhoff by more than a tenth; beyond what the solver's
-last refinement changed it is in {worse} of {len(every)} gratings and angles."""
 
 
-def _is_worse(case: Case) -> bool:
-    """Than Kirchhoff, by more than a tenth and what the solver's last refinement changed."""
-    return -case.gain > max(case.change, 0.1 * case.deviation("kirchhoff"))
+class Cuts(NamedTuple):
+    """Mean and largest deviation of colours on cuts of scales by one model."""
+
+    mean: float
+    worst: float
 
 
-def no_worse(sides: Sides, material: str) -> str:
-    """Where the default model is worse than Kirchhoff on a metal."""
+def cuts_of_scales(cells: Sequence[PatchComparison], model: str) -> Cuts | None:
+    """Deviation on cuts of scales of keratin with slope 0.2; None where none are stored."""
+    deviations = [
+        c.by_model[model]
+        for c in cells
+        if c.case.surface.kind in ("elaphe", "elaphe_like")
+        and c.case.surface.slope == 0.2
+        and c.case.material == "keratin"
+    ]
+    return Cuts(float(np.mean(deviations)), max(deviations)) if deviations else None
+
+
+def much_worse(sides: Sides, material: str) -> list[Case]:
+    """Gratings and angles that are worse than Kirchhoff by more than a tenth.
+
+    Differences below the last refinement of the solver are left out.
+    """
+    return [
+        case
+        for case in singles(models_of(sides, material))
+        if -case.gain > max(case.change, 0.1 * case.deviation("kirchhoff"))
+    ]
+
+
+@dataclass(frozen=True)
+class AgainstKirchhoff:
+    """Gratings and angles of a material where the blend is better or worse than Kirchhoff.
+
+    Differences below the last refinement of the solver count as neither.
+    """
+
+    every: list[Case]
+    better: list[Case]
+    worse: list[Case]
+    worse_bands: list[Case]
+
+
+def against_kirchhoff(sides: Sides, material: str) -> AgainstKirchhoff:
+    """Compare the blend with Kirchhoff on every grating and angle of a material."""
     models = models_of(sides, material)
-    solutions = models["kirchhoff"].solutions
-    models["half_and_half"] = compare(material, solutions, "half_and_half")
-    every, bands = singles(models), whole_bands(models)
-    gains = [case.gain for case in every]
-    better = sum(case.gain > case.change for case in every)
-    worse = [case for case in every if case.gain < -case.change]
-    rows = []
-    for case in [*(case for case in bands if case.gain < -case.change), *worse]:
-        share, best = case.with_one_share()
-        both = case.deviation("kirchhoff"), case.deviation("small_slope")
-        values = [f"{100 * x:.2f} %" for x in (*both, case.change, best, case.with_any_shares())]
-        angle = f"{case.theta:g}°".replace("-", "−")
-        rows.append([case.label, angle, *values[:3], f"{share:.2f}", *values[3:]])
-    header = ["", "light from", "Kirchhoff", "default", "change", "one share", "with it", "any"]
-    most, least = 100 * max(gains), -100 * min(gains)
-    return f"""On {material} it was to be no worse than Kirchhoff. Of {len(every)} gratings and
-angles it is better in {better} by more than the solver's last refinement changed (*change*), at
-best by {most:.1f} points, and worse in {len(worse)}, at worst by {least:.2f}; half of them were
-solved after the blend had been chosen. Bands of depth/period that are worse in the mean, then
-these:
-
-{table(header, rows)}
-
-*One share* is the share of small slope, the same in all orders, that deviates least; *any* is what
-each order's own best share would leave, which no blend is below. Where one share is 0 Kirchhoff's
-errors cancel: both matrices lack light that is diffracted twice
-([second order](#what-the-second-order-would-bring)), and Kirchhoff is the brighter."""
+    models["half_and_half"] = compare(material, models["kirchhoff"].solutions, "half_and_half")
+    every = singles(models)
+    return AgainstKirchhoff(
+        every,
+        [case for case in every if case.gain > case.change],
+        [case for case in every if case.gain < -case.change],
+        [case for case in whole_bands(models) if case.gain < -case.change],
+    )
 
 
 def models_of(sides: Sides, material: str) -> dict[str, Comparison]:
-    """By model."""
-    return {name: one for (of, name), one in sides.items() if of == material}
+    """Comparisons of one material by model."""
+    return {model: part for (name, model), part in sides.items() if name == material}
 
 
 def singles(models: Mapping[str, Comparison]) -> list[Case]:
-    """Every grating and angle of `models_of` a material."""
+    """Every grating and angle of one material, from its comparisons by model."""
     every = models["kirchhoff"]
     return [
         _case(models, str(grating), theta, [grating])
@@ -184,7 +204,7 @@ def _case(
     models: Mapping[str, Comparison], label: str, theta: float, gratings: Sequence[Grating]
 ) -> Case:
     parts = []
-    for one in gratings:
-        chosen = {"profile": one.profile, "period": one.period, "depth": one.depth}
+    for grating in gratings:
+        chosen = {"profile": grating.profile, "period": grating.period, "depth": grating.depth}
         parts.append({name: every.where(theta=theta, **chosen) for name, every in models.items()})
     return Case(label, theta, parts)

@@ -100,6 +100,7 @@ def efficiencies(
     brdf = per_brdf * reference.brdf(
         field, wi, wo, wavelength,
         coherence_width=width, model=known, eta=index.real, k=index.imag, coat=coat,
+        second_order=False,
     )  # fmt: skip
     if model in (*reference.MODELS, "first_order"):
         return brdf
@@ -153,14 +154,15 @@ def second_order(
 ) -> NDArray[np.float64]:
     """What the default multiplies orders of a dielectric by, (n,); arguments as `efficiencies`."""
     total = float(wavenumber(wavelength)) * (wi + wo)
-    places = (ratios or _ratios(field)).at(total[:, :2], total[:, 2])
+    places = (ratios or slope_ratios(field)).at(total[:, :2], total[:, 2])
     places[np.hypot(*total[:, :2].T) < 1e-6] = 0.0  # order 0 is the first order's
     share = share_of(field, index, wi, wo, wavelength)
     return factor(interpolated(index, wi, wo), places, share)
 
 
 @cache
-def _ratios(patch: HeightField) -> SlopeRatios:
+def slope_ratios(patch: HeightField) -> SlopeRatios:
+    """Return the slope ratios of a patch that tiles the plane."""
     q_limit = 2.0 * float(wavenumber(SHORTEST))
     grid = CellGrid.of(patch.extent, patch.rms_height, q_limit, (q_limit, q_limit), q_limit)
     return CellSums.of([(patch, np.ones((1, 1)))], grid).ratios()

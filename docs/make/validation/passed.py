@@ -24,8 +24,8 @@ from mitsuba_diffraction.tables.energy.sides import Sides
 from . import rayleigh, spread
 from .cases import FEW_WAVELENGTHS, KERATIN, Grating
 from .compare import GRAZING
-from .markdown import percent, table
 from .model import lobe_sigma
+from .pages.markdown import percent, table
 
 Real = NDArray[np.float64]
 

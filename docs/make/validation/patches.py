@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 from mitsuba_diffraction import HeightField, gratings
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.heights.preprocess import periodic_smooth
-from mitsuba_diffraction.optics.second_order import SlopeRatios
-from mitsuba_diffraction.settings import TableSettings
-from mitsuba_diffraction.tables.build.slope_ratios import slope_ratios
+from mitsuba_diffraction.optics.slope_ratios import SlopeRatios
 
 from .cases import ALUMINIUM, KERATIN
+from .model import slope_ratios
 
 KINDS = ("sinusoid", "crossed", "elaphe", "elaphe_like", "cd_pits")
 #: Kinds whose cell is the whole surface, not a cut of a patch.
@@ -143,13 +142,15 @@ def ratios_of(surface: Surface) -> SlopeRatios:
     """Slope ratios of the surface's table: those of a grating's cell, or of the patch of a cut."""
     if surface.kind == "elaphe":
         return _measured()[surface.name].ratios
-    return _ratios(cell(surface) if surface.kind in GRATINGS else _whole(surface, _source(surface)))
+    return slope_ratios(
+        cell(surface) if surface.kind in GRATINGS else _whole(surface, _source(surface))
+    )
 
 
 def measured_cuts(patch: HeightField) -> dict[str, Cut]:
     """Cuts of the measured scale, by the names of their surfaces."""
     return {
-        surface.name: Cut(*_cut(surface, patch), _ratios(_whole(surface, patch)))
+        surface.name: Cut(*_cut(surface, patch), slope_ratios(_whole(surface, patch)))
         for surface in SURFACES.values()
         if surface.kind == "elaphe"
     }
@@ -186,14 +187,11 @@ def _measured() -> dict[str, Cut]:
                     tuple(parts[f"orders_{n}"]),
                     tuple(parts[f"kappa_{n}"]),
                     parts[f"values_{n}"].astype(np.float32).view(np.complex64),
+                    change=np.nan,
                 ),
             )
             for n, name in enumerate(parts["names"])
         }
-
-
-def _ratios(patch: HeightField) -> SlopeRatios:
-    return slope_ratios([patch], TableSettings(height_scale_max=1.0))
 
 
 def _whole(surface: Surface, patch: HeightField) -> HeightField:

@@ -28,9 +28,7 @@ from mitsuba_diffraction.optics.second_order import Perturbation
 from .cases import index_of
 from .compare import GRAZING, scans_of
 from .crossed import is_crossed
-from .markdown import percent, table
 from .model import in_plane
-from .models import MATERIALS
 from .patch_solutions import solved
 from .patches import KINDS, cell, patch_index
 from .rayleigh import Complex, Real, Waves
@@ -42,7 +40,7 @@ MODELS = ("first", "mean", "second")
 #: Waves in between, of gratings and of cells.
 _HARMONICS = (201, 1999)
 #: Steepest gratings, depth over period.
-_DEEPEST = 0.13
+DEEPEST = 0.13
 GROUPS = {
     "sinusoid": "sinusoids in any mount",
     "crossed": "crossed grating",
@@ -50,51 +48,6 @@ GROUPS = {
     "elaphe_like": "cuts of scales",
     "cd_pits": "CD's pits",
 }
-
-
-def section(*, quick: bool = False) -> str:
-    """The table; half a minute, `quick` for tests."""
-    cases: list[Case] = []
-    for material in MATERIALS:
-        cases += cases_of_cells(material, KINDS[:1] if quick else KINDS)
-        cases += [] if quick else cases_of_gratings(material)
-    rows = rows_of(cases, MODELS, MODELS)
-    names = ("first order", "and the mean", "second order")
-    header = ["surface", "cases", *names, *(f"light, {name}" for name in names)]
-    return f"""## What the second order would bring
-
-Small slope alone, not blended, in the second order (Voronovich 1994), summed by brute force
-(docs/make/validation/second_order.py): deviation of colours, mean and worst of the cases, and all
-reflected light over the rigorous. *And the mean* is the first order times what Gaussian heights of
-that spectrum would make of the second on average. Gratings by profile are those above, of a
-depth/period up to {_DEEPEST:g}.
-
-{table(header, rows)}
-
-What the first order misses on scales and on a CD is thus mostly the second, and most of that is no
-mean: light that is diffracted twice interferes with light that is diffracted once, and where hills
-are made pits the sign of that changes. A power spectrum does not tell hills from pits. It takes the
-sum over all waves in between, for every order of every pair of directions, which no table of powers
-has; what tables can have of it is below. The mean alone, a smooth factor of two directions, puts
-the reflected light right where walls are gentle, but hardly the colours, and makes some worse: of a
-sinusoid's order the rest takes about as much away. It is therefore not in the model, but of films.
-On vertical walls the sums depend on where they end."""
-
-
-def rows_of(cases: Sequence[Case], models: Sequence[str], lit: Sequence[str]) -> list[list[str]]:
-    """A row for each group: deviations of models, mean and worst; the light of some of them."""
-    rows = []
-    for group in dict.fromkeys(case.group for case in cases):
-        same = [case for case in cases if case.group == group]
-        row = [group, str(len(same))]
-        for model in models:
-            errors = [case.deviation[model] for case in same]
-            row.append(f"{percent(float(np.mean(errors)))}, {percent(max(errors))}")
-        for model in lit:
-            light = [case.light[model] for case in same]
-            row.append(f"{min(light):.3f}–{max(light):.3f}")
-        rows.append(row)
-    return rows
 
 
 def amplitudes(
@@ -168,7 +121,7 @@ def cases_of_gratings(material: str) -> Iterator[Case]:
     """The kept solutions of gratings."""
     solutions = shipped(material).trusted()
     for grating, theta, wavelength, members in scans_of(solutions.rows):
-        if grating.depth <= _DEEPEST * grating.period:
+        if grating.depth <= DEEPEST * grating.period:
             numbers = solutions.rows["order"][members].astype(np.int64)
             sine = np.sin(np.radians(theta))
             wi, wo = in_plane(sine), in_plane(numbers * wavelength / 1e3 / grating.period - sine)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import DiffractionError, DiffractionWarning
+from ...errors import DiffractionError, warn
 from ..field import check_pixel_count
 from . import RawHeights, first_line
 
@@ -84,11 +84,9 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
         finally:
             reader.close()
     if choice.others:
-        warnings.warn(
+        warn(
             f"{shown} has several height channels; {choice.channel.name!r} is read; choose another "
-            f"with channel: {choice.others}",
-            DiffractionWarning,
-            stacklevel=2,
+            f"with channel: {choice.others}"
         )
     raw.notes = (choice.note,)
     return raw

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import DiffractionWarning
+from ...errors import warn
 from ...tables.energy.conservation import FINE
 from .camera import Camera
 from .context import (
@@ -92,9 +91,7 @@ class Renderer:
     def _warn(self, omissions: Sequence[str]) -> None:
         if omissions:
             listed = "; ".join(dict.fromkeys(omissions))
-            warnings.warn(
-                f"the realtime picture does not show: {listed}", DiffractionWarning, stacklevel=3
-            )
+            warn(f"the realtime picture does not show: {listed}")
 
     @property
     def driver(self) -> str:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import DiffractionError, DiffractionWarning
+from ...errors import DiffractionError, DiffractionWarning, warn
 from ...progress import Progress, silent
 from ...scene.passes import Stop, render_passes, write_exr
 from ..glsl.context import clock_of
@@ -205,7 +205,7 @@ class Comparison:
         except DiffractionError as error:
             if not leave_out:
                 raise
-            warnings.warn(f"left out: {error}", DiffractionWarning, stacklevel=2)
+            warn(f"left out: {error}")
             return False
         return True
 

@@ -16,13 +16,12 @@ Chebyshev series in z, in half floats.
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import DiffractionWarning
+from ...errors import warn
 from ...optics.colour import delta_e, linear_srgb, response
 from ..build.coefficients import half_scale
 from ..energy.powers import kind_of
@@ -212,12 +211,10 @@ def _fitting(table: DiffractionTable, grid: PolarGrid, expansion: Expansion) -> 
         share, step = share * 1.1, min(step * 1.05, 2 * STEP)
         grid = PolarGrid.of(lobe_of(table), step, share)
     if share > _COARSE:
-        warnings.warn(
+        warn(
             f"in RGB variants the colours of {table.source.get('name', 'this surface')} are "
             f"blurred: it is so deep, or its coherence window so wide, that azimuths are "
-            f"{share:.1f} lobes apart in {MAX_BYTES / 1e6:.0f} MB; use a spectral variant",
-            DiffractionWarning,
-            stacklevel=2,
+            f"{share:.1f} lobes apart in {MAX_BYTES / 1e6:.0f} MB; use a spectral variant"
         )
     return grid
 

@@ -11,6 +11,8 @@ import pytest
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.heights import gratings
 
+pytestmark = pytest.mark.thorough
+
 SCENE = """<scene version="3.5.0">
   <sensor type="perspective"><float name="fov" value="30"/>
     <transform name="to_world"><lookat origin="0,-3,4" target="0,0,0" up="0,0,1"/></transform>

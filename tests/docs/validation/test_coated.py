@@ -36,12 +36,12 @@ def test_of_a_mirror_it_is_that_of_two_mirrors():
 
 @pytest.mark.parametrize("grating", coated.GRATINGS[:4], ids=str)
 def test_gentle_gratings_under_a_coat(grating):
-    for _, angle, values in coated.deviations([grating]):
+    for deviation in coated.deviations([grating]):
         # refraction and transmission; half a per cent is the structure's own deviation
-        assert values["single"] < 0.005, angle
+        assert deviation.single < 0.005, deviation
         # the model's bounces leave less than no bounces would
-        assert values["bounced"] < 0.85 * values["left out"], angle
-        assert values["bounced"] < 0.1, angle
+        assert deviation.bounced < 0.85 * deviation.share, deviation
+        assert deviation.bounced < 0.1, deviation
 
 
 def test_an_order_inside_is_solved_as_it_is_kept():

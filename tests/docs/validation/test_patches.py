@@ -9,7 +9,7 @@ import pytest
 
 from docs.make.validation import crossed, rayleigh
 from docs.make.validation.cases import Grating, index_of
-from docs.make.validation.patch_sections import PatchComparison, agreements, compared
+from docs.make.validation.cells import PatchComparison, agreements, compared
 from docs.make.validation.patch_solutions import SOLVERS, solve_case, solved
 from docs.make.validation.patches import (
     SURFACES,

@@ -7,6 +7,7 @@ import pytest
 
 from docs.make.validation import coupled_wave, integral, solutions, solve
 from docs.make.validation.__main__ import main
+from docs.make.validation.agreement import agreement
 from docs.make.validation.cases import (
     FEW_WAVELENGTHS,
     MATERIALS,
@@ -16,7 +17,6 @@ from docs.make.validation.cases import (
     index_of,
     scans,
 )
-from docs.make.validation.second import agreement
 from docs.make.validation.solutions import CONVERGED, KEY, ROW, Solutions, load, save, shipped
 from docs.make.validation.solve import solve_material, solve_scan
 from mitsuba_diffraction.errors import DiffractionError

@@ -23,7 +23,10 @@ from mitsuba_diffraction.realtime.shader_comparison.path_traced import (
     visibility,
 )
 
-pytestmark = pytest.mark.filterwarnings("ignore:the realtime picture does not show")
+pytestmark = [
+    pytest.mark.thorough,
+    pytest.mark.filterwarnings("ignore:the realtime picture does not show"),
+]
 
 #: A disc light of radius 0.5 at the height 6, and the edge of a screen at the height 2.
 RADIUS, HIGH, EDGE = 0.5, 6.0, 2.0

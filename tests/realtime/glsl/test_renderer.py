@@ -28,7 +28,7 @@ from mitsuba_diffraction.realtime.shader_comparison.path_traced import (
 from mitsuba_diffraction.tables.energy.conservation import FINE
 from tests.support.lanes import interaction, spectra, vectors
 
-pytestmark = pytest.mark.usefixtures("coarse")
+pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
 
 mi = pytest.importorskip("mitsuba")
 

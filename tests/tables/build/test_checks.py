@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from mitsuba_diffraction import (
     DiffractionError,
     DiffractionTable,
-    DiffractionWarning,
     HeightField,
     reference,
 )
@@ -18,6 +17,8 @@ from mitsuba_diffraction.tables.build import build
 from mitsuba_diffraction.tables.build.choose import taylor_rounding
 from tests.support.directions import rough_patch
 from tests.support.patches import DEEP, DEFAULTS, PATCH
+
+pytestmark = pytest.mark.thorough
 
 
 def refused(**arguments):
@@ -121,15 +122,7 @@ def test_what_a_wide_patch_is_advised_to_do_helps():
     text = refused(heights=wide, coherence_width=1.5)
     assert "crop the heights, for instance to 1.5 µm" in text
     table = DiffractionTable.build(wide.treated(crop=1.5), coherence_width=1.5)
-    assert table.coarse is None
-
-
-def test_the_former_name_of_q_max_says_what_it_is():
-    with pytest.warns(DiffractionWarning, match=r"rad/µm.*µm, crop the heights"):
-        former = DiffractionTable.build(PATCH, crop=12.0, **DEFAULTS)
-    assert former.digest() == DiffractionTable.build(PATCH, q_max=12.0, **DEFAULTS).digest()
-    with pytest.raises(DiffractionError, match="former name"):
-        DiffractionTable.build(PATCH, crop=12.0, q_max=12.0, **DEFAULTS)
+    assert not table.limited
 
 
 def test_a_series_too_short_for_any_number_of_intervals_is_refused():

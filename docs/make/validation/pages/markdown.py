@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """A table; all columns but the first are numbers."""
+    """A table whose columns but the first are aligned to the right."""
     lines = [header, ["---", *["---:"] * (len(header) - 1)], *rows]
     return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
 
 
 def percent(value: float) -> str:
-    """In per cent with two digits; NaN is a dash."""
+    """Per cent with two digits; NaN is a dash."""
     if math.isnan(value):
         return "–"
     share = 100 * value
@@ -23,11 +23,16 @@ def percent(value: float) -> str:
     return text.replace("-", "−")
 
 
+def angle(degrees: float) -> str:
+    """An angle in degrees, with a true minus sign."""
+    return f"{degrees:g}°".replace("-", "−")
+
+
 def joined(values: Sequence[float]) -> str:
     """Numbers as a sentence has them: 1, 2 and 3."""
     return ", ".join(f"{value:g}" for value in values[:-1]) + f" and {values[-1]:g}"
 
 
 def sentence_case(text: str) -> str:
-    """The text with its first letter large."""
+    """Text with its first letter in upper case."""
     return text[:1].upper() + text[1:]

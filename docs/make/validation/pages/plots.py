@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
 
-from .cases import PROFILES, Grating
-from .compare import Comparison, angles_of, gratings_of, table_of
-from .limits import GENTLE_ERROR, STEEP_ERROR, rms_slope
+from ..cases import PROFILES, Grating
+from ..compare import Comparison, angles_of, gratings_of, table_of
+from ..limits import GENTLE_ERROR, STEEP_ERROR, rms_slope
+from ..statistics import Statistics
 from .markdown import percent
-from .statistics import Statistics
 
 _SMALLEST = 1e-4  # deviations below it are drawn on it
 

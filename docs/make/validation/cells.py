@@ -1,0 +1,106 @@
+"""Model and solvers beside each other on periodic cells in two dimensions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .compare import GRAZING
+from .model import efficiencies, jones_of, shares
+from .patch_solutions import Solved, solved
+from .patches import KINDS, PatchCase, cell, patch_index, ratios_of
+
+_MODELS = ("kirchhoff", "small_slope_alone", "first_order", "small_slope")
+_POLARISED = ("kirchhoff", "first_order", "small_slope")
+
+
+@dataclass(frozen=True)
+class PatchComparison:
+    """One case: deviations of colours of each model, of s and p light, and the solution's change.
+
+    `by_model` has Kirchhoff, small slope alone, the default in the first order and the default;
+    `polarised` all but the second of them for incident s, then p light.
+    """
+
+    case: PatchCase
+    by_model: dict[str, float]
+    polarised: dict[str, tuple[float, float]]
+    change: float
+
+
+def compared(material: str, kinds: Sequence[str] = KINDS) -> list[PatchComparison]:
+    """Compare the stored solutions of surfaces of these kinds."""
+    return [
+        _compare(solution)
+        for solution in solved(material)[0]
+        if solution.case.surface.kind in kinds
+    ]
+
+
+@dataclass(frozen=True)
+class PatchAgreement:
+    """Both solvers on one case: their deviation of colours, and what either still changed."""
+
+    case: PatchCase
+    deviation: float
+    first_change: float
+    second_change: float
+
+
+def agreements() -> list[PatchAgreement]:
+    """Rayleigh's expansion beside coupled waves, on keratin."""
+    second = {solution.case: solution for solution in solved("keratin", "coupled_wave")[0]}
+    found = []
+    for first in solved("keratin")[0]:
+        if first.case not in second:
+            continue
+        field, other = cell(first.case.surface), second[first.case]
+        powers, others = (
+            dict(zip(_numbers(one), one.efficiency(field), strict=True)) for one in (first, other)
+        )
+        coloured = [number for number in powers if number != (0, 0)]
+        truth = sum(powers[number] for number in coloured)
+        deviation = sum(abs(powers[number] - others[number]) for number in coloured) / truth
+        changes = (
+            float(one.rows["change"][[number != (0, 0) for number in _numbers(one)]].sum() / truth)
+            for one in (first, other)
+        )
+        found.append(PatchAgreement(first.case, float(deviation), *changes))
+    return found
+
+
+def _numbers(solution: Solved) -> list[tuple[int, int]]:
+    return [(int(mx), int(my)) for mx, my in solution.rows[["mx", "my"]]]
+
+
+def _compare(solution: Solved) -> PatchComparison:
+    case, field = solution.case, cell(solution.case.surface)
+    wi, wo = solution.wi, solution.wo(field)
+    index = patch_index(case.material, case.wavelength)
+    coloured = (solution.rows["mx"] != 0) | (solution.rows["my"] != 0)
+    keep = coloured & (wo[:, 2] >= np.cos(np.radians(GRAZING)))
+    truth = solution.efficiency(field)[keep]
+    light, sigma = (field, index, wi, wo, case.wavelength), max(field.extent)  # lobes are separate
+    found = {
+        model: efficiencies(*light, model, sigma=sigma, ratios=ratios_of(case.surface))
+        for model in _MODELS
+    }
+    found = {model: power[keep] for model, power in found.items()}
+    by_model = {model: _deviation(power, truth) for model, power in found.items()}
+    exact = np.sum(np.abs(solution.rows["jones"]) ** 2, axis=1) * (wo[:, 2] / wi[2])[:, None]
+    polarised = {}
+    for model in _POLARISED:
+        jones = jones_of(*light, model)
+        power = found[model][:, None] * shares(jones)[keep]
+        s, p = (_deviation(power[:, n], exact[keep, n]) for n in range(2))
+        polarised[model] = (s, p)
+    return PatchComparison(
+        case, by_model, polarised, float(solution.rows["change"][keep].sum() / truth.sum())
+    )
+
+
+def _deviation(power: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
+    return float(np.abs(power - truth).sum() / truth.sum())

@@ -1,0 +1,197 @@
+"""docs/validation/gratings.md: gratings of keratin and aluminium."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+from mitsuba_diffraction.heights.validity import GENTLE_SLOPE, STEEP_SLOPE
+
+from .. import goals, models
+from ..cases import Grating
+from ..compare import Comparison, angles_of, gratings_of, table_of
+from ..limits import GENTLE_ERROR, STEEP_ERROR, STEEPEST_LIGHT, rms_slope, slope_limit
+from .markdown import angle, percent, sentence_case, table
+from .measurements import Measurements
+
+
+def write(measured: Measurements) -> str:
+    """Write the page."""
+    parts = [_introduction(), _bands(measured), _slopes(measured), _edges(measured)]
+    return "\n\n".join([*parts, _aluminium(measured)])
+
+
+def _introduction() -> str:
+    return """# Gratings of keratin and aluminium
+
+Deviation of colours of three models from rigorous solutions
+([method](solutions.md), [definition](../validation.md#what-the-figures-are)):
+
+- *Kirchhoff*: `model="kirchhoff"`, Fresnel's coefficients at the half vector.
+- *Small slope*: first-order small slope alone, with Rice's coefficients. The plugin does not offer
+  it.
+- *Blend*: `model="small_slope"`, on dielectrics with `second_order=true`.
+  [second_order.md](second_order.md#gratings) compares it with `second_order=false`.
+
+Light falls across the grooves. Keratin has the index 1.56. Angles are measured from the normal."""
+
+
+def _bands(measured: Measurements) -> str:
+    return f"""## By depth and profile
+
+Mean over the gratings of each range of depth/period, as Kirchhoff / small slope / blend. The blend
+equals small slope on gentle gratings and Kirchhoff on deep ones; in between it is close to the
+better of the two.
+
+{_groups(measured.by_model)}
+
+In unpolarised light the errors of the two polarisations have opposite signs, most of all on metals,
+and partly cancel. For one polarisation at a time, as Kirchhoff / blend (TE: the electric field
+along the grooves; the second order multiplies both polarisations by the same factor):
+
+{_polarised_groups(measured.by_model)}"""
+
+
+def _groups(sides: goals.Sides) -> str:
+    order = ("kirchhoff", "small_slope_alone", "small_slope")
+    return table(
+        ["grating", "depth/period", *map(angle, models.ANGLES)],
+        [
+            [
+                row.grating,
+                row.band,
+                *(" / ".join(map(percent, at)) for at in zip(*row.by_model, strict=True)),
+            ]
+            for row in _rows(sides, order, models.of_colours)
+        ],
+    )
+
+
+def _polarised_groups(sides: goals.Sides) -> str:
+    order = ("kirchhoff", "small_slope")
+    te, tm = (list(_rows(sides, order, measure)) for measure in (models.of_te, models.of_tm))
+    header = [f"{light} {angle(theta)}" for light in ("TE", "TM") for theta in models.ANGLES]
+    return table(
+        ["grating", "depth/period", *header],
+        [
+            [
+                row.grating,
+                row.band,
+                *(
+                    " / ".join(map(percent, at))
+                    for light in (row, other)
+                    for at in zip(*light.by_model, strict=True)
+                ),
+            ]
+            for row, other in zip(te, tm, strict=True)
+        ],
+    )
+
+
+class _Row(NamedTuple):
+    """Deviations of gratings of a material, profile and range of depth/period.
+
+    Attributes
+    ----------
+    by_model : deviations at `models.ANGLES`, for each model.
+    """
+
+    grating: str
+    band: str
+    by_model: list[list[float]]
+
+
+def _rows(
+    sides: goals.Sides, order: Sequence[str], measure: Callable[[Comparison], float]
+) -> Iterator[_Row]:
+    for material in models.MATERIALS:
+        parts = [list(models.banded(sides[material, m], models.ANGLES, measure)) for m in order]
+        for same in zip(*parts, strict=True):
+            profile, (low, high), _ = same[0]
+            values = [deviations for _, _, deviations in same]
+            yield _Row(f"{material}, {profile}", f"{low:g} to {high:g}", values)
+
+
+def _slopes(measured: Measurements) -> str:
+    kirchhoff, default = measured.kirchhoff, measured.default
+    rows = [
+        [
+            f"{material}, {grating.period:g}/{grating.depth:g} µm",
+            f"{rms_slope(grating):.3f}",
+            *_side_by_side(kirchhoff[material], default[material], grating, models.ANGLES),
+        ]
+        for material in default
+        for grating in sorted(gratings_of(default[material], "sinusoidal"), key=rms_slope)
+    ]
+    header = ["sinusoid", "RMS slope", *map(angle, models.ANGLES)]
+    parts = list(default.values())
+    gentle, steep = (slope_limit(parts, error) for error in (GENTLE_ERROR, STEEP_ERROR))
+    return f"""## Sinusoids by slope
+
+The deviation of sinusoids grows with the RMS slope. At equal slope it is larger for narrow periods
+and in oblique light. Period/depth, Kirchhoff / blend:
+
+{table(header, rows)}
+
+The package's warnings follow from this table. A limit is the largest slope below that of the first
+sinusoid, of either material, whose colours deviate by more than {percent(GENTLE_ERROR)} or
+{percent(STEEP_ERROR)} in light up to {STEEPEST_LIGHT:g}° from the normal. The limits are
+{gentle:.3f} and {steep:.3f}; the warnings begin at {GENTLE_SLOPE:g} and {STEEP_SLOPE:g}. Beyond
+{STEEPEST_LIGHT:g}° the deviation is larger at any slope. The RMS slope of steps that are a pixel
+wide depends on the pixel, so it says little about blazed and lamellar gratings."""
+
+
+def _edges(measured: Measurements) -> str:
+    parts = [
+        """## Walls
+
+Light that vertical walls reflect is missing in the model, most of all on metals. Period/depth,
+Kirchhoff / blend. Blazed gratings ascend towards +x: light from positive angles falls on their
+steps, light from negative angles on the facets."""
+    ]
+    for profile in ("lamellar", "blazed"):
+        angles = angles_of(measured.default["keratin"].where(profile=profile))
+        rows = [
+            [
+                f"{material}, {grating.period:g}/{grating.depth:g} µm",
+                *_side_by_side(measured.kirchhoff[material], part, grating, angles),
+            ]
+            for material, part in measured.default.items()
+            for grating in gratings_of(part, profile)
+        ]
+        header = [sentence_case(profile), *map(angle, angles)]
+        parts.append(table(header, rows))
+    return "\n\n".join(parts)
+
+
+def _aluminium(measured: Measurements) -> str:
+    against = goals.against_kirchhoff(measured.by_model, "aluminium")
+    rows = []
+    for case in [*against.worse_bands, *against.worse]:
+        share, best = case.with_one_share()
+        pair = case.deviation("kirchhoff"), case.deviation("small_slope")
+        values = [f"{100 * x:.2f} %" for x in (*pair, case.change, best, case.with_any_shares())]
+        rows.append([case.label, angle(case.theta), *values[:3], f"{share:.2f}", *values[3:]])
+    header = ["", "light from", "Kirchhoff", "blend", "change", "best share", "with it", "bound"]
+    gains = [100 * case.gain for case in against.every]
+    return f"""## Aluminium: blend against Kirchhoff
+
+Of {len(against.every)} gratings and angles the blend is better in {len(against.better)}, at best by
+{max(gains):.1f} points, and worse in {len(against.worse)}, at most by {-min(gains):.2f} points.
+Differences that are smaller than the last refinement of the solver (*change*) count as neither. The
+table lists the ranges of depth/period that are worse on average, then the gratings that are worse.
+
+{table(header, rows)}
+
+*Best share* is the share of small slope, equal for all orders, with the least deviation. *Bound* is
+the deviation if every order had its own best share; no blend is below it. Where the best share is
+0, Kirchhoff's errors cancel: both matrices lack light that is
+[diffracted twice](second_order.md), and Kirchhoff's is the brighter one."""
+
+
+def _side_by_side(
+    first: Comparison, second: Comparison, grating: Grating, angles: Sequence[float]
+) -> list[str]:
+    """Deviations of colours by both comparisons, a cell for each angle."""
+    both = (table_of(part, [grating], angles, models.of_colours)[0] for part in (first, second))
+    return [" / ".join(map(percent, pair)) for pair in zip(*both, strict=True)]

@@ -1,0 +1,77 @@
+"""docs/validation/numerics.md: closed forms of gratings, statistics of random surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cases import PROFILES
+from ..closed_forms import ANGLES, deviations
+from .markdown import table
+from .measurements import Measurements
+
+
+def write(measured: Measurements) -> str:
+    """Write the page."""
+    return f"""# Closed forms and random surfaces
+
+These comparisons test the integral and the tables, not the physical model.
+
+{_closed_forms(measured)}
+
+{_random_surfaces(measured)}"""
+
+
+def _closed_forms(measured: Measurements) -> str:
+    rows = []
+    for profile in PROFILES:
+        compared = [deviations(replace(grating, profile=profile)) for grating in measured.ideal]
+        integral = max(item.integral for item in compared)
+        by_table = max(item.table for item in compared)
+        orders = sum(item.orders for item in compared)
+        rows.append([profile, orders, f"{integral:.1e}", f"{by_table:.1e}"])
+    sizes = " or ".join(f"{g.period:g} and {g.depth:g}" for g in measured.ideal)
+    return f"""## Gratings in closed form
+
+Largest absolute error of an order's power |a_m|²; all orders together have the power 1. Light and
+orders up to {ANGLES[-1]:g}° from the normal, 410 to 760 nm, period and depth {sizes} µm, 512 pixels
+a period. The errors of lamellar and blazed gratings are those of their sampling.
+
+{table(["profile", "orders", "`reference.brdf`", "table"], rows)}"""
+
+
+def _random_surfaces(measured: Measurements) -> str:
+    specular, offsets = measured.statistics.specular, measured.statistics.offsets
+    estimates = zip(
+        specular.kappa_rms, specular.power.mean, specular.power.error, specular.exact, strict=True
+    )
+    rows = [
+        [f"{x:g}", f"{mean:.4f} ± {error:.4f}", f"{exact:.4f}", f"{(mean - exact) / error:+.1f}"]
+        for x, mean, error, exact in estimates
+    ]
+    lobes = []
+    for lobe in measured.statistics.lobes:
+        name = f"{1000 * lobe.roughness.rms:g} nm"
+        lobes.append([name, *_distances(lobe.measured.distance(lobe.exact))])
+    lobes.append(["mean of patches", *_distances(offsets.patches.distance(offsets.ensemble))])
+    return f"""## Random surfaces
+
+Seeded Gaussian heights with the autocorrelation rms²·exp(−r²/T²). Left: mean power of order 0; the
+closed form is exp(−(κ·rms)²) plus the light that is scattered into the same bin. Middle: scattered
+lobe of `md.reference.brdf`, beside Beckmann and Spizzichino's series (lines). Right: `patch`,
+averaged over windows at {offsets.count} random places of one surface, over `ensemble`.
+
+![Specular loss, scattered lobes, and the mean of patches](../images/validation_statistics.png)
+
+{table(["κ·rms", f"mean of {specular.surfaces} surfaces", "exact", "in standard errors"], rows)}
+
+Distances in standard errors over the directions of the picture: of scattered lobes from the closed
+form, and of the mean of patches from the ensemble. The expected root-mean-square is 1.
+
+{table(["rms", "directions", "root-mean-square", "largest"], lobes)}"""
+
+
+def _distances(z: NDArray[np.float64]) -> list[object]:
+    return [len(z), f"{np.sqrt(np.mean(z**2)):.2f}", f"{np.abs(z).max():.1f}"]

@@ -1,0 +1,128 @@
+"""docs/validation/solutions.md: how the comparison is made, and how exact the solutions are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..agreement import agreement
+from ..cases import MATERIALS, PERIODS
+from ..cells import agreements
+from ..patch_solutions import RESOLUTIONS, solved
+from ..solutions import CONVERGED, shipped
+from .markdown import joined, percent, table
+from .measurements import Measurements
+
+
+def write(_: Measurements) -> str:
+    """Write the page."""
+    parts = [_method(), _gratings(), _two_solvers(), _cells()]
+    return "\n\n".join(parts)
+
+
+def _method() -> str:
+    return r"""# The rigorous solutions
+
+## Efficiency of an order
+
+An order m of a grating has the power of its lobe of the BRDF. Through a window much wider than the
+period, the integral of $f \cos\theta_o$ over the lobe is
+
+$$
+\eta_m = \frac{4 \cos\theta_i \cos\theta_m N}{w^2} \, |a_m(k w)|^2, \qquad
+w = \cos\theta_i + \cos\theta_m ,
+$$
+
+because $d\omega_o = d\alpha \, d\beta / (k^2 \cos\theta_o)$ and
+$\iint e^{-\sigma^2 |q - q_m|^2} d\alpha \, d\beta = \pi/\sigma^2$. N is the mean power of the Jones
+matrix ([theory.md](../theory.md)). In the comparisons $\eta_m$ is the value of
+`md.reference.brdf` at the centre of the lobe times $\pi/(\sigma k)^2$: the model before energy is
+conserved.
+
+The solutions are stored in docs/make/validation/data, with the solver and the settings that made
+them. `python -m docs.make.validation solve`, `patches`, `coated` and `films` compute them again;
+this requires the extra `validation`."""
+
+
+def _gratings() -> str:
+    rows = []
+    for material in MATERIALS:
+        every = shipped(material)
+        change = every.change
+        rows.append(
+            [
+                f"{material} ({every.about['index']})",
+                len({(row["profile"], row["period"], row["depth"]) for row in every.rows}),
+                len(change),
+                *(f"{value:.0e}" for value in (*np.quantile(change, (0.5, 0.99)), change.max())),
+                f"{every.balance.max():.0e}",
+                percent(1 - float(np.mean(every.converged))),
+            ]
+        )
+    header = [
+        "material (index)", "gratings", "orders", "change: median", "99 %", "largest",
+        "energy missed", "left out",
+    ]  # fmt: skip
+    return f"""## Gratings
+
+Sinusoidal, lamellar (half high) and blazed gratings; periods {joined(PERIODS)} µm, depths 0.05 to
+0.4 µm, light from 0° to 75° in both polarisations, on blazed gratings from both sides. Solver:
+{shipped("perfect").about["solver"]}.
+
+Each grating was solved on two meshes, the second twice as fine (1.4 times where light in the metal
+is short). Where the second changed an order by more than {CONVERGED:g}, a third mesh was twice as
+fine again. *Change* is the last change of an efficiency (absolute). *Energy missed* is how far the
+orders and the absorption are from adding up to 1. Solutions with an order that still changed by
+more than {CONVERGED:g} are left out.
+
+{table(header, rows)}
+
+![Every order: blend against rigorous efficiency](../images/validation_materials.png)"""
+
+
+def _two_solvers() -> str:
+    pairs = [
+        [
+            part.label,
+            part.orders,
+            f"{part.strongest:.2g}",
+            *(f"{value:.0e}" for value in (part.median, part.largest, part.own_change)),
+        ]
+        for part in agreement()
+    ]
+    return f"""## Two solvers on gratings
+
+The second solver is {shipped("keratin", "coupled_wave").about["solver"]}. Coupled waves on a
+staircase do not converge for TM light on metal. On metal the comparison is therefore of TE light,
+and of both polarisations on lamellar gratings, which need no staircase. Absolute differences of
+efficiencies, and how much the second solver changed when its orders and layers doubled:
+
+{table(["case", "orders", "strongest", "difference: median", "largest", "own change"], pairs)}"""
+
+
+def _cells() -> str:
+    compared = agreements()
+    rows = []
+    for surface, wavelength in dict.fromkeys((a.case.surface, a.case.wavelength) for a in compared):
+        same = [a for a in compared if (a.case.surface, a.case.wavelength) == (surface, wavelength)]
+        worst = (
+            max(getattr(a, name) for a in same)
+            for name in ("deviation", "first_change", "second_change")
+        )
+        rows.append([surface.name, f"{wavelength:g}", len(same), *map(percent, worst)])
+    (coarse,), (fine,) = RESOLUTIONS["rayleigh"][1]
+    (first, _), (second, _) = RESOLUTIONS["coupled_wave"][1]
+    header = ["keratin", "nm", "directions", "difference", "change", "change, coupled waves"]
+    other = solved("keratin", "coupled_wave")[1]["solver"]
+    return f"""## Two solvers in two dimensions
+
+Rayleigh's expansion, whose solutions the comparisons use, beside {other}. *Difference* is the
+deviation of colours of one from the other. *Change* is what each solution still changed from
+{coarse} to {fine} and from {first} to {second} harmonics. All figures are the largest of all
+directions. The two solvers differ by less than coupled waves still change.
+
+{table(header, rows)}
+
+On aluminium coupled waves do not converge. There Rayleigh's expansion agrees with the integral
+method on sinusoids within 3e-5 of an efficiency, up to a depth/period of 0.09. On keratin
+transmitted light, solved from equations of its own, adds up with reflected light to 1 within 1e-6
+(crossed grating) and 1e-3 (the CD's low pits); a test checks both."""

@@ -1,0 +1,95 @@
+"""docs/validation/surfaces.md: cells in two dimensions, in any plane of incidence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..cells import PatchComparison
+from .markdown import angle, percent, table
+from .measurements import Measurements
+
+_MODELS = ("kirchhoff", "small_slope_alone", "first_order", "small_slope")
+_POLARISED = ("kirchhoff", "first_order", "small_slope")
+_ANGLES = (0.0, 30.0, 60.0)
+
+
+def write(measured: Measurements) -> str:
+    """Write the page."""
+    cells = measured.cells
+    header = ["surface", "RMS slope", "nm", *map(angle, _ANGLES), "change"]
+    return f"""# Surfaces in two dimensions
+
+Deviation of colours on small periodic cells: sinusoids in conical mounts, a crossed grating, and
+cuts of 2.6 µm of a measured scale (*Elaphe*), of its look-alike, and of 3.2 µm of a CD. The cuts
+are made periodic, smoothed and scaled to an RMS slope. The solver is Rayleigh's expansion
+(docs/make/validation/rayleigh.py), which does not converge on steeper metals than these.
+
+## Unpolarised light
+
+Mean over the planes of incidence (along x, along y, between), as Kirchhoff / small slope alone /
+`second_order=false` / `second_order=true`. *Change* is the largest change of the solution by more
+harmonics, in the same measure.
+
+The second order takes its slope ratios from what a table would hold: from each order on gratings,
+and on cuts from the whole patch, 20 to 65 µm wide. Metals have no second order.
+
+{table(header, list(_unpolarised(cells)))}
+
+## Polarised light
+
+Light from 60°, mean over the planes of incidence, as Kirchhoff / `second_order=false` /
+`second_order=true`. The second order is one factor for both polarisations, that of their mean.
+{_nearer(cells)}.
+
+{table(["surface", "nm", "s", "p"], list(_polarised(cells)))}"""
+
+
+def _unpolarised(cells: Sequence[PatchComparison]) -> Iterator[list[str]]:
+    for label, same in _by_surface(cells):
+        case = same[0].case
+        values = []
+        for theta in _ANGLES:
+            chosen = [c.by_model for c in same if c.case.theta == theta]
+            means = [_mean([c[model] for c in chosen]) for model in _MODELS]
+            values.append(" / ".join(map(percent, means)) if chosen else "–")
+        change = percent(max(c.change for c in same))
+        yield [label, f"{case.surface.slope:.2g}", f"{case.wavelength:g}", *values, change]
+
+
+def _polarised(cells: Sequence[PatchComparison]) -> Iterator[list[str]]:
+    for label, same in _by_surface(cells):
+        oblique = [c.polarised for c in same if c.case.theta == 60.0]
+        means = (
+            " / ".join(percent(_mean([c[model][n] for c in oblique])) for model in _POLARISED)
+            for n in range(2)
+        )
+        yield [label, f"{same[0].case.wavelength:g}", *means]
+
+
+def _by_surface(cells: Sequence[PatchComparison]) -> Iterator[tuple[str, list[PatchComparison]]]:
+    """Name and cases of each material, surface and wavelength."""
+    groups: dict[tuple[object, ...], list[PatchComparison]] = {}
+    for c in cells:
+        groups.setdefault((c.case.material, c.case.surface, c.case.wavelength), []).append(c)
+    for same in groups.values():
+        yield f"{same[0].case.material}, {same[0].case.surface.name}", same
+
+
+def _nearer(cells: Sequence[PatchComparison]) -> str:
+    """For how many directions on keratin the second order is better in s and in p light."""
+    oblique = [c.polarised for c in cells if c.case.material == "keratin" and c.case.theta == 60.0]
+    sentences = []
+    for n, light in enumerate("sp"):
+        gains = [100.0 * (one["first_order"][n] - one["small_slope"][n]) for one in oblique]
+        better, best, worst = sum(gain > 0.0 for gain in gains), max(gains), -min(gains)
+        sentences.append(
+            f"{light} light is closer in {better} of {len(gains)} directions, by at most "
+            f"{best:.2g} points;\nin the others it is further off by at most {worst:.2g} points"
+        )
+    return ".\n".join(text[:1].upper() + text[1:] for text in sentences)
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values)) if values else np.nan
