@@ -127,7 +127,7 @@ def table(measured: Measured) -> str:
 
 
 def numbers(result: Sweep) -> str:
-    """ΔE of every step, and its time where that is the point, as a Markdown table."""
+    """ΔE of every step, and for some sweeps its time, as a Markdown table."""
     timed = result.kind == "wavelength-step"
     rows: list[tuple[str, ...]] = []
     for step in result.steps:
