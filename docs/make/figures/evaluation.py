@@ -23,7 +23,8 @@ from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.gratings import blazed, elaphe_like, sinusoidal, xenopeltis_like
-from mitsuba_diffraction.thesis.evaluation import (
+from mitsuba_diffraction.thesis.methods import FullSpectrum, make, make_all
+from mitsuba_diffraction.thesis.period_fit import (
     Beam,
     Fit,
     Response,
@@ -34,8 +35,7 @@ from mitsuba_diffraction.thesis.evaluation import (
     thesis_fit,
     window_fits,
 )
-from mitsuba_diffraction.thesis.evaluation.plot import draw
-from mitsuba_diffraction.thesis.methods import FullSpectrum, make, make_all
+from mitsuba_diffraction.thesis.period_fit.plot import draw
 
 from . import pages
 from .pages import SHOWN, add_measured, exit_code, measured_patch

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from mitsuba_diffraction.realtime.comparison.report import markdown, plain_number
+from mitsuba_diffraction.realtime.shader_comparison.report import markdown, plain_number
 
 from . import pages
 from .pages import exit_code, from_json, write_jpeg
