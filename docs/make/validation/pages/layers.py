@@ -70,7 +70,7 @@ A film that follows the heights, beside Rayleigh's expansion at both of its face
 {table(["film", "`film_ior` + i `film_k`", "`film_thickness`"], sizes)}
 
 Deviation of colours as Kirchhoff / small slope of first order / the default, which has the
-[mean of the second order](../theory.md) as well:
+[mean of the second order](../theory/layers.md#the-mean-of-the-second-order) as well:
 
 {table(["film", "sinusoid", *map(angle, ANGLES)], rows)}
 
