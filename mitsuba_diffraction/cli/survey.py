@@ -75,9 +75,9 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
     own_options, settings = options.load_options(args), options.table_options(args)
     check_writable(args.output / "survey.csv", make_folder=True)
 
-    from ..analysis.survey import Treatment, run_survey, treatments_of
+    from ..analysis.survey import Treatment, load_treatments, run_survey
 
-    treatments = treatments_of(args.treatments)
+    treatments = load_treatments(args.treatments)
     variant = set_variant(args.mode or "llvm_ad_rgb")
     with mitsuba_warnings(), contextlib.ExitStack() as stack:
         client = stack.enter_context(client_of(args)) if on_workers(args) else None
@@ -88,6 +88,6 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
         bar = stack.enter_context(Bar(args, unit=" scans", delay=0))
         return run_survey(
             args.files, args.output, treatments=treatments,
-            own=Treatment(own_options, settings), variant=variant, theta=args.theta,
+            common=Treatment(own_options, settings), variant=variant, theta=args.theta,
             resolution=args.resolution, threads=worker_threads(args), client=client, progress=bar,
         )  # fmt: skip

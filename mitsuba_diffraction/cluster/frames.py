@@ -47,8 +47,10 @@ def render(
 ) -> Result:
     """Render a scene on the workers of a Dask cluster.
 
-    The picture is, bit for bit, that of one process with as many Dr.Jit threads on such a
-    processor: tasks are the same groups of passes, added up in the order of their seeds.
+    Tasks are the groups of passes that one process renders, added up in the order of their seeds.
+    With `threads=1` the picture is, bit for bit, that of one process with one Dr.Jit thread on the
+    same kind of processor. With several threads, passes agree within 1e-6 of the film's largest
+    value: threads add samples to a pixel in the order in which they finish (`scene.passes`).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The reference of the plugin's parameters, made of the plugin's own docstring.
+"""Page of the plugin's parameters, from the plugin's docstring.
 
 python -m docs.make.figures.parameters -o docs/parameters.md
 """
@@ -32,7 +32,7 @@ _MODEL, _EXAMPLE = "\nThe model is ", "\nXML and the same in Python:\n"
 
 @dataclass(frozen=True)
 class Parameter:
-    """One entry: usually one parameter, sometimes two that belong together."""
+    """Entry of the page: usually one parameter, sometimes two that belong together."""
 
     names: tuple[str, ...]  # of the parameters; "(nested)" for an object of any name
     # type, default, text: as the docstring has them
@@ -43,18 +43,18 @@ class Parameter:
 
 
 def docstring() -> str:
-    """That of the plugin."""
+    """Docstring of the plugin."""
     return ast.get_docstring(ast.parse(PLUGIN.read_text(encoding="utf-8"))) or ""
 
 
 def groups(text: str) -> dict[str, list[Parameter]]:
-    """The parameters that a docstring describes, by the heading above them."""
+    """Parameters that a docstring describes, by the heading above them."""
     _, *parts = _GROUP.split(text.partition(_MODEL)[0])
     return {heading: _entries(body) for heading, body in zip(parts[::2], parts[1::2], strict=True)}
 
 
 def _entries(body: str) -> list[Parameter]:
-    found = []
+    entries = []
     for entry in re.split(r"\n(?=\S)", body.strip()):
         head, _, rest = entry.partition("\n")
         match = _ENTRY.match(head)
@@ -62,7 +62,7 @@ def _entries(body: str) -> list[Parameter]:
             raise DiffractionError(
                 f"'{PLUGIN}': expected 'name : type [default]' and text below it, got '{head}'"
             )
-        found.append(
+        entries.append(
             Parameter(
                 tuple(match["names"].split(", ")),
                 match["type"],
@@ -71,11 +71,11 @@ def _entries(body: str) -> list[Parameter]:
                 " ".join(rest.split()),
             )
         )
-    return found
+    return entries
 
 
 def page(text: str) -> str:
-    """The reference in Markdown, of the plugin's docstring."""
+    """Return the page in Markdown, from the plugin's docstring."""
     model, _, example = text.partition(_MODEL)[2].partition(_EXAMPLE)
     xml, _, python = textwrap.dedent(example).strip().partition("\n\n")
     sections = [
@@ -108,7 +108,7 @@ def _row(entry: Parameter) -> tuple[str, ...]:
 
 
 def _prose(text: str) -> str:
-    """Paragraphs on one line each, and what is indented as code."""
+    """Return paragraphs on one line each, and indented text as code."""
     shown = []
     for paragraph in re.split(r"\n\n+", text.strip()):
         indented = paragraph.startswith("    ")

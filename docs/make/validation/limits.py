@@ -1,4 +1,4 @@
-"""Up to which slope the model may be trusted: where the package's warnings come from.
+"""Largest slopes of the model for given errors, from which the package warns.
 
 The rule: sinusoids of keratin and of aluminium are put in the order of their RMS slope; a limit is
 the largest slope below the first whose colours deviate (`Comparison.deviation`, the default model)
@@ -22,29 +22,29 @@ STEEPEST_LIGHT = 60.0
 
 
 def rms_slope(grating: Grating) -> float:
-    """As `HeightField.rms_slope` has it."""
+    """RMS slope of the sampled grating."""
     return grating.heights().rms_slope
 
 
 def worst_deviations(comparisons: Sequence[Comparison]) -> list[tuple[Grating, float, float]]:
     """Each material's sinusoids with slope and largest deviation of colours, gentlest first."""
-    found = []
+    deviations = []
     for comparison in comparisons:
         sinusoids = gratings_of(comparison, "sinusoidal")
         angles = [theta for theta in angles_of(comparison) if 0 <= theta <= STEEPEST_LIGHT]
         table = table_of(
             comparison, sinusoids, angles, lambda part: part.deviation(colours=True)
         ).max(axis=1)
-        found += [
+        deviations += [
             (grating, rms_slope(grating), float(worst))
             for grating, worst in zip(sinusoids, table, strict=True)
         ]
-    return sorted(found, key=lambda item: item[1])
+    return sorted(deviations, key=lambda item: item[1])
 
 
 def slope_limit(comparisons: Sequence[Comparison], error: float) -> float:
     """Largest RMS slope up to which no sinusoid deviates by more than `error`; 0 if all do."""
     worst = worst_deviations(comparisons)
     # slopes of one depth/period are equal to rounding
-    first = min((slope for _, slope, found in worst if found > error), default=float("inf"))
+    first = min((slope for _, slope, deviation in worst if deviation > error), default=float("inf"))
     return max((slope for _, slope, _ in worst if slope < first - 1e-6), default=0.0)

@@ -1,4 +1,4 @@
-"""Making and keeping the rigorous solutions in two dimensions, by two solvers.
+"""Rigorous solutions in two dimensions by two solvers, and their files.
 
 Rayleigh's expansion (`rayleigh`) converges on all of these dielectrics, to a tenth of what coupled
 waves in layers (`crossed`) do with as many harmonics as there is memory for, and on metals where
@@ -56,7 +56,7 @@ RESOLUTIONS: dict[str, tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]] = {
 
 @dataclass(frozen=True)
 class Solved:
-    """One case: rows (n,) of `PATCH_ROW`."""
+    """Solution of a case: rows (n,) of `PATCH_ROW`."""
 
     case: PatchCase
     rows: NDArray[np.void]
@@ -94,18 +94,18 @@ def solve_patches(
         If the solver is not here, or the file cannot be written.
     """
     tell = progress or silent
-    cases, made = patch_cases(material), about(material, solver)
+    cases, description = patch_cases(material), about(material, solver)
     rows = np.empty(0, PATCH_ROW)
     for n, case in enumerate(cases):
         tell(n, len(cases), f"solving {case.surface.name}")
         rows = np.concatenate([rows, solve_case(case, solver)])
-        save_rows(rows, made, path)
+        save_rows(rows, description, path)
     tell(len(cases), len(cases), "done")
     return rows
 
 
 def about(material: str, solver: str) -> dict[str, Any]:
-    """What made the solutions."""
+    """Solver, settings and command of the solutions."""
     return {
         "command": f"python -m docs.make.validation patches {material} --solver {solver}",
         "date": datetime.date.today().isoformat(),
@@ -139,15 +139,15 @@ def solve_case(case: PatchCase, solver: str) -> NDArray[np.void]:
 
 
 def solved(material: str, solver: str = "rayleigh") -> tuple[list[Solved], Mapping[str, Any]]:
-    """The solutions that are kept, case by case, and what made them."""
+    """Stored solutions, case by case, and the description of their solver."""
     data = resources.files(__package__) / "data"
     with resources.as_file(data / patch_file(material, solver)) as path:
-        rows, made = load_rows(path, PATCH_ROW)
-    return list(_cases_of(rows, material)), made
+        rows, description = load_rows(path, PATCH_ROW)
+    return list(_cases_of(rows, material)), description
 
 
 def patch_file(material: str, solver: str) -> str:
-    """What the file of a material's solutions by a solver is called."""
+    """Name of the file of a material's solutions by a solver."""
     return f"{material}_patches_{solver}.npz"
 
 
