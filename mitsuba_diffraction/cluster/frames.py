@@ -129,7 +129,7 @@ class Report:
 
 @dataclass(frozen=True)
 class Wanted:
-    """Request for a frame: values of the scene's parameters, samples (None: the scene's), and seed."""
+    """Request for a frame: values of the scene's parameters, samples (None: the scene's), seed."""
 
     values: Mapping[str, str]
     spp: int | None
@@ -250,7 +250,7 @@ class Film:
 
 
 class _InOrder:
-    """Submits tasks ahead of the sum that is due, and collects results in whatever order they come."""
+    """Submits tasks ahead of the sum that is due, and collects results as they come."""
 
     def __init__(self, film: Film, stop: Stop, progress: Progress) -> None:
         self._film, self._stop, self._progress = film, stop, progress

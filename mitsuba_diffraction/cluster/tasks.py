@@ -51,7 +51,7 @@ class Task:
 
     @property
     def key(self) -> str:
-        """Key of the sum: everything that decides it, except the threads and the processor that add it up."""
+        """Key of the sum: all that decides it, except the threads and processor that add it up."""
         passes = [(one.seed, one.spp) for one in self.passes]
         what = (self.files.digest, self.variant, self.sensor, self.preview, self.film, passes)
         return key_of("passes", *what, self.versions)
@@ -140,7 +140,7 @@ def _sums(task: Task) -> Sums:
 
 @lru_cache(1)
 def _scene(files: SceneFiles, variant: str, sensor: int, preview: bool) -> tuple[Any, Any]:
-    """Load the scene of a task; the last one stays loaded while the next one loads, for what both need."""
+    """Load the scene of a task; the one before stays loaded meanwhile, for what both need."""
     path, values = files.here()
     scene = load_scene(path, values)
     found = sensor_of(scene, sensor)

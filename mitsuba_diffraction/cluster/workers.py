@@ -135,7 +135,7 @@ def workers_of(client: Any) -> dict[str, Any]:
 
 
 def outcome(future: Any) -> Any:
-    """Return the result of a task: `Failed` if its workers died; None if it was lost with the scheduler."""
+    """Return the result of a task: `Failed` if its workers died; None if the scheduler lost it."""
     distributed = require_dask()
     try:
         return future.result()
@@ -201,7 +201,7 @@ def _apart(distributed: Any) -> Any:
 
 @contextlib.contextmanager
 def _silent_tracker() -> Iterator[None]:
-    """Let Python's tracker of semaphores, which starts inside, say nothing at a client's abrupt end."""
+    """Silence Python's tracker of semaphores, which starts inside, at a client's abrupt end."""
     name, before = "PYTHONWARNINGS", os.environ.get("PYTHONWARNINGS")
     line = "ignore:resource_tracker:UserWarning"
     os.environ[name] = f"{before},{line}" if before else line

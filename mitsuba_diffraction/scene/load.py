@@ -109,7 +109,7 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
 
 
 def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
-    """Warn of meshes on which a patch has no direction, by name: a BSDF itself cannot see its mesh."""
+    """Warn of meshes on which a patch has no direction: a BSDF itself cannot see its mesh."""
     lacking = [
         name_of(shape, number)
         for number, shape in surfaces.items()
@@ -198,7 +198,7 @@ def error_of(what: str, error: BaseException) -> BaseException:
 
 
 def _words(error: BaseException) -> str:
-    """Return the text of an exception; a quotation of a damaged scene reaches us as bytes, not UTF-8."""
+    """Return the text of an exception; damaged scenes are quoted as bytes that are not UTF-8."""
     if isinstance(error, UnicodeDecodeError):
         return error.object.decode("utf-8", "replace")
     return str(error)

@@ -160,7 +160,7 @@ class Pass:
 
 
 def passes_of(sensor: Any, spp: int, seed: int, variant: str) -> list[Pass]:
-    """List the passes that take `spp` samples per pixel, or the few more that a sampler rounds up to.
+    """List the passes that take `spp` samples per pixel, or a few more for stratified samplers.
 
     Parameters as in `render_passes`.
     """
@@ -220,7 +220,7 @@ def integrator_of(scene: Any) -> Any:
 
 
 def _splats(integrator: Any) -> bool:
-    """Whether the integrator splats finished estimates without weights, so that an average needs them."""
+    """Whether the integrator splats estimates without weights, so that an average needs them."""
     import mitsuba as mi
 
     return isinstance(integrator, mi.AdjointIntegrator)

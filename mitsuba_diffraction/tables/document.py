@@ -204,7 +204,7 @@ def _expansion(fields: Mapping[str, Any]) -> Expansion:
 
 
 def _resolved(expansion: Expansion) -> Expansion:
-    """Return the series if it can follow the phases of such heights; a few terms are one radian each."""
+    """Return the series if it can follow the phases of its heights; few terms are a radian each."""
     terms = expansion.series_terms
     _require(expansion.intervals * terms <= _MOST_SERIES, f"{expansion.intervals}×{terms} terms")
     phase = expansion.half_range * expansion.length

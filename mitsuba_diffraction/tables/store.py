@@ -1,8 +1,8 @@
 """Cache of tables and all that is computed from them, in files found by what they are made of.
 
 A file is one line with its kind, its key and the SHA-256 of the rest; then JSON and arrays as they
-lie in memory. A damaged file, or one under another's name, is rebuilt. This module stores tables and
-their colours, `tables.energy.store` the scales that conserve energy.
+lie in memory. A damaged file, or one under another's name, is rebuilt. This module stores tables
+and their colours, `tables.energy.store` the scales that conserve energy.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ _making: dict[tuple[str, str], threading.Lock] = {}
 
 
 def cache_folder() -> Path | None:
-    """Return $MITSUBA_DIFFRACTION_CACHE, or the user's cache folder; None for a user without a home."""
+    """Return $MITSUBA_DIFFRACTION_CACHE, or the user's cache folder; None without a home."""
     own = os.environ.get(VARIABLE)
     if own:
         return Path(own)
