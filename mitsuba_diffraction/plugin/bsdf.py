@@ -108,9 +108,8 @@ transmission : boolean [false]
     Component 0 is what is reflected, 1 what goes through. Orders that change the tangential part by
     more than 2/λ are left out. It excludes coat, film, nested BSDF and shadowing. energy_conserving
     makes R + T 1, since a dielectric loses no light: order 0 is multiplied by c(ωi) c(ωo), c on the
-    directions of both sides, and where that is not enough all is scaled likewise, by at most 1.5²;
-    what is still missing of steep slopes is spread over all directions where some is missing. A few
-    seconds' work, kept in the cache, in steps of 0.01 of eta.
+    directions of both sides, as far as it has light. Seconds the first time, cached, in steps of
+    0.01 of eta.
 thin : boolean [false]
     Light goes through a sheet, whose other side is flat; both sides have ext_ior. What that side
     sends back is summed as between two mirrors. Light beyond the sheet's critical angle is lost,
@@ -135,12 +134,12 @@ second_order : string or boolean [auto]
 energy_conserving : boolean [true]
     Where the model reflects more than it gets, multiplies it by s(ωi) s(ωo), a scale of directions
     found for this table, model, material and each wavelength, so that no more is reflected than
-    comes in: reciprocal. Kirchhoff's model fades within 5° of the horizon as well. Dielectrics gain
-    nothing and are as they are; blazed metal gratings lose some of the light of directions that
-    gain nothing, too (docs/energy.md has figures). `false` is the model as it is, for checks. The
-    scale takes a second or more the first time, and is kept in the cache. It follows height_scale,
-    interpolated between a few: an optimisation waits where it enters such an interval for the first
-    time. For its derivative, enable that of height_scale before parameters.update().
+    comes in: reciprocal. Dielectrics gain nothing and are as they are; metal gratings lose some
+    per cent of the light of directions that gain nothing, too (docs/energy.md has figures). `false`
+    is the model as it is, for checks. The scale costs seconds the first time, and is cached. It
+    follows height_scale, interpolated between a few: an optimisation waits where it enters such an
+    interval for the first time. For its derivative, enable that of height_scale before
+    parameters.update().
 shadowing : string [none]
     `vcavity`: the surface shadows itself like long V-shaped grooves (Torrance and Sparrow 1967);
     `none`.
@@ -528,15 +527,14 @@ class Diffraction(mi.BSDF):
             return self.through.balance is not None
         return self._energy is not None and self._energy.conserving
 
-    def energy_scale(self, height_scale: float) -> tuple[NDArray[np.float32], bool] | None:
-        """What conserves energy, for who knows no wavelengths: s, and whether it fades as well.
+    def energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
+        """Return s for who knows no wavelengths; None where the model gains nothing.
 
-        s : (polar + 1, azimuthal) on `tables.energy.grid.FINE`; None where nothing is.
+        (polar + 1, azimuthal) on `tables.energy.grid.FINE`.
         """
         if self._energy is None or not self._energy.conserving:
             return None
-        scale = self._energy.brightness(height_scale)
-        return None if scale is None else (scale, self._energy.fades)
+        return self._energy.brightness(height_scale)
 
     def reflected_ratio(self, height_scale: float) -> DirectionalTable | None:
         """Its albedo over the flat interface's reflectance, where T = 1 − a goes on beneath."""
