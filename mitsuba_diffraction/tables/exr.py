@@ -94,12 +94,12 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
             f"{FORMAT_VERSION}; build it again with 'mitsuba-diffraction precompute'"
         )
     try:
-        found = described(document)
-        _check_headers(headers, found, os.path.getsize(path))
-        planes = _planes(_read(path, lambda file: file.channels()), found)
+        description = described(document)
+        _check_headers(headers, description, os.path.getsize(path))
+        planes = _planes(_read(path, lambda file: file.channels()), description)
         if headers[0].get(CHECKSUM) != _checksum(str(text), planes):
             raise ValueError("its checksum is that of another one")
-        return found.table(_coefficients(planes, found))
+        return description.table(_coefficients(planes, description))
     except (DiffractionError, ValueError, MemoryError) as error:
         raise DiffractionError(
             f"'{path}' is a damaged table ({one_line(str(error))[:200]}); build it again with "
@@ -206,13 +206,13 @@ def _headers(path: str | os.PathLike[str]) -> list[dict[str, Any]]:
 
 
 def _read(
-    path: str | os.PathLike[str], what: Callable[[OpenEXR.File], Any], header_only: bool = False
+    path: str | os.PathLike[str], read: Callable[[OpenEXR.File], Any], header_only: bool = False
 ) -> Any:
     """Read a part of an EXR file."""
     readable_file(path)
     try:
         with without_chatter():
-            return what(OpenEXR.File(str(path), separate_channels=True, header_only=header_only))
+            return read(OpenEXR.File(str(path), separate_channels=True, header_only=header_only))
     except (RuntimeError, ValueError, OSError, LookupError, TypeError, MemoryError) as error:
         raise DiffractionError(
             f"cannot read '{path}' as EXR: it is empty, cut short or no EXR file; "

@@ -53,9 +53,9 @@ _making: dict[tuple[str, str], threading.Lock] = {}
 
 def cache_folder() -> Path | None:
     """Return $MITSUBA_DIFFRACTION_CACHE, or the user's cache folder; None without a home."""
-    own = os.environ.get(VARIABLE)
-    if own:
-        return Path(own)
+    chosen = os.environ.get(VARIABLE)
+    if chosen:
+        return Path(chosen)
     try:
         folder = platformdirs.user_cache_path("mitsuba_diffraction", appauthor=False)
     except RuntimeError:
@@ -103,13 +103,13 @@ def kept(
     make : makes it.
     pack, unpack : to a record, and back; unpack raises ValueError for what does not fit.
     """
-    found = memory.get(key)
-    if found is None:
+    value = memory.get(key)
+    if value is None:
         with _making.setdefault((kind, key), threading.Lock()):
-            found = memory.get(key)
-            if found is None:
-                found = memory[key] = _from_disk(kind, key, make, pack, unpack)
-    return found
+            value = memory.get(key)
+            if value is None:
+                value = memory[key] = _from_disk(kind, key, make, pack, unpack)
+    return value
 
 
 def _from_disk(
@@ -123,14 +123,14 @@ def _from_disk(
     if folder is None:
         return make()
     path, title = folder / f"{kind}-{key[:32]}{SUFFIX}", f"{_MAGIC} {kind} {key}"
-    found = _found(path, title, unpack)
-    if found is None:
+    value = _found(path, title, unpack)
+    if value is None:
         with _locked(path):
-            found = _found(path, title, unpack)  # made by whoever was waited for
-            if found is None:
-                found = make()
-                _keep(path, title, pack(found))
-    return found
+            value = _found(path, title, unpack)  # made by whoever was waited for
+            if value is None:
+                value = make()
+                _keep(path, title, pack(value))
+    return value
 
 
 @contextlib.contextmanager
@@ -154,9 +154,9 @@ def _locked(path: Path) -> Iterator[None]:
 def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
     """Read the value in a file; None if it is missing, or damaged, with a warning."""
     try:
-        found = unpack(read_record(path, title))
+        value = unpack(read_record(path, title))
         os.utime(path)  # recently used ones are kept longest
-        return found
+        return value
     except OSError:
         return None
     except (ValueError, LookupError, TypeError, MemoryError, RecursionError) as error:
@@ -236,8 +236,8 @@ def _aligned(size: int) -> int:
 def _prune(folder: Path) -> None:
     """Remove the files unused for longest until the folder is small enough."""
     remove_abandoned(folder, r"\w+-\w+", SUFFIX)
-    found = {path for pattern in _PATTERNS for path in folder.glob(pattern)}
-    newest = sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
+    files = {path for pattern in _PATTERNS for path in folder.glob(pattern)}
+    newest = sorted(files, key=lambda path: path.stat().st_mtime, reverse=True)
     total = 0
     for n, path in enumerate(newest):
         total += path.stat().st_size
@@ -271,11 +271,11 @@ def _table_record(table: DiffractionTable) -> Record:
 
 
 def _table_of(record: Record) -> DiffractionTable:
-    found = described(record.document)
+    description = described(record.document)
     (coefficients,) = record.arrays
-    if coefficients.shape != found.shape:
-        raise ValueError(f"coefficients of another shape than {found.shape}")
-    return found.table(coefficients)
+    if coefficients.shape != description.shape:
+        raise ValueError(f"coefficients of another shape than {description.shape}")
+    return description.table(coefficients)
 
 
 def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:
