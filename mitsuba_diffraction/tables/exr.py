@@ -24,7 +24,7 @@ from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
 from ..files import readable_file
 from ..streams import without_chatter
-from .document import Described, described, document_of, plain
+from .document import TableDescription, document_of, parse_document, plain
 from .expansion import Expansion
 from .table import FORMAT_VERSION, DiffractionTable
 
@@ -94,7 +94,7 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
             f"{FORMAT_VERSION}; build it again with 'mitsuba-diffraction precompute'"
         )
     try:
-        description = described(document)
+        description = parse_document(document)
         _check_headers(headers, description, os.path.getsize(path))
         planes = _planes(_read(path, lambda file: file.channels()), description)
         if headers[0].get(CHECKSUM) != _checksum(str(text), planes):
@@ -142,7 +142,7 @@ def _parsed(text: Any, path: str | os.PathLike[str]) -> dict[str, Any] | None:
     return document if isinstance(document, dict) else None
 
 
-def _check_headers(headers: list[dict[str, Any]], expected: Described, size: int) -> None:
+def _check_headers(headers: list[dict[str, Any]], expected: TableDescription, size: int) -> None:
     """Refuse a file that is not one image as described, before its pixels are read."""
     if len(headers) != 1:
         raise ValueError(f"{len(headers)} parts, expected one")
@@ -160,7 +160,9 @@ def _check_headers(headers: list[dict[str, Any]], expected: Described, size: int
         raise ValueError(f"{size} bytes that claim to hold {claimed:.2g}")
 
 
-def _planes(channels: Mapping[str, Any], expected: Described) -> dict[str, NDArray[np.floating]]:
+def _planes(
+    channels: Mapping[str, Any], expected: TableDescription
+) -> dict[str, NDArray[np.floating]]:
     """Return the pixels of each channel, in the order of `_channels`."""
     expansion = expected.fields["expansion"]
     planes = {name: channels[name].pixels for name, _ in _channels(expansion)}
@@ -171,7 +173,7 @@ def _planes(channels: Mapping[str, Any], expected: Described) -> dict[str, NDArr
 
 
 def _coefficients(
-    planes: Mapping[str, NDArray[np.floating]], expected: Described
+    planes: Mapping[str, NDArray[np.floating]], expected: TableDescription
 ) -> NDArray[np.floating]:
     """Return coefficients (intervals, ny, nx, components, terms), in the precision of the file."""
     names = list(_channels(expected.fields["expansion"]))
