@@ -14,8 +14,8 @@ from typing import Any
 from .errors import DiffractionError, quoted
 
 COHERENCES = ("ensemble", "patch")
-#: Of scenes and the reference besides: one window, centred where the light falls. The table is
-#: that of "patch", whose amplitudes are those of all places but for their phases.
+#: Coherence of scenes and the reference besides: one window, centred where the light falls. The
+#: table is that of "patch", whose amplitudes differ from those of other places by phases alone.
 SURFACE = "surface"
 BASES = ("svd", "chebyshev", "taylor")
 #: Most bins that a look-up reads in each direction: more would take minutes.
@@ -211,7 +211,7 @@ class TableSettings:
 
 _BY_NAME: dict[str, Field[Any]] = {item.name: item for item in fields(TableSettings)}
 
-#: Those that scenes and recipes may set.
+#: Settings that scenes and recipes may set.
 SCENE_SETTINGS = (
     *("coherence_width", "coherence", "basis", "tolerance", "terms", "windows", "second_order"),
 )

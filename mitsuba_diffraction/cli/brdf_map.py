@@ -24,7 +24,7 @@ _TABLE = {
 }  # fmt: skip
 # Options that are parameters of the BSDF, by the plugin's own names.
 _SURFACE = ("material", "int_ior", "coat_ior", "model", "orientation", "height_scale")
-# What only the renderer's BSDF knows.
+# Options that only the renderer's BSDF has.
 _OF_THE_BSDF = (
     "mode", "material", "coat_ior", "model", "orientation", "height_scale", "basis", "second_order",
 )  # fmt: skip
@@ -150,7 +150,7 @@ def run(args: argparse.Namespace) -> int:
         args.parser.error(f"argument --spectral: bands need an EXR, e.g. -o {output.stem}.exr")
     written = [png] if only_png else [output, png]
     check_outputs(written, [args.source], "map")
-    options.load_options(args)  # what does not fit is reported before Mitsuba is loaded
+    options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
     from ..analysis.maps import Bands, save_exr, save_png
 

@@ -35,7 +35,7 @@ _SAMPLES = (
     "some samples are below zero, as colours outside of sRGB are, or no numbers; they are kept"
 )
 
-# Of a terminal that reports no size, as in some containers and editors.
+# Columns and rows of a terminal that reports no size, as in some containers and editors.
 _SIZE = 80, 24
 
 # Below it a bar would only flash by.

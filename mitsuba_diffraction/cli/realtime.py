@@ -215,7 +215,7 @@ def export_shader(args: argparse.Namespace) -> int:
         args.parser.error("argument --int-ior: not allowed with argument --material")
     folder = args.output or Path(f"{args.source.stem}-shader")
     check_outputs([folder / "constants.json"], [args.source], "shader", make_folder=True)
-    options.load_options(args)  # what does not fit is reported before Mitsuba is loaded
+    options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
     from ..realtime.glsl.export import export_shader
 

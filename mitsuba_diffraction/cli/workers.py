@@ -16,7 +16,7 @@ from .options import whole_number
 if TYPE_CHECKING:
     from ..cluster.frames import Film, FrameRequest
 
-#: As `cluster.workers.VARIABLE`, which imports more than --help has time for.
+#: Copy of `cluster.workers.VARIABLE`, whose module imports too much for --help.
 VARIABLE = "DASK_SCHEDULER_ADDRESS"
 
 

@@ -99,9 +99,9 @@ class Report:
     # a worker that died are given to others by the scheduler
     retries: int = 0
     lost: int = 0  # workers that were there and are not any more
-    seconds: float = 0.0  # of the client's clock
+    seconds: float = 0.0  # wall time of the client
     busy: float = 0.0  # seconds of all workers' work
-    bytes: int = 0  # of sums that came from workers
+    bytes: int = 0  # size of the sums that came from workers
     peak: int = 0  # bytes of memory that a worker has taken at most
     # workers, where: addresses, and processors with threads, of what has been added up
     workers: set[str] = field(default_factory=set)

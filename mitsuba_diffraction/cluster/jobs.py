@@ -198,7 +198,7 @@ def _done(content: bytes) -> tuple[Any, float] | Failed:
     start = time.perf_counter()
     try:
         wanted, work, argument = pickle.loads(content)
-        check_versions(wanted)  # of a worker that has come late
+        check_versions(wanted)  # a late worker has not been checked
         return work(argument), time.perf_counter() - start
     except Exception as error:
         return failure(error)

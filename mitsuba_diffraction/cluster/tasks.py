@@ -41,13 +41,13 @@ class Task:
     variant: str
     sensor: int
     preview: bool
-    film: str  # what the client takes the film to be, see `film_of`
+    film: str  # the client's film, see `film_of`
     # frame, first: numbers of the frame and of the first pass, for people
     frame: int
     first: int
     passes: tuple[Pass, ...]  # seeds and samples
-    versions: tuple[str, ...]  # of the packages that decide the bits of a picture
-    threads: int  # of Dr.Jit; 0 for one a core
+    versions: tuple[str, ...]  # packages that decide the bits of a picture
+    threads: int  # threads of Dr.Jit; 0 for one a core
 
     @property
     def key(self) -> str:
@@ -69,7 +69,7 @@ class Sums:
     raw: NDArray[np.float64]  # (ny, nx, channels), the sum of the films' raw storage
     where: str  # processor and Dr.Jit threads, which decide the last bits
     worker: str  # address
-    seconds: float  # of work, loading included
+    seconds: float  # time of the work, loading included
     peak: int  # bytes of the process at most
 
 

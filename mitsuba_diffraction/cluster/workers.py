@@ -47,7 +47,7 @@ def connect(
     if count is not None:
         import dask
 
-        # by the processes that are started: Ctrl-C is for the client
+        # the processes that are started ignore Ctrl-C: it is for the client
         with _ctrl_c_ignored(), _silent_tracker():
             cluster = distributed.LocalCluster(
                 n_workers=count, threads_per_worker=1, processes=True,

@@ -25,7 +25,7 @@ FILMS: dict[str, dict[str, Any]] = {
 }
 #: Why a frame that is not there is rendered.
 MISSING = ("", "")
-_KEY = "mitsuba-diffraction"  # of the text in a frame's PNG
+_KEY = "mitsuba-diffraction"  # key of the text in a frame's PNG
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ _LOADING = re.compile(
 _INSTANTIATE = re.compile(r'failed to instantiate (?P<kind>\w+) plugin of type "(?P<type>[^"]+)": ')
 _NOT_FOUND = re.compile(r'\[PluginManager\] Plugin "[^"]+" not found!')
 _TRACEBACK = re.compile(r"Traceback \(most recent call last\):\n(?:[ \t].*\n)*(?:[\w.]+: (?=\S))?")
-# What a Python plugin raises that says nothing of the scene
+# Exceptions of a Python plugin that say nothing about the scene
 _NO_ERROR = re.compile(r"^(KeyboardInterrupt|MemoryError|SystemExit): ?(\d*)", re.M)
 _UNREAD = re.compile(
     r'Found \d+ unreferenced (?:property|properties) in (\w+) plugin of type "([^"]+)":'

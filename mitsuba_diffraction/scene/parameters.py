@@ -18,7 +18,7 @@ from ..files import refuse_pipe
 _REFERENCE = re.compile(r"\$(\w+)")
 # Mitsuba stops at 15 includes within each other.
 _DEEPEST = 15
-# Of a path, in characters: longer texts name no file, and asking would be an error.
+# Longest path in characters: longer texts name no file, and asking would be an error.
 _LONGEST = 1024
 
 Numbers = tuple[float, ...]

@@ -28,7 +28,7 @@ from .document import TableDescription, document_of, parse_document, plain
 from .expansion import Expansion
 from .table import FORMAT_VERSION, DiffractionTable
 
-#: What every EXR begins with.
+#: First bytes of every EXR.
 EXR_BEGINS = b"\x76\x2f\x31\x01"
 #: The attribute with everything but the coefficients. One string: OpenEXR keeps numbers as floats.
 ATTRIBUTE = "mitsuba_diffraction"
@@ -67,7 +67,7 @@ def save_table(table: DiffractionTable, path: str | os.PathLike[str]) -> None:
     with atomic_path(path) as temporary:
         try:
             OpenEXR.File(header, channels).write(str(temporary))
-        except RuntimeError as error:  # what OpenEXR makes of a full disk
+        except RuntimeError as error:  # OpenEXR's exception for a full disk
             raise OSError(None, f"OpenEXR: {one_line(str(error))}") from error
 
 

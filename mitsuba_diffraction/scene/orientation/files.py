@@ -23,7 +23,7 @@ from .trimesh import TriangleMesh
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# what Mitsuba throws, text that is not UTF-8, and sizes beyond the memory
+# Mitsuba's exceptions, text that is not UTF-8, and sizes beyond the memory
 _UNREAD = (RuntimeError, ValueError, MemoryError)
 
 KINDS = {".ply": "ply", ".obj": "obj", ".serialized": "serialized"}
@@ -170,7 +170,7 @@ def write_ply(
     with atomic_path(path) as temporary:
         try:
             written.write_ply(str(temporary))
-        except RuntimeError as error:  # what Mitsuba makes of a full disk
+        except RuntimeError as error:  # Mitsuba's exception for a full disk
             raise DiffractionError(f"cannot write '{path}': {one_line(str(error))}") from error
         # Mitsuba writes no comments: they follow the line that names the format
         lines = Path(temporary).read_bytes().split(b"\n", 2)
@@ -190,7 +190,7 @@ def triangulated_ply(data: bytes) -> bytes | None:
     """
     try:
         return _triangulated(data)
-    # what a damaged header or body makes of its numbers and names
+    # numbers and names of a damaged header or body
     except (struct.error, ValueError, LookupError, OverflowError, MemoryError):
         return None
 
