@@ -19,8 +19,12 @@ def write(measured: Measurements) -> str:
 
 def _coat(measured: Measurements) -> str:
     rows = [
-        [str(one.grating), angle(one.theta), *map(percent, (one.single, one.share, one.bounced))]
-        for one in measured.coats
+        [
+            str(deviation.grating),
+            angle(deviation.theta),
+            *map(percent, (deviation.single, deviation.share, deviation.bounced)),
+        ]
+        for deviation in measured.coats
     ]
     header = ["grating", "incidence", "one passage", "share of the bounces", "with bounces"]
     return f"""## Under a coat
