@@ -45,7 +45,7 @@ _BLOCK = 1 << 22  # coefficients at a time
 def document_of(table: DiffractionTable) -> dict[str, Any]:
     """Everything but the coefficients; what a table need not have is left out where it has not."""
     return {
-        **table.settings.given(),
+        **table.settings.as_json(),
         "scale": table.scale,
         "spacing": table.spacing,
         "error": dict(table.error),
