@@ -1,4 +1,4 @@
-"""The arguments of a table, declared once: names, defaults, allowed values and help.
+"""Settings of a table, declared once: names, defaults, allowed values and help.
 
 The builder, the plugin, recipes, the commands and the header of a table's file all read them here.
 """
@@ -30,7 +30,7 @@ MAX_COHERENCE_WIDTH = 500.0
 
 
 def _setting(default: Any, check: Callable[[Any], Any], help: str, must: str, **more: Any) -> Any:
-    """A field that `check` settles the type of, or raises ValueError for what is not `must`."""
+    """Declare a field whose type `check` settles; it raises ValueError for what is not `must`."""
     return field(default=default, metadata={"check": check, "help": help, "must": must, **more})
 
 
@@ -56,7 +56,7 @@ def _among(*choices: str) -> Callable[[Any], str]:
 
 
 def _between(low: float, high: float) -> Callable[[Any], float]:
-    """A number above `low`, up to `high`."""
+    """Return a check for a number above `low` and up to `high`."""
 
     def check(value: Any) -> float:
         number = _number(value)
@@ -120,7 +120,7 @@ def _choices(*names: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class TableSettings:
-    """What a table is built with; lengths in µm, wavelengths in nm.
+    """Settings that a table is built with; lengths in µm, wavelengths in nm.
 
     Values are checked, and their types settled, when one is made: of numbers also their text.
 
@@ -204,7 +204,7 @@ class TableSettings:
         return self.coherence == "patch"
 
     def given(self) -> dict[str, Any]:
-        """The settings by name, without those that are None or false: as JSON has them."""
+        """Return the settings by name as JSON has them, without those that are None or false."""
         values = ((name, getattr(self, name)) for name in _BY_NAME)
         return {name: value for name, value in values if value not in (None, False)}
 
@@ -219,7 +219,7 @@ RECIPE_SETTINGS = (*SCENE_SETTINGS, "wavelength_range", "height_scale_max", "fre
 
 
 def checked(name: str, value: Any) -> Any:
-    """A setting's value in its own type.
+    """Return a setting's value in its own type.
 
     Raises
     ------
@@ -236,7 +236,7 @@ def checked(name: str, value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Setting:
-    """A field of `TableSettings`, for people.
+    """Description of a field of `TableSettings`, for people.
 
     Attributes
     ----------
@@ -254,7 +254,7 @@ class Setting:
 
 
 def described_setting(name: str) -> Setting:
-    """The field of this name."""
+    """Return the description of the field of this name."""
     default, described = _BY_NAME[name].default, _BY_NAME[name].metadata
     values = default if isinstance(default, tuple) else (default,)
     text = " ".join(value if isinstance(value, str) else f"{value:g}" for value in values if value)
