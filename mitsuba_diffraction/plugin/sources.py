@@ -211,7 +211,7 @@ def _check_agreement(
             f"{name}={value} is for height fields, but '{path}' is a table and has its own; "
             f"leave {name} out, or say 'auto'"
         )
-    if table.wavelength_range[0] > SHORTEST_WAVELENGTH:
+    if not mi.is_monochromatic and table.wavelength_range[0] > SHORTEST_WAVELENGTH:
         raise DiffractionError(
             f"the table '{path}' starts at {table.wavelength_range[0]:g} nm, but Mitsuba renders "
             f"from {SHORTEST_WAVELENGTH:g} nm on; build it with '--wavelength-range 360 830'"

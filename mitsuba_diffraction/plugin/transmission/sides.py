@@ -16,7 +16,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..boundary import Boundary, Jones, Kirchhoff, SmallSlope, mueller
-from ..directions import Pair, Place, from_patch
+from ..directions import Pair, TablePoint, from_patch
 from ..fresnel import Dielectric, Inside, squared
 from ..layers import CoatedPair, transmittances
 from ..sampling import EVEN, direction_of, with_even_share
@@ -236,7 +236,7 @@ class Through:
             passed = transmittances(cosine, n)
             # T² R/(1 − R²) of each polarisation
             kept.append(0.5 * sum(t * (1.0 - t) * dr.rcp(2.0 - t) for t in passed))
-        place = Place(pair.uv, dr.sqrt(dr.fma(ends[0], ends[0], dr.square(ends[1]))))
+        place = TablePoint(pair.uv, dr.sqrt(dr.fma(ends[0], ends[0], dr.square(ends[1]))))
         power = _changed(bsdf, si, place, scale, change)
         factor = bsdf.area_factor * dr.safe_sqrt(kept[0] * kept[1]) * pair.cos_o
         return mi.depolarizer(power * factor)
@@ -355,7 +355,7 @@ class Shares:
 
 
 def _changed(
-    bsdf: BSDF, si: Interaction, place: Pair | Place, scale: Float, change: Colour | None
+    bsdf: BSDF, si: Interaction, place: Pair | TablePoint, scale: Float, change: Colour | None
 ) -> Colour:
     """⟨|P|²⟩ as `PowerModel.power` has it, with order 0 multiplied by `change`."""
     power = bsdf.power.power(place, scale, si)
