@@ -79,10 +79,6 @@ def _count(most: int) -> Callable[[Any], int | None]:
     return check
 
 
-def _positive(value: Any) -> float | None:
-    return None if value is None else _between(0.0, math.inf)(value)
-
-
 def _pair(value: Any) -> tuple[float, float]:
     low, high = (_number(one) for one in value)
     return low, high
@@ -138,9 +134,8 @@ class TableSettings:
     taps : bins read in each direction; None for as many as the tolerance takes.
     wavelength_range : nm; the shortest sets the largest frequency that light can probe.
     height_scale_max : largest factor on the heights that the table serves.
-    q_max : largest spatial frequency k·|(u, v)| that is tabulated, rad/µm, as half axes of an
-        ellipse along x and y; None for all that light can probe.
-    kappa_max : largest k·w·height_scale that is, rad/µm; None likewise.
+    frequency_limit : half axes along x and y, in rad/µm, of the ellipse of spatial frequencies
+        k·(u, v) that are tabulated: the table is dark beyond. None for all that light can probe.
     windows : width in µm of the overlapping windows that a wide scan is cut into, whose powers are
         averaged (`tables.build.windows`); "auto" for twice the coherence width; None for the whole.
     second_order : whether light is multiplied by the second order of small slope: True, False, or
@@ -183,10 +178,9 @@ class TableSettings:
         1.5, _between(0.0, MAX_HEIGHT_SCALE), "largest height_scale that the table serves",
         f"a positive factor, at most {MAX_HEIGHT_SCALE:g}", metavar="S",
     )  # fmt: skip
-    q_max: tuple[float, float] | None = _setting(
+    frequency_limit: tuple[float, float] | None = _setting(
         None, _half_axes, "largest spatial frequency", "a positive number, or two, in rad/µm"
     )
-    kappa_max: float | None = _setting(None, _positive, "largest κ", "a positive number, in rad/µm")
     windows: str | float | None = _setting(
         None, _windows, "µm, average over overlapping windows of a scan much wider than "
         "coherence_width; auto is twice that", "auto, none, or a positive number of µm",
@@ -221,7 +215,7 @@ _BY_NAME: dict[str, Field[Any]] = {item.name: item for item in fields(TableSetti
 SCENE_SETTINGS = (
     *("coherence_width", "coherence", "basis", "tolerance", "terms", "windows", "second_order"),
 )
-RECIPE_SETTINGS = (*SCENE_SETTINGS, "wavelength_range")
+RECIPE_SETTINGS = (*SCENE_SETTINGS, "wavelength_range", "height_scale_max", "frequency_limit")
 
 
 def checked(name: str, value: Any) -> Any:

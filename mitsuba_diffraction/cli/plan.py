@@ -1,10 +1,9 @@
-"""`mitsuba-diffraction plan`: which part of its tables a scene needs; and `render --plan`."""
+"""`mitsuba-diffraction plan`: recipes of only what a scene needs; and `render --plan`."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,27 +17,26 @@ from .options import number_between, whole_number
 from .report import check_writable, lines_of, save_report
 
 if TYPE_CHECKING:
-    from ..scene.planning.make import TestedPlan
-    from ..scene.planning.plan import Plan
+    from ..scene.planning.plan import PlannedTable
 
 
 PATHS, TOLERANCE = 1 << 15, 1e-3
 _MOST_PATHS = 1 << 22  # lanes are counted in single precision
 
-#: `--plan` without a file.
-MAKE = Path()
-
 
 def add_parser(subparsers: options.Subparsers) -> None:
     parser = options.add_command(
         subparsers, "plan", run, "find out which part of its tables a scene needs",
-        "Trace paths through an XML scene and report which spatial frequencies, kappa and "
-        "wavelengths its diffracting surfaces are asked for, what tables of only these save "
-        "and what they change, measured on a small picture. `render --plan` renders with them.",
+        "Trace paths through an XML scene, report which spatial frequencies, kappa and "
+        "wavelengths its diffracting surfaces are asked for, and write recipes of tables of only "
+        "these, for `precompute` and `render --plan`.",
     )  # fmt: skip
     options.add_scene(parser)
     add_plan_options(parser)
-    options.add_output(parser, "write the plan, for `render --plan PLAN`", ".json", metavar="PLAN")
+    options.add_output(
+        parser, "write the recipe; those of further tables are OUT_2.toml and so on", ".toml",
+        metavar="OUT.toml",
+    )  # fmt: skip
     options.add_json(parser)
 
 
@@ -49,17 +47,17 @@ def add_plan_options(parser: argparse.ArgumentParser) -> None:
         help=f"paths to trace for a plan; default: {PATHS}",
     )  # fmt: skip
     parser.add_argument(
-        "--plan-tolerance", metavar="ERROR", type=number_between(1e-5, 0.1), default=TOLERANCE,
-        help=f"share of a surface's light that a plan may leave outside; default: {TOLERANCE:g}",
+        "--plan-tolerance", metavar="SHARE", type=number_between(1e-5, 0.1), default=TOLERANCE,
+        help=f"share of a surface's light that a plan may leave out; default: {TOLERANCE:g}",
     )  # fmt: skip
 
 
-def planning_variant(asked: str | None) -> str:
-    """The variant to trace paths in, which need wavelengths and many lanes; it is set.
+def planning_variant(requested: str | None) -> str:
+    """Set the variant to trace paths in, which need wavelengths and many lanes; return its name.
 
-    Raises a DiffractionError if a plan would say nothing about the asked one.
+    Raises a DiffractionError if a plan would say nothing about the requested variant.
     """
-    name = set_variant(asked)
+    name = set_variant(requested)
     if "spectral" not in name:
         raise DiffractionError(
             f"--mode {name}: a plan is of wavelengths and spatial frequencies, which only spectral "
@@ -76,140 +74,88 @@ def run(args: argparse.Namespace) -> int:
     if args.paths > _MOST_PATHS:
         args.parser.error(f"argument --paths: at most {_MOST_PATHS}, got {args.paths}")
 
-    from ..scene.planning.make import find_plan, record_scene
+    from ..scene.planning.plan import recipe_files, recipe_of
     from ..scene.planning.report import describe
 
     variant = planning_variant(args.mode)
-    tolerance: float = args.plan_tolerance
     with mitsuba_warnings(), Bar(args, delay=0) as bar:
-        load = partial(load_scene, args.scene, parameters)
-        sensor = partial(sensor_of, index=args.sensor)
-        bar(0, 0, "tracing paths")
-        loaded = record_scene(load, sensor, args.paths, timing=True)
-        found = find_plan(str(args.scene), loaded, load, sensor, tolerance, bar, timing=True)
-        say_if_unsuited(found)
-        bar(0, 0, "timing look-ups")
-        report = {
-            "scene": str(args.scene),
-            "variant": variant,
-            "paths": loaded.traced.paths,
-            "tolerance": tolerance,
-            **describe(loaded, found),
-        }
-    loaded.session.close()
+        planned = _planned(args, partial(load_scene, args.scene, parameters), bar)
+    report = {
+        "scene": str(args.scene),
+        "variant": variant,
+        "paths": args.paths,
+        "tolerance": args.plan_tolerance,
+        "tables": [describe(table) for table in planned],
+    }
     for line in lines_of(report):
         print(line)
     save_report(args, report)
-    if args.output is not None:
-        found.plan.save(args.output)
-        print(f"{args.output}: for mitsuba-diffraction render {args.scene} --plan {args.output}")
+    limited = [table for table in planned if table.settings is not None]
+    if args.output is not None and not limited:
+        say_warning("every table is needed whole: no recipe was written")
+    elif args.output is not None:
+        files = recipe_files(args.output, len(limited))
+        for file, table in zip(files, limited, strict=True):
+            recipe, comment = recipe_of(table, str(args.scene))
+            recipe.save(file, comment)
+        names = " ".join(map(str, files))
+        print(f"{names}: for mitsuba-diffraction render {args.scene} --plan {names}")
     return 0
 
 
-def say_if_unsuited(found: TestedPlan) -> None:
-    """Warn of a scene whose picture no plan keeps."""
-    if not found.suits and found.difference is not None:
-        say_warning(
-            f"the picture still differs by {found.difference.relative:.2g}, more than "
-            f"{found.plan.tolerance:g}: no plan suits this scene, its tables stay whole"
-        )
+def _planned(
+    args: argparse.Namespace, load: Callable[[], Any], tell: Progress
+) -> list[PlannedTable]:
+    from ..scene.planning.plan import plan_table, record
+
+    tell(0, 0, "tracing paths")
+    _, tables = record(load, partial(sensor_of, index=args.sensor), args.paths)
+    tell(0, 0, "building tables")
+    return [plan_table(table, args.plan_tolerance) for table in tables]
 
 
-def plan_or_json(text: str) -> Path:
-    """The file of a plan; what stands after a --plan without one may well be the scene."""
-    if not text.lower().endswith(".json"):
+def recipe_file(text: str) -> Path:
+    """The recipe of a plan; what stands after a --plan without one may well be the scene."""
+    if not text.lower().endswith(".toml"):
         raise argparse.ArgumentTypeError(
-            f"expected a plan ending in .json, got {text!r}; to have one made, write SCENE --plan"
+            f"expected a recipe ending in .toml, got {text!r}; to have one made, write SCENE --plan"
         )
     return Path(text)
 
 
-@dataclass(frozen=True)
-class Planned:
-    """A scene with the tables of a plan that fits it."""
-
-    scene: Any  # in the variant that is set
-    plan: Plan  # its tables
-    tables: dict[str, Any]  # by their keys
-    shares: dict[str, float]  # by key, of the light of a table's surfaces that is looked up outside
-
-
 def load_by_plan(
     args: argparse.Namespace, variant: str, load: Callable[[], Any], tell: Progress
-) -> Planned | None:
-    """A scene with the tables of a plan, or None where the variant has no use for one.
+) -> Any:
+    """Load a scene with the tables of a plan, in the variant that is set.
 
-    Raises a DiffractionError if the plan is for other surfaces, or for a light or a camera of which
-    too much falls outside.
+    Raises a DiffractionError if a recipe is for other surfaces.
     """
+    from ..scene.planning.plan import load_by_recipes, load_limited
+
     if "spectral" not in variant:
         say_warning(
             f"--plan: {variant} looks up a table of colours or one wavelength, which a plan does "
             "not make smaller; rendering without one"
         )
-        return None
-    from ..scene.planning.make import load_planned
-    from ..scene.planning.report import outside_of
-
+        return load()
+    if args.plan:
+        return load_by_recipes(load, args.plan)
     try:
-        plan, shares = _plan(args, variant, load, tell)
+        planning_variant(variant if variant.startswith(("llvm", "cuda")) else None)
+        planned = _planned(args, load, tell)
     finally:
         set_variant(variant)
-    for mine in plan.tables.values():
-        names = ", ".join(mine.surfaces)
-        before, now = (n / 1e6 for n in mine.memory)
-        if mine.domain is None:
+    for table in planned:
+        names, before = ", ".join(table.recorded.surfaces), table.recorded.table.nbytes / 1e6
+        if table.settings is None:
             say(f"plan: {names} keeps its whole table of {before:.3g} MB")
         else:
-            say(f"plan: {names} has a table of {now:.3g} MB instead of {before:.3g} MB")
-    scene, session = load_planned(load, plan)
-    tables = dict(session.tables)
-    session.close()
-    for table in tables.values():
-        outside_of(table)  # those of the paths that were traced
-    return Planned(scene, plan, tables, shares)
-
-
-def _plan(
-    args: argparse.Namespace, variant: str, load: Callable[[], Any], tell: Progress
-) -> tuple[Plan, dict[str, float]]:
-    """The plan, and the shares of light outside; in the variant that paths are traced in."""
-    from ..scene.planning.make import check_light, find_plan, record_scene
-    from ..scene.planning.plan import Plan
-
-    sensor = partial(sensor_of, index=args.sensor)
-    given = None if args.plan == MAKE else Plan.load(args.plan)
-    planning_variant(variant if variant.startswith(("llvm", "cuda")) else None)
-    loaded = record_scene(load, sensor, args.paths, plan=given)
-    try:
-        if given is not None:
-            return given, check_light(loaded, given)
-        found = find_plan(str(args.scene), loaded, load, sensor, args.plan_tolerance, tell)
-    finally:
-        loaded.session.close()
-    say_if_unsuited(found)
-    plan = found.plan
-    return plan, {k: t.domain.outside for k, t in plan.tables.items() if t.domain is not None}
-
-
-def say_outside(planned: Planned, samples: int) -> None:
-    """What was looked up outside the plan, a line for each table."""
-    from ..scene.planning.report import outside_of
-
-    for key, table in planned.tables.items():
-        found, mine = outside_of(table), planned.plan.tables[key]
-        if found is None or not found.count or mine.domain is None:
-            continue
-        share = planned.shares.get(key)
-        light = "" if share is None else f", about {100 * share:.2g} % of the surface's light"
-        far = f"|q| up to {found.frequency:.3g} rad/µm, planned "
-        far += " × ".join(f"{half:.3g}" for half in mine.domain.crop)
-        if found.kappa > mine.domain.kappa_max:
-            far += f"; κ up to {found.kappa:.3g}, planned {mine.domain.kappa_max:.3g}"
-        say(
-            f"plan: {', '.join(mine.surfaces)}: {found.count / samples:.2g} look-ups a sample lay "
-            f"outside{light}, and were read from coarse cells ({far})"
-        )
+            say(
+                f"plan: {names} has a table of {table.table.nbytes / 1e6:.3g} MB instead of "
+                f"{before:.3g} MB; {100 * table.outside:.2g} % of the surface's light lies beyond "
+                "it, and is missing"
+            )
+    return load_limited(load, planned)
 
 
 def check_plan_options(args: argparse.Namespace) -> None:
@@ -217,6 +163,4 @@ def check_plan_options(args: argparse.Namespace) -> None:
     for name, default in (("paths", PATHS), ("plan_tolerance", TOLERANCE)):
         if args.plan is None and getattr(args, name) != default:
             option = name.replace("_", "-")
-            args.parser.error(f"argument --{option}: is for --plan, which is not given")
-    if args.plan is not None and args.plan != MAKE and not args.plan.is_file():
-        raise DiffractionError(f"there is no plan '{args.plan}'; check the path")
+            args.parser.error(f"argument --{option}: is for --plan, which is missing")

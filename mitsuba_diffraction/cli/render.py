@@ -32,12 +32,10 @@ from . import options
 from .console import INTERRUPTED, Bar, mitsuba_warnings, say, say_warning
 from .options import change, number_between, whole_number
 from .plan import (
-    MAKE,
     add_plan_options,
     check_plan_options,
     load_by_plan,
-    plan_or_json,
-    say_outside,
+    recipe_file,
 )
 from .report import check_writable, save_report
 from .workers import add_threads, add_workers, client_of, film_of, on_workers, say_report
@@ -64,8 +62,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
         help="half the width and height, and at most 16 samples, unless -s is given",
     )  # fmt: skip
     parser.add_argument(
-        "--plan", nargs="?", const=MAKE, metavar="PLAN", type=plan_or_json,
-        help="render with tables of only what the scene needs: plan them first, or as in a file "
+        "--plan", nargs="*", metavar="RECIPE.toml", type=recipe_file,
+        help="render with tables of only what the scene needs: plan them first, or as in recipes "
         "that `plan -o` wrote",
     )  # fmt: skip
     add_plan_options(parser)
@@ -158,13 +156,10 @@ def _run_one(args: argparse.Namespace) -> int:
     variant = set_variant(args.mode)
     with mitsuba_warnings():
         with Bar(args, unit=" spp", delay=0) as bar:
-            spp, planned = args.spp or 0, None
+            spp = args.spp or 0
             load = partial(load_scene, args.scene, parameters)
-            if args.plan is not None:
-                bar(0, 0, "planning")
-                planned = load_by_plan(args, variant, load, bar)
             bar(0, spp, "loading")
-            scene = load() if planned is None else planned.scene
+            scene = load() if args.plan is None else load_by_plan(args, variant, load, bar)
             sensor = sensor_of(scene, args.sensor)
             if args.preview:
                 shrink(sensor)
@@ -178,9 +173,6 @@ def _run_one(args: argparse.Namespace) -> int:
                 )  # fmt: skip
         if result.spp == 0:
             raise KeyboardInterrupt  # before the first pass: there is no picture
-        if planned is not None:
-            width, height = result.bitmap.size()
-            say_outside(planned, width * height * result.spp)
         report = _finish(args, result, outputs, variant, start)
     save_report(args, report)
     if result.interrupted:

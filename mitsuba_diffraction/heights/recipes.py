@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import difflib
 import inspect
+import json
 import os
 import tomllib
 from collections.abc import Callable, Mapping
@@ -22,6 +23,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from ..atomic import atomic_path
 from ..errors import DiffractionError
 from ..files import read_text
 from ..settings import RECIPE_SETTINGS, checked
@@ -93,6 +95,45 @@ class Recipe:
             output=_output(content, file, shown),
         )
 
+    @classmethod
+    def of_file(cls, path: Path, options: LoadOptions) -> Recipe:
+        """The recipe of one file of heights, which no file holds yet."""
+        return cls(path, (path,), None, (), options, {}, Path(f"{path.stem}.exr"))
+
+    def describes_heights_of(self, other: Recipe) -> bool:
+        """Whether both recipes name the same sources, or generator, and treatments."""
+        return self._heights() == other._heights()
+
+    def _heights(self) -> tuple[Any, ...]:
+        sources = [source.resolve() for source in self.sources]
+        return sources, self.generator, list(self.arguments), self.options
+
+    def save(self, path: Path, comment: str) -> None:
+        """Write the recipe, with paths relative to the file; `comment` stands above it.
+
+        Raises
+        ------
+        DiffractionError
+            If the file cannot be written.
+        """
+        content: dict[str, Any] = {}
+        arguments = [dict(one) for one in self.arguments]
+        if self.generator is None:
+            sources = [os.path.relpath(source, path.parent) for source in self.sources]
+            content["source"] = sources[0] if len(sources) == 1 else sources
+        else:
+            content["generator"] = self.generator
+            if len(arguments) > 1:  # which differ by their seeds alone
+                content["seeds"] = [one.pop("seed") for one in arguments]
+        content |= {**self.options.specified(), **self.table, "output": f"{path.stem}.exr"}
+        lines = [f"# {line}" for line in comment.splitlines()]
+        lines += [f"{name} = {_toml(value)}" for name, value in content.items()]
+        if arguments and arguments[0]:
+            lines += ["", "[arguments]"]
+            lines += [f"{name} = {_toml(value)}" for name, value in arguments[0].items()]
+        with atomic_path(path) as temporary:
+            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
     def fields(self, options: LoadOptions | None = None) -> list[HeightField]:
         """Read or generate all patches; `options` take precedence over the recipe's options.
 
@@ -138,6 +179,14 @@ class Recipe:
             return generator(**arguments)
         except DiffractionError as error:
             raise DiffractionError(f"{str(self.path)!r}: [arguments]: {error}") from error
+
+
+def _toml(value: Any) -> str:
+    """A TOML value: a string, a boolean, a number or a list of them."""
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_toml, value))}]"
+    # JSON's strings, booleans and finite numbers are TOML's
+    return json.dumps(value, ensure_ascii=False)
 
 
 def options_and_settings(

@@ -16,9 +16,9 @@ textures        height scale and orientation that vary; whether a mesh has what 
 types           names of the types of arguments
 directions      a pair of directions in the patch's frame, and how V-shaped grooves shadow it
 power           the diffracted power at single wavelengths
-lookup          a table inside a kernel: `DeviceTable`, and the weights of its terms at a κ
+lookup          a table inside a kernel: `DeviceTable`
 sampling        directions drawn where the orders are
-restricted      a planned table, and its coarse cells beyond
+series          series in κ: weights of a bin's terms, and order 0
 rgb             power and look-up in the RGB variants' colours
 window_positions  where on the patch the window sits at a point of the surface
 energy          the bound of the albedo that conserves energy

@@ -1,15 +1,14 @@
 """Reading a table inside a Dr.Jit kernel: a few gathers, no Fourier transform.
 
-The twin of `tables.lookup`, which says what is summed, and of `tables.expansion`. All terms of one
-bin are contiguous and aligned, so that one packet load fetches them: this alignment alone is worth
-a factor of two. They are multiplied with a series in κ: Chebyshev's and Taylor's weights follow
-from a recurrence; the functions of basis "svd" have none, and are tabulated, as parabolas on equal
-cells of κ.
+The twin of `tables.lookup`, which says what is summed. All terms of one bin are contiguous and
+aligned, so that one packet load fetches them: this alignment alone is worth a factor of two. They
+are multiplied with the weights of a series in κ (`plugin.series`).
 """
 
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Callable, Sequence
 
 import drjit as dr
@@ -17,119 +16,13 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
-from ..tables.expansion import Expansion
-from ..tables.layout import Record, cells_of, functions_at
+from ..tables.layout import Record
 from ..tables.table import DiffractionTable
 from ..tables.window import first_tap
-from .memory import PACKET, index_between, packet_size, read_packets, read_record, upload
+from .memory import index_between, packet_size, read_packets, upload
+from .series import inner, series_of
 from .types import Float, Index, Mask, Packet, Rotation
 from .window_positions import Window
-
-#: A parabola through three points on a cell of phase h leaves max|f'''| h³/192 (Chebyshev nodes);
-#: this share of the tolerance is what the cells may add.
-_CELLS_SHARE = 0.02
-
-
-class Recurrence:
-    """Weights of Chebyshev's and Taylor's series."""
-
-    def __init__(self, table: DiffractionTable) -> None:
-        self._expansion = table.expansion
-        self._record = Record.aligned(*table.order_0.shape[1:])
-        self._order_0 = upload(mi.Float, self._record.pack(table.order_0.astype(np.float32)))
-
-    def at(self, kappa: Float) -> tuple[Index, list[Float], list[Float]]:
-        """Interval, weights of a bin's terms, and order 0: its power, or the parts of a_0."""
-        offset, interval = series_interval(self._expansion, kappa)
-        weights = series_weights(self._expansion, self._record.stored, offset, interval, kappa)
-        values = read_record(self._order_0, interval, self._record.numbers)
-        centre = [inner(part, weights) for part in self._record.split(values)]
-        factored = mi.Mask(True) if self._expansion.basis == "taylor" else interval == 0
-        centre[0] += dr.select(factored, mi.Float(1.0), 0.0)
-        return interval, weights, centre
-
-
-class Tabulated:
-    """Weights of basis "svd", and order 0, from tables over κ."""
-
-    def __init__(self, table: DiffractionTable) -> None:
-        expansion = table.expansion
-        self._expansion = expansion
-        self._components = table.order_0.shape[1]
-        self._missing = Record.aligned(1, expansion.terms).stored - expansion.terms
-        self._cells = cells_of(expansion, (192.0 * _CELLS_SHARE * table.tolerance) ** (1 / 3))
-        # Chebyshev's three nodes of every cell, and the parabola a + t (b + t c) through them
-        t = 0.5 + 0.5 * np.cos(np.pi * (np.arange(3) + 0.5) / 3)
-        start = np.arange(expansion.intervals * self._cells)
-        kappa = expansion.length / self._cells * (start[:, None] + t)
-        kappa = np.clip(kappa, 0.0, np.nextafter(expansion.kappa_max, 0.0))
-        parabola = np.linalg.inv(t[:, None] ** np.arange(3))
-        # one record a cell, so that few packets fetch all of it
-        both = np.concatenate([functions_at(expansion, kappa), table.order_0_at(kappa)], axis=-1)
-        numbers = np.einsum("pn,cnt->cpt", parabola, both).reshape(len(start), 1, -1)
-        self._record = Record.of(1, numbers.shape[2], unit=PACKET)
-        self._parabolas = upload(mi.Float, self._record.pack(numbers.astype(np.float32)))
-
-    def at(self, kappa: Float) -> tuple[Index, list[Float], list[Float]]:
-        """Interval, weights of a bin's terms, and order 0: its power, or the parts of a_0."""
-        last = self._expansion.intervals * self._cells - 1.0
-        position = kappa * (self._cells / self._expansion.length)
-        lower = index_between(dr.floor(position), 0.0, last)
-        t = dr.clip(position - lower, 0.0, 1.0)
-        cell = mi.UInt32(lower)
-        values = read_record(self._parabolas, cell, self._record.numbers)
-        count = self._expansion.terms + self._components
-        a, b, c = (values[n * count : (n + 1) * count] for n in range(3))
-        found = [dr.fma(dr.fma(z, t, y), t, x) for x, y, z in zip(a, b, c, strict=True)]
-        weights, centre = found[: -self._components], found[-self._components :]
-        offset = dr.minimum(kappa * (1.0 / self._expansion.length), 1.0)
-        factor = offset if self._expansion.kind == "amplitude" else dr.square(offset)
-        interval = mi.UInt32(0)
-        if self._expansion.intervals > 1:
-            interval = cell // self._cells
-            factor = dr.select(interval == 0, factor, 1.0)
-        weights = [w * factor for w in weights]
-        return interval, weights + [mi.Float(0.0)] * self._missing, centre
-
-
-def series_of(table: DiffractionTable) -> Recurrence | Tabulated:
-    """How this table's series is evaluated."""
-    return Recurrence(table) if table.expansion.functions is None else Tabulated(table)
-
-
-def series_interval(expansion: Expansion, kappa: Float) -> tuple[Float, Index]:
-    """Where in its interval κ lies (0 … 1), and the interval."""
-    position = kappa * (1.0 / expansion.length)
-    lower = index_between(dr.floor(position), 0.0, expansion.intervals - 1.0)
-    return position - lower, mi.UInt32(lower)
-
-
-def series_weights(
-    expansion: Expansion, terms: int, offset: Float, interval: Index, kappa: Float
-) -> list[Float]:
-    """What each term of a Chebyshev or Taylor series is multiplied with; `offset` is 0 … 1."""
-    if expansion.basis == "taylor":
-        x = kappa * expansion.half_range
-        weights = [x]
-        for n in range(2, terms + 1):
-            weights.append(weights[-1] * x * (1.0 / n))
-        return weights
-    t = dr.clip(dr.fma(2.0, offset, -1.0), -1.0, 1.0)
-    factor = offset if expansion.kind == "amplitude" else dr.square(offset)
-    scale = dr.select(interval == 0, factor, 1.0)
-    weights = [scale, scale * t]  # Tₙ(t) by their recurrence, the factor carried along
-    while len(weights) < terms:
-        weights.append(dr.fma(2.0 * t, weights[-1], -weights[-2]))
-    return weights[:terms]
-
-
-def inner(terms: Sequence[Float], weights: Sequence[Float]) -> Float:
-    """Σ terms·weights."""
-    total = terms[0] * weights[0]
-    for term, weight in zip(terms[1:], weights[1:], strict=True):
-        total = dr.fma(term, weight, total)
-    return total
-
 
 #: Look-ups of more taps run through their rows in a loop instead of one long program.
 _UNROLLED_TAPS = 36
@@ -143,6 +36,10 @@ _MOST_PACKETS = 2**31
 #: The weight of a tap, by its number.
 Weight = Callable[[Float], Float]
 
+_uploaded: weakref.WeakKeyDictionary[DiffractionTable, dict[str, DeviceTable]] = (
+    weakref.WeakKeyDictionary()
+)
+
 
 def within(qx: Float, qy: Float, radii: tuple[float, float]) -> Mask:
     """Whether frequencies lie in an ellipse, to rounding in single precision."""
@@ -154,7 +51,8 @@ class DeviceTable:
 
     def __init__(self, table: DiffractionTable) -> None:
         self.expansion, self.grid = table.expansion, table.grid
-        self.spacing, self.radii = table.spacing, table.q_max
+        self.spacing, self.limited = table.spacing, table.limited
+        self.radii, self.q_limit = table.frequency_limit, table.q_limit
         self.record = Record.aligned(*table.coefficients.shape[3:])
         self.half = table.coefficients.dtype == np.float16
         self._inverse_scale = 1.0 / table.scale
@@ -174,49 +72,54 @@ class DeviceTable:
     ) -> Float:
         """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`).
 
-        qx, qy, kappa : mi.Float, rad/µm. Outside the table the result is NaN, never a guess.
+        qx, qy, kappa : mi.Float, rad/µm. What light cannot probe is NaN, never a guess; beyond
+            the `frequency_limit` of a table it is 0.
         windows : where they are; none for that of the table itself.
         """
         grid, expansion = self.grid, self.expansion
         inside = within(qx, qy, self.radii) & (kappa <= expansion.kappa_max * (1 + 1e-6))
-        interval, weights, centre = self.series.at(kappa)
+        interval, weights, order_0 = self.series.at(kappa)
 
         x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
         first, weight_x, weight_y = self._place(x, y, interval)
         weights_x = [weight_x(n) for n in range(grid.taps[0])]
 
-        lobe_x, lobe_y = grid.order_0_exponents
+        lobe_x, lobe_y = grid.exponents
         lobe = dr.exp2(dr.fma(_log2(lobe_x), dr.square(x), _log2(lobe_y) * dr.square(y)))
 
         if windows:
             total = self._over_windows(first, (x, y), weights_x, weight_y, weights, windows)
             parts = [
                 dr.fma(lobe, c, part * self._inverse_scale)
-                for c, part in zip(centre, total, strict=True)
+                for c, part in zip(order_0, total, strict=True)
             ]
             result = dr.square(parts[0]) + dr.square(parts[1])
         elif self.record.components == 2 and not grid.coherent:
             total = self._over_taps(
                 first, weights_x, weight_y, lambda packets: self._squares(packets, weights)
             )[0]
-            power = sum((dr.square(c) for c in centre), mi.Float(0.0))
+            power = sum((dr.square(c) for c in order_0), mi.Float(0.0))
             result = dr.fma(lobe, power, total * self._inverse_scale**2)
         else:
             packets = self._over_taps(first, weights_x, weight_y, lambda packets: packets)
             parts = [
                 dr.fma(lobe, c, inner(part, weights) * self._inverse_scale)
-                for c, part in zip(centre, self._components(packets), strict=True)
+                for c, part in zip(order_0, self._components(packets), strict=True)
             ]
             if grid.coherent:
                 result = dr.square(parts[0]) + dr.square(parts[1])
             else:
                 result = dr.maximum(parts[0], 0.0)  # a cut series may dip below zero by its error
-        return dr.select(inside, result, dr.nan)
+        outside = dr.nan
+        if self.limited:
+            outside = dr.select(within(qx, qy, (self.q_limit, self.q_limit)), 0.0, dr.nan)
+            outside = dr.select(kappa <= expansion.kappa_max * (1 + 1e-6), outside, dr.nan)
+        return dr.select(inside, result, outside)
 
     def first_bin(self, qx: Float, qy: Float, kappa: Float) -> Index:
         """Index of the first bin that `window_sum` reads (for benchmarks)."""
         x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
-        return self._place(x, y, self.series.at(kappa)[0])[0]
+        return self._place(x, y, self.series.at(kappa).interval)[0]
 
     def read(self, index: Index) -> list[Packet]:
         """All floats of the bin with this index, in packets."""
@@ -224,10 +127,10 @@ class DeviceTable:
 
     def order_0(self, kappa: Float) -> Float:
         """|a_0(κ)|², the power of order 0."""
-        centre = self.series.at(kappa)[2]
+        parts = self.series.at(kappa).order_0
         if self.record.components == 2:
-            return dr.square(centre[0]) + dr.square(centre[1])
-        return dr.maximum(centre[0], 0.0)
+            return dr.square(parts[0]) + dr.square(parts[1])
+        return dr.maximum(parts[0], 0.0)
 
     def _place(self, x: Float, y: Float, interval: Index) -> tuple[Index, Weight, Weight]:
         """Index of the first bin read at (x, y) in bins; weights along x and y as functions."""
@@ -400,3 +303,11 @@ def _along(step: Rotation, weights: list[Float]) -> list[Rotation]:
 def _log2(exponent: float) -> float:
     """Factor of the exponent of 2 that makes exp(−exponent·Δ²)."""
     return -float(exponent) / math.log(2.0)
+
+
+def device_table(table: DiffractionTable) -> DeviceTable:
+    """The table in the current variant's memory, uploaded once for all BSDFs that share it."""
+    variants = _uploaded.setdefault(table, {})
+    if mi.variant() not in variants:
+        variants[mi.variant()] = DeviceTable(table)
+    return variants[mi.variant()]

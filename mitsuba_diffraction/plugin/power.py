@@ -14,7 +14,7 @@ import mitsuba as mi
 
 from ..tables.table import DiffractionTable
 from .directions import Pair, TablePoint
-from .restricted import device_table
+from .lookup import device_table
 from .rgb import rgb_power
 from .sampling import order_sampler
 from .transmission.crossing import Crossing

@@ -67,11 +67,6 @@ class OrderSampler:
         self._last = len(found.order_0) - 1.0
         self._steps_per_kappa = self._last / table.expansion.kappa_max
 
-    @property
-    def nbytes(self) -> int:
-        """Size in memory."""
-        return 4 * sum(len(a) for a in (self._row_sums, self._column_sums, self._levels))
-
     def strategy(self, k: Float, cos_i: Float, height_scale: Float) -> tuple[Float, Index, Float]:
         """Share of the samples that order 0 gets; the band of the other orders, and its unit."""
         kappa = k * height_scale
@@ -178,18 +173,3 @@ def order_sampler(table: DiffractionTable) -> OrderSampler:
     if mi.variant() not in variants:
         variants[mi.variant()] = OrderSampler(table)
     return variants[mi.variant()]
-
-
-def share_sampler(table: DiffractionTable, other: DiffractionTable) -> None:
-    """Have BSDFs of a table draw directions as those of another do, until `forget_sampler`."""
-    _samplers.setdefault(table, {})[mi.variant()] = order_sampler(other)
-
-
-def forget_sampler(table: DiffractionTable) -> None:
-    """Let the next BSDF of a table have a sampler of its own."""
-    _samplers.pop(table, None)
-
-
-def sampler_bytes(table: DiffractionTable) -> int:
-    """Memory of the densities that directions are drawn from."""
-    return order_sampler(table).nbytes

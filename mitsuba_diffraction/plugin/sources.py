@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
-from ..errors import DiffractionError
+from ..errors import DiffractionError, warn
 from ..files import readable_file
 from ..heights import gratings
 from ..heights.field import HeightField
@@ -29,17 +30,38 @@ HEIGHT_SCALE_ROOM = 1.5
 #: Mitsuba samples its spectral variants' wavelengths from here on, nm.
 SHORTEST_WAVELENGTH = 360.0
 
-#: Gets the table of heights by their digest, from its settings and from what builds it with such.
-TableProvider = Callable[
-    [str, TableSettings, Callable[[TableSettings], DiffractionTable]], DiffractionTable
-]
+
+@dataclass(frozen=True)
+class TableRequest:
+    """The table of heights that a BSDF asks for.
+
+    Attributes
+    ----------
+    digest : of the heights.
+    settings : of the table.
+    height_scale : the largest factor on the heights that the BSDF uses.
+    build : builds the table with any settings.
+    recipe : says where the heights come from; None for an array.
+    """
+
+    digest: str
+    settings: TableSettings
+    height_scale: float
+    build: Callable[[TableSettings], DiffractionTable]
+    recipe: Recipe | None
+
+    def cached(self, settings: TableSettings) -> DiffractionTable:
+        """The table with these settings, from the cache or built."""
+        return cached_table(self.digest, settings, lambda: self.build(settings))
 
 
-def from_cache(
-    digest: str, settings: TableSettings, build: Callable[[TableSettings], DiffractionTable]
-) -> DiffractionTable:
+#: Gets the table that is asked for.
+TableProvider = Callable[[TableRequest], DiffractionTable]
+
+
+def from_cache(request: TableRequest) -> DiffractionTable:
     """The `TableProvider` of all scenes that are not being planned."""
-    return cached_table(digest, settings, lambda: build(settings))
+    return request.cached(request.settings)
 
 
 def table_of_file(
@@ -73,20 +95,30 @@ def table_of_file(
             )
     elif is_recipe(path):
         recipe = Recipe.load(path)
-        table = _built(
-            _recipe_digest(recipe, options),
-            lambda: recipe.fields(options),
-            {**recipe.table, **asked},
-            height_scale,
-            provider,
+        table = provider(
+            _request(
+                _recipe_digest(recipe, options),
+                lambda: recipe.fields(options),
+                {**recipe.table, **asked},
+                height_scale,
+                replace(recipe, options=recipe.options.updated(options)),
+            )
         )
     else:
-        table = _built(
-            _file_digest(path, options),
-            lambda: [load_heights(path, options)],
-            asked,
-            height_scale,
-            provider,
+        table = provider(
+            _request(
+                _file_digest(path, options),
+                lambda: [load_heights(path, options)],
+                asked,
+                height_scale,
+                Recipe.of_file(path, options),
+            )
+        )
+    if table.limited:
+        x, y = table.frequency_limit
+        warn(
+            f"{path.name}: the table ends at the frequencies {x:.4g} along x and {y:.4g} rad/µm "
+            "along y (frequency_limit): light that the surface sends beyond is missing"
         )
     return table
 
@@ -137,23 +169,30 @@ def table_of_heights(
 ) -> DiffractionTable:
     """The table of a height field."""
     digest = heights.digest() + (" cut out" if heights.cut_out else "")  # warned of otherwise
-    return _built(digest, lambda: [heights], asked, height_scale, provider)
+    return provider(_request(digest, lambda: [heights], asked, height_scale, None))
 
 
-def _built(
+def _request(
     digest: str,
     load: Callable[[], list[HeightField]],
     asked: Mapping[str, Any],
     height_scale: float,
-    provider: TableProvider,
-) -> DiffractionTable:
+    recipe: Recipe | None,
+) -> TableRequest:
     def build(settings: TableSettings) -> DiffractionTable:
         heights = load()
         mi.Log(mi.LogLevel.Info, f"diffraction: building the table of {heights[0].name}")
         return build_with(heights, settings)
 
-    most = min(HEIGHT_SCALE_ROOM * max(1.0, height_scale), MAX_HEIGHT_SCALE)
-    return provider(digest, TableSettings(**asked, height_scale_max=most), build)
+    room = min(HEIGHT_SCALE_ROOM * max(1.0, height_scale), MAX_HEIGHT_SCALE)
+    settings = TableSettings(**{"height_scale_max": room, **asked})
+    if height_scale > settings.height_scale_max:
+        raise DiffractionError(
+            f"height_scale={height_scale:g} is beyond height_scale_max="
+            f"{settings.height_scale_max:g} of the recipe (a coat counts as its index times the "
+            "heights); raise it there"
+        )
+    return TableRequest(digest, settings, height_scale, build, recipe)
 
 
 def _file_digest(path: Path, options: LoadOptions) -> str:

@@ -36,7 +36,7 @@ _MOST_INTERVALS, _LONGEST_SERIES = 4096, 2048
 _MOST_SERIES = 1 << 16  # terms over all intervals
 _MOST_NODES = 1 << 12
 _ROUNDED = 1e-6  # relative: of what follows from other fields
-#: Of the light in one order: at most 1 but for the error of a coarse table.
+#: Most of the light in one order: 1, but for the error of a table of a large tolerance.
 _LARGEST_POWER = 2.0
 _LARGEST_RATIO, _MOST_CELLS = 128.0, 1 << 12  # r, and cells along an axis
 _BLOCK = 1 << 22  # coefficients at a time
@@ -54,7 +54,6 @@ def document_of(table: DiffractionTable) -> dict[str, Any]:
         "expansion": _given(table.expansion),
         "grid": _given(table.grid),
         "order_0": table.order_0.tolist(),
-        **({} if table.coarse is None else {"coarse": document_of(table.coarse)}),
         **({} if table.slope_ratios is None else {_RATIOS: _ratios_of(table.slope_ratios)}),
     }
 
@@ -90,16 +89,9 @@ class Described:
     Attributes
     ----------
     fields : arguments of `DiffractionTable`.
-    coarse : of the table around it, or None.
     """
 
     fields: Mapping[str, Any]
-    coarse: Described | None
-
-    @property
-    def parts(self) -> tuple[Described, ...]:
-        """As `DiffractionTable.parts`."""
-        return (self,) if self.coarse is None else (self, self.coarse)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -108,18 +100,16 @@ class Described:
         components = _COMPONENTS[expansion.kind]
         return expansion.intervals, *grid.shape, components, expansion.terms
 
-    def table(self, coefficients: Iterable[NDArray[Any]]) -> DiffractionTable:
-        """The table with its coefficients, and those of the coarse one.
+    def table(self, coefficients: NDArray[Any]) -> DiffractionTable:
+        """The table with its coefficients.
 
         Raises
         ------
         ValueError
             If they are not finite, or larger than any surface's.
         """
-        mine, *rest = coefficients
-        _check_sizes(mine, self.fields["expansion"], self.fields["scale"])
-        coarse = None if self.coarse is None else self.coarse.table(rest)
-        return DiffractionTable(coefficients=mine, coarse=coarse, **self.fields)
+        _check_sizes(coefficients, self.fields["expansion"], self.fields["scale"])
+        return DiffractionTable(coefficients=coefficients, **self.fields)
 
 
 def described(document: Any) -> Described:
@@ -130,20 +120,7 @@ def described(document: Any) -> Described:
     ValueError
         With the field that does not fit.
     """
-    fields = dict(_mapping(document, "the description"))
-    coarse = fields.pop("coarse", None)
-    found = _described(fields, whole=coarse is None)
-    if coarse is None:
-        return found
-    cells = _described(dict(_mapping(coarse, "coarse")), whole=True)
-    mine, theirs = found.fields["settings"], cells.fields["settings"]
-    for name in ("coherence_width", "wavelength_range", "height_scale_max"):
-        _require(getattr(mine, name) == getattr(theirs, name), f"{name} of coarse")
-    _require(not theirs.coherent, "coherence of coarse")
-    return dataclasses.replace(found, coarse=cells)
-
-
-def _described(fields: dict[str, Any], whole: bool) -> Described:
+    fields = _mapping(document, "the description")
     settings = _settings(fields)
     wants = (_RATIOS,) if settings.second_order else ()
     _names(fields, (*_OWN, *_SETTINGS, *wants), (*_OWN, *wants))
@@ -167,35 +144,32 @@ def _described(fields: dict[str, Any], whole: bool) -> Described:
         source=_source(fields["source"]),
         slope_ratios=_ratios(_mapping(fields[_RATIOS], _RATIOS)) if wants else None,
     )
-    _check_agreement(table, whole)
+    _check_agreement(table)
     shares = np.linspace(0.0, 1.0, 33)
     kappa = expansion.length * (np.arange(expansion.intervals)[:, None] + shares).ravel()
     with np.errstate(over="ignore"):
         largest = np.abs(table.order_0_at(kappa)).max()
     _require(largest <= _LARGEST_POWER, f"order_0 of a size of {largest:.3g}")
-    size = 4 * math.prod(Described({"expansion": expansion, "grid": grid}, None).shape)
+    size = 4 * math.prod(Described({"expansion": expansion, "grid": grid}).shape)
     _require(size <= MAX_BYTES, f"{size:.3g} bytes of coefficients")
     values = {field.name: getattr(table, field.name) for field in dataclasses.fields(table)}
-    return Described({k: v for k, v in values.items() if k not in ("coefficients", "coarse")}, None)
+    return Described({name: value for name, value in values.items() if name != "coefficients"})
 
 
-def _check_agreement(table: DiffractionTable, whole: bool) -> None:
+def _check_agreement(table: DiffractionTable) -> None:
     """What follows from other fields is what follows from them."""
     grid, expansion, settings = table.grid, table.expansion, table.settings
     _require(grid.coherent == settings.coherent, "coherent beside coherence")
     _require(expansion.kind == "amplitude" or not grid.coherent, "coherence of powers")
     steps = [table.sigma * spacing for spacing in table.spacing]
-    own = grid.steps if grid.order_0_steps is None else grid.order_0_steps
-    _require(np.allclose(own, steps, rtol=_ROUNDED, atol=0.0), "steps beside spacing")
-    radius = [q / spacing for q, spacing in zip(table.q_max, table.spacing, strict=True)]
-    _require(np.allclose(grid.radius, radius, rtol=1e-3, atol=0.0), "radius beside q_max")
+    _require(np.allclose(grid.steps, steps, rtol=_ROUNDED, atol=0.0), "steps beside spacing")
+    radius = [q / spacing for q, spacing in zip(table.frequency_limit, table.spacing, strict=True)]
+    _require(np.allclose(grid.radius, radius, rtol=1e-3, atol=0.0), "radius beside frequency_limit")
     limit = table.q_limit * table.height_scale_max
-    least = limit if whole else 0.0
     _require(
-        least * (1 - _ROUNDED) <= expansion.kappa_max <= limit * (1 + _ROUNDED),
+        limit * (1 - _ROUNDED) <= expansion.kappa_max <= limit * (1 + _ROUNDED),
         f"kappa_max={expansion.kappa_max:g} beside wavelength_range and height_scale_max",
     )
-    _require(not whole or settings.q_max is None, "q_max without coarse")
 
 
 def _settings(fields: Mapping[str, Any]) -> TableSettings:
@@ -240,9 +214,8 @@ def _resolved(expansion: Expansion) -> Expansion:
 
 def _grid(fields: Mapping[str, Any]) -> Grid:
     required = ("last", "steps", "radius", "taps", "coherent", "trims")
-    _names(fields, (*required, "order_0_steps"), required)
+    _names(fields, required, required)
     _require(isinstance(fields["coherent"], bool), "coherent")
-    own = fields.get("order_0_steps")
     grid = Grid(
         last=_whole_pair(fields["last"], "last", 1, 1 << 20),
         steps=_pair(fields["steps"], "steps", 1e-9, 1e9),
@@ -250,7 +223,6 @@ def _grid(fields: Mapping[str, Any]) -> Grid:
         taps=_whole_pair(fields["taps"], "taps", 1, MAX_TAPS),
         coherent=fields["coherent"],
         trims=tuple(_whole(n, "trims", 0, MAX_TAPS) for n in _list(fields["trims"], "trims")),
-        order_0_steps=None if own is None else _pair(own, "order_0_steps", 1e-9, 1e9),
     )
     for taps, bins in zip(grid.taps, grid.shape[::-1], strict=True):
         _require(taps <= bins, f"{taps} taps of {bins} orders")

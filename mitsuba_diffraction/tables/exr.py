@@ -3,8 +3,8 @@
 A pixel is a bin; bin (0, 0), order 0, is in the middle, x runs along the rows, and the first row
 holds the lowest frequency along y. The channel `power.I.T` holds term T of interval I of a power,
 `re.I.T` and `im.I.T` those of an amplitude. Order 0 itself and the functions of κ that the terms of
-basis "svd" are multiplied with are in the attribute, in full precision. The cells around a table of
-a restricted domain are a second part of the file. A second attribute has the SHA-256 of it all.
+basis "svd" are multiplied with are in the attribute, in full precision. A second attribute has the
+SHA-256 of the rest of the file.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -52,26 +52,21 @@ def save_table(table: DiffractionTable, path: str | os.PathLike[str]) -> None:
     if Path(path).suffix.lower() != ".exr":
         raise DiffractionError(f"cannot write '{path}': a table's file name must end with .exr")
     text = json.dumps({"version": FORMAT_VERSION, **document_of(table)}, default=plain)
-    channels = [
-        {
-            name: np.ascontiguousarray(one.coefficients[index])
-            for name, index in _channels(one.expansion)
-        }
-        for one in table.parts
-    ]
+    channels = {
+        name: np.ascontiguousarray(table.coefficients[index])
+        for name, index in _channels(table.expansion)
+    }
     rows, columns = table.grid.shape
-    # Parts of a file must agree on it
-    shared = {
+    header = {
         "displayWindow": (np.zeros(2, np.int32), np.array([columns - 1, rows - 1], np.int32)),
         "compression": OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
+        ATTRIBUTE: text,
+        CHECKSUM: _checksum(text, channels),
     }
-    headers = [{"name": name, **shared} for name in ("orders", "coarse")[: len(table.parts)]]
-    headers[0] |= {ATTRIBUTE: text, CHECKSUM: _checksum(text, channels)}
     with atomic_path(path) as temporary:
         try:
-            parts = [OpenEXR.Part(*one) for one in zip(headers, channels, strict=True)]
-            OpenEXR.File(parts).write(str(temporary))
+            OpenEXR.File(header, channels).write(str(temporary))
         except RuntimeError as error:  # what OpenEXR makes of a full disk
             raise OSError(None, f"OpenEXR: {one_line(str(error))}") from error
 
@@ -100,13 +95,11 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
         )
     try:
         found = described(document)
-        parts = found.parts
-        _check_headers(headers, parts, os.path.getsize(path))
-        channels = _read(path, lambda file: [file.channels(n) for n in range(len(parts))])
-        planes = [_planes(*one) for one in zip(channels, parts, strict=True)]
+        _check_headers(headers, found, os.path.getsize(path))
+        planes = _planes(_read(path, lambda file: file.channels()), found)
         if headers[0].get(CHECKSUM) != _checksum(str(text), planes):
             raise ValueError("its checksum is that of another one")
-        return found.table(_coefficients(*one) for one in zip(planes, parts, strict=True))
+        return found.table(_coefficients(planes, found))
     except (DiffractionError, ValueError, MemoryError) as error:
         raise DiffractionError(
             f"'{path}' is a damaged table ({one_line(str(error))[:200]}); build it again with "
@@ -149,27 +142,27 @@ def _parsed(text: Any, path: str | os.PathLike[str]) -> dict[str, Any] | None:
     return document if isinstance(document, dict) else None
 
 
-def _check_headers(headers: list[dict[str, Any]], parts: Sequence[Described], size: int) -> None:
-    """Refuse a file whose parts are not the images described, before any is read."""
-    if len(headers) != len(parts):
-        raise ValueError(f"{len(headers)} parts, expected {len(parts)}")
-    for header, part in zip(headers, parts, strict=True):
-        _, rows, columns, _, _ = part.shape
-        low, high = header["dataWindow"]
-        window = [*low.tolist(), *high.tolist()]
-        if window != [0, 0, columns - 1, rows - 1] or header["type"] != OpenEXR.scanlineimage:
-            raise ValueError(f"pixels {window}, expected {columns} x {rows}")
-        names = sorted((c.name, c.xSampling, c.ySampling) for c in header["channels"])
-        if names != sorted((name, 1, 1) for name, _ in _channels(part.fields["expansion"])):
-            raise ValueError(f"{len(names)} channels other than those of its terms")
-    claimed = sum(2 * int(np.prod(part.shape)) for part in parts)
+def _check_headers(headers: list[dict[str, Any]], expected: Described, size: int) -> None:
+    """Refuse a file that is not one image as described, before its pixels are read."""
+    if len(headers) != 1:
+        raise ValueError(f"{len(headers)} parts, expected one")
+    header = headers[0]
+    _, rows, columns, _, _ = expected.shape
+    low, high = header["dataWindow"]
+    window = [*low.tolist(), *high.tolist()]
+    if window != [0, 0, columns - 1, rows - 1] or header["type"] != OpenEXR.scanlineimage:
+        raise ValueError(f"pixels {window}, expected {columns} x {rows}")
+    names = sorted((c.name, c.xSampling, c.ySampling) for c in header["channels"])
+    if names != sorted((name, 1, 1) for name, _ in _channels(expected.fields["expansion"])):
+        raise ValueError(f"{len(names)} channels other than those of its terms")
+    claimed = 2 * int(np.prod(expected.shape))
     if claimed > max(_SMALL, _BEST_COMPRESSION * size):
         raise ValueError(f"{size} bytes that claim to hold {claimed:.2g}")
 
 
-def _planes(channels: Mapping[str, Any], part: Described) -> dict[str, NDArray[np.floating]]:
+def _planes(channels: Mapping[str, Any], expected: Described) -> dict[str, NDArray[np.floating]]:
     """The pixels of each channel, in the order of `_channels`."""
-    expansion = part.fields["expansion"]
+    expansion = expected.fields["expansion"]
     planes = {name: channels[name].pixels for name, _ in _channels(expansion)}
     kinds = {plane.dtype for plane in planes.values()}
     if len(kinds) > 1 or not kinds <= {np.dtype(np.float16), np.dtype(np.float32)}:
@@ -178,21 +171,20 @@ def _planes(channels: Mapping[str, Any], part: Described) -> dict[str, NDArray[n
 
 
 def _coefficients(
-    planes: Mapping[str, NDArray[np.floating]], part: Described
+    planes: Mapping[str, NDArray[np.floating]], expected: Described
 ) -> NDArray[np.floating]:
     """Coefficients (intervals, ny, nx, components, terms), in the precision of the file."""
-    names = list(_channels(part.fields["expansion"]))
-    result = np.empty(part.shape, planes[names[0][0]].dtype)
+    names = list(_channels(expected.fields["expansion"]))
+    result = np.empty(expected.shape, planes[names[0][0]].dtype)
     for name, index in names:
         result[index] = planes[name]
     return result
 
 
-def _checksum(text: str, parts: list[dict[str, NDArray[np.floating]]]) -> str:
+def _checksum(text: str, planes: Mapping[str, NDArray[np.floating]]) -> str:
     content = hashlib.sha256(text.encode())
-    for planes in parts:
-        for plane in planes.values():
-            content.update(np.ascontiguousarray(plane).data)
+    for plane in planes.values():
+        content.update(np.ascontiguousarray(plane).data)
     return content.hexdigest()
 
 
@@ -207,7 +199,7 @@ def _channels(expansion: Expansion) -> Iterator[tuple[str, tuple[Any, ...]]]:
 
 
 def _headers(path: str | os.PathLike[str]) -> list[dict[str, Any]]:
-    """Of every part of an EXR file."""
+    """Headers of all parts of an EXR file; a table has one."""
     return _read(
         path, lambda file: [file.header(n) for n in range(len(file.parts))], header_only=True
     )

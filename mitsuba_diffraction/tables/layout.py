@@ -32,7 +32,6 @@ class Grid:
     taps : (x, y) bins read by a look-up.
     coherent : amplitudes are added (`patch`) instead of powers.
     trims : taps left out at both ends of each row, one number a row; empty if none are.
-    order_0_steps : bin spacing in units of order 0's own 1/σ, where that differs (`build.coarse`).
     """
 
     last: tuple[int, int]
@@ -41,7 +40,6 @@ class Grid:
     taps: tuple[int, int]
     coherent: bool
     trims: tuple[int, ...] = ()
-    order_0_steps: tuple[float, float] | None = None
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -73,13 +71,6 @@ class Grid:
         """Of exp(−exponent·Δ²), the weight of a bin Δ bins away."""
         half = 0.5 if self.coherent else 1.0
         return half * self.steps[0] ** 2, half * self.steps[1] ** 2
-
-    @property
-    def order_0_exponents(self) -> tuple[float, float]:
-        """The same for order 0."""
-        if self.order_0_steps is None:
-            return self.exponents
-        return self.order_0_steps[0] ** 2, self.order_0_steps[1] ** 2
 
 
 @dataclass(frozen=True)

@@ -39,9 +39,8 @@ def window_sum(
 
     Returns
     -------
-    Array of that shape; NaN where the table holds nothing (beyond κ_max, or beyond the reach of
-    its shortest wavelength): a table never extrapolates. One of a restricted domain has its coarse
-    part there.
+    Array of that shape; NaN beyond κ_max or the reach of the shortest wavelength, since a table
+    never extrapolates; 0 beyond the table's `frequency_limit`.
 
     Raises
     ------
@@ -95,11 +94,8 @@ def _window_sum(
     kernels = (_gaussian(grid.exponents[0]), _gaussian(grid.exponents[1]))
     summed = weighted_sum(table, qx, qy, kappa, kernels, grid.taps, place)
     result = np.sum(summed**2, axis=1) if grid.coherent else np.maximum(summed[:, 0], 0.0)
-    outside = ~table.covers(qx, qy, kappa)
-    if table.coarse is None:
-        result[outside] = np.nan
-    elif outside.any():
-        result[outside] = _window_sum(table.coarse, qx[outside], qy[outside], kappa[outside])
+    result[~table.covers(qx, qy, kappa)] = 0.0
+    result[~table.reachable(qx, qy, kappa)] = np.nan
     return result
 
 
@@ -149,11 +145,7 @@ def weighted_sum(
             return np.sum(values**2, axis=1, keepdims=True)
         return values
 
-    if grid.order_0_steps is not None:
-        lobe = [_gaussian(exponent) for exponent in grid.order_0_exponents]
-    else:
-        lobe = list(kernels)
-    total = bin_value(table.order_0_at(kappa)) * (lobe[0](x) * lobe[1](y))[:, None]
+    total = bin_value(table.order_0_at(kappa)) * (kernels[0](x) * kernels[1](y))[:, None]
     trims = grid.trims if taps == grid.taps and grid.trims else (0,) * taps[1]
     for j, trim in enumerate(trims):
         for i in range(trim, taps[0] - trim):

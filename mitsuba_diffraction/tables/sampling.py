@@ -14,13 +14,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse, special
 
-from .build.coarse import cell_powers
 from .table import DiffractionTable
 from .window import apply_window, tap_matrix
 
@@ -33,7 +31,6 @@ FEWEST_KAPPAS, MOST_KAPPAS = 16, 160
 _FADED = 12.0  # exp(−12) = 6e-6 of a Gaussian's peak is nothing
 #: Bins closer than this (in 1/σ) are joined: together they are hardly wider than one lobe.
 _JOINED = 1.0
-_PARTS = 8  # a side of a cell that the edge of a table's domain crosses
 
 
 @dataclass(frozen=True)
@@ -93,8 +90,7 @@ def order_mixture(table: DiffractionTable, height_scale: float, smoothing: float
     kappa_max = table.q_limit * height_scale
     periods = kappa_max * expansion.half_range / math.pi
     count = int(np.clip(math.ceil(PER_PERIOD * periods), FEWEST_KAPPAS, MOST_KAPPAS)) + 1
-    longest = expansion if table.coarse is None else table.coarse.expansion
-    kappas = np.linspace(0.0, min(kappa_max, longest.kappa_max), count)
+    kappas = np.linspace(0.0, min(kappa_max, expansion.kappa_max), count)
     own = 1.0 / (math.sqrt(2.0) * table.sigma)  # standard deviation of one lobe
     all_smooth = own >= smoothing
     smoothing = max(smoothing, own)
@@ -108,16 +104,14 @@ def order_mixture(table: DiffractionTable, height_scale: float, smoothing: float
     powers = np.empty((count, 0), np.float32)
     strongest = np.zeros((len(axes[1].frequency), len(axes[0].frequency)), np.float32)
     kept = []
-    powers_at: _Powers | _PlannedPowers = _Powers(table, axes)
-    if table.coarse is not None:
-        powers_at = _PlannedPowers(table, table.coarse, axes, grid, smoothing)
+    powers_at = _Powers(table, axes)
     for n, kappa in enumerate(kappas):
-        power, central[n], around = powers_at(float(kappa))
+        power, central[n] = powers_at(float(kappa))
         if all_smooth:  # order 0 then is as wide as any other
             power[len(power) // 2, power.shape[1] // 2] += central[n]
             central[n] = 0.0
         np.maximum(strongest, power, out=strongest)
-        density[n] = (splats[0] @ (splats[1] @ power).T).T + around
+        density[n] = (splats[0] @ (splats[1] @ power).T).T
         kept.append(power if power.nbytes * count < 400e6 else None)
     chosen = _choose(strongest) if not all_smooth else np.zeros((0, 2), int)
     rows, columns = chosen.T
@@ -177,8 +171,8 @@ class _Powers:
         self._interval = -1
         self._coefficients: NDArray[np.float32] = np.zeros((0, 0), np.float32)
 
-    def __call__(self, kappa: float) -> tuple[NDArray[np.float32], float, Any]:
-        """Powers (ny, nx) of all orders but order 0, that of order 0, and the density besides."""
+    def __call__(self, kappa: float) -> tuple[NDArray[np.float32], float]:
+        """Powers (ny, nx) of all orders but order 0, and that of order 0."""
         table, axes = self._table, self._axes
         expansion = table.expansion
         interval = int(expansion.interval(kappa))
@@ -193,11 +187,8 @@ class _Powers:
             amplitude = parts[..., 0] + 1j * parts[..., 1]
             amplitude[table.grid.last[1], table.grid.last[0]] = complex(*centre)
             field = (axes[0].matrix @ (axes[1].matrix @ amplitude).T).T
-            return (
-                np.abs(field).astype(np.float32) ** 2 * (axes[0].weight * axes[1].weight),
-                0.0,
-                0.0,
-            )
+            weight = axes[0].weight * axes[1].weight
+            return np.abs(field).astype(np.float32) ** 2 * weight, 0.0
         if expansion.kind == "power":
             power, order_0 = np.maximum(parts[..., 0], 0.0), max(float(centre[0]), 0.0)
         else:
@@ -206,53 +197,7 @@ class _Powers:
             power = power @ axes[0].matrix.T
         if len(axes[1].frequency) < ny:
             power = axes[1].matrix @ power
-        return power, order_0, 0.0
-
-
-class _PlannedPowers:
-    """Powers of a planned table: its own orders in its domain, coarse cells as density beyond."""
-
-    def __init__(
-        self,
-        table: DiffractionTable,
-        coarse: DiffractionTable,
-        axes: list[_Axis],
-        grid: NDArray[np.floating],
-        smoothing: float,
-    ) -> None:
-        self._fine, self._coarse = _Powers(table, axes), coarse
-        self._kappa_max = table.expansion.kappa_max
-        nothing = np.zeros(coarse.grid.shape, np.float32)
-        _, middles = cell_powers(coarse, nothing)
-        self._splats = [_splat(middle, grid, smoothing) for middle in middles]
-        # Which orders the table itself has, and the share of each cell that it has not
-        x, y = (axis.frequency for axis in axes)
-        along_x, along_y = table.q_max
-        self._inside = (np.hypot(x / along_x, y[:, None] / along_y) <= 1.0).astype(np.float32)
-        within = (np.arange(_PARTS) + 0.5) / _PARTS - 0.5
-        x, y = (
-            (middle[:, None] + width * within).ravel()
-            for middle, width in zip(middles, coarse.spacing, strict=True)
-        )
-        outside = np.hypot(x / along_x, y[:, None] / along_y) > 1.0
-        shape = (len(middles[1]), _PARTS, len(middles[0]), _PARTS)
-        self._outside = outside.reshape(shape).mean(axis=(1, 3)).astype(np.float32)
-
-    def __call__(self, kappa: float) -> tuple[NDArray[np.float32], float, Any]:
-        """As `_Powers`."""
-        coarse = self._coarse
-        interval = int(coarse.expansion.interval(kappa))
-        scaled = (coarse.expansion.weights(kappa) / coarse.scale).astype(np.float32)
-        series = coarse.coefficients[interval, :, :, 0].astype(np.float32) @ scaled
-        cells, _ = cell_powers(coarse, series)
-        power, order_0, _ = self._fine(kappa)
-        power *= self._inside
-        if kappa <= self._kappa_max:
-            cells = cells * self._outside
-        else:
-            power[...], order_0 = 0.0, max(float(coarse.order_0_at(kappa)[0]), 0.0)
-        around = (self._splats[0] @ (self._splats[1] @ cells).T).T
-        return power, order_0, around.astype(np.float32)
+        return power, order_0
 
 
 def _splat(
@@ -351,7 +296,7 @@ def proposals(table: DiffractionTable) -> Proposals:
 def _axis(table: DiffractionTable, axis: int) -> tuple[float, int, bool]:
     """Width of the cells along an axis, how many, and whether each is one order's."""
     spacing, last = table.spacing[axis], table.grid.last[axis]
-    edge = min(table.q_max[axis], last * spacing) + 2.0 / table.sigma
+    edge = min(table.frequency_limit[axis], last * spacing) + 2.0 / table.sigma
     if spacing * table.sigma > APART:
         return spacing, 2 * math.ceil(edge / spacing) + 1, True
     cell = max(CELL / table.sigma, 2.0 * edge / MOST_CELLS)

@@ -28,7 +28,6 @@ from ..atomic import atomic_path, remove_abandoned
 from ..errors import DiffractionError, one_line, warn
 from ..heights.validity import TEXTS_VERSION
 from ..settings import TableSettings
-from .build import coarse
 from .colour.build import PolarGrid
 from .colour.table import COLOUR_VERSION, ColourTable
 from .document import described, document_of, plain
@@ -235,10 +234,7 @@ _COLOUR_NUMBERS = ("scale", "radius_end", "sigma")
 
 def table_key(digest: str, settings: TableSettings) -> str:
     """Name of the table of heights with this digest, built with these settings."""
-    cells: tuple[float, ...] = ()
-    if settings.q_max or settings.kappa_max:  # it goes on in cells that no setting tells of
-        cells = (coarse.CELL, coarse.FEWEST, coarse.STEP, coarse.TOLERANCE)
-    return key_of(FORMAT_VERSION, TEXTS_VERSION, digest, asdict(settings), cells)
+    return key_of(FORMAT_VERSION, TEXTS_VERSION, digest, asdict(settings))
 
 
 def cached_table(
@@ -251,15 +247,15 @@ def cached_table(
 
 def _table_record(table: DiffractionTable) -> Record:
     document = json.loads(json.dumps(document_of(table), default=plain))
-    return Record(document, [part.coefficients for part in table.parts])
+    return Record(document, [table.coefficients])
 
 
 def _table_of(record: Record) -> DiffractionTable:
     found = described(record.document)
-    shapes = [part.shape for part in found.parts]
-    if [array.shape for array in record.arrays] != shapes:
-        raise ValueError(f"arrays of other shapes than {shapes}")
-    return found.table(record.arrays)
+    (coefficients,) = record.arrays
+    if coefficients.shape != found.shape:
+        raise ValueError(f"coefficients of another shape than {found.shape}")
+    return found.table(coefficients)
 
 
 def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:

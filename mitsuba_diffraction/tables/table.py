@@ -46,8 +46,6 @@ class DiffractionTable:
     error : the measured error (see `build.error`): near order 0, far from it, and at which κ.
     roughness : height variance by spatial frequency, up to `q_limit`; the mean of several patches'.
     source : the heights: name, digest, size, statistics, history.
-    coarse : of a table that ends before `q_limit` or its own `kappa_max`, the cells that go on
-        from there (`build.coarse`).
     slope_ratios : what the second order needs of the heights, where `settings` ask for it.
     """
 
@@ -61,7 +59,6 @@ class DiffractionTable:
     error: Mapping[str, float]
     roughness: RoughnessTable
     source: Mapping[str, Any] = field(default_factory=dict)
-    coarse: DiffractionTable | None = None
     slope_ratios: SlopeRatios | None = None
 
     # Set by the package `tables`, since what they do builds on this class
@@ -112,9 +109,14 @@ class DiffractionTable:
         return q_limit_of(self.wavelength_range)
 
     @property
-    def q_max(self) -> tuple[float, float]:
+    def frequency_limit(self) -> tuple[float, float]:
         """Half axes (x, y) of the ellipse in which the table has the orders, rad/µm."""
-        return self.settings.q_max or (self.q_limit, self.q_limit)
+        return self.settings.frequency_limit or (self.q_limit, self.q_limit)
+
+    @property
+    def limited(self) -> bool:
+        """Whether the table lacks orders that light can probe."""
+        return self.settings.frequency_limit is not None
 
     @cached_property
     def averaged(self) -> DiffractionTable:
@@ -126,11 +128,6 @@ class DiffractionTable:
         settings = replace(self.settings, coherence="ensemble")
         return replace(self, grid=replace(self.grid, coherent=False), settings=settings)
 
-    @property
-    def parts(self) -> tuple[DiffractionTable, ...]:
-        """The table, and the coarse one that it has, if it has one."""
-        return (self,) if self.coarse is None else (self, self.coarse)
-
     def digest(self) -> str:
         """SHA-256 of all that look-ups depend on; not of names, statistics and measured errors."""
         return self._digest
@@ -138,47 +135,55 @@ class DiffractionTable:
     @cached_property
     def _digest(self) -> str:
         content = hashlib.sha256()
-        for part in self.parts:
-            expansion = {**asdict(part.expansion), "functions": None}
-            plain = [asdict(part.settings), expansion, asdict(part.grid), part.spacing, part.scale]
-            plain.append(part.roughness.first)
-            arrays = (part.coefficients, part.order_0, part.roughness.nodes)
-            for numbers in (*arrays, part.expansion.functions):
-                if numbers is not None:
-                    plain.append([numbers.dtype.str, numbers.shape])
-                    content.update(np.ascontiguousarray(numbers).data)
-            if part.slope_ratios is not None:
-                plain.append([*part.slope_ratios.cell, *part.slope_ratios.kappa])
-                content.update(part.slope_ratios.values.data)
-            content.update(json.dumps(plain, sort_keys=True).encode())
+        expansion = {**asdict(self.expansion), "functions": None}
+        plain = [asdict(self.settings), expansion, asdict(self.grid), self.spacing, self.scale]
+        plain.append(self.roughness.first)
+        arrays = (self.coefficients, self.order_0, self.roughness.nodes)
+        for numbers in (*arrays, self.expansion.functions):
+            if numbers is not None:
+                plain.append([numbers.dtype.str, numbers.shape])
+                content.update(np.ascontiguousarray(numbers).data)
+        if self.slope_ratios is not None:
+            plain.append([*self.slope_ratios.cell, *self.slope_ratios.kappa])
+            content.update(self.slope_ratios.values.data)
+        content.update(json.dumps(plain, sort_keys=True).encode())
         return content.hexdigest()
 
     @property
     def nbytes(self) -> int:
         """Size of the coefficients in memory."""
-        return sum(part.coefficients.nbytes for part in self.parts)
+        return self.coefficients.nbytes
 
     def require_whole(self, what: str) -> None:
-        """Refuse a table of a restricted domain, for what reads orders on its own.
+        """Refuse a limited table where all orders are needed.
+
+        what : names what needs them, with its verb.
 
         Raises
         ------
         DiffractionError
-            Naming `what` needs all of them.
+            If the table has a `frequency_limit`.
         """
-        if self.coarse is not None:
+        if self.limited:
+            x, y = self.frequency_limit
             raise DiffractionError(
-                f"{what} all orders, but the table was made for frequencies up to "
-                f"{self.q_max[0]:.4g} along x, {self.q_max[1]:.4g} along y and κ up to "
-                f"{self.expansion.kappa_max:.4g} rad/µm only; give a table without q_max and "
-                "kappa_max, or the height field"
+                f"{what} all orders, but the table ends at the frequencies {x:.4g} along x and "
+                f"{y:.4g} rad/µm along y; give a table without frequency_limit, or the height field"
             )
 
     def covers(self, qx: ArrayLike, qy: ArrayLike, kappa: ArrayLike) -> NDArray[np.bool_]:
-        """Whether a look-up finds the orders (to rounding in single precision)."""
+        """Whether the table has the orders there (to rounding in single precision)."""
+        return self._within(self.frequency_limit, qx, qy, kappa)
+
+    def reachable(self, qx: ArrayLike, qy: ArrayLike, kappa: ArrayLike) -> NDArray[np.bool_]:
+        """Whether light of the table's wavelengths and heights can probe it."""
+        return self._within((self.q_limit, self.q_limit), qx, qy, kappa)
+
+    def _within(
+        self, radii: tuple[float, float], qx: ArrayLike, qy: ArrayLike, kappa: ArrayLike
+    ) -> NDArray[np.bool_]:
         slack = 1.0 + 1e-6
-        x, y = (np.asarray(q) / r for q, r in zip((qx, qy), self.q_max, strict=True))
-        inside = np.hypot(x, y) <= slack
+        inside = np.hypot(np.asarray(qx) / radii[0], np.asarray(qy) / radii[1]) <= slack
         return inside & (np.asarray(kappa) <= self.expansion.kappa_max * slack)
 
     def order_0_at(self, kappa: ArrayLike) -> NDArray[np.float64]:
@@ -211,7 +216,7 @@ class DiffractionTable:
             "intervals_of_kappa": intervals,
             "taps": list(self.grid.taps),
             "orders": [nx, ny],
-            **self._restriction(),
+            **({"frequency_limit": list(self.frequency_limit)} if self.limited else {}),
             "second_order": self._second_order(),
             "components": components,
             "precision": str(self.coefficients.dtype),
@@ -226,18 +231,6 @@ class DiffractionTable:
             "asked": self.settings.second_order,
             "applied": applies(self.settings.second_order, self.slope_ratios),
             "changes_colours_by": self.slope_ratios.change,
-        }
-
-    def _restriction(self) -> dict[str, Any]:
-        if self.coarse is None:
-            return {}
-        _, ny, nx, _, _ = self.coarse.coefficients.shape
-        return {
-            "restricted_to": {
-                "frequency (rad/µm)": list(self.q_max),
-                "kappa (rad/µm)": self.expansion.kappa_max,
-                "cells beyond": [nx, ny],
-            }
         }
 
     def __repr__(self) -> str:

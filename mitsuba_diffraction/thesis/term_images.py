@@ -46,7 +46,7 @@ class TermImages(DeviceTable):
             for column in range(grid.taps[0])
         ]
         lobe = dr.exp(-grid.exponents[0] * dr.square(x) - grid.exponents[1] * dr.square(y))
-        order_0 = mi.Complex2f(*(lobe * c for c in self.series.at(kappa)[2]))
+        order_0 = mi.Complex2f(*(lobe * c for c in self.series.at(kappa).order_0))
         scaled = kappa * expansion.half_range
 
         def of_term(n: Any, image: Any, weight: Any, total: Any) -> tuple[Any, ...]:

@@ -18,8 +18,6 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.heights.recipes import Recipe
 from mitsuba_diffraction.scene.load import load_scene
 from mitsuba_diffraction.scene.orientation.files import load_mesh
-from mitsuba_diffraction.scene.planning.plan import Plan
-from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.document import described
 from mitsuba_diffraction.tables.exr import read_document
 from tests.support.directions import rough_patch
@@ -46,13 +44,6 @@ end_header
 """
 _OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1\n"
 _GWYDDION = "# Channel: Height\n# Width: 2.4 µm\n# Height: 2 µm\n# Value units: nm\n"
-_PLAN = {
-    "kind": "mitsuba-diffraction plan", "version": 2, "scene": "a.xml", "tolerance": 1e-3,
-    "paths": 1000, "tables": {"5" * 64: {
-        "surfaces": ["skin"], "name": "a.npy", "digest": "6" * 64, "memory": [1000, 100],
-        "domain": {"crop": [20.0, 10.0], "kappa_max": 30.0, "tolerance": 1e-3, "outside": 1e-4},
-    }},
-}  # fmt: skip
 _SCENE = """<scene version="3.0.0"><default name="width" value="4"/>
 <integrator type="path"><integer name="max_depth" value="3"/></integrator>
 <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="$width"/>
@@ -87,7 +78,6 @@ def originals() -> dict[str, bytes]:
         (at / "recipe.toml").write_text(_RECIPE)
         (at / "mesh.ply").write_text(_PLY)
         (at / "mesh.obj").write_text(_OBJ)
-        (at / "plan.json").write_text(json.dumps(_PLAN))
         np.savetxt(at / "gwyddion.txt", field.heights, header=_GWYDDION, comments="")
         np.savetxt(at / "heights.csv", field.heights, delimiter=",")
         return {path.name: path.read_bytes() for path in sorted(at.iterdir())}
@@ -137,11 +127,10 @@ def check_document(rng: np.random.Generator) -> None:
     _mutate(rng, document)
     try:
         found = described(document)
-        shapes = [one.shape for one in (found, found.coarse) if one is not None]
         # as many numbers as it declares, which `exr` compares with the file's size
-        if sum(int(np.prod(shape)) for shape in shapes) > _MOST_NUMBERS:
+        if int(np.prod(found.shape)) > _MOST_NUMBERS:
             return
-        table = found.table(rng.normal(0.0, 1e-3, shape).astype(np.float32) for shape in shapes)
+        table = found.table(rng.normal(0.0, 1e-3, found.shape).astype(np.float32))
     except (md.DiffractionError, ValueError, MemoryError):  # what `load_table` makes one line of
         return
     with tempfile.TemporaryDirectory() as folder:
@@ -192,10 +181,9 @@ def check_heights(rng: np.random.Generator) -> None:
 
 
 def check_text(rng: np.random.Generator) -> None:
-    """Recipes, meshes and plans."""
+    """Recipes and meshes."""
     _check(rng, ["recipe.toml"], lambda path: Recipe.load(path))
     _check(rng, ["mesh.ply", "mesh.obj"], lambda path: load_mesh(path))
-    _check(rng, ["plan.json"], _use_plan)
 
 
 def check_scene(rng: np.random.Generator) -> None:
@@ -229,11 +217,6 @@ def _check(rng: np.random.Generator, names: list[str], use: Callable[[Path], obj
 def _check_line(error: md.DiffractionError) -> None:
     assert len(str(error)) <= _MOST, "too long a message"
     assert "\n" not in str(error), "more than one line"
-
-
-def _use_plan(path: Path) -> None:
-    for limits in Plan.load(path).limits().values():
-        TableSettings(coherence_width=2.0, **limits)
 
 
 def _use_heights(path: Path) -> None:

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.plugin.lookup import _UNROLLED_TAPS
-from mitsuba_diffraction.plugin.restricted import device_table
+from mitsuba_diffraction.plugin.lookup import _UNROLLED_TAPS, device_table
 from tests.support.directions import rough_patch
 from tests.support.lanes import lanes
 
@@ -31,7 +30,7 @@ def drawn(seed):
         wavelength_range=(500, 600),
     )
     angle, share = rng.uniform(0, 2 * np.pi, 40), np.sqrt(rng.uniform(0, 0.95, 40))
-    radii = table.q_max
+    radii = table.frequency_limit
     asked = radii[0] * share * np.cos(angle), radii[1] * share * np.sin(angle)
     return table, (*asked, rng.uniform(0.5, 0.99, 40) * table.expansion.kappa_max)
 

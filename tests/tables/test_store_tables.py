@@ -111,16 +111,6 @@ def test_tables_of_another_format_are_built_anew(monkeypatch):
     assert build.built == 2
 
 
-def test_cells_of_another_width_are_another_table(monkeypatch):
-    whole, planned = Builder(), Builder(**ARGUMENTS, q_max=20.0)
-    tables = [build.table() for build in (whole, planned)]
-    monkeypatch.setattr("mitsuba_diffraction.tables.build.coarse.FEWEST", 4)
-    again = [build.table() for build in (whole, planned)]
-    assert again[0] is tables[0]
-    assert (whole.built, planned.built) == (1, 2)
-    assert again[1].coarse.spacing > tables[1].coarse.spacing
-
-
 @pytest.mark.parametrize("content", [b"", b"half a table"])
 def test_a_damaged_file_is_replaced(folder, content):
     build = Builder()
@@ -222,7 +212,6 @@ def test_a_digest_is_of_what_is_looked_up_alone():
         dataclasses.replace(table, coefficients=other),
         dataclasses.replace(table, order_0=table.order_0 + 1e-9),
         dataclasses.replace(table, scale=2.0 * table.scale),
-        dataclasses.replace(table, coarse=table),
         dataclasses.replace(table, roughness=dataclasses.replace(table.roughness, first=-3.0)),
     ):
         assert changed.digest() != table.digest()

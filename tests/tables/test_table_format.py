@@ -28,7 +28,7 @@ KINDS = {
     "single floats": {"tolerance": 1e-5},
     "amplitudes": {"coherence": "patch"},
     "taylor": {"basis": "taylor"},
-    "restricted": {"q_max": 12.0, "kappa_max": 20.0},
+    "limited": {"frequency_limit": 12.0},
 }
 
 
@@ -112,12 +112,11 @@ def test_the_plugin_takes_what_the_page_s_writer_wrote(examples, some_variant):
 
 def test_the_page_describes_every_field(tmp_path):
     file = tmp_path / "table.exr"
-    DiffractionTable.build(PATCH, coherence_width=1.8, **KINDS["restricted"]).save(file)
+    DiffractionTable.build(PATCH, coherence_width=1.8, **KINDS["limited"]).save(file)
     document = read_document(file)
-    coarse = document["coarse"]
     rows = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \|", PAGE, re.M)
     described = set(re.findall(r"\w+", " ".join(rows)))
-    fields = {*document, *coarse, *document["expansion"], *document["grid"], *coarse["grid"]}
+    fields = {*document, *document["expansion"], *document["grid"]}
     assert fields | {"windows"} == described  # of wide scans alone
     assert f"This page describes version\n{FORMAT_VERSION};" in PAGE
     assert json.dumps(document["version"]) == str(FORMAT_VERSION)

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from mitsuba_diffraction.analysis.timing import PIXEL, Queries, quiet_bsdf
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.field import HeightField
-from mitsuba_diffraction.plugin.lookup import DeviceTable
-from mitsuba_diffraction.plugin.restricted import device_table
+from mitsuba_diffraction.plugin.lookup import device_table
 from mitsuba_diffraction.progress import Progress
 from mitsuba_diffraction.tables.table import DiffractionTable
 from mitsuba_diffraction.thesis.term_images import thesis_bsdf
@@ -131,7 +130,6 @@ def bare_gathers(table: DiffractionTable, queries: Queries) -> Callable[[], Any]
     Where they are is found out beforehand.
     """
     device = device_table(table)
-    assert isinstance(device, DeviceTable)  # only scalar variants have another
     si, total = queries.si, queries.si.wi + queries.wo
     firsts = []
     for n in range(len(si.wavelengths)):

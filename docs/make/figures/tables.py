@@ -147,12 +147,9 @@ def _spectral(spectral: dict[str, Any]) -> str:
     return f"{by_step}\n\n{by_count}"
 
 
-_PICTURE = "picture, planned against whole, same random numbers"
-
-
 def plan(report: dict[str, Any], name: str = "") -> dict[str, str]:
     """`planned` in a sentence, `plan` in full."""
-    table, picture = report["tables"][0], report[_PICTURE]
+    table = report["tables"][0]
     whole, planned = table["whole"], table["planned"]
     asked, needs = table["asked for"], table["needs"]
     frequency = asked["frequency (rad/µm)"]["light can probe"]
@@ -161,17 +158,10 @@ def plan(report: dict[str, Any], name: str = "") -> dict[str, str]:
         ("frequencies, rad/µm", f"up to {frequency:.1f}", _frequencies(needs)),
         ("κ, rad/µm", f"up to {kappa:.1f}", f"up to {needs['kappa (rad/µm)']:.1f}"),
         ("series in κ, terms", str(whole["terms"]), str(planned["terms"])),
-        ("table", *(f"{one['memory_mb']:.2g} MB" for one in (whole, planned))),
-        (
-            "densities for sampling",
-            *(f"{one['sampling_memory_mb']:.2g} MB" for one in (whole, planned)),
-        ),
+        ("table", *(f"{figures['memory_mb']:.2g} MB" for figures in (whole, planned))),
     ]
-    shift, mean = picture["mean difference / mean (XYZ)"], picture["delta E 2000, mean"]
-    change = (
-        f"and the picture changes by {shift:.0e} of its mean (XYZ; ΔE2000 {mean:.2f}, 99 % "
-        f"{picture['delta E 2000, 99 %']:.2f})"
-    )
+    missing = needs["share of the light outside, which is missing"]
+    change = f"and {100 * missing:.2g} % of the light from the skin is missing"
     less = table["times less memory"]
     return {
         "planned": f"The snake's table shrinks from {whole['memory_mb']:.1f} to "

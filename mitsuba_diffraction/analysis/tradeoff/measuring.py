@@ -192,7 +192,7 @@ def measure(
 def _table(field: HeightField, setting: Setting, coherence_width: float) -> DiffractionTable:
     arguments: dict[str, Any] = dict(setting.arguments)
     if setting.crop is not None:
-        arguments["q_max"] = setting.crop * q_limit_of((360.0, 830.0))
+        arguments["frequency_limit"] = setting.crop * q_limit_of((360.0, 830.0))
     table = DiffractionTable.build(field, coherence_width=coherence_width, **arguments)
     if setting.stored is None:
         return table

@@ -139,7 +139,7 @@ def pack_obstacles(triangles: Array) -> Packed:
 
 
 def _places(triangles: Array) -> Iterator[Array]:
-    """WindowPositions (n, 3) all over triangles (n, 3, 3), in cells, some at a time."""
+    """Places (n, 3) all over triangles (n, 3, 3), in cells, some at a time."""
     sides = triangles - np.roll(triangles, 1, axis=1)
     longest = np.sqrt((sides**2).sum(axis=2).max(axis=1))
     parts = np.maximum(np.ceil(longest / _SPACING), 1.0).astype(int)

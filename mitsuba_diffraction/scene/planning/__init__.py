@@ -2,9 +2,9 @@
 
 Contents
 --------
-paths        paths through a scene, and what its BSDFs are asked on them
-recording    records of look-ups, and plans that are followed while a scene loads
-plan         `Plan`: how much of each table that takes, as a file
-make         making one, and trying what it changes in the picture
-report       what it found, as plain data, with the time of look-ups and how many fall outside
+paths        paths through a scene, and the look-ups of its BSDFs on them
+recording    loading with other tables, and with BSDFs that record their look-ups
+lookups      how far the look-ups in one table go, with how much of the light
+plan         limits of each table, as recipes, and loading a scene by them
+report       what a table is asked for and what limits save, as plain data
 """

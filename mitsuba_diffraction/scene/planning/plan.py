@@ -1,259 +1,250 @@
-"""A plan: from what surfaces are asked to the part of each table that suffices, as a small file."""
+"""Plans: the smallest limits of each table of a scene that leave next to no light outside.
+
+A plan is made of recipes. Each describes the heights of one table, as the scene has them, with a
+`frequency_limit` and a `height_scale_max` besides; `precompute` builds it like any other recipe.
+"""
 
 from __future__ import annotations
 
-import json
-import math
-import os
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+import mitsuba as mi
 
-from ...atomic import atomic_path
-from ...errors import DiffractionError, quoted
-from ...files import read_text
-from ...optics.colour import delta_e, linear_srgb
-from ...optics.geometry import wavenumber
+from ...errors import DiffractionError
+from ...heights.recipes import Recipe
+from ...optics.second_order_change import applies
+from ...plugin.sources import TableRequest
+from ...settings import RECIPE_SETTINGS, TableSettings
 from ...tables.table import DiffractionTable
+from .lookups import Lookups
+from .paths import TracedPaths, trace
+from .recording import Session
 
-#: No planned table is coarser than this in itself.
-MOST_TOLERANCE = 1e-2
-#: A frequency beyond the last that was asked for: a path not traced may go a little farther.
-ROOM = 1.02
+#: Settings that a plan chooses.
+CHOSEN = ("frequency_limit", "height_scale_max", "second_order")
+#: Share of a table's size above which a limited one is not worth it.
+WORTH = 0.8
 
-#: Raised whenever an older file would mean something else.
-VERSION = 2
-_KIND = "mitsuba-diffraction plan"
-
-_REMEDY = "make one with 'mitsuba-diffraction plan SCENE -o plan.json'"
-
-
-@dataclass(frozen=True)
-class Lookups:
-    """What one table is asked, over all surfaces that share it."""
-
-    # u, v, w: (n,) ωi + ωo in the patch's frame, w times height_scale
-    u: NDArray[np.float64]
-    v: NDArray[np.float64]
-    w: NDArray[np.float64]
-    wavelength: NDArray[np.float64]  # (n,) nm
-    # (n, 3) light of the picture that each look-up adds, the whole picture's being 1
-    xyz: NDArray[np.float64]
-    total: float  # light of all paths that meet the surfaces, what lies beneath included
-
-    @property
-    def light(self) -> NDArray[np.float64]:
-        """(n,) relative to all light of the surfaces."""
-        return np.asarray(self.xyz.sum(axis=1) / self.total)
-
-    @property
-    def wavenumber(self) -> NDArray[np.float64]:
-        """(n,) k in rad/µm: u and v times it are α and β."""
-        return np.asarray(wavenumber(self.wavelength))
-
-    @property
-    def along(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(n,), (n,) |α| and |β| in rad/µm."""
-        return np.abs(self.wavenumber * self.u), np.abs(self.wavenumber * self.v)
-
-    @property
-    def frequency(self) -> NDArray[np.float64]:
-        """(n,) |q| in rad/µm."""
-        return np.hypot(*self.along)
-
-    @property
-    def kappa(self) -> NDArray[np.float64]:
-        """(n,) rad/µm."""
-        return np.asarray(self.wavenumber * self.w)
-
-    def outside(self, crop: tuple[float, float], kappa_max: float) -> float:
-        """Share of the surfaces' light that is asked of beyond a domain."""
-        x, y = (q / half for q, half in zip(self.along, crop, strict=True))
-        beyond = (np.hypot(x, y) > 1.0) | (self.kappa > kappa_max)
-        return float(self.light[beyond].sum())
+Load = Callable[[], Any]
 
 
 @dataclass(frozen=True)
-class Domain:
-    """How much of a table a scene needs."""
+class RecordedTable:
+    """A table of a scene, and the look-ups in it.
 
-    # crop, kappa_max: rad/µm, see `DiffractionTable.build`
-    crop: tuple[float, float]
-    kappa_max: float
-    tolerance: float  # of the table itself
-    outside: float  # share of the surfaces' light that is looked up beyond
-
-    def arguments(self) -> dict[str, Any]:
-        """For `DiffractionTable.build`."""
-        return {"q_max": self.crop, "kappa_max": self.kappa_max, "tolerance": self.tolerance}
-
-
-def domain_for(
-    asked: Lookups, table: DiffractionTable, height_scale: float, tolerance: float
-) -> Domain:
-    """The smallest domain that leaves at most `tolerance` of the surfaces' light outside.
-
-    Diffraction is but a part of that light: the table's own relative error may be larger than the
-    picture's by that factor.
-
-    asked : what is asked of the table.
-    table : the table of everything, as the scene would have it.
-    height_scale : largest of the surfaces'.
-    tolerance : relative error of the picture.
+    Attributes
+    ----------
+    request : the heights and settings, as the scene has them.
+    table : of all orders.
+    surfaces : names of the BSDFs that look it up.
+    lookups : made by the paths; None where no path meets the surfaces.
+    lobe_turn : see `paths.TracedPaths.lobe_turn`; the largest of the surfaces'.
     """
-    light = asked.light
-    crop = _ellipse(asked.along, light, tolerance)
-    crop = (min(crop[0] * ROOM, table.q_limit), min(crop[1] * ROOM, table.q_limit))
-    # All that these heights can make: the bound of the albedo looks at every direction, and next
-    # to nothing is gained by less
-    kappa_max = table.q_limit * height_scale
-    own = tolerance / max(float(light.sum()), 1e-6)
-    return Domain(
-        crop=crop,
-        kappa_max=kappa_max,
-        tolerance=max(table.tolerance, float(f"{min(own, MOST_TOLERANCE):.2g}")),
-        outside=asked.outside(crop, kappa_max),
-    )
 
-
-def _ellipse(
-    along: tuple[NDArray[np.float64], NDArray[np.float64]], light: NDArray[np.float64], share: float
-) -> tuple[float, float]:
-    """Half axes of the smallest ellipse that leaves at most a share of the light outside."""
-    x, y = along
-    # Fingers and tracks spread light across themselves much farther than along
-    ratios = 2.0 ** np.arange(-3.0, 3.01, 0.25)
-    halves = [(_reach(np.hypot(x, y / ratio), light, share), ratio) for ratio in ratios]
-    half, ratio = min(halves, key=lambda found: found[0] ** 2 * found[1])
-    return half, float(half * ratio)
-
-
-def _reach(values: NDArray[np.float64], light: NDArray[np.float64], share: float) -> float:
-    """The smallest limit that leaves at most this much of the light above it."""
-    order = np.argsort(values)[::-1]
-    above = np.cumsum(light[order])
-    first = int(np.searchsorted(above, share, side="right"))
-    return float(values[order][min(first, len(order) - 1)])
-
-
-def quantiles(
-    values: NDArray[np.float64], light: NDArray[np.float64], shares: list[float]
-) -> list[float]:
-    """Values below which these shares of the light lie."""
-    order = np.argsort(values)
-    below = np.cumsum(light[order])
-    places = np.searchsorted(below, np.asarray(shares) * below[-1])
-    return [float(values[order][min(int(n), len(order) - 1)]) for n in places]
-
-
-def lobes_in_a_pixel(turn: float, sigma: float) -> float:
-    """How many lobes of the window one pixel sees at once, at 550 nm, because the surface bends.
-
-    Where ωi turns by δ in the surface's frame, so does ωo: (u, v) moves by up to 2δ, and a lobe is
-    1/(kσ) wide.
-
-    turn : δ between two places in a pixel, in direction cosines.
-    sigma : of the window, µm.
-    """
-    return float((2.0 * turn * float(wavenumber(550.0)) * sigma) ** 2)
-
-
-def wavelengths_needed(asked: Lookups, share: float = 1e-3) -> dict[str, Any]:
-    """The band that all but a share of the diffracted light lies in, half of it on either side.
-
-    Returns range_nm, and lost_colour: ΔE2000 between the mean colours of all light and of the band
-    alone.
-    """
-    low, high = quantiles(asked.wavelength, asked.light, [0.5 * share, 1.0 - 0.5 * share])
-    inside = (asked.wavelength >= low) & (asked.wavelength <= high)
-    colours = [linear_srgb(asked.xyz[mine].sum(axis=0)) for mine in (slice(None), inside)]
-    largest = max(float(np.abs(colours[0]).max()), 1e-30)
-    lost = delta_e(colours[0][None] / largest, colours[1][None] / largest, exposure=1.0)
-    return {"range_nm": [low, high], "lost_colour": float(lost[0])}
+    request: TableRequest
+    table: DiffractionTable
+    surfaces: Sequence[str]
+    lookups: Lookups | None
+    lobe_turn: float
 
 
 @dataclass(frozen=True)
 class PlannedTable:
-    """One table of the scene."""
+    """A table of a scene, with the limits that it needs.
 
-    surfaces: list[str]  # ids of the BSDFs that look it up
-    name: str  # of the heights
-    digest: str  # of the heights
-    domain: Domain | None  # what of it is needed, or None for all of it
-    memory: tuple[int, int]  # bytes of the whole table and of the planned one
+    Attributes
+    ----------
+    recorded : the table of all orders, and the look-ups in it.
+    settings : of the limited table; None where it would save too little.
+    table : the limited table, or that of all orders.
+    outside : share of the surfaces' light that is looked up beyond the limits, and missing.
+    """
+
+    recorded: RecordedTable
+    settings: TableSettings | None
+    table: DiffractionTable
+    outside: float
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What a scene needs of its tables."""
+def record(
+    load: Load, sensor: Callable[[Any], Any], paths: int, seed: int = 0
+) -> tuple[TracedPaths, list[RecordedTable]]:
+    """Load a scene, trace paths through it, and gather the look-ups in each of its tables.
 
-    scene: str  # name of the file, for people
-    tolerance: float  # relative error of the picture that it was made for
-    paths: int  # that were traced
-    # by the key of the whole table (`tables.store.table_key`): heights and parameters
-    tables: Mapping[str, PlannedTable] = field(default_factory=dict)
-
-    def limits(self) -> dict[str, dict[str, Any]]:
-        """What `session.Session` follows."""
-        return {
-            key: table.domain.arguments()
-            for key, table in self.tables.items()
-            if table.domain is not None
-        }
-
-    def save(self, path: Path) -> None:
-        """Write it as JSON."""
-        document = {"kind": _KIND, "version": VERSION, **asdict(self)}
-        with atomic_path(path) as temporary:
-            temporary.write_text(
-                json.dumps(document, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
-            )
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Plan:
-        """Read what `save` wrote.
-
-        Raises a DiffractionError if the file is missing, no plan, damaged, or of another version.
-        """
-        try:
-            document = json.loads(read_text(path))
-        except (json.JSONDecodeError, RecursionError) as error:
-            raise DiffractionError(f"'{path}' is no plan: it is no JSON; {_REMEDY}") from error
-        if not isinstance(document, dict) or document.get("kind") != _KIND:
-            raise DiffractionError(f"'{path}' is JSON but no plan; {_REMEDY}")
-        if document.get("version") != VERSION:
+    Raises a DiffractionError if no surface diffracts, none has a table of heights, or no path
+    carries light of one.
+    """
+    session = Session(recording=True)
+    with session:
+        scene = load()
+    try:
+        _check(session)
+        traced = trace(scene, sensor(scene), session, paths, seed)
+        if not len(traced.lookups):
             raise DiffractionError(
-                f"'{path}' is a plan of version {quoted(document.get('version'))}, this program "
-                f"reads version {VERSION}; {_REMEDY}"
+                f"none of {paths} paths carries light of a surface that diffracts "
+                f"({_names(session)}): the camera does not see it lit; check camera and lights, or "
+                "raise --paths"
             )
-        try:
-            return cls(
-                scene=str(document["scene"]),
-                tolerance=float(document["tolerance"]),
-                paths=int(document["paths"]),
-                tables={str(k): _table(v) for k, v in document["tables"].items()},
-            )
-        except (LookupError, TypeError, ValueError, OverflowError, AttributeError) as error:
-            raise DiffractionError(f"'{path}' is a damaged plan ({error!r}); {_REMEDY}") from error
+        return traced, [_recorded(key, session, traced) for key in session.tables]
+    finally:
+        session.close()
 
 
-def _table(document: dict[str, Any]) -> PlannedTable:
-    domain = document["domain"]
-    if domain is not None:
-        x, y = (float(value) for value in domain.pop("crop"))
-        domain = Domain(crop=(x, y), **{name: float(value) for name, value in domain.items()})
-        numbers = (x, y, domain.kappa_max, domain.tolerance)
-        if not all(0.0 < number < math.inf for number in numbers):
-            raise ValueError(f"domain {domain}")
-    whole, planned = document["memory"]
-    return PlannedTable(
-        surfaces=[str(name) for name in document["surfaces"]],
-        name=str(document["name"]),
-        digest=str(document["digest"]),
-        domain=domain,
-        memory=(int(whole), int(planned)),
+def _check(session: Session) -> None:
+    if not session.bsdfs:
+        raise DiffractionError(
+            "the scene has no BSDF 'diffraction'; there is nothing to plan, render it as it is"
+        )
+    passed = {
+        name for name, bsdf in session.bsdfs if mi.has_flag(bsdf.flags(), mi.BSDFFlags.Transmission)
+    }
+    if passed:
+        raise DiffractionError(
+            f"light goes through {', '.join(sorted(passed))}, which plans do not record; render "
+            "the scene without a plan"
+        )
+    if not session.tables:
+        raise DiffractionError(
+            f"the tables of {_names(session)} come from files and stay as they are; give the scene "
+            "the height field, or its recipe, to have smaller ones planned"
+        )
+
+
+def _names(session: Session) -> str:
+    return ", ".join(sorted({name for name, _ in session.bsdfs}))
+
+
+def _recorded(key: str, session: Session, traced: TracedPaths) -> RecordedTable:
+    table = session.tables[key]
+    bsdfs = [n for n, (_, bsdf) in enumerate(session.bsdfs) if bsdf.table is table]
+    found = traced.of(bsdfs)
+    lookups = None
+    if len(found):
+        total = float(min(traced.total[bsdfs].sum(), 1.0))
+        lookups = Lookups(
+            found["u"], found["v"], found["w"], found["wavelength"], found["xyz"], total
+        )
+    turns = [float(traced.lobe_turn[n]) for n in bsdfs if traced.lobe_turn[n] >= 0.0]
+    return RecordedTable(
+        request=session.requests[key],
+        table=table,
+        surfaces=sorted({session.bsdfs[n][0] for n in bsdfs}),
+        lookups=lookups,
+        lobe_turn=max(turns, default=float("nan")),
     )
+
+
+def plan_table(recorded: RecordedTable, tolerance: float) -> PlannedTable:
+    """Limit a table so that at most a share `tolerance` of its surfaces' light lies outside."""
+    whole, lookups = recorded.table, recorded.lookups
+    unlimited = PlannedTable(recorded, None, whole, 0.0)
+    if lookups is None:
+        return unlimited
+    limit = lookups.frequency_limit(tolerance, whole.q_limit)
+    # a series in κ has as many terms as before, so that the size follows the area
+    if limit[0] * limit[1] > WORTH * whole.q_limit**2:
+        return unlimited
+    request, ratios = recorded.request, whole.slope_ratios
+    settings = replace(
+        request.settings,
+        frequency_limit=(_rounded(limit[0]), _rounded(limit[1])),
+        height_scale_max=request.height_scale,
+        # decided by all orders, not by those within the limit
+        second_order=ratios is not None and applies(request.settings.second_order, ratios),
+    )
+    table = request.cached(settings)
+    if table.nbytes > WORTH * whole.nbytes:
+        return unlimited
+    return PlannedTable(recorded, settings, table, lookups.outside(table.frequency_limit))
+
+
+def _rounded(frequency: float) -> float:
+    """Three digits are enough for people; the fourth is `lookups.ROOM`."""
+    return float(f"{frequency:.3g}")
+
+
+def recipe_of(planned: PlannedTable, scene: str) -> tuple[Recipe, str]:
+    """The recipe of a limited table, and a comment that says what it is for.
+
+    Raises a DiffractionError if the heights come from no file.
+    """
+    recorded, settings = planned.recorded, planned.settings
+    recipe = recorded.request.recipe
+    surfaces = ", ".join(recorded.surfaces)
+    if recipe is None or settings is None:
+        raise DiffractionError(
+            f"the heights of {surfaces} are an array, which no recipe can name; save them to a file"
+        )
+    default = TableSettings(coherence=settings.coherence, basis=settings.basis)
+    values = {name: getattr(settings, name) for name in RECIPE_SETTINGS}
+    table = {name: value for name, value in values.items() if value != getattr(default, name)}
+    comment = (
+        f"Planned for {surfaces} in {scene}: {100 * planned.outside:.2g} % of the light that its\n"
+        "camera sees of them lies beyond these limits, and is missing. Plan again when camera or\n"
+        "lights change."
+    )
+    return replace(recipe, table=table), comment
+
+
+def recipe_files(output: Path, count: int) -> list[Path]:
+    """Names of a plan's recipes: OUT.toml, OUT_2.toml and so on."""
+    numbered = (output.with_name(f"{output.stem}_{n}{output.suffix}") for n in range(2, count + 1))
+    return [output, *numbered]
+
+
+def load_limited(load: Load, planned: Sequence[PlannedTable]) -> Any:
+    """Load a scene with the tables of a plan."""
+    limited = {}
+    for table in planned:
+        if table.settings is not None:
+            request = table.recorded.request
+            limited[request.digest, request.settings] = table.settings
+
+    def settings_of(request: TableRequest) -> TableSettings:
+        return limited.get((request.digest, request.settings), request.settings)
+
+    return Session(settings_of).load(load)
+
+
+def load_by_recipes(load: Load, files: Sequence[Path]) -> Any:
+    """Load a scene with the limits of some recipes.
+
+    Raises a DiffractionError if a recipe is for other heights or other settings than the scene's.
+    """
+    recipes = {file: Recipe.load(file) for file in files}
+    used = set()
+
+    def settings_of(request: TableRequest) -> TableSettings:
+        for file, recipe in recipes.items():
+            if request.recipe is not None and recipe.describes_heights_of(request.recipe):
+                used.add(file)
+                return _limited(request, recipe)
+        return request.settings
+
+    session = Session(settings_of)
+    scene = session.load(load)
+    if missing := [str(file) for file in recipes if file not in used]:
+        raise DiffractionError(
+            f"the scene has no surface with the heights of {', '.join(missing)}; plan this scene"
+        )
+    return scene
+
+
+def _limited(request: TableRequest, recipe: Recipe) -> TableSettings:
+    settings = TableSettings(**recipe.table)
+    for name in RECIPE_SETTINGS:
+        theirs, ours = getattr(settings, name), getattr(request.settings, name)
+        if name not in CHOSEN and theirs != ours:
+            raise DiffractionError(
+                f"{name}={theirs} of '{recipe.path}' is {ours} in the scene; plan this scene"
+            )
+    if request.height_scale > settings.height_scale_max:
+        raise DiffractionError(
+            f"height_scale={request.height_scale:g} is beyond height_scale_max="
+            f"{settings.height_scale_max:g} of '{recipe.path}'; plan this scene"
+        )
+    return settings

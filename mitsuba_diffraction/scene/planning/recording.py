@@ -1,16 +1,14 @@
-"""What a scene is loaded with beyond its own parameters: a plan to follow, or a record to keep.
+"""Loading a scene with other tables than it asks for, and with BSDFs that record their look-ups.
 
 A BSDF cannot be given more than its scene says. While a session is open, the plugin `diffraction`
-makes BSDFs that get their tables from it, as the plan restricts them, and that it has recorded:
-then as `RecordedDiffraction`, which writes down every look-up.
+makes BSDFs that get their tables from it and, if it records, write down every look-up.
 """
 
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any, Self
 
 import drjit as dr
@@ -21,7 +19,7 @@ from numpy.typing import NDArray
 from ...errors import DiffractionError
 from ...plugin.directions import Pair
 from ...plugin.properties import own_id
-from ...plugin.sampling import share_sampler
+from ...plugin.sources import TableRequest
 from ...plugin.types import (
     BSDF,
     Colour,
@@ -34,7 +32,7 @@ from ...plugin.types import (
     Vector2f,
 )
 from ...settings import TableSettings
-from ...tables.store import cached_table, table_key
+from ...tables.store import table_key
 from ...tables.table import DiffractionTable
 
 _one_at_a_time = threading.Lock()
@@ -42,7 +40,7 @@ _one_at_a_time = threading.Lock()
 
 @dataclass(frozen=True)
 class Recorded:
-    """What one BSDF was asked in one call; lanes without light are left out."""
+    """Look-ups of one BSDF in one call; lanes without light are left out."""
 
     bsdf: int  # index among the session's BSDFs
     lane: NDArray[np.int64]  # (n,) what the caller put into `si.time`
@@ -57,21 +55,15 @@ class Recorded:
 class Session:
     """Open it (`with`) around the loading of a scene.
 
-    limits : fields of `TableSettings` by the key of the table that they restrict.
-    sample_like : tables by the key of another, which is to draw directions as they do: pictures of
-        both then differ by what they look up, and by nothing else.
-    timing : build tables that the cache may have, too, and note how long that takes.
-    recording : whether BSDFs are to record what they are asked, between `start` and `records`.
+    settings_of : chooses the settings of each table that is asked for; None for the scene's own.
+    recording : whether BSDFs record their look-ups, between `start` and `records`.
     """
 
-    limits: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    sample_like: Mapping[str, DiffractionTable] = field(default_factory=dict)
+    settings_of: Callable[[TableRequest], TableSettings] | None = None
     recording: bool = False
-    timing: bool = False
-    # key of every table that was built from heights, in the order of loading
+    # by the key of every table that was built from heights, in the order of loading
+    requests: dict[str, TableRequest] = field(default_factory=dict)
     tables: dict[str, DiffractionTable] = field(default_factory=dict)
-    # that each took to build, with `timing`
-    seconds: dict[str, float] = field(default_factory=dict)
     # every `diffraction` BSDF that was loaded, with its name for people
     bsdfs: list[tuple[str, Any]] = field(default_factory=list)
     _buffers: list[list[Any]] = field(default_factory=list)
@@ -88,42 +80,27 @@ class Session:
         mi.register_bsdf("diffraction", Diffraction)
         _one_at_a_time.release()
 
+    def load(self, load: Callable[[], Any]) -> Any:
+        """Load a scene, and let go of it."""
+        try:
+            with self:
+                return load()
+        finally:
+            self.close()
+
     def _make(self, props: Properties) -> BSDF:
         bsdf = _kind(self)(props, self.table)
-        self.register(bsdf, props.id())
+        heights = bsdf.table.source.get("name") or "heights without a name"
+        name = own_id(props.id()) or f"a diffraction BSDF without id (of {heights})"
+        self.bsdfs.append((name, bsdf))
         return bsdf
 
-    def key_of(self, table: DiffractionTable) -> str | None:
-        """The key of a table, or None for one that came from a file."""
-        return next((key for key, mine in self.tables.items() if mine is table), None)
-
-    def register(self, bsdf: BSDF, given: str) -> None:
-        """Note a BSDF that was loaded, by its id or else by its heights."""
-        heights = bsdf.table.source.get("name") or "heights without a name"
-        name = own_id(given) or f"a diffraction BSDF without id (of {heights})"
-        self.bsdfs.append((name, bsdf))
-
-    def table(
-        self,
-        digest: str,
-        settings: TableSettings,
-        build: Callable[[TableSettings], DiffractionTable],
-    ) -> DiffractionTable:
-        """The table of heights with this digest, as far as the plan needs it."""
-        key = table_key(digest, settings)
-        restricted = replace(settings, **self.limits.get(key, {}))
-        made = []
-        if self.timing:
-            start = time.perf_counter()
-            made.append(build(restricted))
-            self.seconds[key] = time.perf_counter() - start
-        table = cached_table(digest, restricted, lambda: made[0] if made else build(restricted))
-        self.tables[key] = table
-        if key in self.sample_like:
-            like = self.sample_like[key]
-            share_sampler(table, like)
-            share_sampler(table.averaged, like.averaged)
-        return table
+    def table(self, request: TableRequest) -> DiffractionTable:
+        """The table that a BSDF asks for, with the settings that the session chooses."""
+        key = table_key(request.digest, request.settings)
+        settings = self.settings_of(request) if self.settings_of else request.settings
+        self.requests[key], self.tables[key] = request, request.cached(settings)
+        return self.tables[key]
 
     def start(self, lanes: int) -> None:
         """Record from now on what `lanes` lanes ask, each a BSDF once at most."""
@@ -135,10 +112,10 @@ class Session:
     def record(
         self, bsdf: BSDF, si: Interaction, uv: Vector2f, scaled_w: Float, value: Colour
     ) -> None:
-        """Keep what a BSDF was asked and what it answered; for the BSDF to call."""
+        """Write down what a BSDF was asked and what it answered; for the BSDF to call."""
         if not self._buffers:
             return
-        number = next(n for n, (_, mine) in enumerate(self.bsdfs) if mine is bsdf)
+        number = next(n for n, (_, known) in enumerate(self.bsdfs) if known is bsdf)
         lane = mi.UInt32(si.time)
         columns = (uv.x, uv.y, scaled_w, *value)
         buffers = self._buffers[number]
@@ -147,25 +124,26 @@ class Session:
             dr.scatter(buffer, mi.Float(column), lane, lit)
 
     def records(self) -> list[Recorded]:
-        """What was recorded; nothing more is."""
-        found = []
+        """Look-ups since `start`; nothing more is recorded."""
+        result = []
         for number, buffers in enumerate(self._buffers):
             u, v, w, *value = (np.array(buffer) for buffer in buffers)
             values = np.stack(value, axis=1)
             lane = np.flatnonzero(values.max(axis=1) > 0.0)
             if len(lane):
-                found.append(Recorded(number, lane, u[lane], v[lane], w[lane], values[lane]))
+                result.append(Recorded(number, lane, u[lane], v[lane], w[lane], values[lane]))
         self._buffers = []
-        return found
+        return result
 
     def close(self) -> None:
         """Let go of the scene: BSDFs know their session, which Python would not clear up."""
         self.bsdfs.clear()
         self.tables.clear()
+        self.requests.clear()
 
 
 def _kind(session: Session) -> type[BSDF]:
-    """The plugin of the current variant; one that records, where the session does."""
+    """The plugin of the current variant; a subclass that records, where the session does."""
     from ...plugin.bsdf import Diffraction
 
     if not session.recording:

@@ -10,7 +10,6 @@ powers        the mean power of several patches, by batches, on workers if given
 spectrum      DFT of exp(iκh) at some κ, cropped to the orders that light can reach
 coefficients  of the series, from transforms of the heights; as half floats
 error         the one error measure of the project
-coarse        what a table of a restricted domain has everywhere else
 slope_ratios  what tells hills from pits, for the second order
 describe      what a table remembers of its heights
 """

@@ -38,7 +38,6 @@ from .choose import (
     taylor_expansion,
     too_many_intervals,
 )
-from .coarse import coarse_table
 from .coefficients import coefficients_of, half_precision
 from .describe import describe, roughness_of
 from .error import FLOOR, ErrorMeter, Parts, worst
@@ -169,23 +168,20 @@ class _Wanted:
         return (sigma * self.spacing[0], sigma * self.spacing[1])
 
     @property
-    def q_max(self) -> tuple[float, float]:
+    def q_limit(self) -> float:
+        """Largest spatial frequency that light can probe, rad/µm."""
+        return q_limit_of(self.settings.wavelength_range)
+
+    @property
+    def frequency_limit(self) -> tuple[float, float]:
         """Half axes of the frequencies to tabulate, at most what light can probe."""
-        limit = q_limit_of(self.settings.wavelength_range)
-        x, y = self.settings.q_max or (limit, limit)
-        return (min(x, limit), min(y, limit))
+        x, y = self.settings.frequency_limit or (self.q_limit, self.q_limit)
+        return (min(x, self.q_limit), min(y, self.q_limit))
 
     @property
     def kappa_max(self) -> float:
-        """Largest κ to tabulate, at most what light can probe."""
-        limit = q_limit_of(self.settings.wavelength_range) * self.settings.height_scale_max
-        return min(self.settings.kappa_max or limit, limit)
-
-    @property
-    def whole(self) -> bool:
-        """Whether that is all that light can probe."""
-        everything = _Wanted(self.patches, replace(self.settings, q_max=None, kappa_max=None))
-        return (self.q_max, self.kappa_max) == (everything.q_max, everything.kappa_max)
+        """Largest κ to tabulate, rad/µm."""
+        return self.q_limit * self.settings.height_scale_max
 
 
 @dataclass(frozen=True)
@@ -210,8 +206,7 @@ def build_table(
     wavelength_range: tuple[float, float] = TableSettings.wavelength_range,
     height_scale_max: float = TableSettings.height_scale_max,
     taps: int | None = None,
-    q_max: float | tuple[float, float] | None = None,
-    kappa_max: float | None = None,
+    frequency_limit: float | tuple[float, float] | None = None,
     windows: str | float | None = None,
     second_order: str | bool = "auto",
     progress: Progress | None = None,
@@ -223,9 +218,7 @@ def build_table(
     heights : the patch, which tiles the plane; or several of one size, whose powers are
         averaged (`ensemble` only).
     coherence_width, coherence, basis, tolerance, terms, wavelength_range, height_scale_max, taps,
-    q_max, kappa_max, windows, second_order : see `settings.TableSettings`. Beyond `q_max` or
-        `kappa_max` a table of coarse cells answers, which is right on average
-        (`tables.build.coarse`).
+    frequency_limit, windows, second_order : see `settings.TableSettings`.
     progress : called as progress(done, total, text) while it works.
 
     Raises
@@ -236,7 +229,7 @@ def build_table(
     """
     settings = TableSettings(
         coherence_width, coherence, basis, tolerance, terms, taps, wavelength_range,
-        height_scale_max, checked("q_max", q_max), kappa_max, windows, second_order,
+        height_scale_max, checked("frequency_limit", frequency_limit), windows, second_order,
     )  # fmt: skip
     return build_with(heights, settings, progress)
 
@@ -281,7 +274,7 @@ def _built(wanted: _Wanted, tell: Progress) -> DiffractionTable:
         if setting.trims and attempt.error(setting.trims) > tolerance:
             setting = replace(setting, trims=())
         if attempt.error(setting.trims) <= tolerance:
-            return _table(wanted, setting, attempt, tell)
+            return _table(wanted, setting, attempt)
         setting = _next(wanted, setting, attempt)
         found = attempt.error()
         del attempt  # before the next one takes as much memory
@@ -338,13 +331,12 @@ def _next(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> _Setting:
     return replace(setting, expansion=longer)
 
 
-def _table(
-    wanted: _Wanted, setting: _Setting, attempt: Attempt, tell: Progress
-) -> DiffractionTable:
+def _table(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> DiffractionTable:
     """What an attempt made, with all that a table knows of itself."""
     patches, settings = wanted.patches, wanted.settings
-    everywhere = wanted.q_max == (q_limit_of(settings.wavelength_range),) * 2
-    roughness = roughness_of(patches, q_limit_of(settings.wavelength_range))
+    limit = None if wanted.frequency_limit == (wanted.q_limit,) * 2 else wanted.frequency_limit
+    settings = replace(settings, frequency_limit=limit)
+    roughness = roughness_of(patches, wanted.q_limit)
     return DiffractionTable(
         coefficients=attempt.coefficients,
         order_0=attempt.order_0,
@@ -352,21 +344,20 @@ def _table(
         expansion=attempt.expansion,
         grid=replace(attempt.grid, trims=setting.trims),
         spacing=wanted.spacing,
-        settings=replace(settings, q_max=None if everywhere else wanted.q_max),
+        settings=settings,
         error=attempt.measured,
         roughness=roughness,
         source=describe(patches, settings, setting.taps),
-        coarse=None if wanted.whole else coarse_table(patches, settings, tell),
         slope_ratios=slope_ratios(patches, settings, roughness) if settings.second_order else None,
     )
 
 
 def _grid(wanted: _Wanted, taps: tuple[int, int]) -> Grid:
     """The bins that these taps can read."""
-    q_max, spacing = wanted.q_max, wanted.spacing
+    limit, spacing = wanted.frequency_limit, wanted.spacing
     if max(taps) > MAX_TAPS:
         raise too_wide(wanted.patches[0].extent, wanted.settings, taps)
-    radius = (q_max[0] / spacing[0], q_max[1] / spacing[1])
+    radius = (limit[0] / spacing[0], limit[1] / spacing[1])
     ny, nx = shape_of(wanted.patches)
     # A margin as wide as the taps: see tables.lookup
     last_x = min(math.ceil(radius[0]), nx // 2) + taps[0]

@@ -22,14 +22,13 @@ def slope_ratios(
     roughness : of the patches, as in the table.
     """
     q_limit = q_limit_of(settings.wavelength_range)
-    x, y = settings.q_max or (q_limit, q_limit)
-    kappa_max = q_limit * settings.height_scale_max
+    x, y = settings.frequency_limit or (q_limit, q_limit)
     grid = CellGrid.of(
         next(sections(patches))[0].extent,
         max(patch.rms_height for patch in patches),
         q_limit,
         (min(x, q_limit), min(y, q_limit)),
-        min(kappa_max, settings.kappa_max or kappa_max),
+        q_limit * settings.height_scale_max,
     )
     sums = CellSums.of(sections(patches), grid)
     ratios = sums.ratios()

@@ -118,7 +118,7 @@ def grating_of(
     table: DiffractionTable, most_units: int = MOST_UNITS
 ) -> tuple[Grating, NDArray[np.int64]] | None:
     """The grating, if a table has the orders of one only, and their bins (n, 2)."""
-    if table.grid.coherent or table.coarse is not None:
+    if table.grid.coherent or table.limited:
         return None
     rows, columns = np.nonzero(table.coefficients.any(axis=(0, 3, 4)))
     bins = np.stack([columns, rows], axis=1).astype(np.int64) - np.array(table.grid.last)

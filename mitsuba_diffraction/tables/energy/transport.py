@@ -67,7 +67,7 @@ class Orders:
             self.mixture = order_mixture(table, height_scale, SMOOTHING * spacing)
         #: the grating of all strong orders
         self.tracks: Grating | None = None
-        if not table.grid.coherent and table.coarse is None:
+        if not table.grid.coherent and not table.limited:
             bins = np.rint(self.mixture.frequency / np.array(table.spacing)).astype(np.int64)
             self.tracks = on_one_line(table, bins)
         total = self.mixture.density.sum(axis=(1, 2)).max() * self.mixture.pitch**2

@@ -95,7 +95,7 @@ def window_fits(
 
 
 def _lattice(count: int) -> Array:
-    """WindowPositions (count, 2) in [0, 1)²: a rank-1 lattice by the plastic number, with one offset."""
+    """Places (count, 2) in [0, 1)²: a rank-1 lattice by the plastic number, with one offset."""
     plastic = 1.32471795724474602596
     steps = np.arange(count)[:, None] * np.array([1.0 / plastic, 1.0 / plastic**2])
     return np.asarray((steps + np.random.default_rng(_SEED).random(2)) % 1.0)

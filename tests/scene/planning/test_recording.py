@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -14,13 +12,13 @@ from mitsuba_diffraction.scene.planning.recording import Session
 PATCH = md.HeightField(0.005 * np.random.default_rng(1).random((64, 64)), 0.0875)
 
 
-def test_a_bsdf_without_id_is_called_by_its_heights():
-    bsdf = SimpleNamespace(table=SimpleNamespace(source={"name": "grating.npy"}))
+def test_a_bsdf_without_id_is_called_by_its_heights(some_variant):
     session = Session()
-    session.register(bsdf, "_unnamed_3")
-    session.register(bsdf, "foil")
+    with session:
+        for name in ({}, {"id": "foil"}):
+            mi.load_dict({**md.bsdf_dict(PATCH, coherence_width=5.0), **name})
     names = [name for name, _ in session.bsdfs]
-    assert names == ["a diffraction BSDF without id (of grating.npy)", "foil"]
+    assert names == [f"a diffraction BSDF without id (of {PATCH.name})", "foil"]
 
 
 def test_only_what_is_loaded_in_a_session_belongs_to_it(some_variant):

@@ -120,7 +120,7 @@ def test_what_a_wide_patch_is_advised_to_do_helps():
     text = refused(heights=wide, coherence_width=1.5)
     assert "crop the heights, for instance to 1.5 µm" in text
     table = DiffractionTable.build(wide.treated(crop=1.5), coherence_width=1.5)
-    assert table.coarse is None
+    assert not table.limited
 
 
 def test_a_series_too_short_for_any_number_of_intervals_is_refused():
