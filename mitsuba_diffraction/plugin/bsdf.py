@@ -1,7 +1,8 @@
-"""The Mitsuba BSDF plugin `diffraction`: measured surfaces that diffract.
+"""The Mitsuba BSDF plugin `diffraction`: measured surfaces that diffract the light they reflect.
 
 Parameters, with defaults in brackets; ∂: differentiable. Lengths are in µm, wavelengths in nm.
-`docs/parameters.md` is made of this text.
+`docs/parameters.md` is made of this text. Surfaces that light goes through as well are of the
+plugin `diffraction_dielectric`.
 
 The surface
 -----------
@@ -102,19 +103,6 @@ film_thickness : float ∂ [none]
     2 n d = 12 µm. RGB variants sum its colours over wavelengths, apart from those of the orders.
 film_k : float ∂ [0]
     The film's absorption, the k of n + ik over that of the medium above it; not over a nested BSDF.
-transmission : boolean [false]
-    Light goes through the dielectric, from both sides: orders of κ = k (n cosθt − cosθi). The side
-    that normals point to has ext_ior, the other one int_ior, which is at least 1.01 times that.
-    Component 0 is what is reflected, 1 what goes through. Orders that change the tangential part by
-    more than 2/λ are left out. It excludes coat, film, nested BSDF and shadowing. energy_conserving
-    makes R + T 1, since a dielectric loses no light: order 0 is multiplied by c(ωi) c(ωo), c on the
-    directions of both sides, and where that is not enough all is scaled likewise, by at most 1.5²;
-    what is still missing of steep slopes is spread over all directions where some is missing. A few
-    seconds' work, kept in the cache, in steps of 0.01 of eta.
-thin : boolean [false]
-    Light goes through a sheet, whose other side is flat; both sides have ext_ior. What that side
-    sends back is summed as between two mirrors. Light beyond the sheet's critical angle is lost,
-    unless energy_conserving puts it back, into order 0 first.
 model : string [small_slope]
     `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
     where the surface is rough at the scale of an order; polarised variants have its Mueller
@@ -211,7 +199,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tables.energy.grid import DirectionalTable
+from ..tables.energy.conservation import DirectionalTable
 from .boundary import Kirchhoff
 from .directions import Pair, from_patch, in_patch, vcavity
 from .energy import EnergyModel
@@ -525,7 +513,7 @@ class Diffraction(DiffractingSurface):
     def energy_scale(self, height_scale: float) -> tuple[NDArray[np.float32], bool] | None:
         """Return s of the mean wavelength, for shaders, and whether Kirchhoff's model fades.
 
-        s : (polar + 1, azimuthal) on `tables.energy.grid.FINE`; None where all s are 1.
+        s : (polar + 1, azimuthal) on `tables.energy.conservation.FINE`; None where all s are 1.
         """
         if self._energy is None or not self._energy.conserving:
             return None

@@ -17,6 +17,7 @@ from ..heights.lengths import is_auto, numbers_of
 from ..heights.read import LoadOptions
 from ..settings import COHERENCES, SURFACE, checked
 from ..tables.table import DiffractionTable
+from .dictionary import PLUGINS
 from .llvm import require_loaded_llvm
 from .properties import choice, flag, kind_of, number
 from .sources import (
@@ -55,7 +56,7 @@ _COMMON = (
     "energy_conserving",
 )
 _LAYERS = ("coat_ior", "film_ior", "film_k", "film_thickness", "layering", "diffuse_weight")
-REFLECTING, TRANSMITTING = "diffraction", "diffraction_dielectric"
+REFLECTING, TRANSMITTING = PLUGINS
 #: Names of the parameters of each plugin.
 NAMES: Mapping[str, tuple[str, ...]] = {
     REFLECTING: (

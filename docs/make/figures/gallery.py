@@ -116,7 +116,8 @@ PICTURES = (
     ),
     _scene(
         "film", "A diffraction film before lamps",
-        "A thin sheet with shallow waves on one side (`thin`): every lamp between its spectra.",
+        "A thin sheet with shallow waves on one side (`diffraction_dielectric`): every lamp "
+        "between its spectra.",
     ),
     _scene(
         "spectrometer", "A grating spectrometer",
