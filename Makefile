@@ -32,7 +32,8 @@ demo: setup  ## tabulate a snake scale, render three scenes with it, the snake i
 	@echo "Compare out/snake.png and out/snake_other_light.png: the colours move with the sun."
 
 # one thread for linear algebra in each of the two processes
-PYTEST := OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest -n 2 --dist worksteal
+# TIMES=1 prints what the processor time went into
+PYTEST := OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest -n 2 --dist worksteal $(if $(TIMES),--processor-time)
 test: setup .venv/browser  ## run the quick tests, of every part: three minutes
 	@$(PYTEST) -m "not thorough"
 

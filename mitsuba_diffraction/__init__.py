@@ -6,11 +6,11 @@ HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
 maps               what a surface reflects in every direction, as pictures
-evaluation         a beam on a patch: maxima against the grating equation
+period_fit         periods of a patch from its response to a beam, by the grating equation
 tradeoff           accuracy against speed and memory, setting by setting
 glsl               the realtime renderer
 design             patches from their BRDF, reliefs for given colours
-comparison         how far its pictures are from path-traced ones
+shader_comparison  comparison of the shaders with the path tracer
 cluster            rendering on many processes and machines
 web                pages that show a scene in a browser or a notebook
 reference          the BRDF straight from its integral, in double precision
@@ -49,8 +49,8 @@ from .tables import DiffractionTable  # noqa: E402
 if TYPE_CHECKING:
     from . import cluster
     from .analysis import design, maps, tradeoff
-    from .realtime import comparison, glsl, web
-    from .thesis import evaluation
+    from .realtime import glsl, shader_comparison, web
+    from .thesis import period_fit
 
 __version__ = version(__name__)
 __all__ = [
@@ -60,13 +60,13 @@ __all__ = [
     "HeightField",
     "bsdf_dict",
     "cluster",
-    "comparison",
     "design",
-    "evaluation",
     "glsl",
     "gratings",
     "maps",
+    "period_fit",
     "reference",
+    "shader_comparison",
     "tradeoff",
     "web",
 ]
@@ -74,11 +74,11 @@ __all__ = [
 # Imported when first asked for: renders need none, nor Matplotlib, which some load.
 _ON_DEMAND = {
     "cluster": "cluster",
-    "comparison": "realtime.comparison",
     "design": "analysis.design",
-    "evaluation": "thesis.evaluation",
     "glsl": "realtime.glsl",
     "maps": "analysis.maps",
+    "period_fit": "thesis.period_fit",
+    "shader_comparison": "realtime.shader_comparison",
     "tradeoff": "analysis.tradeoff",
     "web": "realtime.web",
 }

@@ -20,6 +20,8 @@ from tests.support import ROOT
 from tests.support.command_line import Ran
 from tests.support.variants import VARIANTS, obstacle
 
+pytest_plugins = ["tests.support.processor_time"]
+
 
 def pytest_configure(config: pytest.Config) -> None:
     """Allow the package's own warnings, which follow from a test's surface; others are errors."""

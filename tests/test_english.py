@@ -13,7 +13,7 @@ from tests.support.docstrings import Docstring, docstrings
 # Rooms whose docstrings are still to be rewritten: remove a room when none of its offenders remain.
 NOT_DONE = (
     "analysis", "cli", "cluster", "errors", "optics", "plugin", "realtime", "scene",
-    "settings", "streams", "tables", "thesis",
+    "settings", "streams", "tables",
 )  # fmt: skip
 
 # Part of all docstrings, private code included, that may begin vaguely.

@@ -86,13 +86,17 @@ def test_tests_import_helpers_and_never_one_another():
     assert not wrong
 
 
-def test_the_tier_of_a_file_is_one_line_at_its_top():
+def test_a_tier_is_that_of_a_whole_file():
     for file in TESTS:
-        lines = [line for line in file.read_text("utf-8").splitlines() if "mark.thorough" in line]
-        if lines and file != Path(__file__):
-            assert len(lines) == 1, file
-            # alone, or first among other marks
-            assert lines[0].replace("[", "").startswith("pytestmark = pytest.mark.thorough"), file
+        tree = ast.parse(file.read_text("utf-8"))
+        marks = [ast.unparse(node) for node in ast.walk(tree) if isinstance(node, ast.Attribute)]
+        at_top = [
+            ast.unparse(node.value)
+            for node in tree.body
+            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "pytestmark"
+        ]
+        once = marks.count("pytest.mark.thorough")
+        assert once == "".join(at_top).count("pytest.mark.thorough") <= 1, file
 
 
 def test_no_test_file_lies_where_pytest_does_not_look(pytestconfig):

@@ -140,7 +140,7 @@ def test_what_renders_do_without_is_imported_on_demand():
         "import sys, mitsuba_diffraction as md\n"
         "slow = {'matplotlib', 'scipy.signal', 'mitsuba_diffraction.realtime'}\n"
         "assert not slow & set(sys.modules)\n"
-        "assert md.maps.brdf_map and md.evaluation.Beam and md.glsl.Renderer and md.web.Viewer"
+        "assert md.maps.brdf_map and md.period_fit.Beam and md.glsl.Renderer and md.web.Viewer"
     )
     ran = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     assert ran.returncode == 0, ran.stderr

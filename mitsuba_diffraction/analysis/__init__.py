@@ -1,13 +1,13 @@
-"""What is measured of a surface or a scene.
+"""Measurements of surfaces, tables and scenes.
 
 Contents
 --------
-maps       BRDF maps: the hemisphere of view directions
-survey     many scans: a row, a table and a map each
+maps       BRDF maps over the hemisphere of view directions
+survey     table, map and statistics of many scans
 tradeoff   accuracy against speed and memory
-timing     times of kernels, compared fairly
+timing     kernel times, measured in alternating rounds
 machine    description of the machine that measures
-pictures   patches and albedo as pictures
-design     surfaces from what they are to show, by gradients with respect to the heights
-energy     how much a table reflects before and after energy is conserved
+pictures   pictures of patches and of raw albedo
+design     surfaces from their BRDF or colours, by gradients with respect to the heights
+energy     albedo of a table's surface before and after energy conservation
 """

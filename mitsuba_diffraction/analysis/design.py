@@ -1,7 +1,7 @@
-"""Surfaces from what they are to show: gradients of the BRDF with respect to the heights.
+"""Surfaces from their BRDF or colours, by gradients of the BRDF with respect to the heights.
 
-A phase screen exp(iκh) has the orders a_j(κ), and a pair of directions sees of them, on average
-over every position of the window (see `reference`),
+A phase screen exp(iκh) has the orders a_j(κ). The BRDF of a pair of directions, averaged over all
+positions of the window (see `reference`), is
 
     f = factor · 4π²σ⁴ Σ_j |a_j|² exp(−σ²|q − q_j|²).
 
@@ -9,8 +9,8 @@ A loss L of many such f changes with the heights by the adjoint of the DFT, one 
 
     ∂L/∂h(r) = −(2κ/N) Im[exp(iκh(r)) · conj Σ_j (∂L/∂|a_j|²) a_j exp(−i q_j·r)],
 
-for N pixels. L-BFGS-B (Byrd, Lu, Nocedal and Zhu 1995) does the rest. The BRDF does not tell apart
-h, its shifts, h + constant, and −h(−r), the patch turned by 180° and upside down.
+for N pixels. L-BFGS-B (Byrd, Lu, Nocedal and Zhu 1995) minimises the loss. The heights h, their
+shifts, h + constant, and −h(−r), the patch turned by 180° and upside down, have the same BRDF.
 """
 
 from __future__ import annotations
@@ -29,27 +29,27 @@ from ..optics import colour
 from ..optics.geometry import diffraction_coordinates, sigma_of, wavenumber
 
 Real = NDArray[np.float64]
-#: A loss of BRDFs (n,): its value, and its derivative to each of them.
+#: Loss of BRDFs (n,): returns its value and its derivatives (n,).
 Loss = Callable[[Real], tuple[float, Real]]
 
-#: What stands for the spectrum, nm.
+#: Wavelengths that represent the spectrum, nm.
 WAVELENGTHS = tuple(float(x) for x in range(400, 701, 20))
 
 _ALL = slice(None)
-_AT_ONCE = 2**20  # pixels of all screens that a BRDF takes at once, 40 MB
+_AT_ONCE = 2**20  # pixels of the screens that `Views.brdf` evaluates at a time, 40 MB
 _UP = (0.0, 0.0, 1.0)
-_NARROW = 1e-3  # µm: under so small a σ a flat patch reflects alike in all directions
+_NARROW = 1e-3  # µm: under so small a σ a flat patch has one BRDF in all directions
 
 
 class Views:
-    """Pairs of directions and wavelengths in which patches of one size are seen.
+    """Pairs of directions and wavelengths in which patches of one size are evaluated.
 
     Parameters
     ----------
-    patch : HeightField, of which only the shape and the size of the pixels count.
-    wi, wo, wavelength, coherence_width, eta, k : as in `reference.brdf`, whose
-        `coherence="ensemble"` and `model="kirchhoff"` this is; n pairs in all. A gradient takes
-        some 50 bytes for each pixel and pair.
+    patch : HeightField of that size; its heights are not used.
+    wi, wo, wavelength, coherence_width, eta, k : as in `reference.brdf` with
+        `coherence="ensemble"` and `model="kirchhoff"`; n pairs in all. A gradient requires some 50
+        bytes for each pixel and pair.
 
     Raises
     ------
@@ -68,9 +68,9 @@ class Views:
         eta: ArrayLike | None = None,
         k: ArrayLike = 0.0,
     ) -> None:
-        _of_mirror(_UP, _UP, 550.0, coherence_width)  # refuses a width that is none
-        # all that knows no heights is the same in front of any patch and, over σ², of any window
-        narrow = _of_mirror(wi, wo, wavelength, 4 * _NARROW, eta, k)
+        _flat_brdf(_UP, _UP, 550.0, coherence_width)  # checks the width
+        # the factor of the BRDF that depends neither on heights nor, divided by σ², on the window
+        narrow = _flat_brdf(wi, wo, wavelength, 4 * _NARROW, eta, k)
         sigma = sigma_of(coherence_width)
         u, v, w = diffraction_coordinates(wi, wo)
         wave = wavenumber(wavelength)
@@ -86,36 +86,38 @@ class Views:
         return len(self._factor)
 
     def brdf(self, heights: ArrayLike) -> Real:
-        """The BRDF in 1/sr, (n,), of heights (ny, nx) in µm."""
+        """Return the BRDF (n,) of heights (ny, nx) in µm, 1/sr."""
         size = max(1, _AT_ONCE // (self.shape[0] * self.shape[1]))
         parts = [slice(start, start + size) for start in range(0, len(self), size)]
-        found = [self._seen(fft.ifft2(self._screens(heights, part)), part) for part in parts]
-        return np.concatenate([np.empty(0), *found])
+        values = [self._brdf(fft.ifft2(self._screens(heights, part)), part) for part in parts]
+        return np.concatenate([np.empty(0), *values])
 
-    def loss(self, heights: ArrayLike, of: Loss) -> tuple[float, Real]:
-        """A loss of the BRDF and its gradient (ny, nx), per µm of height at each pixel."""
+    def loss(self, heights: ArrayLike, loss: Loss) -> tuple[float, Real]:
+        """Return a loss of the BRDF and its gradient (ny, nx), per µm of height at each pixel."""
         screens = self._screens(heights)
         orders = fft.ifft2(screens)
-        value, weights = of(self._seen(orders))
-        wanted = (self._factor * weights)[:, None] * self._window_y
-        orders *= np.einsum("ny,nx->nyx", wanted, self._window_x)
+        value, derivatives = loss(self._brdf(orders))
+        weights = (self._factor * derivatives)[:, None] * self._window_y
+        orders *= np.einsum("ny,nx->nyx", weights, self._window_x)
         adjoint = fft.fft2(orders, overwrite_x=True)
-        pulled = screens.imag * adjoint.real - screens.real * adjoint.imag
-        return value, -2.0 / screens[0].size * np.einsum("n,nyx->yx", self.kappa, pulled)
+        imaginary = screens.imag * adjoint.real - screens.real * adjoint.imag
+        return value, -2.0 / screens[0].size * np.einsum("n,nyx->yx", self.kappa, imaginary)
 
     def _screens(self, heights: ArrayLike, part: slice = _ALL) -> NDArray[np.complex128]:
-        found = np.asarray(heights, np.float64)
-        if found.shape != self.shape:
-            raise DiffractionError(f"heights have shape {found.shape}, these views {self.shape}")
-        return np.asarray(np.exp(1j * self.kappa[part, None, None] * found))
+        """Return the phase screens exp(iκh) of some pairs, (n, ny, nx)."""
+        h = np.asarray(heights, np.float64)
+        if h.shape != self.shape:
+            raise DiffractionError(f"heights have shape {h.shape}, these views {self.shape}")
+        return np.asarray(np.exp(1j * self.kappa[part, None, None] * h))
 
-    def _seen(self, orders: NDArray[np.complex128], part: slice = _ALL) -> Real:
+    def _brdf(self, orders: NDArray[np.complex128], part: slice = _ALL) -> Real:
+        """Return the BRDF (n,) of some pairs from the amplitudes of the orders (n, ny, nx)."""
         powers = orders.real**2 + orders.imag**2
         rows = np.einsum("nyx,nx->ny", powers, self._window_x[part])
         return np.asarray(self._factor[part] * np.einsum("ny,ny->n", rows, self._window_y[part]))
 
 
-def _of_mirror(
+def _flat_brdf(
     wi: ArrayLike,
     wo: ArrayLike,
     wavelength: ArrayLike,
@@ -123,9 +125,11 @@ def _of_mirror(
     eta: ArrayLike | None = None,
     k: ArrayLike = 0.0,
 ) -> Real:
-    """The reference's BRDF of a flat patch, which checks all arguments."""
+    """Return the reference BRDF of a flat patch; checks all arguments."""
     flat = HeightField(np.zeros((2, 2)), 1.0)
-    return reference.brdf(flat, wi, wo, wavelength, coherence_width=width, eta=eta, k=k)
+    return reference.brdf(
+        flat, wi, wo, wavelength, coherence_width=width, model="kirchhoff", eta=eta, k=k
+    )
 
 
 def recover(
@@ -136,30 +140,30 @@ def recover(
     smoothing: float = 0.0,
     iterations: int = 1000,
 ) -> HeightField:
-    """The patch with this BRDF, up to what the BRDF does not tell (see `aligned`).
+    """Find a patch with this BRDF, up to changes that leave the BRDF the same (see `aligned`).
 
-    Descends Σ (√f − √f_asked)²: amplitudes, as in phase retrieval (Fienup 1982), so that dim
-    directions count beside the mirror's lobe. From a start far off it may end in another valley:
-    compare `views.brdf` of what comes back, and begin elsewhere.
+    Minimises Σ (√f − √f_measured)². The difference of amplitudes, as in phase retrieval (Fienup
+    1982), gives weight to dim directions beside the mirror direction's lobe. From a distant start,
+    the result may be another local minimum: compare its `views.brdf`, and try another start.
 
     Parameters
     ----------
-    brdf : (n,), 1/sr, what was measured in the views.
-    start : where to begin; not flat, where the gradient is 0.
-    smoothing : µm, standard deviation of a Gaussian under which the patch has no detail.
-    iterations : at most so many steps.
+    brdf : (n,), 1/sr, measured values in the views.
+    start : initial heights; not flat, where the gradient is 0.
+    smoothing : µm, standard deviation of the Gaussian that filters the heights.
+    iterations : largest number of steps.
 
     Raises
     ------
     DiffractionError
-        If `brdf` is not n values, finite and at least 0, the start does not fit the views, or a
-        number is out of range.
+        If `brdf` is not n values, finite and at least 0, the start has other pixels than the views,
+        or a number is out of range.
     """
-    asked = np.asarray(brdf, np.float64)
-    if asked.shape != (len(views),) or not np.all((asked >= 0) & (asked < np.inf)):
+    measured = np.asarray(brdf, np.float64)
+    if measured.shape != (len(views),) or not np.all((measured >= 0) & (measured < np.inf)):
         raise DiffractionError(
-            f"brdf has shape {asked.shape}; it must be {len(views)} finite values of at least 0, "
-            "one for each view"
+            f"brdf has shape {measured.shape}; it must be {len(views)} finite values of at least "
+            "0, one for each view"
         )
     if (start.shape, start.pixel_size) != (views.shape, views.pixel_size):
         raise DiffractionError(
@@ -170,35 +174,37 @@ def recover(
         raise DiffractionError("start is flat, where the gradient is 0; give it random heights")
     if not 0.0 <= smoothing < np.inf:
         raise DiffractionError(f"smoothing={smoothing} must be at least 0 µm and finite")
-    dark = 1e-9 * asked.max()  # keeps the root's derivative finite where there is no light
-    roots = np.sqrt(asked + dark)
-    scale = 1.0 / (roots @ roots)
+    dark = 1e-9 * measured.max()  # keeps the root's derivative finite where f is 0
+    target = np.sqrt(measured + dark)
+    scale = 1.0 / (target @ target)
 
-    def amplitudes(found: Real) -> tuple[float, Real]:
-        reached = np.sqrt(found + dark)
-        off = reached - roots
-        return float(scale * off @ off), scale * off / reached
+    def amplitudes(f: Real) -> tuple[float, Real]:
+        """Return the squared difference of amplitudes and its derivatives with respect to f."""
+        amplitude = np.sqrt(f + dark)
+        difference = amplitude - target
+        return float(scale * difference @ difference), scale * difference / amplitude
 
-    heights, steps = _descend(views, amplitudes, start.heights, smoothing, None, iterations)
+    heights, steps = _minimise(views, amplitudes, start.heights, smoothing, None, iterations)
     return start.changed(heights, f"recovered from {len(views)} views in {steps} steps")
 
 
-def _descend(
+def _minimise(
     views: Views,
-    of: Loss,
+    loss: Loss,
     start: Real,
     smoothing: float,
     bounds: optimize.Bounds | None,
     iterations: int,
 ) -> tuple[Real, int]:
-    """Heights of a small loss, smoothed by a Gaussian (µm), and the number of steps taken."""
+    """Minimise a loss over heights smoothed by a Gaussian (µm); also return the number of steps."""
     _check_whole("iterations", iterations, 1)
 
     def objective(x: Real) -> tuple[float, Real]:
-        value, gradient = views.loss(_smooth(x.reshape(views.shape), smoothing, views), of)
+        """Return the loss of the smoothed heights and its gradient."""
+        value, gradient = views.loss(_smooth(x.reshape(views.shape), smoothing, views), loss)
         return value, _smooth(gradient, smoothing, views).ravel()
 
-    found = optimize.minimize(
+    result = optimize.minimize(
         objective,
         start.ravel(),
         jac=True,
@@ -207,35 +213,39 @@ def _descend(
         options={"maxiter": iterations, "maxfun": 2 * iterations, "maxcor": 30}
         | {"ftol": 1e-15, "gtol": 1e-12},
     )
-    return _smooth(found.x.reshape(views.shape), smoothing, views), int(found.nit)
+    return _smooth(result.x.reshape(views.shape), smoothing, views), int(result.nit)
 
 
 def _smooth(heights: Real, sigma: float, like: HeightField | Views) -> Real:
-    """Under a Gaussian of so many µm; its own adjoint, since the patch tiles the plane."""
+    """Smooth periodic heights by a Gaussian of σ in µm; the operation is its own adjoint."""
     blur = [sigma / pixel for pixel in like.pixel_size[::-1]]
     return np.asarray(ndimage.gaussian_filter(heights, blur, mode="wrap", truncate=6.0))
 
 
 def _check_whole(name: str, value: int, least: int) -> None:
+    """Refuse a value that is not a whole number from `least` on."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
         raise DiffractionError(f"{name}={value} must be a whole number of at least {least}")
 
 
 def aligned(field: HeightField, like: HeightField) -> HeightField:
-    """The one nearest to `like` of all patches that have the same BRDF as `field`.
+    """Return the patch nearest to `like` of all that have the same BRDF as `field`.
 
-    These are its shifts by whole pixels, each with any constant added, and those of −h(−r).
+    These are the shifts by whole pixels of h and of −h(−r), with any constant added.
     """
     if field.shape != like.shape or field.pixel_size != like.pixel_size:
-        raise DiffractionError(f"{field.name} and {like.name} have not the same pixels")
+        raise DiffractionError(
+            f"{field.name} and {like.name} have different pixels; give patches of the same shape "
+            "and pixel_size"
+        )
     target = like.heights - like.heights.mean()
-    nearest, most = field.heights, -np.inf
+    nearest, largest = field.heights, -np.inf
     for sign in (1, -1):
         heights = sign * (field.heights - field.heights.mean())[::sign, ::sign]
-        alike = fft.ifft2(fft.fft2(target) * np.conj(fft.fft2(heights))).real
-        shift = np.unravel_index(alike.argmax(), alike.shape)
-        if alike[shift] > most:
-            nearest, most = np.roll(heights, shift, axis=(0, 1)), alike[shift]
+        correlation = fft.ifft2(fft.fft2(target) * np.conj(fft.fft2(heights))).real
+        shift = np.unravel_index(correlation.argmax(), correlation.shape)
+        if correlation[shift] > largest:
+            nearest, largest = np.roll(heights, shift, axis=(0, 1)), correlation[shift]
     return field.changed(nearest + like.heights.mean(), f"aligned with {like.name}")
 
 
@@ -253,28 +263,28 @@ def relief(
     seed: int = 0,
     iterations: int = 100,
 ) -> HeightField:
-    """A relief that shows m given colours in m pairs of directions, as nearly as a descent comes.
+    """Design a relief that shows m colours in m pairs of directions.
 
-    It makes the squared difference between `shown` and the colours small, from random heights.
+    Minimises the squared difference between `shown` and the colours, from random heights.
 
     Parameters
     ----------
     wi, wo : (m, 3) or (3,), as in `reference.brdf`.
     colours : (m, 3), linear sRGB under D65 of a perfect reflector with this relief; a white
         diffuser is (1, 1, 1), and a colour may be brighter than that.
-    pixels, pixel_size : the relief has pixels × pixels of so many µm, and tiles the plane.
-    max_height : µm, from the lowest to the highest point at most.
-    max_slope : along x and along y at most: heights are smoothed by a Gaussian of standard
-        deviation max_height/(√(2π) max_slope), whose slopes are nowhere steeper.
-    coherence_width : µm; lobes of a window wider than the relief are dots with dark between them.
-    wavelengths : (k,), nm, evenly spaced, which stand for the spectrum.
-    seed : of the heights at the start; equal arguments give equal reliefs.
-    iterations : at most so many steps.
+    pixels, pixel_size : pixels along each axis and their size in µm; the relief tiles the plane.
+    max_height : largest difference of heights, µm.
+    max_slope : largest slope along x and along y: a Gaussian of standard deviation
+        max_height/(√(2π) max_slope) smooths the heights, so that they are nowhere steeper.
+    coherence_width : µm; a window wider than the relief has separate lobes with dark between them.
+    wavelengths : (k,), nm, evenly spaced, which represent the spectrum.
+    seed : seed of the initial heights; equal arguments give equal reliefs.
+    iterations : largest number of steps.
 
     Raises
     ------
     DiffractionError
-        If the colours do not fit the directions, or a number is out of range.
+        If colours and directions differ in number, or a number is out of range.
     """
     for name, value in (("max_height", max_height), ("max_slope", max_slope)):
         if not 0.0 < value < np.inf:
@@ -284,24 +294,25 @@ def relief(
     check_pixel_count(pixels, pixels, "relief")
     patch = HeightField(np.zeros((pixels, pixels)), pixel_size, name="relief")
     views, matrix = _colour_views(patch, wi, wo, coherence_width, wavelengths)
-    asked = np.asarray(colours, np.float64)
+    target = np.asarray(colours, np.float64)
     m = len(views) // len(matrix)
-    if asked.shape != (m, 3) or not np.all(np.isfinite(asked)) or not np.any(asked):
+    if target.shape != (m, 3) or not np.all(np.isfinite(target)) or not np.any(target):
         raise DiffractionError(
-            f"colours have shape {asked.shape}; they must be ({m}, 3), finite and not all 0: "
+            f"colours have shape {target.shape}; they must be ({m}, 3), finite and not all 0: "
             "linear sRGB, one for each pair of directions"
         )
-    scale = 1.0 / np.sum(asked**2)
+    scale = 1.0 / np.sum(target**2)
 
-    def difference(found: Real) -> tuple[float, Real]:
-        off = found.reshape(m, -1) @ matrix - asked
-        return float(scale * np.sum(off**2)), (2 * scale * off @ matrix.T).ravel()
+    def squared_difference(f: Real) -> tuple[float, Real]:
+        """Return the squared difference of colours and its derivatives with respect to f."""
+        difference = f.reshape(m, -1) @ matrix - target
+        return float(scale * np.sum(difference**2)), (2 * scale * difference @ matrix.T).ravel()
 
     smoothing = max_height / (np.sqrt(2 * np.pi) * max_slope)
     noise = _smooth(np.random.default_rng(seed).normal(size=patch.shape), smoothing, patch)
     start = max_height * (noise - noise.min()) / max(np.ptp(noise), 1e-30)
     bounds = optimize.Bounds(0.0, max_height)
-    heights, steps = _descend(views, difference, start, smoothing, bounds, iterations)
+    heights, steps = _minimise(views, squared_difference, start, smoothing, bounds, iterations)
     return patch.changed(heights, f"designed for {m} colours in {steps} steps")
 
 
@@ -313,7 +324,7 @@ def shown(
     coherence_width: float = 10.0,
     wavelengths: ArrayLike = WAVELENGTHS,
 ) -> Real:
-    """Colours (m, 3) that a perfect reflector with these heights shows; arguments as `relief`."""
+    """Return the colours (m, 3) of a perfect reflector with these heights, as in `relief`."""
     views, matrix = _colour_views(field, wi, wo, coherence_width, wavelengths)
     return np.asarray(views.brdf(field.heights).reshape(-1, len(matrix)) @ matrix)
 
@@ -321,15 +332,15 @@ def shown(
 def _colour_views(
     patch: HeightField, wi: ArrayLike, wo: ArrayLike, coherence_width: float, wavelengths: ArrayLike
 ) -> tuple[Views, Real]:
-    """Views of m pairs at k wavelengths, (m k), and the matrix (k, 3) from BRDFs to linear sRGB."""
+    """Return views of m pairs at k wavelengths, and the matrix (k, 3) from BRDFs to linear sRGB."""
     nodes = np.atleast_1d(np.asarray(wavelengths, np.float64))
     steps = np.diff(nodes)
     if nodes.ndim != 1 or len(nodes) < 3 or not (steps[0] > 0 and np.allclose(steps, steps[0])):
         raise DiffractionError("wavelengths must be at least 3 in nm, ascending and evenly spaced")
-    m = len(_of_mirror(wi, wo, 550.0, coherence_width))
+    m = len(_flat_brdf(wi, wo, 550.0, coherence_width))
     pairs = (np.broadcast_to(np.asarray(w, np.float64), (m, 3)) for w in (wi, wo))
     incident, outgoing = (np.repeat(w, len(nodes), axis=0) for w in pairs)
     lights = np.tile(nodes, m)
-    found = Views(patch, incident, outgoing, lights, coherence_width=coherence_width)
+    views = Views(patch, incident, outgoing, lights, coherence_width=coherence_width)
     # a white diffuser has f = 1/π
-    return found, np.asarray(np.pi * steps[0] * colour.linear_srgb(colour.response(nodes)))
+    return views, np.asarray(np.pi * steps[0] * colour.linear_srgb(colour.response(nodes)))

@@ -15,7 +15,7 @@ _PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit", "numpy", "scipy")
 
 
 def describe_machine() -> dict[str, Any]:
-    """Processor, cores, load of the last minute, memory, and versions of all that computes."""
+    """Return processor, cores, load of the last minute, memory, and versions of packages."""
     import drjit as dr
 
     llvm = loaded_llvm_version()

@@ -1,4 +1,4 @@
-"""Patches and tables as pictures: heights, spectra and the light that they throw; raw albedo."""
+"""Pictures of patches (heights, spectra, far field) and of a table's raw albedo."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from ..tables.table import DiffractionTable
 
 RED, GREEN, BLUE = 650.0, 550.0, 450.0  # nm
 
-# Width of the second picture, µm, at most: fingers and pits are a few µm long.
+# Largest width of the second picture, µm: fingers and pits are a few µm long.
 _DETAIL = 16.0
-# Spectral density of a flat patch, below the axes, µm⁴.
+# Spectral density drawn for a flat patch, below the axes, µm⁴.
 _NOTHING = 1e-12
-# Heights (nm) on either side of the mean, and density (µm⁴), that the axes show at least.
+# Least range of the axes: heights (nm) on either side of the mean, and density (µm⁴).
 _HEIGHTS, _DENSITY = 200.0, 1.0
 
 # Light per unit of (u, v) that is drawn black and white: six decades below the mirror's order.
 _DARKEST, _BRIGHTEST = 2e-3, 4.0
 
-#: Polar angles of albedo's curves end here: towards 90° the raw albedo has no limit.
+#: Largest polar angle of the albedo's curves, degrees: towards 90° the raw albedo diverges.
 LAST = 89.0
-#: Azimuths of its curves, degrees.
+#: Azimuths of the albedo's curves, degrees.
 AZIMUTHS = (0.0, 45.0, 90.0)
-#: Wavelengths that it is looked at across the table's range.
+#: Number of wavelengths of the albedo, over the table's range.
 WAVELENGTHS = 24
 
 
 def patches_figure(fields: Sequence[HeightField]) -> Figure:
-    """Draw a row for each patch; the first one's curves stay in the others' panels, in grey.
+    """Draw a row for each patch; panels of other patches have the first patch's curves in grey.
 
-    From left to right: the patch and a detail of it, seen from above; how the heights are
-    distributed; the spectrum of the heights along x and y; and the far field of light along the
-    normal at 450, 550 and 650 nm, shown as blue, green and red (not colorimetric), logarithmic.
+    From left to right: the patch and a detail of it, seen from above; the distribution of heights;
+    the spectrum of heights along x and y; and the far field of light along the normal at 450, 550
+    and 650 nm, shown as blue, green and red (not colorimetric), logarithmic.
     """
     figure = Figure(figsize=(19, 3.7 * len(fields)), layout="constrained")
     panels = figure.subplots(len(fields), 5, squeeze=False, width_ratios=[1.12, 1.12, 1, 1.15, 1])
@@ -57,7 +57,7 @@ def patches_figure(fields: Sequence[HeightField]) -> Figure:
 
 
 def _heights(axes: Axes, field: HeightField, width: float) -> None:
-    """The corner of a patch up to `width` µm in both directions."""
+    """Draw the corner of a patch up to `width` µm in both directions."""
     (ny, nx), (dx, dy) = field.shape, field.pixel_size
     part = field.heights[: min(ny, round(width / dy)), : min(nx, round(width / dx))] * 1000
     low, high = np.percentile(part, [0.05, 99.95])
@@ -72,10 +72,11 @@ def _heights(axes: Axes, field: HeightField, width: float) -> None:
 
 
 def _distribution(axes: Axes, field: HeightField, others: Sequence[HeightField]) -> None:
+    """Draw the density of heights."""
     furthest = 1000 * float(np.abs(field.heights - field.heights.mean()).max())
     limit = max(_HEIGHTS, 1.05 * furthest)
-    for one, style in _drawn(field, others):
-        heights = (one.heights - one.heights.mean()) * 1000
+    for patch, style in _drawn(field, others):
+        heights = (patch.heights - patch.heights.mean()) * 1000
         share, edges = np.histogram(heights, bins=68, range=(-limit, limit), density=True)
         axes.semilogy((edges[1:] + edges[:-1]) / 2, share, **style)
     axes.set(xlabel="height above the mean (nm)", ylabel="density (1/nm)", ylim=(1e-6, 0.1))
@@ -84,16 +85,17 @@ def _distribution(axes: Axes, field: HeightField, others: Sequence[HeightField])
 
 
 def _spectrum(axes: Axes, field: HeightField, others: Sequence[HeightField]) -> None:
+    """Draw the spectral density along x and y."""
     edges = np.geomspace(0.04, 8, 61)
     middle = np.sqrt(edges[1:] * edges[:-1])
-    for one, style in _drawn(field, others):
-        density = height_spectrum(one)
+    for patch, style in _drawn(field, others):
+        density = height_spectrum(patch)
         for direction, dashes in (("x", "-"), ("y", "--")):
-            curve = profile(density, one, edges, direction)  # type: ignore[arg-type]
-            label = f"along {direction}" if one is field else None
-            seen = np.isfinite(curve)
+            curve = profile(density, patch, edges, direction)  # type: ignore[arg-type]
+            label = f"along {direction}" if patch is field else None
+            rings = np.isfinite(curve)
             axes.loglog(
-                middle[seen], np.maximum(curve[seen], _NOTHING), dashes, label=label, **style
+                middle[rings], np.maximum(curve[rings], _NOTHING), dashes, label=label, **style
             )
     axes.set(xlabel="frequency (1/µm)", ylabel="spectral density (µm⁴)", ylim=(1e-9, None))
     axes.set_ylim(top=max(_DENSITY, axes.get_ylim()[1]))
@@ -101,6 +103,7 @@ def _spectrum(axes: Axes, field: HeightField, others: Sequence[HeightField]) -> 
 
 
 def _light(axes: Axes, field: HeightField) -> None:
+    """Draw the far field, and write the share of light in the mirror direction."""
     light = colour_field(field)
     axes.imshow(light, origin="lower", extent=(-1, 1, -1, 1), interpolation="bilinear")
     axes.set(xlabel="u = sinθ cosφ", ylabel="v = sinθ sinφ")
@@ -110,14 +113,14 @@ def _light(axes: Axes, field: HeightField) -> None:
 
 
 def colour_field(field: HeightField, size: int = 301) -> FloatArray:
-    """Far fields at 650, 550 and 450 nm as red, green and blue, (size, size, 3) in [0, 1]."""
+    """Return far fields at 650, 550 and 450 nm as red, green, blue, (size, size, 3) in [0, 1]."""
     light = np.stack([far_field(field, w, size) for w in (RED, GREEN, BLUE)], axis=-1)
     bright = np.log(np.maximum(light, _DARKEST) / _DARKEST) / np.log(_BRIGHTEST / _DARKEST)
     return np.asarray(np.nan_to_num(np.clip(bright, 0, 1), nan=1.0))
 
 
 def _mirror_share(field: HeightField, wavelength: float) -> float:
-    """Share of the light within 3 orders of the mirror direction."""
+    """Return the share of the light within 3 orders of the mirror direction."""
     powers = order_powers(field, wavelength)
     y, x = (n // 2 for n in powers.shape)
     return float(powers[y - 3 : y + 4, x - 3 : x + 4].sum())
@@ -126,12 +129,13 @@ def _mirror_share(field: HeightField, wavelength: float) -> float:
 def _drawn(
     field: HeightField, others: Sequence[HeightField]
 ) -> list[tuple[HeightField, dict[str, object]]]:
+    """Return the patches of a panel with the style of their curves."""
     grey = [(other, {"color": "0.65", "lw": 2.2}) for other in others]
     return [*grey, (field, {"color": "tab:blue", "lw": 1.0})]
 
 
 def albedo_figure(table: DiffractionTable) -> Figure:
-    """Directional albedo for R = 1 of the raw Kirchhoff BRDF.
+    """Draw the directional albedo for R = 1 of the raw Kirchhoff BRDF.
 
     Left: against the angle of incidence at three azimuths, the range over the table's wavelengths
     (shaded) and their mean. Right: the largest over the wavelengths, against both angles; the
@@ -161,7 +165,7 @@ def albedo_figure(table: DiffractionTable) -> Figure:
 def _curves(
     axes: Axes, theta: NDArray[np.float64], albedo: NDArray[np.floating], wavelengths: NDArray
 ) -> None:
-    """Albedo (wavelengths, angles, azimuths)."""
+    """Draw curves of the albedo (wavelengths, angles, azimuths)."""
     for n, azimuth in enumerate(AZIMUTHS):
         values = albedo[:, :, n]
         (line,) = axes.plot(theta, values.mean(axis=0), label=f"φ = {azimuth:g}°")
@@ -182,7 +186,7 @@ def _map(
     phi: NDArray[np.float64],
     albedo: NDArray[np.floating],
 ) -> None:
-    """Albedo (angles, azimuths)."""
+    """Draw the albedo (angles, azimuths) in false colours."""
     reach = max(0.05, float(np.abs(albedo[theta <= 80.0] - 1.0).max()))
     image = axes.pcolormesh(
         np.radians(phi), theta, albedo, shading="gouraud", cmap="RdBu_r",

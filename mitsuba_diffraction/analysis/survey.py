@@ -1,15 +1,16 @@
-"""Surveys: many scans, each with its table, map, statistics, gratings and colours, in one table.
+"""Surveys of many scans: table, map, statistics, gratings and colours of each.
 
-What is new is measured, here or on workers; then the table of all rows and contact sheets are
-written. A TOML file of patterns says how files are read and treated:
+Scans that the folder does not yet have are measured, in this process or on workers; then the CSV
+of all rows and contact sheets are written. A TOML file of patterns selects reading options and
+treatments:
 
     ["snakes/*.png"]
     pixel_size = 0.0488
     max_height = 0.375
     level = "plane"
 
-Patterns are matched with the whole path and with the file's name; of several that match, later ones
-override. Keys are those of recipes.
+Patterns are matched with the whole path and with the file's name. Where several match, later ones
+override earlier ones. Keys are those of recipes.
 """
 
 from __future__ import annotations
@@ -43,46 +44,45 @@ from ..heights.recipes import LOAD_KEYS, Recipe, options_and_settings
 from ..heights.spectra import dominant_periods
 from ..progress import Progress, silent
 from ..scene.load import error_of
-from ..scene.passes import Stop
 from ..settings import RECIPE_SETTINGS, TableSettings
 from ..tables.build.build import build_with
 from ..tables.store import cached_table, key_of
 from .maps import brdf_map
-from .maps.result import colours_of, iridescence
+from .maps.result import BrdfMap, colours_of, iridescence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Raised whenever rows would differ.
+#: Version of the rows: raise it when their values change.
 VERSION = 2
-#: Gratings in a row.
+#: Number of gratings in a row.
 PERIODS = 3
 #: Names of the files in a survey's folder.
 TABLE, SHEET, SCANS = "survey.csv", "sheet", "scans"
-_COLUMNS, _ROWS = 6, 8  # of a contact sheet
+_COLUMNS, _ROWS = 6, 8  # maps in a contact sheet
 
 
 @dataclass(frozen=True)
 class Treatment:
-    """How one file is read, and what its table is built with."""
+    """Options to read a file, and settings of its table."""
 
     options: LoadOptions = field(default_factory=LoadOptions)
     settings: Mapping[str, Any] = field(default_factory=dict)
 
     def updated(self, other: Treatment) -> Treatment:
-        """This one, with what `other` sets in its place."""
+        """Return this treatment, replaced by the values that `other` sets."""
         return Treatment(self.options.updated(other.options), {**self.settings, **other.settings})
 
 
-def treatments_of(
+def load_treatments(
     path: str | os.PathLike[str] | None,
 ) -> Sequence[tuple[str, Treatment]]:
-    """The patterns of a file, in its order; none without one.
+    """Read patterns and their treatments from a TOML file, in its order; none if path is `None`.
 
     Raises
     ------
     DiffractionError
-        If the file cannot be read, or a pattern has an option that does not fit.
+        If the file cannot be read, or a pattern has an option without a valid value.
     """
     if path is None:
         return []
@@ -94,7 +94,7 @@ def treatments_of(
 
 
 def treatment_for(file: Path, treatments: Sequence[tuple[str, Treatment]]) -> Treatment:
-    """What the patterns that match a file say of it."""
+    """Combine the treatments of the patterns that match a file."""
     result = Treatment()
     for pattern, treatment in treatments:
         if fnmatch.fnmatch(str(file), pattern) or fnmatch.fnmatch(file.name, pattern):
@@ -103,6 +103,7 @@ def treatment_for(file: Path, treatments: Sequence[tuple[str, Treatment]]) -> Tr
 
 
 def _treatment(where: str, values: Any) -> Treatment:
+    """Check the options of one pattern."""
     if not isinstance(values, dict):
         raise DiffractionError(f"{where}: expected a pattern in brackets with options below it")
     unknown = set(values) - {*LOAD_KEYS, *RECIPE_SETTINGS}
@@ -116,33 +117,34 @@ def _treatment(where: str, values: Any) -> Treatment:
 
 @dataclass(frozen=True)
 class Job:
-    """A scan to measure."""
+    """Parameters of the measurement of one scan."""
 
     files: SceneFiles  # the scan, or a recipe with its sources
-    treatment: Treatment  # how it is read
-    theta: float  # of the light, degrees; its azimuth is across the strongest grating's grooves
-    resolution: int  # pixels of the map a side
-    variant: str  # of Mitsuba
-    threads: int  # of Dr.Jit
+    treatment: Treatment
+    # polar angle of the light, degrees; the azimuth is across the strongest grating's grooves
+    theta: float
+    resolution: int  # pixels a side of the map
+    variant: str  # variant of Mitsuba
+    threads: int  # threads of Dr.Jit
 
     @property
     def key(self) -> str:
-        """Changes when the row may."""
+        """Digest of all parameters that the row depends on."""
         treatment = [self.treatment.options.specified(), dict(self.treatment.settings)]
-        own = (VERSION, self.theta, self.resolution, self.variant.partition("_")[2])
-        return key_of("survey", self.files.digest, treatment, *own)[:32]
+        parameters = (VERSION, self.theta, self.resolution, self.variant.partition("_")[2])
+        return key_of("survey", self.files.digest, treatment, *parameters)[:32]
 
 
 @dataclass(frozen=True)
 class Measured:
-    """What a scan gave: a row of plain numbers and texts, and files by suffix."""
+    """Results of one scan: a row of plain numbers and texts, and files by suffix."""
 
     row: dict[str, Any]
     files: dict[str, bytes]
 
 
 def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured | Lacking:
-    """Measure one scan in this process; what is wrong with it is its row's `reason`."""
+    """Measure one scan in this process; the row's `reason` has the error, if any."""
     job.files.keep(contents or {})
     lacking = job.files.missing()
     if lacking:
@@ -152,8 +154,8 @@ def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured |
     files: dict[str, bytes] = {}
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DiffractionWarning)  # they are the table's, in the row
-            files = _measured(job, row)
+            warnings.simplefilter("ignore", DiffractionWarning)  # the row has the table's warnings
+            files = _measure(job, row)
     except DiffractionError as error:
         row["reason"] = str(error)
     except Exception as error:  # one scan must not end a survey of a thousand
@@ -162,7 +164,8 @@ def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured |
     return Measured(row, files)
 
 
-def _measured(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
+def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
+    """Fill the row of a scan, so far as no error ends it, and return table and map."""
     import drjit as dr
     import mitsuba as mi
 
@@ -179,9 +182,9 @@ def _measured(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     row |= {"patches": len(fields), "pixels_x": nx, "pixels_y": ny}
     row |= {"width_um": width, "height_um": height}
     gratings = dominant_periods(fields[0], PERIODS)
-    for n, one in enumerate(gratings, 1):
-        row |= {f"period_{n}_um": one.period, f"direction_{n}_deg": one.direction}
-        row[f"share_{n}"] = one.share
+    for n, grating in enumerate(gratings, 1):
+        row |= {f"period_{n}_um": grating.period, f"direction_{n}_deg": grating.direction}
+        row[f"share_{n}"] = grating.share
     digest = key_of("survey", *(field.digest() for field in fields))
     table = cached_table(digest, settings, lambda: build_with(fields, settings))
     row |= {"orders_x": table.coefficients.shape[2], "orders_y": table.coefficients.shape[1]}
@@ -194,22 +197,22 @@ def _measured(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "table.exr"
         table.save(file)
-        # ideal reflection: what the structure does, whatever it is made of
+        # ideal reflection: the effect of the structure alone, without a material
         try:
             bsdf = mi.load_dict({"type": "diffraction", "table": str(file), "material": "none"})
         except RuntimeError as error:
             raise error_of("cannot map it", error) from error
-        made = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
+        measured = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
         content = file.read_bytes()
     row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
-    row["iridescence"] = iridescence(made)
-    row |= {f"share_{name}": share for name, share in colours_of(made).items()}
-    row["diffracted"] = _beside_mirror(made)
-    return {".exr": content, ".png": _png(made)}
+    row["iridescence"] = iridescence(measured)
+    row |= {f"share_{name}": share for name, share in colours_of(measured).items()}
+    row["diffracted"] = _diffracted_share(measured)
+    return {".exr": content, ".png": _png(measured)}
 
 
 def _heights(path: Path, treatment: Treatment) -> tuple[list[HeightField], TableSettings]:
-    """The patches of a scan or a recipe, and its table's settings."""
+    """Read the patches of a scan or a recipe, and return them with the settings of their table."""
     if is_recipe(path):
         recipe = Recipe.load(path)
         settings = {**recipe.table, **treatment.settings}
@@ -217,19 +220,19 @@ def _heights(path: Path, treatment: Treatment) -> tuple[list[HeightField], Table
     return [load_heights(path, treatment.options)], TableSettings(**treatment.settings)
 
 
-def _beside_mirror(made: Any) -> float:
-    """Share of the luminous power that leaves the mirror's lobe."""
-    luminance = made.luminance
-    return float(luminance[made.away_from_mirror()].sum() / max(luminance.sum(), 1e-30))
+def _diffracted_share(brdf_map: BrdfMap) -> float:
+    """Return the share of the luminous power outside the mirror direction's lobe."""
+    luminance = brdf_map.luminance
+    return float(luminance[brdf_map.away_from_mirror()].sum() / max(luminance.sum(), 1e-30))
 
 
-def _png(made: Any) -> bytes:
-    """The map as a picture, the largest y first."""
+def _png(brdf_map: BrdfMap) -> bytes:
+    """Encode the map as a PNG, the largest y first."""
     from PIL import Image
 
     stream = io.BytesIO()
-    shown = np.round(255.0 * made.srgb(made.exposure())[::-1]).astype(np.uint8)
-    Image.fromarray(shown, "RGBA").save(stream, "PNG")
+    pixels = np.round(255.0 * brdf_map.srgb(brdf_map.exposure())[::-1]).astype(np.uint8)
+    Image.fromarray(pixels, "RGBA").save(stream, "PNG")
     return stream.getvalue()
 
 
@@ -238,37 +241,36 @@ def run_survey(
     folder: Path,
     *,
     treatments: Sequence[tuple[str, Treatment]] = (),
-    own: Treatment | None = None,
+    common: Treatment | None = None,
     variant: str = "llvm_ad_rgb",
     theta: float = 30.0,
     resolution: int = 160,
     threads: int = 0,
     client: Any = None,
-    stop: Stop | None = None,
     progress: Progress = silent,
 ) -> list[dict[str, Any]]:
-    """Measure every scan that is not in the folder yet, and write what is known of all.
+    """Measure every scan that the folder does not have yet, and write the results of all.
 
-    The folder holds `survey.csv`, a row for each scan; contact sheets of their maps; and in `scans`
-    a table (.exr), a map (.png) and a row (.json) of each, found again by the content of the scan
-    and how it is treated.
+    The folder holds `survey.csv`, a row for each scan; contact sheets of the maps; and in `scans` a
+    table (.exr), a map (.png) and a row (.json) of each scan. They are named by the content of the
+    scan and its treatment.
 
     Parameters
     ----------
     files : scans of any format, or recipes.
-    folder : is made if it is missing.
-    treatments, own : by patterns (`treatments_of`), and for all, which takes precedence.
-    variant : of Mitsuba, in RGB or spectral.
-    theta : of the light, degrees from the normal, across the grooves of the strongest grating.
-    resolution : pixels of a map a side.
-    threads : of Dr.Jit, in workers; 0 for one a core.
-    client : `distributed.Client`, or None to do all in this process.
-    stop, progress : as in `scene.passes.render_passes`; progress counts scans.
+    folder : folder of the survey, created if it does not exist.
+    treatments : treatments by patterns (`load_treatments`).
+    common : treatment of all files, which takes precedence.
+    variant : variant of Mitsuba, RGB or spectral.
+    theta : angle of the light from the normal, degrees, across the strongest grating's grooves.
+    resolution : pixels a side of the maps.
+    threads : threads of Dr.Jit in workers; 0 for one per core.
+    client : `distributed.Client`, or None to measure in this process.
+    progress : called as progress(scans done, scans in all, text).
 
     Returns
     -------
-    The rows, in the order of the files; those that failed have a `reason`. A run that was stopped
-    has rows for what is done.
+    The rows, in the order of the files; rows of failed scans have a `reason`.
 
     Raises
     ------
@@ -283,52 +285,53 @@ def run_survey(
     jobs: dict[int, Job] = {}
     for n, file in enumerate(files):
         try:
-            job = Job(_files_of(file), treatment_for(file, treatments).updated(own or Treatment()),
-                      theta, resolution, variant, threads)  # fmt: skip
+            treatment = treatment_for(file, treatments).updated(common or Treatment())
+            job = Job(_files_of(file), treatment, theta, resolution, variant, threads)
         except DiffractionError as error:
             rows[n] = {"reason": str(error)}
             continue
-        known = _known(scans, job)
-        if known is None:
+        stored = _stored_row(scans, job)
+        if stored is None:
             jobs[n] = job
         else:
-            rows[n] = known
+            rows[n] = stored
     todo = list(jobs)
     progress(0, len(todo), "scans")
-    found = each(client, measure, [jobs[n] for n in todo], stop or Stop())
-    for done, (which, result) in enumerate(found, 1):
+    results = each(client, measure, [jobs[n] for n in todo])
+    for done, (which, result) in enumerate(results, 1):
         n = todo[which]
         if isinstance(result, Failed):
             rows[n] = {"reason": f"{result.text} {result.worker}".strip()}
         else:
-            rows[n] = _keep(scans, files[n], jobs[n], result)
+            rows[n] = _store(scans, files[n], jobs[n], result)
+        _write_table(folder / TABLE, files, rows)  # complete even if Ctrl-C ends the next scan
         progress(done, len(todo), "scans")
-    named = [{"file": str(files[n]), **rows[n]} for n in sorted(rows)]
-    _write_table(folder / TABLE, named)
+    named = _write_table(folder / TABLE, files, rows)
     _write_sheets(folder, named)
     return named
 
 
 def _files_of(file: Path) -> SceneFiles:
-    found = SceneFiles.of(readable_file(file), {})
+    """Return the scan's files, after a check of the recipe if it is one."""
+    files = SceneFiles.of(readable_file(file), {})
     if is_recipe(file):
         Recipe.load(file)
-    return found
+    return files
 
 
-def _known(scans: Path, job: Job) -> dict[str, Any] | None:
-    """The row that an earlier run has kept, with its files."""
+def _stored_row(scans: Path, job: Job) -> dict[str, Any] | None:
+    """Read the row that an earlier run has stored, if its files exist."""
     try:
         (path,) = scans.glob(f"*-{job.key}.json")
         row: dict[str, Any] = json.loads(path.read_text("utf-8"))
-    except ValueError:  # none, or damaged
+    except ValueError:  # no such file, or damaged
         return None
-    there = row["reason"] or all(path.with_suffix(s).is_file() for s in (".exr", ".png"))
-    return row if there else None
+    complete = row["reason"] or all(path.with_suffix(s).is_file() for s in (".exr", ".png"))
+    return row if complete else None
 
 
-def _keep(scans: Path, file: Path, job: Job, result: Measured) -> dict[str, Any]:
-    """Write a scan's files, the row last; what nobody expected to fail is tried again next time."""
+def _store(scans: Path, file: Path, job: Job, result: Measured) -> dict[str, Any]:
+    """Write a scan's files, the row last; after unexpected errors no row: the next run retries."""
     stem = f"{file.stem[:60]}-{job.key}"
     row = dict(result.row)
     for suffix, content in result.files.items():
@@ -341,7 +344,11 @@ def _keep(scans: Path, file: Path, job: Job, result: Measured) -> dict[str, Any]
     return row
 
 
-def _write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+def _write_table(
+    path: Path, files: Sequence[Path], rows_by_number: Mapping[int, Mapping[str, Any]]
+) -> list[dict[str, Any]]:
+    """Write the measured rows in the order of the files as CSV, and return them."""
+    rows = [{"file": str(files[n]), **rows_by_number[n]} for n in sorted(rows_by_number)]
     columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
     names = ["file", "reason", *(n for n in columns if n not in ("file", "reason"))]
     text = io.StringIO()
@@ -350,20 +357,22 @@ def _write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     writer.writerows(rows)
     with atomic_path(path) as temporary:
         temporary.write_text(text.getvalue(), "utf-8")
+    return rows
 
 
 def _write_sheets(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Pages of maps, with what makes them and how iridescent they are."""
-    each_page = _COLUMNS * _ROWS
-    shown = [row for row in rows if not row["reason"]]
-    for page in range(math.ceil(len(shown) / each_page)):
-        mine = shown[page * each_page : (page + 1) * each_page]
-        name = SHEET if len(shown) <= each_page else f"{SHEET}-{page + 1:03d}"
+    """Write contact sheets of all maps."""
+    per_page = _COLUMNS * _ROWS
+    measured = [row for row in rows if not row["reason"]]
+    for page in range(math.ceil(len(measured) / per_page)):
+        name = SHEET if len(measured) <= per_page else f"{SHEET}-{page + 1:03d}"
         with atomic_path(folder / f"{name}.png") as temporary:
-            _sheet(folder, mine).savefig(temporary, format="png")
+            sheet = _sheet(folder, measured[page * per_page : (page + 1) * per_page])
+            sheet.savefig(temporary, format="png")
 
 
 def _sheet(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Figure:
+    """Draw a contact sheet: maps with file name, strongest grating and iridescence."""
     from matplotlib.figure import Figure
     from PIL import Image
 

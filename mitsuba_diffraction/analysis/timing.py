@@ -1,4 +1,4 @@
-"""Times of kernels, compared fairly: random queries, rounds through all candidates, ratios."""
+"""Kernel times of BSDFs: random queries, alternating rounds through all candidates, ratios."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from ..errors import DiffractionWarning
 PIXEL = 65.0 / 1332
 #: Seed of the random directions and wavelengths.
 SEED = 20140113
-#: Calls before the first that counts: the first compiles, the second finds the processor awake.
+#: Calls before the first that counts: the first one compiles, the second one wakes the processor.
 WARM_UP = 2
 
 
 def kernel_seconds(call: Callable[[], Any]) -> float:
-    """Execution time of the kernels that one call launches, without tracing in Python."""
+    """Return the execution time of the kernels of one call, s, without tracing in Python."""
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.kernel_history_clear()
         dr.eval(call())
@@ -34,9 +34,9 @@ def kernel_seconds(call: Callable[[], Any]) -> float:
 def rounds_of(
     calls: Mapping[str, Callable[[], float]], rounds: int, done: Callable[[int, int], None]
 ) -> dict[str, list[float]]:
-    """Seconds of every call in every round; each round goes through all of them in turn.
+    """Return the seconds of every call in every round; each round goes through all calls in turn.
 
-    So background load affects all candidates alike, and ratios within a round can be trusted.
+    Background load then affects all candidates equally, and ratios within a round are reliable.
     """
     seconds: dict[str, list[float]] = {name: [] for name in calls}
     for n in range(WARM_UP + rounds):
@@ -49,12 +49,12 @@ def rounds_of(
 
 
 def ratio(a: Sequence[float], b: Sequence[float]) -> float:
-    """Median over the rounds of a/b."""
+    """Return the median of a/b over the rounds."""
     return statistics.median(x / y for x, y in zip(a, b, strict=True))
 
 
 def quiet_bsdf(table: str | os.PathLike[str], **parameters: Any) -> Any:
-    """Load the plugin with a table, without warnings about how far the model holds for it."""
+    """Load the plugin with a table, without warnings about the model's limits."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
         return mi.load_dict({"type": "diffraction", "table": str(table), **parameters})
@@ -62,7 +62,7 @@ def quiet_bsdf(table: str | os.PathLike[str], **parameters: Any) -> Any:
 
 @dataclass(frozen=True)
 class Queries:
-    """Random queries of a BSDF, evaluated and in memory."""
+    """Random arguments of a BSDF's methods, evaluated to memory."""
 
     si: Any
     wo: Any
@@ -71,7 +71,7 @@ class Queries:
 
     @classmethod
     def random(cls, lanes: int) -> Queries:
-        """Draw directions uniformly, wavelengths as Mitsuba does, and any place on the surface."""
+        """Draw directions and texture coordinates uniformly, and wavelengths as Mitsuba does."""
         random = mi.PCG32(size=lanes, initstate=SEED)
 
         def hemisphere() -> Any:

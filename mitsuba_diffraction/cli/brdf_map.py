@@ -152,7 +152,7 @@ def run(args: argparse.Namespace) -> int:
     from ..analysis.maps import Bands, save_exr, save_png
 
     spectrum = options.wavelengths(args)
-    bands = Bands.of(spectrum["wavelength_range"], spectrum["step"], args.wavelength)
+    bands = Bands.choose(spectrum["wavelength_range"], spectrum["step"], args.wavelength)
     evaluate = _by_bsdf if args.method is None else _by_method
     result, surface, how = evaluate(args, bands, spectrum)
     exposure = None if bands.is_single else args.exposure

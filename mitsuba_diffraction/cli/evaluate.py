@@ -19,7 +19,7 @@ from .report import check_outputs, save_report
 
 if TYPE_CHECKING:
     from ..heights.spectra import Periodicity
-    from ..thesis.evaluation import Fit, Response, Ridge
+    from ..thesis.period_fit import Fit, Response, Ridge
 
 _WINDOWS = 32
 # Single windows are fitted at about so many wavelengths: the period needs no more.
@@ -79,12 +79,12 @@ def run(args: argparse.Namespace) -> int:
 
     from ..atomic import atomic_path
     from ..heights.spectra import dominant_periods
-    from ..thesis.evaluation import Beam, measure
-    from ..thesis.evaluation.plot import figure, save_csv, save_npz
-    from ..thesis.evaluation.ridge import check_axes
     from ..thesis.methods import make
     from ..thesis.methods.method import trapezoid_rule
     from ..thesis.methods.periodic import check_period
+    from ..thesis.period_fit import Beam, measure
+    from ..thesis.period_fit.plot import figure, save_csv, save_npz
+    from ..thesis.period_fit.ridge import check_axes
 
     start = time.perf_counter()
     output = args.output or Path(f"{args.source.stem}-evaluation.png")
@@ -153,9 +153,9 @@ def run(args: argparse.Namespace) -> int:
 
 def periods_along(gratings: Sequence[Periodicity], phi: float) -> list[float]:
     """Periods in µm that gratings have in a plane of incidence at an azimuth, in degrees."""
-    cosines = [abs(math.cos(math.radians(one.direction - phi))) for one in gratings]
+    cosines = [abs(math.cos(math.radians(g.direction - phi))) for g in gratings]
     # a plane along the grooves meets none of their orders
-    return [one.period / c for one, c in zip(gratings, cosines, strict=True) if c > _LEAST_COSINE]
+    return [g.period / c for g, c in zip(gratings, cosines, strict=True) if c > _LEAST_COSINE]
 
 
 def _followed(
@@ -167,7 +167,7 @@ def _followed(
     """
     import numpy as np
 
-    from ..thesis.evaluation import Ridge, find_period, fit_period, ridge_of
+    from ..thesis.period_fit import Ridge, find_period, fit_period, ridge_of
 
     period = find_period(response, held, order)
     ridge = ridge_of(response, order, period=period)
@@ -220,8 +220,8 @@ def _windows(
     """What single windows show, and the thesis' procedure: lines, and entries of the NPZ."""
     if args.positions == 0 or fit is None:
         return [], {}
-    from ..thesis.evaluation import thesis_fit, window_fits
     from ..thesis.methods import make
+    from ..thesis.period_fit import thesis_fit, window_fits
 
     few = steps[:: max(1, steps.size // _FEW)]
     # the look-up in the package's own series: a single window's amplitudes
@@ -238,7 +238,7 @@ def _windows(
         lines.append(("windows", str(error)))
     else:
         periods = 1e3 * found.periods
-        more |= {"window_periods": found.periods, "window_places": found.places}
+        more |= {"window_periods": found.periods, "window_places": found.centres}
         lines.append(
             ("windows", f"{periods.size} of {args.positions} window positions: "
              f"{1e3 * found.mean:.5g} ± {1e3 * found.spread:.2g} nm, {periods.min():.5g} to "

@@ -110,8 +110,8 @@ def compare(args: argparse.Namespace) -> int:
         raise DiffractionError(f"-o {folder}: it is a file; name a folder")
     check_writable(folder / "compare.json", make_folder=True)
 
-    from ..realtime.comparison.report import markdown
-    from ..realtime.comparison.run import Comparison
+    from ..realtime.shader_comparison.report import markdown
+    from ..realtime.shader_comparison.run import Comparison
 
     start = time.perf_counter()
     variant = _set_variant(args)

@@ -7,9 +7,9 @@ import contextlib
 import os
 import time
 from pathlib import Path
+from typing import Any
 
 from ..scene.load import set_variant
-from ..scene.passes import Stop
 from . import options
 from .console import INTERRUPTED, Bar, mitsuba_warnings, say
 from .options import number_between, whole_number
@@ -52,13 +52,32 @@ def add_parser(subparsers: options.Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure what is new, and return the exit code."""
+    start = time.perf_counter()
+    try:
+        rows = _measured(args)
+    except KeyboardInterrupt:
+        say(f"interrupted; finished scans are in '{args.output}': run the command again to go on")
+        return INTERRUPTED
+    for row in rows:
+        if row["reason"]:
+            say(f"{os.path.basename(row['file'])}: {row['reason']}")
+    failed = sum(bool(row["reason"]) for row in rows)
+    seconds = time.perf_counter() - start
+    save_report(args, {"rows": rows, "seconds": seconds})
+    print(
+        f"{args.output}: {len(rows) - failed} scans in survey.csv, {failed} failed, {seconds:.1f} s"
+    )
+    return 0
+
+
+def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
+    """Measure what is new, here or on workers, and return the rows of all scans."""
     own_options, settings = options.load_options(args), options.table_options(args)
     check_writable(args.output / "survey.csv", make_folder=True)
 
-    from ..analysis.survey import Treatment, run_survey, treatments_of
+    from ..analysis.survey import Treatment, load_treatments, run_survey
 
-    treatments = treatments_of(args.treatments)
-    start = time.perf_counter()
+    treatments = load_treatments(args.treatments)
     variant = set_variant(args.mode or "llvm_ad_rgb")
     with mitsuba_warnings(), contextlib.ExitStack() as stack:
         client = stack.enter_context(client_of(args)) if on_workers(args) else None
@@ -66,23 +85,9 @@ def run(args: argparse.Namespace) -> int:
             from ..cluster.workers import check_workers
 
             check_workers(client, variant)
-        with Bar(args, unit=" scans", delay=0) as bar, Stop() as stop:
-            rows = run_survey(
-                args.files, args.output, treatments=treatments,
-                own=Treatment(own_options, settings), variant=variant, theta=args.theta,
-                resolution=args.resolution, threads=worker_threads(args), client=client,
-                stop=stop, progress=bar,
-            )  # fmt: skip
-    for row in rows:
-        if row["reason"]:
-            say(f"{os.path.basename(row['file'])}: {row['reason']}")
-    failed = sum(bool(row["reason"]) for row in rows)
-    save_report(args, {"rows": rows, "seconds": time.perf_counter() - start})
-    print(
-        f"{args.output}: {len(rows) - failed} scans in survey.csv, {failed} failed, "
-        f"{time.perf_counter() - start:.1f} s"
-    )
-    if len(rows) < len(args.files):
-        say(f"interrupted; {len(rows)} of {len(args.files)} scans are done, run it again to go on")
-        return INTERRUPTED
-    return 0
+        bar = stack.enter_context(Bar(args, unit=" scans", delay=0))
+        return run_survey(
+            args.files, args.output, treatments=treatments,
+            common=Treatment(own_options, settings), variant=variant, theta=args.theta,
+            resolution=args.resolution, threads=worker_threads(args), client=client, progress=bar,
+        )  # fmt: skip

@@ -148,7 +148,7 @@ def _title(step: Any, result: Any) -> str:
         return options.method(step.label)
     if step.label == result.reference:
         return f"{options.method(step.label)} (reference)"
-    return f"{options.method(step.label)}; ΔE {step.mean:.2g}"
+    return f"{options.method(step.label)}; ΔE {step.difference.delta_e:.2g}"
 
 
 def _lines(result: Any) -> list[str]:
@@ -157,10 +157,11 @@ def _lines(result: Any) -> list[str]:
         text = f"{options.method(step.label):<12} {step.seconds:7.2f} s"
         if step.label == result.reference:
             text += "  reference"
-        elif math.isfinite(step.mean):
+        elif math.isfinite(step.difference.delta_e):
+            d = step.difference
             text += (
-                f"  ΔE {step.mean:.3g} mean, {step.high:.3g} at 95 %, {step.own_mean:.3g} with its "
-                f"own exposure; Z/X × {step.blueness:.3g}"
+                f"  ΔE {d.delta_e:.3g} mean, {d.delta_e_95:.3g} at 95 %, "
+                f"{d.delta_e_own_exposure:.3g} with its own exposure; Z/X × {d.blueness:.3g}"
             )
         lines.append(text)
     return lines
@@ -181,5 +182,4 @@ def _save(path: Path, result: Any) -> None:
 
 def _row(step: Any) -> dict[str, Any]:
     value = options.method(step.value) if isinstance(step.value, str) else step.value
-    numbers = (step.seconds, step.mean, step.high, step.own_mean, step.blueness)
-    return dict(zip(_COLUMNS, (value, *numbers), strict=True))
+    return dict(zip(_COLUMNS, (value, step.seconds, *step.difference), strict=True))

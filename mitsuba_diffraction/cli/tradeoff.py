@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
         from ..tables.table import DiffractionTable
 
         finest = DiffractionTable.build(field, coherence_width=width, tolerance=1e-4)
-        sample = Sample.of(field, width, "ensemble", min(pairs, 160), bar)
+        sample = Sample.draw(field, width, "ensemble", min(pairs, 160), bar)
         spectral = measure_wavelengths(finest, sample.wi, sample.wo)
         deep = measure_depths(depths, bar)
     args.output.mkdir(parents=True, exist_ok=True)

@@ -13,7 +13,6 @@ from typing import Any, Protocol
 from ..errors import DiffractionError
 from ..heights.field import HeightField
 from ..progress import Progress
-from ..scene.passes import Stop
 from ..settings import TableSettings
 from ..tables.build.build import build_with
 from ..tables.table import DiffractionTable
@@ -80,7 +79,7 @@ class HasFiles(Protocol):
 
 
 def each(
-    client: Any, work: Callable[..., Any], jobs: Sequence[HasFiles], stop: Stop
+    client: Any, work: Callable[..., Any], jobs: Sequence[HasFiles]
 ) -> Iterator[tuple[int, Any]]:
     """Do `work(job, contents)` for each, and give its number with what came of it.
 
@@ -89,7 +88,6 @@ def each(
     client : `distributed.Client`, or None to do all here.
     work : gives `Lacking` for files that it needs by content.
     jobs : any.
-    stop : asked, it ends what has not begun.
 
     Returns
     -------
@@ -102,17 +100,15 @@ def each(
     """
     if client is None:
         for n, job in enumerate(jobs):
-            if stop.asked:
-                return
             yield n, work(job)
         return
     waiting = {client.submit(work, job, pure=False): n for n, job in enumerate(jobs)}
     try:
-        while waiting and not stop.asked:
+        while waiting:
             for future in [future for future in waiting if future.done()]:
                 n, found = waiting.pop(future), outcome(future)
                 if found is None:
-                    wait_for_scheduler(client, stop)
+                    wait_for_scheduler(client)
                     waiting[client.submit(work, jobs[n], pure=False)] = n
                 elif isinstance(found, Lacking):
                     again = client.submit(work, jobs[n], _contents(jobs[n], found), pure=False)

@@ -162,8 +162,8 @@ def check_versions(wanted: tuple[str, ...]) -> None:
     for name, mine, theirs in zip(_PACKAGES, found, wanted, strict=True):
         if mine != theirs:
             raise DiffractionError(
-                f"it has {name} {mine}, and the client {theirs}: pictures of both do not agree to "
-                "the last bit; install the same on both"
+                f"it has {name} {mine}, and the client {theirs}: pictures of both need not agree; "
+                "install the same version on both"
             )
 
 

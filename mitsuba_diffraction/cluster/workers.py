@@ -47,10 +47,11 @@ def connect(
     if count is not None:
         import dask
 
-        with _ctrl_c_ignored():  # by the processes that are started: it is for the client
+        # by the processes that are started: Ctrl-C is for the client
+        with _ctrl_c_ignored(), _silent_tracker():
             cluster = distributed.LocalCluster(
                 n_workers=count, threads_per_worker=1, processes=True,
-                dashboard_address=":0", silence_logs=logging.CRITICAL,
+                dashboard_address="127.0.0.1:0", silence_logs=logging.CRITICAL,
             )  # fmt: skip
         # a worker that died is started again, and not given up if that takes more than 15 s
         patient = dask.config.set({"distributed.deploy.lost-worker-timeout": "10 minutes"})
@@ -196,6 +197,21 @@ def _apart(distributed: Any) -> Any:
                 os.setsid()
 
     return Apart()
+
+
+@contextlib.contextmanager
+def _silent_tracker() -> Iterator[None]:
+    """Inside, Python starts its tracker of semaphores so that it says nothing of a client's end."""
+    name, before = "PYTHONWARNINGS", os.environ.get("PYTHONWARNINGS")
+    line = "ignore:resource_tracker:UserWarning"
+    os.environ[name] = f"{before},{line}" if before else line
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
 
 
 @contextlib.contextmanager

@@ -65,7 +65,7 @@ def small_slope(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     (x0, y0), (x, y) = _xy(s_in), _xy(s_out)
     dot, cross = x0 * x + y0 * y, x0 * y - y0 * x
     found = [
-        _matrix(
+        jones_matrix(
             ss=-there.s * came.s * dot,
             sp=there.s * came.x * cross,
             ps=there.x * came.s * cross,
@@ -90,7 +90,7 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     """
     incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
     s_in, s_out = polarisation_axes(incident, outgoing)
-    axis = _facet_axis(incident, outgoing, s_in)
+    axis = facet_axis(incident, outgoing, s_in)
     total = incident + outgoing
     # |ωi + ωo|² = 2(1 + ωi·ωo) is the form that survives opposite grazing directions
     one_plus_dot = 0.5 * np.sum(total * total, axis=-1)
@@ -99,7 +99,7 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
         index = index.tilted(0.5 * total[..., 2] / cos_half)
     r_s, r_p = amplitudes(cos_half, index)
     zero = np.zeros_like(r_s)
-    facet = _matrix(ss=r_s, sp=zero, ps=zero, pp=r_p)
+    facet = jones_matrix(ss=r_s, sp=zero, ps=zero, pp=r_p)
     turned = turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident)
     scale = one_plus_dot / (2 * incident[..., 2] * outgoing[..., 2])
     return np.asarray(scale[..., None, None] * turned)
@@ -149,7 +149,7 @@ def _horizontal(direction: Real) -> tuple[Real, NDArray[np.bool_]]:
     return np.stack([-y / safe, x / safe, np.zeros_like(x)], axis=-1), found[..., None]
 
 
-def _facet_axis(incident: Real, outgoing: Real, fallback: Real) -> Real:
+def facet_axis(incident: Real, outgoing: Real, fallback: Real) -> Real:
     """s of a facet that mirrors ωi to ωo: normal to both; any where they are one direction."""
     # (ωi+ωo)×(−ωi) = ωi×ωo: the direction of ẑ×d with the half vector for ẑ
     normal = np.cross(incident, outgoing)
@@ -162,10 +162,10 @@ def turn(to: Real, start: Real, direction: Real) -> Complex:
     """Matrix (..., 2, 2) from components along (start, d×start) to those along (to, d×to)."""
     cosine = np.sum(to * start, axis=-1)
     sine = np.sum(to * np.cross(direction, start), axis=-1)
-    return _matrix(ss=cosine, sp=sine, ps=-sine, pp=cosine)
+    return jones_matrix(ss=cosine, sp=sine, ps=-sine, pp=cosine)
 
 
-def _matrix(*, ss: ArrayLike, sp: ArrayLike, ps: ArrayLike, pp: ArrayLike) -> Complex:
+def jones_matrix(*, ss: ArrayLike, sp: ArrayLike, ps: ArrayLike, pp: ArrayLike) -> Complex:
     """[[ss, sp], [ps, pp]]: first the outgoing, then the incident polarisation."""
     entries = np.broadcast_arrays(*(np.asarray(x, np.complex128) for x in (ss, sp, ps, pp)))
     return np.stack(entries, axis=-1).reshape(*entries[0].shape, 2, 2)

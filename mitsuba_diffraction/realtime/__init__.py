@@ -1,8 +1,8 @@
-"""Scenes in real time, and how far they are from the path tracer's.
+"""Scenes rendered in real time, and their differences from the path tracer.
 
 Contents
 --------
-glsl         shaders, and a renderer of them
-web          pages for a browser
-comparison   beside the path tracer
+glsl               shaders, and a renderer that uses them
+web                pages for a browser
+shader_comparison  comparison of the shaders with the path tracer
 """

@@ -1,21 +1,25 @@
-"""The diffraction BRDF straight from its integral: float64, slow and obviously right (NumPy only).
+"""The BSDF straight from the heights: float64, slow, without series, tables or interpolation.
 
-No series, no table and no interpolation: for every direction pair the phase screen exp(iκh) is
-formed from all heights and projected on plane waves. Everything else is measured against this.
+Every pair of directions has its own phase screen exp(iκh), made from all heights. All faster code
+is measured against this (NumPy only).
 
 Contents
 --------
-bsdf       `brdf`, `mueller`, `btdf`: the integral, times what the material makes of the light
-integral   `window_power`, `screen_power`: the integral alone, which knows no material
-second_order  the integral, each order times its factor of the second order of small slope
-arguments  what they take, checked
+model         the default model in one file: the equations, numbered as in docs/theory.md
+bsdf          `brdf` and `mueller`: the model with any window, material, coat and film
+coat, film    wrappers of the model
+transmission  `btdf`: light that goes through a dielectric
+integral      `window_power`, `screen_power`: ⟨|P|²⟩ alone, which knows no material
+second_order  whether "auto" applies the second order
+arguments     checks of the arguments
 """
 
 from __future__ import annotations
 
 from ..settings import COHERENCES
 from .arguments import MODELS
-from .bsdf import brdf, btdf, mueller
+from .bsdf import brdf, mueller
 from .integral import screen_power, window_power
+from .transmission import btdf
 
 __all__ = ["COHERENCES", "MODELS", "brdf", "btdf", "mueller", "screen_power", "window_power"]

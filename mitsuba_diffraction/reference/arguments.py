@@ -1,20 +1,23 @@
-"""Arguments of the reference, checked and brought to one shape."""
+"""Arguments of the reference: checks, and one shape for all."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, quoted
 from ..optics.fresnel import Filmed
-from ..optics.geometry import wavenumber
+from ..optics.geometry import sigma_of, wavenumber
 from ..settings import SURFACE, checked
+from .model import Light
 
 MODELS = ("kirchhoff", "small_slope")
 
 
 def width_of(value: float) -> float:
-    """A coherence width: unlike a table, an integral may have any."""
+    """Check a coherence width; unlike a table's, it has no largest value."""
     number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
     if not (number and 0.0 < value < np.inf):
         shown = f"{value:g}" if number else quoted(value)
@@ -22,44 +25,65 @@ def width_of(value: float) -> float:
     return float(value)
 
 
-def places_of(coherence: str, place: ArrayLike | None, n: int) -> NDArray[np.float64] | None:
-    """Centres (n, 2) of windows on the surface, µm."""
+class Window(NamedTuple):
+    """Coherence window: σ in µm, coherence, and centres (n, 2) in µm or None for the patch's."""
+
+    sigma: float
+    coherence: str
+    centres: NDArray[np.float64] | None
+
+    def at(self, chosen: NDArray[np.bool_]) -> Window:
+        """Window of the chosen direction pairs, (n,)."""
+        return self if self.centres is None else self._replace(centres=self.centres[chosen])
+
+
+def window_of(
+    coherence_width: float, coherence: str, place: ArrayLike | None, count: int
+) -> Window:
+    """Check a window's width, coherence and place, for so many direction pairs."""
+    sigma = sigma_of(width_of(coherence_width))
     if coherence != SURFACE:
         checked("coherence", coherence)
     if (place is None) == (coherence == SURFACE):
-        given = "needs a place: (x, y) on the patch in µm" if place is None else "takes no place"
-        raise DiffractionError(f"coherence='{coherence}' {given}")
+        text = "needs a place: (x, y) on the patch in µm" if place is None else "takes no place"
+        raise DiffractionError(f"coherence='{coherence}' {text}")
     if place is None:
-        return None
+        return Window(sigma, coherence, None)
     try:
-        found = np.broadcast_to(np.asarray(place, np.float64), (n, 2))
+        centres = np.broadcast_to(np.asarray(place, np.float64), (count, 2))
     except ValueError as error:
         raise DiffractionError(
-            f"place has shape {np.shape(place)}; it must be ({n}, 2) or (2,), in µm"
+            f"place has shape {np.shape(place)}; it must be ({count}, 2) or (2,), in µm"
         ) from error
-    if not np.all(np.isfinite(found)):
+    if not np.all(np.isfinite(centres)):
         raise DiffractionError("place must be finite, in µm")
-    return found
+    return Window(sigma, coherence, centres)
+
+
+def model_of(model: str | None, index: NDArray[np.complex128] | Filmed | None) -> str:
+    """Name of the model: by default "small_slope" where there is an index."""
+    if model is None:
+        return "kirchhoff" if index is None else "small_slope"
+    if model not in MODELS:
+        raise DiffractionError(f"model='{model}' is unknown; choose one of {', '.join(MODELS)}")
+    if model == "small_slope" and index is None:
+        raise DiffractionError(
+            "model='small_slope' needs an index: give eta (and k of a conductor), or "
+            "model='kirchhoff' for a perfect reflector"
+        )
+    return model
 
 
 def index_of(
-    model: str,
     eta: ArrayLike | None,
     k: ArrayLike,
     wavelength: NDArray[np.float64],
     film: tuple[complex, float] | None,
 ) -> NDArray[np.complex128] | Filmed | None:
-    """The index eta + ik, (n,), under a film where there is one; or none, which is R = 1."""
-    if model not in MODELS:
-        raise DiffractionError(f"model='{model}' is unknown; choose one of {', '.join(MODELS)}")
+    """Index eta + ik, (n,), under a film where there is one; None for a perfect reflector."""
     if eta is None:
         if film is not None:
             raise DiffractionError(f"film={film} needs an index beneath it: give eta (and k)")
-        if model == "small_slope":
-            raise DiffractionError(
-                "model='small_slope' needs an index: give eta (and k of a conductor), or "
-                "model='kirchhoff' for a perfect reflector"
-            )
         return None
     index = _complex(eta, k, wavelength.shape)
     if film is None:
@@ -71,19 +95,6 @@ def index_of(
             "thickness of at least 0 nm"
         )
     return Filmed(index, layer, wavenumber(wavelength) * thickness * 1e-3)
-
-
-def require_dielectric(
-    model: str, coherence: str, index: NDArray[np.complex128] | Filmed | None
-) -> None:
-    """Refuse what the second order is not for."""
-    if model != "small_slope" or coherence != "ensemble":
-        raise DiffractionError(
-            "second_order=True is for model='small_slope' and coherence='ensemble'; got "
-            f"model='{model}', coherence='{coherence}'"
-        )
-    if not isinstance(index, np.ndarray) or np.any(index.imag > 0.0):
-        raise DiffractionError("second_order=True is for dielectrics: leave k and film out")
 
 
 def _complex(eta: ArrayLike, k: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.complex128]:
@@ -102,9 +113,8 @@ def _complex(eta: ArrayLike, k: ArrayLike, shape: tuple[int, ...]) -> NDArray[np
         ) from error
 
 
-def directions_of(
-    wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def directions_of(wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike) -> Light:
+    """Broadcast directions and wavelengths to one length."""
     incident, outgoing = np.atleast_2d(np.asarray(wi, float)), np.atleast_2d(np.asarray(wo, float))
     lam = np.atleast_1d(np.asarray(wavelength, float))
     if incident.shape[-1] != 3 or outgoing.shape[-1] != 3:
@@ -120,7 +130,7 @@ def directions_of(
             f"wi {np.shape(wi)}, wo {np.shape(wo)} and wavelength {np.shape(wavelength)} "
             "do not broadcast to one length n"
         ) from error
-    return (
+    return Light(
         np.broadcast_to(incident, (*n, 3)),
         np.broadcast_to(outgoing, (*n, 3)),
         np.broadcast_to(lam, n),

@@ -1,26 +1,60 @@
-"""The BSDF from the integral over the heights, and what the material makes of the light.
+"""BRDF and Mueller matrices of a surface, computed from its heights for every pair of directions.
 
-The material is a factor outside the integral: `optics.boundary`, `optics.blend`, `optics.through`.
+The default is `model.default_brdf`; other models, windows, coats and films replace one factor of
+its equation (4).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
 from ..heights.field import HeightField
-from ..optics import blend, boundary, through
-from ..optics.coat import refracted, transmitted
-from ..optics.fresnel import Filmed, Index
-from ..optics.geometry import diffraction_coordinates, kirchhoff_factor, sigma_of, wavenumber
-from ..optics.mean_second_order import mean_gain
-from ..settings import checked
-from .arguments import directions_of, index_of, places_of, require_dielectric, width_of
-from .integral import screen_power, window_power
-from .second_order import second_order_power
+from ..optics import boundary
+from ..optics.fresnel import Filmed
+from ..optics.geometry import kirchhoff_factor
+from ..settings import COHERENCES
+from . import coat as coats
+from . import film as films
+from . import model as models
+from .arguments import Window, directions_of, index_of, model_of, window_of
+from .integral import window_power
+from .model import Light
+from .second_order import resolved
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+#: A measure of Jones matrices (n, 2, 2): N of unpolarised light (n,), or Mueller matrices.
+Measure = Callable[[Complex], Real]
+
+
+@dataclass(frozen=True)
+class Material:
+    """Material of a surface, and the model of its boundary.
+
+    Attributes
+    ----------
+    model : one of `arguments.MODELS`.
+    index : (n,) n + ik over that of the medium above it, under a film where there is one; None for
+        a perfect reflector.
+    coat : index of a clear coat over the surface, over that of the medium above it, or None.
+    second_order : whether orders are multiplied by the second order of small slope.
+    """
+
+    model: str
+    index: Complex | Filmed | None
+    coat: float | None
+    second_order: bool
+
+    @property
+    def is_default(self) -> bool:
+        """Whether `model.default_brdf` is the BRDF in an ensemble."""
+        bare = self.coat is None and not isinstance(self.index, Filmed)
+        return bare and self.model == "small_slope"
 
 
 def brdf(
@@ -32,59 +66,55 @@ def brdf(
     coherence_width: float = 65.0,
     coherence: str = "ensemble",
     place: ArrayLike | None = None,
-    model: str = "kirchhoff",
+    model: str | None = None,
     eta: ArrayLike | None = None,
     k: ArrayLike = 0.0,
     coat: float | None = None,
     film: tuple[complex, float] | None = None,
-    second_order: bool = False,
-) -> NDArray[np.float64]:
+    second_order: str | bool = "auto",
+) -> Real:
     """BRDF of a surface with these heights for unpolarised light, in 1/sr, shape (n,).
 
-    Stam 1999, eq. 7–11, with a normalised Gaussian window (see the package's theory page); the
-    material as in `optics.blend`. By default Kirchhoff's of a perfect reflector, R = 1.
+    Equations (1) to (10) of `reference.model`; the defaults are those of the BSDF `diffraction`.
+    Below the surface the BRDF is 0.
 
     Parameters
     ----------
     field : HeightField, heights in µm.
     wi, wo : (n, 3) or (3,), unit vectors in the patch's frame, pointing away from the surface;
-        x runs along rows, y along columns, z is the normal. Below the surface the BRDF is 0.
+        x runs along rows, y along columns, z is the normal.
     wavelength : (n,) or scalar, vacuum wavelength in nm.
     coherence_width : 4σ of the amplitude window, µm.
     coherence : "ensemble", the power averaged over every position of the window; "patch", the
         power under one window centred on the patch; "surface", under one centred on `place`.
     place : (n, 2) or (2,), µm along x and y from the patch's first pixel; it tiles the plane.
-    model : "kirchhoff", or "small_slope", which needs an index.
+    model : "small_slope", the default where there is an index, or "kirchhoff".
     eta, k : (n,) or scalar, the index eta + ik of the material over that of the medium above it;
-        without eta R = 1.
-    coat : index of a flat clear coat over the surface, relative likewise (`optics.coat`); it needs
-        eta, and its own reflection is the lobe of a flat patch.
-    film : index n + ik, relative likewise, and thickness in nm of a film that follows the heights,
-        coherent with the surface (`optics.fresnel.Filmed`); it needs eta, and no coat. Small slope
-        has the mean of the second order then (`optics.mean_second_order`).
-    second_order : whether to multiply orders by the second order of small slope
-        (`optics.second_order`): of a dielectric, bare or under a coat, by model "small_slope", in
-        an ensemble.
+        without eta the surface is a perfect reflector, R = 1, by model "kirchhoff".
+    coat : index of a flat clear coat over the surface, over that of the medium above
+        (`optics.coat`); it needs eta, and its own reflection is the lobe of a flat patch.
+    film : index n + ik, over that of the medium above, and thickness in nm of a film that follows
+        the heights, coherent with the surface (`optics.fresnel.Filmed`); it needs eta, and no coat.
+        Small slope has the mean of the second order then (`optics.mean_second_order`).
+    second_order : whether orders are multiplied by the second order of small slope, eq. (10):
+        True, False, or "auto" for where it changes the colours of these heights by 5 % or more
+        (`optics.second_order_change`). It is known for a dielectric, bare or under a coat, by model
+        "small_slope", in an ensemble; True is refused elsewhere.
 
     Raises
     ------
     DiffractionError
         For an unknown coherence or model, a width that is not positive and finite, an index or a
-        place that is missing or none, or arrays whose shapes do not fit.
+        place that is missing or superfluous, or arrays whose shapes do not fit.
     """
-    width = width_of(coherence_width)
     light = directions_of(wi, wo, wavelength)
-    window = sigma_of(width), coherence, places_of(coherence, place, len(light[2]))
-    index = index_of(model, eta, k, light[2], film)
-    if second_order:
-        require_dielectric(model, coherence, index)
-    if index is not None:
-        made = model, index, coat, second_order
-        return _measured(boundary.unpolarised, field, light, made, window)
-    if coat is not None:
-        raise DiffractionError(f"coat={coat} needs an index beneath it: give eta (and k)")
-    power = window_power(field, *light, *window)
-    return kirchhoff_factor(*light, sigma_of(width)) * power
+    window = window_of(coherence_width, coherence, place, len(light.wavelength))
+    index = index_of(eta, k, light.wavelength, film)
+    material = _material(field, model_of(model, index), index, coat, window, second_order)
+    if material.index is None:
+        power = window_power(field, *light, *window)
+        return kirchhoff_factor(*light, window.sigma) * power
+    return _reflected(boundary.unpolarised, field, light, material, window)
 
 
 def mueller(
@@ -98,203 +128,89 @@ def mueller(
     coherence_width: float = 65.0,
     coherence: str = "ensemble",
     place: ArrayLike | None = None,
-    model: str = "small_slope",
+    model: str | None = None,
     coat: float | None = None,
     film: tuple[complex, float] | None = None,
-    second_order: bool = False,
-) -> NDArray[np.float64]:
+    second_order: str | bool = "auto",
+) -> Real:
     """Mueller matrices of the BRDF, in 1/sr, shape (n, 4, 4); arguments and errors as `brdf`.
 
     They take Stokes vectors of light along −ωi to those of light along ωo, both about the axes of
     `optics.boundary.polarisation_axes`. Entry (0, 0) is `brdf`.
     """
-    width = width_of(coherence_width)
     light = directions_of(wi, wo, wavelength)
-    window = sigma_of(width), coherence, places_of(coherence, place, len(light[2]))
-    index = index_of(model, eta, k, light[2], film)
-    if index is None:
+    window = window_of(coherence_width, coherence, place, len(light.wavelength))
+    index = index_of(eta, k, light.wavelength, film)
+    material = _material(field, model_of(model, index), index, coat, window, second_order)
+    if material.index is None:
         raise DiffractionError("polarisation needs an index: give eta (and k of a conductor)")
-    if second_order:
-        require_dielectric(model, coherence, index)
-    return _measured(boundary.mueller, field, light, (model, index, coat, second_order), window)
+    return _reflected(boundary.mueller, field, light, material, window)
 
 
-def btdf(
+def _material(
     field: HeightField,
-    wi: ArrayLike,
-    wo: ArrayLike,
-    wavelength: ArrayLike,
-    *,
-    eta: float,
-    thin: bool = False,
-    coherence_width: float = 65.0,
-    coherence: str = "ensemble",
-    model: str = "small_slope",
-) -> NDArray[np.float64]:
-    """BTDF of a dielectric with these heights over n², symmetric in both directions, (n,), 1/sr.
-
-    Radiance in the dielectric over n² is what a BTDF over n² transmits (`optics.through`).
-    Arguments and errors as `brdf`, but for:
-
-    wi, wo : above and below the surface, in any order; below, in the dielectric.
-    eta : real index of the dielectric, above 1.
-    thin : below is outside of a thin sheet, beyond its other side, which is flat.
-    """
-    width = width_of(coherence_width)
-    checked("coherence", coherence)
-    first, second, lam = directions_of(wi, wo, wavelength)
-    index_of(model, eta, 0.0, lam, None)
-    if not 1.0 < float(eta) < np.inf:
-        raise DiffractionError(f"eta={eta} must be one real index above 1")
-    swapped = first[:, 2:] < 0
-    above, below = np.where(swapped, second, first), np.where(swapped, first, second)
-    lit = (above[:, 2] > 0) & (below[:, 2] < 0)
-    above, below = (
-        np.where(lit[:, None], w, [0.0, 0.0, side]) for w, side in ((above, 1.0), (below, -1.0))
-    )
-    inside = below
-    if thin:
-        inside = refracted(below * [1, 1, -1], eta) * [1, 1, -1]
-    k, total = wavenumber(lam), above + eta * inside
-    kappa, sigma = -k * total[:, 2], sigma_of(width)
-    roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
-    jones = through.kirchhoff(above, inside, eta)
-    if model == "small_slope":
-        s = blend.weight(kappa, roughness.at(k * np.hypot(*total[:, :2].T)), eta)[:, None, None]
-        jones = np.asarray((1 - s) * jones + s * through.small_slope(above, inside, eta))
-    if thin:
-        jones = through.out_of_sheet(jones, above, below, eta)
-    power = [
-        screen_power(np.exp(1j * one * field.heights), field.pixel_size, x, y, sigma, coherence)
-        for one, (x, y) in zip(kappa, -k[:, None] * total[:, :2], strict=True)
-    ]
-    cosines = -4 * above[:, 2] * eta * inside[:, 2]
-    factor = cosines / ((lam * 1e-3) ** 2 * np.pi * sigma**2 * total[:, 2] ** 2)
-    return np.where(lit, factor * boundary.unpolarised(jones) * power, 0.0)
-
-
-def _measured(
-    measure: Callable[[NDArray[np.complex128]], NDArray[np.float64]],
-    field: HeightField,
-    light: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    made: tuple[str, NDArray[np.complex128] | Filmed, float | None, bool],
-    window: tuple[float, str, NDArray[np.float64] | None],
-) -> NDArray[np.float64]:
-    """The BRDF as a measure of its Jones matrices; under a coat, that of its face too.
-
-    light : wi, wo, wavelength; made : model, index, coat, second order; window : sigma, coherence,
-    places.
-    """
-    sigma, (model, index, coat, second) = window[0], made
-
-    def weighed(factor: NDArray[np.float64], jones: NDArray[np.complex128]) -> NDArray[np.float64]:
-        found = measure(jones)
-        return factor.reshape(factor.shape + (1,) * (found.ndim - 1)) * found
-
-    wi, wo, wavelength = light
-    if coat is None:
-        power = _power(field, light, index, window, second)
-        return weighed(_order_factor(*light, sigma) * power, _jones(field, *light, model, index))
-    if isinstance(index, Filmed):
-        raise DiffractionError(f"coat={coat} and a film exclude each other: leave one of them out")
-    if not (np.isfinite(coat) and coat >= 1.0):
-        raise DiffractionError(f"coat={coat} must be an index of at least 1")
-    below, above = refracted(wi, coat), refracted(wo, coat)
-    below, above = (np.where(w[:, 2:] > 0, r, -r) for w, r in ((wi, below), (wo, above)))
-    inside = below, above, wavelength / coat
-    power = _power(field, inside, index / coat, window, second) / coat**2
-    lit = _lit(wi, wo)
-    jones = transmitted(_jones(field, *inside, model, index / coat), *lit, coat, index / coat)
-    structure = weighed(_order_factor(*inside, sigma) * power, jones)
-    flat = np.exp(-((sigma * wavenumber(wavelength)) ** 2) * np.sum((wi + wo)[:, :2] ** 2, axis=1))
-    face = _order_factor(*light, sigma) * 4 * np.pi**2 * sigma**4 * flat
-    return structure + weighed(face, boundary.kirchhoff(*lit, coat))
-
-
-def _power(
-    field: HeightField,
-    light: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    index: NDArray[np.complex128] | Filmed,
-    window: tuple[float, str, NDArray[np.float64] | None],
-    second: bool,
-) -> NDArray[np.float64]:
-    """⟨|P|²⟩, with the second order if there is one."""
-    if not second or isinstance(index, Filmed):
-        return window_power(field, *light, *window)
-    share = _share(field, *_lit(*light[:2]), light[2], index)
-    return second_order_power(field, light, window[0], index.real, share)
-
-
-def _lit(
-    wi: NDArray[np.float64], wo: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Both directions; the normal, where either is below the surface and there is no light."""
-    above = ((wi[:, 2] > 0) & (wo[:, 2] > 0))[:, None]
-    normal = np.array([0.0, 0.0, 1.0])
-    return np.where(above, wi, normal), np.where(above, wo, normal)
-
-
-def _jones(
-    field: HeightField,
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
-    wavelength: NDArray[np.float64],
     model: str,
-    index: NDArray[np.complex128] | Filmed,
-) -> NDArray[np.complex128]:
-    """Jones matrices (n, 2, 2) of a model; those of a mirror's normal where there is no light."""
-    incident, outgoing = _lit(wi, wo)
-    if model == "kirchhoff":
-        return boundary.kirchhoff(incident, outgoing, index)
-    share = _share(field, incident, outgoing, wavelength, index)
-    jones = blend.jones(incident, outgoing, index, share)
+    index: Complex | Filmed | None,
+    coat: float | None,
+    window: Window,
+    second_order: str | bool,
+) -> Material:
+    """Check what goes together, and decide "auto"."""
+    if coat is not None:
+        if index is None:
+            raise DiffractionError(f"coat={coat} needs an index beneath it: give eta (and k)")
+        if isinstance(index, Filmed):
+            raise DiffractionError(
+                f"coat={coat} and a film exclude each other: leave one of them out"
+            )
+        if not (np.isfinite(coat) and coat >= 1.0):
+            raise DiffractionError(f"coat={coat} must be an index of at least 1")
+    applied = resolved(second_order, field, model, window.coherence, index, coat)
+    return Material(model, index, coat, applied)
+
+
+def _reflected(
+    measure: Measure, field: HeightField, light: Light, material: Material, window: Window
+) -> Real:
+    """Measured light where both directions are above the surface, 0 elsewhere."""
+    assert material.index is not None
+    lit = (light.wi[:, 2] > 0) & (light.wo[:, 2] > 0)
+    index, window = material.index[lit], window.at(lit)
+    light = Light(*(part[lit] for part in light))
+    values = measure(np.zeros((len(lit), 2, 2), complex))
+    if not lit.any():
+        return values
+    if material.coat is not None:
+        inside, relative = coats.refracted_light(light, material.coat), index / material.coat
+        power, jones = _structure(field, inside, relative, material, window)
+        values[lit] = coats.reflected(
+            light, window.sigma, material.coat, relative, power, jones, measure
+        )
+    elif material.is_default and window.coherence == COHERENCES[0]:
+        values[lit] = models.default_brdf(
+            field, light, index, window.sigma, material.second_order, measure
+        )
+    else:
+        power, jones = _structure(field, light, index, material, window)
+        values[lit] = models.reflected(light, window.sigma, power, jones, measure)
+    return values
+
+
+def _structure(
+    field: HeightField, light: Light, index: Complex | Filmed, material: Material, window: Window
+) -> tuple[Real, Complex]:
+    """⟨|P|²⟩ and J of the heights, in the medium where `light` and `index` are given."""
     if isinstance(index, Filmed):
-        both = _mean_gain(field, (incident[:, 2], outgoing[:, 2]), wavelength, index)
-        jones = jones * np.sqrt(both)[:, None, None]
-    return jones
-
-
-def _mean_gain(
-    field: HeightField,
-    cosines: tuple[NDArray[np.float64], NDArray[np.float64]],
-    wavelength: NDArray[np.float64],
-    index: Filmed,
-) -> NDArray[np.float64]:
-    """g(ωi) g(ωo) of `mean_second_order`, (n,)."""
-    roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
-    found = np.ones(len(wavelength))
-    parts = np.stack(np.broadcast_arrays(wavelength, *index.parts), axis=1)
-    for one in np.unique(parts, axis=0):
-        at = (parts == one).all(axis=1)
-        film, k = Filmed(*one[1:]), float(wavenumber(one[0].real))
-        for cosine in cosines:
-            found[at] *= mean_gain(cosine[at], film, roughness, k)
-    return found
-
-
-def _share(
-    field: HeightField,
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
-    wavelength: NDArray[np.float64],
-    index: Index,
-) -> NDArray[np.float64]:
-    """s of `blend.weight`, (n,)."""
-    u, v, w = diffraction_coordinates(wi, wo)
-    wave = wavenumber(wavelength)
-    roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
-    return blend.weight(wave * w, roughness.at(wave * np.hypot(u, v)), index)
-
-
-def _order_factor(
-    wi: NDArray[np.float64],
-    wo: NDArray[np.float64],
-    wavelength: NDArray[np.float64],
-    sigma: float,
-) -> NDArray[np.float64]:
-    """4 cosθi cosθo / (λ² A w²) in 1/µm⁴, λ in µm; zero below the surface (see `boundary`)."""
-    cos_i, cos_o = wi[:, 2], wo[:, 2]
-    above = (cos_i > 0) & (cos_o > 0)
-    w = np.where(above, cos_i + cos_o, 1.0)
-    lam = wavelength * 1e-3
-    return np.where(above, 4 * cos_i * cos_o / (lam**2 * np.pi * sigma**2 * w**2), 0.0)
+        jones = films.jones(field, light, index, material.model)
+    elif material.model == "kirchhoff":
+        jones = models.kirchhoff(light, index)
+    else:
+        s = models.share(field, light, index)
+        jones = models.blended(
+            models.kirchhoff(light, index),
+            models.small_slope(light, index),
+            s,
+        )
+        if material.second_order:
+            return models.ensemble_power(field, light, window.sigma, (index, s)), jones
+    return window_power(field, *light, *window), jones

@@ -1,61 +1,63 @@
-"""⟨|P|²⟩ with the second order of small slope: each order times its own factor.
-
-Of an order j of a patch r_j = D_j / a_j is exact (`optics.second_order`, whose spectra are
-the conjugates of this integral's), and so is c of a pair of directions (`optics.second_order`):
-
-    ⟨|P|²⟩ = 4π²σ⁴ Σ_j |a_j|² |1 + s (c_l r_l,j + c_t r_t,j)|² exp(−σ²|q − q_j|²).
-"""
+"""Decision whether the reference multiplies orders by the second order of small slope."""
 
 from __future__ import annotations
+
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import DiffractionError
 from ..heights.field import HeightField
-from ..optics.geometry import diffraction_coordinates, wavenumber
-from ..optics.second_order import factor, slope_coefficients
-from ..optics.slope_ratios import Slopes, along
-from .integral import plane_waves
+from ..optics.blend import ScaleRoughness
+from ..optics.colour import LONGEST, SHORTEST
+from ..optics.fresnel import Filmed
+from ..optics.geometry import wavenumber
+from ..optics.second_order_change import AUTO_FROM, colour_change
+from ..optics.slope_ratios import CellGrid, CellSums
+from ..settings import checked
 
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 
+def resolved(
+    second_order: str | bool,
+    field: HeightField,
+    model: str,
+    coherence: str,
+    index: NDArray[np.complex128] | Filmed | None,
+    coat: float | None,
+) -> bool:
+    """Whether "auto", True or False applies the second order to this surface.
 
-def second_order_power(
-    field: HeightField, light: tuple[Real, Real, Real], sigma: float, index: Real, share: Real
-) -> Real:
-    """⟨|P|²⟩ in µm⁴, (n,), averaged over all positions of the window.
-
-    Parameters
-    ----------
-    light : wi (n, 3), wo (n, 3), wavelength (n,) in nm.
-    index : (n,) of the dielectric over that of the medium above it.
-    share : (n,) s, of small slope in the model.
+    Raises
+    ------
+    DiffractionError
+        If True is asked where the second order is not known.
     """
-    wi, wo, wavelength = light
-    wave, (u, v, w) = wavenumber(wavelength), diffraction_coordinates(wi, wo)
-    slopes, power = Slopes.of(field.heights, field.pixel_size), np.zeros(len(wave))
-    for n in np.flatnonzero((wi[:, 2] > 0) & (wo[:, 2] > 0)):
-        coefficients = slope_coefficients(wi[n], wo[n : n + 1], index[n])
-        screen = np.exp(1j * wave[n] * w[n] * field.heights)
-        q, amplitudes = _spectra(screen, slopes, field, wave[n] * u[n], wave[n] * v[n], sigma)
-        squares = np.abs(amplitudes[0]) ** 2
-        other = (squares > 0) & np.any(q != 0, axis=-1)  # order 0's power is the first order's
-        a, *products = amplitudes[:, other].conj()
-        ratios = np.zeros((*q.shape[:2], 2), complex)
-        ratios[other] = along(q[other], np.stack(products, axis=-1)) / a[:, None]
-        distances = np.sum((q - wave[n] * np.array([u[n], v[n]])) ** 2, axis=-1)
-        factors = factor(coefficients, slopes.gate * ratios, share[n])
-        power[n] = np.sum(np.exp(-(sigma**2) * distances) * squares * factors)
-    return 4 * np.pi**2 * sigma**4 * power
+    asked = checked("second_order", second_order)
+    if asked is False:
+        return False
+    known = model == "small_slope" and coherence == "ensemble"
+    dielectric = isinstance(index, np.ndarray) and not np.any(index.imag > 0.0)
+    if asked is True:
+        if not known:
+            raise DiffractionError(
+                "second_order=True is for model='small_slope' and coherence='ensemble'; got "
+                f"model='{model}', coherence='{coherence}'"
+            )
+        if not dielectric:
+            raise DiffractionError("second_order=True is for dielectrics: leave k and film out")
+        return True
+    if not (known and isinstance(index, np.ndarray) and dielectric):
+        return False
+    denser = bool(np.all(index.real >= (coat or 1.0)))
+    return denser and measured_change(field) >= AUTO_FROM
 
 
-def _spectra(
-    screen: Complex, slopes: Slopes, field: HeightField, alpha: float, beta: float, sigma: float
-) -> tuple[Real, Complex]:
-    """Orders about (α, β): frequencies (ny, nx, 2), and a, D (4, ny, nx)."""
-    ny, nx = field.shape
-    qx, waves_x = plane_waves(nx, field.pixel_size[0], alpha, sigma)
-    qy, waves_y = plane_waves(ny, field.pixel_size[1], beta, sigma)
-    functions = screen * np.stack([np.ones(field.shape), *slopes.products])
-    return np.stack(np.meshgrid(qx, qy), axis=-1), waves_y @ functions @ waves_x.T / (nx * ny)
+@lru_cache(maxsize=16)
+def measured_change(field: HeightField) -> float:
+    """Relative change of the colours of these heights, as a table of them measures it."""
+    q_limit = 2.0 * float(wavenumber(SHORTEST))
+    grid = CellGrid.of(field.extent, field.rms_height, q_limit, (q_limit, q_limit), q_limit)
+    sums = CellSums.of([(field, np.ones((1, 1)))], grid)
+    roughness = ScaleRoughness.of(field.heights, field.pixel_size)
+    return colour_change(sums, sums.ratios(), roughness, (SHORTEST, LONGEST))

@@ -1,6 +1,11 @@
-"""Rendering in passes, so that there is progress to show and Ctrl-C keeps what is done.
+"""Rendering in passes, so that there is progress to show and Ctrl-C keeps the picture so far.
 
-Pictures of it are EXR, linear, and PNG, for the eye.
+Pictures are written as EXR, linear, and as PNG, for the eye.
+
+A seed gives the same random numbers everywhere, and with one Dr.Jit thread the same picture bit for
+bit. Several threads add their samples to the film in the order in which they finish, in single
+precision, so that two runs of one process agree within 1e-6 of the film's largest value. Filters
+wider than a pixel, such as the default, make threads meet in most pixels.
 """
 
 from __future__ import annotations
@@ -28,7 +33,7 @@ _SHOWN_AS = {"RGB": "RGB", "RGBA": "RGBA", "XYZ": "RGB", "XYZA": "RGBA", "Y": "Y
 GROUP = 8
 
 # Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
-# wavefronts exhaust the memory. Fixed, so that a seed gives the same picture on every machine.
+# wavefronts exhaust the memory. Fixed, so that a seed gives the same random numbers everywhere.
 _SAMPLES = {"llvm": 2**21, "cuda": 2**24}
 
 

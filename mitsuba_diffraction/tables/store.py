@@ -154,7 +154,7 @@ def _locked(path: Path) -> Iterator[None]:
 def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
     """What a file holds; None if there is none, and with a warning if it is damaged."""
     try:
-        found = unpack(_read(path, title))
+        found = unpack(read_record(path, title))
         os.utime(path)  # recently used ones are kept longest
         return found
     except OSError:
@@ -166,7 +166,16 @@ def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
         return None
 
 
-def _read(path: Path, title: str) -> Record:
+def read_record(path: Path, title: str) -> Record:
+    """Read what `write_record` wrote under this title, and check it.
+
+    Raises
+    ------
+    OSError
+        If there is no such file.
+    ValueError, LookupError, TypeError, MemoryError, RecursionError
+        If it is damaged, or has another title.
+    """
     if not path.is_file():
         raise FileNotFoundError
     content = np.fromfile(path, np.uint8)
@@ -184,20 +193,31 @@ def _read(path: Path, title: str) -> Record:
 
 
 def _keep(path: Path, title: str, record: Record) -> None:
+    try:
+        write_record(path, title, record)
+        _prune(path.parent)
+    except (DiffractionError, OSError):
+        return
+
+
+def write_record(path: Path, title: str, record: Record) -> None:
+    """Write a record in one piece: a line with title and SHA-256, JSON, and the arrays.
+
+    Raises
+    ------
+    DiffractionError
+        If it cannot be written.
+    """
     arrays = [np.ascontiguousarray(array) for array in record.arrays]
     described = [[array.dtype.str, array.shape] for array in arrays]
     text = json.dumps({"document": record.document, "arrays": described}).encode()
     texts = [np.frombuffer(t, np.uint8) for t in (str(len(text)).encode().ljust(_HEAD), text)]
     blocks = [*texts, *(array.reshape(-1).view(np.uint8) for array in arrays)]
     padded = [np.pad(block, (0, _aligned(block.size) - block.size)) for block in blocks]
-    try:
-        with atomic_path(path) as temporary, open(temporary, "wb") as file:
-            file.write(_head(title, padded))
-            for block in padded:
-                file.write(block.data)
-        _prune(path.parent)
-    except (DiffractionError, OSError):
-        return
+    with atomic_path(path) as temporary, open(temporary, "wb") as file:
+        file.write(_head(title, padded))
+        for block in padded:
+            file.write(block.data)
 
 
 def _head(title: str, blocks: Sequence[NDArray[np.uint8]]) -> bytes:

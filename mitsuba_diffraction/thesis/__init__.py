@@ -1,9 +1,9 @@
-"""The thesis of 2014 that the method comes from: its methods, its evaluation, its sweeps.
+"""Methods and experiments of the 2014 thesis that the package's model is based on.
 
 Contents
 --------
-methods      ways to spend the wavelength loop, those of the thesis beside the package's own
-evaluation   a beam on a patch, and the ridge of maxima
-term_images  the look-up of a Taylor series as the thesis stores it
-sweeps       one parameter of a BRDF map after the other
+methods      the thesis' methods to sum over wavelengths, and the package's own
+period_fit   period of the grating equation that fits the response of a patch to a beam
+term_images  look-up of a Taylor series as the thesis stores it
+sweeps       BRDF maps for several values of one parameter, compared and timed
 """

@@ -1,7 +1,7 @@
-"""The thesis' sweeps: one parameter of a BRDF map after the other, compared and timed.
+"""Sweeps of one parameter, as in the thesis: a BRDF map for each value, compared and timed.
 
-Maps for every value, how long each took, how far each is from the reference; and the default
-look-up against `flss`, both compiled: the same map, timed side by side (Dr.Jit).
+Each map is compared with the one of the reference value. `time_compiled` times the default look-up
+against `flss`, both compiled by Dr.Jit.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,23 +24,25 @@ from ..tables.table import DiffractionTable
 from .methods import NAMES, FullSpectrum, Gain, Method, make, make_all
 from .methods.make import method_map
 
+#: Largest number of maps, which one contact sheet shows.
 _MOST_VALUES = 24
-# Pixels of the reference this much darker than the brightest away from the mirror are unlit.
+# Luminance above which a pixel is lit, relative to the brightest away from the mirror direction.
 _LIT = 1e-4
 
-#: Each is timed so often, in turns; the first of them only warms up.
+#: Rounds of timing, in each of which every look-up is timed once; the first only warms up.
 _ROUNDS = 3
-# What Mitsuba's spectral variants span, nm.
+# Wavelengths of Mitsuba's spectral variants, nm.
 _RANGE = (360.0, 830.0)
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """A sweep's parameter."""
+    """Unit, default values and reference of a sweep's parameter."""
 
     unit: str  # printed after values
-    values: tuple[Any, ...]  # by default
-    reference: Any  # the value that others are compared with; `None`: the maps differ by intent
+    values: tuple[Any, ...]  # default values
+    # value that the others are compared with, or `None`: the maps differ by intent
+    reference: Any
 
 
 SWEEPS: dict[str, _Kind] = {
@@ -54,25 +56,32 @@ SWEEPS: dict[str, _Kind] = {
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One value."""
+    """Map of one value of the parameter, and its difference from the reference."""
 
-    value: Any  # of the parameter
-    label: str  # with its unit
-    map: BrdfMap  # the colours
-    seconds: float  # that the map took, without tables
-    # mean, high: ΔE2000 from the reference (`colour.delta_e`) over the pixels that it lights, mean
-    # and 95th percentile; NaN where there is no reference
-    mean: float
-    high: float
-    # the same mean when both have their own exposure: difference of colour, not of light
-    own_mean: float
-    # ΣZ/ΣX over that of the reference, away from the mirror's lobe; above 1 is bluer
-    blueness: float
+    value: Any
+    label: str  # the value with its unit
+    map: BrdfMap
+    seconds: float  # time of the map, without that of tables
+    difference: Difference
+
+
+class Difference(NamedTuple):
+    """Difference of a map from the reference over the pixels that the reference lights.
+
+    All values are NaN without a reference.
+    """
+
+    delta_e: float = np.nan  # mean ΔE2000 (`colour.delta_e`)
+    delta_e_95: float = np.nan  # 95th percentile
+    # mean ΔE2000 when each map has its own exposure: difference of colour, not of brightness
+    delta_e_own_exposure: float = np.nan
+    # ΣZ/ΣX over that of the reference, away from the mirror direction's lobe; above 1 is bluer
+    blueness: float = np.nan
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """All steps of a sweep, and the label of the one that the others are compared with."""
+    """All steps of a sweep, and the label of the reference."""
 
     kind: str
     steps: tuple[Step, ...]
@@ -92,23 +101,24 @@ def sweep(
     progress: Progress | None = None,
     **settings: Any,
 ) -> Sweep:
-    """A map for every value of a parameter.
+    """Evaluate a BRDF map for every value of a parameter and compare them.
 
     Parameters
     ----------
     kind : one of `SWEEPS`.
     heights : the patch.
     light : direction to the light; a sweep over its angle keeps the azimuth.
-    values : of the parameter; by default the sweep's own.
-    method : what evaluates; not for a sweep over methods. `terms` needs one with a Taylor series.
-    resolution, samples, gain : see `maps.method_map`.
+    values : values of the parameter; by default those of `SWEEPS`.
+    method : method of the maps, except in a sweep over methods; `terms` requires "flss".
+    resolution, samples, gain : see `methods.method_map`.
     progress : called as progress(done, total, text).
-    settings : of `methods.make_all`; a sweep over methods has coherence="patch" by default.
+    settings : parameters of `methods.make_all`; coherence is "patch" by default in a sweep over
+        methods.
 
     Raises
     ------
     DiffractionError
-        If a name or value does not fit.
+        If a name or value is not valid.
     """
     if kind not in SWEEPS:
         raise DiffractionError(f"sweep '{kind}' is unknown; choose one of {', '.join(SWEEPS)}")
@@ -117,66 +127,83 @@ def sweep(
         raise DiffractionError(f"{len(chosen)} values are to be swept; give 1 to {_MOST_VALUES}")
     if gain is not None and ("rainbow" in chosen or method == "rainbow"):
         raise DiffractionError("method 'rainbow' has no relative reflectance; leave it out")
-    made = _made(kind, chosen, heights, light, method, progress, settings)
+    setups = _setups(kind, chosen, heights, light, method, progress, settings)
     common: dict[str, Any] = {
         "resolution": resolution, "samples": samples, "gain": gain, "progress": progress,
     }  # fmt: skip
-    done = [
-        (value, *timed_map(one, where, step=step, **common))
-        for value, (one, where, step) in zip(chosen, made, strict=True)
-    ]
-    return _all_compared(kind, chosen, done)
+    maps = [timed_map(s.method, s.light, step=s.step, **common) for s in setups]
+    return _compare_all(kind, chosen, maps)
 
 
-def timed_map(method: Method, light: Light, **arguments: Any) -> tuple[BrdfMap, float]:
-    """A map (arguments as in `maps.method_map`) and the seconds that it took."""
+class TimedMap(NamedTuple):
+    """A BRDF map and the seconds that it took."""
+
+    map: BrdfMap
+    seconds: float
+
+
+def timed_map(method: Method, light: Light, **arguments: Any) -> TimedMap:
+    """Evaluate a map (arguments as in `methods.method_map`) and time it."""
     start = time.perf_counter()
-    found = method_map(method, light, **arguments)
-    return found, time.perf_counter() - start
+    brdf_map = method_map(method, light, **arguments)
+    return TimedMap(brdf_map, time.perf_counter() - start)
 
 
-def _made(
+class _Setup(NamedTuple):
+    """Parameters of the map of one value."""
+
+    method: Method
+    light: Light
+    step: float  # between wavelengths, nm
+
+
+def _setups(
     kind: str, values: Sequence[Any], heights: HeightField, light: Light, method: str,
     progress: Progress | None, settings: dict[str, Any],
-) -> list[tuple[Method, Light, float]]:  # fmt: skip
-    """For every value: method, light, and width of its wavelength step."""
+) -> list[_Setup]:  # fmt: skip
+    """Return the setup of each value; setups share tables where the parameter allows."""
     step = float(settings.get("step", 5.0))
 
-    def one(**more: Any) -> Method:
-        return make(method, heights, progress=progress, **(settings | more))
+    def build(**changes: Any) -> Method:
+        """Build the method with the settings and these changes."""
+        return make(method, heights, progress=progress, **(settings | changes))
 
     if kind == "method":
-        # one coherence for all: what differs then is the method
-        alike = {"coherence": "patch"} | settings
-        all_ = make_all(values, heights, progress=progress, **alike)
-        return [(all_[name], light, step) for name in values]
+        # one coherence for all, so that only the methods differ
+        by_name = make_all(
+            values, heights, progress=progress, **({"coherence": "patch"} | settings)
+        )
+        return [_Setup(by_name[name], light, step) for name in values]
     if kind == "light-angle":
         lights = [Light(float(value), light.phi) for value in values]
-        fixed = one()
-        return [(fixed, where, step) for where in lights]
+        shared = build()
+        return [_Setup(shared, direction, step) for direction in lights]
     if kind == "wavelength-step":
-        first = one(step=float(min(values)))
+        finest = build(step=float(min(values)))
         # the table does not depend on the step
-        if isinstance(first, FullSpectrum):
-            table, span = first.table, first.wavelength_range
-            return [(FullSpectrum(method, table, span, float(v)), light, float(v)) for v in values]
-        return [(one(step=float(v)), light, float(v)) for v in values]
+        if isinstance(finest, FullSpectrum):
+            table, span = finest.table, finest.wavelength_range
+            return [
+                _Setup(FullSpectrum(method, table, span, float(v)), light, float(v)) for v in values
+            ]
+        return [_Setup(build(step=float(v)), light, float(v)) for v in values]
     if kind == "coherence-width":
-        return [(one(coherence_width=float(v)), light, step) for v in values]
+        return [_Setup(build(coherence_width=float(v)), light, step) for v in values]
     if method != "flss":
         raise DiffractionError(
             f"a sweep over terms needs method 'flss', whose series is Taylor's; not '{method}'"
         )
-    full = one()
+    full = build()
     assert isinstance(full, FullSpectrum)
+    span = full.wavelength_range
     return [
-        (FullSpectrum("flss", truncated(full.table, v), full.wavelength_range, step), light, step)
+        _Setup(FullSpectrum("flss", truncated(full.table, v), span, step), light, step)
         for v in values
     ]
 
 
 def truncated(table: DiffractionTable, terms: int) -> DiffractionTable:
-    """A Taylor table cut off after so many terms, or as it is if it has no more."""
+    """Truncate the Taylor series of a table to `terms` terms, if it has more."""
     if terms != int(terms) or terms < 1:
         raise DiffractionError(f"terms={terms} must be a whole number, at least 1")
     count = min(int(terms), table.expansion.terms)
@@ -188,73 +215,76 @@ def truncated(table: DiffractionTable, terms: int) -> DiffractionTable:
     )
 
 
-def _all_compared(
-    kind: str, values: Sequence[Any], done: Sequence[tuple[Any, BrdfMap, float]]
-) -> Sweep:
-    wanted = SWEEPS[kind].reference
+def _compare_all(kind: str, values: Sequence[Any], maps: Sequence[TimedMap]) -> Sweep:
+    """Compare all maps with that of the reference value, if the sweep has one."""
+    rule = SWEEPS[kind].reference
     reference: int | None
-    if wanted is None or (wanted == "flss" and "flss" not in values):
+    if rule is None or (rule == "flss" and "flss" not in values):
         reference = None
-    elif wanted == "flss":
+    elif rule == "flss":
         reference = list(values).index("flss")
     else:
-        reference = int(np.argmin(values) if wanted == "smallest" else np.argmax(values))
-    base = None if reference is None else done[reference][1]
-    steps = []
-    for value, found, seconds in done:
-        steps.append(compared(value, label_of(kind, value), base, found, seconds))
-    label = None if reference is None else steps[reference].label
-    return Sweep(kind, tuple(steps), label)
+        reference = int(np.argmin(values) if rule == "smallest" else np.argmax(values))
+    base = None if reference is None else maps[reference].map
+    steps = tuple(
+        compare(value, label_of(kind, value), base, timed)
+        for value, timed in zip(values, maps, strict=True)
+    )
+    return Sweep(kind, steps, None if reference is None else steps[reference].label)
 
 
-def compared(value: Any, label: str, base: BrdfMap | None, found: BrdfMap, seconds: float) -> Step:
-    """A step, compared with the map `base` if there is one."""
-    numbers = (np.nan,) * 4 if base is None else _distance(base, found)
-    return Step(value, label, found, seconds, *numbers)
+def compare(value: Any, label: str, reference: BrdfMap | None, timed: TimedMap) -> Step:
+    """Return the step of a value, compared with the map `reference` if there is one."""
+    difference = Difference() if reference is None else _difference(reference, timed.map)
+    return Step(value, label, timed.map, timed.seconds, difference)
 
 
 def label_of(kind: str, value: Any) -> str:
-    """A value as it is printed."""
+    """Return a value with its unit."""
     return f"{value}" if kind == "method" else f"{value:g}{SWEEPS[kind].unit}"
 
 
-def _distance(base: BrdfMap, other: BrdfMap) -> tuple[float, float, float, float]:
-    """ΔE mean and 95th percentile, mean with own exposures, and blueness."""
+def _difference(base: BrdfMap, other: BrdfMap) -> Difference:
+    """Compare a map with the map `base`."""
     assert base.xyz is not None
     assert other.xyz is not None
     away = base.away_from_mirror()
     luminance = base.luminance.astype(np.float64)
     if not luminance.max() > 0.0:
-        return (np.nan,) * 4
-    # a grating is dark nearly everywhere, and no exposure would suit it: what it lights counts
+        return Difference()
+    # a grating is dark nearly everywhere, so only the pixels that it lights count
     bright = np.percentile(luminance[away], 99.9)
     lit = luminance > _LIT * bright
     first, second = (m.linear[lit].astype(np.float64) for m in (base, other))
-    apart = delta_e(first, second)
+    same_exposure = delta_e(first, second)
     levels = [np.percentile(m.luminance[lit], 95.0) for m in (base, other)]
-    own = delta_e(first, second * (levels[0] / levels[1] if levels[1] > 0.0 else 1.0))
+    own_exposure = delta_e(first, second * (levels[0] / levels[1] if levels[1] > 0.0 else 1.0))
     shares = [m[away].sum(axis=0, dtype=np.float64) for m in (base.xyz, other.xyz)]
     blue = [share[2] / share[0] if share[0] > 0.0 else np.nan for share in shares]
-    high = float(np.nanpercentile(apart, 95.0))
-    return float(np.nanmean(apart)), high, float(np.nanmean(own)), float(blue[1] / blue[0])
+    return Difference(
+        delta_e=float(np.nanmean(same_exposure)),
+        delta_e_95=float(np.nanpercentile(same_exposure, 95.0)),
+        delta_e_own_exposure=float(np.nanmean(own_exposure)),
+        blueness=float(blue[1] / blue[0]),
+    )
 
 
 @dataclass(frozen=True)
 class Compiled:
-    """Seconds of one map, the smallest of the rounds."""
+    """Seconds of one compiled map, the smallest of all rounds."""
 
-    spectral: float  # the package's own look-up, at every wavelength
-    colours: float  # as in RGB variants: one look-up in the table of the whole spectrum's colours
-    flss: float  # the thesis' loop over wavelengths, terms and taps, an image a term
+    spectral: float  # default look-up at every wavelength
+    colours: float  # RGB variants: one look-up in the table of the whole spectrum's colours
+    flss: float  # the thesis' loop over wavelengths, terms and taps, one image per term
 
     @property
     def ratio(self) -> float:
-        """How many times faster than `flss` the default is, wavelength by wavelength."""
+        """Time of `flss` over that of the default look-up at every wavelength."""
         return self.flss / self.spectral
 
     @property
     def colour_ratio(self) -> float:
-        """How many times faster than `flss` the default's colours are."""
+        """Time of `flss` over that of the default look-up in colours."""
         return self.flss / self.colours
 
 
@@ -269,10 +299,10 @@ def time_compiled(
     tolerance: float = 1e-3,
     progress: Progress | None = None,
 ) -> Compiled:
-    """Evaluate one map of the whole spectrum in three ways; tables are not in the times.
+    """Time one map of the whole spectrum by three look-ups, without building tables.
 
-    The variants llvm_ad_spectral and llvm_ad_rgb (or those for a GPU, if the one that is set is)
-    are set in turn, the spectral one last.
+    The function sets the variants llvm_ad_rgb and llvm_ad_spectral, or those of CUDA if the current
+    variant is one, and leaves the spectral one set.
 
     Raises
     ------
@@ -290,6 +320,7 @@ def time_compiled(
     backend = "cuda" if (mi.variant() or "").startswith("cuda") else "llvm"
 
     def seconds(bsdfs: dict[str, Any]) -> dict[str, float]:
+        """Return the shortest time of each BSDF's map."""
         from ..analysis.maps import brdf_map
 
         best = dict.fromkeys(bsdfs, float("inf"))
@@ -305,14 +336,14 @@ def time_compiled(
         return best
 
     with tempfile.TemporaryDirectory(prefix="mitsuba-diffraction-") as folder:
-        own, flss = Path(folder) / "own.exr", Path(folder) / "flss.exr"
-        DiffractionTable.build(heights, progress=progress, **common).save(own)
+        default, flss = Path(folder) / "default.exr", Path(folder) / "flss.exr"
+        DiffractionTable.build(heights, progress=progress, **common).save(default)
         full = make("flss", heights, progress=progress, **common)
         assert isinstance(full, FullSpectrum)
         full.table.save(flss)
         mi.set_variant(f"{backend}_ad_rgb")
         raw: dict[str, Any] = {"material": "none", "energy_conserving": False}
-        best = seconds({"colours": quiet_bsdf(own, **raw)})
+        best = seconds({"colours": quiet_bsdf(default, **raw)})
         mi.set_variant(f"{backend}_ad_spectral")
-        best |= seconds({"spectral": quiet_bsdf(own, **raw), "flss": thesis_bsdf(flss, **raw)})
+        best |= seconds({"spectral": quiet_bsdf(default, **raw), "flss": thesis_bsdf(flss, **raw)})
     return Compiled(best["spectral"], best["colours"], best["flss"])

@@ -26,8 +26,8 @@ class TermImages(DeviceTable):
     """A coherent Taylor table as the thesis stores it: an image of complex numbers per term.
 
     For every wavelength and every term, the 3 × 3 texels around the frequency are gathered from
-    that term's image, weighted by the Gaussian window, and added up. `plugin.lookup` can hold the
-    same series, but stores all terms of one bin together. Only `window_sum` differs.
+    that term's image, weighted by the Gaussian window, and added up. `plugin.lookup` stores all
+    terms of one bin together instead. Only `window_sum` differs.
     """
 
     def __init__(self, table: DiffractionTable) -> None:
@@ -36,7 +36,7 @@ class TermImages(DeviceTable):
         self._images = upload(mi.Float, np.ascontiguousarray(images))
 
     def window_sum(self, qx: Any, qy: Any, kappa: Any, windows: Any = ()) -> Any:
-        """Σ over orders under the window, dimensionless (`tables.lookup.window_sum`)."""
+        """Sum the orders under the window, dimensionless (`tables.lookup.window_sum`)."""
         grid, expansion = self.grid, self.expansion
         x, y = qx * (1.0 / self.spacing[0]), qy * (1.0 / self.spacing[1])
         first, weight_x, weight_y = self._place(x, y, mi.UInt32(0))
@@ -49,7 +49,8 @@ class TermImages(DeviceTable):
         order_0 = mi.Complex2f(*(lobe * c for c in self.series.at(kappa).order_0))
         scaled = kappa * expansion.half_range
 
-        def of_term(n: Any, image: Any, weight: Any, total: Any) -> tuple[Any, ...]:
+        def add_term(n: Any, image: Any, weight: Any, total: Any) -> tuple[Any, ...]:
+            """Add term n of the series: the state of the loop after it."""
             weight *= scaled / mi.Float(n)  # xⁿ/n!
             windowed = mi.Complex2f(0.0)
             for offset, gaussian in weights:
@@ -57,5 +58,5 @@ class TermImages(DeviceTable):
             return n + 1, image + grid.index(1, 0, 0), weight, total + weight * windowed
 
         state = (mi.UInt32(1), first, mi.Float(1.0), order_0)
-        total = dr.while_loop(state, lambda n, *_: n <= expansion.terms, of_term)[3]
+        total = dr.while_loop(state, lambda n, *_: n <= expansion.terms, add_term)[3]
         return dr.squared_norm(total)

@@ -1,4 +1,4 @@
-"""How thick a snake is where: cross-sections from snout to tail tip, and the head's features."""
+"""Cross-sections of a snake from snout to tail tip, and features of its head."""
 
 from __future__ import annotations
 

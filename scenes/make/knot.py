@@ -1,4 +1,4 @@
-"""A closed tube in a trefoil knot, without texture coordinates, like many a mesh that one gets."""
+"""A closed tube in a trefoil knot, without texture coordinates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One check for the parameters of the generators."""
+"""Check of the parameters of the generators."""
 
 from __future__ import annotations
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import csv
 import math
+import os
+import signal
+import time
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +20,11 @@ from mitsuba_diffraction.analysis.survey import (
     Treatment,
     colours_of,
     iridescence,
+    load_treatments,
     run_survey,
     treatment_for,
-    treatments_of,
 )
+from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.optics.colour import response
 
 pytestmark = pytest.mark.usefixtures("coarse")
@@ -44,11 +48,17 @@ def scans(tmp_path):
 @pytest.fixture
 def survey(scans, tmp_path):
     own = Treatment().updated(Treatment(settings=SMALL))
-    options = treatments_of(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'))
+    options = load_treatments(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'))
 
-    def call(files=scans):
+    def call(files=scans, **more):
         return run_survey(
-            files, tmp_path / "out", treatments=options, own=own, resolution=32, theta=20.0
+            files,
+            tmp_path / "out",
+            treatments=options,
+            common=own,
+            resolution=32,
+            theta=20.0,
+            **more,
         )
 
     return call
@@ -83,8 +93,8 @@ def test_rows_have_periods_to_a_percent_and_directions_to_a_degree(survey, tmp_p
 
 def test_a_table_that_cannot_be_mapped_is_a_row_with_its_reason(scans, tmp_path):
     own = Treatment(settings={**SMALL, "wavelength_range": (500.0, 600.0)})
-    options = treatments_of(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'))
-    (row,) = run_survey(scans[:1], tmp_path / "out", treatments=options, own=own, resolution=8)
+    options = load_treatments(_toml(tmp_path, f'["*.npy"]\npixel_size = {PIXEL}\n'))
+    (row,) = run_survey(scans[:1], tmp_path / "out", treatments=options, common=own, resolution=8)
     assert row["reason"].startswith("cannot map it: ")
     assert "starts at 500 nm" in row["reason"]
 
@@ -121,17 +131,17 @@ def test_treatments_are_those_of_all_patterns_that_match(tmp_path):
         tmp_path,
         '["*.png"]\npixel_size = 0.1\nlevel = "plane"\n["b*"]\nlevel = "lines"\ntolerance = 0.1\n',
     )
-    found = treatment_for(Path("in/b.png"), treatments_of(path))
+    found = treatment_for(Path("in/b.png"), load_treatments(path))
     assert found.options.pixel_size == (0.1, 0.1)
     assert found.options.level == "lines"
     assert found.settings == {"tolerance": 0.1}
-    assert treatment_for(Path("in/c.npy"), treatments_of(path)) == Treatment()
+    assert treatment_for(Path("in/c.npy"), load_treatments(path)) == Treatment()
 
 
 @pytest.mark.parametrize("text", ["level = 1", '["*"]\nheight = 2', '["*"]\nlevel = "sea"', "["])
 def test_treatments_that_are_none_are_one_line(tmp_path, text):
     with pytest.raises(DiffractionError, match=r"treatments\.toml"):
-        treatments_of(_toml(tmp_path, text))
+        load_treatments(_toml(tmp_path, text))
 
 
 def test_a_disc_is_more_iridescent_than_a_scale_and_both_than_a_mirror(tmp_path):
@@ -141,10 +151,10 @@ def test_a_disc_is_more_iridescent_than_a_scale_and_both_than_a_mirror(tmp_path)
     }  # fmt: skip
     for name, heights in made.items():
         np.save(tmp_path / f"{name}.npy", heights)
-    options = treatments_of(_toml(tmp_path, '["*.npy"]\npixel_size = 0.125\n'))
+    options = load_treatments(_toml(tmp_path, '["*.npy"]\npixel_size = 0.125\n'))
     rows = run_survey(
         [tmp_path / f"{name}.npy" for name in made], tmp_path / "out", treatments=options,
-        own=Treatment(settings={"coherence_width": 20.0, "tolerance": 0.05}), resolution=32,
+        common=Treatment(settings={"coherence_width": 20.0, "tolerance": 0.05}), resolution=32,
     )  # fmt: skip
     assert [row["reason"] for row in rows] == ["", "", ""]
     mirror, scale, disc = (row["iridescence"] for row in rows)
@@ -192,3 +202,33 @@ def test_gratings_of_two_directions_are_both_found():
     assert (one.period, other.period) == pytest.approx((1.3, 2.1), rel=0.01)
     assert (one.direction, other.direction) == pytest.approx((0.0, 90.0), abs=1.0)
     assert (one.share, other.share) == pytest.approx((9 / 13, 4 / 13), abs=0.02)
+
+
+def test_an_interrupted_survey_has_the_rows_that_are_done(survey, tmp_path):
+    def interrupt(done, total, text):
+        if done == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        survey(progress=interrupt)
+    with (tmp_path / "out" / "survey.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [Path(row["file"]).stem for row in rows] == ["straight"]
+
+
+def test_ctrl_c_ends_the_command_within_a_scan(scans, tmp_path, monkeypatch, capfd):
+    def measure(job):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(60)
+
+    monkeypatch.setattr(module, "measure", measure)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    start = time.perf_counter()
+    try:
+        code = main(["survey", *map(str, scans), "--pixel-size", "0.1", "-o", str(tmp_path / "a")])
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert code == 130
+    assert time.perf_counter() - start < 30  # far from the minute that the scan would take
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "run the command again to go on" in line

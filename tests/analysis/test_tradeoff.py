@@ -32,13 +32,13 @@ def quiet(done: int, total: int, text: str) -> None:
 
 @pytest.fixture(scope="module")
 def sample() -> Sample:
-    return Sample.of(PATCH, WIDTH, "ensemble", 120, quiet)
+    return Sample.draw(PATCH, WIDTH, "ensemble", 120, quiet)
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
 def test_the_error_found_is_below_the_tolerance_that_was_asked_for(sample, tolerance):
     table = DiffractionTable.build(PATCH, coherence_width=WIDTH, tolerance=tolerance)
-    error = max(sample.error(sample.looked_up(table)))
+    error = max(sample.error(sample.window_sums(table)))
     assert 0.0 < error <= tolerance
 
 

@@ -119,7 +119,7 @@ def test_the_second_order_is_told_and_changes_the_map(run, heights):
         (["--theta", "90"], "theta=90 must be at least 0 and below 90"),
         (["--phi", "1e9"], "phi=1e+09 must be from -360 to 360"),
         (["--step", "500"], "step=500 nm does not fit"),
-        (["--wavelength-range", "700", "400"], "700 to 400 nm is none"),
+        (["--wavelength-range", "700", "400"], "700 to 400 nm"),
         (["--wavelength-range", "300", "400"], "table's shortest wavelength, 360 nm"),
         (["--resolution", "99999"], "resolution=99999 must be"),
         (["--samples", "0"], "samples=0 must be"),

@@ -16,6 +16,8 @@ import pytest
 
 from tests.support import ROOT
 
+pytestmark = pytest.mark.thorough
+
 CODE = """
 import argparse
 from mitsuba_diffraction.cli import Bar

@@ -11,6 +11,8 @@ import pytest
 from mitsuba_diffraction import DiffractionTable
 from tests.support.directions import rough_patch
 
+pytestmark = pytest.mark.thorough
+
 # A plate seen from above in light from 20°, with next to no sky.
 SCENE = """<scene version="3.5.0">
   <default name="elevation" value="70"/>

@@ -17,6 +17,8 @@ import drjit as dr
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.thorough
+
 distributed = pytest.importorskip("distributed")
 
 from mitsuba_diffraction import DiffractionError, cluster  # noqa: E402
@@ -268,7 +270,7 @@ def test_a_process_without_llvm_says_so_as_a_worker():
 def test_workers_with_several_dask_threads_are_refused(scene):
     with (
         distributed.LocalCluster(
-            n_workers=1, threads_per_worker=2, processes=False, dashboard_address=":0"
+            n_workers=1, threads_per_worker=2, processes=False, dashboard_address="127.0.0.1:0"
         ) as local,
         distributed.Client(local) as mine,
         pytest.raises(DiffractionError, match="has 2 Dask threads"),
@@ -325,7 +327,10 @@ def test_jobs_of_a_queue_are_workers(scene, expected):
     jobqueue = pytest.importorskip("dask_jobqueue.local")
     with (
         jobqueue.LocalCluster(
-            cores=1, processes=1, memory="2GB", scheduler_options={"dashboard_address": ":0"}
+            cores=1,
+            processes=1,
+            memory="2GB",
+            scheduler_options={"dashboard_address": "127.0.0.1:0"},
         ) as queue,
         distributed.Client(queue) as mine,
     ):
@@ -333,15 +338,71 @@ def test_jobs_of_a_queue_are_workers(scene, expected):
         np.testing.assert_array_equal(np.array(rendered(mine, scene).bitmap), expected)
 
 
-def test_damaged_sums_are_rendered_again(scene, tmp_path):
-    task = _Recorder.first_task(scene)
-    kept, sums = Kept(tmp_path / "passes"), run_task(task)
-    kept.write(task, sums)
+def cut(content: bytes) -> bytes:
+    return content[:-100]
+
+
+def times_50(content: bytes) -> bytes:
+    return content[:-4096] + (50 * np.frombuffer(content[-4096:], np.float64)).tobytes()
+
+
+def not_a_number(content: bytes) -> bytes:
+    return content[:-4096] + np.full(512, np.nan).tobytes()
+
+
+@pytest.mark.parametrize("damage", [cut, times_50, not_a_number])
+def test_damaged_sums_are_rendered_again(scene, tmp_path, damage):
+    task, said = _Recorder.first_task(scene), []
+    kept, sums = Kept(tmp_path / "passes", said.append), run_task(task)
+    assert kept.write(task, sums)
     assert np.array_equal(kept.read(task).raw, sums.raw)
     (file,) = (tmp_path / "passes").iterdir()
-    file.write_bytes(file.read_bytes()[:-100])
+    file.write_bytes(damage(file.read_bytes()))
     assert kept.read(task) is None
     assert task not in kept
+    (line,) = said
+    assert str(file) in line
+
+
+def test_sums_under_the_name_of_others_are_rendered_again(scene, tmp_path):
+    first, second = film(_Recorder(), scene, [Wanted({}, SPP, 3)], tmp_path)._frames[0][:2]
+    kept = Kept(tmp_path / "passes", lambda _: None)
+    kept.write(first, run_task(first))
+    (file,) = (tmp_path / "passes").iterdir()
+    file.rename(file.with_name(f"{second.key[:32]}{file.suffix}"))
+    assert kept.read(second) is None
+
+
+def test_sums_that_are_not_finite_are_not_kept(scene, tmp_path):
+    task = _Recorder.first_task(scene)
+    sums = run_task(task)
+    raw = np.where(np.arange(sums.raw.size).reshape(sums.raw.shape) == 7, np.inf, sums.raw)
+    kept = Kept(tmp_path / "passes")
+    assert not kept.write(task, replace(sums, raw=raw))
+    assert task not in kept
+
+
+def test_pages_of_workers_are_for_this_machine_alone(client):
+    for address in (client.scheduler_info()["address"], client.dashboard_link):
+        assert "//127.0.0.1:" in address
+    assert _listening(os.getpid()) <= {"0100007F"}  # in hexadecimal: 127.0.0.1
+    for worker in client.cluster.workers.values():
+        assert _listening(worker.pid) <= {"0100007F"}
+
+
+def _listening(process: int) -> set[str]:
+    """Addresses of IPv4 and IPv6 at which a process listens, as /proc has them."""
+    sockets = set()
+    for link in Path(f"/proc/{process}/fd").iterdir():
+        with contextlib.suppress(OSError):
+            sockets.add(os.readlink(link))
+    found = set()
+    for table in ("tcp", "tcp6"):
+        for line in Path(f"/proc/{process}/net/{table}").read_text().splitlines()[1:]:
+            fields = line.split()
+            if fields[3] == "0A" and f"socket:[{fields[9]}]" in sockets:
+                found.add(fields[1].partition(":")[0])
+    return found
 
 
 def test_the_command_renders_on_a_cluster(client, scene, expected, run, tmp_path):

@@ -11,6 +11,8 @@ from PIL import Image
 from mitsuba_diffraction import gratings
 from tests.support.coarse import coarse_energy
 
+pytestmark = pytest.mark.thorough
+
 OPTIONS = (
     "--coherence-width", 6, "--tolerance", 0.05, "--resolution", 24,
     "--treatments", "treatments.toml", "--threads", 1, "-o", "out",

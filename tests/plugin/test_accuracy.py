@@ -19,7 +19,10 @@ from tests.support.directions import lit_pairs, rough_patch
 from tests.support.lanes import brdf_values
 
 # measured and made surfaces alike may be steeper than the model likes; that is not the point here
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
+pytestmark = [
+    pytest.mark.thorough,
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning"),
+]
 
 FINE_CHEBYSHEV = [("chebyshev", 1e-4), ("taylor", 1e-3)]
 FINE_TAYLOR = [("chebyshev", 1e-3), ("taylor", 1e-4)]

@@ -11,6 +11,8 @@ from tests.support.gentle import load
 from tests.support.lanes import interaction, spectra
 from tests.support.variants import obstacle
 
+pytestmark = pytest.mark.thorough
+
 PIGMENT = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.5}}
 COLOURED = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.5, 0.1, 0.05]}}
 

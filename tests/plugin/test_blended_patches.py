@@ -13,6 +13,8 @@ from tests.support.directions import rough_patch
 from tests.support.gentle import PATCH, WIDTH, pairs
 from tests.support.lanes import interaction, refusal, spectra, vectors
 
+pytestmark = pytest.mark.thorough
+
 OTHER = rough_patch((60, 60), (0.08, 0.08), 0.1, seed=3)
 RAW = {"material": "none", "energy_conserving": False, "coherence_width": WIDTH}
 PIGMENTED = {"int_ior": 1.5, "pigment": {"type": "conductor"}, "energy_conserving": False}

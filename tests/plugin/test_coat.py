@@ -18,6 +18,8 @@ from tests.support.lanes import evaluated, interaction, refusal
 from tests.support.layered import FLAT, PATCH, WIDTH, assert_values_are_the_reference_s, load, pairs
 from tests.support.variants import ALL, evaluate, runs
 
+pytestmark = pytest.mark.thorough
+
 COATED = {
     "metal": ({"eta": 0.9, "k": 6.0, "coat_ior": 1.58}, {"eta": 0.9, "k": 6.0, "coat": 1.58}),
     "dielectric": (

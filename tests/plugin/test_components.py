@@ -18,6 +18,8 @@ from tests.support.directions import polar
 from tests.support.gentle import load
 from tests.support.lanes import lanes, refusal, vectors
 
+pytestmark = pytest.mark.thorough
+
 THETA = 35.0
 FLAGS = mi.BSDFFlags
 GREY = {"type": "diffuse", "reflectance": {"type": "uniform", "value": 0.7}}

@@ -15,6 +15,7 @@ import drjit as dr  # isort: skip
 
 # the surfaces are steep on purpose
 pytestmark = [
+    pytest.mark.thorough,
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
     pytest.mark.usefixtures("variant"),
 ]

@@ -28,6 +28,8 @@ from tests.support.lanes import evaluated, interaction, refusal
 from tests.support.layered import FLAT, PATCH, WIDTH, assert_values_are_the_reference_s, load, pairs
 from tests.support.variants import evaluate, runs
 
+pytestmark = pytest.mark.thorough
+
 Array = NDArray[Any]
 OXIDE = {"film_ior": 1.77, "film_thickness": 250.0}
 METAL = {"eta": 0.9, "k": 6.0}

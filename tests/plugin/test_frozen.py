@@ -24,6 +24,7 @@ from tests.support.plates import (
 
 # coarse pixels keep the tables small; that is not the point here
 pytestmark = [
+    pytest.mark.thorough,
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
     pytest.mark.usefixtures("coarse"),
 ]

@@ -15,6 +15,8 @@ from tests.support.directions import polar
 from tests.support.gentle import load, pairs
 from tests.support.lanes import refusal, vectors
 
+pytestmark = pytest.mark.thorough
+
 FACTORS = np.array([[0.25, 1.25], [0.8, 0.0]], np.float32)
 #: Middles of the texels.
 UV = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]], np.float32)

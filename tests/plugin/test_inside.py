@@ -24,7 +24,10 @@ from tests.support.plates import (
 )
 
 # coarse pixels keep the tables small; that is not the point here
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+pytestmark = [
+    pytest.mark.thorough,
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+]
 
 
 def load(kind: str, **parameters: Any) -> Any:

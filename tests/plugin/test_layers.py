@@ -12,6 +12,7 @@ import mitsuba as mi  # isort: skip
 import drjit as dr  # isort: skip
 
 pytestmark = [
+    pytest.mark.thorough,
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
     pytest.mark.usefixtures("variant"),
 ]

@@ -20,6 +20,7 @@ from tests.support.variants import obstacle
 
 # coarse pixels keep the tables small; that is not the point here
 pytestmark = [
+    pytest.mark.thorough,
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
     pytest.mark.usefixtures("coarse"),
 ]

@@ -16,6 +16,8 @@ from tests.support.lanes import evaluated, refusal
 from tests.support.layered import PATCH, WIDTH, pairs
 from tests.support.variants import ALL, evaluate, runs
 
+pytestmark = pytest.mark.thorough
+
 MATERIALS = {
     "dielectric": ({}, 1.5 / 1.000277, 0.0),
     "less dense": ({"int_ior": 1.0, "ext_ior": 1.4}, 1.0 / 1.4, 0.0),

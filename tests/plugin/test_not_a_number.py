@@ -10,6 +10,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.thorough
+
 # In a child: a read outside the table may end the process, where memory happens to end.
 PROGRAM = """
 import numpy as np, drjit as dr, warnings

@@ -19,6 +19,7 @@ from tests.support.directions import polar, rough_patch
 from tests.support.lanes import interaction, lanes, spectra, vectors
 
 pytestmark = [
+    pytest.mark.thorough,
     pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning"),
     pytest.mark.usefixtures("coarse"),
 ]

@@ -14,7 +14,10 @@ from tests.support.directions import lit_pairs, polar, rough_patch
 from tests.support.lanes import brdf_values, interaction, refusal, vectors
 
 # a patch this small is beyond what the model likes; that is not the point here
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+pytestmark = [
+    pytest.mark.thorough,
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+]
 
 #: Of 1.7 × 1.76 µm, its orders far apart under the window.
 PATCH = rough_patch((22, 20), (0.085, 0.08), 0.1)

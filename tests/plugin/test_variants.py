@@ -17,6 +17,8 @@ from mitsuba_diffraction.tables.colour.table import ColourTable
 from tests.support.directions import Array, as_single, rough_patch, uniform_directions
 from tests.support.variants import evaluate, interaction, runs
 
+pytestmark = pytest.mark.thorough
+
 WIDTH = 8.0  # µm
 HEIGHTS = rough_patch((90, 100), (0.085, 0.09), 0.2, 0.9)
 N = 24

@@ -15,6 +15,8 @@ from tests.support.directions import lit_pairs, uniform_directions
 from tests.support.gentle import PATCH, WIDTH, load
 from tests.support.lanes import interaction, refusal, spectra, vectors
 
+pytestmark = pytest.mark.thorough
+
 ON_SURFACE = {"coherence": "surface", "uv_scale": 10.0}
 
 

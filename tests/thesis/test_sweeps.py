@@ -23,45 +23,47 @@ def grating():
 
 
 def test_finer_steps_come_closer(grating):
-    found = sweep("wavelength-step", grating, Light(20.0), values=[2.0, 10.0, 100.0], **SETTINGS)
-    assert found.reference == "2 nm"
-    first, fine, coarse = found.steps
-    assert first.mean == 0.0
-    assert fine.mean < 1.0 < coarse.mean  # ΔE of 1 is what an eye can just see
+    result = sweep("wavelength-step", grating, Light(20.0), values=[2.0, 10.0, 100.0], **SETTINGS)
+    assert result.reference == "2 nm"
+    first, fine, coarse = result.steps
+    assert first.difference.delta_e == 0.0
+    assert (
+        fine.difference.delta_e < 1.0 < coarse.difference.delta_e
+    )  # ΔE of 1 is what an eye can just see
 
 
 def test_more_terms_come_closer(grating):
-    found = sweep("terms", grating, Light(20.0), values=[2, 6, 14], **SETTINGS)
-    assert found.reference == "14 terms"
-    assert found.steps[0].mean > 10.0 * found.steps[1].mean > 0.0
+    result = sweep("terms", grating, Light(20.0), values=[2, 6, 14], **SETTINGS)
+    assert result.reference == "14 terms"
+    assert result.steps[0].difference.delta_e > 10.0 * result.steps[1].difference.delta_e > 0.0
 
 
 def test_the_light_s_angle_has_no_reference(grating):
-    found = sweep("light-angle", grating, Light(), values=[0.0, 50.0], **SETTINGS)
-    assert found.reference is None
-    assert np.isnan(found.steps[1].mean)
-    assert [step.map.light.theta for step in found.steps] == [0.0, 50.0]
+    result = sweep("light-angle", grating, Light(), values=[0.0, 50.0], **SETTINGS)
+    assert result.reference is None
+    assert np.isnan(result.steps[1].difference.delta_e)
+    assert [step.map.light.theta for step in result.steps] == [0.0, 50.0]
 
 
 def test_wider_windows_make_sharper_lobes(grating):
-    found = sweep("coherence-width", grating, Light(20.0), values=[5.0, 20.0], **SETTINGS)
-    assert found.reference == "20 µm"
-    brightest = [step.map.luminance.max() for step in found.steps]
+    result = sweep("coherence-width", grating, Light(20.0), values=[5.0, 20.0], **SETTINGS)
+    assert result.reference == "20 µm"
+    brightest = [step.map.luminance.max() for step in result.steps]
     assert brightest[0] < 0.5 * brightest[1]
 
 
 def test_methods_are_compared_with_flss(grating):
     names = ("default", "flss", "nmm", "rainbow")
-    found = sweep("method", grating, Light(20.0), values=names, **SETTINGS)
-    by_name = {step.value: step for step in found.steps}
+    result = sweep("method", grating, Light(20.0), values=names, **SETTINGS)
+    by_name = {step.value: step for step in result.steps}
     # tables of tolerance 1e-3 both
-    assert by_name["default"].mean < 0.1
-    assert by_name["nmm"].mean > 1.0
-    assert by_name["nmm"].blueness > 1.05  # the purple shift
+    assert by_name["default"].difference.delta_e < 0.1
+    assert by_name["nmm"].difference.delta_e > 1.0
+    assert by_name["nmm"].difference.blueness > 1.05  # the purple shift
     lobes = sweep(
         "method", grating, Light(20.0), values=["flss", "nmm"], nmm_weights="lobe", **SETTINGS
     )
-    assert lobes.steps[1].mean < 0.5 * by_name["nmm"].mean
+    assert lobes.steps[1].difference.delta_e < 0.5 * by_name["nmm"].difference.delta_e
 
 
 def test_a_truncated_series_is_the_shorter_series(grating):
@@ -87,9 +89,9 @@ def test_relative_maps_are_the_thesis_value(grating):
 
 
 def test_a_contact_sheet_has_a_map_for_every_value(grating):
-    found = sweep("light-angle", grating, Light(), values=[0, 10, 20, 30, 40], **SETTINGS)
+    result = sweep("light-angle", grating, Light(), values=[0, 10, 20, 30, 40], **SETTINGS)
     figure = contact_sheet(
-        [s.map for s in found.steps], [s.label for s in found.steps], title="light"
+        [s.map for s in result.steps], [s.label for s in result.steps], title="light"
     )
     assert [axes.get_title().split(";")[0] for axes in figure.axes] == [
         "0°", "10°", "20°", "30°", "40°",

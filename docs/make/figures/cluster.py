@@ -1,4 +1,4 @@
-"""The figures of docs/cluster.md: a film on two workers beside one process, and how far it scales.
+"""Figures of docs/cluster.md: a film on two workers beside one process, and simulated clusters.
 
 python -m docs.make.figures.cluster scenes/plate.xml -o docs/cluster.md
 
@@ -96,7 +96,7 @@ def film_seconds(
 
 
 def client_seconds(count: int = 20) -> float:
-    """Of the client for one sum: written, read, added."""
+    """Seconds that the client spends on one sum: written, read, added."""
     task = Task(SceneFiles("scene", (), ()), "", 0, False, "", 0, 0, (), (), 1)
     rng = np.random.default_rng(0)
     raw = rng.random((640, PIXELS // 640, CHANNELS)).astype(np.float32).astype(np.float64)
@@ -114,7 +114,7 @@ def client_seconds(count: int = 20) -> float:
 
 
 def scheduler_seconds(count: int = 500) -> float:
-    """Of client, scheduler and worker together for a task that does nothing, one after the other
+    """Seconds of client, scheduler and worker together for an empty task, one after the other
     in the queue: more than the scheduler's own."""
     distributed = require_dask()
     with (

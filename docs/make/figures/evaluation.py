@@ -1,4 +1,4 @@
-"""The page on the grating equation: every method on every patch, in pictures and numbers.
+"""Page on the grating equation: every method on every patch, in pictures and numbers.
 
     python -m docs.make.figures.evaluation -o docs/evaluation.md \\
         --measured elaphe.png --pixel-size 0.0488 --max-height 0.375
@@ -23,7 +23,8 @@ from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights.field import HeightField
 from mitsuba_diffraction.heights.gratings import blazed, elaphe_like, sinusoidal, xenopeltis_like
-from mitsuba_diffraction.thesis.evaluation import (
+from mitsuba_diffraction.thesis.methods import FullSpectrum, make, make_all
+from mitsuba_diffraction.thesis.period_fit import (
     Beam,
     Fit,
     Response,
@@ -34,8 +35,7 @@ from mitsuba_diffraction.thesis.evaluation import (
     thesis_fit,
     window_fits,
 )
-from mitsuba_diffraction.thesis.evaluation.plot import draw
-from mitsuba_diffraction.thesis.methods import FullSpectrum, make, make_all
+from mitsuba_diffraction.thesis.period_fit.plot import draw
 
 from . import pages
 from .pages import SHOWN, add_measured, exit_code, measured_patch
@@ -51,7 +51,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Evaluated:
-    """One method on one patch."""
+    """Result of a method on a patch."""
 
     response: Response
     ridge: Ridge
@@ -71,7 +71,7 @@ class Periods:
 
 
 def exact_gratings() -> list[tuple[HeightField, float | None]]:
-    """Gratings, with the period that they are made with."""
+    """Gratings with their nominal periods."""
     return [
         (blazed(2.5, 0.25, pixels_per_period=60, rows=2), 2.5),
         (sinusoidal(1.6, 0.1, rows=2), 1.6),
@@ -88,7 +88,7 @@ def evaluate_patch(
     methods: Sequence[str] = METHODS,
     coherence_width: float = 65.0,
 ) -> Periods:
-    """Every method, and single windows, under a beam at 75°."""
+    """Evaluate every method, and single windows, under a beam at 75°."""
     beam = Beam()
     made = make_all(methods, patch, coherence_width=coherence_width)
     results = {}

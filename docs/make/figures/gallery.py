@@ -1,8 +1,8 @@
-"""The gallery, and the pictures of the page on meshes: each with the commands that make it.
+"""Pictures of docs/gallery.md and docs/meshes.md, each with the commands that make it.
 
     python -m docs.make.figures.gallery -o docs [--only cd]
 
-What the pages show between their markers is what `shown` says, so a test sees when they disagree.
+`markdown` writes the parts of the pages between their markers; a test compares them.
 """
 
 from __future__ import annotations
@@ -37,16 +37,15 @@ _MESHES = ".venv/bin/python -m scenes.make"
 class Picture:
     """A picture of a page."""
 
-    page: str  # the page's name, and that of its markers
-    name: str  # of the picture's file
-    # title, text: what it shows
+    page: str  # name of the page and of its markers
+    name: str  # name of the picture's file
     title: str
     text: str
-    commands: tuple[str, ...]  # what makes it, the last one writing it; files are made in `out`
+    commands: tuple[str, ...]  # files are written to `out`; the last command writes the picture
 
     @property
     def file(self) -> Path:
-        """Where it is, seen from the pages."""
+        """Path of the picture, relative to the page."""
         film = self.commands[-1].endswith(".webp")
         return FOLDER / f"{self.name}{'.webp' if film else '.jpg'}"
 
@@ -59,7 +58,7 @@ def _scene(name: str, title: str, text: str, options: str = "", scene: str = "")
 PICTURES = (
     _scene(
         "snake", "A corn snake",
-        "Its scales are those of a look-alike of *Elaphe guttata*; sun and clear sky.",
+        "Scales of a look-alike of *Elaphe guttata*, in sun and clear sky.",
     ),
     _scene(
         "xenopeltis", "A sunbeam snake",
@@ -73,7 +72,7 @@ PICTURES = (
     ),
     _scene(
         "snake_two", "A snake with two patches",
-        "The sunbeam snake's relief, and rings of a wider one, whose colours stay close to the "
+        "The sunbeam snake's relief with rings of a wider one, whose colours stay close to the "
         "window's mirror image (`diffraction_mix`).",
         "-D skin=skin_two.xml -D resx=480 -D resy=300 -s 64", "xenopeltis",
     ),
@@ -86,20 +85,20 @@ PICTURES = (
     ),
     _scene(
         "scales", "Some scales from close by",
-        "A small lamp: on each scale its mirror image, white along the keel, and on both sides "
+        "A small lamp: each scale shows its mirror image, white along the keel, and on both sides "
         "the orders of the fingers.",
     ),
     Picture(
         "gallery", "scales_macro", "The grain of a scale",
-        "Two millimetres of one of them, each place with a coherence window of its own "
-        "(`coherence=surface`): colours break up into speckle, which moves with the lamp, here by "
+        "Two millimetres of a scale; each place has its own coherence window "
+        "(`coherence=surface`). Colours break up into speckle, which moves with the lamp, here by "
         "2°.",
         ("render scenes/scales_macro.xml -D resx=300 -D resy=200 -s 48 --frames 10 "
          "--animate lamp_azimuth=112:114 --fps 8 -o out/scales_macro.webp",),
     ),
     _scene(
         "cd", "A compact disc under a lamp",
-        "Colours lie where the tracks run across the plane of lamp and camera.",
+        "Colours appear where the tracks run across the plane of lamp and camera.",
     ),
     _scene(
         "cd_window", "The disc under a window",
@@ -112,21 +111,21 @@ PICTURES = (
     ),
     _scene(
         "grating_window", "The grating under a window",
-        "The panes' spectra overlap; only beside the mullion and the frame are colours pure.",
+        "The spectra of the panes overlap; colours are pure beside the mullion and the frame only.",
     ),
     _scene(
         "film", "A diffraction film before lamps",
-        "A thin sheet with shallow waves on one side (`diffraction_dielectric`): every lamp "
-        "between its spectra.",
+        "A thin sheet with shallow waves on one side (`diffraction_dielectric`): each lamp stands "
+        "spectra.",
     ),
     _scene(
         "spectrometer", "A grating spectrometer",
-        "Lamp light through a slit and a clear grating, traced from the lamp: orders on a screen.",
+        "Lamp light through a slit and a clear grating onto a screen, traced from the lamp.",
     ),
     _scene(
         "material_ball", "A ball of any material",
-        "To look at a patch of your own: `-D patch=\"$PWD/scale.exr\" -D material=Cr`. Here the "
-        "sunbeam snake's relief in aluminium.",
+        "The sunbeam snake's relief in aluminium. For a patch of your own: "
+        "`-D patch=\"$PWD/scale.exr\" -D material=Cr`.",
     ),
     _scene(
         "material_ball_cd", "The tracks of a CD on gold",
@@ -135,7 +134,7 @@ PICTURES = (
     ),
     _scene(
         "own_mesh", "A mesh of your own",
-        "A knot that came without texture coordinates; see [meshes](meshes.md).",
+        "A knot without texture coordinates of its own; see [meshes](meshes.md).",
     ),
     _scene(
         "plate", "A flat sample",
@@ -156,7 +155,7 @@ PICTURES = (
     ),
     Picture(
         "meshes", "snake_slender", "",
-        "A slender one with many small smooth scales:",
+        "A slender snake with many small smooth scales:",
         ("meshes snake -o out/slender.ply --eyes out/slender_eyes.ply --length 150 "
          "--girth-radius 1.15 --coils 3.2 --rows 27 --keel 0 --relief 0.05 --overlap 0.15 "
          "--detail 3",
@@ -165,7 +164,7 @@ PICTURES = (
     ),
     Picture(
         "meshes-field", "knot_field", "",
-        "A closed tube in a knot, which came without texture coordinates:",
+        "A closed tube in a knot, a mesh without texture coordinates:",
         ("meshes knot -o out/bare.ply",
          "tangents out/bare.ply -o out/knot.ply",
          "render scenes/own_mesh.xml -D mesh=$PWD/out/knot.ply -D resx=400 -D resy=360 -s 64 "
@@ -174,8 +173,8 @@ PICTURES = (
 )  # fmt: skip
 
 
-def shown(page: str) -> str:
-    """What stands between a page's markers, as Markdown."""
+def markdown(page: str) -> str:
+    """Part of a page between its markers: pictures, texts and commands."""
     parts = []
     for picture in PICTURES:
         if picture.page != page:
@@ -184,7 +183,7 @@ def shown(page: str) -> str:
         link = picture.file.as_posix()
         label = picture.title or picture.text.rstrip(":")
         commands = "\n".join(as_typed(command) for command in picture.commands)
-        # what is read before the picture ends with a colon
+        # a text that ends with a colon precedes its picture
         inner = (picture.text, f"![{label}]({link})")
         body = "\n\n".join(inner if picture.text.endswith(":") else inner[::-1])
         parts.append(f"{title}{body}\n\n```sh\n{commands}\n```")
@@ -192,7 +191,7 @@ def shown(page: str) -> str:
 
 
 def as_typed(command: str) -> str:
-    """A command with its program, broken where it is long."""
+    """Command with its program, in lines of at most 110 characters."""
     first, rest = command.split(" ", 1)
     line = f"{_MESHES} {rest}" if first == "meshes" else f"{_PROGRAM} {command}"
     if len(line) <= 110:
@@ -207,7 +206,7 @@ def as_typed(command: str) -> str:
 
 
 def make(picture: Picture, target: Path, scenes: Path) -> None:
-    """Run a picture's commands, and write it."""
+    """Run the commands of a picture, and write it."""
     with tempfile.TemporaryDirectory() as temporary:
         for command in picture.commands:
             words = [
@@ -218,18 +217,18 @@ def make(picture: Picture, target: Path, scenes: Path) -> None:
                 code = meshes(words[1:]) if words[0] == "meshes" else program(words)
             if code != 0:
                 raise DiffractionError(f"{picture.name}: '{command}' failed; see above")
-        made = Path(words[-1])
+        rendered = Path(words[-1])
         if target.suffix == ".jpg":
-            write_jpeg(made, target, most=_MOST)
+            write_jpeg(rendered, target, most=_MOST)
             return
-        if made.stat().st_size > _MOST:
-            raise DiffractionError(f"{picture.name}: the film has {made.stat().st_size} bytes")
+        if rendered.stat().st_size > _MOST:
+            raise DiffractionError(f"{picture.name}: the film has {rendered.stat().st_size} bytes")
         with atomic_path(target) as path:
-            shutil.copyfile(made, path)
+            shutil.copyfile(rendered, path)
 
 
 def _moved(word: str, out: Path, scenes: Path) -> str:
-    """A word of a command with its files where they are to be."""
+    """Word of a command, with paths in the temporary folder and in the folder of the scenes."""
     head, equals, value = word.rpartition("=")
     if value.startswith("out/"):
         return f"{head}{equals}{out / value.removeprefix('out/')}"
@@ -256,8 +255,8 @@ def main(argv: Sequence[str] | None = None) -> int:
                 start = time.perf_counter()
                 make(picture, args.output / picture.file, args.scenes)
                 print(f"{picture.name}: {time.perf_counter() - start:.1f} s", flush=True)
-        pages.update(args.output / "gallery.md", {"gallery": shown("gallery")})
-        parts = {name: shown(name) for name in ("meshes", "meshes-field")}
+        pages.update(args.output / "gallery.md", {"gallery": markdown("gallery")})
+        parts = {name: markdown(name) for name in ("meshes", "meshes-field")}
         pages.update(args.output / "meshes.md", parts)
 
     return exit_code("gallery", work)

@@ -1,4 +1,4 @@
-"""The notebooks run anew, and what they show kept in their files.
+"""Run the notebooks, and store their outputs in their files.
 
     python -m docs.make.figures.notebooks [notebooks/first_render.ipynb ...]
 
@@ -27,7 +27,7 @@ _TIMEOUT = 300
 
 
 def execute(path: Path) -> Any:
-    """The notebook with the outputs that it has now; its file stays as it is."""
+    """Return the notebook with new outputs; its file is not changed."""
     try:
         import nbclient
         import nbformat
@@ -56,7 +56,7 @@ def execute(path: Path) -> Any:
 
 
 def _environment() -> dict[str, str]:
-    """That of the kernel: this copy of the package first, and figures in the cells."""
+    """Environment of the kernel: this copy of the package first, and figures in the cells."""
     environment = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}
     before = environment.get("PYTHONPATH")
     environment["PYTHONPATH"] = os.pathsep.join([str(ROOT), *([before] if before else [])])

@@ -1,7 +1,7 @@
-"""What the programs of this folder share: parts of pages, renderings as JPEG, measurements, errors.
+"""Shared functions of the programs of this folder: parts of pages, JPEG, measurements, errors.
 
-Generated parts of Markdown files stand between `<!-- begin NAME -->` and its end. What is missing,
-damaged or cannot be written is a DiffractionError, which `exit_code` prints in one line.
+Generated parts of Markdown files stand between `<!-- begin NAME -->` and its end. Files that are
+missing, damaged or not writable are a DiffractionError, which `exit_code` prints in one line.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from mitsuba_diffraction.heights.field import HeightField
 
 Made = TypeVar("Made")
 
-#: What the command line calls a method that the library has under another name.
+#: Names of methods on the command line, where they differ from those of the library.
 SHOWN = {"default": "spectral"}
 # JPEG's default blurs single sparkling pixels; at 90 they stay, in a quarter of a PNG's size.
 _QUALITIES = (90, 86, 82, 78, 74, 70, 64, 58)
 
 
 def replaced(text: str, name: str, content: str) -> str:
-    """The text with the part of that name replaced; the markers stay."""
+    """Return the text with the part of that name replaced between its markers."""
     begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
     if text.count(begin) != 1 or text.count(end) != 1 or text.index(begin) > text.index(end):
         raise DiffractionError(f"expected '{begin}' and then '{end}', once each")
@@ -40,7 +40,7 @@ def replaced(text: str, name: str, content: str) -> str:
 
 
 def part(text: str, name: str) -> str:
-    """What stands between the markers of that name."""
+    """Return the text between the markers of that name."""
     begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
     if begin not in text or end not in text:
         raise DiffractionError(f"expected '{begin}' and '{end}'")
@@ -61,7 +61,7 @@ def update(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
 
 
 def update_present(path: str | os.PathLike[str], parts: Mapping[str, str]) -> None:
-    """Replace those parts that a file has markers for."""
+    """Replace the parts that a file has markers for."""
     text = _read(Path(path))
     present = {name: part for name, part in parts.items() if f"<!-- begin {name} -->" in text}
     if not present:
@@ -119,26 +119,26 @@ def write_jpeg(
 
 
 def add_measured(parser: argparse.ArgumentParser, what: str) -> None:
-    """Declare the options that name a measured patch; `what` says what becomes of it."""
+    """Declare the options that name a measured patch; `what` is the help of the first."""
     parser.add_argument("--measured", metavar="FILE", help=what)
     parser.add_argument("--pixel-size", metavar="DX", help="of the measured patch, µm")
     parser.add_argument("--max-height", metavar="H", help="of the measured patch, µm")
 
 
 def measured_patch(args: argparse.Namespace) -> HeightField | None:
-    """The patch that these options name, or None."""
+    """Return the patch that these options name, or None."""
     if args.measured is None:
         return None
     return HeightField.load(args.measured, pixel_size=args.pixel_size, max_height=args.max_height)
 
 
 def from_json(file: Path, make: Callable[[Any], Made], *, writer: str, remedy: str) -> Made:
-    """What `make` makes of a measurement in JSON.
+    """Read a measurement in JSON.
 
     Parameters
     ----------
-    make : takes the document; what it misses there shows that this is another file.
-    writer, remedy : the command that writes such files, and what to do if this is none.
+    make : converts the document; it fails if the document is of another kind.
+    writer, remedy : the command that writes such files, and what to do if this is another file.
     """
     try:
         return make(json.loads(file.read_text(encoding="utf-8")))
@@ -149,7 +149,7 @@ def from_json(file: Path, make: Callable[[Any], Made], *, writer: str, remedy: s
 
 
 def exit_code(name: str, work: Callable[[], None]) -> int:
-    """Run `work`; 0, or 1 after an error, which is printed in one line."""
+    """Run `work` and return 0, or 1 after an error, which is printed in one line."""
     try:
         work()
     except DiffractionError as error:

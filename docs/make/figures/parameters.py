@@ -36,7 +36,7 @@ _MODEL, _EXAMPLE = "\nThe model is ", "\nXML and the same in Python:\n"
 
 @dataclass(frozen=True)
 class Parameter:
-    """One entry: usually one parameter, sometimes two that belong together."""
+    """Entry of the page: usually one parameter, sometimes two that belong together."""
 
     names: tuple[str, ...]  # of the parameters; "(nested)" for an object of any name
     # type, default, text: as the docstring has them
@@ -52,7 +52,7 @@ def docstring(plugin: str) -> str:
 
 
 def groups(text: str) -> dict[str, list[Parameter]]:
-    """The parameters that a docstring describes, by the heading above them."""
+    """Parameters that a docstring describes, by the heading above them."""
     _, *parts = _GROUP.split(text.partition(_MODEL)[0])
     return {heading: _entries(body) for heading, body in zip(parts[::2], parts[1::2], strict=True)}
 
@@ -120,7 +120,7 @@ def _row(entry: Parameter) -> tuple[str, ...]:
 
 
 def _prose(text: str) -> str:
-    """Paragraphs on one line each, and what is indented as code."""
+    """Return paragraphs on one line each, and indented text as code."""
     shown = []
     for paragraph in re.split(r"\n\n+", text.strip()):
         indented = paragraph.startswith("    ")

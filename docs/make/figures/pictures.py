@@ -1,4 +1,4 @@
-"""The pictures of docs/images: patches and their light, BRDF maps, the snakes of the scenes.
+"""Pictures of docs/images: patches and their light, BRDF maps, the snakes of the scenes.
 
     python -m docs.make.figures.pictures -o docs/images \\
         --measured elaphe.png --pixel-size 0.0488 --max-height 0.375
@@ -124,14 +124,14 @@ def render_snakes(
 
 
 def _patches(args: argparse.Namespace) -> None:
-    """Of all look-alikes, below a measured patch where one is given."""
+    """Draw all look-alikes, below a measured patch if there is one."""
     fields = [*_measured(args), *(make() for make in LOOKALIKES)]
     with atomic_path(args.output / "patches.png") as path:
         patches_figure(fields).savefig(path, dpi=80, format="png")
 
 
 def _maps(args: argparse.Namespace) -> None:
-    """Of look-alikes of two snakes and a CD and a blazed grating, a measured patch first."""
+    """Draw maps of a measured patch, look-alikes of two snakes, a CD and a blazed grating."""
     from mitsuba_diffraction.scene.load import set_variant
 
     fields = [*_measured(args), elaphe_like(), xenopeltis_like(), cd(), blazed(2.5, 0.25)]
@@ -158,7 +158,7 @@ FIGURES: dict[str, Callable[[argparse.Namespace], None]] = {
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Make the pictures that are asked for, and return the exit code."""
+    """Make the requested pictures, and return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m docs.make.figures.pictures")
     parser.add_argument("-o", "--output", metavar="FOLDER", type=Path, default=Path("docs/images"))
     parser.add_argument(

@@ -1,4 +1,4 @@
-"""The picture and the tables of docs/realtime.md, from what `compare` measured.
+"""Picture and tables of docs/realtime.md, from measurements by `compare`.
 
 mitsuba-diffraction compare scenes/snake.xml --method all -o out/compare/snake
 mitsuba-diffraction compare scenes/cd.xml --method lut spectral -o out/compare/cd
@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from mitsuba_diffraction.realtime.comparison.report import markdown, plain_number
+from mitsuba_diffraction.realtime.shader_comparison.report import markdown, plain_number
 
 from . import pages
 from .pages import exit_code, from_json, write_jpeg
@@ -27,7 +27,7 @@ _METHOD, _WIDTH = "lut", 1600
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Replace them, and return the exit code."""
+    """Replace picture and tables, and return the exit code."""
     parser = argparse.ArgumentParser(prog="python -m docs.make.figures.realtime")
     parser.add_argument(
         "compared", metavar="FOLDER", type=Path, nargs="+",
@@ -67,7 +67,7 @@ def _tables(files: Sequence[Path]) -> str:
 
 
 def _of_sheet(folder: Path) -> str:
-    """What is measured in the larger picture."""
+    """Sentence with the measurements of the larger picture."""
     document = from_json(
         folder / "compare.json", lambda d: (d["methods"][_METHOD]["whole"], d)[1],
         writer="compare", remedy=f"run compare with the method {_METHOD}",
@@ -83,7 +83,7 @@ def _of_sheet(folder: Path) -> str:
 
 
 def scenes_table(documents: Sequence[dict[str, Any]]) -> str:
-    """How far `lut` and `spectral` are off in some scenes, over all pixels."""
+    """Deviations of `lut` and `spectral` in some scenes, over all pixels."""
     head = "| scene |" + "".join(
         f" `{m}`, ΔE2000 mean | 99 % | noise, mean | 99 % |" for m in _OURS
     )

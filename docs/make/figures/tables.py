@@ -1,4 +1,4 @@
-"""Tables of docs/benchmarks.md, accuracy.md, plan.md and energy.md, from what commands measured.
+"""Tables of docs/benchmarks.md, accuracy.md, plan.md and energy.md, from measurements by commands.
 
 python -m docs.make.bench --json out/bench.json
 python -m docs.make.figures.tables speed out/bench.json
@@ -27,7 +27,7 @@ from .pages import exit_code, from_json
 
 @dataclass(frozen=True)
 class Figure:
-    """One line of the table of speed."""
+    """Row of the table of speed."""
 
     # section, row: how the section's title and the row's name begin
     section: str
@@ -72,7 +72,7 @@ FIGURES = (
 
 
 def speed(measured: dict[str, Any], name: str = "") -> dict[str, str]:
-    """What was measured on which machine, and the goals."""
+    """Tables of speed and memory with the machine and the goals."""
     machine = measured["machine"]
     head = f"Measured by `make bench` on {machine['cores']} cores ({machine['processor']})"
     versions = f"Mitsuba {machine['mitsuba']}, version {machine['mitsuba_diffraction']}"
@@ -185,7 +185,7 @@ _ENERGY = (
 
 
 def energy(report: dict[str, Any], name: str) -> dict[str, str]:
-    """A row for each material, from what `info --energy --json` wrote of one table."""
+    """A row for each material, from the file of `info --energy --json` for a table."""
     rows = [_row(name, material, found) for material, found in report["energy"].items()]
     return {"energy": pages.table(_ENERGY, rows)}
 
@@ -215,7 +215,7 @@ def _range(ends: Sequence[float]) -> str:
 
 @dataclass(frozen=True)
 class Part:
-    """What one command measured."""
+    """Reader and writer of the measurements of a command."""
 
     # Markdown by the name of its markers, from a document and the name of its file
     tables: Callable[[dict[str, Any], str], dict[str, str]]

@@ -31,7 +31,7 @@ from mitsuba_diffraction.thesis.sweeps import (
     Compiled,
     Step,
     Sweep,
-    compared,
+    compare,
     sweep,
     time_compiled,
     timed_map,
@@ -95,10 +95,8 @@ def _steps(
     reference = method_map(fine, _LIGHT, step=_FINE, resolution=resolution, samples=samples)
     result = {}
     for name, method in made.items():
-        found, seconds = timed_map(
-            method, _LIGHT, step=step, resolution=resolution, samples=samples
-        )
-        result[name] = compared(name, name, reference, found, seconds)
+        timed = timed_map(method, _LIGHT, step=step, resolution=resolution, samples=samples)
+        result[name] = compare(name, name, reference, timed)
     return result
 
 
@@ -110,7 +108,8 @@ def table(measured: Measured) -> str:
         cost = scale.seconds / measured.scale["flss"].seconds
         rows.append(
             (f"`{SHOWN.get(name, name)}`" if name in NAMES else name, text, f"{cost:.2g}",
-             f"{grating.mean:.2g} (× {grating.blueness:.2f})", f"{scale.mean:.2g}")
+             f"{grating.difference.delta_e:.2g} (× {grating.difference.blueness:.2f})",
+             f"{scale.difference.delta_e:.2g}")
         )  # fmt: skip
     header = (
         "method", "what it approximates", "time (`flss` = 1)", "ΔE on a blazed grating (blue/red)",
@@ -128,15 +127,15 @@ def table(measured: Measured) -> str:
 
 
 def numbers(result: Sweep) -> str:
-    """ΔE of every step, and its time where that is the point, as a Markdown table."""
+    """ΔE of every step, and for some sweeps its time, as a Markdown table."""
     timed = result.kind == "wavelength-step"
     rows: list[tuple[str, ...]] = []
     for step in result.steps:
         cells = ["", ""]
         if step.label == result.reference:
             cells = ["reference", ""]
-        elif math.isfinite(step.mean):
-            cells = [f"{step.mean:.2g}", f"{step.high:.2g}"]
+        elif math.isfinite(step.difference.delta_e):
+            cells = [f"{step.difference.delta_e:.2g}", f"{step.difference.delta_e_95:.2g}"]
         time = [f"{step.seconds / result.steps[0].seconds:.2g}"] if timed else []
         rows.append((SHOWN.get(step.label, step.label), *cells, *time))
     header = ("value", "mean ΔE", "95th percentile")

@@ -91,7 +91,7 @@ def agreement(
 
 
 def report(whole: Run, windowed: Run, pixels: int) -> str:
-    """What was measured, as a paragraph."""
+    """Return a paragraph with the measurements."""
     windows = windowed.table.source["windows"]
     parts = agreement(windowed.table, whole.table)
     (near, near_error), (far, far_error) = parts["glossy"], parts["colours"]

@@ -39,4 +39,5 @@ def _module(name: str, module: ModuleType) -> str:
 
 
 def _directive(module: str, name: str) -> str:
-    return f"::: {module}.{name}\n    options:\n      show_root_heading: false"
+    options = "show_root_heading: false", "show_root_toc_entry: false"
+    return "\n      ".join([f"::: {module}.{name}\n    options:", *options])

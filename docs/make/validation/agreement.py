@@ -1,4 +1,4 @@
-"""Two rigorous solvers beside each other, for what both can do."""
+"""Two rigorous solvers of gratings beside each other."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Agreement:
 
 
 def agreement() -> list[Agreement]:
-    """One for each material, profile and polarisation that the second solver can do."""
+    """Compare the solvers for each material, profile and polarisation that both can solve."""
     found = []
     for material in ("aluminium", "keratin"):
         first, second = shipped(material), shipped(material, "coupled_wave")

@@ -48,14 +48,14 @@ PIXELS = 512
 
 @dataclass(frozen=True)
 class Grating:
-    """One period of a grating; `period` and `depth` (peak to valley) in µm."""
+    """Period of a grating; `period` and `depth` (peak to valley) in µm."""
 
     profile: str
     period: float
     depth: float
 
     def heights(self, pixels: int = PIXELS) -> HeightField:
-        """The period as the package sees it: `pixels` samples along x, two rows of them.
+        """Heights of the period: `pixels` samples along x, two rows of them.
 
         Raises
         ------
@@ -81,7 +81,7 @@ class Grating:
 
 @dataclass(frozen=True)
 class Scan:
-    """One grating in light from one direction (θi in degrees), at several wavelengths (nm)."""
+    """Grating in light from one direction (θi in degrees), at several wavelengths (nm)."""
 
     grating: Grating
     material: str
@@ -126,7 +126,7 @@ def _scans(material: str) -> Iterator[Scan]:
 
 
 def _affordable(grating: Grating, material: str) -> bool:
-    """Light is short in a material, most of all in aluminium, and edges take a finer mesh yet."""
+    """Whether a grating is solved: light is short in metals, and edges require a finer mesh."""
     if material == "perfect" or grating.profile == "sinusoidal":
         return True
     return grating.period in (1.1, 2.5) or (material == "aluminium" and grating.period < 5.0)

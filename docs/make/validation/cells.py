@@ -19,7 +19,7 @@ _POLARISED = ("kirchhoff", "first_order", "small_slope")
 
 @dataclass(frozen=True)
 class PatchComparison:
-    """One case: deviations of colours of each model, of s and p light, and the solution's change.
+    """Deviations of colours of each model, of s and p light, and the change of the solution.
 
     `by_model` has Kirchhoff, small slope alone, the default in the first order and the default;
     `polarised` all but the second of them for incident s, then p light.

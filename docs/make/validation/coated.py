@@ -56,12 +56,12 @@ _HARMONICS = (31, 61)
 
 
 def coated_file(series: str) -> str:
-    """What the file of solutions of one of `SERIES` is called."""
+    """Name of the file of solutions of one of `SERIES`."""
     return f"aluminium_coated_{series}.npz"
 
 
 def solve_coated(folder: Path, progress: Progress | None = None) -> dict[str, NDArray[np.void]]:
-    """Rows of all `GRATINGS` for each of `SERIES`, written to files after each.
+    """Solve all `GRATINGS` for each of `SERIES`, and write the rows to files after each grating.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def leaving(
 
 
 def inner_orders(period: float, wavelength: float, theta: float) -> NDArray[np.int64]:
-    """Orders that travel inside the coat."""
+    """Orders that propagate inside the coat."""
     step, sine = wavelength / 1000 / period, np.sin(np.radians(theta))
     return np.arange(np.ceil((sine - COAT) / step), np.floor((sine + COAT) / step) + 1).astype(int)
 
@@ -177,7 +177,7 @@ def deviations(gratings: Sequence[Grating] = GRATINGS) -> list[CoatDeviation]:
 
 
 def shipped_coated(series: str) -> Solutions:
-    """What is kept of one of `SERIES`."""
+    """Stored solutions of one of `SERIES`."""
     with resources.as_file(resources.files(__package__) / "data" / coated_file(series)) as path:
         return load(path)
 
@@ -189,7 +189,7 @@ def _of(part: Solutions, grating: Grating, theta: float) -> Solutions:
 
 
 def _once(grating: Grating, theta: float, wavelength: float) -> Real:
-    """The default model's efficiencies of light that is diffracted once, without the face's own."""
+    """Efficiencies by the default of light that is diffracted once, without the face's own."""
     _, sines = order_sines(grating.period, wavelength, theta)
     sine, field = np.sin(np.radians(theta)), grating.heights()
     light = in_plane(sine / COAT), in_plane(sines / COAT), wavelength / COAT

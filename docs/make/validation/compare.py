@@ -1,4 +1,4 @@
-"""The model beside rigorous solutions, and the measures of how far apart they are."""
+"""Deviations of the model from rigorous solutions of gratings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ GRAZING = 75.0  # degrees
 
 @dataclass(frozen=True)
 class Comparison:
-    """Solutions of one material (what has converged) and the model's efficiency of each row.
+    """Converged solutions of one material, and the model's efficiency of each row.
 
     `by_light` are the model's for TE and TM light, (n, 2), whose mean is `model`.
     """
@@ -71,7 +71,7 @@ class Comparison:
         return float(np.abs(model - exact)[keep].sum()) / total if total else np.nan
 
     def change(self) -> float:
-        """What the solver's last refinement changed, in the measure of `deviation` of colours."""
+        """Change by the last refinement of the solver, in the measure of `deviation` of colours."""
         rows = self.solutions.rows
         keep = self.counted & (rows["order"] != 0)
         changed = rows["te_change"][keep].astype(float) + rows["tm_change"][keep]
@@ -93,7 +93,7 @@ def compare(
     model: str = "kirchhoff",
     coat: float | None = None,
 ) -> Comparison:
-    """Evaluate a model (`model.MODELS`) for what has converged, by default of what is shipped.
+    """Evaluate a model (`model.MODELS`) for the converged solutions, by default the stored ones.
 
     coat : index of a coat over the gratings; `by_light` is NaN then.
 
@@ -119,7 +119,7 @@ def compare(
 def scans_of(
     rows: NDArray[np.void],
 ) -> Iterator[tuple[Grating, float, float, NDArray[np.intp]]]:
-    """Every solution's grating, angle in degrees and wavelength in nm, and which rows it has."""
+    """Grating, angle in degrees, wavelength in nm and rows of every solution."""
     unique, inverse = np.unique(rows[KEY], return_inverse=True)
     starts = np.argsort(inverse.ravel(), kind="stable")
     ends = np.cumsum(np.bincount(inverse.ravel()))
@@ -129,7 +129,7 @@ def scans_of(
 
 
 def gratings_of(comparison: Comparison, profile: str) -> list[Grating]:
-    """The gratings of a profile that were solved, gentlest slope first."""
+    """Solved gratings of a profile, gentlest slope first."""
     rows = comparison.solutions.rows
     rows = rows[rows["profile"] == PROFILES.index(profile)]
     pairs = {(_decimal(p), _decimal(d)) for p, d in zip(rows["period"], rows["depth"], strict=True)}

@@ -50,7 +50,7 @@ class Stack:
 
     @property
     def file(self) -> str:
-        """What the file of its solutions is called."""
+        """Name of the file of solutions."""
         return f"film_{self.name.replace(' ', '_')}.npz"
 
 
@@ -77,7 +77,7 @@ FIRST = "first order"
 
 
 def name() -> str:
-    """What solved."""
+    """Name of the solver."""
     return "Rayleigh's expansion at both faces (docs/make/validation/filmed.py)"
 
 
@@ -92,7 +92,7 @@ def solve(grating: Grating, stack: Stack, theta: float, wavelength: float, harmo
 def _amplitudes(
     grating: Grating, stack: Stack, sine: float, wavelength: float, harmonics: int
 ) -> tuple[Complex, Complex]:
-    """Of all orders, (2, n), and their q above."""
+    """Return the amplitudes of all orders, (2, n), and their q above."""
     m = np.arange(-harmonics, harmonics + 1)
     alpha = m * wavelength / 1000 / grating.period - sine
     epsilons = 1.0, stack.film**2, stack.index[wavelength] ** 2
@@ -152,7 +152,7 @@ def solve_films(folder: Path, progress: Progress | None = None) -> list[Path]:
 
 
 def shipped_film(stack: Stack) -> Solutions:
-    """What is kept of one of `STACKS`."""
+    """Stored solutions of one of `STACKS`."""
     with resources.as_file(resources.files(__package__) / "data" / stack.file) as path:
         return load(path)
 

@@ -1,4 +1,4 @@
-"""Up to which slope the model may be trusted: where the package's warnings come from.
+"""Largest slopes of the model for given errors, from which the package warns.
 
 The rule: sinusoids of keratin and of aluminium are put in the order of their RMS slope; a limit is
 the largest slope below the first whose colours deviate (`Comparison.deviation`, the default model)
@@ -22,7 +22,7 @@ STEEPEST_LIGHT = 60.0
 
 
 def rms_slope(grating: Grating) -> float:
-    """As `HeightField.rms_slope` has it."""
+    """RMS slope of the sampled grating."""
     return grating.heights().rms_slope
 
 

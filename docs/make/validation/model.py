@@ -1,4 +1,4 @@
-"""What the package says about a grating's orders, from its BRDF.
+"""Efficiencies of a grating's orders by the package, from its BRDF.
 
 Through a window much wider than the period every order is a narrow lobe of the BRDF,
 
@@ -100,6 +100,7 @@ def efficiencies(
     brdf = per_brdf * reference.brdf(
         field, wi, wo, wavelength,
         coherence_width=width, model=known, eta=index.real, k=index.imag, coat=coat,
+        second_order=False,
     )  # fmt: skip
     if model in (*reference.MODELS, "first_order"):
         return brdf
@@ -151,7 +152,7 @@ def second_order(
     wavelength: float,
     ratios: SlopeRatios | None = None,
 ) -> NDArray[np.float64]:
-    """What the default multiplies orders of a dielectric by, (n,); arguments as `efficiencies`."""
+    """Factor of the second order on orders of a dielectric, (n,); arguments as `efficiencies`."""
     total = float(wavenumber(wavelength)) * (wi + wo)
     places = (ratios or slope_ratios(field)).at(total[:, :2], total[:, 2])
     places[np.hypot(*total[:, :2].T) < 1e-6] = 0.0  # order 0 is the first order's

@@ -1,4 +1,4 @@
-"""Making and keeping the rigorous solutions in two dimensions, by two solvers.
+"""Rigorous solutions in two dimensions by two solvers, and their files.
 
 Rayleigh's expansion (`rayleigh`) converges on all of these dielectrics, to a tenth of what coupled
 waves in layers (`crossed`) do with as many harmonics as there is memory for, and on metals where
@@ -56,7 +56,7 @@ RESOLUTIONS: dict[str, tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]] = {
 
 @dataclass(frozen=True)
 class Solved:
-    """One case: rows (n,) of `PATCH_ROW`."""
+    """Solution of a case: rows (n,) of `PATCH_ROW`."""
 
     case: PatchCase
     rows: NDArray[np.void]
@@ -105,7 +105,7 @@ def solve_patches(
 
 
 def about(material: str, solver: str) -> dict[str, Any]:
-    """What made the solutions."""
+    """Solver, settings and command of the solutions."""
     return {
         "command": f"python -m docs.make.validation patches {material} --solver {solver}",
         "date": datetime.date.today().isoformat(),
@@ -139,7 +139,7 @@ def solve_case(case: PatchCase, solver: str) -> NDArray[np.void]:
 
 
 def solved(material: str, solver: str = "rayleigh") -> tuple[list[Solved], Mapping[str, Any]]:
-    """The solutions that are kept, case by case, and what made them."""
+    """Stored solutions, case by case, and the description of their solver."""
     data = resources.files(__package__) / "data"
     with resources.as_file(data / patch_file(material, solver)) as path:
         rows, made = load_rows(path, PATCH_ROW)
@@ -147,7 +147,7 @@ def solved(material: str, solver: str = "rayleigh") -> tuple[list[Solved], Mappi
 
 
 def patch_file(material: str, solver: str) -> str:
-    """What the file of a material's solutions by a solver is called."""
+    """Name of the file of a material's solutions by a solver."""
     return f"{material}_patches_{solver}.npz"
 
 

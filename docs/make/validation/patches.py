@@ -1,4 +1,4 @@
-"""Surfaces in two dimensions that the model is held against rigorous solutions for.
+"""Surfaces in two dimensions, for comparisons with rigorous solutions.
 
 Small periodic cells: conical mounts of a sinusoid, a crossed grating, and cuts
 of scales and of a CD. A cut is made periodic, smoothed and scaled to a given slope, so that it can
@@ -43,7 +43,7 @@ _ROW = 0.01
 
 @dataclass(frozen=True)
 class Surface:
-    """One cell that tiles the plane.
+    """Cell that tiles the plane.
 
     `kind` is one of `KINDS`. `size` is the period or the cut's
     side in µm, `place` its corner in pixels of what it is cut from. `slope` is the RMS of |∇h|,
@@ -103,7 +103,7 @@ _FEW = ((0.0, 0.0), (60.0, 0.0), (60.0, 45.0))
 
 
 def patch_cases(material: str) -> list[PatchCase]:
-    """What is solved for a material, in a fixed order."""
+    """All cases of a material, in a fixed order."""
     return list(_cases(material))
 
 

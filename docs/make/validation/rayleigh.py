@@ -42,7 +42,7 @@ _LARGEST = 18.0
 
 
 def name() -> str:
-    """What solved."""
+    """Name of the solver."""
     return "Rayleigh's expansion, reduced (docs/make/validation/rayleigh.py)"
 
 
@@ -211,7 +211,7 @@ class _Spectra:
 def _orders(
     waves: Waves, wi: Real, found: Complex, mean: float, out: Complex, travels: Real
 ) -> Orders:
-    """Of the amplitudes (2n, 2), those that travel, about `boundary.polarisation_axes`.
+    """Return the propagating orders of the amplitudes (2n, 2), by `boundary.polarisation_axes`.
 
     mean : of the heights, which the amplitudes' phases are from; out : (n, 3) unit vectors;
     travels : (n,) their cosines, 0 of those that fade.

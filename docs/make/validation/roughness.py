@@ -1,4 +1,4 @@
-"""Statistical ground: random surfaces whose mean diffraction is known in closed form.
+"""Random surfaces whose mean diffraction is known in closed form.
 
 For heights with a Gaussian distribution of standard deviation `rms` and the autocorrelation
 rms²·exp(−r²/T²), the mean power of the phase screen exp(iκh) at spatial frequency q is, with
@@ -40,7 +40,7 @@ class Roughness:
     correlation: float
 
     def patch(self, extent: float, pixels: int, seed: int) -> HeightField:
-        """One surface of `extent` µm and `pixels`² pixels, which tiles; equal for equal seeds.
+        """Surface of `extent` µm and `pixels`² pixels that tiles; equal for equal seeds.
 
         White noise filtered to the autocorrelation exactly, so that heights are Gaussian, and
         their mean square over all seeds is rms² (a single patch's is not, nor its mean 0).
@@ -110,7 +110,7 @@ class Estimate:
 
     @classmethod
     def of(cls, samples: NDArray[np.float64]) -> Estimate:
-        """From samples (surfaces, n)."""
+        """Estimate the means of samples (surfaces, n)."""
         error = samples.std(axis=0, ddof=1) / np.sqrt(len(samples))
         return cls(samples.mean(axis=0), error)
 

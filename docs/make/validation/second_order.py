@@ -1,4 +1,4 @@
-"""What the second order of the small-slope approximation would bring, on periodic surfaces.
+"""Exact second order of the small-slope approximation on periodic surfaces.
 
 Voronovich 1994 (Waves in Random Media 4, 337) adds to the first order's boundary matrix B what the
 second term of perturbation lacks. With B₂ that term's kernel, ĥ and a spectra of the heights and of
@@ -98,7 +98,7 @@ def at(function: NDArray[np.inexact], orders: NDArray[np.int64]) -> Complex:
 
 @dataclass(frozen=True)
 class Case:
-    """One solution: deviation of colours by each model, and all light over the rigorous."""
+    """Deviation of colours by each model on one solution, and all light over the rigorous."""
 
     group: str
     deviation: dict[str, float]
@@ -106,7 +106,7 @@ class Case:
 
 
 def cases_of_cells(material: str, kinds: Sequence[str] = KINDS) -> Iterator[Case]:
-    """The kept solutions of cells of these kinds."""
+    """Compare the stored solutions of cells of these kinds."""
     for one in solved(material)[0]:
         surface = one.case.surface
         if surface.kind in kinds:
@@ -118,7 +118,7 @@ def cases_of_cells(material: str, kinds: Sequence[str] = KINDS) -> Iterator[Case
 
 
 def cases_of_gratings(material: str) -> Iterator[Case]:
-    """The kept solutions of gratings."""
+    """Compare the stored solutions of gratings."""
     solutions = shipped(material).trusted()
     for grating, theta, wavelength, members in scans_of(solutions.rows):
         if grating.depth <= DEEPEST * grating.period:

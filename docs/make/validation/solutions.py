@@ -1,4 +1,4 @@
-"""Rigorous solutions, and the files that keep them: rows of numbers with what made them."""
+"""Files of rigorous solutions: rows of numbers, and the solver that computed them."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ KEY = ["profile", "period", "depth", "theta", "wavelength"]
 
 
 class Efficiencies:
-    """One scan as a solver returns it, by polarisation ("te", "tm").
+    """Efficiencies of a scan by polarisation ("te", "tm").
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Solutions:
 
     @property
     def change(self) -> NDArray[np.float64]:
-        """How far from converged each row is: the larger change of both polarisations, (n,)."""
+        """Last change of each row, the larger of both polarisations, (n,)."""
         return np.fmax(self.rows["te_change"], self.rows["tm_change"]).astype(float)
 
     @property
@@ -181,5 +181,5 @@ def shipped(material: str, solver: str = "integral") -> Solutions:
 
 
 def file_name(material: str, solver: str) -> str:
-    """What the file of a material's solutions is called."""
+    """Name of the file of a material's solutions."""
     return f"{material}_{solver}.npz"

@@ -1,4 +1,4 @@
-"""Making the solutions: every scan at two resolutions or more, on all processors."""
+"""Rigorous solutions of all scans, each at two resolutions or more, on all processors."""
 
 from __future__ import annotations
 

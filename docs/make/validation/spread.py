@@ -85,6 +85,7 @@ def shares(theta: float, azimuth: float) -> Shares:
         plain = per_f * model(
             field, wi, orders.wo, WAVELENGTH, eta=INDEX, model="small_slope",
             coherence_width=WIDTHS_PER_SIGMA * sigma,
+            **({} if side else {"second_order": False}),
         )  # fmt: skip
         left = np.arccos(cosines), np.arctan2(orders.wo[:, 1], orders.wo[:, 0])
         c, s = (

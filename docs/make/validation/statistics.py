@@ -1,4 +1,4 @@
-"""The statistical checks of docs/validation.md: random surfaces, and windows at random places."""
+"""Statistical checks: random surfaces, and windows at random places."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Lobe:
 
 @dataclass(frozen=True)
 class Offsets:
-    """One surface under windows at random places, and the `ensemble` of the same surface."""
+    """Mean over windows at random places of a surface, and its `ensemble`."""
 
     angles: NDArray[np.float64]
     patches: Estimate
@@ -64,7 +64,7 @@ class Offsets:
 
 @dataclass(frozen=True)
 class Statistics:
-    """All of them."""
+    """Results of all statistical checks."""
 
     specular: Specular
     lobes: list[Lobe]

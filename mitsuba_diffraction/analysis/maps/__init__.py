@@ -3,13 +3,13 @@
 Contents
 --------
 brdf_map   evaluate a BSDF over the hemisphere
-check_map  refuse what it would refuse, before any work
-BrdfMap    what that gives: colours and spectra
-Light      a direction to the light
-Bands      wavelengths to sum over
-draw       a map into Matplotlib axes
-save_png   a map as a picture with axes
-save_exr   a map as linear numbers
+check_map  check the parameters of `brdf_map` before any work
+BrdfMap    colours and spectra of a map
+Light      direction to the light
+Bands      bands of wavelengths to sum over
+draw       draw a map into Matplotlib axes
+save_png   write a map as a picture with axes
+save_exr   write a map as linear numbers
 """
 
 from __future__ import annotations

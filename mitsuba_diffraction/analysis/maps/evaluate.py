@@ -1,4 +1,4 @@
-"""Evaluating a BSDF over the hemisphere, with Dr.Jit: what the renderer sees, not a copy of it."""
+"""Evaluation of a Mitsuba BSDF over the hemisphere of view directions, with Dr.Jit."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from ...tables.build.spectrum import NEAR
 from . import hemisphere
 from .result import Bands, BrdfMap, Light
 
-# Pixels at a time: enough for a GPU, and their sums stay within some tens of megabytes.
+# Pixels per kernel launch: enough for a GPU, with sums of some tens of megabytes.
 _PIXELS = 1 << 20
-#: Numbers in the largest spectral map, 4 GB.
+#: Largest number of values in a spectral map, 4 GB.
 _MOST_NUMBERS = 1 << 30
 
 
@@ -40,37 +40,37 @@ def brdf_map(
     spectral: bool = False,
     progress: Progress | None = None,
 ) -> BrdfMap:
-    """The BRDF for one light direction, over the whole hemisphere of view directions.
+    """Evaluate the BRDF for one light direction over the hemisphere of view directions.
 
     Each pixel is the mean over `samples` directions. The spectrum is integrated by the midpoint
-    rule over bands of `step`; the samples of a pixel take turns within the bands, which refines the
-    rule as many times, so that orders do not fall apart into beads.
+    rule over bands of `step`. Each sample of a pixel has another wavelength within the bands, which
+    refines the rule by the number of samples, so that orders do not break up into dots.
 
-    In an RGB variant the BSDF's own colours are mapped, those of the whole spectrum in daylight:
-    one look-up a direction, through the table that such variants render with.
+    In an RGB variant the map has the BSDF's colours under daylight's whole spectrum: one look-up
+    per direction, in the table with which such variants render.
 
     Parameters
     ----------
-    bsdf : a Mitsuba BSDF of the variant that is set, `diffraction` or any other without textures.
+    bsdf : a Mitsuba BSDF of the current variant, `diffraction` or any other without textures.
     theta, phi : direction to the light, degrees; see `Light`.
     wavelength_range : nm.
-    step : widest band, nm.
-    wavelength : nm, instead of a range: a map of f at one wavelength.
+    step : largest width of a band, nm.
+    wavelength : nm; map f at this wavelength instead of colours.
     resolution : pixels along each axis.
-    samples : directions in a pixel; by default enough to find every lobe.
+    samples : directions per pixel; by default enough to sample every lobe.
     illuminant : "D65" or "E".
     cosine : map f·cosθo instead of f.
-    spectral : keep the bands, too.
+    spectral : store the bands, too.
     progress : called as progress(done, total, text).
 
     Raises
     ------
     DiffractionError
-        If a parameter is out of range, or the variant is neither spectral nor RGB, or scalar; or if
-        an RGB variant is asked for anything but the whole spectrum in daylight.
+        If a parameter is out of range; if the variant is scalar, or neither spectral nor RGB; or if
+        it is RGB and the parameters are not those of the whole spectrum in daylight.
     """
     light = Light(theta, phi)
-    bands = Bands.of(wavelength_range, step, wavelength)
+    bands = Bands.choose(wavelength_range, step, wavelength)
     check_illuminant(illuminant)
     check_map(bands, resolution, samples, spectral)
     _check_variant(bands, illuminant, spectral)
@@ -79,17 +79,19 @@ def brdf_map(
     if table is not None and bands.low < table.wavelength_range[0]:
         raise DiffractionError(
             f"{bands}: below the table's shortest wavelength, {table.wavelength_range[0]:g} "
-            "nm; build a table for them with 'mitsuba-diffraction precompute --wavelength-range'"
+            "nm; build a wider table with 'mitsuba-diffraction precompute --wavelength-range'"
         )
     # σ·k·Δ = 1/√2 is one standard deviation of exp(−σ²k²Δ²)
     narrowest = 0.5 if table is None else 1 / (2**0.5 * table.sigma * float(wavenumber(bands.low)))
     if samples is None:
         samples = hemisphere.samples_for(resolution, narrowest)
-    sums: _Sums | _Colours
+    sums: _SpectralSums | _RgbSums
     if mi.is_rgb:
-        sums = _Colours(cosine)
+        sums = _RgbSums(cosine)
     else:
-        sums = _Sums(bands, illuminant, cosine, colours=not bands.is_single, spectral=spectral)
+        sums = _SpectralSums(
+            bands, illuminant, cosine, colours=not bands.is_single, spectral=spectral
+        )
     coverage, values = _over_pixels(bsdf, light, resolution, samples, sums, progress)
     if mi.is_rgb:
         to_xyz = np.linalg.inv(linear_srgb(np.eye(3)))
@@ -108,35 +110,35 @@ def brdf_map(
 
 
 def _check_variant(bands: Bands, illuminant: str, spectral: bool) -> None:
-    """Refuse a variant that cannot make such a map."""
+    """Refuse a variant in which the map cannot be evaluated."""
     if not (mi.is_spectral or mi.is_rgb) or mi.is_polarized or "scalar" in mi.variant():
         raise DiffractionError(
-            f"variant '{mi.variant()}' cannot make a map; use llvm_ad_spectral, llvm_ad_rgb, "
+            f"variant '{mi.variant()}' does not support maps; use llvm_ad_spectral, llvm_ad_rgb, "
             "cuda_ad_spectral or cuda_ad_rgb"
         )
     if mi.is_rgb and (
         (bands.low, bands.high) != (SHORTEST, LONGEST) or spectral or illuminant != "D65"
     ):
         raise DiffractionError(
-            f"variant '{mi.variant()}' knows only the colours of the whole spectrum in daylight; "
+            f"variant '{mi.variant()}' supports only colours of the whole spectrum in daylight; "
             "leave wavelengths, bands and illuminant out, or use llvm_ad_spectral"
         )
 
 
 def check_map(bands: Bands, resolution: int, samples: int | None, spectral: bool) -> None:
-    """Refuse numbers of pixels, samples and bands that are out of range or beyond the memory."""
+    """Refuse numbers of pixels, samples and bands that are out of range or need too much memory."""
     hemisphere.check_resolution(resolution)
     if samples is not None:
         hemisphere.check_samples(samples)
     if spectral and resolution**2 * bands.count > _MOST_NUMBERS:
         raise DiffractionError(
-            f"a spectral map of {resolution}² pixels and {bands.count} bands would take "
+            f"a spectral map of {resolution}² pixels and {bands.count} bands requires "
             f"{resolution**2 * bands.count * 4 / 1e9:.0f} GB; lower resolution or widen step"
         )
 
 
-class _Sums:
-    """Sums over wavelengths, in one kernel that serves all of them."""
+class _SpectralSums:
+    """Sums over wavelengths: tristimulus values, bands or both, with one kernel for all packets."""
 
     def __init__(
         self, bands: Bands, illuminant: str, cosine: bool, *, colours: bool, spectral: bool
@@ -149,12 +151,12 @@ class _Sums:
     def add(
         self, totals: list[Any], bsdf: Any, si: Any, wo: Any, active: Any, offset: float
     ) -> None:
-        """Add one sample of each pixel to its totals: X, Y, Z if wanted, and the bands if wanted.
+        """Add one sample of each pixel to its totals: X, Y, Z, bands, or both.
 
         Parameters
         ----------
-        totals : mi.Float each, `count` of them; changed in place.
-        offset : where in each band the wavelength lies, 0 to 1.
+        totals : `count` variables mi.Float; changed in place.
+        offset : position of the wavelength in each band, 0 to 1.
         """
         packet = len(mi.Spectrum())
         wavelengths = self.bands.wavelengths(offset)
@@ -162,18 +164,18 @@ class _Sums:
             response(wavelengths, self.illuminant) * self.bands.width if self.colours else None
         )
         for first in range(0, self.bands.count, packet):
-            # the last packet is filled up with wavelengths that have no weight and go nowhere
+            # the last packet is padded with wavelengths of weight 0
             index = np.minimum(np.arange(first, first + packet), self.bands.count - 1)
             used = min(packet, self.bands.count - first)
-            # as variables, not as literals: a literal would be a kernel of its own
+            # opaque, since every literal would compile another kernel
             si.wavelengths = mi.Spectrum(_opaque(wavelengths[index]))
             f = bsdf.eval(self._context, si, wo, active)
             if not self.cosine:
                 f *= dr.rcp(wo.z)
             if weights is not None:
-                shown = weights[index] * (np.arange(packet) < used)[:, None]
+                padded = weights[index] * (np.arange(packet) < used)[:, None]
                 for n in range(3):
-                    totals[n] += dr.dot(mi.Spectrum(_opaque(shown[:, n])), f)
+                    totals[n] += dr.dot(mi.Spectrum(_opaque(padded[:, n])), f)
             if self.keeps_bands:
                 start = self.count - self.bands.count + first
                 for n in range(used):
@@ -182,8 +184,8 @@ class _Sums:
             dr.eval(totals[:3])
 
 
-class _Colours:
-    """Linear sRGB of RGB variants, with the interface of `_Sums`."""
+class _RgbSums:
+    """Linear sRGB of RGB variants, with the interface of `_SpectralSums`."""
 
     count = 3
     keeps_bands = False
@@ -195,7 +197,7 @@ class _Colours:
     def add(
         self, totals: list[Any], bsdf: Any, si: Any, wo: Any, active: Any, offset: float
     ) -> None:
-        """Add one sample of each pixel; `offset` is for wavelengths, of which there are none."""
+        """Add one sample of each pixel; `offset` is not used."""
         f = bsdf.eval(self._context, si, wo, active)
         if not self.cosine:
             f *= dr.rcp(wo.z)
@@ -209,10 +211,10 @@ def _over_pixels(
     light: Light,
     resolution: int,
     samples: int,
-    sums: _Sums | _Colours,
+    sums: _SpectralSums | _RgbSums,
     progress: Progress | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Means over all pixels: coverage (n, n) and sums (count, n, n)."""
+    """Return the means over each pixel: coverage (n, n) and sums (count, n, n)."""
     inside = hemisphere.inside(resolution)
     low, size = hemisphere.corners(resolution), 2.0 / resolution
     rows, columns = np.nonzero(inside)
@@ -240,7 +242,7 @@ def _over_pixels(
             hit += dr.select(active, 1.0, 0.0)
             dr.eval(wo, active, hit)
             sums.add(totals, bsdf, si, wo, active, float(offset))
-            dr.sync_thread()  # for the progress, and lest kernels queue up beyond Ctrl-C's reach
+            dr.sync_thread()  # so that Ctrl-C need not wait for queued kernels
         coverage[rows[part], columns[part]] = np.array(hit) / samples
         for total, value in zip(totals, values, strict=True):
             value[rows[part], columns[part]] = np.array(total) / samples
@@ -250,7 +252,7 @@ def _over_pixels(
 
 
 def _opaque(values: NDArray[np.float64]) -> list[Any]:
-    """Numbers as variables of one element each."""
+    """Return numbers as opaque Dr.Jit variables of one element each."""
     variables = [mi.Float(float(v)) for v in values]
     dr.make_opaque(variables)
     return variables

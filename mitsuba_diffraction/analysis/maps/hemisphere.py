@@ -1,8 +1,8 @@
-"""View directions of a map: an orthographic picture of the hemisphere above the surface.
+"""Orthographic projection of the view directions of a map.
 
-A direction (θ, φ) lies at x = sinθ cosφ, y = sinθ sinφ, the normal in the middle. There solid angle
-times cosθ is area, cosθ dω = dx dy: the mean of a map of f over the square [−1, 1]², times 4, is
-the directional albedo.
+A direction (θ, φ) lies at x = sinθ cosφ, y = sinθ sinφ, the normal in the middle. Area in the map
+is solid angle times cosθ, dx dy = cosθ dω: the mean of a map of f over the square [−1, 1]², times
+4, is the directional albedo.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from ...errors import DiffractionError
 SMALLEST, LARGEST = 8, 4096
 MOST_SAMPLES = 1024
 
-# More samples than this in a pixel are not chosen automatically: they would take minutes.
+# Least and largest number of samples per pixel that is chosen automatically; 64 take a minute.
 _AUTOMATIC_SAMPLES = (4, 64)
 
 
 def check_resolution(resolution: int) -> None:
-    """Refuse a number of pixels that is no picture, or too large a one."""
+    """Refuse a number of pixels that is out of range."""
     if not SMALLEST <= resolution <= LARGEST:
         raise DiffractionError(
             f"resolution={resolution} must be from {SMALLEST} to {LARGEST} pixels"
@@ -31,18 +31,18 @@ def check_resolution(resolution: int) -> None:
 
 
 def check_samples(samples: int) -> None:
-    """Refuse a number of samples in a pixel that is none, or too large."""
+    """Refuse a number of samples per pixel that is out of range."""
     if not 1 <= samples <= MOST_SAMPLES:
         raise DiffractionError(f"samples={samples} must be from 1 to {MOST_SAMPLES} in a pixel")
 
 
 def corners(resolution: int) -> NDArray[np.float64]:
-    """Lower corner of each pixel along an axis, (resolution,), from −1 on."""
+    """Return the lower corner of each pixel along an axis, (resolution,), from −1 on."""
     return np.arange(resolution, dtype=np.float64) * (2.0 / resolution) - 1.0
 
 
 def inside(resolution: int) -> NDArray[np.bool_]:
-    """Which pixels (y, x) the hemisphere touches."""
+    """Return the pixels (y, x) that the hemisphere touches, as a mask."""
     low = corners(resolution)
     high = low + 2.0 / resolution
     nearest = np.where(low > 0.0, low, np.where(high < 0.0, high, 0.0))
@@ -51,16 +51,16 @@ def inside(resolution: int) -> NDArray[np.bool_]:
 
 @functools.cache
 def sub_samples(samples: int) -> NDArray[np.float64]:
-    """Where in each pixel and in each band the samples lie, (samples, 3) from 0 to 1.
+    """Return the positions of samples in each pixel and band, (samples, 3) from 0 to 1.
 
-    Columns are x, y and wavelength; each takes the middles of `samples` equal parts once, so that
-    no column has a bias, and one sample is in the middle. Pixel by pixel the samples repeat, so all
-    of them together are one lattice over the whole map, which sums a smooth lobe much better than
-    random places would; there is no noise. It is the rank-1 lattice (Korobov 1959) whose closest
-    neighbours are farthest apart, first in x and y, then with the wavelength.
+    Columns are x, y and wavelength; each has the middles of `samples` equal parts once, so that no
+    column is biased. The pattern repeats in every pixel, so all samples are one lattice over the
+    whole map, which integrates a smooth lobe without noise and more accurately than random
+    positions. It is the rank-1 lattice (Korobov 1959) whose closest neighbours are farthest apart,
+    first in x and y, then with the wavelength.
     """
     steps = np.arange(samples, dtype=np.int64)
-    multiples = steps[:, None] * steps % samples  # row a: where the generator a leads
+    multiples = steps[:, None] * steps % samples  # row a: multiples of the generator a
     coprime = steps[np.gcd(steps, samples) == 1] if samples > 1 else steps
     columns = [steps]
     apart = _wrapped(steps, samples) ** 2.0
@@ -76,7 +76,7 @@ def sub_samples(samples: int) -> NDArray[np.float64]:
 
 
 def samples_for(resolution: int, lobe: float) -> int:
-    """How many samples in a pixel find every lobe.
+    """Return the number of samples per pixel that resolves every lobe.
 
     Parameters
     ----------
@@ -85,10 +85,10 @@ def samples_for(resolution: int, lobe: float) -> int:
     """
     fewest, most = _AUTOMATIC_SAMPLES
     pixel = 2.0 / resolution
-    # a lattice whose places are √2 standard deviations apart sums a Gaussian within about 1e-4
+    # a lattice with steps of √2 standard deviations sums a Gaussian within about 1e-4
     return min(max(math.ceil(0.5 * (pixel / lobe) ** 2), fewest), most)
 
 
 def _wrapped(steps: NDArray[np.int64], period: int) -> NDArray[np.int64]:
-    """Distance to the nearest multiple of the period."""
+    """Return the distance to the nearest multiple of the period."""
     return np.minimum(steps, period - steps)

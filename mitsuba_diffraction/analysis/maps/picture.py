@@ -1,4 +1,4 @@
-"""Maps as pictures with axes, on contact sheets (Matplotlib), and on disk: PNG, linear EXR."""
+"""Pictures of maps with axes, contact sheets (Matplotlib), and files: PNG, linear EXR."""
 
 from __future__ import annotations
 
@@ -21,34 +21,34 @@ if TYPE_CHECKING:
 
 #: Polar angles of the thin circles, degrees; the horizon, 90, is drawn stronger.
 _CIRCLES = (30, 60)
-#: What the marks of `draw` mean.
+#: Explanation of the marks that `draw` adds.
 LEGEND = "+ mirror direction   ☉ light   circles: θₒ = 30°, 60°, 90°"
-# One wavelength is shown in false colours over this many powers of ten.
+# Powers of ten of the false colours of one wavelength.
 _DECADES = 6.0
 _DPI = 100
-# Around the axes, inches: left, right, bottom, top.
+# Margins of the axes, inches: left, right, bottom, top.
 _MARGINS = (0.85, 0.35, 1.25, 0.75)
 _COLOUR_BAR = 1.0
 _SMALLEST_AXES = 4.8
 _TEXT, _SUN = "#303030", "#e0c060"
-# What is this close to the mirror direction stays free of marks.
+# Radius around the mirror direction without the dot of the light.
 _LOBE = 0.1
-# Of contact sheets: side of a map, inches, and maps in a row.
+# Contact sheets: least side of a map, inches, and largest number of maps in a row.
 _SMALLEST_SIDE, _MOST_COLUMNS = 2.3, 4
-#: The attribute that says what an EXR's map is of. One string: OpenEXR keeps numbers as floats.
+#: EXR attribute that describes the map, as JSON: OpenEXR stores numbers in single precision.
 ATTRIBUTE = "brdf_map"
 
 
 def draw(
     axes: Axes, brdf_map: BrdfMap, exposure: float | None = None, *, marks: bool = True
 ) -> AxesImage:
-    """Draw a map into axes: what a display shows at f × 2^exposure, or false colours.
+    """Draw a map into axes: colours at f × 2^exposure, or false colours of one wavelength.
 
     Parameters
     ----------
-    axes : their limits and aspect are set, too.
+    axes : axes; the function sets limits and aspect.
     brdf_map : the map.
-    exposure : stops; by default `brdf_map.exposure()`. Not for a single wavelength.
+    exposure : stops; by default `brdf_map.exposure()`. Not used for a single wavelength.
     marks : circles of equal angle, the mirror direction (+), and the light (a ring with a dot).
 
     Returns
@@ -79,12 +79,12 @@ def draw(
 
 
 def figure(brdf_map: BrdfMap, exposure: float | None, *, title: str, notes: str) -> Figure:
-    """A figure around one map, its pixels one to one unless they are few or many.
+    """Draw a figure of one map, its pixels one to one unless they are few.
 
     Parameters
     ----------
-    title : what was mapped.
-    notes : what else there is to say about it, e.g. material and coherence.
+    title : name of the surface.
+    notes : last lines of the caption, for instance material and coherence.
     """
     single = brdf_map.xyz is None
     stops = brdf_map.exposure() if exposure is None else exposure
@@ -122,13 +122,14 @@ def figure(brdf_map: BrdfMap, exposure: float | None, *, title: str, notes: str)
 
 
 def _draw_marks(axes: Axes, brdf_map: BrdfMap) -> None:
+    """Draw circles of equal angle, the mirror direction and the light."""
     turn = np.linspace(0.0, 2.0 * np.pi, 361)
     for angle in _CIRCLES:
         radius = np.sin(np.radians(angle))
         axes.plot(radius * np.cos(turn), radius * np.sin(turn), color="#909090", lw=0.5, alpha=0.45)
     axes.plot(np.cos(turn), np.sin(turn), color=_TEXT, lw=0.8)
     (x, y, _), light = brdf_map.light.mirror, brdf_map.light.direction
-    # a cross with an open middle, so that the lobe itself stays in sight
+    # a cross with an open middle, so that the lobe stays visible
     for dx, dy in ((1, 0), (-1, 0), (0, 1), (0, -1)):
         axes.plot(
             [x + 0.035 * dx, x + 0.075 * dx], [y + 0.035 * dy, y + 0.075 * dy],
@@ -140,7 +141,7 @@ def _draw_marks(axes: Axes, brdf_map: BrdfMap) -> None:
 
 
 def signed(stops: float) -> str:
-    """An exposure with its sign, a true minus."""
+    """Return an exposure with its sign, a true minus."""
     return f"{stops:+g}".replace("-", "−")
 
 
@@ -151,14 +152,14 @@ def contact_sheet(
     title: str,
     exposure: float | None = None,
 ) -> Figure:
-    """Maps in rows of up to four, each with its title.
+    """Draw maps in rows of up to four, each with its title.
 
     Parameters
     ----------
-    maps : of colours, not of single wavelengths.
-    titles : one for each; two lines at most.
-    title : of the whole sheet.
-    exposure : stops, for all maps alike; by default each has its own, which is then stated.
+    maps : maps of colours, not of single wavelengths.
+    titles : one for each map; two lines at most.
+    title : title of the whole sheet.
+    exposure : stops for all maps; by default, each map has its own, which its title states.
     """
     from matplotlib.figure import Figure
 
@@ -167,12 +168,12 @@ def contact_sheet(
     side = max(1.02 * max(m.resolution for m in maps) / _DPI, _SMALLEST_SIDE)
     width, height = (side + 0.2) * columns + 0.6, (side + 0.55) * rows + 0.8
     figure = Figure(figsize=(width, height), dpi=_DPI, facecolor="white")
-    for n, (one, name) in enumerate(zip(maps, titles, strict=True)):
+    for n, (brdf_map, name) in enumerate(zip(maps, titles, strict=True)):
         row, column = divmod(n, columns)
         left, bottom = 0.6 + (side + 0.2) * column, 0.65 + (side + 0.55) * (rows - 1 - row)
         axes = figure.add_axes((left / width, bottom / height, side / width, side / height))
-        stops = one.exposure() if exposure is None else exposure
-        draw(axes, one, stops)
+        stops = brdf_map.exposure() if exposure is None else exposure
+        draw(axes, brdf_map, stops)
         text = name if exposure is not None else f"{name}; {signed(stops)} stops"
         axes.set_title(text, fontsize=8)
         last = n + columns >= len(maps)
@@ -205,11 +206,10 @@ def save_png(
     Raises
     ------
     DiffractionError
-        If it cannot be written; nothing half-written is left.
+        If the file cannot be written; no half-written file is left.
     """
     with atomic_path(path) as temporary:
-        drawn = figure(brdf_map, exposure, title=title, notes=notes)
-        drawn.savefig(temporary, format="png")
+        figure(brdf_map, exposure, title=title, notes=notes).savefig(temporary, format="png")
 
 
 def save_exr(
@@ -217,19 +217,19 @@ def save_exr(
 ) -> None:
     """Write linear numbers in 1/sr, in single precision, neither exposed nor clipped.
 
-    Channels are R, G, B (linear sRGB, which may be negative) or, for a single wavelength, Y; A is
-    the share of the pixel that the hemisphere covers, and the others are premultiplied with it.
-    Bands are named as spectral EXR files name reflectances (Fichet, Pacanowski and Wilkie 2021),
-    `T.550,0nm` for that middle. The first row is the largest y.
+    Channels are R, G, B (linear sRGB, which may be negative) or, for a single wavelength, Y. A is
+    the share of the pixel that the hemisphere covers; the other channels are premultiplied with it.
+    Bands have the names of reflectances in spectral EXR files (Fichet, Pacanowski and Wilkie 2021):
+    `T.550,0nm` is the band around 550 nm. The first row is the largest y.
 
     Parameters
     ----------
-    notes : more entries for the JSON attribute `brdf_map`.
+    notes : further entries of the JSON attribute `brdf_map`.
 
     Raises
     ------
     DiffractionError
-        If it cannot be written; nothing half-written is left.
+        If the file cannot be written; no half-written file is left.
     """
     channels = {"A": brdf_map.coverage}
     if brdf_map.xyz is None:
@@ -263,5 +263,5 @@ def save_exr(
     with atomic_path(path) as temporary:
         try:
             OpenEXR.File(header, pixels).write(str(temporary))
-        except RuntimeError as error:  # what OpenEXR makes of a full disk
+        except RuntimeError as error:  # OpenEXR raises it on a full disk
             raise OSError(None, f"OpenEXR: {' '.join(str(error).split())}") from error

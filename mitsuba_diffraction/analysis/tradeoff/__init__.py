@@ -1,15 +1,15 @@
-"""Accuracy against speed and memory, setting by setting; `mitsuba-diffraction tradeoff` prints it.
+"""Accuracy against speed and memory of table settings; `mitsuba-diffraction tradeoff` prints it.
 
 Contents
 --------
-Setting               one table to try
-settings              what `mitsuba-diffraction tradeoff` tries
+Setting               settings of one table
+settings              settings that `mitsuba-diffraction tradeoff` measures
 measure               error, colours, time and memory of each setting
-Measured              what that gives
-lit_pairs             directions where a patch sends light
-measure_wavelengths   steps of sums over the spectrum, and how many wavelengths a ray needs
-measure_depths        where Taylor's series breaks down, and the others do not
-Budget, recommended   the cheapest setting within a budget
+Measured              result of one setting
+lit_pairs             pairs of directions between which a patch sends light
+measure_wavelengths   error of sums over the spectrum, and noise by wavelengths per ray
+measure_depths        error of each series over depth: where Taylor's diverges
+Budget, recommended   best setting within a budget
 """
 
 from __future__ import annotations

@@ -1,12 +1,14 @@
-"""Errors: of tables at directions where a patch sends light, of sums over the spectrum, over depth.
+"""Errors of tables where a patch sends light, of sums over the spectrum, and over depth (NumPy).
 
-The exact answer at those directions (NumPy only); how fine a sum over the spectrum has to be, and
-how many wavelengths a ray should carry; where Taylor's series breaks down in single precision.
+`Sample` has the exact answer at pairs of directions, `measure_wavelengths` the error of a sum by
+its step and the noise by the number of wavelengths per ray, `measure_depths` the depth at which
+Taylor's series diverges in single precision.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,32 +23,32 @@ from ...tables.table import DiffractionTable, q_limit_of
 
 Array = NDArray[np.float64]
 
-#: nm between the samples of a sum.
+#: Steps of a sum over wavelengths, nm.
 STEPS = (2.0, 5.0, 10.0, 20.0, 40.0)
-#: Wavelengths of one ray.
+#: Numbers of wavelengths per ray.
 COUNTS = (1, 2, 4, 8, 16)
-_FIRST, _LAST, _FINEST = 380.0, 780.0, 0.5  # nm
+_FIRST, _LAST, _FINEST = 380.0, 780.0, 0.5  # range and step of the exact sum, nm
 _DRAWS = 256  # rays for each pair
-#: Terms of the thesis' shaders.
+#: Number of terms in the thesis' shaders.
 TERMS = 37
-#: Normal incidence and return at 380 nm: the largest κ of the visible.
+#: Largest κ of visible light: normal incidence and return at 380 nm, rad/µm.
 KAPPA = q_limit_of((380.0, 780.0))
-_SIDE, _PIXEL = 48, 0.1  # of the patch that is made deeper: pixels, µm
+_SIDE, _PIXEL = 48, 0.1  # pixels a side of the patch whose depth varies, and their size, µm
 
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Pairs of directions with the exact window sum for each."""
+    """Pairs of directions and wavelengths with the exact window sum of each."""
 
-    # wi, wo: (n, 3), exact in single precision
+    # (n, 3), exact in single precision
     wi: Array
     wo: Array
-    wavelength: Array  # (n,) nm, likewise
+    wavelength: Array  # (n,) nm, exact in single precision
     near: NDArray[np.bool_]  # (n,) whether the pair lies within 3/σ of order 0
     exact: Array  # (n,) ⟨|P|²⟩ / 4π²σ⁴ by `reference`, in double precision
 
     @classmethod
-    def of(
+    def draw(
         cls,
         field: HeightField,
         coherence_width: float,
@@ -54,32 +56,31 @@ class Sample:
         n: int,
         progress: Progress,
     ) -> Sample:
-        """n pairs for a patch, by Riemann sums over all of its pixels: slow, and plain."""
+        """Draw n pairs for a patch, and compute the exact sums from all of its pixels."""
         sigma = sigma_of(coherence_width)
-        wi, wo, wavelength, near = lit_pairs(field, sigma, n, seed=20140113)
+        pairs = lit_pairs(field, sigma, n, seed=20140113)
         exact = np.empty(n)
         for i in range(n):
-            one = slice(i, i + 1)
-            power = window_power(field, wi[one], wo[one], wavelength[one], sigma, coherence)
-            exact[i] = power[0]
+            wi, wo, wavelength = (values[i : i + 1] for values in pairs[:3])
+            exact[i] = window_power(field, wi, wo, wavelength, sigma, coherence)[0]
             progress(i + 1, n, f"the exact answer, {coherence}")
-        return cls(wi, wo, wavelength, near, exact / (4.0 * np.pi**2 * sigma**4))
+        return cls(*pairs, exact / (4.0 * np.pi**2 * sigma**4))
 
-    def error(self, found: Array) -> tuple[float, float]:
-        """Σ|found − exact| / Σ exact, near order 0 and elsewhere."""
-        difference = np.abs(found - self.exact)
+    def error(self, sums: Array) -> tuple[float, float]:
+        """Return Σ|sums − exact| / Σ exact, near order 0 and elsewhere."""
+        difference = np.abs(sums - self.exact)
         parts = self.near, ~self.near
         near, far = (float(difference[p].sum() / self.exact[p].sum()) for p in parts)
         return near, far
 
-    def looked_up(self, table: DiffractionTable) -> Array:
-        """A table's answer (n,), by its twin in double precision."""
+    def window_sums(self, table: DiffractionTable) -> Array:
+        """Look up the window sums (n,) of the pairs in a table, in double precision."""
         k, (u, v, w) = wavenumber(self.wavelength), diffraction_coordinates(self.wi, self.wo)
         return table.window_sum(k * u, k * v, k * w)
 
 
 def uniform_directions(n: int, rng: np.random.Generator, lowest: float = 0.1) -> Array:
-    """Unit vectors (n, 3), uniform over the hemisphere above cosθ = lowest, exact in float32."""
+    """Draw unit vectors (n, 3), uniform above cosθ = lowest, exact in single precision."""
     z = rng.uniform(lowest, 1.0, n)
     phi = rng.uniform(0.0, 2 * np.pi, n)
     r = np.sqrt(1.0 - z * z)
@@ -87,34 +88,36 @@ def uniform_directions(n: int, rng: np.random.Generator, lowest: float = 0.1) ->
 
 
 def as_single(values: Array) -> Array:
-    """The values that single precision can hold: then both sides get the same input."""
+    """Round values to single precision, so that NumPy and Dr.Jit get the same input."""
     return values.astype(np.float32).astype(np.float64)
 
 
-def lit_pairs(
-    field: HeightField, sigma: float, n: int, seed: int
-) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Direction pairs and wavelengths where the patch sends light, and some where it may not.
+class LitPairs(NamedTuple):
+    """Pairs of directions and wavelengths, exact in single precision."""
+
+    wi: Array  # (n, 3)
+    wo: Array  # (n, 3)
+    wavelength: Array  # (n,) nm
+    near: NDArray[np.bool_]  # (n,) whether the pair lies within 3/σ of order 0
+
+
+def lit_pairs(field: HeightField, sigma: float, n: int, seed: int) -> LitPairs:
+    """Draw pairs of directions and wavelengths, most of them where the patch sends light.
 
     A quarter lies within the lobe of order 0, a quarter is uniform over the hemisphere, and half
     lies in the lobes of orders drawn by their power: a grating is dark nearly everywhere else.
-
-    Returns
-    -------
-    wi, wo (n, 3), wavelength (n,) in nm, all exact in float32, and (n,) whether the pair lies
-    within 3/σ of order 0.
     """
     rng = np.random.default_rng(seed)
     lx, ly = field.extent
     ny, nx = field.shape
-    screen = np.exp(1j * 4 * np.pi / 0.55 * field.heights)  # 550 nm, straight down and up again
+    screen = np.exp(1j * 4 * np.pi / 0.55 * field.heights)  # 550 nm at normal incidence
     power = np.abs(np.fft.ifft2(screen)) ** 2
     power[0, 0] = 0.0
-    drawn = rng.choice(power.size, 50 * n, p=power.ravel() / power.sum())
+    bins = rng.choice(power.size, 50 * n, p=power.ravel() / power.sum())
     orders = np.stack(
         [
-            2 * np.pi / lx * (np.fft.fftfreq(nx) * nx)[drawn % nx],
-            2 * np.pi / ly * (np.fft.fftfreq(ny) * ny)[drawn // nx],
+            2 * np.pi / lx * (np.fft.fftfreq(nx) * nx)[bins % nx],
+            2 * np.pi / ly * (np.fft.fftfreq(ny) * ny)[bins // nx],
         ],
         axis=1,
     )
@@ -129,26 +132,26 @@ def lit_pairs(
     z2 = 1.0 - np.sum(tangential**2, axis=1)
     aimed = np.concatenate([tangential, np.sqrt(np.maximum(z2, 0.0))[:, None]], axis=1)
     outgoing = as_single(np.where((kinds == 1)[:, None], uniform, aimed))
-    # Orders that do not propagate, or only along the surface, give way to others of their kind
+    # evanescent and grazing orders are replaced by the next ones of the same kind
     good = (kinds == 1) | (z2 > 0.01)
     chosen = np.concatenate([np.flatnonzero(good & (kinds == c))[: n // 4] for c in range(4)])
     wi, wo, lam = incident[chosen], outgoing[chosen], lam[chosen]
     near = np.hypot(*(wi + wo)[:, :2].T) * 2e3 * np.pi / lam * sigma <= 3.0
-    return wi, wo, lam, near
+    return LitPairs(wi, wo, lam, near)
 
 
 @dataclass(frozen=True)
 class Spectral:
-    """Errors of sums, and noise of rays."""
+    """Colour error of sums over wavelengths, and noise of rays."""
 
-    steps: dict[float, float]  # nm → mean ΔE2000 of a sum with such steps from one of 0.5 nm
-    counts: dict[int, float]  # wavelengths of a ray → relative standard deviation of its luminance
+    steps: dict[float, float]  # step, nm → mean ΔE2000 from the sum in steps of 0.5 nm
+    counts: dict[int, float]  # wavelengths per ray → relative standard deviation of luminance
 
 
 def measure_wavelengths(
     table: DiffractionTable, wi: NDArray[np.float64], wo: NDArray[np.float64]
 ) -> Spectral:
-    """From a table, at pairs (n, 3) of directions that it sends light to."""
+    """Measure sums and rays with a table, at pairs (n, 3) of directions."""
     lam = np.arange(_FIRST, _LAST, _FINEST) + 0.5 * _FINEST
     spectrum = _spectrum(table, wi, wo, lam)  # (pairs, wavelengths)
     weights = linear_srgb(response(lam))
@@ -165,13 +168,13 @@ def measure_wavelengths(
     rng = np.random.default_rng(0)
     counts = {}
     for count in COUNTS:
-        # as Mitsuba draws them: one number, shifted by 1/count for each further wavelength
-        drawn = (rng.random((_DRAWS, 1)) + np.arange(count) / count) % 1.0
-        wavelength, density = _important(drawn)
-        found = np.stack(
+        # like Mitsuba: one random number, shifted by 1/count for each further wavelength
+        shifted = (rng.random((_DRAWS, 1)) + np.arange(count) / count) % 1.0
+        wavelength, density = _draw_wavelengths(shifted)
+        values = np.stack(
             [np.interp(wavelength, lam, row, left=0.0, right=0.0) for row in luminance]
         )
-        estimate = (found / density).mean(axis=2)
+        estimate = (values / density).mean(axis=2)
         noise = estimate.std(axis=1) / total
         counts[count] = float(np.sqrt(np.mean(noise**2)))
     return Spectral(steps, counts)
@@ -183,30 +186,31 @@ def _spectrum(
     wo: NDArray[np.float64],
     lam: NDArray[np.float64],
 ) -> NDArray[np.float64]:
+    """Return the window sums over λ², up to a factor, (pairs, wavelengths)."""
     k, (u, v, w) = wavenumber(lam), diffraction_coordinates(wi, wo)
     sums = table.window_sum(k * u[:, None], k * v[:, None], k * w[:, None])
     return sums * (k / k.mean()) ** 2
 
 
-def _important(u: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Mitsuba's wavelengths (nm) and their density: after Radziszewski et al. 2009."""
+def _draw_wavelengths(u: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Map uniform numbers to Mitsuba's wavelengths (nm) and densities: Radziszewski et al. 2009."""
     lam = 538.0 - np.arctanh(0.8569106254698279 - 1.8275019724092267 * u) * 138.88888888888889
     return lam, 0.003939804229326285 / np.cosh(0.0072 * (lam - 538.0)) ** 2
 
 
 @dataclass(frozen=True)
 class Depths:
-    """Errors over depth."""
+    """Errors of each series over depth."""
 
     depth: NDArray[np.float64]  # (n,) µm, peak to valley
-    # name of a series → (n,) Σ|power − exact| / Σ exact of all orders but order 0; NaN where it is
-    # refused
+    # name of a series → (n,) Σ|power − exact| / Σ exact of all orders but order 0; NaN where the
+    # table is refused
     errors: dict[str, NDArray[np.float64]]
-    intervals: NDArray[np.int64]  # (n,) of the default series
+    intervals: NDArray[np.int64]  # (n,) intervals of κ in the default series
 
 
 def measure_depths(count: int, progress: Progress = silent) -> Depths:
-    """From 1 nm to 20 µm, `count` depths, on one rough patch of many slopes."""
+    """Measure the error of each series on a rough patch with `count` depths, 1 nm to 20 µm."""
     shape = _rough()
     depths = np.geomspace(1e-3, 20.0, count)
     names = (
@@ -240,13 +244,13 @@ def measure_depths(count: int, progress: Progress = silent) -> Depths:
 
 
 def taylor_error(heights: NDArray[np.float64], kappa: float, terms: int) -> float:
-    """Error of the orders' powers by Σ (iκ)ⁿ/n! DFT[hⁿ], stored and summed in single precision.
+    """Return the error of orders' powers by Σ (iκ)ⁿ/n! DFT[hⁿ] in single precision.
 
     Parameters
     ----------
     heights : (ny, nx) µm.
     kappa : rad/µm.
-    terms : n = 0 … terms − 1, as the thesis counts them.
+    terms : number of terms, n = 0 … terms − 1.
     """
     exact = np.abs(np.fft.ifft2(np.exp(1j * kappa * heights))) ** 2
     total = np.zeros(heights.shape, np.complex64)
@@ -263,7 +267,7 @@ def taylor_error(heights: NDArray[np.float64], kappa: float, terms: int) -> floa
 
 
 def _rough() -> NDArray[np.float64]:
-    """A random surface that tiles, from 0 to 1."""
+    """Return a random periodic surface with heights from 0 to 1."""
     noise = np.fft.fft2(np.random.default_rng(1).normal(size=(_SIDE, _SIDE)))
     q = 2.0 * np.pi * np.fft.fftfreq(_SIDE, _PIXEL)
     heights = np.fft.ifft2(noise * np.exp(-0.05 * (q**2 + q[:, None] ** 2))).real

@@ -1,4 +1,4 @@
-"""Error, colours, time and memory of each setting, side by side in one run."""
+"""Error, colour difference, time and memory of table settings, measured in one run."""
 
 from __future__ import annotations
 
@@ -27,29 +27,29 @@ from .accuracy import Sample
 
 @dataclass(frozen=True)
 class Setting:
-    """One table."""
+    """Settings of one table."""
 
-    group: str  # the parameter that is varied
-    name: str  # what is said of this value
-    # of `DiffractionTable.build`, besides the patch and the coherence width
+    group: str  # name of the parameter that varies
+    name: str  # label of this value
+    # arguments of `DiffractionTable.build`, besides the patch and the coherence width
     arguments: dict[str, Any] = field(default_factory=dict)
-    # numbers the coefficients are stored as afterwards: "half", "single", or as built
+    # precision to which the coefficients are converted: "half" or "single"; None: as built
     stored: str | None = None
-    # largest spatial frequency as a share of what light can probe, or None
+    # largest spatial frequency as a share of those that light reaches, or None for all
     crop: float | None = None
 
     @property
     def usable(self) -> bool:
-        """Whether a user can ask for it, tolerance and all."""
+        """Whether users can build this table: no conversion, and a proper tolerance."""
         return self.stored is None and self.arguments.get("tolerance", 1e-3) < _ANY
 
 
-#: A tolerance that everything meets: then the error is what the other parameters leave.
+#: Tolerance that every table meets, so that the other parameters alone determine the error.
 _ANY = 0.999
 
 
 def settings(quick: bool) -> Iterator[Setting]:
-    """All tables that are tried, the defaults first."""
+    """Yield the settings to measure, the defaults first."""
     yield Setting("default", "the defaults")
     tolerances = (1e-2, 1e-4) if quick else (1e-2, 1e-4, 1e-5, 1e-6)
     for tolerance in tolerances:
@@ -78,34 +78,30 @@ def settings(quick: bool) -> Iterator[Setting]:
         yield Setting("coherence", f"patch, {tolerance:.0e}", arguments)
 
 
-#: What colours are compared with: an error so small that nobody sees it.
+#: Tolerance of the table with which colours are compared; its error is invisible.
 FINEST = 1e-5
 
 
 @dataclass(frozen=True)
 class Measured:
-    """One setting and what it does."""
+    """Results of one setting."""
 
-    setting: Setting  # what was asked for
-    refused: str = ""  # why there is no such table; everything else then is as by default
+    setting: Setting
+    refused: str = ""  # error of a table that cannot be built; all other results are then missing
     # Σ|table − exact| / Σ exact, the larger of near order 0 and elsewhere, double precision
     error: float = float("nan")
-    error_single: float = float("nan")  # the same by the plugin, in single precision
-    # delta_e, delta_e_99: ΔE2000 of random directions in daylight from the finest table, mean and
-    # 99th percentile
+    error_single: float = float("nan")  # error of the plugin, in single precision
+    # ΔE2000 of random directions in daylight from the finest table: mean, 99th percentile
     delta_e: float = float("nan")
     delta_e_99: float = float("nan")
-    nanoseconds: float = float("nan")  # of `eval` with four wavelengths
-    # the same over that of `roughconductor` (Al), median of the rounds
-    relative: float = float("nan")
-    # taps, terms, intervals: bins read, numbers of each, intervals of κ
-    taps: int = 0
-    terms: int = 0
-    intervals: int = 0
+    nanoseconds: float = float("nan")  # time of `eval` with four wavelengths
+    relative: float = float("nan")  # time over that of `roughconductor` (Al), median of rounds
+    taps: int = 0  # number of bins that a look-up reads
+    terms: int = 0  # numbers per bin
+    intervals: int = 0  # intervals of κ
     precision: str = ""
-    # megabytes, seconds: the table's size, and the time it took to build
-    megabytes: float = float("nan")
-    seconds: float = float("nan")
+    megabytes: float = float("nan")  # size of the table
+    seconds: float = float("nan")  # time to build the table
 
 
 def measure(
@@ -118,25 +114,25 @@ def measure(
     rounds: int = 7,
     progress: Progress = silent,
 ) -> list[Measured]:
-    """All settings for one patch, in the current (spectral) variant.
+    """Measure all settings for one patch, in the current (spectral) variant.
 
     Parameters
     ----------
     field : the patch.
-    chosen : what to try.
+    chosen : settings to measure, the default first.
     coherence_width : µm.
-    pairs : of directions and wavelengths that errors are measured on.
-    lanes, rounds : calls at once, and timed repetitions.
+    pairs : number of pairs of directions and wavelengths for errors.
+    lanes, rounds : queries per call, and number of timed calls.
     progress : called as progress(done, total, text).
 
     Raises
     ------
     DiffractionError
-        If the patch is flat, or not even the default table can be built.
+        If the patch is flat, or the first table cannot be built.
     """
     modes = {str(setting.arguments.get("coherence", "ensemble")) for setting in chosen}
     samples = {
-        mode: Sample.of(field, coherence_width, mode, pairs, progress) for mode in sorted(modes)
+        mode: Sample.draw(field, coherence_width, mode, pairs, progress) for mode in sorted(modes)
     }
     finest = {
         mode: DiffractionTable.build(
@@ -172,7 +168,7 @@ def measure(
         results.append(
             Measured(
                 setting,
-                error=max(sample.error(sample.looked_up(table))),
+                error=max(sample.error(sample.window_sums(table))),
                 error_single=max(sample.error(_by_plugin(bsdf, sample))),
                 delta_e=float(loss.mean()),
                 delta_e_99=float(np.percentile(loss, 99.0)),
@@ -185,11 +181,12 @@ def measure(
             )
         )
     timed = {name: partial(kernel_seconds, call) for name, call in calls.items()}
-    taken = rounds_of(timed, rounds, lambda done, total: progress(done, total, "timing"))
-    return [_with_times(one, taken, lanes) for one in results]
+    times = rounds_of(timed, rounds, lambda done, total: progress(done, total, "timing"))
+    return [_with_times(result, times, lanes) for result in results]
 
 
 def _table(field: HeightField, setting: Setting, coherence_width: float) -> DiffractionTable:
+    """Build the table of a setting, and convert its precision if the setting has one."""
     arguments: dict[str, Any] = dict(setting.arguments)
     if setting.crop is not None:
         arguments["frequency_limit"] = setting.crop * q_limit_of((360.0, 830.0))
@@ -203,29 +200,32 @@ def _table(field: HeightField, setting: Setting, coherence_width: float) -> Diff
 
 
 def _by_plugin(bsdf: Any, sample: Sample) -> NDArray[np.float64]:
-    """The window sums (n,) that the plugin finds, all in single precision."""
+    """Return the window sums (n,) by the plugin, in single precision."""
     k = 2e3 * np.pi / sample.wavelength
     total = mi.Vector3f((sample.wi + sample.wo).T)
     device = bsdf.power.device
     wavenumber = upload(mi.Float, k)
-    found = device.window_sum(wavenumber * total.x, wavenumber * total.y, wavenumber * total.z)
-    return np.array(found, float)
+    sums = device.window_sum(wavenumber * total.x, wavenumber * total.y, wavenumber * total.z)
+    return np.array(sums, float)
 
 
-def _with_times(one: Measured, taken: dict[str, list[float]], lanes: int) -> Measured:
-    if one.refused:
-        return one
-    mine = taken[one.setting.name]
+def _with_times(result: Measured, times: dict[str, list[float]], lanes: int) -> Measured:
+    """Add the times of `eval` to a result, unless its table was refused."""
+    if result.refused:
+        return result
+    seconds = times[result.setting.name]
     return replace(
-        one, nanoseconds=float(np.median(mine)) / lanes * 1e9, relative=ratio(mine, taken[""])
+        result,
+        nanoseconds=float(np.median(seconds)) / lanes * 1e9,
+        relative=ratio(seconds, times[""]),
     )
 
 
 def rows(results: Sequence[Measured]) -> Iterator[dict[str, Any]]:
-    """Plain data, one flat record a setting."""
-    for one in results:
-        setting = one.setting
+    """Yield one flat record of plain data for each setting."""
+    for result in results:
+        setting = result.setting
         names = {"group": setting.group, "setting": setting.name}
         arguments = {"arguments": setting.arguments, "usable": setting.usable}
-        measured = {name: value for name, value in vars(one).items() if name != "setting"}
+        measured = {name: value for name, value in vars(result).items() if name != "setting"}
         yield names | arguments | measured

@@ -1,4 +1,4 @@
-"""What was measured of all settings, as text, plain data, CSV and plots; which one to take."""
+"""Report of measured settings: text, plain data, CSV, plots, and the recommended setting."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ...errors import DiffractionError
 from .accuracy import Depths, Spectral
 from .measuring import Measured, rows
 
-_ALIKE = 1.1  # times differ by as much from one run to the next
+_ALIKE = 1.1  # factor between equal times: they differ as much from run to run
 
 _HEAD = "  error  plugin's  ΔE2000    99 %  × roughconductor   taps  terms      MB   s"
 _MARKS = "osD^vP*Xp<>h"
@@ -24,62 +24,60 @@ _MARKS = "osD^vP*Xp<>h"
 
 @dataclass(frozen=True)
 class Budget:
-    """What a user can afford; None: as much as it takes."""
+    """Limits of error, memory and time; None is no limit."""
 
     tolerance: float | None = None  # largest error
-    megabytes: float | None = None  # of the table
-    relative: float | None = None  # time of `eval` over that of `roughconductor`
+    megabytes: float | None = None  # largest table
+    relative: float | None = None  # longest time of `eval` over that of `roughconductor`
 
-    def allows(self, one: Measured) -> bool:
-        """Whether a setting stays within it."""
+    def allows(self, result: Measured) -> bool:
+        """Return whether a setting stays within the limits."""
         limits = (
-            (one.error, self.tolerance),
-            (one.megabytes, self.megabytes),
-            (one.relative, self.relative),
+            (result.error, self.tolerance),
+            (result.megabytes, self.megabytes),
+            (result.relative, self.relative),
         )
         return all(limit is None or value <= limit for value, limit in limits)
 
 
 def recommended(results: Sequence[Measured], budget: Budget) -> Measured:
-    """The fastest setting that is exact enough; without a tolerance, the most exact one.
+    """Return the fastest setting within the tolerance, or without a tolerance the most exact one.
 
-    Of settings that are about as fast the smallest is taken.
-
-    Only settings that compute the same thing (coherence `ensemble`) and that a user can ask for
-    compete.
+    The smallest of equally fast settings is chosen. Only settings of coherence `ensemble` that
+    users can build are candidates.
 
     Raises
     ------
     DiffractionError
-        If nothing that was measured stays within the budget.
+        If no measured setting stays within the budget.
     """
-    able = [
-        one
-        for one in results
-        if not one.refused
-        and one.setting.usable
-        and one.setting.group != "coherence"
-        and math.isfinite(one.error)
+    candidates = [
+        result
+        for result in results
+        if not result.refused
+        and result.setting.usable
+        and result.setting.group != "coherence"
+        and math.isfinite(result.error)
     ]
-    within = [one for one in able if budget.allows(one)]
+    within = [result for result in candidates if budget.allows(result)]
     if not within:
-        smallest = min(one.megabytes for one in able)
-        fastest = min(one.relative for one in able)
-        finest = min(one.error for one in able)
+        smallest = min(result.megabytes for result in candidates)
+        fastest = min(result.relative for result in candidates)
+        finest = min(result.error for result in candidates)
         raise DiffractionError(
             f"no setting stays within this budget: errors reach down to {finest:.1e}, tables to "
             f"{smallest:.1f} MB and eval to {fastest:.1f} times roughconductor, but not all at "
             "once; allow more of one"
         )
     if budget.tolerance is None:
-        return min(within, key=lambda one: one.error)
-    fastest = min(one.relative for one in within)
-    as_fast = [one for one in within if one.relative <= _ALIKE * fastest]
-    return min(as_fast, key=lambda one: one.megabytes)
+        return min(within, key=lambda result: result.error)
+    fastest = min(result.relative for result in within)
+    as_fast = [result for result in within if result.relative <= _ALIKE * fastest]
+    return min(as_fast, key=lambda result: result.megabytes)
 
 
 def plain(results: list[Measured], depths: Depths) -> dict[str, Any]:
-    """All settings, and the errors over depth."""
+    """Return all settings and the errors over depth as plain data."""
     return {
         "settings": list(rows(results)),
         "depths": {
@@ -91,7 +89,7 @@ def plain(results: list[Measured], depths: Depths) -> dict[str, Any]:
 
 
 def save_csv(path: Path, settings: Sequence[Mapping[str, Any]]) -> None:
-    """Write the settings of `plain`, a row each."""
+    """Write the settings of `plain`, one row for each."""
     with (
         atomic_path(path) as temporary,
         temporary.open("w", newline="", encoding="utf-8") as file,
@@ -108,54 +106,54 @@ def lines(
     best: Measured,
     budget: Mapping[str, float | None],
 ) -> Iterator[str]:
-    """A row for each setting, the errors of sums over the spectrum, and the recommendation."""
-    width = max(len(one.setting.name) for one in results)
+    """Yield a row for each setting, the errors of sums over the spectrum, the recommendation."""
+    width = max(len(result.setting.name) for result in results)
     yield f"{'':<{width}} {_HEAD}"
-    for one in results:
-        name = f"{one.setting.name:<{width}}"
-        if one.refused:
-            yield f"{name}  {one.refused}"
+    for result in results:
+        name = f"{result.setting.name:<{width}}"
+        if result.refused:
+            yield f"{name}  {result.refused}"
             continue
-        series = f"{one.intervals} × {one.terms}"
+        series = f"{result.intervals} × {result.terms}"
         yield (
-            f"{name} {one.error:7.1e}   {one.error_single:7.1e} {one.delta_e:7.3f} "
-            f"{one.delta_e_99:7.2f} {one.relative:16.2f} {one.taps:6d} {series:>6} "
-            f"{one.megabytes:7.2f} {one.seconds:3.1f}"
+            f"{name} {result.error:7.1e}   {result.error_single:7.1e} {result.delta_e:7.3f} "
+            f"{result.delta_e_99:7.2f} {result.relative:16.2f} {result.taps:6d} {series:>6} "
+            f"{result.megabytes:7.2f} {result.seconds:3.1f}"
         )
     steps = ", ".join(f"{step:g} nm {error:.2f}" for step, error in spectral.steps.items())
     counts = ", ".join(f"{count} {noise:.2f}" for count, noise in spectral.counts.items())
     yield f"sums over the spectrum, ΔE2000: {steps}"
     yield f"wavelengths of a ray, noise of its luminance: {counts}"
-    asked = ", ".join(f"{name} {value:g}" for name, value in budget.items() if value)
+    limits = ", ".join(f"{name} {value:g}" for name, value in budget.items() if value)
     arguments = best.setting.arguments or {"": "the defaults"}
-    said = ", ".join(f"{k}={v}" if k else str(v) for k, v in arguments.items())
+    recommendation = ", ".join(f"{k}={v}" if k else str(v) for k, v in arguments.items())
     if best.setting.crop is not None:
-        said += f", crop at {best.setting.crop:g} of all frequencies"
+        recommendation += f", crop at {best.setting.crop:g} of all frequencies"
     yield (
-        f"recommended{f' ({asked})' if asked else ''}: {said}: error {best.error:.1e}, "
+        f"recommended{f' ({limits})' if limits else ''}: {recommendation}: error {best.error:.1e}, "
         f"{best.relative:.1f} × roughconductor, {best.megabytes:.1f} MB"
     )
 
 
 def draw_trade(results: Sequence[Measured], path: Path, title: str) -> None:
-    """Error against time, the area of a mark for its memory, and the best of all at each error."""
-    shown = [one for one in results if not one.refused and one.setting.group != "coherence"]
+    """Draw error against time, with the memory as area of the marks, and the Pareto front."""
+    drawn = [r for r in results if not r.refused and r.setting.group != "coherence"]
     axes = _axes(5.0)
-    groups = list(dict.fromkeys(one.setting.group for one in shown))
+    groups = list(dict.fromkeys(r.setting.group for r in drawn))
     for n, group in enumerate(groups):
-        mine = [one for one in shown if one.setting.group == group]
+        members = [r for r in drawn if r.setting.group == group]
         axes.scatter(
-            [one.relative for one in mine], [one.error for one in mine],
-            s=[12 + 6 * one.megabytes for one in mine], marker=_MARKS[n % len(_MARKS)],
+            [r.relative for r in members], [r.error for r in members],
+            s=[12 + 6 * r.megabytes for r in members], marker=_MARKS[n % len(_MARKS)],
             color=f"C{n % 10}", alpha=0.75, label=group, edgecolors="black", linewidths=0.4,
             zorder=3,
         )  # fmt: skip
-    front = _front(shown)
+    front = _front(drawn)
     axes.step(
-        [one.relative for one in front], [one.error for one in front], where="post", color="0.5",
+        [r.relative for r in front], [r.error for r in front], where="post", color="0.5",
         lw=1.0, label="nothing faster is as exact",
     )  # fmt: skip
-    default = shown[0]
+    default = drawn[0]
     axes.annotate(
         "default", (default.relative, default.error), (12, 10), textcoords="offset points",
         fontsize=8, arrowprops={"arrowstyle": "-", "lw": 0.6},
@@ -173,13 +171,13 @@ def draw_trade(results: Sequence[Measured], path: Path, title: str) -> None:
 
 
 def draw_depths(depths: Depths, path: Path) -> None:
-    """Where Taylor's series breaks down, beside those that do not."""
+    """Draw the error of each series over depth."""
     axes = _axes(4.2)
     for n, (name, errors) in enumerate(depths.errors.items()):
         axes.plot(
             depths.depth, np.clip(errors, 1e-8, 10.0), marker=_MARKS[n], ms=4, lw=1.2, label=name
         )
-    axes.axhline(1e-3, color="0.4", lw=0.8, ls="--", label="the tolerance that is asked for")
+    axes.axhline(1e-3, color="0.4", lw=0.8, ls="--", label="tolerance")
     axes.set(ylim=(1e-8, 20.0), xlabel="depth of the surface, peak to valley (µm)")
     axes.set(ylabel="relative error of the orders (cut at 10)")
     axes.set_title("light of 380 nm, normal; a line that ends is refused from there on", fontsize=9)
@@ -188,17 +186,17 @@ def draw_depths(depths: Depths, path: Path) -> None:
 
 
 def _front(results: Sequence[Measured]) -> list[Measured]:
-    """Settings that nothing is both faster and more exact than, fastest first."""
+    """Return the Pareto front: settings that no other beats in time and error, fastest first."""
     front: list[Measured] = []
-    for one in sorted(results, key=lambda one: one.relative):
-        if not front or one.error < front[-1].error:
-            front.append(one)
+    for result in sorted(results, key=lambda result: result.relative):
+        if not front or result.error < front[-1].error:
+            front.append(result)
     return front
 
 
 def _axes(height: float) -> Any:
-    """Both logarithmic, in a figure of that height in inches."""
-    from matplotlib.figure import Figure  # not for those who draw nothing
+    """Return logarithmic axes in a new figure of this height in inches."""
+    from matplotlib.figure import Figure  # slow to import, and not needed for text
 
     axes = Figure(figsize=(7.6, height), layout="constrained").add_subplot()
     axes.set(xscale="log", yscale="log")
@@ -207,5 +205,6 @@ def _axes(height: float) -> Any:
 
 
 def _save(axes: Any, path: Path) -> None:
+    """Write the figure of the axes as PNG."""
     with atomic_path(path) as temporary:
         axes.figure.savefig(temporary, dpi=130, format="png")

@@ -15,8 +15,7 @@ from ...tables.build.build import build_with
 from ...tables.store import cached_colours, cached_table
 from ...tables.table import DiffractionTable
 from ...thesis.methods import FullSpectrum, OrdersOnly, Repeated, make
-from ...thesis.methods.method import Method
-from ...thesis.methods.periodic import SPECULAR_WAVELENGTH
+from ...thesis.methods.method import SPECULAR_WAVELENGTH, Method
 from .context import Bindings, compile_program
 from .materials import Material
 from .packing import area_factor, pack_colours, pack_powers

@@ -18,7 +18,7 @@ from PIL import Image
 from ...atomic import atomic_path
 from ...errors import DiffractionError
 from ...optics.colour import encode_srgb
-from ..comparison.truth import Progressive
+from ..shader_comparison.path_traced import PathTracing
 from .camera import Camera, Orbit, dragged
 from .context import check_version
 from .progressive import ProgressiveLight
@@ -76,7 +76,7 @@ class Viewer(moderngl_window.WindowConfig):
         self.drawn = 0
         self.message = ""
         self.renderer: Renderer | None = None
-        self.tracing: Progressive | None = None
+        self.tracing: PathTracing | None = None
         self.light: ProgressiveLight | None = None
         self.shadows = True  # all light and shadows, or few lights without them at once
         self._shown: tuple[Any, ...] = ()
@@ -239,7 +239,7 @@ class Viewer(moderngl_window.WindowConfig):
         renderer = self._ready
         width, height = self.wnd.fbo.size
         camera = self._camera((width, height))
-        self.tracing = Progressive(self.mitsuba_scene, camera, renderer.lights, self.spp)
+        self.tracing = PathTracing(self.mitsuba_scene, camera, renderer.lights, self.spp)
         self.message = "path tracing ..."
 
     def _trace(self) -> None:

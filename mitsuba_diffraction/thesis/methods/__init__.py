@@ -1,21 +1,21 @@
-"""Ways to spend the wavelength loop: those of the thesis beside the package's own.
+"""Methods to sum the BRDF over wavelengths: those of the thesis and the package's default.
 
-One interface (`Method`): `brdf` in 1/sr at single wavelengths, `relative` as the thesis defines
-reflectance, `xyz` and `linear_srgb` under D65, all for arrays of direction pairs (NumPy only).
+All have one interface (`Method`): `brdf` in 1/sr at single wavelengths, `relative` as the thesis
+defines reflectance, `xyz` and `linear_srgb` under D65, for arrays of direction pairs (NumPy only).
 
 Contents
 --------
-make               a method by name, for a height field
-make_all           several of them, which share what they tabulate
-NAMES              their names
-Method             what each of them is
+make               build a method by name, for a height field
+make_all           build several methods, which share tables
+NAMES              names of the methods
+Method             interface of all methods
 FullSpectrum       default and flss: uniform sampling of the whole spectrum
 OrdersOnly         nmm: only the wavelengths whose orders reach the view direction
 Repeated           pq: the patch repeated, with linear or sinc interpolation
 Rainbow            rainbow: the grating equation alone
 Gain               the thesis' gain factor C
-method_map         a method over the hemisphere
-estimate_periods   the period of a patch, with its confidence
+method_map         evaluate a method over the hemisphere
+estimate_periods   periods of a patch along x and y, with their confidence
 """
 
 from __future__ import annotations

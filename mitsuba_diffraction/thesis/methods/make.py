@@ -1,4 +1,4 @@
-"""Methods by name, and their maps: for comparison with what the renderer sees."""
+"""Building methods by name, and their BRDF maps, for comparison with maps of the plugin."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from .periodic import OrdersOnly, Rainbow, Repeated, check_period, estimate_peri
 
 NAMES = ("default", "flss", "nmm", "pq", "pq-sinc", "rainbow")
 
-#: Makes a table of a patch, like `DiffractionTable.build`.
+#: Function that builds a table of a patch, like `DiffractionTable.build`.
 Build = Callable[..., DiffractionTable]
 
-#: Bins that "pq-sinc" reads along each axis.
+#: Number of bins that "pq-sinc" reads along each axis.
 SINC_TAPS = 8
 
 
 def make(name: str, heights: HeightField, **settings: object) -> Method:
-    """The method of that name; settings as in `make_all`."""
+    """Build the method with a name of `NAMES`; settings as in `make_all`."""
     return make_all((name,), heights, **settings)[name]  # type: ignore[arg-type]
 
 
@@ -54,34 +54,33 @@ def make_all(
     progress: Progress | None = None,
     build: Build | None = None,
 ) -> dict[str, Method]:
-    """Methods by name, for one patch.
+    """Build methods by name, for one patch.
 
     Parameters
     ----------
-    names : of `NAMES`.
+    names : names of `NAMES`.
     heights : the patch, which tiles the plane.
     coherence_width : 4σ of the Gaussian amplitude window, µm; for `pq`, the width that is filled
         with copies of the patch.
-    coherence : "patch", one window on the patch's centre, or "ensemble", the mean power of all its
+    coherence : "patch", one window on the patch's centre, or "ensemble", the mean power of all
         positions. By default "ensemble" for `default`, and "patch", as in the thesis, for `flss`
-        and `nmm`. `pq` always adds amplitudes; `rainbow` has neither.
-    tolerance : of the tables.
-    terms, taps : of the Taylor series and the window of `flss`, `nmm` and `pq`; by default as many
-        as the tolerance takes. The thesis has 30 and 3: fewer than the tolerance takes
-        are accepted if it is raised.
-    wavelength_range, step : nm, of the colours.
+        and `nmm`. `pq` always adds amplitudes; `rainbow` has no window.
+    tolerance : tolerance of the tables.
+    terms, taps : terms of the Taylor series and taps of the window of `flss`, `nmm` and `pq`; by
+        default as many as the tolerance requires. The thesis has 30 and 3: fewer than required are
+        accepted with a larger tolerance.
+    wavelength_range, step : range and step of the wavelengths of colours, nm.
     period : µm, for `nmm` (along the axis where the patch is most periodic) and `rainbow`; by
         default estimated from the heights.
     repeats : (N₁, N₂) of `pq`; by default as many as fill the coherence width, at least 2.
     nmm_weights, specular : see `OrdersOnly`.
     progress : called as progress(done, total, text) while tables are built.
-    build : makes a table of heights and the arguments of `DiffractionTable.build`, that function by
-        default; another may keep them.
+    build : function to call instead of `DiffractionTable.build`, for instance with a cache.
 
     Raises
     ------
     DiffractionError
-        If a name is unknown, a parameter does not fit, a table cannot be built, or the patch has no
+        If a name is unknown, a parameter is not valid, a table cannot be built, or the patch has no
         period and the method needs one.
     """
     for name in names:
@@ -95,13 +94,13 @@ def make_all(
         "wavelength_range": wavelength_range, "progress": progress, "second_order": False,
     }  # fmt: skip
 
-    @functools.cache  # methods share what they tabulate
-    def table(**own: Any) -> DiffractionTable:
-        return (build or DiffractionTable.build)(heights, **(common | own))
+    @functools.cache  # methods share tables
+    def table(**changes: Any) -> DiffractionTable:
+        return (build or DiffractionTable.build)(heights, **(common | changes))
 
     def default(name: str) -> FullSpectrum:
-        own = table(coherence=coherence or "ensemble")
-        return FullSpectrum(name, own, wavelength_range, step)
+        powers = table(coherence=coherence or "ensemble")
+        return FullSpectrum(name, powers, wavelength_range, step)
 
     def flss(name: str) -> FullSpectrum:
         taylor = table(coherence=coherence or "patch", basis="taylor", terms=terms, taps=taps)
@@ -113,7 +112,7 @@ def make_all(
 
     def pq(name: str) -> Repeated:
         x, y = (max(2, round(coherence_width / extent)) for extent in heights.extent)
-        width = max(heights.extent)  # of a window that does not matter
+        width = max(heights.extent)  # coherence width of the table, which `Repeated` does not use
         step_x, step_y = (0.5 * math.pi * width / extent for extent in heights.extent)
         most = max(SINC_TAPS, *taps_for((step_x, step_y), tolerance * TAPS_SHARE, True))
         copies = table(
@@ -141,10 +140,10 @@ def make_all(
 def _periods(
     heights: HeightField, method: str, period: float | None
 ) -> tuple[float | None, float | None]:
-    """Periods along x and y, `None` where there is none."""
+    """Return the periods along x and y, or `None` along an axis without a reliable one."""
     main = required_period(heights, method, period)
     if period is None:
-        x, y = (p.length if p.found else None for p in estimate_periods(heights))
+        x, y = (p.length if p.reliable else None for p in estimate_periods(heights))
         return x, y
     return (main.length, None) if main.axis == "x" else (None, main.length)
 
@@ -161,17 +160,17 @@ def method_map(
     gain: Gain | None = None,
     progress: Progress | None = None,
 ) -> BrdfMap:
-    """A method's BRDF for one light direction, over the whole hemisphere of view directions.
+    """Evaluate a method's BRDF for one light direction over the hemisphere of view directions.
 
     Parameters
     ----------
-    method : sums over its own wavelengths, under D65.
+    method : method, which sums over its wavelengths under D65.
     light : direction to the light.
-    step : nm, of the method, for the caption.
-    wavelength : nm: a map of f at one wavelength instead of colours.
+    step : wavelength step of the method, nm, for the caption.
+    wavelength : nm; map f at one wavelength instead of colours.
     resolution : pixels along each axis.
-    samples : directions in a pixel. The wavelengths are the same for all of them, unlike in
-        `brdf_map`: what a step leaves out of the spectrum shows.
+    samples : directions per pixel. Unlike in `brdf_map`, all have the same wavelengths, so that
+        errors of a large step are visible.
     cosine : map f·cosθo instead of f.
     gain : map the thesis' relative reflectance with this gain factor instead of f.
     progress : called as progress(done, total, text).
@@ -179,11 +178,11 @@ def method_map(
     Raises
     ------
     DiffractionError
-        If a parameter is out of range, or the method has no such value.
+        If a parameter is out of range, or the method has no relative reflectance.
     """
     hemisphere.check_resolution(resolution)
     hemisphere.check_samples(samples)
-    bands = Bands.of(method.wavelength_range, step, wavelength)
+    bands = Bands.choose(method.wavelength_range, step, wavelength)
     rows, columns = np.nonzero(hemisphere.inside(resolution))
     low, size = hemisphere.corners(resolution), 2.0 / resolution
     pattern = hemisphere.sub_samples(samples)
@@ -197,17 +196,17 @@ def method_map(
     views = np.stack([x, y, np.sqrt(np.maximum(height, 0.0))], axis=-1)[above]
     lights = np.broadcast_to(light.direction, views.shape)
     if wavelength is None:
-        found = method.xyz(lights, views, gain=gain, progress=progress)
+        evaluated = method.xyz(lights, views, gain=gain, progress=progress)
     elif gain is None:
-        found = method.brdf(lights, views, wavelength)[:, None]
+        evaluated = method.brdf(lights, views, wavelength)[:, None]
     else:
-        found = method.relative(lights, views, wavelength, gain)[:, None]
+        evaluated = method.relative(lights, views, wavelength, gain)[:, None]
     if cosine:
-        found = found * views[:, 2:]
-    every = np.zeros((x.size, components))
-    every[above] = found
+        evaluated = evaluated * views[:, 2:]
+    sampled = np.zeros((x.size, components))
+    sampled[above] = evaluated
     coverage[rows, columns] = above.reshape(-1, samples).mean(axis=1)
-    values[rows, columns] = every.reshape(-1, samples, components).mean(axis=1)
+    values[rows, columns] = sampled.reshape(-1, samples, components).mean(axis=1)
     return BrdfMap(
         light=light,
         bands=bands,

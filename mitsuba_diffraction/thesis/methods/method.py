@@ -1,19 +1,18 @@
-"""What every method is: a spectrum for direction pairs, and a rule that sums it to colours.
+"""Interface of methods: a spectrum for direction pairs, and the rule that sums it to colours.
 
-`flss` and the package's own look-up, `default`, sum one integral over the same wavelengths
-(`FullSpectrum`); they differ in the series that gives S.
+`flss` and the package's `default` sum one integral over the same wavelengths (`FullSpectrum`); they
+differ in the series that approximates S.
 
 Relative reflectance, as the thesis defines it, divides the reflected radiance by that of a flat
 mirror of the same material lit and seen along the normal. With S(ωi, ωo; λ) = ⟨|P|²⟩ under the
-window, normalised to 1 for that mirror, what is left of the BRDF (Stam 1999, eq. 7) is
+window, normalised to 1 for that mirror, the BRDF (Stam 1999, eq. 7) becomes
 
     ρ(λ) = C(ωi, ωo)·S,   C = F²(ωi, ωo)/F²(ω0, ω0) · (1 + ωi·ωo)²/(w² cosθo) · G,
 
-with w = cosθi + cosθo and Schlick's F. So ρ has neither 1/λ² nor the window's area: in it blue is
-weaker against red, by up to (λ_blue/λ_red)², than in the BRDF f(λ) = (1 + ωi·ωo)² 4πσ²·S /
-(λ² w² cosθi cosθo). The thesis wrote F², although Schlick's F already is a power, and
-always multiplied by the shadowing G of V-shaped grooves: both are kept here, since that is what
-makes their pictures; the BRDF proper has neither.
+with w = cosθi + cosθo and Schlick's F. So ρ has neither 1/λ² nor the window's area: blue is weaker
+against red, by up to (λ_blue/λ_red)², than in the BRDF f(λ) = (1 + ωi·ωo)² 4πσ²·S /
+(λ² w² cosθi cosθo). The thesis has F², although Schlick's F already is a power, and the shadowing G
+of V-shaped grooves. `Gain` has both, to reproduce the thesis' pictures; the BRDF has neither.
 """
 
 from __future__ import annotations
@@ -37,13 +36,16 @@ from ...tables.table import DiffractionTable
 SHADOWINGS = ("none", "vcavity")
 
 Array = NDArray[np.float64]
-_FINEST_STEP = 0.1  # nm
-_PAIRS = 4096  # direction pairs at a time, per thread
+#: Wavelength whose value sets the brightness of white around the mirror direction, nm: the eye's
+#: sensitivity is largest there.
+SPECULAR_WAVELENGTH = 555.0
+_FINEST_STEP = 0.1  # least step between wavelengths, nm
+_PAIRS = 4096  # direction pairs that a thread evaluates at a time
 
 
 @dataclass(frozen=True)
 class Gain:
-    """The gain factor C.
+    """Gain factor C of the thesis' relative reflectance.
 
     Parameters
     ----------
@@ -62,8 +64,8 @@ class Gain:
     def __post_init__(self) -> None:
         if not 1.0 < self.int_ior < 100.0:
             raise DiffractionError(
-                f"int_ior={self.int_ior:g} must be above 1 and below 100 for relative reflectance: "
-                "it is relative to a mirror of that index"
+                f"int_ior={self.int_ior:g} must be above 1 and below 100 for relative reflectance, "
+                "which is relative to a mirror of that index"
             )
         if self.shadowing not in SHADOWINGS:
             raise DiffractionError(
@@ -71,7 +73,7 @@ class Gain:
             )
 
     def factor(self, wi: NDArray[np.float64], wo: NDArray[np.float64]) -> NDArray[np.float64]:
-        """C, dimensionless, shape (n,), for unit vectors (n, 3); 0 below the surface.
+        """Return C, dimensionless, shape (n,), of unit vectors (n, 3); 0 below the surface.
 
         G = min(1, 2(n·h)(n·ωi)/(ωo·h), 2(n·h)(n·ωo)/(ωo·h)) (Blinn 1977; Stam 1999, appendix), and
         F = F0 + (1 − F0)(1 − h·ωo)⁵ with F0 = ((n − 1)/(n + 1))² (Schlick 1994).
@@ -90,16 +92,16 @@ class Gain:
 
 
 class Method(ABC):
-    """One way to spend the wavelength loop.
+    """BRDF at single wavelengths, and its sum over wavelengths to colours.
 
     Directions are unit vectors (n, 3) or (3,) in the patch's frame, both pointing away from the
-    surface; the surface reflects everything (R = 1), and nothing from below.
+    surface. The surface reflects everything (R = 1) above the horizon, and nothing below it.
 
     Attributes
     ----------
     name : one of `NAMES`.
-    sigma : µm; 4πσ² is the coherent area (that of a Gaussian window of this σ).
-    wavelength_range : nm, that the colours are summed over.
+    sigma : σ of the Gaussian window, µm; 4πσ² is the coherent area.
+    wavelength_range : range of the sum to colours, nm.
     """
 
     name: str
@@ -108,7 +110,7 @@ class Method(ABC):
 
     @abstractmethod
     def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
-        """S = ⟨|P|²⟩/(2πσ²)², shape (n,), dimensionless: 1 for a flat mirror in its direction.
+        """Return S = ⟨|P|²⟩/(2πσ²)², shape (n,), dimensionless: 1 in a flat mirror's direction.
 
         Parameters
         ----------
@@ -118,14 +120,14 @@ class Method(ABC):
 
     @abstractmethod
     def samples(self, wi: Array, wo: Array) -> Iterator[tuple[Array, Array]]:
-        """Wavelengths (n,) in nm and their weights (n,) in nm, 0 where there is none for a pair."""
+        """Yield wavelengths (n,) and their weights (n,), both nm; weight 0 excludes a pair."""
 
-    def special(self, wi: Array, wo: Array) -> tuple[NDArray[np.bool_], float]:
-        """Pairs (n,) that are white instead, as bright as at this wavelength (nm); none here."""
-        return np.zeros(len(wi), bool), 550.0
+    def white_pairs(self, wi: Array, wo: Array) -> NDArray[np.bool_]:
+        """Return the pairs (n,) whose colour is white, as bright as at `SPECULAR_WAVELENGTH`."""
+        return np.zeros(len(wi), bool)
 
     def brdf(self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike) -> Array:
-        """f = (1 + ωi·ωo)²·4πσ²·S / (λ² w² cosθi cosθo), the BRDF in 1/sr, shape (n,).
+        """Return the BRDF f = (1 + ωi·ωo)²·4πσ²·S / (λ² w² cosθi cosθo) in 1/sr, shape (n,).
 
         wavelength : (n,) or scalar, nm.
         """
@@ -134,7 +136,7 @@ class Method(ABC):
     def relative(
         self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, gain: Gain | None = None
     ) -> Array:
-        """ρ = C·S, the thesis' relative reflectance (see `gain`), shape (n,)."""
+        """Return the thesis' relative reflectance ρ = C·S (see `Gain`), shape (n,)."""
         return self._value(wi, wo, wavelength, gain or Gain())
 
     def xyz(
@@ -145,10 +147,10 @@ class Method(ABC):
         gain: Gain | None = None,
         progress: Progress | None = None,
     ) -> Array:
-        """X, Y, Z under D65, shape (n, 3): Σ over the method's wavelengths of value·s̄(λ)·weight.
+        """Return X, Y, Z under D65, (n, 3): Σ value·s̄(λ)·weight over the method's wavelengths.
 
-        s̄ = S_D65·(x̄, ȳ, z̄)/∫S_D65·ȳ dλ (`colour.response`), so that what reflects all wavelengths
-        alike is D65's white with Y = its value.
+        s̄ = S_D65·(x̄, ȳ, z̄)/∫S_D65·ȳ dλ (`colour.response`), so that a value that does not depend on
+        the wavelength has the white of D65 and Y equal to the value.
 
         Parameters
         ----------
@@ -160,6 +162,7 @@ class Method(ABC):
         starts = range(0, len(incident), _PAIRS)
 
         def chunk(start: int) -> None:
+            """Evaluate the pairs above the surface from index `start` on."""
             part = slice(start, start + _PAIRS)
             above = (incident[part, 2] > 0) & (outgoing[part, 2] > 0)
             rows = np.flatnonzero(above) + start
@@ -179,16 +182,17 @@ class Method(ABC):
         gain: Gain | None = None,
         progress: Progress | None = None,
     ) -> Array:
-        """The same in linear sRGB, (n, 3); components outside the gamut are negative."""
+        """Return `xyz` in linear sRGB, (n, 3); components outside the gamut are negative."""
         xyz = self.xyz(wi, wo, gain=gain, progress=progress)
         return np.asarray(linear_srgb(xyz), np.float64)
 
     def _xyz(self, wi: Array, wo: Array, gain: Gain | None) -> Array:
-        """Colours of pairs above the surface."""
+        """Return X, Y, Z of pairs above the surface."""
         total = np.zeros((len(wi), 3))
-        white, wavelength = self.special(wi, wo)
+        white = self.white_pairs(wi, wo)
         if white.any():
-            value = self._scaled(wi[white], wo[white], np.full(white.sum(), wavelength), gain)
+            wavelength = np.full(white.sum(), SPECULAR_WAVELENGTH)
+            value = self._scaled(wi[white], wo[white], wavelength, gain)
             total[white] = value[:, None] * self._white()
         for wavelengths, weights in self.samples(wi, wo):
             on = (weights > 0) & ~white
@@ -200,13 +204,14 @@ class Method(ABC):
         return total
 
     def _white(self) -> Array:
-        """X, Y, Z (3,) of a reflectance of 1 over the method's range."""
+        """Return X, Y, Z (3,) of a reflectance of 1 over the method's range."""
         lam = np.arange(self.wavelength_range[0], self.wavelength_range[1] + 0.5)
         return np.asarray(trapezoid(response(lam), lam, axis=0))
 
     def _value(
         self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, gain: Gain | None
     ) -> Array:
+        """Check directions and wavelengths; return f, or ρ with a gain factor, (n,)."""
         incident, outgoing = self._pairs(wi, wo)
         lam = np.broadcast_to(np.asarray(wavelength, float), len(incident))
         if not np.all(lam > 0):
@@ -217,6 +222,7 @@ class Method(ABC):
         return result
 
     def _scaled(self, wi: Array, wo: Array, wavelength: Array, gain: Gain | None) -> Array:
+        """Return f, or ρ with a gain factor, (n,), of pairs above the surface."""
         s = self.window_sum(wi, wo, wavelength)
         if gain is not None:
             return gain.factor(wi, wo) * s
@@ -225,6 +231,7 @@ class Method(ABC):
 
     @staticmethod
     def _pairs(wi: ArrayLike, wo: ArrayLike) -> tuple[Array, Array]:
+        """Check directions and broadcast them to (n, 3)."""
         incident, outgoing = (np.atleast_2d(np.asarray(d, float)) for d in (wi, wo))
         try:
             incident, outgoing = np.broadcast_arrays(incident, outgoing)
@@ -238,22 +245,23 @@ class Method(ABC):
 
 
 class UniformMethod(Method):
-    """A method that sums over a uniform grid of wavelengths, for all pairs alike.
+    """Method that sums over one uniform grid of wavelengths for all pairs.
 
     Attributes
     ----------
-    wavelengths, weights : (n,), nm, of the trapezoidal rule.
+    wavelengths, weights : nodes and weights of the trapezoidal rule, (n,), nm.
     """
 
     wavelengths: Array
     weights: Array
 
     def _sum_over(self, wavelength_range: tuple[float, float], step: float) -> None:
+        """Set the grid of wavelengths."""
         self.wavelength_range = wavelength_range
         self.wavelengths, self.weights = trapezoid_rule(wavelength_range, step)
 
     def samples(self, wi: Array, wo: Array) -> Iterator[tuple[Array, Array]]:
-        """Every wavelength of the grid, for all pairs alike."""
+        """Yield every wavelength of the grid for all pairs."""
         ones = np.ones(len(wi))
         for wavelength, weight in zip(self.wavelengths, self.weights, strict=True):
             yield wavelength * ones, weight * ones
@@ -262,17 +270,19 @@ class UniformMethod(Method):
 def trapezoid_rule(
     wavelength_range: tuple[float, float], step: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Wavelengths λ_min, λ_min + step, … and their weights, nm; the last interval may be shorter.
+    """Return wavelengths λ_min, λ_min + step, … and their weights, nm.
+
+    The last interval may be shorter than `step`.
 
     Raises
     ------
     DiffractionError
-        If the range is empty or the step does not fit it.
+        If the range is empty or the step is too small or longer than the range.
     """
     low, high = wavelength_range
     if not (0.0 < low < high < np.inf):
         raise DiffractionError(
-            f"wavelength_range={low:g}, {high:g} nm is none; give the shortest first, both above "
+            f"wavelength_range={low:g}, {high:g} nm is empty; give the shortest first, both above "
             "0, e.g. 380 780"
         )
     if not _FINEST_STEP <= step <= (high - low) * (1.0 + 1e-12):
@@ -292,7 +302,7 @@ def trapezoid_rule(
 
 
 class FullSpectrum(UniformMethod):
-    """S from a table at every wavelength of a uniform grid, summed by the trapezoidal rule.
+    """`default` and `flss`: S from a table on a uniform grid of wavelengths, trapezoidal rule.
 
     For a direction pair with (u, v, w) = ωi + ωo and each λ_k = λ_min + k·step up to λ_max
     (thesis, fragment shader, lines 4–26; Stam 1999, eq. 7–12):
@@ -306,25 +316,25 @@ class FullSpectrum(UniformMethod):
        t_nj = iⁿ·(−1)^(j_x + j_y) · mean over pixels of (2h/H)ⁿ·exp(+i q_j·r),
        where heights are centred, h ∈ ±H/2, and (−1)^(j_x + j_y) moves the window to the patch's
        centre. t_nj is `table.coefficients[0, row, column, :, n − 1]` (real, imaginary), bin (0, 0)
-       in the middle; bin 0's own series is `table.order_0`, and its lobe is added wherever the
-       taps are.
+       in the middle; the series of bin 0 is `table.order_0`, and its lobe is added whichever bins
+       are read.
     3. S = |P|² (`coherence="patch"`), or Σ_j g_j²·|a_j|² (`ensemble`). The terms are summed
        before they are squared.
     4. XYZ = Σ_k step·(½ at both ends)·f(λ_k)·s̄(λ_k), where
        f = (1 + ωi·ωo)²·4πσ²·S/(λ_k² w² cosθi cosθo), or C·S for relative reflectance.
 
-    `default` reads |a_j|² (or a_j) from the table's own series instead (`tables.expansion`).
+    `default` reads |a_j|² (or a_j) from the series in κ of `tables.expansion` instead.
 
     Parameters
     ----------
-    name : for messages.
+    name : name in messages.
     table : series of S, over at least the wavelength range.
     wavelength_range, step : nm.
 
     Raises
     ------
     DiffractionError
-        If range and step do not fit each other or the table.
+        If the step is longer than the range, or the range begins below the table's.
     """
 
     def __init__(
@@ -340,11 +350,11 @@ class FullSpectrum(UniformMethod):
         if wavelength_range[0] < table.wavelength_range[0] * (1.0 - 1e-9):
             raise DiffractionError(
                 f"wavelength_range begins at {wavelength_range[0]:g} nm, below the table's "
-                f"shortest wavelength, {table.wavelength_range[0]:g} nm; build one for it"
+                f"shortest wavelength, {table.wavelength_range[0]:g} nm; build a table for it"
             )
 
     def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
-        """S from the table."""
+        """Return S from the table."""
         k = wavenumber(wavelength)
         u, v, w = diffraction_coordinates(wi, wo)
         return self.table.window_sum(k * u, k * v, k * w)

@@ -1,7 +1,7 @@
-"""The thesis' methods that take a surface as periodic, `nmm` and `pq`, and rainbows.
+"""Methods of the thesis for periodic surfaces: `nmm`, `pq` and `rainbow`.
 
 `nmm` evaluates only the wavelengths whose orders reach the view direction, `pq` repeats the patch
-without any other window, and `rainbow` has colours from the spacing of a grating alone. The period
+without any other window, and `rainbow` has colours from the period of a grating alone. The period
 is estimated from the autocorrelation of the heights (NumPy only).
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,32 +22,30 @@ from ...optics.geometry import diffraction_coordinates, sigma_of, wavenumber
 from ...tables.build.spectrum import NEAR
 from ...tables.lookup import Kernel, weighted_sum
 from ...tables.table import DiffractionTable
-from .method import Array, FullSpectrum, Gain, Method, UniformMethod
+from .method import SPECULAR_WAVELENGTH, Array, FullSpectrum, Gain, Method, UniformMethod
 
-#: Below this confidence a patch counts as having no period: the ring-shaped autocorrelation of a
-#: random surface reaches 0.1 by chance, snake scales across their fingers 0.5 and more.
+#: Least confidence of a usable period: the ring-shaped autocorrelation of a random surface reaches
+#: 0.1 by chance, snake scales across their fingers 0.5 and more.
 LEAST_CONFIDENCE = 0.3
 
-_SHORTEST, _LONGEST = 1e-2, 1e3  # µm
-#: Of `OrdersOnly` and of `Repeated`.
+_SHORTEST, _LONGEST = 1e-2, 1e3  # periods that are accepted, µm
+#: Choices of `weights` in `OrdersOnly`, and of `interpolation` in `Repeated`.
 WEIGHTS, INTERPOLATIONS = ("step", "lobe"), ("linear", "sinc")
-#: nm, whose value the white around the mirror direction takes: where the eye sees best.
-SPECULAR_WAVELENGTH = 555.0
 
 
 @dataclass(frozen=True)
 class Period:
-    """An estimate."""
+    """Estimate of a patch's period along one axis."""
 
     axis: str  # "x" or "y"
-    length: float  # µm; NaN where the autocorrelation has no peak at all
-    # 0 to 1, how far the autocorrelation rises from its valley (or from 0, if that is higher) to
-    # its peak at `length`; 1 for an exact grating
+    length: float  # µm; NaN if the autocorrelation has no peak
+    # 0 to 1, rise of the autocorrelation from its valley (or from 0, if that is higher) to its
+    # peak at `length`; 1 for an exact grating
     confidence: float
 
     @property
-    def found(self) -> bool:
-        """Whether it is worth using."""
+    def reliable(self) -> bool:
+        """Whether the confidence is at least `LEAST_CONFIDENCE`."""
         return self.confidence >= LEAST_CONFIDENCE
 
     def __str__(self) -> str:
@@ -56,12 +55,12 @@ class Period:
 
 
 def estimate_periods(field: HeightField) -> tuple[Period, Period]:
-    """Periods along x and along y.
+    """Estimate the periods along x and along y.
 
     The autocorrelation r of the heights, which tile the plane, is followed along each axis from lag
-    0 down to its first valley and up to the first peak that rises by `LEAST_CONFIDENCE`, or else to
-    the peak that rises most; a parabola through the peak and its neighbours gives the lag between
-    pixels. Lags up to half of the patch are looked at: its own length is a period of any tile.
+    0 down to the first valley and up to the first peak that rises by `LEAST_CONFIDENCE`, or else to
+    the peak that rises most. A parabola through the peak and its neighbours gives the lag between
+    pixels. Lags up to half of the patch are examined: the patch's length is a period of any tile.
     """
     centred = field.heights - field.heights.mean()
     power = np.abs(np.fft.fft2(centred)) ** 2
@@ -75,40 +74,41 @@ def estimate_periods(field: HeightField) -> tuple[Period, Period]:
 
 
 def main_period(field: HeightField) -> Period:
-    """The estimate with the greater confidence; x if they are alike."""
+    """Return the estimate with the greater confidence; that along x if they are equal."""
     along_x, along_y = estimate_periods(field)
     return along_y if along_y.confidence > along_x.confidence else along_x
 
 
 def required_period(field: HeightField, method: str, period: float | None) -> Period:
-    """The period that a method needs: the given one (along the main axis), or the estimate."""
+    """Return the user's period (along the main axis), or else the estimate if it is reliable."""
     estimate = main_period(field)
     if period is not None:
         return Period(estimate.axis, check_period(period), 1.0)
-    if estimate.found:
+    if estimate.reliable:
         return estimate
-    both = "; ".join(str(p) for p in estimate_periods(field))
+    estimates = "; ".join(str(p) for p in estimate_periods(field))
     raise DiffractionError(
-        f"method '{method}' needs a period, and {field.name} has none that shows ({both}; "
+        f"method '{method}' needs a period, and {field.name} has no reliable one ({estimates}; "
         f"at least {LEAST_CONFIDENCE:g} is needed); give period in µm, or choose another method"
     )
 
 
 def check_period(period: float) -> float:
-    """Refuse a period that is none."""
+    """Refuse a period that is out of range."""
     if not _SHORTEST <= period <= _LONGEST:
         raise DiffractionError(f"period={period} must be from {_SHORTEST:g} to {_LONGEST:g} µm")
     return float(period)
 
 
 def _first_peak(axis: str, correlation: NDArray[np.float64], pixel: float) -> Period:
+    """Return the period of the first high peak of an autocorrelation (n,), else of the highest."""
     if correlation[0] <= 0.0:  # a flat patch
         return Period(axis, np.nan, 0.0)
     r = correlation / correlation[0]
     half = r.size // 2
     valley = 1.0
     best = Period(axis, np.nan, 0.0)
-    for lag in range(1, half + 1):  # two periods of an odd number of pixels peak at half a lag more
+    for lag in range(1, half + 1):  # inclusive: an odd number of pixels may hold two periods
         valley = min(valley, r[lag])
         before, after = r[lag - 1], r[(lag + 1) % r.size]
         if not (r[lag] > before and r[lag] >= after - 1e-12):
@@ -118,7 +118,7 @@ def _first_peak(axis: str, correlation: NDArray[np.float64], pixel: float) -> Pe
             bend = before - 2.0 * r[lag] + after
             shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
             best = Period(axis, float((lag + shift) * pixel), rise)
-        if best.found:
+        if best.reliable:
             break
     return best
 
@@ -126,29 +126,29 @@ def _first_peak(axis: str, correlation: NDArray[np.float64], pixel: float) -> Pe
 class OrdersOnly(Method):
     """`nmm`: S of `flss`, at the wavelengths λₙ = d·|u|/n (and d·|v|/n) alone.
 
-    For a direction pair with (u, v, w) = ωi + ωo (thesis, "NMM approach", with the period d
-    where one draft has the pixel size):
+    For a direction pair with (u, v, w) = ωi + ωo (thesis, "NMM approach", d is the period):
 
     1. Where hypot(u, v) < ε the colour is white, as bright as at 555 nm: near the mirror direction
        n_min…n_max holds too few wavelengths or none. ε = 3/(σ k(λ_max)) by default, where order
        0's lobe ends at the longest wavelength.
     2. Elsewhere, for n from n_min = ⌈d|u|/λ_max⌉ (at least 1) to n_max = ⌊d|u|/λ_min⌋, every
-       λₙ = d|u|/n adds f(λₙ)·s̄(λₙ)·Δλₙ; likewise for v where there is a period along y. A
-       wavelength that both reach is added twice, as in the thesis.
+       λₙ = d|u|/n adds f(λₙ)·s̄(λₙ)·Δλₙ, and so does every λₙ = d|v|/n if there is a period along
+       y. A wavelength that both reach is added twice, as in the thesis.
 
-    `weights` says what Δλₙ is. "step", the thesis' own, is the step of the full sum (5 nm) for
-    every wavelength alike: since the λₙ lie closer together, and their lobes are narrower, the
-    shorter they are, the sum is too blue, and red is lost: the known purple shift. "lobe" is
-    ∫exp(−σ²(k·u − 2πn/d)²)dλ = λₙ²/(2√π·σ·|u|), the width in wavelength of the lobe that a perfect
-    grating puts there; it is right where the lobe of one order does not reach the next.
+    `weights` selects Δλₙ. "step", as in the thesis, is the step of the full sum (5 nm) for every
+    wavelength. The shorter the λₙ, the closer together they lie and the narrower are their lobes,
+    so the sum is too blue: the known purple shift. "lobe" is
+    ∫exp(−σ²(k·u − 2πn/d)²)dλ = λₙ²/(2√π·σ·|u|), the width in wavelength of a perfect grating's
+    lobe; it is exact where the lobes of neighbouring orders do not overlap.
 
-    Between orders, and wherever the surface is not periodic, light is missed: `brdf` and `relative`
-    are those of `flss` within half a step of a λₙ and around the mirror direction, and 0 elsewhere.
+    Light between orders, and light of a surface that is not periodic, is lost: `brdf` and
+    `relative` equal those of `flss` within half a step of a λₙ and around the mirror direction, and
+    are 0 elsewhere.
 
     Parameters
     ----------
-    full : the method to sample, its table above all.
-    periods : (dx, dy) in µm, `None` where there is none along an axis, not both.
+    full : method whose table is sampled.
+    periods : (dx, dy) in µm; at most one is `None`: no period along that axis.
     weights : "step" or "lobe".
     specular : ε, or `None` for the default.
     """
@@ -177,54 +177,63 @@ class OrdersOnly(Method):
         self._step = float(np.diff(full.wavelengths).max())
 
     def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
-        """S as `flss` has it, at wavelengths that are taken, and 0 at others."""
-        taken = self._takes(wi, wo, wavelength)
+        """Return S of `flss` at sampled wavelengths, and 0 at others."""
+        sampled = self._sampled(wi, wo, wavelength)
         result = np.zeros(len(wi))
-        result[taken] = self.full.window_sum(wi[taken], wo[taken], wavelength[taken])
+        result[sampled] = self.full.window_sum(wi[sampled], wo[sampled], wavelength[sampled])
         return result
 
-    def special(self, wi: Array, wo: Array) -> tuple[NDArray[np.bool_], float]:
-        """White within ε of the mirror direction."""
+    def white_pairs(self, wi: Array, wo: Array) -> NDArray[np.bool_]:
+        """Return the pairs within ε of the mirror direction."""
         u, v, _ = diffraction_coordinates(wi, wo)
-        return np.hypot(u, v) < self.specular, SPECULAR_WAVELENGTH
+        return np.asarray(np.hypot(u, v) < self.specular)
 
     def samples(self, wi: Array, wo: Array) -> Iterator[tuple[Array, Array]]:
-        """λₙ and Δλₙ, order by order, first along x and then along y."""
+        """Yield λₙ and Δλₙ, order by order, first along x and then along y."""
         u, v, _ = diffraction_coordinates(wi, wo)
         for period, frequency in zip(self.periods, (u, v), strict=True):
             if period is not None:
-                for _, wavelength, reached in _orders(period, frequency, self.wavelength_range):
-                    yield wavelength, np.where(reached, self._width(wavelength, frequency), 0.0)
+                for order in _orders(period, frequency, self.wavelength_range):
+                    width = self._width(order.wavelength, frequency)
+                    yield order.wavelength, np.where(order.in_range, width, 0.0)
 
-    def _takes(self, wi: Array, wo: Array, wavelength: Array) -> NDArray[np.bool_]:
-        """Whether a λₙ is within half a step, or the pair is close to the mirror direction."""
+    def _sampled(self, wi: Array, wo: Array, wavelength: Array) -> NDArray[np.bool_]:
+        """Return whether a λₙ is within half a step, or the pair is near the mirror direction."""
         u, v, _ = diffraction_coordinates(wi, wo)
-        taken = np.hypot(u, v) < self.specular
+        sampled = np.hypot(u, v) < self.specular
         for period, frequency in zip(self.periods, (u, v), strict=True):
             if period is not None:
                 path = 1e3 * period * np.abs(frequency)
                 nearest = np.maximum(np.round(path / wavelength), 1.0)
-                taken |= np.abs(path / nearest - wavelength) <= 0.5 * self._step
-        return taken
+                sampled |= np.abs(path / nearest - wavelength) <= 0.5 * self._step
+        return np.asarray(sampled)
 
     def _width(self, wavelength: Array, frequency: Array) -> Array:
-        """Δλ in nm."""
+        """Return Δλₙ in nm."""
         if self.weighting == "step":
             return np.full(len(wavelength), self._step)
         slope = np.maximum(np.abs(frequency), 1e-12)
         return 1e-3 * wavelength**2 / (2.0 * math.sqrt(math.pi) * self.sigma * slope)
 
 
+class _Order(NamedTuple):
+    """Order n of a period, its wavelengths λₙ (n,) in nm, and whether they are in the range."""
+
+    n: int
+    wavelength: Array
+    in_range: NDArray[np.bool_]
+
+
 def _orders(
     period: float, frequency: Array, wavelength_range: tuple[float, float]
-) -> Iterator[tuple[int, Array, NDArray[np.bool_]]]:
-    """Orders n of a period in µm, their wavelengths λₙ (n,) in nm, and which are in the range."""
+) -> Iterator[_Order]:
+    """Yield the orders of a period in µm at frequencies (n,)."""
     low, high = wavelength_range
-    path = 1e3 * period * np.abs(frequency)  # nm, of order 1
+    path = 1e3 * period * np.abs(frequency)  # λ₁, nm
     for n in range(1, math.floor(path.max(initial=0.0) / low) + 1):
         wavelength = path / n
-        reached = (low <= wavelength) & (wavelength <= high)
-        yield n, np.where(reached, wavelength, high), reached
+        in_range = (low <= wavelength) & (wavelength <= high)
+        yield _Order(n, np.where(in_range, wavelength, high), in_range)
 
 
 class Repeated(UniformMethod):
@@ -236,22 +245,22 @@ class Repeated(UniformMethod):
         S = |B(x, y)|² · D(2πx; N₁)² · D(2πy; N₂)²,
         D(t; N) = |sin(N t/2) / (N sin(t/2))|, and 1 where t is a multiple of 2π,
 
-    the stable form of the thesis' p + iq, with their N + 1 copies called N here. B is the
-    Fourier transform of exp(iκh) over one patch, from its DFT a_j about the patch's centre (without
-    that phase neighbours would cancel):
+    the stable form of the thesis' p + iq; N is the number of copies, N + 1 in the thesis. B is the
+    Fourier transform of exp(iκh) over one patch, from the DFT a_j about the patch's centre (about
+    its corner, neighbouring bins would cancel):
 
-    - "sinc": B = Σ_j a_j sinc(x − j_x) sinc(y − j_y), exact if all bins are summed; `taps` of them
-      nearest to (x, y) are, and order 0 always (the thesis takes 3);
-    - "linear": the same with (1 − |x − j_x|)(1 − |y − j_y|) for the two nearest bins along each
-      axis: wrong between bins, where a wide patch's B is not smooth.
+    - "sinc": B = Σ_j a_j sinc(x − j_x) sinc(y − j_y), exact if all bins are summed; the sum has the
+      `taps` bins nearest to (x, y) along each axis, and order 0 always (the thesis has 3);
+    - "linear": B = Σ_j a_j (1 − |x − j_x|)(1 − |y − j_y|) over the two nearest bins along each
+      axis: inaccurate between bins, where B of a wide patch is not smooth.
 
-    The coherent area is N₁Lx·N₂Ly: f = (1 + ωi·ωo)²·N₁N₂LxLy·S/(λ²w²cosθi cosθo). Its lobes have
-    the side lobes of a rectangle, and a patch that does not tile the surface in truth gets false
-    orders, 2π/Lx apart. Colours are summed as in `flss`.
+    The coherent area is N₁Lx·N₂Ly: f = (1 + ωi·ωo)²·N₁N₂LxLy·S/(λ²w²cosθi cosθo). Lobes have the
+    side lobes of a rectangle, and a patch of a surface that is not periodic gets false orders,
+    2π/Lx apart. Colours are summed as in `flss`.
 
     Parameters
     ----------
-    table : of any series, with coherence="patch" and enough taps; the thesis' is Taylor's.
+    table : table with coherence="patch" and enough taps, of any series; the thesis has Taylor's.
     repeats : (N₁, N₂), at least 1 each.
     interpolation : "linear" or "sinc".
     taps : bins read along each axis for "sinc".
@@ -280,8 +289,8 @@ class Repeated(UniformMethod):
             raise DiffractionError("method 'pq' adds amplitudes: its table needs coherence='patch'")
         self.name, self.table, self.repeats = name, table, repeats
         self._kernel: Kernel = np.sinc if interpolation == "sinc" else _tent
-        wanted = taps if interpolation == "sinc" else 2
-        self._taps = (min(wanted, table.grid.taps[0]), min(wanted, table.grid.taps[1]))
+        bins = taps if interpolation == "sinc" else 2
+        self._taps = (min(bins, table.grid.taps[0]), min(bins, table.grid.taps[1]))
         if interpolation == "linear" and min(self._taps) < 2:
             raise DiffractionError("method 'pq' needs a table of at least 2 taps")
         extents = [2.0 * np.pi / spacing for spacing in table.spacing]
@@ -290,7 +299,7 @@ class Repeated(UniformMethod):
         self._sum_over(wavelength_range, step)
 
     def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
-        """|B|²·D₁²·D₂²."""
+        """Return S = |B|²·D₁²·D₂²."""
         k = wavenumber(wavelength)
         u, v, w = diffraction_coordinates(wi, wo)
         amplitude = weighted_sum(
@@ -303,7 +312,7 @@ class Repeated(UniformMethod):
 
 
 def copies(x: Array, n: int) -> Array:
-    """D = |sin(πnx)/(n sin(πx))| for positions x in bins, 1 at whole numbers.
+    """Return D = |sin(πnx)/(n sin(πx))| at positions x in bins, 1 at whole numbers.
 
     x is reduced to the nearest whole number first, which keeps both sines exact.
     """
@@ -314,15 +323,16 @@ def copies(x: Array, n: int) -> Array:
 
 
 def _tent(distance: Array) -> Array:
+    """Return the weight 1 − |distance| of linear interpolation."""
     return np.maximum(0.0, 1.0 - np.abs(distance))
 
 
 class Rainbow(Method):
     """`rainbow`: every order of the grating equation d·|u| = nλ is equally strong.
 
-    What many shaders do (after Guardado, GPU Gems 2004, chapter 8): heights do not enter, nor does
-    the direction along the grooves, nor any decay towards grazing angles. The light of a Lambertian
-    reflector, 1/π, is redistributed over the spectrum by a comb of lines of mean 1,
+    Many shaders do this (after Guardado, GPU Gems 2004, chapter 8). It depends neither on heights,
+    nor on the direction along the grooves, nor does it decrease towards grazing angles. The light
+    of a Lambertian reflector, 1/π, is redistributed over the spectrum by a comb of lines of mean 1,
 
         f(λ) = 1/π · (2√π σ/d) Σ_n exp(−σ²(k|u| − 2πn/d)²),
 
@@ -334,8 +344,8 @@ class Rainbow(Method):
 
     Parameters
     ----------
-    period : along x or y.
-    coherence_width : µm, 4σ: width of the lines.
+    period : period along x or y.
+    coherence_width : 4σ in µm, which sets the width of the lines.
     wavelength_range : nm.
     """
 
@@ -353,25 +363,25 @@ class Rainbow(Method):
         self._density = 2.0 * math.sqrt(math.pi) * self.sigma / period.length
 
     def window_sum(self, wi: Array, wo: Array, wavelength: Array) -> Array:
-        """The comb, (2√π σ/d) Σ_n exp(−σ²(k|u| − 2πn/d)²): mean 1 over frequency."""
+        """Return the comb (2√π σ/d) Σ_n exp(−σ²(k|u| − 2πn/d)²), of mean 1 over frequency."""
         line = self._frequency(wi, wo) * wavenumber(wavelength) * self.period.length / (2 * np.pi)
         sharpness = (2.0 * np.pi * self.sigma / self.period.length) ** 2
-        # the nearest line on either side: others matter only where the window holds no period
+        # the nearest lines on either side; more only where the window is narrower than a period
         reach = max(1, math.ceil(3.0 / math.sqrt(sharpness)))
         offsets = np.round(line)[:, None] + np.arange(-reach, reach + 1)
         lines = np.exp(-sharpness * (line[:, None] - offsets) ** 2)
         return self._density * lines.sum(axis=1)
 
     def samples(self, wi: Array, wo: Array) -> Iterator[tuple[Array, Array]]:
-        """λₙ and the gaps between them, λₙ²/(d|u|)."""
+        """Yield λₙ and the gaps between them, λₙ²/(d|u|)."""
         frequency = self._frequency(wi, wo)
-        for n, wavelength, reached in _orders(self.period.length, frequency, self.wavelength_range):
-            yield wavelength, np.where(reached, wavelength / n, 0.0)
+        for order in _orders(self.period.length, frequency, self.wavelength_range):
+            yield order.wavelength, np.where(order.in_range, order.wavelength / order.n, 0.0)
 
     def relative(
         self, wi: ArrayLike, wo: ArrayLike, wavelength: ArrayLike, gain: Gain | None = None
     ) -> Array:
-        """Refused: there is no mirror that it would be relative to."""
+        """Raise an error: `rainbow` has no mirror that a reflectance could be relative to."""
         raise self._refused()
 
     def _xyz(self, wi: Array, wo: Array, gain: Gain | None) -> Array:
@@ -388,11 +398,13 @@ class Rainbow(Method):
         return self.window_sum(wi, wo, wavelength) / np.pi
 
     def _frequency(self, wi: Array, wo: Array) -> NDArray[np.float64]:
+        """Return |u| along x, or |v| along y, (n,)."""
         u, v, _ = diffraction_coordinates(wi, wo)
         return np.abs(u if self.period.axis == "x" else v)
 
     def _refused(self) -> DiffractionError:
+        """Return the error of a request for relative reflectance."""
         return DiffractionError(
-            "method 'rainbow' has no relative reflectance: it knows no mirror to compare with; "
+            "method 'rainbow' has no relative reflectance, since it has no mirror to compare with; "
             "leave it out, or ask for the BRDF"
         )

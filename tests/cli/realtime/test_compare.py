@@ -11,6 +11,8 @@ import pytest
 from mitsuba_diffraction import DiffractionTable
 from mitsuba_diffraction.heights import gratings
 
+pytestmark = pytest.mark.thorough
+
 SCENE = """<scene version="3.5.0">
   <sensor type="perspective"><float name="fov" value="30"/>
     <transform name="to_world"><lookat origin="0,-3,4" target="0,0,0" up="0,0,1"/></transform>
@@ -96,14 +98,14 @@ def test_a_scene_without_a_light_to_compare_under_is_refused(run, scene, some_va
     light = SCENE[SCENE.index("  <emitter") : SCENE.index("</scene>")]
     scene.write_text(SCENE.replace(light, '  <emitter type="constant"/>\n'))
     line = run("compare", scene).failed_in_one_line()
-    assert "no light with a direction or place" in line
+    assert "no light with a direction or position" in line
     assert not Path("plate_compare").exists()
 
 
 def test_a_method_that_does_not_suit_is_refused_before_anything_is_rendered(
     run, scene, some_variant, gl_works, monkeypatch
 ):
-    from mitsuba_diffraction.realtime.comparison import run as comparison
+    from mitsuba_diffraction.realtime.shader_comparison import run as comparison
 
     monkeypatch.setattr(comparison, "render_passes", lambda *_, **__: pytest.fail("rendered"))
     # the scene's table is of powers; nmm needs heights

@@ -9,6 +9,8 @@ from docs.make.figures import evaluation, pages
 from mitsuba_diffraction import DiffractionError
 from tests.support import ROOT
 
+pytestmark = pytest.mark.thorough
+
 DOCS = ROOT / "docs"
 
 

@@ -14,6 +14,8 @@ from mitsuba_diffraction.analysis.maps import Light
 from mitsuba_diffraction.analysis.pictures import colour_field, patches_figure
 from mitsuba_diffraction.heights.gratings import cd, elaphe_like
 
+pytestmark = pytest.mark.thorough
+
 # Takes the parameters that the snakes' scenes have; a white sky all around.
 SCENE = """<scene version="3.0.0">
   <default name="sun_azimuth" value="0"/><default name="light" value="it"/>

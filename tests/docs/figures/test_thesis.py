@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import pytest
 from PIL import Image
 
 from docs.make.figures import pages, thesis
 from mitsuba_diffraction.cli.options import METHODS
 from mitsuba_diffraction.thesis.sweeps import SWEEPS
 from tests.support import ROOT
+
+pytestmark = pytest.mark.thorough
 
 DOCS = ROOT / "docs"
 

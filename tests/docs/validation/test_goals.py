@@ -13,6 +13,8 @@ from docs.make.validation.models import compare_all
 from docs.make.validation.solutions import shipped
 from mitsuba_diffraction.optics import blend, boundary
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture(scope="module")
 def sides() -> goals.Sides:

@@ -13,6 +13,8 @@ from docs.make.validation.solutions import shipped
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.geometry import wavenumber
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.mark.parametrize("model", ["first_order", "small_slope"])
 def test_nowhere_on_keratin_is_it_worse_than_kirchhoff_by_more_than_a_tenth(model):

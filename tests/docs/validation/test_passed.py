@@ -10,6 +10,8 @@ from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.optics import boundary
 from tests.support.directions import polar
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.mark.parametrize("grating", passed.GRATINGS[:4], ids=str)
 def test_gratings_of_slope_up_to_a_tenth(grating):

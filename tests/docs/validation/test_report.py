@@ -11,6 +11,8 @@ from docs.make.validation.pages.markdown import joined, percent, table
 from docs.make.validation.pages.report import PAGES, page_path
 from tests.support import ROOT
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.mark.usefixtures("coarse")  # figures of energy need not be exact here
 def test_the_report_is_whole(tmp_path, capsys):

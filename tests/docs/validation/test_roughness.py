@@ -10,6 +10,8 @@ from docs.make.validation.model import in_plane
 from docs.make.validation.roughness import Roughness, mean_brdf, mean_order_0
 from mitsuba_diffraction import HeightField, reference
 
+pytestmark = pytest.mark.thorough
+
 #: Standard errors: a Gaussian's mean lies beyond once in 16000, and the seeds are fixed.
 DISTANCE = 4.0
 

@@ -14,6 +14,8 @@ from docs.make.validation.second_order import MODELS, amplitudes, cases_of_cells
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.optics import boundary
 
+pytestmark = pytest.mark.thorough
+
 WI = np.array([0.5, 0.3, np.sqrt(1 - 0.34)])
 INDICES = [1.56, 1.2 + 6.5j]
 

@@ -21,6 +21,8 @@ from tests.support.layered import PATCH, WIDTH, load, pairs
 from tests.support.transmitting import BELOW, INDICES, SIDES, OneSide, both, sampled
 from tests.support.variants import evaluate, runs
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.mark.parametrize("kind", SIDES)
 @pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])

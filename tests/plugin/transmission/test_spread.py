@@ -21,7 +21,10 @@ from tests.support.layered import pairs
 from tests.support.transmitting import BELOW, INDICES, SIDES, OneSide, both, sampled
 from tests.support.variants import evaluate, runs
 
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+pytestmark = [
+    pytest.mark.thorough,
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+]
 
 
 def steep(kind: str, width: float = 20.0, **parameters: Any) -> Any:

@@ -50,6 +50,8 @@ from mitsuba_diffraction.tables.energy.conservation import FINE, DirectionalTabl
 from mitsuba_diffraction.thesis.methods import make
 from tests.support.shaders import DAYLIGHT, PERFECT, difference, probed
 
+pytestmark = pytest.mark.thorough
+
 
 def places(n: int, seed: int = 1) -> NDArray[np.float64]:
     """(u, v, z, 1) of random pairs of directions, a sixth of them close to the specular one."""

@@ -14,12 +14,19 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from mitsuba_diffraction import DiffractionError
-from mitsuba_diffraction.realtime.comparison.truth import box_sensor, direct_light, seen
 from mitsuba_diffraction.realtime.glsl.camera import Camera
 from mitsuba_diffraction.realtime.glsl.emitters import Emitters, emission
 from mitsuba_diffraction.realtime.glsl.renderer import Renderer
+from mitsuba_diffraction.realtime.shader_comparison.path_traced import (
+    box_sensor,
+    direct_light,
+    visibility,
+)
 
-pytestmark = pytest.mark.filterwarnings("ignore:the realtime picture does not show")
+pytestmark = [
+    pytest.mark.thorough,
+    pytest.mark.filterwarnings("ignore:the realtime picture does not show"),
+]
 
 #: A disc light of radius 0.5 at the height 6, and the edge of a screen at the height 2.
 RADIUS, HIGH, EDGE = 0.5, 6.0, 2.0
@@ -384,7 +391,7 @@ def test_lobes_and_lights_share_what_surrounds_a_scene(
     light.release()
     once = direct_light(scene, renderer.camera)
     expected = np.array(mi.render(once, spp=512), float)[..., :3]
-    shapes = seen(once, renderer.lights)["shape"]
+    shapes = visibility(once, renderer.lights).shape
     renderer.release()
     numbers = [number for number in np.unique(shapes) if number > -2]
     assert len(numbers) == 1 + len(materials)
@@ -440,7 +447,7 @@ def test_a_lamp_may_reflect_other_light(
     light.advance(512)
     found, expected = light.image[..., :3], truth(renderer, 256)
     light.release()
-    shapes = seen(direct_light(scene, renderer.camera), renderer.lights)["shape"]
+    shapes = visibility(direct_light(scene, renderer.camera), renderer.lights).shape
     renderer.release()
     numbers = np.unique(shapes[shapes >= 0])
     assert len(numbers) == 2

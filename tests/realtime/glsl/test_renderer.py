@@ -17,14 +17,18 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import DiffractionError, DiffractionWarning
 from mitsuba_diffraction.optics.colour import delta_e, linear_srgb, response
 from mitsuba_diffraction.optics.fresnel import reflectance
-from mitsuba_diffraction.realtime.comparison.measures import regions
-from mitsuba_diffraction.realtime.comparison.truth import box_sensor, seen, with_lights
 from mitsuba_diffraction.realtime.glsl.context import check_version, headless_context
 from mitsuba_diffraction.realtime.glsl.renderer import Renderer
+from mitsuba_diffraction.realtime.shader_comparison.measures import regions
+from mitsuba_diffraction.realtime.shader_comparison.path_traced import (
+    box_sensor,
+    visibility,
+    with_lights,
+)
 from mitsuba_diffraction.tables.energy.conservation import FINE
 from tests.support.lanes import interaction, spectra, vectors
 
-pytestmark = pytest.mark.usefixtures("coarse")
+pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
 
 mi = pytest.importorskip("mitsuba")
 
@@ -135,7 +139,7 @@ def test_pictures_agree_with_path_traced_ones(renderer: Any) -> None:
     halves = [path_traced(scene, 1024, seed) for seed in (1, 2)]
     reference = 0.5 * (halves[0] + halves[1])
     every = np.ones(len(scene.shapes()), bool)
-    sees = seen(scene, renderer.lights)
+    sees = visibility(scene, renderer.lights)
     noise = 0.5 * delta_e(*halves)
     # the contract's figures are 1.0 and 0.5 without noise; the lights are small and sharp here
     for method, mean in (("lut", 0.7), ("spectral", 0.35)):
@@ -146,7 +150,7 @@ def test_pictures_agree_with_path_traced_ones(renderer: Any) -> None:
         both = areas["both"]
         assert np.nanmean(errors[both]) < mean + np.nanmean(noise[both]), method
         for number in range(len(scene.shapes())):
-            one = areas["both"] & (sees["shape"] == number)
+            one = areas["both"] & (sees.shape == number)
             assert one.sum() > 50
             # where light is concentrated, 2048 samples of it still scatter by 2 %
             bias = drawn[one, :3].sum() / reference[one].sum()

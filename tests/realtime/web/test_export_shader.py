@@ -22,6 +22,8 @@ from mitsuba_diffraction.optics.colour import delta_e
 from mitsuba_diffraction.realtime.glsl.export import export_shader, make_shader
 from tests.support.browser import PATIENCE
 
+pytestmark = pytest.mark.thorough
+
 THREE = "three@0.187.0"
 SITE = "http://shader.test/"
 SIDE = 96

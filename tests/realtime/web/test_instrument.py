@@ -15,6 +15,8 @@ from mitsuba_diffraction.optics.colour import delta_e
 from tests.support.browser import Tab
 from tests.support.pictures import of_the_desktop, picture
 
+pytestmark = pytest.mark.thorough
+
 SIZE = (240, 180)
 PHONE = (390, 844)
 

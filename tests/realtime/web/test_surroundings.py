@@ -14,6 +14,8 @@ from mitsuba_diffraction.realtime.web.export import make_page
 from tests.support.browser import SIZE, Tab
 from tests.support.pictures import of_the_desktop, picture
 
+pytestmark = pytest.mark.thorough
+
 SAMPLES = 16
 
 

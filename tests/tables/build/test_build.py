@@ -12,6 +12,8 @@ from mitsuba_diffraction.optics.geometry import kirchhoff_factor
 from tests.support.directions import lit_pairs, rough_patch
 from tests.support.patches import DEEP, DEFAULTS, PATCH, WIDTH, relative_error
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.mark.parametrize(
     ("basis", "tolerance"),

@@ -18,6 +18,8 @@ from mitsuba_diffraction.tables.build.choose import taylor_rounding
 from tests.support.directions import rough_patch
 from tests.support.patches import DEEP, DEFAULTS, PATCH
 
+pytestmark = pytest.mark.thorough
+
 
 def refused(**arguments):
     """The one line with which a table of PATCH, or of heights=…, is refused."""

@@ -11,6 +11,8 @@ from mitsuba_diffraction.reference import screen_power
 from mitsuba_diffraction.tables.build.error import FLOOR, NEAR, alternate, worst
 from tests.support.directions import rough_patch
 
+pytestmark = pytest.mark.thorough
+
 #: Odd and even, not square, nor are the pixels: 5.04 × 4.55 µm.
 PATCH = rough_patch((65, 56), (0.09, 0.07), 0.35)
 WIDTH = 4.0

@@ -10,7 +10,10 @@ from mitsuba_diffraction.optics.colour import response
 from mitsuba_diffraction.optics.geometry import diffraction_coordinates, sigma_of, wavenumber
 from mitsuba_diffraction.reference import screen_power
 
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
+pytestmark = [
+    pytest.mark.thorough,
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning"),
+]
 
 #: Tables and samples of each: together more than 10 000.
 TABLES, SAMPLES = 206, 50

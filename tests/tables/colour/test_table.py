@@ -15,6 +15,8 @@ from mitsuba_diffraction.tables.colour.table import ColourTable
 from mitsuba_diffraction.tables.store import VARIABLE, cached_colours, colour_record, colours_of
 from tests.support.directions import Array, rough_patch
 
+pytestmark = pytest.mark.thorough
+
 WIDTH = 10.0  # µm: wide lobes, which small tables hold
 
 

@@ -11,6 +11,8 @@ from mitsuba_diffraction.optics.fresnel import Filmed
 from mitsuba_diffraction.tables.energy.film import exponents
 from tests.support.directions import rough_patch
 
+pytestmark = pytest.mark.thorough
+
 RANGE = (400.0, 700.0)
 
 

@@ -11,7 +11,10 @@ from mitsuba_diffraction.tables.energy.fit import FEW_ORDERS, Samples, fitted, l
 from mitsuba_diffraction.tables.energy.grid import DirectionGrid
 from tests.support.reflecting import MATERIALS, grating, index_of, rough
 
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+pytestmark = [
+    pytest.mark.thorough,
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+]
 
 
 def pits() -> md.HeightField:

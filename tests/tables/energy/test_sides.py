@@ -15,6 +15,8 @@ from mitsuba_diffraction.tables.energy.grating import Grating, fractions, positi
 from mitsuba_diffraction.tables.energy.links import Link, Medium
 from mitsuba_diffraction.tables.energy.sides import Sides
 
+pytestmark = pytest.mark.thorough
+
 #: Between nodes of angles, azimuths and wavelengths.
 THETA, PHI = np.radians([1.0, 31.0, 46.0, 59.0, 74.0]), np.radians([11.0, 63.0, 184.0])
 

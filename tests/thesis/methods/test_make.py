@@ -23,7 +23,7 @@ def test_light_from_below_is_none(rough, of_rough):
         ("ray", {}, "method='ray' is unknown; choose one of default, flss"),
         ("flss", {"step": 0.0}, "step=0 nm does not fit"),
         ("flss", {"step": 900.0}, "step=900 nm does not fit"),
-        ("flss", {"wavelength_range": (700.0, 400.0)}, "wavelength_range=700, 400 nm is none"),
+        ("flss", {"wavelength_range": (700.0, 400.0)}, "wavelength_range=700, 400 nm"),
         ("flss", {"coherence": "some"}, "coherence='some' must be one of"),
         ("flss", {"terms": 3}, "terms=3 of basis='taylor' leave"),
         ("nmm", {"period": -1.0}, "period=-1.0 must be"),

@@ -26,14 +26,14 @@ def test_the_period_of_a_grating_is_found(length, axis):
     found, other = (x, y) if axis == "x" else (y, x)
     assert found.length == pytest.approx(length, rel=1e-3)
     assert found.confidence == pytest.approx(1.0, abs=1e-6)
-    assert not other.found
+    assert not other.reliable
 
 
 def test_a_snake_s_scale_has_a_period_across_its_fingers_only():
     x, y = estimate_periods(gratings.elaphe_like(32.0, 512))
-    assert x.found
+    assert x.reliable
     assert 0.9 < x.length < 1.2  # what it is made with (gratings.scales), some 1 µm
-    assert not y.found
+    assert not y.reliable
 
 
 @pytest.mark.parametrize("name", ["nmm", "rainbow"])
@@ -60,7 +60,7 @@ def test_nmm_with_the_width_of_lobes_is_the_whole_spectrum(grating, pairs_of_a_s
     settings = {"coherence_width": 240.0, "step": 0.5}
     full = methods.make("flss", grating, **settings)
     few = OrdersOnly(full, (2.0, None), weights="lobe")
-    away = ~few.special(np.broadcast_to(wi, wo.shape), wo)[0]
+    away = ~few.white_pairs(np.broadcast_to(wi, wo.shape), wo)
     assert away.sum() > 30
     exact, found = full.xyz(wi, wo[away]), few.xyz(wi, wo[away])
     # lobes are about 1 % of a wavelength wide; the observer's curves bend within them
@@ -70,7 +70,7 @@ def test_nmm_with_the_width_of_lobes_is_the_whole_spectrum(grating, pairs_of_a_s
 def test_nmm_of_the_thesis_is_too_blue(grating, pairs_of_a_sweep):
     wi, wo = pairs_of_a_sweep
     of = methods.make_all(("flss", "nmm"), grating, coherence_width=60.0)
-    away = ~of["nmm"].special(np.broadcast_to(wi, wo.shape), wo)[0]
+    away = ~of["nmm"].white_pairs(np.broadcast_to(wi, wo.shape), wo)
     shares = [m.xyz(wi, wo[away]).sum(axis=0) for m in of.values()]
     blue = [xyz[2] / xyz[0] for xyz in shares]
     assert blue[1] > 1.2 * blue[0]

@@ -1,4 +1,4 @@
-"""Pictures of docs/validation.md."""
+"""Pictures of the pages of the validation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the path tracer renders for comparison: all light once reflected, or few lights."""
+"""Path-traced references: direct light of all emitters, or of points and directions alone."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from ...optics.colour import daylight
 from ...plugin.memory import upload
 from ..glsl.camera import Camera
 from ..glsl.lights import Light
+from .measures import Visibility
 
-_RAYS = 4  # along either side of a pixel, to see what is there
+_RAYS = 4  # rays along either side of a pixel in `visibility`
 _STEP = 8  # samples per pixel of one pass
 
 
 def direct_light(scene: Any, camera: Camera) -> Any:
-    """The scene with its own emitters, whose light is reflected once at most.
+    """Return the scene with its emitters, whose light is reflected once at most.
 
     The result has one sensor, whose film averages evenly over each pixel.
     """
@@ -39,7 +40,7 @@ def direct_light(scene: Any, camera: Camera) -> Any:
 
 
 def with_lights(scene: Any, camera: Camera, lights: Sequence[Light]) -> Any:
-    """The scene's shapes under these lights alone, once reflected.
+    """Return the scene's shapes under these lights alone, whose light is reflected once.
 
     Shapes that emit light are left out: their light is among `lights`. The result has one sensor,
     whose film averages evenly over each pixel, as supersampling does.
@@ -48,7 +49,7 @@ def with_lights(scene: Any, camera: Camera, lights: Sequence[Light]) -> Any:
 
     parts: dict[str, Any] = {
         "type": "scene",
-        # lights without extent are never hit: no samples for that
+        # rays never hit lights without extent: no BSDF samples
         "integrator": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0},
         "sensor": box_sensor(replace(camera, lens=0.0)),
     }
@@ -61,7 +62,7 @@ def with_lights(scene: Any, camera: Camera, lights: Sequence[Light]) -> Any:
 
 
 def box_sensor(camera: Camera) -> Any:
-    """A sensor for this camera, whose film averages evenly over each pixel."""
+    """Return a sensor for this camera, whose film averages evenly over each pixel."""
     import mitsuba as mi
 
     width, height = camera.size
@@ -90,6 +91,7 @@ def box_sensor(camera: Camera) -> Any:
 
 
 def _emitter(light: Light) -> dict[str, Any]:
+    """Return the Mitsuba emitter of a light."""
     place = np.asarray(light.place, float)
     if place[3] == 0.0:
         towards = [-float(x) for x in place[:3]]
@@ -99,6 +101,7 @@ def _emitter(light: Light) -> dict[str, Any]:
 
 
 def _spectrum(light: Light) -> dict[str, Any]:
+    """Return the Mitsuba spectrum of a light, in the current variant."""
     import mitsuba as mi
 
     if not mi.is_spectral:
@@ -111,15 +114,8 @@ def _spectrum(light: Light) -> dict[str, Any]:
     }
 
 
-def seen(scene: Any, lights: Sequence[Light]) -> dict[str, NDArray[Any]]:
-    """What each pixel of a scene of `with_lights` sees, by rays through a grid in the pixel.
-
-    Returns
-    -------
-    shape : (height, width) index among the scene's shapes, −1 where there is nothing, and −2 where
-        rays differ.
-    lit : (height, width) whether all rays find every light that is above the surface, and one is.
-    """
+def visibility(scene: Any, lights: Sequence[Light]) -> Visibility:
+    """Trace a grid of rays in each pixel of a scene of `with_lights`."""
     import drjit as dr
     import mitsuba as mi
 
@@ -143,15 +139,16 @@ def seen(scene: Any, lights: Sequence[Light]) -> dict[str, NDArray[Any]]:
             for number in range(len(shapes)):
                 index = dr.select(si.shape == shapes[number], number, index)
             index = dr.select(si.is_valid(), index, -1)
-            found = np.array(index, np.int64).reshape(height, width)
-            first = found if first is None else first
-            same &= found == first
+            shape = np.array(index, np.int64).reshape(height, width)
+            first = shape if first is None else first
+            same &= shape == first
             lit &= _lit(scene, si, lights).reshape(height, width)
     assert first is not None
-    return {"shape": np.where(same, first, -2), "lit": lit}
+    return Visibility(np.where(same, first, -2), lit)
 
 
 def _lit(scene: Any, si: Any, lights: Sequence[Light]) -> NDArray[np.bool_]:
+    """Return whether every light above the surface reaches it, and at least one is above it."""
     import mitsuba as mi
 
     clear, any_above = mi.Mask(True), mi.Mask(False)
@@ -163,17 +160,19 @@ def _lit(scene: Any, si: Any, lights: Sequence[Light]) -> NDArray[np.bool_]:
         else:
             ray = si.spawn_ray_to(place)
             direction = place - si.p
-        # on the side that is seen
+        # above: on the side of the surface that the ray hits
         above = si.sh_frame.cos_theta(si.to_local(direction)) * si.wi.z > 0.0
         clear &= ~above | ~scene.ray_test(ray, si.is_valid() & above)
         any_above |= above
     return np.array(si.is_valid() & clear & any_above, bool)
 
 
-class Progressive:
-    """Direct light of a scene under these lights, as `truth.with_lights` has it.
+class PathTracing:
+    """Path-traced direct light of a scene under some lights (`with_lights`), pass by pass.
 
-    spp : samples per pixel in all.
+    Parameters
+    ----------
+    spp : samples per pixel in all passes.
     """
 
     def __init__(self, scene: Any, camera: Camera, lights: Sequence[Light], spp: int = 64) -> None:
@@ -183,19 +182,19 @@ class Progressive:
 
     @property
     def finished(self) -> bool:
-        """Whether all samples are taken."""
+        """Whether all passes are rendered."""
         return self.done >= self.spp
 
     def advance(self) -> None:
-        """Take the samples of one pass."""
+        """Render one pass."""
         import mitsuba as mi
 
-        taken = min(_STEP, self.spp - self.done)
-        image = mi.render(self._scene, spp=taken, seed=self.done)
-        self._sum += taken * np.array(image, np.float64)[..., :3]
-        self.done += taken
+        spp = min(_STEP, self.spp - self.done)
+        image = mi.render(self._scene, spp=spp, seed=self.done)
+        self._sum += spp * np.array(image, np.float64)[..., :3]
+        self.done += spp
 
     @property
     def image(self) -> NDArray[np.float32]:
-        """The picture so far, (height, width, 3), linear sRGB."""
+        """Mean of the passes so far, (height, width, 3), linear sRGB."""
         return (self._sum / max(self.done, 1)).astype(np.float32)

@@ -1,13 +1,13 @@
-"""How far a realtime picture is from the path-traced one of the same scene.
+"""Comparison of realtime pictures with path-traced pictures of the same scene.
 
 Contents
 --------
 Comparison    pictures, sheets, errors and times of both renderers, in a folder
-SameLights    a scene for both renderers, under the lights that both know
-difference    how far a picture is from its reference, over some of the pixels
-Difference    what that gives
+SameLights    one scene for both renderers, under lights that both support
+difference    compare a picture with its reference, over some of the pixels
+Difference    measures of that comparison
 delta_e       ΔE2000 of each pixel
-exposure_of   the factor that makes a picture's brightest pixels white
+exposure_of   factor with which a picture's brightest pixels are white
 """
 
 from __future__ import annotations

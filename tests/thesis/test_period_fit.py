@@ -11,7 +11,7 @@ from mitsuba_diffraction import DiffractionError, HeightField
 from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.spectra import dominant_periods
 from mitsuba_diffraction.thesis import methods
-from mitsuba_diffraction.thesis.evaluation import (
+from mitsuba_diffraction.thesis.period_fit import (
     Beam,
     Response,
     find_period,
@@ -47,7 +47,7 @@ def response_of(method, beam=None, angles=ANGLES, wavelengths=WAVELENGTHS) -> Re
 def test_the_blazed_grating_follows_the_grating_equation(of_blazed, name):
     ridge = ridge_of(response_of(of_blazed[name]))
     expected = Beam().grating_angles(WAVELENGTHS, 2.5, 1)
-    assert ridge.found.all()
+    assert ridge.has_maximum.all()
     # 0.05° is asked for; nmm knows its λₙ to half a step of 5 nm only, 0.1° here
     allowed = 0.1 if name == "nmm" else 0.05
     assert np.abs(ridge.angles - expected).max() < allowed
@@ -145,7 +145,7 @@ def test_a_bent_scale_has_the_period_of_its_fingers_across_them_only():
     bending = rough_patch((512, 512), (0.0625, 0.0625), 0.1, correlation=3.0).heights
     heights = gratings.xenopeltis_like(32.0, 512).heights + bending
     bent = HeightField(heights, 0.0625)
-    held = [one.period for one in dominant_periods(bent)]
+    held = [grating.period for grating in dominant_periods(bent)]
     method = methods.make("default", bent, tolerance=1e-2)
     response = response_of(method)
     fit = fit_period(ridge_of(response, period=find_period(response, held)))
@@ -158,7 +158,7 @@ def test_a_rough_patch_has_no_period_though_one_order_of_its_tile_is_brightest()
     rough = rough_patch((256, 256), (0.1, 0.1), 0.1, seed=4)
     response = response_of(methods.make("default", rough, tolerance=1e-2))
     assert fit_period(ridge_of(response)).residual < 0.01  # on a perfect line
-    assert find_period(response, [one.period for one in dominant_periods(rough)]) is None
+    assert find_period(response, [grating.period for grating in dominant_periods(rough)]) is None
 
 
 def test_the_second_order_is_told_from_the_first(of_blazed):

@@ -1,4 +1,4 @@
-"""What a comparison found: a sheet of pictures for each method, and all methods as Markdown."""
+"""Report of a comparison: a sheet of pictures for each method, and a Markdown table of all."""
 
 from __future__ import annotations
 
@@ -33,21 +33,26 @@ def write_sheet(
     full: Image | None,
     *,
     method: str,
-    found: Difference,
+    errors: Difference,
     compared: NDArray[np.bool_] | None,
     exposure: float,
 ) -> None:
-    """Write the sheet.
+    """Write a sheet: both pictures, their difference, and full transport.
 
-    path : an image file.
+    Parameters
+    ----------
+    path : image file.
     reference, other : direct light, path-traced and of the shader, linear sRGB (height, width, 3).
     full : full transport, or None.
-    method : of the shader.
-    found : over the pixels that count.
-    compared : those pixels, the map being pale elsewhere; None for all.
+    method : method of the shader.
+    errors : difference over the compared pixels.
+    compared : compared pixels; the map is pale elsewhere. None for all.
     exposure : factor on all pictures.
 
-    Raises a DiffractionError if it cannot be written.
+    Raises
+    ------
+    DiffractionError
+        If the file cannot be written.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -63,12 +68,13 @@ def write_sheet(
         axis.imshow(encode_srgb(exposure * np.asarray(image, float)))
         axis.set_title(title)
     least = 0.0 if compared is None else 0.01
-    errors = delta_e(reference, other, exposure=exposure, least=least)
+    distances = delta_e(reference, other, exposure=exposure, least=least)
     shown = axes[1, 0].imshow(
-        np.nan_to_num(errors), cmap="magma", vmin=0.0, vmax=_WORST,
+        np.nan_to_num(distances), cmap="magma", vmin=0.0, vmax=_WORST,
         alpha=None if compared is None else np.where(compared, 1.0, 0.25),
     )  # fmt: skip
-    title = f"difference, mean {found.delta_e_mean:.2f}, 99 % {found.delta_e_percentiles['99']:.1f}"
+    high = errors.delta_e_percentiles["99"]
+    title = f"difference, mean {errors.delta_e_mean:.2f}, 99 % {high:.1f}"
     if compared is not None:
         title += "\n(pale where shadows, edges and materials differ)"
     axes[1, 0].set_title(title, fontsize="medium")
@@ -80,9 +86,11 @@ def write_sheet(
 
 
 def markdown(document: dict[str, Any]) -> str:
-    """The methods' tables, over all pixels and under lights without extent; how it was measured.
+    """Return the methods' tables over all pixels and under points and directions, with notes.
 
-    document : what is in compare.json.
+    Parameters
+    ----------
+    document : content of compare.json.
     """
     slow = document["methods"].get("flss", {}).get("fragment_ns")
     rows = [_row(method, entry, slow) for method, entry in document["methods"].items()]
@@ -107,38 +115,41 @@ def markdown(document: dict[str, Any]) -> str:
 
 
 def _samples(document: dict[str, Any]) -> int:
-    """Of a pixel in a progressive frame."""
-    taken = [e["whole"]["samples"] for e in document["methods"].values() if "whole" in e]
-    return int(max(taken, default=0) / document["frames"])
+    """Return the samples per pixel in one progressive frame."""
+    samples = [e["whole"]["samples"] for e in document["methods"].values() if "whole" in e]
+    return int(max(samples, default=0) / document["frames"])
 
 
 def _whole_row(method: str, entry: dict[str, Any]) -> str:
-    found = entry["whole"]
-    direct, full = found["direct"], found["full"]
+    """Return the row of a method in progressive light, over all pixels."""
+    whole = entry["whole"]
+    direct, full = whole["direct"], whole["full"]
     return _line(
         method, direct["delta_e_mean"], direct["delta_e_percentiles"]["99"],
-        found["noise"]["delta_e_mean"], direct["flip"], direct["relative_rmse"],
-        full and full["delta_e_mean"], found["frame_ms"],
-        found["frame_ms"] / found["plain_frame_ms"],
+        whole["noise"]["delta_e_mean"], direct["flip"], direct["relative_rmse"],
+        full and full["delta_e_mean"], whole["frame_ms"],
+        whole["frame_ms"] / whole["plain_frame_ms"],
     )  # fmt: skip
 
 
 def _row(method: str, entry: dict[str, Any], slow: float | None) -> str:
-    found = entry["diffracting"]
+    """Return the row of a method under points and directions, over diffracting pixels."""
+    errors = entry["diffracting"]
     return _line(
-        method, found["delta_e_mean"], found["delta_e_percentiles"].get("99"), found["flip"],
-        found["relative_rmse"], entry["frame_ms"], entry["fragment_ns"],
+        method, errors["delta_e_mean"], errors["delta_e_percentiles"].get("99"), errors["flip"],
+        errors["relative_rmse"], entry["frame_ms"], entry["fragment_ns"],
         slow / entry["fragment_ns"] if slow else None, entry["look_up_ns"],
         entry["texture_bytes"] / 1e6,
     )  # fmt: skip
 
 
 def _line(method: str, *values: float | None) -> str:
+    """Return a line of a Markdown table."""
     return "| " + " | ".join([f"`{method}`", *map(plain_number, values)]) + " |"
 
 
 def plain_number(value: float | None) -> str:
-    """Three digits at most, no more than two after the point, never with an exponent."""
+    """Format a number with at most three digits, two after the point, and no exponent."""
     if value is None:
         return ""
     digits = 2 - math.floor(math.log10(value)) if value > 0.0 else 0

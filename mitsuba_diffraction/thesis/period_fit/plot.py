@@ -1,4 +1,4 @@
-"""Responses as pictures (Matplotlib): wavelength along x, viewing angle along y; CSV and NPZ."""
+"""Pictures of responses (Matplotlib), wavelength along x, viewing angle along y; CSV and NPZ."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from ...atomic import atomic_path
 from .ridge import Fit, Response, Ridge
 
-#: The picture spans this many powers of ten below its brightest point.
+#: Dynamic range of the picture in powers of ten.
 DECADES = 5.0
 # The thesis' colours: yellow is bright, green is dark; ridge red, grating equation blue.
 _MAP, _RIDGE, _GRATING = "viridis", "#e02020", "#3040ff"
@@ -31,15 +31,15 @@ def draw(
     *,
     largest: float | None = None,
 ) -> ScalarMappable:
-    """Draw a response, its ridge if there is one, and the grating equation for a period in µm.
+    """Draw a response, its ridge if any, and the grating equation for a period in µm if any.
 
     Parameters
     ----------
-    largest : 1/sr, brightest colour; by default the response's own maximum.
+    largest : 1/sr, value of the brightest colour; by default the maximum of the response.
 
     Returns
     -------
-    What a colour bar needs.
+    The colour scale, for a colour bar.
     """
     largest = float(response.values.max()) if largest is None else largest
     if not largest > 0.0:
@@ -54,9 +54,7 @@ def draw(
     if period is not None:
         expected = response.beam.grating_angles(response.wavelengths, period, order)
         label = f"grating equation, {1e3 * period:.4g} nm"
-        axes.plot(
-            response.wavelengths, expected, color=_GRATING, lw=1.3, ls=(0, (4, 3)), label=label
-        )
+        axes.plot(response.wavelengths, expected, color=_GRATING, lw=1.3, ls=_DASHES, label=label)
     if ridge is not None or period is not None:
         axes.legend(fontsize=7, loc="lower right", framealpha=0.85)
     axes.set_xlim(response.wavelengths[0], response.wavelengths[-1])
@@ -68,7 +66,7 @@ def figure(
     response: Response, ridge: Ridge | None, fit: Fit | None, period: float | None, *,
     order: int, title: str, notes: str,
 ) -> Figure:  # fmt: skip
-    """One response with axes, units, both curves, and below them how far they are apart."""
+    """Draw one response with both curves, and their difference in degrees below."""
     result = Figure(figsize=(7.4, 7.2), dpi=110, layout="constrained")
     upper, lower = result.subplots(2, 1, height_ratios=(4, 1), sharex=True)
     shown = draw(upper, response, ridge, period, order)
@@ -92,9 +90,9 @@ COLUMNS = ("wavelength_nm", "ridge_deg", "grating_deg", "difference_deg", "scatt
 def save_csv(
     path: str | os.PathLike[str], response: Response, ridge: Ridge, period: float, order: int
 ) -> None:
-    """Write the ridge and the grating equation for a period (µm), a wavelength a line.
+    """Write the ridge and the grating equation for a period (µm), one line per wavelength.
 
-    What does not exist (no maximum, no such order) is an empty field.
+    Fields without a maximum, or without an order at that wavelength, are empty.
     """
     expected = response.beam.grating_angles(response.wavelengths, period, order)
     columns = (
@@ -116,9 +114,9 @@ def save_npz(
     ridge: Ridge,
     period: float,
     order: int,
-    more: Mapping[str, object],
+    entries: Mapping[str, object],
 ) -> None:
-    """Write the response (wavelengths, angles, f·cosθo), both curves, and `more` entries."""
+    """Write the response (wavelengths, angles, f·cosθo), both curves, and further `entries`."""
     with atomic_path(path) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(
             stream,
@@ -132,5 +130,5 @@ def save_npz(
             period=period,
             order=order,
             method=response.label,
-            **more,  # type: ignore[arg-type]
+            **entries,  # type: ignore[arg-type]
         )

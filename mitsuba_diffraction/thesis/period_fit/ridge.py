@@ -1,6 +1,7 @@
-"""The ridge of maxima under a beam, and the period for which the grating equation runs along it.
+"""Ridge of maxima of a response, and the period for which the grating equation fits it.
 
-A virtual bench: a monochromatic beam, a detector that swings through its plane of incidence.
+The response is that of a virtual goniometer: a monochromatic beam, and a detector that swings
+through the plane of incidence.
 """
 
 from __future__ import annotations
@@ -22,46 +23,51 @@ Array = NDArray[np.float64]
 #: brdf(wi, wo, wavelength) in 1/sr for (n, 3), (n, 3) and (n,) nm.
 Brdf = Callable[[Array, Array, Array], Array]
 
+#: Largest number of values in a response: 160 MB.
 MOST_POINTS = 20_000_000
 
-#: Fewer maxima than this determine no period.
+#: Least number of maxima that determine a period.
 FEWEST = 5
-#: Share of the light on an order's side that a grating sends into the order, at least; and how much
-#: brighter its lobe is than what is within an octave.
+#: Least share of the light on an order's side that a grating sends into the order, and least ratio
+#: of the order's brightness to that of the surroundings, half an octave on either side.
 LEAST_SHARE, LEAST_RATIO = 0.05, 4.0
-# Relative half widths of an irregular grating's order and of what it is compared with.
+# Relative half widths of an irregular grating's order and of the surroundings.
 _SPREAD, _AROUND = 0.07, 0.5
-# A period found in the heights and one found in the light agree to this factor.
+# Largest factor between a period of the heights and the one of the light.
 _AGREES = 1.15
-# In units of 1/σ: beyond it exp(−25), 1e-11, is left of order 0's power.
+# Half width of order 0's lobe in units of 1/σ: beyond it exp(−25), 1e-11, of its power is left.
 _ORDER_0 = 5.0
-# Light this much weaker than the brightest order is the window's own tail, not a maximum.
+# Light this much weaker than the brightest order is the tail of the window, not a maximum.
 _FAINT = 1e-12
-# Periods that are tried, evenly spaced in frequency.
+# Number of periods that are tried, evenly spaced in frequency.
 _LINES = 4000
 
 
 @dataclass(frozen=True)
 class Beam(Light):
-    """Direction of the light, and with it the plane of incidence; parameters as of `Light`."""
+    """Direction of the light, which defines the plane of incidence; parameters of `Light`."""
 
     theta: float = 75.0
 
     @property
     def sine(self) -> float:
-        """sinθi."""
+        """Sine of the angle of incidence, sinθi."""
         return math.sin(math.radians(self.theta))
 
     def views(self, angles: Array) -> Array:
-        """ωo, (n, 3), for viewing angles in degrees, positive on the light's side of the normal."""
+        """Return ωo (n, 3) of viewing angles in degrees, positive on the light's side."""
         theta, phi = np.radians(angles), math.radians(self.phi)
         sine = np.sin(theta)
         return np.stack([sine * math.cos(phi), sine * math.sin(phi), np.cos(theta)], axis=-1)
 
     def grating_angles(self, wavelength: Array, period: float, order: int) -> Array:
-        """Viewing angles where sinθo = mλ/d − sinθi, degrees; NaN where there is none.
+        """Return the viewing angles with sinθo = mλ/d − sinθi, degrees, or NaN without an order.
 
-        wavelength : nm. period : µm.
+        Parameters
+        ----------
+        wavelength : λ, nm.
+        period : d, µm.
+        order : m.
         """
         sine = order * wavelength * 1e-3 / period - self.sine
         return np.degrees(np.arcsin(np.where(np.abs(sine) <= 1.0, sine, np.nan)))
@@ -69,16 +75,15 @@ class Beam(Light):
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """What leaves the patch, by wavelength and viewing angle."""
+    """Angle-resolved scatter of a patch, by wavelength and viewing angle."""
 
-    beam: Beam  # the light
+    beam: Beam
     wavelengths: Array  # (L,), nm
-    angles: Array  # (A,), degrees, rising
-    # (L, A), angle-resolved scatter f·cosθo in 1/sr: the share of the beam's power that a small
-    # detector gets, per solid angle
+    angles: Array  # (A,), degrees, ascending
+    # (L, A), f·cosθo in 1/sr: share of the beam's power per solid angle at a small detector
     values: Array
-    sigma: float  # µm, of the window; sets how far order 0 reaches
-    label: str  # which method
+    sigma: float  # σ of the window, µm, which sets the width of order 0
+    label: str  # name of the method
 
 
 def measure(
@@ -96,7 +101,7 @@ def measure(
     Raises
     ------
     DiffractionError
-        If there are too few or too many of either, or an angle is beyond ±90°.
+        If there are too few or too many wavelengths or angles, or an angle is beyond ±90°.
     """
     check_axes(wavelengths, angles)
     views = beam.views(angles)
@@ -111,7 +116,7 @@ def measure(
 
 
 def check_axes(wavelengths: Array, angles: Array) -> None:
-    """Refuse axes that make no plot."""
+    """Refuse axes with too few or too many values, or with values out of range."""
     if wavelengths.size < 2 or angles.size < 8:
         raise DiffractionError(
             f"{wavelengths.size} wavelengths and {angles.size} angles are too few; widen the ranges"
@@ -132,46 +137,44 @@ def check_axes(wavelengths: Array, angles: Array) -> None:
 class Ridge:
     """Viewing angle of the maximum at each wavelength."""
 
-    response: Response  # where it was found
-    order: int  # whose it is
-    angles: Array  # (L,), degrees; NaN where there is none
-    heights: Array  # (L,), f·cosθo there, 1/sr
+    response: Response
+    order: int
+    angles: Array  # (L,), degrees; NaN without a maximum
+    heights: Array  # (L,), f·cosθo at the maximum, 1/sr
 
     @property
-    def found(self) -> NDArray[np.bool_]:
-        """Wavelengths (L,) that have a maximum."""
+    def has_maximum(self) -> NDArray[np.bool_]:
+        """Whether a maximum exists at each wavelength, (L,)."""
         return np.isfinite(self.angles)
 
     @property
     def frequency(self) -> Array:
-        """|u| = |sinθi + sinθo| at the maxima, (L,)."""
+        """Coordinate |u| = |sinθi + sinθo| of the maxima, (L,)."""
         return np.abs(self.response.beam.sine + np.sin(np.radians(self.angles)))
 
 
 @dataclass(frozen=True)
 class Fit:
-    """The grating equation, fitted to a ridge."""
+    """Period of the grating equation that fits a ridge, and how well it fits."""
 
     period: float  # µm
-    residual: float  # degrees, root mean square of ridge less grating equation
-    largest: float  # degrees, the largest difference
-    # points, wavelengths: maxima that were found, of how many wavelengths
-    points: int
-    wavelengths: int
+    residual: float  # RMS difference of ridge and grating equation, degrees
+    largest: float  # largest difference, degrees
+    points: int  # number of maxima
+    wavelengths: int  # number of wavelengths
 
 
 def ridge_of(
     response: Response, order: int = 1, *, period: float | None = None, within: float = 1.1
 ) -> Ridge:
-    """At each wavelength, where the patch sends most light on the side of that order.
+    """Find the brightest viewing angle at each wavelength on the side of an order.
 
-    With a `period` in µm, only where the grating equation has a period up to `within` times larger
-    or smaller.
+    With a `period` in µm, only angles count that belong to periods up to `within` times larger or
+    smaller.
 
-    Order 0 is left out up to where its lobe ends, |u| = 5/(σk), and so is the other side of it: the
-    brightest point of what remains is taken, as in the thesis, between samples by a
-    parabola through the logarithms of three neighbours, which is exact for a Gaussian lobe. A
-    maximum at the end of the range is none.
+    The lobe of order 0, |u| < 5/(σk), and the other side of it are excluded. As in the thesis, the
+    brightest remaining sample is the maximum; a parabola through the logarithms of three neighbours
+    refines it, which is exact for a Gaussian lobe. Maxima at the end of the range do not count.
 
     Raises
     ------
@@ -194,7 +197,7 @@ def ridge_of(
     good &= around[1] > _FAINT * response.values.max(initial=0.0)
     before, middle, after = np.log(np.where(good & np.all(around > 0.0, axis=0), around, 1.0))
     bend = before - 2.0 * middle + after
-    curved = bend < 0.0  # not so where a method knows nothing of the neighbours
+    curved = bend < 0.0  # methods that sample few wavelengths may be 0 at the neighbours
     shift = np.where(curved, 0.5 * (before - after) / np.where(curved, bend, -1.0), 0.0)
     step = np.where(
         shift > 0.0,
@@ -207,11 +210,11 @@ def ridge_of(
 
 
 def find_period(response: Response, expected: Sequence[float], order: int = 1) -> float | None:
-    """Period of the strongest ridge that obeys the grating equation, µm; None if there is none.
+    """Return the period of the strongest ridge that obeys the grating equation, µm, or None.
 
-    Light that a grating sends lies at one u/λ for all wavelengths. So the response is averaged over
-    the wavelengths at each u/λ, and the ridge is that with the largest share of the light on the
-    order's side whose lobe also stands out of its surroundings.
+    An order of a grating has one u/λ at all wavelengths. So the response is averaged over the
+    wavelengths at each u/λ. The ridge is the u/λ with the largest share of the light on the order's
+    side, among those whose lobe is brighter than its surroundings.
 
     Parameters
     ----------
@@ -232,7 +235,7 @@ def find_period(response: Response, expected: Sequence[float], order: int = 1) -
         return None
     lines = np.linspace(first, last, _LINES)  # u/λ, 1/µm
     upward = np.argsort(u)
-    # in the grating equation's own units light falls with λ² (Stam 1999, eq. 7)
+    # as a function of u/λ, light decreases with λ² (Stam 1999, eq. 7)
     light = np.array([
         np.interp(lines * wavelength, u[upward], row[upward], left=np.nan, right=np.nan)
         * wavelength**2
@@ -242,7 +245,7 @@ def find_period(response: Response, expected: Sequence[float], order: int = 1) -
     if seen.sum() < FEWEST:
         return None
     lines, light = lines[seen], np.nanmean(light[:, seen], axis=0)
-    share, ratio = _standing_out(lines, light, response.sigma)
+    share, ratio = _contrast(lines, light, response.sigma)
     periods = abs(order) / lines
     agrees = np.zeros(periods.shape, bool)
     for period in expected:
@@ -253,19 +256,23 @@ def find_period(response: Response, expected: Sequence[float], order: int = 1) -
     return float(periods[np.where(strong, share, 0.0).argmax()])
 
 
-def _standing_out(lines: Array, light: Array, sigma: float) -> tuple[Array, Array]:
-    """Share of the light in a lobe around each of `lines` (n,), and its brightness over that of the
-    surroundings, both (n,).
+def _contrast(lines: Array, light: Array, sigma: float) -> tuple[Array, Array]:
+    """Return the contrast of a lobe around each of `lines` (n,).
+
+    Returns
+    -------
+    The lobe's share of the light, and the ratio of its brightness to the surroundings', both (n,).
     """
     step = lines[1] - lines[0]
     edges = np.append(lines, lines[-1] + step) - 0.5 * step
     total = np.append(0.0, np.cumsum(light)) * step
 
     def within(low: Array, high: Array) -> tuple[Array, Array]:
+        """Integrate the light from `low` to `high`; also return the clipped width."""
         low, high = np.clip(low, edges[0], edges[-1]), np.clip(high, edges[0], edges[-1])
         return np.interp(high, edges, total) - np.interp(low, edges, total), high - low
 
-    # three standard deviations of the window's own lobe, or the spread of an irregular grating
+    # three standard deviations of the window's lobe, or the spread of an irregular grating
     half = np.maximum(_SPREAD * lines, 3.0 / (2.0**1.5 * np.pi * sigma))
     lobe, width = within(lines - half, lines + half)
     far = np.maximum(_AROUND * lines, 1.5 * half)
@@ -275,35 +282,37 @@ def _standing_out(lines: Array, light: Array, sigma: float) -> tuple[Array, Arra
 
 
 def _frequencies(response: Response, order: int) -> Array:
-    """u = sinθi + sinθo (A,), positive on the side of an order."""
+    """Return u = sinθi + sinθo (A,), positive on the side of an order."""
     if order == 0:
-        raise DiffractionError("order=0 is the mirror's, at every wavelength; give 1, -1, 2, ...")
+        raise DiffractionError(
+            "order=0 is the mirror direction at every wavelength; give 1, -1, 2, ..."
+        )
     u = response.beam.sine + np.sin(np.radians(response.angles))
     return np.asarray(np.sign(order) * u)
 
 
 def fit_period(ridge: Ridge) -> Fit:
-    """The period d whose |mλ/d| is closest to the ridge's |u|.
+    """Fit the period d whose |mλ/d| is closest to the ridge's |u|.
 
-    Least squares in u, robust (soft L1 beyond the width of a lobe), since the ridge of an irregular
-    patch may jump between speckles at some wavelengths.
+    The fit is by least squares in u, soft L1 beyond the width of a lobe, since the ridge of an
+    irregular patch may jump between speckles at some wavelengths.
 
     Raises
     ------
     DiffractionError
         If there are fewer than `FEWEST` maxima.
     """
-    found = ridge.found
+    fitted = ridge.has_maximum
     response = ridge.response
-    if found.sum() < FEWEST:
+    if fitted.sum() < FEWEST:
         raise DiffractionError(
-            f"{response.label}: {found.sum()} of {found.size} wavelengths have a maximum on the "
+            f"{response.label}: {fitted.sum()} of {fitted.size} wavelengths have a maximum on the "
             f"side of order {ridge.order}, too few to fit a period to (at least {FEWEST}); widen "
             "the ranges of angles and wavelengths, or choose another order"
         )
     order = abs(ridge.order)
-    wavelength = response.wavelengths[found] * 1e-3
-    u = ridge.frequency[found]
+    wavelength = response.wavelengths[fitted] * 1e-3
+    u = ridge.frequency[fitted]
     lobe = float(np.median(1.0 / (response.sigma * wavenumber(response.wavelengths))))
     start = float(np.median(u / (order * wavelength)))
     result = least_squares(
@@ -311,13 +320,13 @@ def fit_period(ridge: Ridge) -> Fit:
         x_scale=start, xtol=1e-12, ftol=1e-12, gtol=1e-12,
     )  # fmt: skip
     period = float(1.0 / result.x[0])
-    expected = response.beam.grating_angles(response.wavelengths[found], period, ridge.order)
-    apart = ridge.angles[found] - expected
-    apart = apart[np.isfinite(apart)]
+    expected = response.beam.grating_angles(response.wavelengths[fitted], period, ridge.order)
+    difference = ridge.angles[fitted] - expected
+    difference = difference[np.isfinite(difference)]
     return Fit(
         period=period,
-        residual=float(np.sqrt(np.mean(apart**2))) if apart.size else np.nan,
-        largest=float(np.abs(apart).max()) if apart.size else np.nan,
-        points=int(found.sum()),
-        wavelengths=int(found.size),
+        residual=float(np.sqrt(np.mean(difference**2))) if difference.size else np.nan,
+        largest=float(np.abs(difference).max()) if difference.size else np.nan,
+        points=int(fitted.sum()),
+        wavelengths=int(fitted.size),
     )

@@ -1,10 +1,10 @@
-"""Numbers for the difference between two pictures."""
+"""Measures of the difference between two pictures."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +15,18 @@ from ...optics.colour import delta_e, encode_srgb
 
 Image = NDArray[np.floating]
 
-#: Percentiles of ΔE2000 that are given.
+#: Percentiles of ΔE2000 that a comparison reports.
 PERCENTILES = (50, 90, 99)
 
 
 @dataclass(frozen=True)
 class Difference:
-    """How far a picture is from its reference, over some of the pixels.
+    """Difference of a picture from its reference, over some of the pixels.
 
     Attributes
     ----------
-    pixels : how many.
-    share : of the picture.
+    pixels : number of these pixels.
+    share : their share of the picture.
     delta_e_mean, delta_e_percentiles : ΔE2000 as `colour.delta_e` defines it; NaN without pixels.
     flip : mean of FLIP (Andersson et al. 2020), low dynamic range, at its default viewing distance.
     relative_rmse : ‖difference‖ / ‖reference‖ of linear sRGB.
@@ -41,18 +41,18 @@ class Difference:
 
 
 def exposure_of(reference: Image) -> float:
-    """The factor with which a display clips one pixel in a hundred, and no more."""
+    """Return the factor with which a display clips one pixel in a hundred."""
     white = float(np.percentile(np.asarray(reference, float).max(axis=2), 99.0))
     return 1.0 / white if white > 0.0 else 1.0
 
 
 def flip_map(reference: Image, other: Image, exposure: float) -> NDArray[np.float32]:
-    """FLIP's error, 0 to 1, (height, width).
+    """Return the error by FLIP, 0 to 1, (height, width).
 
     Parameters
     ----------
     reference, other : (height, width, 3) linear sRGB.
-    exposure : what both are multiplied with.
+    exposure : factor on both pictures.
 
     Raises
     ------
@@ -65,20 +65,20 @@ def flip_map(reference: Image, other: Image, exposure: float) -> NDArray[np.floa
         raise DiffractionError(
             "FLIP needs flip-evaluator: pip install 'mitsuba-diffraction[gl]'"
         ) from error
-    shown = [
+    encoded = [
         encode_srgb(exposure * np.asarray(a, float)).astype(np.float32) for a in (reference, other)
     ]
-    found, _, _ = flip_evaluator.evaluate(*shown, "LDR", applyMagma=False)
-    return np.asarray(found, np.float32).reshape(shown[0].shape[:2])
+    errors, _, _ = flip_evaluator.evaluate(*encoded, "LDR", applyMagma=False)
+    return np.asarray(errors, np.float32).reshape(encoded[0].shape[:2])
 
 
 def difference(
     reference: Image, other: Image, mask: NDArray[np.bool_] | None, exposure: float
 ) -> Difference:
-    """How far a picture (height, width, 3) is from its reference over all pixels, or some.
+    """Compare a picture (height, width, 3) with its reference, over all pixels or those of a mask.
 
-    Of some, those that are nearly black do not count for ΔE2000. FLIP's filters reach into
-    neighbours: those outside the mask are taken to be alike.
+    With a mask, nearly black pixels do not count for ΔE2000. FLIP's filters reach neighbouring
+    pixels: outside the mask, both pictures are assumed to be equal.
     """
     least = 0.01 if mask is not None else 0.0
     if mask is None:
@@ -87,57 +87,66 @@ def difference(
     values = values[np.isfinite(values)]
     first, second = (np.asarray(image, float)[mask] for image in (reference, other))
     norm = float(np.linalg.norm(first))
-    nothing = math.nan
-    flip = nothing
+    flip = math.nan
     if mask.any():
         inside = np.where(mask[..., None], other, reference)
         flip = float(flip_map(reference, inside, exposure)[mask].mean())
     return Difference(
         pixels=int(mask.sum()),
         share=float(mask.mean()),
-        delta_e_mean=float(values.mean()) if values.size else nothing,
+        delta_e_mean=float(values.mean()) if values.size else math.nan,
         delta_e_percentiles={
-            str(p): float(np.percentile(values, p)) if values.size else nothing for p in PERCENTILES
+            str(p): float(np.percentile(values, p)) if values.size else math.nan
+            for p in PERCENTILES
         },
         flip=flip,
-        relative_rmse=float(np.linalg.norm(second - first)) / norm if norm > 0.0 else nothing,
+        relative_rmse=float(np.linalg.norm(second - first)) / norm if norm > 0.0 else math.nan,
     )
 
 
+class Visibility(NamedTuple):
+    """Shape and light of each pixel of a scene, (height, width)."""
+
+    # index among the scene's shapes, −1 for the background, −2 where rays in the pixel differ
+    shape: NDArray[np.int64]
+    # whether no ray in the pixel is in shadow, and at least one light is above the surface
+    lit: NDArray[np.bool_]
+
+
 def regions(
-    seen: dict[str, NDArray[Any]],
+    visibility: Visibility,
     exact: NDArray[np.bool_],
     diffracting: NDArray[np.bool_],
     coverage: NDArray[np.floating],
 ) -> dict[str, NDArray[np.bool_]]:
-    """Kinds of pixels, each without the one-pixel edges of what it consists of.
+    """Classify pixels; each class excludes one-pixel edges.
 
     Parameters
     ----------
-    seen : of `truth.seen`.
-    exact, diffracting : of each shape of its scene, whether all of its material is shown, and
-        whether it diffracts.
-    coverage : of the realtime picture, 0 to 1.
+    visibility : result of `path_traced.visibility`.
+    exact, diffracting : for each shape of the scene, whether the shaders support all of its
+        material, and whether it diffracts.
+    coverage : coverage of the realtime picture, 0 to 1.
 
     Returns
     -------
-    both : seen by both renderers and lit in both: what is compared.
-    diffracting : those of them that diffract.
-    shadow : lit in the realtime picture only.
-    other : shapes whose materials are shown otherwise, and where one of the two sees nothing.
-    edge : the rest.
+    both : pixels that both renderers show and light; they are compared.
+    diffracting : pixels of `both` that diffract.
+    shadow : pixels that only the realtime picture lights.
+    other : shapes whose materials differ, and pixels that only one renderer covers.
+    edge : all other pixels.
     """
-    shape, lit = seen["shape"], seen["lit"]
+    shape, lit = visibility
     whole = (shape >= 0) & (coverage > 0.999)
     index = np.maximum(shape, 0)
-    shown = whole & exact[index]
+    supported = whole & exact[index]
     same = np.ones_like(whole)
     for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
         neighbour = np.roll(shape, (dy, dx), axis=(0, 1)) == shape
         same &= neighbour & np.roll(neighbour, (-dy, -dx), axis=(0, 1))
-    both = binary_erosion(shown & lit, np.ones((3, 3)), border_value=1) & same
-    shadow = shown & ~lit
-    other = ((shape >= 0) & ~shown) | ((shape == -1) & (coverage > 0.0))
+    both = binary_erosion(supported & lit, np.ones((3, 3)), border_value=1) & same
+    shadow = supported & ~lit
+    other = ((shape >= 0) & ~supported) | ((shape == -1) & (coverage > 0.0))
     background = (shape == -1) & (coverage == 0.0)
     return {
         "both": both,

@@ -1,9 +1,9 @@
-"""One coherence window at many places of a patch, and the period that each of them shows.
+"""Periods of single coherence windows spread over a patch, and the thesis' procedure.
 
-`thesis_fit` is the procedure behind the thesis' published periods, so that they can be understood.
-It differs from the model in three ways: the phase is exp(ikh) where it should be exp(ikwh), the
-window sits on the patch's first pixel, and what is followed is the brightest speckle of that one
-window. What is plotted is its relative reflectance. For an exact grating none of that matters.
+`thesis_fit` is the procedure behind the thesis' published periods. It differs from the model in
+three ways: the phase is exp(ikh) instead of exp(ikwh), the one window is centred on the patch's
+first pixel, and the ridge is that window's brightest speckle, in relative reflectance. None of the
+three changes the period of an exact grating.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from ...tables.table import DiffractionTable
 from ..methods.method import Gain
 from .ridge import Array, Beam, Fit, fit_period, measure, ridge_of
 
+#: Largest number of windows: each costs a whole response.
 MOST_WINDOWS = 4096
 
 _SEED = 20140113
@@ -27,19 +28,19 @@ _SEED = 20140113
 
 @dataclass(frozen=True, eq=False)
 class WindowFits:
-    """Fits of single windows."""
+    """Fits of single coherence windows."""
 
-    places: Array  # (n, 2), centres of the windows, µm
-    fits: tuple[Fit | None, ...]  # as many; `None` where too few maxima were found
+    centres: Array  # (n, 2), centres of the windows, µm
+    fits: tuple[Fit | None, ...]  # one for each window; `None` with too few maxima
 
     @property
     def periods(self) -> Array:
-        """µm, of the windows that have one."""
+        """Periods of the windows that have a fit, µm."""
         return np.array([fit.period for fit in self.fits if fit is not None])
 
     @property
     def mean(self) -> float:
-        """µm."""
+        """Mean of `periods`, µm."""
         return float(self.periods.mean())
 
     @property
@@ -63,8 +64,8 @@ def window_fits(
 
     Parameters
     ----------
-    table : with coherence="patch".
-    period : µm; ridges are followed where the grating equation has up to half as much again.
+    table : table with coherence="patch".
+    period : µm; ridges are searched at periods up to 1.5 times larger or smaller.
 
     Raises
     ------
@@ -74,12 +75,12 @@ def window_fits(
     if not 1 <= count <= MOST_WINDOWS:
         raise DiffractionError(f"windows={count} must be from 1 to {MOST_WINDOWS}")
     extent = 2.0 * np.pi / np.array(table.spacing)
-    places = _lattice(count) * extent
+    centres = _lattice(count) * extent
     fits: list[Fit | None] = []
-    for n, place in enumerate(places):
-        moved = partial(table.brdf, place=place)
+    for n, centre in enumerate(centres):
+        brdf = partial(table.brdf, place=centre)
         response = measure(
-            moved, beam, wavelengths, angles, sigma=table.sigma, label=f"window {n + 1}"
+            brdf, beam, wavelengths, angles, sigma=table.sigma, label=f"window {n + 1}"
         )
         try:
             fits.append(fit_period(ridge_of(response, order, period=period, within=1.5)))
@@ -91,11 +92,11 @@ def window_fits(
         raise DiffractionError(
             f"none of {count} windows shows order {order} at enough wavelengths to fit a period to"
         )
-    return WindowFits(places, tuple(fits))
+    return WindowFits(centres, tuple(fits))
 
 
 def _lattice(count: int) -> Array:
-    """Places (count, 2) in [0, 1)²: a rank-1 lattice by the plastic number, with one offset."""
+    """Return points (count, 2) in [0, 1)²: a rank-1 lattice by the plastic number, shifted."""
     plastic = 1.32471795724474602596
     steps = np.arange(count)[:, None] * np.array([1.0 / plastic, 1.0 / plastic**2])
     return np.asarray((steps + np.random.default_rng(_SEED).random(2)) % 1.0)
@@ -104,18 +105,19 @@ def _lattice(count: int) -> Array:
 def thesis_fit(
     table: DiffractionTable, beam: Beam, wavelengths: Array, angles: Array, order: int = 1
 ) -> Fit:
-    """The period that its procedure finds, at viewing angles across the normal from the light.
+    """Fit a period by the thesis' procedure, at viewing angles across the normal from the light.
 
-    That is where it looks; on the light's own side its response grows towards the horizon. The
-    response is C·S at κ = k, the window on the corner, of a table with coherence="patch".
+    On the light's side, the response of the procedure grows towards the horizon. The response is
+    C·S at κ = k, with the window on the patch's corner, of a table with coherence="patch".
     """
     gain, across = Gain(), angles[angles <= 0.0]
 
     def relative(wi: Array, wo: Array, wavelength: Array) -> Array:
+        """Return the relative reflectance C·S with the phase exp(ikh)."""
         k = wavenumber(wavelength)
         u, v, _ = diffraction_coordinates(wi, wo)
         return gain.factor(wi, wo) * table.window_sum(k * u, k * v, k, (0.0, 0.0))
 
     label = "thesis' procedure"
-    found = measure(relative, beam, wavelengths, across, sigma=table.sigma, label=label)
-    return fit_period(ridge_of(found, order))
+    response = measure(relative, beam, wavelengths, across, sigma=table.sigma, label=label)
+    return fit_period(ridge_of(response, order))

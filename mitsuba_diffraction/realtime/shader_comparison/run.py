@@ -1,0 +1,335 @@
+"""Comparison of the shaders with the path tracer: pictures, sheets, errors and times."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import DiffractionError, DiffractionWarning, warn
+from ...progress import Progress, silent
+from ...scene.passes import Stop, render_passes, write_exr
+from ..glsl.context import clock_of
+from ..glsl.renderer import Renderer
+from ..glsl.scene import load
+from ..glsl.source import THESIS_METHODS
+from ..glsl.timing import fragment_times
+from .measures import difference, exposure_of, regions
+from .path_traced import box_sensor, direct_light, visibility, with_lights
+from .report import write_sheet
+
+#: Samples along either side of a pixel: fewer for the thesis' slow methods, whose errors are far
+#: larger than the noise, and at most so many for the others.
+_FEWER, _MOST = 2, 64
+_DETAIL = 1024  # largest number of samples per pixel under points and directions: little noise
+_STEP = 8  # frames between two reports of progress
+
+#: Only every `_SPARED`-th frame of methods other than `_QUICK` is drawn. Their difference from
+#: `_QUICK` with the same lights and samples has little noise; it is added to the picture of all
+#: frames by `_QUICK`.
+_QUICK, _SPARED = "lut", 8
+_IN_FRAME = 1 << 15  # samples that progressive light draws at once; fewer are not faster
+
+
+class SameLights:
+    """One scene for both renderers, lit only by directions and points.
+
+    Both renderers replace lights with an extent by points and directions: the sun of a sky by its
+    direction. The rest of the sky is left out of both.
+
+    Parameters
+    ----------
+    scene : a `mi.Scene` of the current variant, or an XML file.
+    sensor : index of the camera.
+    name : name of the scene in errors.
+
+    Attributes
+    ----------
+    renderer : renderer by shaders.
+    scene : scene for the path tracer; its one sensor averages evenly over each pixel.
+
+    Raises
+    ------
+    DiffractionError
+        If the scene has no light with a direction or position, or as of `glsl.Renderer`.
+    """
+
+    def __init__(self, scene: Any, *, sensor: int = 0, name: str = "the scene") -> None:
+        scene = load(scene)
+        self.renderer = Renderer(scene, sensor=sensor)
+        if not self.renderer.lights:
+            raise DiffractionError(
+                f"{name} has no light with a direction or position; add a directional or point "
+                "emitter, or a sky with a sun"
+            )
+        self.renderer.sky = np.zeros((4, 3))
+        self.scene = with_lights(scene, self.renderer.camera, self.renderer.lights)
+        self._visibility = visibility(self.scene, self.renderer.lights)
+        by_address = {surface.shape.ptr: surface for surface in self.renderer.scene.surfaces}
+        surfaces = [by_address.get(shape.ptr) for shape in self.scene.shapes()]
+        self._exact = np.array([s is not None and s.exact for s in surfaces])
+        self._diffracting = np.array(
+            [s is not None and s.material.bsdf is not None for s in surfaces]
+        )
+
+    def regions(self, picture: NDArray[np.floating]) -> dict[str, NDArray[np.bool_]]:
+        """Classify the pixels of a picture (height, width, 4) by `renderer`, see `regions`."""
+        return regions(self._visibility, self._exact, self._diffracting, picture[..., 3])
+
+
+@dataclass(frozen=True)
+class Halves:
+    """Two pictures with half of the samples each."""
+
+    first: Any
+    second: Any
+
+    @property
+    def mean(self) -> Any:
+        """Picture of all samples."""
+        return 0.5 * (self.first + self.second)
+
+    def noise(self, exposure: float, mask: Any = None) -> dict[str, float]:
+        """Estimate the ΔE2000 of the mean from a picture without noise: mean and 99 %."""
+        halves = difference(self.first, self.second, mask, exposure)
+        # the difference of the halves is twice the error of their mean
+        return {
+            "delta_e_mean": 0.5 * halves.delta_e_mean,
+            "delta_e_99": 0.5 * halves.delta_e_percentiles["99"],
+        }
+
+
+class ProgressivePicture(NamedTuple):
+    """Picture in progressive light, with samples along a side of a pixel, and seconds."""
+
+    picture: Halves
+    side: int
+    seconds: float
+
+
+@dataclass
+class Comparison:
+    """Parameters of a comparison, and its folder of pictures.
+
+    Attributes
+    ----------
+    scene : a `mi.Scene` of the current variant.
+    name : name of the scene's file.
+    variant : name of the current variant.
+    folder : folder of pictures (EXR) and sheets (PNG), created with the first file.
+    sensor : index of the camera.
+    spp, full_spp : samples per pixel of the direct light and of full transport; 0 leaves it out.
+    frames : frames of progressive light, for all methods but those of the thesis.
+    supersampling : samples of the shaders along either side of a pixel.
+    seed : seed of the random numbers.
+    progress : called as progress(done, total, text).
+    """
+
+    scene: Any
+    name: str
+    variant: str
+    folder: Path
+    sensor: int = 0
+    spp: int = 1024
+    full_spp: int = 64
+    frames: int = 512
+    supersampling: int = 8
+    seed: int = 0
+    progress: Progress = silent
+    same_lights: SameLights = field(init=False)
+    _progressive: dict[tuple[str, int], ProgressivePicture] = field(
+        init=False, repr=False, default_factory=dict
+    )
+
+    def __post_init__(self) -> None:
+        self.same_lights = SameLights(self.scene, sensor=self.sensor, name=f"'{self.name}'")
+
+    def run(self, methods: Sequence[str], *, leave_out: bool = False) -> dict[str, Any]:
+        """Draw with these methods of the shaders, path-trace, and measure.
+
+        Parameters
+        ----------
+        leave_out : warn of methods that do not support the surfaces, instead of raising errors.
+
+        Raises
+        ------
+        DiffractionError
+            Before anything is rendered, if a method does not support the surfaces.
+        KeyboardInterrupt
+            If the rendering was interrupted.
+        """
+        supported = [name for name in dict.fromkeys(methods) if self._supports(name, leave_out)]
+        renderer, full = self.same_lights.renderer, None
+        with Stop() as stop:
+            simple = self._halves(self.same_lights.scene, min(self.spp, _DETAIL), stop)
+            direct = self._halves(direct_light(self.scene, renderer.camera), self.spp, stop)
+            if self.full_spp:
+                sensor = box_sensor(renderer.camera)
+                full = self._path_trace(self.scene, sensor, self.full_spp, self.seed, stop)
+        reference = simple.mean
+        exposure = exposure_of(reference)
+        self._make_folder()
+        self._write(direct.mean, "direct", self.spp)
+        if full is not None:
+            self._write(full, "full", self.full_spp)
+        table, compared = self._compare_same_lights(supported, reference, exposure)
+        for method in supported:
+            if method not in THESIS_METHODS:
+                table[method]["whole"] = self._compare_all_light(method, direct, full)
+        return {
+            "scene": self.name, "variant": self.variant, "driver": renderer.driver,
+            "size": list(renderer.camera.size), "spp": self.spp, "exposure": exposure,
+            "lights": [light.name for light in renderer.lights],
+            "not_shown": list(renderer.scene.omissions),
+            "noise_delta_e_mean": simple.noise(exposure, compared)["delta_e_mean"],
+            "whole_noise": direct.noise(exposure_of(direct.mean)),
+            "clipped": float((direct.mean * exposure_of(direct.mean) > 1.0).any(axis=2).mean()),
+            "frames": self.frames,
+            "full_transport": None
+            if full is None
+            else difference(full, direct.mean, None, exposure_of(full)),
+            "methods": table,
+        }  # fmt: skip
+
+    def _supports(self, method: str, leave_out: bool) -> bool:
+        """Prepare a method's tables, and return whether it supports the surfaces."""
+        self.progress(0, 0, f"preparing {method}")
+        try:
+            self.same_lights.renderer.prepared(method)
+        except DiffractionError as error:
+            if not leave_out:
+                raise
+            warn(f"left out: {error}")
+            return False
+        return True
+
+    def _compare_all_light(self, method: str, direct: Halves, full: Any) -> dict[str, Any]:
+        """Compare all pixels in progressive light with direct light and with full transport."""
+        frames = self.frames if method == _QUICK else max(self.frames // _SPARED // 4 * 4, 4)
+        picture, side, seconds = self._draw_progressive(method, frames)
+        if method != _QUICK:
+            many, few = (self._draw_progressive(_QUICK, n).picture for n in (self.frames, frames))
+            picture = Halves(
+                many.first + (picture.first - few.first),
+                many.second + (picture.second - few.second),
+            )
+        exposure = exposure_of(direct.mean)
+        errors = difference(direct.mean, picture.mean, None, exposure)
+        self._write(picture.mean, f"{method}_whole", self.frames)
+        write_sheet(
+            self.folder / f"{method}.png", direct.mean, picture.mean, full, method=method,
+            errors=errors, compared=None, exposure=exposure,
+        )  # fmt: skip
+        renderer = self.same_lights.renderer
+        fine = (side * renderer.camera.size[0], side * renderer.camera.size[1])
+        return {
+            "direct": errors,
+            "full": None
+            if full is None
+            else difference(full, picture.mean, None, exposure_of(full)),
+            "noise": picture.noise(exposure),
+            "frames": frames,
+            "samples": self.frames * side**2,
+            "frame_ms": 1e3 * seconds / frames,
+            "plain_frame_ms": 1e3 * renderer.frame_time(method, size=fine, frames=3),
+        }
+
+    def _draw_progressive(self, method: str, frames: int) -> ProgressivePicture:
+        """Draw frames of progressive light; results are cached."""
+        if (method, frames) in self._progressive:
+            return self._progressive[method, frames]
+        renderer = self.same_lights.renderer
+        width, height = renderer.camera.size
+        side = min(self.supersampling, math.isqrt(max(_IN_FRAME // (width * height), 1)))
+        light = renderer.progressive(method, size=(side * width, side * height))
+        clock = clock_of(renderer.driver)
+        light.advance(2)  # compiles
+        light.restart()
+        halves, start = [], clock()
+        for half in range(2):
+            for done in range(0, frames // 2, _STEP):
+                self.progress(half * frames // 2 + done, frames, f"lighting {method}")
+                light.advance(min(_STEP, frames // 2 - done))
+            parts = light.image[..., :3].reshape(height, side, width, side, 3)
+            halves.append(parts.mean(axis=(1, 3), dtype=np.float64))
+        seconds = clock() - start
+        light.release()
+        picture = Halves(halves[0], 2.0 * halves[1] - halves[0])
+        self._progressive[method, frames] = ProgressivePicture(picture, side, seconds)
+        return self._progressive[method, frames]
+
+    def _compare_same_lights(
+        self, methods: Sequence[str], reference: Any, exposure: float
+    ) -> tuple[dict[str, dict[str, Any]], Any]:
+        """Return errors, times and memory of all methods, and the pixels that are compared."""
+        renderer, table = self.same_lights.renderer, {}
+        compared: Any = None
+        for n, method in enumerate(methods):
+            self.progress(n, len(methods), f"drawing with {method}")
+            samples = min(self.supersampling, _FEWER if method in THESIS_METHODS else _MOST)
+            with warnings.catch_warnings():  # other lights are left out of both renderers
+                warnings.simplefilter("ignore", DiffractionWarning)
+                drawn = renderer.render(method, supersampling=samples)
+            areas, picture = self.same_lights.regions(drawn), drawn[..., :3]
+            compared = areas["both"]
+            errors = {
+                name: difference(reference, picture, mask, exposure) for name, mask in areas.items()
+            }
+            seconds = renderer.frame_time(method, frames=1 if method in THESIS_METHODS else 3)
+            self._write(picture, method, samples**2)
+            if method in THESIS_METHODS:
+                write_sheet(
+                    self.folder / f"{method}.png", reference, picture, None, method=method,
+                    errors=errors["diffracting"], compared=compared, exposure=exposure,
+                )  # fmt: skip
+            table[method] = {
+                "supersampling": samples,
+                "frame_ms": 1e3 * seconds,
+                "texture_bytes": renderer.texture_bytes(method),
+                **errors,
+            }
+        self.progress(0, 1, "timing fragments")
+        for method, times in fragment_times(renderer, tuple(table)).items():
+            table[method]["fragment_ns"] = 1e9 * times["whole"]
+            table[method]["look_up_ns"] = 1e9 * times["look_up"]
+        return table, compared
+
+    def _halves(self, scene: Any, spp: int, stop: Stop) -> Halves:
+        """Path-trace a scene by its first sensor, in two halves of the samples."""
+        sensor, seeds = scene.sensors()[0], (2 * self.seed, 2 * self.seed + 1)
+        return Halves(*(self._path_trace(scene, sensor, spp // 2, s, stop) for s in seeds))
+
+    def _path_trace(self, scene: Any, sensor: Any, spp: int, seed: int, stop: Stop) -> Any:
+        """Path-trace a picture (height, width, 3)."""
+        result = render_passes(
+            scene, sensor, spp=spp, seed=seed, variant=self.variant, stop=stop,
+            progress=self.progress,
+        )  # fmt: skip
+        if result.interrupted:
+            raise KeyboardInterrupt
+        return np.array(result.bitmap, np.float32)[..., :3]
+
+    def _make_folder(self) -> None:
+        """Create the folder of pictures."""
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise DiffractionError(
+                f"cannot make the folder '{self.folder}': {error.strerror}; choose another"
+            ) from error
+
+    def _write(self, image: Any, name: str, samples: int) -> None:
+        """Write a picture as EXR, with scene, variant and samples per pixel."""
+        import mitsuba as mi
+
+        origin: dict[str, str | int] = {
+            "scene": self.name, "variant": self.variant, "spp": samples,
+        }  # fmt: skip
+        bitmap = mi.Bitmap(np.ascontiguousarray(image, np.float32), mi.Bitmap.PixelFormat.RGB)
+        write_exr(bitmap, self.folder / f"{name}.exr", origin)

@@ -1,0 +1,198 @@
+"""The default model in one file: light that a rough surface reflects (NumPy, float64).
+
+A surface of heights h(r) tiles the plane. Light of wavelength λ arrives from ωi and leaves along
+ωo, unit vectors that point away from the surface; n = η + ik is the material's index over that of
+the medium above it. Lengths are in µm. The equations have the numbers of docs/theory.md:
+
+    (u, v, w) = ωi + ωo,   k = 2π/λ,   q = k (u, v),   κ = k w                                  (1)
+    a_j(κ) = mean of exp(iκh) exp(i q_j·r) over the pixels                                      (2)
+    ⟨|P|²⟩ = 4π²σ⁴ Σ_j F_j |a_j|² exp(−σ²|q − q_j|²)                                            (3)
+    f = 4 cosθi cosθo N / (λ² A w²) · ⟨|P|²⟩,   A = πσ²                                         (4)
+    N = ½ Σ |J|² over the four entries of J                                                     (5)
+    J = (1 − s) K + s B                                                                         (6)
+    K = (1 + ωi·ωo) / (2 cosθi cosθo) · T(ωo) diag(r_s, r_p) T(ωi)                              (7)
+    B = (ε − 1) · [the four entries in `small_slope`],   ε = n²                                 (8)
+    s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3),   R₀ = |(n − 1)/(n + 1)|²                                (9)
+    F_j = |1 + x_j|²,   x_j = s (c_l r_l + c_t r_t), |x_j| at most ½,   F_0 = 1                (10)
+
+(2) are orders of the phase screen exp(iκh); (3) is the power under a Gaussian window exp(−r²/2σ²),
+averaged over its positions (Stam 1999, eq. 7–12). K is Kirchhoff's tangent plane: Fresnel's r_s and
+r_p at the half vector, T the turn between the axes of the surface and the facet's. B is first-order
+small slope (Rice 1951; Voronovich 1985), (10) its second order (Voronovich 1994). Rows and columns
+of J are s and p, outgoing and incoming. Indices and results are arrays (n,) as `Light`'s are.
+coat.py, film.py and transmission.py wrap this.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..heights.field import HeightField
+from ..optics.blend import ScaleRoughness
+from ..optics.boundary import facet_axis, jones_matrix, polarisation_axes, turn, unpolarised
+from ..optics.fresnel import Index, amplitudes, decaying_root, reflectance
+from ..optics.second_order import slope_coefficients
+from ..optics.slope_ratios import Slopes, along
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class Light(NamedTuple):
+    """Directions ωi and ωo (n, 3), and wavelengths (n,) in nm, in the medium above the surface."""
+
+    wi: Real
+    wo: Real
+    wavelength: Real
+
+
+def default_brdf(
+    field: HeightField,
+    light: Light,
+    index: Complex,
+    sigma: float,
+    second_order: bool,
+    measure: Callable[[Complex], Real] = unpolarised,
+) -> Real:
+    """BRDF of the default model, 1/sr; `measure` is N of (5), or a Mueller matrix in its place."""
+    s = share(field, light, index)
+    jones = blended(kirchhoff(light, index), small_slope(light, index), s)
+    power = ensemble_power(field, light, sigma, (index, s) if second_order else None)
+    return reflected(light, sigma, power, jones, measure)
+
+
+def reflected(
+    light: Light, sigma: float, power: Real, jones: Complex, measure: Callable[[Complex], Real]
+) -> Real:
+    """f of (4) from ⟨|P|²⟩ and J."""
+    cos_i, cos_o = light.wi[:, 2], light.wo[:, 2]
+    lam, w = light.wavelength * 1e-3, cos_i + cos_o
+    factor = 4 * cos_i * cos_o / (lam**2 * np.pi * sigma**2 * w**2)
+    return (factor * power * measure(jones).T).T
+
+
+def ensemble_power(
+    field: HeightField, light: Light, sigma: float, second: tuple[Complex, Real] | None
+) -> Real:
+    """⟨|P|²⟩ of (3) in µm⁴; second : index and share s for the factors of (10), else F_j = 1."""
+    k, power = 2e3 * np.pi / light.wavelength, np.zeros(len(light.wavelength))
+    slopes = None if second is None else Slopes.of(field.heights, field.pixel_size)
+    for n, (wi, wo) in enumerate(zip(light.wi, light.wo, strict=True)):
+        # (1): the frequency q and the phase per height κ
+        u, v, w = wi + wo
+        q, kappa = (k[n] * u, k[n] * v), k[n] * w
+        screen = np.exp(1j * kappa * field.heights)
+        orders = orders_near(q, sigma, screen, field.pixel_size)
+        factors: Real | float = 1.0
+        if second is not None and slopes is not None:
+            c = slope_coefficients(wi, wo[None], second[0][n])[0]
+            factors = second_order_factors(orders, screen, slopes, c, second[1][n])
+        power[n] = window_sum(orders, q, sigma, factors)
+    return power
+
+
+class Orders(NamedTuple):
+    """Orders about q: q_j along x and y, plane waves exp(i q_j·r) at the pixels, and a_j (y, x)."""
+
+    qx: Real
+    qy: Real
+    waves_x: Complex
+    waves_y: Complex
+    a: Complex
+
+
+def orders_near(
+    q: tuple[float, float], sigma: float, screen: Complex, pixel_size: tuple[float, float]
+) -> Orders:
+    """Orders (2) of a screen (ny, nx) that the window about q reaches."""
+    ny, nx = screen.shape
+    qx, waves_x = plane_waves(nx, pixel_size[0], q[0], sigma)
+    qy, waves_y = plane_waves(ny, pixel_size[1], q[1], sigma)
+    return Orders(qx, qy, waves_x, waves_y, waves_y @ screen @ waves_x.T / (nx * ny))
+
+
+def plane_waves(n: int, pixel: float, q: float, sigma: float) -> tuple[Real, Complex]:
+    """Frequencies q_j of a DFT of n pixels near q, and exp(i q_j x) at the pixels."""
+    # exp(−8.6²/2) = 9e-17: amplitudes farther from q are below the last bit of the sum
+    spacing, reach = 2 * np.pi / (n * pixel), 8.6 / sigma
+    first, last = np.ceil((q - reach) / spacing), np.floor((q + reach) / spacing)
+    # A DFT of an even number of points has −n/2 but not +n/2
+    j = np.arange(max(first, -(n // 2)), min(last, (n - 1) // 2) + 1)
+    turns = np.outer(j, np.arange(n)) % n  # exact integers keep the phase exact
+    return j * spacing, np.exp(2j * np.pi / n * turns)
+
+
+def window_sum(
+    orders: Orders, q: tuple[float, float], sigma: float, factors: Real | float
+) -> float:
+    """4π²σ⁴ Σ_j F_j |a_j|² exp(−σ²|q − q_j|²) of (3)."""
+    window_x = np.exp(-0.5 * (sigma * (q[0] - orders.qx)) ** 2)
+    window_y = np.exp(-0.5 * (sigma * (q[1] - orders.qy)) ** 2)
+    total = window_y**2 @ (factors * np.abs(orders.a) ** 2) @ window_x**2
+    return float(4 * np.pi**2 * sigma**4 * total)
+
+
+def second_order_factors(
+    orders: Orders, screen: Complex, slopes: Slopes, c: Complex, s: float
+) -> Real:
+    """F_j of (10), (y, x); c : c_l and c_t, the second order's kernel for these directions."""
+    # D: spectra of the products xx, xy, yy of the filtered slopes, times the screen
+    spectra = orders.waves_y @ (slopes.products * screen) @ orders.waves_x.T / screen.size
+    q = np.stack(np.meshgrid(orders.qx, orders.qy), axis=-1)
+    others = np.any(q != 0, axis=-1) & (orders.a != 0)  # F_0 = 1
+    # r = a D*/|a|² along and across q_j, times the gate of the slopes
+    r = along(q[others], np.moveaxis(spectra[:, others], 0, -1)) / orders.a[others][:, None]
+    x = s * (slopes.gate * np.conj(r) @ c)
+    factors = np.ones(orders.a.shape)
+    factors[others] = np.abs(1.0 + x / np.maximum(1.0, np.abs(x) / 0.5)) ** 2
+    return factors
+
+
+def blended(tangent_plane: Complex, gentle: Complex, s: Real) -> Complex:
+    """J of (6) from K and B."""
+    return (1 - s[:, None, None]) * tangent_plane + s[:, None, None] * gentle
+
+
+def share(field: HeightField, light: Light, index: Index) -> Real:
+    """s of (9), the part of small slope in J."""
+    total, k = light.wi + light.wo, 2e3 * np.pi / light.wavelength
+    q = k * np.hypot(total[:, 0], total[:, 1])
+    # σ_q² = Σ_q' |h_q'|² (1 − exp(−(4q'/q)⁴)) exp(−(q'/2q)⁴), h_q' the heights' spectrum
+    variance = ScaleRoughness.of(field.heights, field.pixel_size).at(q)
+    roughness = np.square(k * total[:, 2]) * variance  # (κσ_q)²
+    return np.exp(-roughness * (0.5 * reflectance(1.0, index) + roughness / 3))
+
+
+def kirchhoff(light: Light, index: Complex) -> Complex:
+    """K of (7), (n, 2, 2)."""
+    wi, wo, _ = light
+    s_in, s_out = polarisation_axes(wi, wo)
+    axis, half = facet_axis(wi, wo, s_in), wi + wo
+    # |ωi + ωo|²/2 = 1 + ωi·ωo, and cosθ at the half vector is √((1 + ωi·ωo)/2)
+    one_plus_dot = 0.5 * np.sum(half * half, axis=1)
+    r_s, r_p = amplitudes(np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0)), index)
+    facet = jones_matrix(ss=r_s, sp=0.0, ps=0.0, pp=r_p)
+    turned = turn(s_out, axis, wo) @ facet @ turn(axis, s_in, -wi)
+    return (one_plus_dot / (2 * wi[:, 2] * wo[:, 2]))[:, None, None] * turned
+
+
+def small_slope(light: Light, index: Complex) -> Complex:
+    """B of (8), (n, 2, 2); k0, k̂0 and k, k̂ are tangential parts of −ωi and ωo over 2π/λ."""
+    wi, wo, _ = light
+    (x0, y0, _), (x, y, _) = (axis.T for axis in polarisation_axes(wi, wo))
+    dot, cross = x0 * x + y0 * y, x0 * y - y0 * x  # k̂·k̂0 and ẑ·(k̂0×k̂)
+    k0, k, epsilon = np.hypot(wi[:, 0], wi[:, 1]), np.hypot(wo[:, 0], wo[:, 1]), index * index
+    inside0, inside = decaying_root(epsilon - k0**2), decaying_root(epsilon - k**2)
+    s0, s = 1 / (wi[:, 2] + inside0), 1 / (wo[:, 2] + inside)
+    p0, p = 1 / (epsilon * wi[:, 2] + inside0), 1 / (epsilon * wo[:, 2] + inside)
+    entries = jones_matrix(
+        ss=-s * s0 * dot,
+        sp=s * (inside0 * p0) * cross,
+        ps=(inside * p) * s0 * cross,
+        pp=(inside * p) * (inside0 * p0) * dot - epsilon * p * p0 * k * k0,
+    )
+    return entries * (epsilon - 1)[:, None, None]

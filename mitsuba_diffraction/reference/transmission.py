@@ -1,0 +1,69 @@
+"""Wrapper of the model: light that goes through a dielectric (`optics.through`)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import DiffractionError
+from ..heights.field import HeightField
+from ..optics import blend, boundary, through
+from ..optics.coat import refracted
+from ..optics.geometry import sigma_of, wavenumber
+from ..settings import checked
+from .arguments import directions_of, index_of, model_of, width_of
+from .integral import screen_power
+
+
+def btdf(
+    field: HeightField,
+    wi: ArrayLike,
+    wo: ArrayLike,
+    wavelength: ArrayLike,
+    *,
+    eta: float,
+    thin: bool = False,
+    coherence_width: float = 65.0,
+    coherence: str = "ensemble",
+    model: str | None = None,
+) -> NDArray[np.float64]:
+    """BTDF of a dielectric with these heights over n², symmetric in both directions, (n,), 1/sr.
+
+    Radiance in the dielectric over n² is transmitted by the BTDF over n² (`optics.through`).
+    Arguments and errors as for `brdf`, except:
+
+    wi, wo : above and below the surface, in any order; below, in the dielectric.
+    eta : real index of the dielectric, above 1.
+    thin : whether the direction below is outside of a thin sheet, beyond its flat other side.
+    """
+    width = width_of(coherence_width)
+    checked("coherence", coherence)
+    first, second, lam = directions_of(wi, wo, wavelength)
+    model = model_of(model, index_of(eta, 0.0, lam, None))
+    if not 1.0 < float(eta) < np.inf:
+        raise DiffractionError(f"eta={eta} must be one real index above 1")
+    swapped = first[:, 2:] < 0
+    above, below = np.where(swapped, second, first), np.where(swapped, first, second)
+    lit = (above[:, 2] > 0) & (below[:, 2] < 0)
+    above, below = (
+        np.where(lit[:, None], w, [0.0, 0.0, side]) for w, side in ((above, 1.0), (below, -1.0))
+    )
+    inside = below
+    if thin:
+        inside = refracted(below * [1, 1, -1], eta) * [1, 1, -1]
+    k, total = wavenumber(lam), above + eta * inside
+    kappa, sigma = -k * total[:, 2], sigma_of(width)
+    roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
+    jones = through.kirchhoff(above, inside, eta)
+    if model == "small_slope":
+        s = blend.weight(kappa, roughness.at(k * np.hypot(*total[:, :2].T)), eta)[:, None, None]
+        jones = np.asarray((1 - s) * jones + s * through.small_slope(above, inside, eta))
+    if thin:
+        jones = through.out_of_sheet(jones, above, below, eta)
+    power = [
+        screen_power(np.exp(1j * phase * field.heights), field.pixel_size, x, y, sigma, coherence)
+        for phase, (x, y) in zip(kappa, -k[:, None] * total[:, :2], strict=True)
+    ]
+    cosines = -4 * above[:, 2] * eta * inside[:, 2]
+    factor = cosines / ((lam * 1e-3) ** 2 * np.pi * sigma**2 * total[:, 2] ** 2)
+    return np.where(lit, factor * boundary.unpolarised(jones) * power, 0.0)

@@ -1,0 +1,25 @@
+"""Periods of a patch from its response to a monochromatic beam, by the grating equation (NumPy).
+
+Contents
+--------
+Beam            direction of the light, and the plane of the detector
+Response        angle-resolved scatter of a method, by wavelength and viewing angle
+measure         response of a method to a beam
+Ridge           viewing angle of the maximum at each wavelength
+ridge_of        ridge of one order
+Fit             period of the grating equation that fits a ridge
+fit_period      fit of that period
+find_period     period of the strongest ridge that obeys the grating equation, if one does
+window_fits     fits to single coherence windows spread over the patch
+thesis_fit      procedure behind the thesis' published periods
+"""
+
+from __future__ import annotations
+
+from .ridge import Beam, Fit, Response, Ridge, find_period, fit_period, measure, ridge_of
+from .windows import thesis_fit, window_fits
+
+__all__ = [
+    "Beam", "Fit", "Response", "Ridge", "find_period", "fit_period", "measure", "ridge_of",
+    "thesis_fit", "window_fits",
+]  # fmt: skip
