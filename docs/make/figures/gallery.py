@@ -116,7 +116,7 @@ PICTURES = (
     _scene(
         "film", "A diffraction film before lamps",
         "A thin sheet with shallow waves on one side (`diffraction_dielectric`): each lamp stands "
-        "spectra.",
+        "between its spectra.",
     ),
     _scene(
         "spectrometer", "A grating spectrometer",

@@ -131,7 +131,8 @@ def section(gratings: Sequence[Grating] = GRATINGS) -> str:
     return f"""## Through a dielectric
 
 Orders that go through (`diffraction_dielectric`), from above into keratin, against Rayleigh's
-expansion, with light across the grooves (azimuth 0°), between and along them; steepest slopes from 0.03 to 0.2.
+expansion, with light across the grooves (azimuth 0°), between and along them; steepest slopes from
+0.03 to 0.2.
 Deviation of colours within {GRAZING:g}° of the normal, Kirchhoff's model / `small_slope` as it is /
 with energy conserved, the default:
 
