@@ -204,7 +204,7 @@ from .boundary import Kirchhoff
 from .directions import Pair, from_patch, in_patch, vcavity
 from .energy import EnergyModel
 from .layers import CoatedPair, Transmission, UnderFilm
-from .parameter_changes import ObjectValues
+from .parameter_changes import ObjectValues, check_parameters
 from .parameters import read_parameters
 from .sampling import EVEN, direction_of, with_even_share
 from .sources import TableProvider, from_cache
@@ -252,6 +252,7 @@ class Diffraction(DiffractingSurface):
             self.parameters.append(ObjectValues("nested", self.nested))
         self.m_components = components  # at once: reading it makes a copy
         self.m_flags = functools.reduce(operator.or_, components)
+        check_parameters([self])
         self.derive()
 
     # ------------------------------------------------------------------ Mitsuba's interface

@@ -104,7 +104,8 @@ def check(rng: np.random.Generator) -> None:
         assert path.read_bytes() == content, "not written again"
     assert made == (changed != content), f"made {made} times"
     lines = [str(line.message) for line in said if line.category is md.DiffractionWarning]
-    assert len(lines) == made
+    # what is made again says what else it doubts
+    assert sum("in the cache is damaged" in line for line in lines) == made
     assert all(len(line) < 500 and "\n" not in line for line in lines)
     expected = _expected(name)
     assert found.document == expected.document

@@ -56,6 +56,7 @@ from ..boundary import Boundary, Jones, Kirchhoff, SmallSlope, mueller
 from ..directions import Pair, TablePoint, from_patch
 from ..fresnel import Inside, squared
 from ..layers import CoatedPair, transmittances
+from ..parameter_changes import check_parameters
 from ..sampling import EVEN, direction_of, with_even_share
 from ..sources import TableProvider, from_cache
 from ..support import TRANSMISSION
@@ -128,6 +129,7 @@ class DiffractionDielectric(DiffractingSurface):
             transmitted = transmitted | mi.BSDFFlags.NonSymmetric
         self.m_components = [mi.BSDFFlags.GlossyReflection | sides, transmitted]
         self.m_flags = mi.BSDFFlags.GlossyReflection | sides | transmitted
+        check_parameters([self])
         self.derive()
 
     # ------------------------------------------------------------------ Mitsuba's interface
