@@ -110,11 +110,12 @@ def own_vectors() -> Iterator[int]:
 @pytest.fixture(scope="module")
 def coarse() -> Iterator[None]:
     """Energy conserved coarsely, for modules that do not ask how well it is."""
+    from mitsuba_diffraction.tables.energy.settings import use_energy_settings
     from tests.support.coarse import coarse_energy
 
-    with pytest.MonkeyPatch.context() as patch:
-        coarse_energy(patch.setattr)
-        yield
+    before = coarse_energy()
+    yield
+    use_energy_settings(before)
 
 
 @pytest.fixture(scope="session")

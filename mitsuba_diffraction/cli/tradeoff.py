@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _budget(args: argparse.Namespace) -> dict[str, float | None]:
-    """What is asked for; the default tolerance, if nothing is."""
+    """Return the requested budget; the default tolerance without one."""
     given = {"tolerance": args.max_error, "megabytes": args.memory, "relative": args.time}
     if all(value is None for value in given.values()):
         given["tolerance"] = 1e-3

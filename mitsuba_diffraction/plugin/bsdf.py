@@ -199,7 +199,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tables.energy.conservation import DirectionalTable
+from ..tables.energy.grid import DirectionalTable
 from .boundary import Kirchhoff
 from .directions import Pair, from_patch, in_patch, vcavity
 from .energy import EnergyModel
@@ -514,7 +514,7 @@ class Diffraction(DiffractingSurface):
     def energy_scale(self, height_scale: float) -> tuple[NDArray[np.float32], bool] | None:
         """Return s of the mean wavelength, for shaders, and whether Kirchhoff's model fades.
 
-        s : (polar + 1, azimuthal) on `tables.energy.conservation.FINE`; None where all s are 1.
+        s : (polar + 1, azimuthal) on `tables.energy.grid.FINE`; None where all s are 1.
         """
         if self._energy is None or not self._energy.conserving:
             return None

@@ -46,7 +46,6 @@ XML and the same in Python:
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import drjit as dr
@@ -80,6 +79,7 @@ from .crossing import (
     Turned,
     crossing_axes,
     first_order,
+    order_0,
     out_of_sheet,
     tangent_plane,
 )
@@ -148,20 +148,20 @@ class DiffractionDielectric(DiffractingSurface):
         """Return `eval` and `pdf` at once."""
         cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
         asked = _asked(ctx)
-        shares = self._shares(ctx, si, active)
+        share = self._reflected_share(cos_i, asked)
         rotation = self.orientation.rotation(si, active)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
-        scales: list[Colour] = []
+        # c(ωi) c(ωo), by which order 0 makes up for what R + T lacks or exceeds
+        change = None
         if self.balance is not None and self.balance.takes:
             k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
-            scales = self.balance.products((si.wi, wo), rotation, k, scale)
-        change = scales[0] if scales else None
+            change = self.balance.product((si.wi, wo), rotation, k, scale)
         if asked.reflection:
             for reflected, sign in ((self._above, 1.0), (self._below, -1.0)):
                 lit = active & (sign * cos_i > 0.0) & (cos_i * cos_o > 0.0)
                 side, orders = reflected(ctx, si, wo, rotation, lit, change)
                 value = dr.select(lit, side, value)
-                density = dr.select(lit, shares.of_reflected(orders), density)
+                density = dr.select(lit, share * with_even_share(orders), density)
         if asked.transmission:
             lit = active & (cos_i * cos_o < 0.0)
             crossing = Crossing(si, wo, rotation, lit, self.material.eta, self.thin)
@@ -169,11 +169,7 @@ class DiffractionDielectric(DiffractingSurface):
             value = dr.select(lit, passed, value)
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
             orders = self.power.density(crossing, self.scale_at(si, active), si) * dr.square(out)
-            density = dr.select(lit, shares.of_passed(orders), density)
-        if len(scales) > 1:
-            value *= mi.Spectrum(scales[1])
-        if len(scales) > 2:
-            value += self._spread(ctx, cos_i, cos_o, scales[2], active, asked)
+            density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
         return value, density
 
     def sample(
@@ -187,13 +183,11 @@ class DiffractionDielectric(DiffractingSurface):
         """Draw a side by the flat reflectance, then a direction by the orders."""
         cos_i = mi.Frame3f.cos_theta(si.wi)
         active = mi.Mask(active) & (cos_i != 0.0)
-        shares = self._shares(ctx, si, active)
-        share = shares.reflected
+        share = self._reflected_share(cos_i, _asked(ctx))
         reflected = sample1 < share
         sample1 = dr.select(
             reflected, sample1 / dr.maximum(share, 1e-6), (sample1 - share) / (1.0 - share + 1e-6)
         )
-        even = dr.select(reflected, *shares.even)
         down, n = cos_i > 0.0, dr.detach(self.material.eta)
         sides = Sides.of(n, self.thin, down)
         inner = mi.Float(1.0) if self.thin else n
@@ -204,14 +198,14 @@ class DiffractionDielectric(DiffractingSurface):
         drawn = self.power.draw(
             dr.select(reflected, cosine, sides.cosine(cosine, n, down, self.thin)),
             dr.detach(self.scale_at(si, active) * dr.select(reflected & (cos_i < 0.0), n, 1.0)),
-            dr.maximum((sample1 - even) * dr.rcp(dr.maximum(1.0 - even, 1e-6)), 0.0),
+            dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
             sample2,
             si,
         )
         rotation = self.orientation.rotation(si, active)
         total = sign * from_patch(drawn, rotation) - into * mi.Vector2f(si.wi.x, si.wi.y)
         wo = dr.select(
-            sample1 < even, mi.warp.square_to_uniform_hemisphere(sample2), direction_of(total / out)
+            sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), direction_of(total / out)
         )
         active &= wo.z > 0.0
         wo.z = dr.select(reflected == down, wo.z, -wo.z)
@@ -311,12 +305,20 @@ class DiffractionDielectric(DiffractingSurface):
         crossing: Crossing,
         change: Colour | None,
     ) -> Spectrum:
-        """BSDF of light that goes through, as the mode of transport has it."""
-        place, scale = crossing.place, self.scale_at(si, crossing.active)
-        power = self._power(si, place, scale, change)
-        factor = self._factor(ctx, si, crossing, self._matrices(si, crossing, scale))
-        outside = self.area_factor * crossing.n * dr.rcp(dr.square(place.w) * crossing.q0)
-        outside *= dr.rcp(-crossing.inside.z)
+        """BSDF of light that goes through, as the mode of transport has it.
+
+        Order 0 has what the flat surface transmits, and is finite where w → 0, as all others are.
+        """
+        point, scale = crossing.place, self.scale_at(si, crossing.active)
+        power, zeroth = self.power.power(point, scale, si), self.power.zeroth(point, scale, si)
+        zeroth = dr.minimum(zeroth, power)  # speckle may be dark
+        axes = crossing_axes(-crossing.above, crossing.inside)
+        per_w = crossing.n * dr.rcp(dr.square(point.w) * crossing.q0 * -crossing.inside.z)
+        others = self._factor(ctx, si, crossing, axes, self._matrices(si, crossing, axes))
+        flat = self._factor(ctx, si, crossing, axes, [order_0(crossing, axes, self.thin)])
+        value = mi.Spectrum((power - zeroth) * per_w) * others
+        value += mi.Spectrum(zeroth if change is None else zeroth * change) * flat
+        outside = mi.Float(self.area_factor)
         if not self.thin:
             # Radiance over n² is transmitted; light along ωi or ωo
             down = mi.Frame3f.cos_theta(si.wi) > 0.0
@@ -324,29 +326,40 @@ class DiffractionDielectric(DiffractingSurface):
             if ctx.mode == mi.TransportMode.Importance:
                 scales = scales[::-1]
             outside *= dr.select(down, *scales)
-        return mi.Spectrum(dr.select(crossing.active, power * outside, 0.0)) * factor
+        return dr.select(crossing.active, value * outside, 0.0)
 
-    def _matrices(self, si: Interaction, crossing: Crossing, scale: Float) -> list[Jones]:
+    def _matrices(
+        self,
+        si: Interaction,
+        crossing: Crossing,
+        axes: tuple[Vector3f, Vector3f],
+    ) -> list[Jones]:
         """2 cosθi cosθt times the Jones matrices of light from above, of each channel or of all."""
-        axes = crossing_axes(-crossing.above, crossing.inside)
         tangent = tangent_plane(crossing, axes)
         if not isinstance(self.boundary, SmallSlope):
-            return [tangent]
+            return [out_of_sheet(tangent, crossing)] if self.thin else [tangent]
         first = first_order(crossing, axes, self.thin)
         shares = self.boundary.shares(
-            crossing.place, scale, self.power.wavenumbers(si), [crossing.n]
+            crossing.place,
+            self.scale_at(si, crossing.active),
+            self.power.wavenumbers(si),
+            [crossing.n],
         )
-        return [
+        blended = [
             tuple(b + (k - b) * share for k, b in zip(tangent, first, strict=True))
             for share in shares
         ]
+        return [out_of_sheet(jones, crossing) for jones in blended] if self.thin else blended
 
     def _factor(
-        self, ctx: Context, si: Interaction, crossing: Crossing, matrices: list[Jones]
+        self,
+        ctx: Context,
+        si: Interaction,
+        crossing: Crossing,
+        axes: tuple[Vector3f, Vector3f],
+        matrices: list[Jones],
     ) -> Spectrum:
-        """½ Σ|J|², or Mueller matrices, for each channel; out of the flat side of a sheet."""
-        if self.thin:
-            matrices = [out_of_sheet(jones, crossing) for jones in matrices]
+        """½ Σ|J|², or Mueller matrices, for each channel."""
         if not mi.is_polarized:
             powers = [0.5 * sum(map(squared, jones)) for jones in matrices]
             return mi.UnpolarizedSpectrum(powers if len(powers) > 1 else powers[0])
@@ -354,7 +367,6 @@ class DiffractionDielectric(DiffractingSurface):
         importance = ctx.mode == mi.TransportMode.Importance
         falls = (mi.Frame3f.cos_theta(si.wi) > 0.0) == mi.Mask(importance)
         ends = -crossing.above, crossing.below
-        axes = crossing_axes(-crossing.above, crossing.inside)
         light = tuple(
             dr.select(falls, *both) for both in ((ends[0], -ends[1]), (ends[1], -ends[0]))
         )
@@ -366,43 +378,6 @@ class DiffractionDielectric(DiffractingSurface):
             for ss, sp, ps, pp in matrices
         ]
         return mueller(turned_round, light, about)
-
-    def _shares(self, ctx: Context, si: Interaction, active: Mask) -> Shares:
-        """Of the samples: by the flat reflectance, and by what is spread."""
-        reflects, passes = asked = _asked(ctx)
-        cos_i = mi.Frame3f.cos_theta(si.wi)
-        orders = self._reflected_share(cos_i, asked)
-        if self.balance is None or not self.balance.spreads:
-            return Shares(orders, (mi.Float(EVEN), mi.Float(EVEN)))
-        rotation, scale = self.orientation.rotation(si, active), self.scale_at(si, active)
-        above, below = self.balance.shares(si.wi, rotation, self.power.wavenumbers(si), scale)
-        down = cos_i > 0.0
-        stays = dr.select(down, above, below) if reflects else mi.Float(0.0)
-        goes = dr.select(down, below, above) if passes else mi.Float(0.0)
-        even = [
-            dr.fma(part, EVEN, spread) * dr.rcp(dr.maximum(part + spread, 1e-6))
-            for part, spread in ((orders, stays), (1.0 - orders, goes))
-        ]
-        return Shares((orders + stays) * dr.rcp(1.0 + stays + goes), (even[0], even[1]))
-
-    def _spread(
-        self,
-        ctx: Context,
-        cos_i: Float,
-        cos_o: Float,
-        product: Colour,
-        active: Mask,
-        asked: Asked,
-    ) -> Spectrum:
-        """g(ωi) g(ωo) cosθo: what R + T lacks, as the mode of transport has it."""
-        lit = mi.Mask(asked.reflection) & (cos_i * cos_o > 0.0) | mi.Mask(asked.transmission) & (
-            cos_i * cos_o < 0.0
-        )
-        factor = dr.abs(cos_o)
-        if not self.thin:
-            end = cos_o if ctx.mode == mi.TransportMode.Importance else cos_i
-            factor *= dr.select(end < 0.0, dr.square(self.material.eta), 1.0)
-        return mi.depolarizer(product * dr.select(mi.Mask(active) & lit, factor, 0.0))
 
     def _reflected_share(self, cos_i: Float, asked: Asked) -> Float:
         """Share of the samples that stay on their side."""
@@ -439,24 +414,6 @@ class DiffractionDielectric(DiffractingSurface):
         return self.described(
             "DiffractionDielectric", str(self.boundary), self.balance is not None, more
         )
-
-
-@dataclass(frozen=True)
-class Shares:
-    """Of the samples: those that stay on their side; and the evenly drawn ones of these and of the
-    others.
-    """
-
-    reflected: Float
-    even: tuple[Float, Float]
-
-    def of_reflected(self, density: Float) -> Float:
-        """Density of the samples that stay, from that of the orders'."""
-        return self.reflected * with_even_share(density, self.even[0])
-
-    def of_passed(self, density: Float) -> Float:
-        """That of the others."""
-        return (1.0 - self.reflected) * with_even_share(density, self.even[1])
 
 
 def _asked(ctx: Context) -> Asked:
