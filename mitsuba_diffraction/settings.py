@@ -80,7 +80,7 @@ def _count(most: int) -> Callable[[Any], int | None]:
 
 
 def _pair(value: Any) -> tuple[float, float]:
-    low, high = (_number(one) for one in value)
+    low, high = (_number(end) for end in value)
     return low, high
 
 
@@ -120,7 +120,7 @@ def _choices(*names: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class TableSettings:
-    """What a table is built with; lengths in µm, wavelengths in nm.
+    """Settings that a table is built with; lengths in µm, wavelengths in nm.
 
     Values are checked, and their types settled, when one is made: of numbers also their text.
 
