@@ -54,7 +54,7 @@ def groups(text: str) -> dict[str, list[Parameter]]:
 
 
 def _entries(body: str) -> list[Parameter]:
-    found = []
+    entries = []
     for entry in re.split(r"\n(?=\S)", body.strip()):
         head, _, rest = entry.partition("\n")
         match = _ENTRY.match(head)
@@ -62,7 +62,7 @@ def _entries(body: str) -> list[Parameter]:
             raise DiffractionError(
                 f"'{PLUGIN}': expected 'name : type [default]' and text below it, got '{head}'"
             )
-        found.append(
+        entries.append(
             Parameter(
                 tuple(match["names"].split(", ")),
                 match["type"],
@@ -71,7 +71,7 @@ def _entries(body: str) -> list[Parameter]:
                 " ".join(rest.split()),
             )
         )
-    return found
+    return entries
 
 
 def page(text: str) -> str:

@@ -87,14 +87,14 @@ def measure(
 def _steps(
     patch: HeightField, resolution: int, samples: int, step: float, width: float
 ) -> dict[str, Step]:
-    made = dict(make_all(NAMES, patch, coherence="patch", step=step, coherence_width=width))
+    by_name = dict(make_all(NAMES, patch, coherence="patch", step=step, coherence_width=width))
     fine = make("flss", patch, step=_FINE, coherence_width=width)
-    plain = made["nmm"]
+    plain = by_name["nmm"]
     assert isinstance(plain, OrdersOnly)
-    made["nmm, lobes"] = OrdersOnly(plain.full, plain.periods, weights="lobe")
+    by_name["nmm, lobes"] = OrdersOnly(plain.full, plain.periods, weights="lobe")
     reference = method_map(fine, _LIGHT, step=_FINE, resolution=resolution, samples=samples)
     result = {}
-    for name, method in made.items():
+    for name, method in by_name.items():
         timed = timed_map(method, _LIGHT, step=step, resolution=resolution, samples=samples)
         result[name] = compare(name, name, reference, timed)
     return result
