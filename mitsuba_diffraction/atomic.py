@@ -1,4 +1,4 @@
-"""Writing files so that a crash, a full disk or Ctrl-C never leaves half of one."""
+"""Files written whole: a crash, a full disk or Ctrl-C never leaves half of one."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _in_use: set[Path] = set()
 
 @contextlib.contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a temporary path beside `path`; rename it there on success, remove it otherwise.
+    """Yield a temporary path beside `path`; rename it there on success, remove it otherwise.
 
     The temporary name keeps the suffix of `path`, since image writers choose a format by it. What a
     killed process left of the same file is removed.

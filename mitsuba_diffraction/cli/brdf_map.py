@@ -83,7 +83,10 @@ def _add_map_options(group: argparse._ArgumentGroup) -> None:
 
 
 def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:
-    """Declare what reflects; see `surface_bsdf`. turned: whether the patch can be."""
+    """Declare the options of a reflecting surface; see `surface_bsdf`.
+
+    turned: include its orientation.
+    """
     group.add_argument(
         "--material", metavar="NAME",
         help="conductor, e.g. Al, or none for a reflectance of 1; default: none",
@@ -116,7 +119,7 @@ def add_relative(group: argparse._ArgumentGroup) -> None:
 
 
 def gain_of(args: argparse.Namespace) -> Any:
-    """The gain factor of --relative, or `None`.
+    """Return the gain factor of --relative, or None without it.
 
     Raises a DiffractionError if --int-ior is no number.
     """
@@ -176,7 +179,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> tuple[Any, ...]:
-    """A map by the renderer's BSDF, what reflects, and how it was made."""
+    """Map the renderer's BSDF."""
     from ..analysis.maps import Light, brdf_map, check_map
     from .console import mitsuba_warnings
 
@@ -194,7 +197,7 @@ def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> 
 
 
 def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> tuple[Any, ...]:
-    """The same by a method of the thesis."""
+    """Map a method of the thesis."""
     from ..analysis.maps import Light, check_map
     from ..thesis.methods import make
     from ..thesis.methods.make import method_map
@@ -208,7 +211,7 @@ def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -
     with Bar(args) as bar, warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
         method = make(
-            options.in_library(args.method), patch, period=args.period, progress=bar,
+            args.method, patch, period=args.period, progress=bar,
             **settings, **spectrum,
         )  # fmt: skip
         start = time.perf_counter()
@@ -222,7 +225,7 @@ def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -
 
 
 def _refuse_contradictions(args: argparse.Namespace) -> None:
-    """Usage errors that argparse does not find by itself."""
+    """Refuse contradictory options that argparse does not find, with a usage error."""
     refused: list[str] = []
     if args.wavelength is not None:
         refused = [
@@ -253,7 +256,7 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
 
 
 def surface_bsdf(args: argparse.Namespace) -> Any:
-    """The plugin for what `add_surface` and `add_heights` read, in the variant that is set."""
+    """Return the BSDF of `add_surface` and `add_heights`, in the variant that is set."""
     import mitsuba as mi
 
     from ..plugin.bsdf import Diffraction
@@ -282,7 +285,7 @@ def _is_number(text: str) -> bool:
 
 
 def _surface(bsdf: Any) -> str:
-    """What reflects, in a line."""
+    """Describe the reflecting surface in a line."""
     table, scale, turn = bsdf.table, bsdf.height_scale[0], bsdf.orientation.degrees[0]
     return "; ".join(
         [

@@ -108,9 +108,7 @@ def run(args: argparse.Namespace) -> int:
     settings |= spectrum
     with Bar(args) as bar, warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)  # said above
-        method = make(
-            options.in_library(args.method), patch, period=args.period, progress=bar, **settings
-        )
+        method = make(args.method, patch, period=args.period, progress=bar, **settings)
         response = measure(
             method.brdf, beam, steps, angles, sigma=method.sigma, label=args.method,
             progress=bar,
@@ -152,7 +150,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def periods_along(gratings: Sequence[Periodicity], phi: float) -> list[float]:
-    """Periods in µm that gratings have in a plane of incidence at an azimuth, in degrees."""
+    """Return the periods in µm of gratings in a plane of incidence, by its azimuth in degrees."""
     cosines = [abs(math.cos(math.radians(g.direction - phi))) for g in gratings]
     # a plane along the grooves meets none of their orders
     return [g.period / c for g, c in zip(gratings, cosines, strict=True) if c > _LEAST_COSINE]
@@ -217,7 +215,7 @@ def _windows(
     args: argparse.Namespace, patch: Any, settings: dict[str, Any], beam: Any, steps: Any,
     angles: Any, fit: Fit | None, bar: Bar,
 ) -> tuple[list[tuple[str, str]], dict[str, Any]]:  # fmt: skip
-    """What single windows show, and the thesis' procedure: lines, and entries of the NPZ."""
+    """Measure single windows by the thesis' procedure: lines to print, and entries of the NPZ."""
     if args.positions == 0 or fit is None:
         return [], {}
     from ..thesis.methods import make
@@ -226,7 +224,7 @@ def _windows(
     few = steps[:: max(1, steps.size // _FEW)]
     # the look-up in the package's own series: a single window's amplitudes
     single = {**settings, "coherence": "patch"}
-    table = make("default", patch, progress=bar, **single).table  # type: ignore[attr-defined]
+    table = make("spectral", patch, progress=bar, **single).table  # type: ignore[attr-defined]
     lines: list[tuple[str, str]] = []
     more: dict[str, Any] = {}
     try:

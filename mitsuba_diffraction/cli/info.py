@@ -155,7 +155,7 @@ def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _periods(field: HeightField) -> dict[str, list[str]]:
-    """The gratings that the patch holds, if any."""
+    """Return the gratings found in the patch, if any."""
     from ..heights.spectra import dominant_periods
 
     found = [str(grating) for grating in dominant_periods(field)]

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, Any]:
-    """One table, of a recipe or of one or several files, and what is in it."""
+    """Build one table of a recipe, or of one or several files, and return its summary."""
     from ..heights.load import load_heights
     from ..heights.read import is_recipe
     from ..heights.recipes import Recipe
@@ -119,7 +119,7 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
 def _built(
     args: argparse.Namespace, fields: Sequence[HeightField], settings: TableSettings, bar: Progress
 ) -> tuple[DiffractionTable, dict[str, Any]]:
-    """The table, and what workers did for it, if there are any and it is of windows."""
+    """Build the table; also return what workers did for it, where they build windows."""
     from ..tables.build.build import build_with
 
     if settings.windows is None or not on_workers(args):
@@ -145,7 +145,7 @@ def _second_order_line(table: DiffractionTable) -> str:
 def _report(
     fields: Sequence[HeightField], table: DiffractionTable, output: Path, seconds: float
 ) -> Iterator[tuple[str, str]]:
-    """What was made of what, how good it is, and what it cost."""
+    """Yield lines on the patch, the table, its error and its cost, each with its label."""
     for field in fields:
         (ny, nx), (dx, dy), (lx, ly) = field.shape, field.pixel_size, field.extent
         patch = (

@@ -236,7 +236,7 @@ def export_shader(args: argparse.Namespace) -> int:
 
 
 def _set_variant(args: argparse.Namespace) -> str:
-    """The variant that is asked for, set, if shaders can read scenes in it."""
+    """Set the requested variant if shaders can read scenes in it, and return its name."""
     from ..realtime.glsl.scene import check_variant
 
     variant = set_variant(args.mode)
@@ -245,7 +245,7 @@ def _set_variant(args: argparse.Namespace) -> str:
 
 
 def _scene(args: argparse.Namespace, parameters: dict[str, str]) -> Any:
-    """The scene, which has the sensor that is asked for."""
+    """Load the scene, and check that it has the requested sensor."""
     scene = load_scene(args.scene, parameters)
     sensor_of(scene, args.sensor)
     return scene

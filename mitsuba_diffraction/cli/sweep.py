@@ -81,11 +81,11 @@ def run(args: argparse.Namespace) -> int:
     if args.period is not None:
         settings["period"] = args.period
     if values is None and args.kind == "method" and gain is not None:
-        values = [options.in_library(name) for name in options.METHODS if name != "rainbow"]
+        values = [name for name in options.METHODS if name != "rainbow"]
     with Bar(args) as bar, warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
         result = sweep(
-            args.kind, patch, light, values=values, method=options.in_library(args.method),
+            args.kind, patch, light, values=values, method=args.method,
             gain=gain, resolution=args.resolution, samples=args.samples, progress=bar, **settings,
         )  # fmt: skip
         compiled = _compiled(args, patch, light, settings, bar)
@@ -109,11 +109,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _values(args: argparse.Namespace) -> list[Any] | None:
-    """The values given, as the sweep takes them."""
+    """Return the values on the command line in the form that the sweep takes."""
     if args.values is None:
         return None
     if args.kind == "method":
-        return [options.in_library(value) for value in args.values]
+        return list(args.values)
     try:
         return [int(v) if args.kind == "terms" else float(v) for v in args.values]
     except ValueError as error:
@@ -145,16 +145,16 @@ def _compiled(
 
 def _title(step: Any, result: Any) -> str:
     if result.reference is None:
-        return options.method(step.label)
+        return step.label
     if step.label == result.reference:
-        return f"{options.method(step.label)} (reference)"
-    return f"{options.method(step.label)}; ΔE {step.difference.delta_e:.2g}"
+        return f"{step.label} (reference)"
+    return f"{step.label}; ΔE {step.difference.delta_e:.2g}"
 
 
 def _lines(result: Any) -> list[str]:
     lines = []
     for step in result.steps:
-        text = f"{options.method(step.label):<12} {step.seconds:7.2f} s"
+        text = f"{step.label:<12} {step.seconds:7.2f} s"
         if step.label == result.reference:
             text += "  reference"
         elif math.isfinite(step.difference.delta_e):
@@ -181,5 +181,5 @@ def _save(path: Path, result: Any) -> None:
 
 
 def _row(step: Any) -> dict[str, Any]:
-    value = options.method(step.value) if isinstance(step.value, str) else step.value
+    value = step.value
     return dict(zip(_COLUMNS, (value, step.seconds, *step.difference), strict=True))

@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _todo(along: str, report: TangentReport) -> str:
-    """What to do about a field that breaks."""
+    """Advise what to do about a field that breaks."""
     others = " or ".join(guide for guide in ("smooth", "body") if guide != along)
     todo = f"choose another guide, --along {others}"
     if report.turns_fast:  # triangles are large beside what the field must turn
@@ -98,7 +98,7 @@ def _todo(along: str, report: TangentReport) -> str:
 
 
 def _places(places: object, indices: object, report: TangentReport) -> str:
-    """The singular points in one line, or that the field has none."""
+    """Name the singular points in one line, or say that the field has none."""
     import numpy as np
 
     points, turns = np.asarray(places), np.asarray(indices)

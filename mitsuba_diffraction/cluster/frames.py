@@ -1,4 +1,4 @@
-"""Frames from the tasks of many workers: submitted, kept on disk, added up in order, developed."""
+"""Frames rendered by tasks on workers: submitted, stored on disk, added up in order, developed."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def render(
 
 @dataclass
 class Report:
-    """What a run on workers cost."""
+    """Cost of a run on workers."""
 
     tasks: int = 0  # that were done now
     kept: int = 0  # that had been kept
@@ -108,14 +108,14 @@ class Report:
     where: set[str] = field(default_factory=set)
 
     def summary(self) -> dict[str, Any]:
-        """As plain data, with what a task cost besides its work."""
+        """Return plain data, with the time that a task costs besides its work."""
         plain = {k: sorted(v) if isinstance(v, set) else v for k, v in vars(self).items()}
         count = len(self.workers) or 1
         idle = self.seconds * count - self.busy
         return plain | {"overhead_per_task_s": idle / self.tasks if self.tasks else 0.0}
 
     def add(self, sums: Sums, new: bool) -> None:
-        """Count one sum."""
+        """Count one sum. new: rendered in this run."""
         self.where.add(sums.where)
         if not new:
             self.kept += 1
@@ -129,7 +129,7 @@ class Report:
 
 @dataclass(frozen=True)
 class Wanted:
-    """A frame: values of the scene's parameters, samples (None: the scene's), and seed."""
+    """Request for a frame: values of the scene's parameters, samples (None: the scene's), seed."""
 
     values: Mapping[str, str]
     spp: int | None
@@ -195,16 +195,16 @@ class Film:
 
     @property
     def sensor(self) -> Any:
-        """The sensor of frame 0, with its film."""
+        """Sensor of frame 0, with its film."""
         return self._sensor
 
     @property
     def scene(self) -> Any:
-        """The scene of frame 0."""
+        """Scene of frame 0."""
         return self._scene
 
     def render(self, stop: Stop, progress: Progress) -> Iterator[Result]:
-        """Frame after frame; ends early once asked to stop.
+        """Yield frame after frame; end early once asked to stop.
 
         Raises
         ------
@@ -244,13 +244,13 @@ class Film:
         return len(there)
 
     def forget(self, frame: int) -> None:
-        """Remove what was kept of a frame."""
+        """Remove the stored sums of a frame."""
         for task in self._frames[frame]:
             self._kept.forget(task)
 
 
 class _InOrder:
-    """Gives out tasks ahead of what is added up, and takes results in whatever order they come."""
+    """Submits tasks ahead of the sum that is due, and collects results as they come."""
 
     def __init__(self, film: Film, stop: Stop, progress: Progress) -> None:
         self._film, self._stop, self._progress = film, stop, progress
@@ -263,7 +263,7 @@ class _InOrder:
         self._counted = (-math.inf, 1)
 
     def of(self, task: Task) -> Sums | None:
-        """The sums of a task; None once asked to stop."""
+        """Return the sums of a task; None once asked to stop."""
         kept = self._film._kept
         while True:
             if task.key in self._ready or task in kept:
@@ -282,7 +282,7 @@ class _InOrder:
             time.sleep(_POLL)
 
     def cancel(self) -> None:
-        """Take back what nobody waits for."""
+        """Cancel tasks whose results nobody waits for."""
         for future in self._with:
             future.cancel()
         self._with.clear()
@@ -334,7 +334,7 @@ class _InOrder:
         self._progress(self._done, self._total, f"{what}{self._workers()} workers")
 
     def _workers(self) -> int:
-        """How many there are, asked for every other second."""
+        """Return the number of workers, counted every other second."""
         now = time.perf_counter()
         if now - self._counted[0] > _COUNTED:
             self._counted = now, self._film._count_workers()
@@ -393,5 +393,5 @@ class Kept:
 
 
 def _title(task: Task) -> str:
-    """First line of a sum's file: what it is, and the key of its task."""
+    """Return the first line of a sum's file: its kind, and the key of its task."""
     return f"mitsuba_diffraction sum {task.key}"

@@ -1,4 +1,4 @@
-"""Independent jobs, here or on workers, as they are done or in their order: scans, windows."""
+"""Independent jobs, here or on workers: scans as they finish, windows in their order."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def build_on_workers(
     client: Any,
     progress: Progress | None = None,
 ) -> tuple[DiffractionTable, OrderedMap]:
-    """`build`, with what it cost."""
+    """Build as `build`, and return the table with the map that knows its cost."""
     if settings.windows is None:
         raise DiffractionError(
             "workers build tables of windows: set windows=auto (--windows auto), or do without "
@@ -71,17 +71,17 @@ def build_on_workers(
 
 
 class HasFiles(Protocol):
-    """A job that needs files."""
+    """Job that needs files."""
 
     @property
     def files(self) -> SceneFiles:
-        """These, by content."""
+        """Files of the job, known by content."""
 
 
 def each(
     client: Any, work: Callable[..., Any], jobs: Sequence[HasFiles]
 ) -> Iterator[tuple[int, Any]]:
-    """Do `work(job, contents)` for each, and give its number with what came of it.
+    """Do `work(job, contents)` for each job, and yield its number and result.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def _contents(job: HasFiles, lacking: Lacking) -> Mapping[str, bytes]:
 
 
 class OrderedMap:
-    """`map` on workers: results in the order of the arguments, of which few are under way at once.
+    """`map` on workers: results in the order of the arguments, a few of which are at work at once.
 
     Attributes
     ----------
@@ -142,12 +142,12 @@ class OrderedMap:
         self.busy = 0.0
 
     def summary(self) -> dict[str, Any]:
-        """What it cost, as plain data."""
+        """Return the cost as plain data."""
         names = "tasks", "retries", "bytes", "busy"
         return {name: getattr(self, name) for name in names}
 
     def __call__(self, work: Callable[[Any], Any], arguments: Iterable[Any]) -> Iterator[Any]:
-        """Results of `work` for each of the arguments.
+        """Yield the results of `work` for each of the arguments.
 
         Raises
         ------
@@ -194,7 +194,7 @@ class OrderedMap:
 
 
 def _done(content: bytes) -> tuple[Any, float] | Failed:
-    """A call's result and its seconds."""
+    """Run a pickled call; return its result and its seconds."""
     start = time.perf_counter()
     try:
         wanted, work, argument = pickle.loads(content)

@@ -213,7 +213,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tables.energy.conservation import DirectionalTable
+from ..tables.energy.grid import DirectionalTable
 from .boundary import Boundary, Kirchhoff
 from .directions import Pair, from_patch, in_patch, vcavity
 from .energy import EnergyModel
@@ -531,7 +531,7 @@ class Diffraction(mi.BSDF):
     def energy_scale(self, height_scale: float) -> tuple[NDArray[np.float32], bool] | None:
         """What conserves energy, for who knows no wavelengths: s, and whether it fades as well.
 
-        s : (polar + 1, azimuthal) on `tables.energy.conservation.FINE`; None where nothing is.
+        s : (polar + 1, azimuthal) on `tables.energy.grid.FINE`; None where nothing is.
         """
         if self._energy is None or not self._energy.conserving:
             return None

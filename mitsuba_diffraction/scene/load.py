@@ -1,4 +1,4 @@
-"""Choosing a variant and loading a scene; what Mitsuba says about it in one line.
+"""Variants set and scenes loaded; Mitsuba's errors in one line.
 
 Mitsuba 3.9 throws RuntimeError (ImportError for variants) with a text such as
 
@@ -109,7 +109,7 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
 
 
 def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
-    """Name the meshes on which a patch has no direction: a BSDF itself cannot see its mesh."""
+    """Warn of meshes on which a patch has no direction: a BSDF itself cannot see its mesh."""
     lacking = [
         name_of(shape, number)
         for number, shape in surfaces.items()
@@ -136,13 +136,13 @@ def shrink(sensor: Any) -> None:
 
 
 def preview_samples(sensor: Any, preview: bool) -> int:
-    """The scene's own samples per pixel; for a preview at most 16."""
+    """Return the scene's own samples per pixel; for a preview at most 16."""
     own = int(sensor.sampler().sample_count())
     return min(own, 16) if preview else own
 
 
 def sensor_of(scene: Any, index: int) -> Any:
-    """One of the scene's sensors.
+    """Return a sensor of the scene.
 
     Raises a DiffractionError if there is none with that index.
     """
@@ -157,7 +157,7 @@ def sensor_of(scene: Any, index: int) -> Any:
 
 
 def plain_text(error: BaseException) -> str:
-    """The text of one of Mitsuba's exceptions as one line: where in the scene, and what is wrong.
+    """Return the text of Mitsuba's exception as one line: where in the scene, and what is wrong.
 
     The places in Mitsuba's own sources, the tracebacks of Python plugins and repeated
     "while loading" are left out.
@@ -184,7 +184,7 @@ def plain_text(error: BaseException) -> str:
 
 
 def error_of(what: str, error: BaseException) -> BaseException:
-    """What to raise for one of Mitsuba's exceptions.
+    """Return the error to raise for Mitsuba's exception.
 
     Mitsuba makes a RuntimeError of whatever a Python plugin raises: Ctrl-C, an exit and lack of
     memory are themselves again, anything else is a DiffractionError that begins with `what`.
@@ -198,14 +198,14 @@ def error_of(what: str, error: BaseException) -> BaseException:
 
 
 def _words(error: BaseException) -> str:
-    """Its text; a text that is no UTF-8, as it quotes a damaged scene, reaches us as bytes."""
+    """Return the text of an exception; damaged scenes are quoted as bytes that are not UTF-8."""
     if isinstance(error, UnicodeDecodeError):
         return error.object.decode("utf-8", "replace")
     return str(error)
 
 
 def _no_ply(found: re.Match[str]) -> str:
-    """A mesh of another format where a PLY is expected, with what to do about it."""
+    """Say what to do about a mesh of another format where a PLY is expected."""
     file = PurePath(found["file"])
     todo = f"run 'mitsuba-diffraction tangents {file} -o mesh.ply' first, and use mesh.ply"
     if not found["why"].startswith("invalid PLY"):
@@ -218,7 +218,7 @@ def _no_ply(found: re.Match[str]) -> str:
 
 
 def _unused(found: re.Match[str]) -> str:
-    """Parameters that are given and that nothing in the scene reads."""
+    """Name parameters that are given and that nothing in the scene reads."""
     names = re.findall(r"\$(\w+)=", found["list"])
     if not names:
         return found[0]

@@ -108,7 +108,7 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
 
 
 def is_table(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is a table, of whatever version; False if it cannot be read."""
+    """Whether a file is a table, of any version; False if it cannot be read."""
     try:
         with readable_file(path).open("rb") as stream:
             if stream.read(len(EXR_BEGINS)) != EXR_BEGINS:
@@ -119,7 +119,7 @@ def is_table(path: str | os.PathLike[str]) -> bool:
 
 
 def read_document(path: str | os.PathLike[str]) -> dict[str, Any] | None:
-    """The JSON attribute of a table's file, or None if the file is an EXR image without one.
+    """Return the JSON attribute of a table's file; None for an EXR image without one.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def _check_headers(headers: list[dict[str, Any]], expected: Described, size: int
 
 
 def _planes(channels: Mapping[str, Any], expected: Described) -> dict[str, NDArray[np.floating]]:
-    """The pixels of each channel, in the order of `_channels`."""
+    """Return the pixels of each channel, in the order of `_channels`."""
     expansion = expected.fields["expansion"]
     planes = {name: channels[name].pixels for name, _ in _channels(expansion)}
     kinds = {plane.dtype for plane in planes.values()}
@@ -173,7 +173,7 @@ def _planes(channels: Mapping[str, Any], expected: Described) -> dict[str, NDArr
 def _coefficients(
     planes: Mapping[str, NDArray[np.floating]], expected: Described
 ) -> NDArray[np.floating]:
-    """Coefficients (intervals, ny, nx, components, terms), in the precision of the file."""
+    """Return coefficients (intervals, ny, nx, components, terms), in the precision of the file."""
     names = list(_channels(expected.fields["expansion"]))
     result = np.empty(expected.shape, planes[names[0][0]].dtype)
     for name, index in names:
@@ -189,7 +189,7 @@ def _checksum(text: str, planes: Mapping[str, NDArray[np.floating]]) -> str:
 
 
 def _channels(expansion: Expansion) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    """Channel names, and the index of each in the coefficients."""
+    """Yield channel names, and the index of each in the coefficients."""
     for interval in range(expansion.intervals):
         for component, prefix in enumerate(_PREFIXES[expansion.kind]):
             for term in range(expansion.terms):
@@ -199,7 +199,7 @@ def _channels(expansion: Expansion) -> Iterator[tuple[str, tuple[Any, ...]]]:
 
 
 def _headers(path: str | os.PathLike[str]) -> list[dict[str, Any]]:
-    """Headers of all parts of an EXR file; a table has one."""
+    """Read the headers of all parts of an EXR file; a table has one."""
     return _read(
         path, lambda file: [file.header(n) for n in range(len(file.parts))], header_only=True
     )
@@ -208,7 +208,7 @@ def _headers(path: str | os.PathLike[str]) -> list[dict[str, Any]]:
 def _read(
     path: str | os.PathLike[str], what: Callable[[OpenEXR.File], Any], header_only: bool = False
 ) -> Any:
-    """Part of an EXR file."""
+    """Read a part of an EXR file."""
     readable_file(path)
     try:
         with without_chatter():

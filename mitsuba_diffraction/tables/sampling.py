@@ -78,7 +78,9 @@ class OrderMixture:
         return np.asarray(low * (1.0 - share) + high * share)
 
 
-def order_mixture(table: DiffractionTable, height_scale: float, smoothing: float) -> OrderMixture:
+def order_mixture(
+    table: DiffractionTable, height_scale: float, smoothing: float, *, apart: bool = False
+) -> OrderMixture:
     """Sort a table's orders.
 
     Parameters
@@ -86,6 +88,7 @@ def order_mixture(table: DiffractionTable, height_scale: float, smoothing: float
     table : the diffraction table.
     height_scale : factor on its heights.
     smoothing : standard deviation of the density's smoothing, rad/µm, the lobe's own included.
+    apart : whether order 0 is apart from the density even if its lobe is as wide.
     """
     expansion = table.expansion
     kappa_max = table.q_limit * height_scale
@@ -108,7 +111,7 @@ def order_mixture(table: DiffractionTable, height_scale: float, smoothing: float
     powers_at = _Powers(table, axes)
     for n, kappa in enumerate(kappas):
         power, central[n] = powers_at(float(kappa))
-        if all_smooth:  # order 0 then is as wide as any other
+        if all_smooth and not apart:  # order 0 then is as wide as any other
             power[len(power) // 2, power.shape[1] // 2] += central[n]
             central[n] = 0.0
         np.maximum(strongest, power, out=strongest)

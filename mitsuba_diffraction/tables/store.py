@@ -1,8 +1,8 @@
-"""The one cache: whatever is made once, in files that are found by what it is made of.
+"""Cache of tables and all that is computed from them, in files found by what they are made of.
 
-A file is one line with what it is, its key and the SHA-256 of the rest; then JSON and arrays as
-they lie in memory. What is damaged, or stands under another's name, is made again. Tables and their
-colours are kept by what is below; what conserves energy by `tables.energy.store`.
+A file is one line with its kind, its key and the SHA-256 of the rest; then JSON and arrays as they
+lie in memory. A damaged file, or one under another's name, is rebuilt. This module stores tables
+and their colours, `tables.energy.store` the scales that conserve energy.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ _making: dict[tuple[str, str], threading.Lock] = {}
 
 
 def cache_folder() -> Path | None:
-    """$MITSUBA_DIFFRACTION_CACHE, or the user's cache folder; None for a user without a home."""
+    """Return $MITSUBA_DIFFRACTION_CACHE, or the user's cache folder; None without a home."""
     own = os.environ.get(VARIABLE)
     if own:
         return Path(own)
@@ -65,7 +65,7 @@ def cache_folder() -> Path | None:
 
 @dataclass(frozen=True)
 class Record:
-    """What a file holds.
+    """Content of a file.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Record:
 
 
 def key_of(*parts: Any) -> str:
-    """A key: the SHA-256 of what something is made of, as JSON."""
+    """Return a key: the SHA-256 of its parts as JSON."""
     return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
 
 
@@ -90,7 +90,7 @@ def kept(
     pack: Callable[[T], Record],
     unpack: Callable[[Record], T],
 ) -> T:
-    """What is kept under a key, in memory or on disk; or made now, and kept.
+    """Return the value under a key, from memory or from disk; otherwise make and store it.
 
     Of several threads and processes that want one thing at a time, one makes it and the others
     wait. A cache that cannot be written is no reason to fail: the thing is then made every time.
@@ -135,7 +135,7 @@ def _from_disk(
 
 @contextlib.contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Alone among all processes with this file; where there are no locks, not alone."""
+    """Hold the lock of a file among all processes; where there are no locks, do nothing."""
     lock = path.with_suffix(".lock")
     with contextlib.ExitStack() as release:
         with contextlib.suppress(OSError):
@@ -152,7 +152,7 @@ def _locked(path: Path) -> Iterator[None]:
 
 
 def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
-    """What a file holds; None if there is none, and with a warning if it is damaged."""
+    """Read the value in a file; None if it is missing, or damaged, with a warning."""
     try:
         found = unpack(read_record(path, title))
         os.utime(path)  # recently used ones are kept longest
@@ -221,7 +221,7 @@ def write_record(path: Path, title: str, record: Record) -> None:
 
 
 def _head(title: str, blocks: Sequence[NDArray[np.uint8]]) -> bytes:
-    """The first line, filled up."""
+    """Return the first line, filled up to `_HEAD` bytes."""
     content = hashlib.sha256()
     for block in blocks:
         content.update(block.data)
@@ -229,7 +229,7 @@ def _head(title: str, blocks: Sequence[NDArray[np.uint8]]) -> bytes:
 
 
 def _aligned(size: int) -> int:
-    """The least multiple of `_ALIGNMENT` that is not below a size."""
+    """Return the least multiple of `_ALIGNMENT` that is not below a size."""
     return -(-size // _ALIGNMENT) * _ALIGNMENT
 
 
@@ -253,14 +253,14 @@ _COLOUR_NUMBERS = ("scale", "radius_end", "sigma")
 
 
 def table_key(digest: str, settings: TableSettings) -> str:
-    """Name of the table of heights with this digest, built with these settings."""
+    """Return the key of the table of heights with this digest, built with these settings."""
     return key_of(FORMAT_VERSION, TEXTS_VERSION, digest, asdict(settings))
 
 
 def cached_table(
     digest: str, settings: TableSettings, build: Callable[[], DiffractionTable]
 ) -> DiffractionTable:
-    """The table for heights with this digest, from memory, from disk, or built and kept."""
+    """Return the table of heights with this digest, from memory, from disk, or built and stored."""
     key = table_key(digest, settings)
     return kept("table", key, _tables, build, _table_record, _table_of)
 
@@ -279,7 +279,7 @@ def _table_of(record: Record) -> DiffractionTable:
 
 
 def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:
-    """`DiffractionTable.load`, once for all that use the same file at the same time."""
+    """Load a table file once for all that use it at the same time."""
     try:
         status = os.stat(path)
     except OSError:
@@ -292,14 +292,14 @@ def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:
 
 
 def cached_colours(table: DiffractionTable) -> ColourTable:
-    """The colours of a table, from memory, from disk, or summed and kept."""
+    """Return the colours of a table, from memory, from disk, or summed and stored."""
     key = key_of(COLOUR_VERSION, table.digest())
     memory = _colours.setdefault(table, {})
     return kept("colours", key, memory, lambda: ColourTable.build(table), colour_record, colours_of)
 
 
 def colour_record(colours: ColourTable) -> Record:
-    """What a file keeps of colours."""
+    """Return the record of colours for the cache."""
     document = {
         "grid": asdict(colours.grid),
         "expansion": asdict(colours.expansion),
@@ -309,7 +309,7 @@ def colour_record(colours: ColourTable) -> Record:
 
 
 def colours_of(record: Record) -> ColourTable:
-    """What was made into such a record."""
+    """Return the colours of such a record."""
     document = record.document
     grid = document["grid"]
     coefficients, order_0 = record.arrays

@@ -38,9 +38,9 @@ from mitsuba_diffraction.thesis.period_fit import (
 from mitsuba_diffraction.thesis.period_fit.plot import draw
 
 from . import pages
-from .pages import SHOWN, add_measured, exit_code, measured_patch
+from .pages import add_measured, exit_code, measured_patch
 
-METHODS = ("default", "flss", "nmm", "pq", "pq-sinc")
+METHODS = ("spectral", "flss", "nmm", "pq", "pq-sinc")
 
 _DPI = 85
 _STEP = 5.0  # nm
@@ -96,7 +96,7 @@ def evaluate_patch(
         response = measure(method.brdf, beam, wavelengths, angles, sigma=method.sigma, label=name)
         ridge = ridge_of(response)
         results[name] = Evaluated(response, ridge, fit_period(ridge))
-    single = make("default", patch, coherence="patch", coherence_width=coherence_width)
+    single = make("spectral", patch, coherence="patch", coherence_width=coherence_width)
     assert isinstance(single, FullSpectrum)
     few = wavelengths[:: max(1, wavelengths.size // 20)]
     fits = window_fits(single.table, beam, few, angles, count=windows)
@@ -141,7 +141,7 @@ def evaluation_figure(patches: Sequence[Periods]) -> Figure:
 def period_table(patches: Sequence[Periods]) -> str:
     """Fitted periods, in nm, as a Markdown table."""
     names = list(patches[0].by_method)
-    header = ("patch", "nominal", *(SHOWN.get(name, name) for name in names))
+    header = ("patch", "nominal", *names)
     rows = []
     for patch in patches:
         nominal = "" if patch.nominal is None else f"{1e3 * patch.nominal:.4g}"
@@ -164,7 +164,7 @@ def difference_table(patches: Sequence[Periods]) -> str:
             expected = response.beam.grating_angles(response.wavelengths, patch.nominal, 1)
             cells.append(f"{_short(float(np.nanmax(np.abs(ridge.angles - expected))))}°")
         rows.append((patch.name, f"{1e3 * patch.nominal:.4g}", *cells))
-    return pages.table(("patch", "period, nm", *(SHOWN.get(name, name) for name in names)), rows)
+    return pages.table(("patch", "period, nm", *names), rows)
 
 
 def window_table(patches: Sequence[Periods]) -> str:
@@ -172,7 +172,7 @@ def window_table(patches: Sequence[Periods]) -> str:
     rows = []
     for patch in patches:
         mean, spread, least, most = (1e3 * value for value in patch.windows)
-        ensemble = 1e3 * patch.by_method["default"].fit.period
+        ensemble = 1e3 * patch.by_method["spectral"].fit.period
         spread_text = f"± {spread:.2g}" if spread >= 0.01 else "± 0"
         thesis = "" if np.isnan(patch.thesis) else f"{1e3 * patch.thesis:.5g}"
         ends = f"{least:.5g} – {most:.5g}"

@@ -10,8 +10,6 @@ mirrors leave it. Light that the structure sends beyond the sheet's critical ang
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import drjit as dr
 import mitsuba as mi
 
@@ -39,6 +37,7 @@ from .crossing import (
     Turned,
     crossing_axes,
     first_order,
+    order_0,
     out_of_sheet,
     tangent_plane,
 )
@@ -89,52 +88,29 @@ class Through:
         """`eval` and `pdf` of the BSDF."""
         cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
         reflects, passes = _asked(ctx)
-        shares = self._shares(bsdf, ctx, si, active)
+        share = self._share(cos_i, reflects, passes)
         rotation = bsdf.orientation.rotation(si, active)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
-        scales: list[Colour] = []
+        change = None
         if self.balance is not None and self.balance.takes:
             k, scale = bsdf.power.wavenumbers(si), bsdf.scale_at(si, active)
-            scales = self.balance.products((si.wi, wo), rotation, k, scale)
-        change = scales[0] if scales else None
+            change = self.balance.product((si.wi, wo), rotation, k, scale)
         if reflects:
             for front in (True, False):
                 lit = active & ((cos_i > 0.0) == front) & (cos_i * cos_o > 0.0)
-                found, one = self._reflected(bsdf, ctx, si, wo, rotation, lit, front, change)
-                value = dr.select(lit, found, value)
-                density = dr.select(lit, shares.of_reflected(one), density)
+                side, orders = self._reflected(bsdf, ctx, si, wo, rotation, lit, front, change)
+                value = dr.select(lit, side, value)
+                density = dr.select(lit, share * with_even_share(orders), density)
         if passes:
             lit = active & (cos_i * cos_o < 0.0)
             crossing = Crossing(si, wo, rotation, lit, self.material.eta, self.thin)
-            found = self._passed(bsdf, ctx, si, crossing, change) * dr.abs(cos_o)
-            value = dr.select(lit, found, value)
+            passed = self._passed(bsdf, ctx, si, crossing, change) * dr.abs(cos_o)
+            value = dr.select(lit, passed, value)
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
             scale = bsdf.scale_at(si, active)
             orders = bsdf.power.density(crossing, scale, si) * dr.square(out)
-            density = dr.select(lit, shares.of_passed(orders), density)
-        if len(scales) > 1:
-            value *= mi.Spectrum(scales[1])
-        if len(scales) > 2:
-            value += self._spread(ctx, cos_i, cos_o, scales[2], active, reflects, passes)
+            density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
         return value, density
-
-    def _spread(
-        self,
-        ctx: Context,
-        cos_i: Float,
-        cos_o: Float,
-        product: Colour,
-        active: Mask,
-        reflects: bool,
-        passes: bool,
-    ) -> Spectrum:
-        """g(ωi) g(ωo) cosθo: what R + T lacks, as the mode of transport has it."""
-        lit = mi.Mask(reflects) & (cos_i * cos_o > 0.0) | mi.Mask(passes) & (cos_i * cos_o < 0.0)
-        factor = dr.abs(cos_o)
-        if not self.thin:
-            end = cos_o if ctx.mode == mi.TransportMode.Importance else cos_i
-            factor *= dr.select(end < 0.0, dr.square(self.material.eta), 1.0)
-        return mi.depolarizer(product * dr.select(mi.Mask(active) & lit, factor, 0.0))
 
     def sample(
         self,
@@ -148,13 +124,11 @@ class Through:
         """`sample` of the BSDF: one of the sides by its flat reflectance, then by the orders."""
         cos_i = mi.Frame3f.cos_theta(si.wi)
         active = mi.Mask(active) & (cos_i != 0.0)
-        shares = self._shares(bsdf, ctx, si, active)
-        share = shares.reflected
+        share = self._share(cos_i, *_asked(ctx))
         reflected = sample1 < share
         sample1 = dr.select(
             reflected, sample1 / dr.maximum(share, 1e-6), (sample1 - share) / (1.0 - share + 1e-6)
         )
-        even = dr.select(reflected, *shares.even)
         down, n = cos_i > 0.0, dr.detach(self.material.eta)
         sides = Sides.of(n, self.thin, down)
         inner = mi.Float(1.0) if self.thin else n
@@ -165,14 +139,14 @@ class Through:
         drawn = bsdf.power.draw(
             dr.select(reflected, cosine, sides.cosine(cosine, n, down, self.thin)),
             dr.detach(bsdf.scale_at(si, active) * dr.select(reflected & (cos_i < 0.0), n, 1.0)),
-            dr.maximum((sample1 - even) * dr.rcp(dr.maximum(1.0 - even, 1e-6)), 0.0),
+            dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
             sample2,
             si,
         )
         rotation = bsdf.orientation.rotation(si, active)
         total = sign * from_patch(drawn, rotation) - into * mi.Vector2f(si.wi.x, si.wi.y)
         wo = dr.select(
-            sample1 < even, mi.warp.square_to_uniform_hemisphere(sample2), direction_of(total / out)
+            sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), direction_of(total / out)
         )
         active &= wo.z > 0.0
         wo.z = dr.select(reflected == down, wo.z, -wo.z)
@@ -219,7 +193,7 @@ class Through:
             return value, density
         inner = Turned(si, wo, rotation, lit, n)
         power = _changed(bsdf, si, inner.place, scale, change)
-        # not in place: beyond what tables reach there is light that is spread
+        # not in place: tables do not reach farther
         lit = lit & inner.reached
         value = bsdf.lobe(ctx, si, inner, self.below, lit, power) * dr.square(n)
         density = bsdf.power.density(inner, scale * n, si) * dr.square(n)
@@ -249,12 +223,20 @@ class Through:
         crossing: Crossing,
         change: Colour | None,
     ) -> Spectrum:
-        """BSDF of light that goes through, as the mode of transport has it."""
+        """BSDF of light that goes through, as the mode of transport has it.
+
+        Order 0 has what the flat surface transmits, and is finite where w → 0, as all others are.
+        """
         place, scale = crossing.place, bsdf.scale_at(si, crossing.active)
-        power = _changed(bsdf, si, place, scale, change)
-        factor = self._factor(ctx, si, crossing, self._matrices(bsdf, si, crossing, scale))
-        outside = bsdf.area_factor * crossing.n * dr.rcp(dr.square(place.w) * crossing.q0)
-        outside *= dr.rcp(-crossing.inside.z)
+        power, zeroth = bsdf.power.power(place, scale, si), bsdf.power.zeroth(place, scale, si)
+        zeroth = dr.minimum(zeroth, power)  # speckle may be dark
+        axes = crossing_axes(-crossing.above, crossing.inside)
+        per_w = crossing.n * dr.rcp(dr.square(place.w) * crossing.q0 * -crossing.inside.z)
+        others = self._factor(ctx, si, crossing, axes, self._matrices(bsdf, si, crossing, axes))
+        flat = self._factor(ctx, si, crossing, axes, [order_0(crossing, axes, self.thin)])
+        value = mi.Spectrum((power - zeroth) * per_w) * others
+        value += mi.Spectrum(zeroth if change is None else zeroth * change) * flat
+        outside = mi.Float(bsdf.area_factor)
         if not self.thin:
             # Radiance over n² is transmitted; light along ωi or ωo
             down = mi.Frame3f.cos_theta(si.wi) > 0.0
@@ -262,31 +244,41 @@ class Through:
             if ctx.mode == mi.TransportMode.Importance:
                 scales = scales[::-1]
             outside *= dr.select(down, *scales)
-        return mi.Spectrum(dr.select(crossing.active, power * outside, 0.0)) * factor
+        return dr.select(crossing.active, value * outside, 0.0)
 
     def _matrices(
-        self, bsdf: BSDF, si: Interaction, crossing: Crossing, scale: Float
+        self,
+        bsdf: BSDF,
+        si: Interaction,
+        crossing: Crossing,
+        axes: tuple[Vector3f, Vector3f],
     ) -> list[Jones]:
         """2 cosθi cosθt times the Jones matrices of light from above, of each channel or of all."""
-        axes = crossing_axes(-crossing.above, crossing.inside)
         tangent = tangent_plane(crossing, axes)
         if not isinstance(self.boundary, SmallSlope):
-            return [tangent]
+            return [out_of_sheet(tangent, crossing)] if self.thin else [tangent]
         first = first_order(crossing, axes, self.thin)
         shares = self.boundary.shares(
-            crossing.place, scale, bsdf.power.wavenumbers(si), [crossing.n]
+            crossing.place,
+            bsdf.scale_at(si, crossing.active),
+            bsdf.power.wavenumbers(si),
+            [crossing.n],
         )
-        return [
+        blended = [
             tuple(b + (k - b) * share for k, b in zip(tangent, first, strict=True))
             for share in shares
         ]
+        return [out_of_sheet(jones, crossing) for jones in blended] if self.thin else blended
 
     def _factor(
-        self, ctx: Context, si: Interaction, crossing: Crossing, matrices: list[Jones]
+        self,
+        ctx: Context,
+        si: Interaction,
+        crossing: Crossing,
+        axes: tuple[Vector3f, Vector3f],
+        matrices: list[Jones],
     ) -> Spectrum:
-        """½ Σ|J|², or Mueller matrices, for each channel; out of the flat side of a sheet."""
-        if self.thin:
-            matrices = [out_of_sheet(jones, crossing) for jones in matrices]
+        """½ Σ|J|², or Mueller matrices, for each channel."""
         if not mi.is_polarized:
             powers = [0.5 * sum(map(squared, jones)) for jones in matrices]
             return mi.UnpolarizedSpectrum(powers if len(powers) > 1 else powers[0])
@@ -294,7 +286,6 @@ class Through:
         importance = ctx.mode == mi.TransportMode.Importance
         falls = (mi.Frame3f.cos_theta(si.wi) > 0.0) == mi.Mask(importance)
         ends = -crossing.above, crossing.below
-        axes = crossing_axes(-crossing.above, crossing.inside)
         light = tuple(
             dr.select(falls, *both) for both in ((ends[0], -ends[1]), (ends[1], -ends[0]))
         )
@@ -307,24 +298,6 @@ class Through:
         ]
         return mueller(turned_round, light, about)
 
-    def _shares(self, bsdf: BSDF, ctx: Context, si: Interaction, active: Mask) -> Shares:
-        """Of the samples: by the flat reflectance, and by what is spread."""
-        reflects, passes = _asked(ctx)
-        cos_i = mi.Frame3f.cos_theta(si.wi)
-        orders = self._share(cos_i, reflects, passes)
-        if self.balance is None or not self.balance.spreads:
-            return Shares(orders, (mi.Float(EVEN), mi.Float(EVEN)))
-        rotation, scale = bsdf.orientation.rotation(si, active), bsdf.scale_at(si, active)
-        above, below = self.balance.shares(si.wi, rotation, bsdf.power.wavenumbers(si), scale)
-        down = cos_i > 0.0
-        stays = dr.select(down, above, below) if reflects else mi.Float(0.0)
-        goes = dr.select(down, below, above) if passes else mi.Float(0.0)
-        even = [
-            dr.fma(part, EVEN, spread) * dr.rcp(dr.maximum(part + spread, 1e-6))
-            for part, spread in ((orders, stays), (1.0 - orders, goes))
-        ]
-        return Shares((orders + stays) * dr.rcp(1.0 + stays + goes), (even[0], even[1]))
-
     def _share(self, cos_i: Float, reflects: bool, passes: bool) -> Float:
         """Share of the orders' samples that stay on their side."""
         if not (reflects and passes):
@@ -334,24 +307,6 @@ class Through:
         if self.thin:
             flat = 2.0 * flat * dr.rcp(1.0 + flat)
         return dr.clip(flat, _LEAST_SHARE, 1.0 - _LEAST_SHARE)
-
-
-@dataclass(frozen=True)
-class Shares:
-    """Of the samples: those that stay on their side; and the evenly drawn ones of these and of the
-    others.
-    """
-
-    reflected: Float
-    even: tuple[Float, Float]
-
-    def of_reflected(self, density: Float) -> Float:
-        """Density of the samples that stay, from that of the orders'."""
-        return self.reflected * with_even_share(density, self.even[0])
-
-    def of_passed(self, density: Float) -> Float:
-        """That of the others."""
-        return (1.0 - self.reflected) * with_even_share(density, self.even[1])
 
 
 def _changed(

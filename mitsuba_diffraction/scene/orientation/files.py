@@ -35,7 +35,7 @@ _CODES = {
 
 
 def load_mesh(path: str | os.PathLike[str]) -> tuple[Floats, Floats | None, Floats | None, Ints]:
-    """Positions (n, 3), normals (n, 3) or None, texture coordinates (n, 2) or None, faces (m, 3).
+    """Read a mesh file.
 
     Reads what Mitsuba reads, .ply, .obj, .serialized, and PLY files of polygons.
 
@@ -72,7 +72,7 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[Floats, Floats | None, Floa
 
 
 def _vertices_and_faces(file: Path, kind: str) -> tuple[int, Ints]:
-    """How many vertices, and the faces (m, 3), of a mesh that is not kept.
+    """Return the number of vertices and the faces (m, 3) of a mesh that is not kept.
 
     Whoever keeps an error keeps what its traceback has seen, and Dr.Jit compiles kernels for all
     meshes alive: one without faces would break every later rendering of the process.
@@ -84,7 +84,7 @@ def _vertices_and_faces(file: Path, kind: str) -> tuple[int, Ints]:
 
 
 def has_own_normals(path: str | os.PathLike[str]) -> bool:
-    """Whether the file of a mesh itself holds vertex normals; else Mitsuba makes smooth ones."""
+    """Whether the file of a mesh holds vertex normals; otherwise Mitsuba makes smooth ones."""
     file = Path(path)
     content = read_bytes(file)
     if file.suffix.lower() == ".ply":
@@ -113,7 +113,7 @@ def _read(file: Path, kind: str, face_normals: bool) -> mi.Mesh:
 
 
 def load_orientation(path: str | os.PathLike[str]) -> Floats | None:
-    """The attribute vertex_orientation of a mesh that `load_mesh` reads, (n, 2), or None."""
+    """Read the attribute vertex_orientation of a mesh file, (n, 2); None without one."""
     file = readable_file(path)
     mesh = _load(file, KINDS[file.suffix.lower()], face_normals=False)
     if not mesh.has_attribute(ORIENTATION):
@@ -167,7 +167,7 @@ def _need_variant() -> None:
 
 
 def triangulated_ply(data: bytes) -> bytes | None:
-    """A PLY file whose polygons are cut into fans of triangles, as Mitsuba cuts those of OBJ.
+    """Cut the polygons of a PLY file into fans of triangles, as Mitsuba cuts those of OBJ.
 
     Faces must come after vertices; the result has nothing else. None where the file is no such PLY.
     """
@@ -207,7 +207,7 @@ def _triangulated(data: bytes) -> bytes | None:
 def _read_ascii(
     body: bytes, vertex: list[str], face: list[str], _: str
 ) -> tuple[bytes, list[list[int]]]:
-    """The vertices' part of the file, and the corners of each face."""
+    """Return the vertices' part of the file, and the corners of each face."""
     count, faces = (int(e[0].split()[2]) for e in (vertex, face))
     lines = body.splitlines(keepends=True)
     if not face[1].startswith("property list"):
@@ -224,7 +224,7 @@ def _read_ascii(
 def _read_binary(
     body: bytes, vertex: list[str], face: list[str], order: str
 ) -> tuple[bytes, list[list[int]]]:
-    """The vertices' part of the file, and the corners of each face."""
+    """Return the vertices' part of the file, and the corners of each face."""
     count, faces = (int(e[0].split()[2]) for e in (vertex, face))
     # lists at vertices are none of these codes: KeyError
     row = order + "".join(_CODES[line.split()[1]] for line in vertex[1:])

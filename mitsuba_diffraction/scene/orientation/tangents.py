@@ -1,4 +1,4 @@
-"""Does a mesh have the tangents that a measured patch needs?
+"""Tangents of a mesh, judged by whether a measured patch can follow them.
 
 A patch is laid along dp/du, which Mitsuba takes from the texture coordinates of each triangle, and
 turned from there by the mesh attribute vertex_orientation, where the mesh has it. So a mesh needs
@@ -106,7 +106,7 @@ def _shares(corners: Floats, crossed: Bools, middles: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class TangentReport:
-    """What `check_tangents` found; shares are of the surface area, 0 to 1."""
+    """Findings of `check_tangents`; shares are of the surface area, 0 to 1."""
 
     triangles: int  # number of triangles with an area
     # has_uv, has_normals, has_orientation: whether the mesh carries them
@@ -146,7 +146,7 @@ class TangentReport:
         )
 
     def problems(self) -> list[str]:
-        """One line for each thing that speaks against this mesh, with what to do."""
+        """Reasons against this mesh, a line each, with what to do."""
         if not self.has_uv:
             return [
                 "no texture coordinates, so the patch has no direction: give the mesh one with "
@@ -273,7 +273,7 @@ def check_tangents(
 
 
 def carried(vectors: Floats, before: Floats, after: Floats) -> Floats:
-    """Vectors (n, 3) turned by the smallest rotation of one unit normal to another (Rodrigues)."""
+    """Turn vectors (n, 3) by the smallest rotation of one unit normal to another (Rodrigues)."""
     axis = np.cross(before, after)
     cosine = (before * after).sum(axis=1, keepdims=True)
     along = (axis * vectors).sum(axis=1, keepdims=True) / np.maximum(1 + cosine, 1e-3)
@@ -283,7 +283,7 @@ def carried(vectors: Floats, before: Floats, after: Floats) -> Floats:
 def _jumps(
     welded: Ints, normals: Floats, tangent: Floats, turn: Floats, good: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], Ints]:
-    """Across which edges the direction jumps, the fold of the surface apart.
+    """Find edges across which the direction jumps, apart from the fold of the surface.
 
     Parameters
     ----------
@@ -325,7 +325,7 @@ def _jumps(
 
 
 def _laid(tangent: Floats, normal: Floats, turn: Floats) -> Floats:
-    """Unit tangents (n, 3) turned by (cosine, sine) (n, 2) counter-clockwise around normals."""
+    """Turn unit tangents (n, 3) by (cosine, sine) (n, 2), counter-clockwise around normals."""
     unit = _unit(turn)
     return unit[:, :1] * tangent + unit[:, 1:] * np.cross(normal, tangent)
 

@@ -68,7 +68,7 @@ def vertex_normals(positions: Floats, faces: Ints) -> Floats:
 
 
 def join(meshes: list[TriangleMesh]) -> TriangleMesh:
-    """One mesh out of several, without welding; an orientation is kept where all have one."""
+    """Join meshes into one, without welding; an orientation is kept where all have one."""
     starts = np.cumsum([0] + [len(mesh.positions) for mesh in meshes])
     turns = [mesh.orientation for mesh in meshes if mesh.orientation is not None]
     return TriangleMesh(

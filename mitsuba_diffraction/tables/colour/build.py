@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from scipy import ndimage, sparse
 
 from ...optics.colour import linear_srgb, response
-from ..energy.powers import order_0_power, power_expansion, powers_of
 from ..expansion import Expansion
+from ..powers import order_0_power, power_expansion, powers_of
 from ..table import DiffractionTable
 from ..window import taps_at
 

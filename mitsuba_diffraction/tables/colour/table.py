@@ -24,8 +24,8 @@ from numpy.typing import ArrayLike, NDArray
 from ...errors import warn
 from ...optics.colour import delta_e, linear_srgb, response
 from ..build.coefficients import half_scale
-from ..energy.powers import kind_of
 from ..expansion import Expansion
+from ..powers import kind_of
 from ..table import DiffractionTable
 from .build import VISIBLE, OtherOrders, PolarGrid, lobe_of, order_0_colour
 

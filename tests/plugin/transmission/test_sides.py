@@ -13,7 +13,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.fresnel import reflectance
-from mitsuba_diffraction.tables.energy import sides
+from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.chi_square import DISPERSED, ROUGH, SMALL, Case, chi_square
 from tests.support.directions import as_single, rough_patch
 from tests.support.lanes import evaluated, interaction, refusal, spectra, vectors
@@ -110,22 +110,20 @@ def test_of_gentle_surfaces_both_sides_add_up_to_all_light(some_variant, kind):
 
 @pytest.mark.parametrize(
     ("kind", "theta", "lengths", "width"),
-    # chains of directions are solved of the last, whose lobes are narrow
     [
         ("dielectric", 60.0, (2.5, 0.08), 20.0),
         ("sheet", 70.0, (2.5, 0.08), 20.0),
         ("sheet", 75.0, (1.1, 0.06), 40.0),
     ],
 )
-def test_conserved_both_sides_add_up_to_all_light(
-    some_variant, kind, theta, lengths, width, monkeypatch
-):
-    monkeypatch.setattr(sides, "WAVELENGTHS", (3, 3))  # one of them near 550 nm
+def test_conserved_both_sides_add_up_to_all_light(some_variant, kind, theta, lengths, width):
     period, depth = lengths
     size = {"periods": math.ceil(width / period), "pixels_per_period": math.ceil(period / 0.0895)}
     grating = md.gratings.sinusoidal(period, depth, **size)
     common = {"field": grating, "coherence_width": width, **SIDES[kind]}
+    before = use_energy_settings(EnergySettings(side_wavelengths=3))  # one of them near 550 nm
     raw, conserved = (sampled(both(energy_conserving=e, **common), theta)[0] for e in (False, True))
+    use_energy_settings(before)
     error = 3 * raw.std() / np.sqrt(len(raw))
     # first order gains light, and a sheet loses what is beyond its critical angle
     assert raw.mean() > 1.0 + error if kind == "dielectric" else raw.mean() < 0.99 - error
