@@ -1,4 +1,4 @@
-"""The arguments of a table, declared once: names, defaults, allowed values and help.
+"""Settings of a table, declared once: names, defaults, allowed values and help.
 
 The builder, the plugin, recipes, the commands and the header of a table's file all read them here.
 """
@@ -56,7 +56,7 @@ def _among(*choices: str) -> Callable[[Any], str]:
 
 
 def _between(low: float, high: float) -> Callable[[Any], float]:
-    """A number above `low`, up to `high`."""
+    """Return a check for a number above `low` and up to `high`."""
 
     def check(value: Any) -> float:
         number = _number(value)
@@ -80,7 +80,7 @@ def _count(most: int) -> Callable[[Any], int | None]:
 
 
 def _pair(value: Any) -> tuple[float, float]:
-    low, high = (_number(one) for one in value)
+    low, high = (_number(end) for end in value)
     return low, high
 
 

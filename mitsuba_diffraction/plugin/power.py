@@ -23,7 +23,7 @@ from .window_positions import Window, WindowPositions
 
 
 class PowerModel(Protocol):
-    """What the BSDF asks of the diffracted power."""
+    """Diffracted power in the variant's channels, and a density to draw directions from."""
 
     def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
         """⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm², per channel."""
@@ -40,10 +40,10 @@ class PowerModel(Protocol):
         """2π/λ of each channel, rad/µm."""
 
     def flat(self, pair: Pair | TablePoint, si: Interaction) -> Colour:
-        """What `power` is of a flat surface."""
+        """`power` of a flat surface."""
 
     def zeroth(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
-        """What of `power` is order 0's, in ensembles."""
+        """Part of `power` that is order 0's, in ensembles."""
 
     def draw(
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
@@ -102,15 +102,15 @@ class SpectralPower:
             windows = self._places.at(si, pair.rotation)
 
         def of_wavelength(k: Float) -> Float:
-            found = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w, windows)
-            return found * dr.square(k * (0.5 / dr.pi))
+            total = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w, windows)
+            return total * dr.square(k * (0.5 / dr.pi))
 
         return of_wavelength
 
     def _density(self, pair: Pair | Crossing, height_scale: Float) -> Callable[[Float], Float]:
         def of_wavelength(k: Float) -> Float:
             strategy = self._sampler.strategy(k, pair.cos_i, dr.detach(height_scale))
-            return self._sampler.density(k * pair.uv, *strategy) * pair.cos_o * dr.square(k)
+            return self._sampler.density(k * pair.uv, strategy) * pair.cos_o * dr.square(k)
 
         return of_wavelength
 
@@ -170,17 +170,17 @@ class SpectralPower:
             return [[function(k) for k in wavenumbers] for function in functions]
 
         def body(
-            n: Index, inputs: list[Float], found: list[list[Float]]
+            n: Index, inputs: list[Float], values: list[list[Float]]
         ) -> tuple[Index, list[Float], list[list[Float]]]:
             added = [
-                [*of_one[1:], function(inputs[0])]
-                for of_one, function in zip(found, functions, strict=True)
+                [*earlier[1:], function(inputs[0])]
+                for earlier, function in zip(values, functions, strict=True)
             ]
             return n + 1, [*inputs[1:], inputs[0]], added
 
         nothing = [[mi.Float(0.0) for _ in wavenumbers] for _ in functions]
         state = (mi.UInt32(0), wavenumbers, nothing)
-        return [list(one) for one in dr.while_loop(state, lambda n, *_: n < count, body)[2]]
+        return [list(values) for values in dr.while_loop(state, lambda n, *_: n < count, body)[2]]
 
 
 def _mean(values: list[Float]) -> Float:
@@ -190,5 +190,5 @@ def _mean(values: list[Float]) -> Float:
 def power_model(
     table: DiffractionTable, wavelength: float, places: WindowPositions | None = None
 ) -> PowerModel:
-    """That of the current variant; places, which RGB variants do not know, as `SpectralPower`."""
+    """Make the model of the current variant; RGB variants know no `places`."""
     return rgb_power(table) if mi.is_rgb else SpectralPower(table, wavelength, places)
