@@ -258,7 +258,7 @@ def test_scenes_without_anything_to_plan_are_refused(tmp_path):
 
 def test_a_sheet_that_lets_light_through_is_refused():
     with pytest.raises(DiffractionError, match="light goes through foil, which plans do not"):
-        record(lambda: plate(thin=True), sensor, 100)
+        record(lambda: plate(plugin="diffraction_dielectric", material=None), sensor, 100)
 
 
 def test_a_scene_in_the_dark_is_refused():
