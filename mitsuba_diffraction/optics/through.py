@@ -6,8 +6,14 @@ from above into a dielectric of index n has
     f = n² · 4 cosθi n cosθt N / (λ² A w²) · ⟨|P|²⟩,   ⟨|P|²⟩ at −q and κ = 2π w/λ,
 
 with N the mean power of the Jones matrix as in `boundary`: orders add up to a flat interface's
-transmittance as κh → 0. f/n² is the same for reversed light. Where w → 0, so does ⟨|P|²⟩ but for
-order 0, whose lobe is not there.
+transmittance as κh → 0. f/n² is the same for reversed light. Where w → 0, so does the power of all
+orders but order 0, whose lobe N/w² would make as large as one likes. What a lobe's width does to a
+flat interface is not the heights' to say, so order 0 has its flat transmittances instead:
+
+    f_0 = n² · 4πσ²/λ² · N_0 |a_0(κ)|² exp(−σ²q²),
+
+with N_0 of `order_0`, the geometric mean of both directions: at the lobe's middle that is 4 cosθi n
+cosθt N/w², and finite elsewhere.
 
 - Small slope: first-order perturbation (Rice 1951; Voronovich 1985), from the fields that light
   along ωi and reversed light along ωo make at the flat interface, as in `boundary.small_slope`.
@@ -81,6 +87,47 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
     zero = np.zeros_like(t_s)
     facet = np.stack([t_s, zero, zero, t_p], axis=-1).reshape(*t_s.shape, 2, 2)
     return np.asarray(turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident))
+
+
+def order_0(wi: ArrayLike, wo: ArrayLike, index: float, *, thin: bool = False) -> Complex:
+    """Jones matrices of order 0, (..., 2, 2), whose mean power is N_0.
+
+    With √√T of either direction and polarisation, turned from the one plane of incidence to the
+    other: symmetric, and √T in the refracted direction.
+
+    Parameters
+    ----------
+    wi : (..., 3) unit vectors above the surface; wo : unit vectors below it, in the dielectric or,
+        if `thin`, beyond the flat other side of a sheet.
+    """
+    s_in, s_out = polarisation_axes(wi, wo)
+    cosines = np.asarray(wi, np.float64)[..., 2], -np.asarray(wo, np.float64)[..., 2]
+    came, left = (
+        flat_transmittances(cosine, index, thin, side) ** 0.25
+        for side, cosine in enumerate(cosines)
+    )
+    dot = np.sum(s_in * s_out, axis=-1)
+    cross = s_in[..., 0] * s_out[..., 1] - s_in[..., 1] * s_out[..., 0]
+    rows = [
+        [left[0] * came[0] * dot, -left[0] * came[1] * cross],
+        [left[1] * came[0] * cross, left[1] * came[1] * dot],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2).astype(np.complex128)
+
+
+def flat_transmittances(cosine: ArrayLike, index: float, thin: bool, side: int) -> Real:
+    """Transmittances of s and p light by the flat surface, (2, ...).
+
+    Parameters
+    ----------
+    cosine : of the direction to the normal, where it is measured: in the dielectric if below.
+    index : of the dielectric over that of the medium above it.
+    thin : whether below is beyond the flat other side of a sheet (`out_of_sheet`).
+    side : 0 above the surface, 1 below.
+    """
+    relative = 1.0 / index if side and not thin else index
+    back = np.minimum(np.abs(np.stack(amplitudes(cosine, relative))) ** 2, 1.0)
+    return np.asarray((1.0 - back) / (1.0 + back) if thin else 1.0 - back)
 
 
 def out_of_sheet(jones: ArrayLike, wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:

@@ -19,12 +19,13 @@ from ..errors import warn
 from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS, response
 from ..optics.mean_second_order import limited
-from ..tables.energy.conservation import FINE, Conservation, DirectionalTable
+from ..tables.energy.conservation import Conservation
 from ..tables.energy.gain import GRAZING, fades
+from ..tables.energy.grid import FINE, DirectionalTable
 from ..tables.energy.store import Energy, mean_exponents
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, Kirchhoff
-from .direction_lookup import DirectionLookup, alike, between, scales_of
+from .direction_lookup import DirectionLookup, between, scales_of
 from .directions import Pair
 from .fresnel import Inside, Perfect, Reflectance
 from .layers import UnderFilm, plain
@@ -114,7 +115,7 @@ class EnergyModel:
             self._warn(found)
             self._scale.update(scales, nodes, height_scale, lowest is not None)
         if beneath:
-            ratios = [self._ratio(one) for one in alike([one.albedo for one in found])]
+            ratios = [self._ratio(one.albedo) for one in found]
             self._reflected.update(ratios, nodes, height_scale, lowest is not None)
 
     def _warn(self, found: list[Conservation]) -> None:

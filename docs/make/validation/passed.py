@@ -6,7 +6,7 @@ That takes a fraction of a second a grating, and is done when the page is made; 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +17,8 @@ from mitsuba_diffraction.analysis.energy import PASSED, sides_summary
 from mitsuba_diffraction.heights.recipes import Recipe
 from mitsuba_diffraction.optics import boundary
 from mitsuba_diffraction.optics.geometry import WIDTHS_PER_SIGMA, wavenumber
-from mitsuba_diffraction.tables.energy.conservation import DirectionalTable
-from mitsuba_diffraction.tables.energy.links import Medium
-from mitsuba_diffraction.tables.energy.sides import Sides
 
-from . import rayleigh, spread
+from . import rayleigh
 from .cases import FEW_WAVELENGTHS, KERATIN, Grating
 from .compare import GRAZING
 from .model import lobe_sigma
@@ -37,7 +34,7 @@ GRATINGS = tuple(
 ANGLES = (0.0, 30.0, 60.0, 75.0)
 #: Azimuths of the light: across the grooves, between, along.
 AZIMUTHS = (0.0, 35.0, 90.0)
-MODELS = ("kirchhoff", "small_slope", "small_slope, conserved")
+MODELS = ("kirchhoff", "small_slope")
 #: Beside those whose orders are compared.
 SURFACES = {
     "sinusoid 2.5/0.08 µm": partial(gratings.sinusoidal, 2.5, 0.08, periods=8),
@@ -69,37 +66,11 @@ def orders_of(
     sigma = lobe_sigma(grating)
     btdf = reference.btdf(
         field, wi, found.wo, wavelength,
-        eta=KERATIN, coherence_width=WIDTHS_PER_SIGMA * sigma, model=model.split(",")[0],
+        eta=KERATIN, coherence_width=WIDTHS_PER_SIGMA * sigma, model=model,
     )  # fmt: skip
-    if model == MODELS[-1]:
-        btdf = btdf * _kept(grating, wavelength, polar, turn, found)
     per_btdf = np.pi / (sigma * float(wavenumber(wavelength))) ** 2
     coloured = (found.order != 0).any(axis=1) & (-found.wo[:, 2] > np.cos(np.radians(GRAZING)))
     return per_btdf * btdf, exact, coloured.astype(float)
-
-
-def _kept(
-    grating: Grating, wavelength: float, theta: float, phi: float, found: rayleigh.Orders
-) -> Real:
-    """What orders are multiplied by where energy is conserved."""
-    sides, scale = _scale(grating, wavelength)
-    ends = (theta, phi), (np.arccos(-found.wo[:, 2]), np.arctan2(found.wo[:, 1], found.wo[:, 0]))
-    product = np.ones(len(found.wo))
-    for n, one in enumerate((scale or [])[:4]):
-        changes = product * sides.at(one, n % 2, *ends[n % 2], wavelength)
-        zeroth = (found.order == 0).all(axis=1)
-        product = np.where(zeroth | (n > 1), changes, product)  # c is order 0's alone
-    return product
-
-
-@lru_cache
-def _scale(grating: Grating, wavelength: float) -> tuple[Sides, list[DirectionalTable] | None]:
-    width = WIDTHS_PER_SIGMA * lobe_sigma(grating)
-    table = DiffractionTable.build(
-        grating.heights(_PIXELS), coherence_width=width, height_scale_max=KERATIN
-    )
-    sides = Sides(table, 1.0, Medium(KERATIN, "small_slope", thin=False))
-    return sides, sides.scale((wavelength, wavelength))
 
 
 def deviation(grating: Grating, theta: float, azimuth: float, model: str) -> float:
@@ -130,15 +101,16 @@ def section(gratings: Sequence[Grating] = GRATINGS) -> str:
     recipes = PRECOMPUTE if len(gratings) > 1 else PRECOMPUTE[1:2]  # of few orders
     return f"""## Through a dielectric
 
-Orders that go through (`transmission`), from above into keratin, against Rayleigh's expansion, with
-light across the grooves (azimuth 0°), between and along them; steepest slopes from 0.03 to 0.2.
-Deviation of colours within {GRAZING:g}° of the normal, Kirchhoff's model / `small_slope` as it is /
-with energy conserved, the default:
+Orders that go through (`diffraction_dielectric`), from above into keratin, against Rayleigh's
+expansion, with light across the grooves (azimuth 0°), between and along them; steepest slopes from
+0.03 to 0.2.
+Deviation of colours within {GRAZING:g}° of the normal, Kirchhoff's model / `small_slope`, the
+default; conserving energy does not change them:
 
 {table(header, rows)}
 
 At slopes up to 0.1 the default is within {percent(worst[0.0])} in light along the normal, and
-within {percent(max(worst.values()))} up to 75°: energy is conserved by order 0, which is no colour.
+within {percent(max(worst.values()))} up to 75°.
 What a thin sheet does besides is Fresnel's: its other side is flat.
 
 Reflected and transmitted light by `small_slope` as it is → by default, coherent over 20 µm, of an
@@ -147,39 +119,14 @@ A lossless dielectric has 1:
 
 {table(["surface", "light", *(f"{theta:g}°" for theta in PASSED)], sums(surfaces))}
 
-The recipes of `precompute/`, coherent over the default 65 µm, up to 75°; *spread* is the largest
-share of single directions' light (`python -m docs.make.validation passed` prints this table):
+The recipes of `precompute/`, coherent over the default 65 µm, up to 75°
+(`python -m docs.make.validation passed` prints this table):
 
 {wide(recipes)}
 
-The aim is 0.98 to 1.001. Sheets reach it. Scales take 0.3 MB, of gratings' sheets 4 to 25. These
-are sums over orders. A path tracer found the sheet of `blazed` between 0.982 and 1.010 in 60 random
-directions and wavelengths (noise 0.0015), those of `cd` and `dvd_pits` between 0.985 and 1.001 in
-50, within 0.013, 0.004 and 0.003 of the sums, when scales had ten nodes from order to order instead
-of fourteen. The sums take the scale in the middle of a lobe, across which it bends amid kinks: of
-18 directions picked there one was at 1.035.
-
-Between the scale's directions and wavelengths R + T is looked at too: the scale is lowered where
-that is above 1, and more is spread where it is below 0.985. Orders come and go there. Of a sheet
-that is a grating the nodes lie where they do, if its lobes are narrow; if they are not and light is
-lacking, its directions are finer. Of an interface they cannot: orders come up at its upper side
-where (c − x)/g is whole and at its lower one where (c' − x)/g is, c² = 1 − y², c'² = n² − y², and
-no grid of two whole numbers has both. So light from within a
-grating meets kinks between nodes, narrower than a cell, and loses 2 to 4 % there in single
-directions, on steep walls more. A third to a half more nodes along angles and azimuths bring `cd`
-from 0.91 to 0.937 at least, before anything is spread, in twice the time: they are not spent.
-
-What s, which multiplies colours and is at most 1.5, leaves out is spread over all directions where
-some is missing, if R + T is below 0.98 in 3 % of the directions between nodes: it is the blazed
-grating's, and interfaces' from within. It cannot be order 0's: what is missing along one direction,
-and not along those that order 0 goes to, no reciprocal model can give to order 0.
-
-{spread.section()}
-
-So it is not: what is missing is in the strong orders, each of them too weak by some per cent. A
-grating has no light between its orders, so what is spread keeps the account of energy and no more,
-and s, which keeps it too, does not bring orders closer to the rigorous ones on slopes like these.
-`energy_conserving=false` leaves orders as they are."""
+Order 0 alone is scaled, so colours are as the model has them; where order 0 has too little light,
+what is missing stays missing, and what is too much stays too much. `energy_conserving=false` leaves
+order 0 as it is."""
 
 
 def wide(recipes: Sequence[Path] = PRECOMPUTE) -> str:
@@ -189,16 +136,14 @@ def wide(recipes: Sequence[Path] = PRECOMPUTE) -> str:
         built = DiffractionTable.build(recipe.fields(), **recipe.table)
         cells = []
         for _, found in sorted(sides_summary(built).items(), reverse=True):  # sheets first
-            spread = found.pop("spread, largest")
             for kept in (False, True):
                 ends = [
                     span for key, spans in found.items() if ("conserved" in key) == kept
                     for one in spans.values() for span in one
                 ]  # fmt: skip
                 cells.append(_span([min(ends), max(ends)]))
-            cells.append(f"{spread:.3f}")
         rows.append([recipe.path.stem, *cells])
-    whats = "as it is", "default", "spread"
+    whats = "as it is", "default"
     kinds = [f"{kind}, {what}" for kind in ("sheet", "dielectric") for what in whats]
     return table(["recipe", *kinds], rows)
 

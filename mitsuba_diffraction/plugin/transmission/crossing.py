@@ -11,13 +11,14 @@ import drjit as dr
 import mitsuba as mi
 
 from ..boundary import LEVEL, Jones, turn, turned
-from ..directions import Pair, Place, in_patch
+from ..directions import Pair, TablePoint, in_patch
 from ..fresnel import root
 from ..layers import transmittances
 from ..types import Float, Interaction, Mask, Rotation, Vector3f
 
-#: Least |w|: where n cosθt and cosθi are alike ⟨|P|²⟩/w² has a limit, but 0/0 has none.
-_LEAST_W = 1e-3
+#: Least |w|: where n cosθt and cosθi are alike the power of an order other than 0 over w² has a
+#: limit, which single precision loses in the difference of all orders and order 0.
+_LEAST_W = 0.01
 #: Sums of directions that tables reach, in units of k.
 _FARTHEST = 2.0 - 1e-5
 
@@ -38,9 +39,9 @@ class Turned(Pair):
         self.uv, self.w = -n * self.uv, n * self.w
 
     @property
-    def place(self) -> Place:
+    def place(self) -> TablePoint:
         """Of the look-up; see `reached`."""
-        return Place(dr.select(self.reached, self.uv, 0.0), self.w)
+        return TablePoint(dr.select(self.reached, self.uv, 0.0), self.w)
 
     @property
     def reached(self) -> Mask:
@@ -78,7 +79,7 @@ class Crossing:
         w = self.q - self.q0
         reached = dr.squared_norm(total) < _FARTHEST**2
         self.active = active & reached
-        self.place = Place(
+        self.place = TablePoint(
             dr.select(self.active, dr.select(w > 0.0, -total, total), 0.0),
             dr.maximum(dr.abs(w), _LEAST_W),
         )
@@ -139,6 +140,30 @@ def out_of_sheet(jones: Jones, crossing: Crossing) -> Jones:
     )
     shares = [t * dr.rcp(dr.fma(-(1.0 - t), 1.0 - other, 1.0)) for t in left for other in came]
     return tuple(entry * dr.sqrt(share) for entry, share in zip(jones, shares, strict=True))
+
+
+def order_0(crossing: Crossing, axes: tuple[Vector3f, Vector3f], thin: bool) -> Jones:
+    """Jones matrix of order 0 (`optics.through.order_0`)."""
+    n = crossing.n
+    ends = [
+        [t * dr.rcp(2.0 - t) if thin else t for t in transmittances(cosine, n)]
+        for cosine in (crossing.above.z, _outer_cosine(crossing, thin))
+    ]
+    dot = dr.dot(*axes)
+    cross = dr.fma(axes[0].x, axes[1].y, -axes[0].y * axes[1].x)
+    # at the critical angle and beyond, the root's derivative would be infinite
+    roots = [[dr.sqrt(dr.sqrt(dr.maximum(t, 1e-14))) for t in end] for end in ends]
+    (s_in, p_in), (s_out, p_out) = roots
+    return s_out * s_in * dot, -s_out * p_in * cross, p_out * s_in * cross, p_out * p_in * dot
+
+
+def _outer_cosine(crossing: Crossing, thin: bool) -> Float:
+    """Cosine above the surface of the light below it; 0 beyond the critical angle."""
+    if thin:
+        return -crossing.below.z
+    inside = crossing.inside
+    sine = dr.square(crossing.n) * (dr.square(inside.x) + dr.square(inside.y))
+    return dr.safe_sqrt(1.0 - sine)
 
 
 def first_order(crossing: Crossing, axes: tuple[Vector3f, Vector3f], thin: bool) -> Jones:

@@ -17,11 +17,10 @@ from ...optics.second_order import LIMIT, NODES, coefficient_table
 from ...optics.slope_ratios import SlopeRatios
 from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
-from ...tables.energy.conservation import FINE, DirectionalTable
 from ...tables.energy.gain import GRAZING
-from ...tables.energy.grid import SHARE
-from ...tables.energy.powers import order_0_power, power_series
+from ...tables.energy.grid import FINE, SHARE, DirectionalTable
 from ...tables.layout import Record, cells_of, functions_at
+from ...tables.powers import order_0_power, power_series
 from ...tables.table import DiffractionTable
 from .texels import Packed, Texture, as_half, listed, paired, texels
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import warn
-from ...tables.energy.conservation import FINE
+from ...tables.energy.grid import FINE
 from .camera import Camera
 from .context import (
     Bindings,

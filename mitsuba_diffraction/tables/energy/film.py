@@ -11,9 +11,9 @@ from ...optics import mean_second_order
 from ...optics.blend import RoughnessTable
 from ...optics.fresnel import Filmed
 from ...optics.geometry import wavenumber
-from .conservation import FINE, DirectionalTable, Index
-from .fit import parallel
-from .grid import DirectionGrid
+from .conservation import Index
+from .grid import FINE, DirectionalTable, DirectionGrid
+from .scaling import parallel
 
 #: Phase of a fringe, rad, from one wavelength to the next, and most wavelengths: within a twentieth
 #: of the most there is up to a path 2 n d of 3 µm, and three times that at 12 µm. Under thin films

@@ -1,4 +1,4 @@
-"""What becomes of one order's light: the factor of |a_j|² in the albedo (NumPy, float64).
+"""Factor of |a_j|² in the albedo: what the boundary makes of one order's light (NumPy, float64).
 
 An order of a surface sends the share η = G |a_j|² of the light along −ωi to ωo, with
 
@@ -10,13 +10,13 @@ N the mean power of the boundary's Jones matrix (`optics.boundary`): for Kirchho
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
-from scipy.ndimage import map_coordinates
 
 from ...optics import blend, boundary, fresnel
 from ...optics.blend import RoughnessTable
@@ -28,7 +28,7 @@ Real = NDArray[np.float64]
 POLAR_NODES, AZIMUTH_NODES = 31, 15
 #: Polar angles θo and cosines of the azimuth between which its table is then bilinear.
 POLAR_FINE, AZIMUTH_FINE = 61, 65
-# The horizon itself would divide by zero in the facets' frame
+#: Least cosine: the horizon itself would divide by zero in the facets' frame.
 LEAST_COSINE = 1e-3
 
 
@@ -77,37 +77,33 @@ class Gain:
             power = power * np.prod([mean_gain(c, self.index, *heights) for c in (cos_i, cos_o)], 0)
         return np.asarray((2.0 * cos_i * cos_o / one_plus_dot) ** 2 * power)
 
+    def at(self, theta: Real, faded: bool) -> list[Callable[[Real, Real], Real]]:
+        """Return G as a function of cosθo and φo − φi, for each polar angle θi (rad).
+
+        faded : whether it is attenuated by `fade`.
+        """
+        cosines, sines = np.cos(theta), np.sin(theta)
+        tables = [None] * len(theta) if self.index is None else self.tables(theta)
+
+        def of_angle(cos_i: float, sin_i: float, table: Real | None) -> Callable[..., Real]:
+            def gain(cos_o: Real, turn: Real) -> Real:
+                one_plus_dot = 1.0 + cos_i * cos_o + sin_i * np.sqrt(1.0 - cos_o**2) * np.cos(turn)
+                kirchhoff = (one_plus_dot / (cos_i + cos_o)) ** 2 / (cos_i * cos_o)
+                if table is not None:
+                    kirchhoff = kirchhoff * read(table, cos_o, turn)
+                return kirchhoff * fade(cos_i, cos_o) if faded else kirchhoff
+
+            return gain
+
+        return [of_angle(*each) for each in zip(cosines, sines, tables, strict=True)]
+
     def tables(self, theta: Real) -> Real:
         """`ratio` at θi = theta (t,), rad, for `read`: (t, POLAR_FINE, AZIMUTH_FINE)."""
         return np.tensordot(_spline(theta), self._nodes, 1)
 
-    def between(self, cos_i: Real, cos_o: Real, turn: Real) -> Real:
-        """`ratio`, linear between a table's nodes, at (cosθi, cosθo, φo − φi); all broadcast."""
-        if self.index is None:
-            return np.ones(())
-        fine = (POLAR_FINE - 1) / (0.5 * np.pi)
-        places = [np.arccos(np.minimum(cosine, 1.0)) * fine for cosine in (cos_i, cos_o)]
-        column = (np.cos(turn) + 1.0) * (0.5 * (AZIMUTH_FINE - 1))
-        at = np.stack(np.broadcast_arrays(*places, column))
-        return np.asarray(map_coordinates(self._fine, at, order=1, mode="nearest"))
-
-    def at(self, cos_i: Real, cos_o: Real, turn: Real) -> Real:
-        """G likewise."""
-        sines = np.sqrt(np.maximum((1.0 - cos_i**2) * (1.0 - cos_o**2), 0.0))
-        dot, w = 1.0 + cos_i * cos_o + sines * np.cos(turn), self.width(cos_i, cos_o)
-        return self.between(cos_i, cos_o, turn) * (dot / w) ** 2 / (cos_i * cos_o)
-
-    def width(self, cos_i: Real, cos_o: Real) -> Real:
-        """κ over the wavenumber and the height scale."""
-        return cos_i + cos_o
-
-    @cached_property
-    def _fine(self) -> Real:
-        return self.tables(np.linspace(0.0, 0.5 * np.pi, POLAR_FINE))
-
     @cached_property
     def _nodes(self) -> Real:
-        """The same at θi of the nodes."""
+        """`ratio` at θi of the nodes, (POLAR_NODES, POLAR_FINE, AZIMUTH_FINE)."""
         cosines = np.maximum(np.cos(_POLAR), LEAST_COSINE)
         turns = np.polynomial.chebyshev.chebpts2(AZIMUTH_NODES)  # cos(φo − φi)
         i, o = np.tril_indices(POLAR_NODES)
@@ -135,15 +131,9 @@ def _spline(theta: Real) -> Real:
 
 
 def read(table: Real, cos_o: Real, turn: Real) -> Real:
-    """One θi's table at (cosθo, φo − φi), bilinear."""
-    return bilinear(
-        table, np.arccos(np.minimum(cos_o, 1.0)) * ((POLAR_FINE - 1) / (0.5 * np.pi)), turn
-    )
-
-
-def bilinear(table: Real, row: Real, turn: Real) -> Real:
-    """A table at rows and at azimuths (rad), whose cosines its columns have evenly; broadcast."""
+    """Interpolate a table, even in θo from 0 to π/2 and in cos(φo − φi), at cosθo and φo − φi."""
     last, columns = len(table) - 2, table.shape[1]
+    row = np.arccos(np.minimum(cos_o, 1.0)) * ((len(table) - 1) / (0.5 * np.pi))
     column = (np.cos(turn) + 1.0) * (0.5 * (columns - 1))
     i = np.clip(row.astype(np.int32), 0, last)
     j = np.clip(column.astype(np.int32), 0, columns - 2)
@@ -156,16 +146,6 @@ def bilinear(table: Real, row: Real, turn: Real) -> Real:
     )
 
 
-def over_lobe(gain: Real, at_horizon: Real, cos_o: Real, pole: Real) -> Real:
-    """G's mean over a lobe, from G at the lobe's mean cosθo and G cosθo at the horizon.
-
-    With G cosθo linear in cosθo over a lobe, whose mean of 1/cosθo is `pole`: Kirchhoff's G has a
-    pole at the horizon, the small-slope one has little of it. All broadcast.
-    """
-    share = np.clip(at_horizon / np.maximum(gain * cos_o, 1e-30), 0.0, 1.0)
-    return np.asarray(gain * (1.0 + share * (cos_o * pole - 1.0)))
-
-
 #: cosθ of `fade`: light that leaves or comes within 5° of the horizon.
 GRAZING = float(np.cos(np.radians(85.0)))
 
@@ -173,15 +153,14 @@ GRAZING = float(np.cos(np.radians(85.0)))
 def fade(cos_i: ArrayLike, cos_o: ArrayLike) -> Real:
     """(min/max)² of the two cosines, those above cos 85° taken for cos 85°: symmetric.
 
-    Kirchhoff's G grows as 1/cosθo towards the horizon: an order that comes up there is a spike of
-    the albedo as narrow as the coherence window's lobe. So it comes up gently, and what is taken
-    from light between the horizon and 5° above the other directions get back (`conservation`).
-    Mirrors, and all light that comes and leaves within 85° of the normal, are left as they are.
+    Kirchhoff's G grows as 1/cosθo towards the horizon: an order that becomes propagating there is a
+    spike of the albedo as narrow as the coherence window's lobe, whose scaling would cost all light
+    beside it. Mirrors, and all light within 85° of the normal, are left as they are.
     """
-    one, other = np.minimum(cos_i, GRAZING), np.minimum(cos_o, GRAZING)
-    return np.asarray((np.minimum(one, other) / np.maximum(one, other)) ** 2)
+    incident, outgoing = np.minimum(cos_i, GRAZING), np.minimum(cos_o, GRAZING)
+    return np.asarray((np.minimum(incident, outgoing) / np.maximum(incident, outgoing)) ** 2)
 
 
 def fades(model: str) -> bool:
-    """Whether what is scaled has `fade`: Kirchhoff's."""
+    """Whether what is scaled is attenuated by `fade`: Kirchhoff's model."""
     return model == "kirchhoff"

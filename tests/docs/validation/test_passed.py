@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from docs.make.validation import passed, rayleigh, spread
+from docs.make.validation import passed, rayleigh
 from mitsuba_diffraction import HeightField, reference
 from mitsuba_diffraction.optics import boundary
 from tests.support.directions import polar
@@ -16,11 +16,9 @@ pytestmark = pytest.mark.thorough
 @pytest.mark.parametrize("grating", passed.GRATINGS[:4], ids=str)
 def test_gratings_of_slope_up_to_a_tenth(grating):
     for azimuth in passed.AZIMUTHS:
-        # with energy conserved a direction is left between 0.99 and 0.999 of its light
-        for model, level in (("small_slope", 0.002), (passed.MODELS[-1], 0.01)):
-            assert passed.deviation(grating, 0.0, azimuth, model) < level
-            for theta in passed.ANGLES[1:]:
-                assert passed.deviation(grating, theta, azimuth, model) < 0.03, (theta, azimuth)
+        assert passed.deviation(grating, 0.0, azimuth, "small_slope") < 0.002
+        for theta in passed.ANGLES[1:]:
+            assert passed.deviation(grating, theta, azimuth, "small_slope") < 0.03, (theta, azimuth)
 
 
 def test_on_a_surface_without_symmetry_orders_are_on_their_own_side():
@@ -35,11 +33,3 @@ def test_on_a_surface_without_symmetry_orders_are_on_their_own_side():
     assert exact[first[1]] > 1.1 * exact[first[-1]]  # there is something to tell apart
     for order in (-1, 1):
         assert model[first[order]] == pytest.approx(exact[first[order]], rel=2e-3)
-
-
-def test_what_is_spread_is_rigorously_in_the_strong_orders():
-    found = spread.shares(75.0, 180.0)
-    assert found.exact.sum() == pytest.approx(1.0, abs=1e-3)
-    assert found.spread > 0.05
-    assert found.scaled.sum() + found.spread == pytest.approx(1.0, abs=0.02)
-    assert found.in_strongest() > 0.9

@@ -7,7 +7,9 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.tables.energy import store
-from mitsuba_diffraction.tables.energy.conservation import Conservation, DirectionalTable
+from mitsuba_diffraction.tables.energy.conservation import Conservation
+from mitsuba_diffraction.tables.energy.grid import DirectionalTable
+from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from mitsuba_diffraction.tables.energy.store import Energy
 from mitsuba_diffraction.tables.store import VARIABLE
 
@@ -69,3 +71,14 @@ def test_another_material_is_computed_anew(computed):
     for index in (1.5, 1.5000001, 1.6, 1.5 + 0.1j):  # the second is the first to rounding
         energy(index).at(1.0)
     assert [index for _, index in computed] == [1.5, 1.6, 1.5 + 0.1j]
+
+
+def test_other_settings_are_another_record(computed):
+    energy().at(1.0)
+    before = use_energy_settings(EnergySettings(target=0.9))
+    try:
+        energy().at(1.0)
+    finally:
+        use_energy_settings(before)
+    energy().at(1.0)
+    assert len(computed) == 2
