@@ -26,7 +26,7 @@ goals            goals of the default, and deviations beside them
 limits           slopes at which the package warns
 cells            deviations in two dimensions
 second_order     exact second order of small slope
-factored         second order as the factor that tables hold
+second_order_factor  second order as the factor that tables hold
 closed_forms     ideal gratings
 roughness        random surfaces of known mean diffraction
 statistics       checks with random surfaces, and windows at random places
