@@ -110,8 +110,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _budget(args: argparse.Namespace) -> dict[str, float | None]:
-    """Return the requested budget; the default tolerance without one."""
-    given = {"tolerance": args.max_error, "megabytes": args.memory, "relative": args.time}
-    if all(value is None for value in given.values()):
-        given["tolerance"] = 1e-3
-    return given
+    """Limits of the recommended setting; by default, an error of 1e-3."""
+    budget = {"tolerance": args.max_error, "megabytes": args.memory, "relative": args.time}
+    if all(value is None for value in budget.values()):
+        budget["tolerance"] = 1e-3
+    return budget

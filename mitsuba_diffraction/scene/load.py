@@ -96,11 +96,11 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
         raise error_of("cannot load the scene", error) from error
     if not isinstance(scene, mi.Scene):
         raise DiffractionError(f"'{file}' is not a scene; its outermost element must be <scene>")
-    # "Diffraction[" is found inside twosided, blendbsdf and the like, too
+    # Found inside twosided, blendbsdf and the like, too
     surfaces = {
         number: shape
         for number, shape in enumerate(scene.shapes())
-        if "Diffraction[" in str(shape.bsdf())
+        if re.search(r"Diffraction(Dielectric)?\[", str(shape.bsdf()))
     }
     for number, shape in surfaces.items():
         check_attributes(shape, number)

@@ -45,7 +45,7 @@ _BLOCK = 1 << 22  # coefficients at a time
 def document_of(table: DiffractionTable) -> dict[str, Any]:
     """Return all fields of a table but the coefficients; absent ones are left out."""
     return {
-        **table.settings.given(),
+        **table.settings.as_json(),
         "scale": table.scale,
         "spacing": table.spacing,
         "error": dict(table.error),
