@@ -80,7 +80,7 @@ def _count(most: int) -> Callable[[Any], int | None]:
 
 
 def _pair(value: Any) -> tuple[float, float]:
-    low, high = (_number(one) for one in value)
+    low, high = (_number(end) for end in value)
     return low, high
 
 

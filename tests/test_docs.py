@@ -160,12 +160,13 @@ def test_modules_that_it_names_exist(page):
     ids=lambda value: value if value in PAGES else "",
 )
 def test_xml_blocks_set_parameters_that_exist(page, text, some_variant):
-    from mitsuba_diffraction.plugin.parameters import NAMES
+    from mitsuba_diffraction.plugin.surface_parameters import NAMES
 
     root = ElementTree.fromstring(f"<scene>{text}</scene>")
-    for bsdf in root.iterfind(".//bsdf[@type='diffraction']"):
-        named = {child.get("name") for child in bsdf if child.tag != "bsdf"}
-        assert named <= set(NAMES)
+    for plugin, names in NAMES.items():
+        for bsdf in root.iterfind(f".//bsdf[@type='{plugin}']"):
+            named = {child.get("name") for child in bsdf if child.tag != "bsdf"}
+            assert named <= set(names)
 
 
 def test_patches_lie_on_shapes_as_the_page_says():

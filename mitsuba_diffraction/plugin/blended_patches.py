@@ -40,6 +40,7 @@ from .parameter_changes import (
     Changing,
     ObjectValues,
     arrays_within,
+    check_parameters,
     take_changes,
 )
 from .textures import is_attribute, is_bitmap, require_raw
@@ -90,9 +91,7 @@ class DiffractionMix(mi.BSDF):
             for name, weight in self.weights.items()
             if weight is not None
         ]
-        for refused in self.refusals():
-            if refused:
-                raise DiffractionError(refused)
+        check_parameters([self])
         for one in self.together[1:]:
             one.mix = weakref.ref(self)  # not a cycle, which would keep both
         self.derive()

@@ -18,7 +18,8 @@ import mitsuba as mi
 import numpy as np
 
 from ..optics.blend import NODES_PER_OCTAVE, RoughnessTable
-from .directions import Pair, Place
+from ..tables.table import DiffractionTable
+from .directions import Pair, TablePoint
 from .fresnel import (
     Conductor,
     Dielectric,
@@ -125,7 +126,7 @@ class SmallSlope:
 
     def shares(
         self,
-        pair: Pair | Place,
+        pair: Pair | TablePoint,
         height_scale: Float,
         wavenumbers: list[Float],
         indices: list[Index],
@@ -156,6 +157,13 @@ class SmallSlope:
 
 
 Boundary = Kirchhoff | SmallSlope
+
+
+def boundary_of(model: str, material: Reflectance | UnderFilm, table: DiffractionTable) -> Boundary:
+    """Return the boundary of a model; small slope is for materials with an index."""
+    if model == "kirchhoff" or isinstance(material, Perfect):
+        return Kirchhoff(material)
+    return SmallSlope(material, table.roughness)
 
 
 def _one_minus_exp(x: Float) -> Float:

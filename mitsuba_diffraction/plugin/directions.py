@@ -68,8 +68,8 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Place:
-    """Where a table is looked up: of a `Pair` what the diffracted power and the roughness ask."""
+class TablePoint:
+    """The part of a `Pair` that tables of power and roughness are looked up at."""
 
     uv: Vector2f
     w: Float

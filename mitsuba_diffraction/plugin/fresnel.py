@@ -178,7 +178,7 @@ class Dielectric:
         self._index = Bounded(name, eta, least, INDICES[1], partial(_ratio_refusal, name, least))
         self.eta = self._index.value
         self.changeable = (self._index,)
-        self.traverse = self._index.traverse
+        self.traverse, self.refusal = self._index.traverse, self._index.refusal
         self.derive()
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:

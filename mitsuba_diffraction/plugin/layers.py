@@ -231,6 +231,11 @@ class UnderFilm:
         if mi.is_rgb and path > self._path:
             self._path, self.channels = path, Channels.of(path)
 
+    @property
+    def absorbs(self) -> bool:
+        """Whether the film absorbs light."""
+        return plain(self.k) > 0.0
+
     def numbers(self) -> tuple[complex, float]:
         """The film's index and its thickness, nm."""
         return complex(plain(self.film.eta), plain(self.k)), plain(self.thickness)

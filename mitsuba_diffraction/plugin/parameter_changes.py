@@ -152,8 +152,7 @@ def take_changes(changed: Changing, together: Sequence[Changing]) -> None:
         With all that is refused. Everything is then as it was before.
     """
     try:
-        if refused := [line for one in together for line in _refused(one)]:
-            raise DiffractionError("; ".join(refused))
+        check_parameters(together)
         changed.derive()
     except BaseException:  # an interrupted computation leaves nothing half done either
         for one in together:
@@ -163,6 +162,18 @@ def take_changes(changed: Changing, together: Sequence[Changing]) -> None:
         raise
     for parameter in changed.parameters:
         parameter.keep()
+
+
+def check_parameters(together: Sequence[Changing]) -> None:
+    """Refuse parameters that are not allowed, each by itself or with each other.
+
+    Raises
+    ------
+    DiffractionError
+        With all that is refused.
+    """
+    if refused := [line for one in together for line in _refused(one)]:
+        raise DiffractionError("; ".join(refused))
 
 
 def _refused(changed: Changing) -> list[str]:

@@ -20,7 +20,7 @@ from ..tables.colour.proposals import BANDED, BANDS, LOBES, colour_proposals
 from ..tables.colour.table import PACKET, TERMS, ColourTable
 from ..tables.store import cached_colours
 from ..tables.table import DiffractionTable
-from .directions import Pair, Place
+from .directions import Pair, TablePoint
 from .memory import index_between, read, read_record, upload
 from .sampling import BELOW_ONE, invert, order_0_share
 from .series import series_interval, series_weights
@@ -145,7 +145,7 @@ class RGBPower:
         # 1/(2·variance) of the lobes in (u, v)
         self._sharpness = [(2.0 * math.pi * table.sigma / lam) ** 2 for lam in LOBES]
 
-    def power(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
+    def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
         """See `PowerModel.power`."""
         return self._lookup.colour(pair.uv, pair.w * height_scale)
 
@@ -165,11 +165,11 @@ class RGBPower:
         """See `PowerModel.wavenumbers`; of the wavelength that is a channel's mean."""
         return self._wavenumbers
 
-    def flat(self, pair: Pair | Place, si: Interaction) -> Colour:
+    def flat(self, pair: Pair | TablePoint, si: Interaction) -> Colour:
         """See `PowerModel.flat`: of order 0 where no phase tells heights apart."""
         return self._lookup.zeroth(pair.uv, mi.Float(0.0))
 
-    def zeroth(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
+    def zeroth(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
         """See `PowerModel.zeroth`."""
         return self._lookup.zeroth(pair.uv, pair.w * height_scale)
 

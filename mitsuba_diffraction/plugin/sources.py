@@ -204,7 +204,7 @@ def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
     files = [readable_file(source) for source in recipe.sources]
     if recipe.generator is not None:
         files += sorted(Path(gratings.__file__).parent.glob("*.py"))
-    arguments = [dict(one) for one in recipe.arguments]
+    arguments = [dict(patch) for patch in recipe.arguments]
     options_of_both = [recipe.options.specified(), options.specified()]
     return key_of(options_of_both, recipe.generator, arguments, *map(_sha256, files))
 
@@ -223,8 +223,8 @@ def _remedy(name: str) -> str:
 def _check_agreement(
     path: Path, table: DiffractionTable, options: LoadOptions, asked: Mapping[str, Any]
 ) -> None:
-    """A table fixes its own parameters: those given beside it must agree with it."""
-    own = {
+    """Refuse parameters of a scene that contradict its table, which fixes them."""
+    tabulated = {
         "coherence_width": table.coherence_width,
         "coherence": table.coherence,
         "basis": table.expansion.basis,
@@ -239,18 +239,18 @@ def _check_agreement(
             "it out, or build the table with '--second-order true', for coherence='ensemble'"
         )
     for name, value in asked.items():
-        if value != own[name] and not (name == "basis" and value == "auto"):
+        if value != tabulated[name] and not (name == "basis" and value == "auto"):
             raise DiffractionError(
-                f"{name}={value} contradicts the table '{path}', which has {name}={own[name]}; "
-                f"{_remedy(name)}, or build another table with 'mitsuba-diffraction precompute "
-                f"--{name.replace('_', '-')} {value}'"
+                f"{name}={value} contradicts the table '{path}', which has "
+                f"{name}={tabulated[name]}; {_remedy(name)}, or build another table with "
+                f"'mitsuba-diffraction precompute --{name.replace('_', '-')} {value}'"
             )
     for name, value in options.specified().items():
         raise DiffractionError(
             f"{name}={value} is for height fields, but '{path}' is a table and has its own; "
             f"leave {name} out, or say 'auto'"
         )
-    if table.wavelength_range[0] > SHORTEST_WAVELENGTH:
+    if not mi.is_monochromatic and table.wavelength_range[0] > SHORTEST_WAVELENGTH:
         raise DiffractionError(
             f"the table '{path}' starts at {table.wavelength_range[0]:g} nm, but Mitsuba renders "
             f"from {SHORTEST_WAVELENGTH:g} nm on; build it with '--wavelength-range 360 830'"

@@ -161,8 +161,6 @@ class ConstantOrientation:
 
     def __init__(self, degrees: float) -> None:
         self._angle = Bounded("orientation", degrees, -MOST_DEGREES, MOST_DEGREES, _refusal)
-        if refused := self._angle.refusal():
-            raise DiffractionError(refused)
         self.degrees = self._angle.value
         self.traverse, self.changeable = self._angle.traverse, (self._angle,)
 

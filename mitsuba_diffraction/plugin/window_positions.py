@@ -54,7 +54,7 @@ class Window:
         return cls(turn, (x, y), weight)
 
 
-class Places:
+class WindowPositions:
     """From points of the surface to windows on a patch.
 
     Parameters

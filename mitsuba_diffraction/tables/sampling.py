@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,9 +95,9 @@ def order_mixture(
     periods = kappa_max * expansion.half_range / math.pi
     count = int(np.clip(math.ceil(PER_PERIOD * periods), FEWEST_KAPPAS, MOST_KAPPAS)) + 1
     kappas = np.linspace(0.0, min(kappa_max, expansion.kappa_max), count)
-    own = 1.0 / (math.sqrt(2.0) * table.sigma)  # standard deviation of one lobe
-    all_smooth = own >= smoothing
-    smoothing = max(smoothing, own)
+    lobe = 1.0 / (math.sqrt(2.0) * table.sigma)  # standard deviation
+    all_smooth = lobe >= smoothing
+    smoothing = max(smoothing, lobe)
     axes = [_Axis(table, axis) for axis in (0, 1)]
     pitch = 0.5 * smoothing
     half = math.ceil(table.q_limit / pitch) + 1
@@ -273,37 +274,43 @@ class Proposals:
 
 def proposals(table: DiffractionTable) -> Proposals:
     """Tabulate the densities of all bands."""
-    axes = (_axis(table, 0), _axis(table, 1))
-    (cell_x, nx, _), (cell_y, ny, _) = axes
-    cell, counts = (cell_x, cell_y), (nx, ny)
-    origin = (-0.5 * cell_x * nx, -0.5 * cell_y * ny)
+    x, y = (_cells(table, axis) for axis in (0, 1))
+    cell, counts = (x.width, y.width), (x.number, y.number)
+    origin = (-0.5 * x.width * x.number, -0.5 * y.width * y.number)
     matrices = [_cell_matrix(table, n, origin[n], cell[n], counts[n]) for n in (0, 1)]
-    bands = min(max(CACHED // (nx * ny), FEWEST_BANDS), BANDS)
+    bands = min(max(CACHED // (x.number * y.number), FEWEST_BANDS), BANDS)
     rows = np.zeros((bands, counts[1] + 1), np.float32)
     columns = np.zeros((bands, counts[1], counts[0] + 1), np.float32)
     levels = np.zeros((bands, counts[1], -(-counts[0] // 4) * 4), np.uint8)
     units = np.zeros(bands, np.float32)
     for band in range(bands):
-        found = _levels(_cell_power(table, matrices, BANDED * (band + 0.5) / bands))
-        levels[band, :, : counts[0]] = found
-        power = density_of(found)
+        band_levels = _levels(_cell_power(table, matrices, BANDED * (band + 0.5) / bands))
+        levels[band, :, : counts[0]] = band_levels
+        power = density_of(band_levels)
         of_row = power.sum(axis=1)
         if of_row.sum() > 0.0:
             units[band] = 1.0 / of_row.sum()
             rows[band] = _cumulative(of_row)
             columns[band] = _cumulative(power)
-    lobes = (axes[0][2], axes[1][2])
+    lobes = (x.lobes, y.lobes)
     return Proposals(origin, cell, lobes, levels, units, rows, columns, _order_0(table))
 
 
-def _axis(table: DiffractionTable, axis: int) -> tuple[float, int, bool]:
-    """Width of the cells along an axis, how many, and whether each is one order's."""
+class _Cells(NamedTuple):
+    """Cells along one axis: width in rad/µm, number, and whether each is one order's."""
+
+    width: float
+    number: int
+    lobes: bool
+
+
+def _cells(table: DiffractionTable, axis: int) -> _Cells:
     spacing, last = table.spacing[axis], table.grid.last[axis]
     edge = min(table.frequency_limit[axis], last * spacing) + 2.0 / table.sigma
     if spacing * table.sigma > APART:
-        return spacing, 2 * math.ceil(edge / spacing) + 1, True
+        return _Cells(spacing, 2 * math.ceil(edge / spacing) + 1, True)
     cell = max(CELL / table.sigma, 2.0 * edge / MOST_CELLS)
-    return cell, math.ceil(2.0 * edge / cell), False
+    return _Cells(cell, math.ceil(2.0 * edge / cell), False)
 
 
 def _levels(power: NDArray[np.float64]) -> NDArray[np.uint8]:
@@ -313,12 +320,12 @@ def _levels(power: NDArray[np.float64]) -> NDArray[np.uint8]:
         return np.zeros(power.shape, np.uint8)
     largest = float(density_of(np.uint8(255)))
     bits = (power * (largest / most)).astype(np.float32).view(np.uint32)
-    found = ((bits >> (SHIFT - 1)) + 1) >> 1
-    return np.where(found < 8, 0, np.minimum(found, 255)).astype(np.uint8)  # normal numbers only
+    levels = ((bits >> (SHIFT - 1)) + 1) >> 1
+    return np.where(levels < 8, 0, np.minimum(levels, 255)).astype(np.uint8)  # normal numbers only
 
 
 def density_of(levels: NDArray[np.uint8] | np.uint8) -> NDArray[np.float64]:
-    """What levels mean, in no particular unit."""
+    """Density of a cell for its level, in no particular unit."""
     return (np.asarray(levels, np.uint32) << SHIFT).view(np.float32).astype(float)
 
 
@@ -341,13 +348,13 @@ def _cell_power(
     weights = expansion.weights(kappas) / table.scale
     total: NDArray[np.float64] = np.zeros(())
     for interval in np.unique(intervals):
-        mine = weights[intervals == interval]
+        in_interval = weights[intervals == interval]
         coefficients = table.coefficients[interval].astype(np.float32)
         if expansion.kind == "power":  # linear: the mean of the weights does
-            power = coefficients[:, :, 0] @ mine.sum(axis=0).astype(np.float32)
+            power = coefficients[:, :, 0] @ in_interval.sum(axis=0).astype(np.float32)
             total = total + apply_window(matrices, np.maximum(power, 0.0))
             continue
-        for weight in mine.astype(np.float32):
+        for weight in in_interval.astype(np.float32):
             parts = coefficients @ weight
             if table.grid.coherent:
                 amplitude = parts[..., 0] + 1j * parts[..., 1]

@@ -48,8 +48,8 @@ KINDS = {
     "filmed metal": surface(
         eta=0.9, k=6.0, film_ior=1.8, film_thickness=200.0, film_k=0.01, model="kirchhoff"
     ),
-    "transmission": surface(transmission=True),
-    "thin": surface(thin=True),
+    "transmission": surface(plugin="diffraction_dielectric"),
+    "thin": surface(plugin="diffraction_dielectric", thin=True),
     "mix": mixed(),
 }
 

@@ -1,4 +1,4 @@
-"""What `eval` is compared with: other BSDFs and settings, the thesis' look-up, bare gathers.
+"""Contenders that `eval` is compared with: other BSDFs and settings, the thesis' look-up, gathers.
 
 No warning tells how far the model holds for the patch: here it is there to be looked up.
 """
@@ -55,7 +55,7 @@ class Tables:
         return quiet_bsdf(self.paths[name], **parameters)
 
     def load(self, name: str) -> DiffractionTable:
-        """One of the tables."""
+        """Load the table of this name."""
         return DiffractionTable.load(self.paths[name])
 
 

@@ -101,8 +101,9 @@ def section(gratings: Sequence[Grating] = GRATINGS) -> str:
     recipes = PRECOMPUTE if len(gratings) > 1 else PRECOMPUTE[1:2]  # of few orders
     return f"""## Through a dielectric
 
-Orders that go through (`transmission`), from above into keratin, against Rayleigh's expansion, with
-light across the grooves (azimuth 0°), between and along them; steepest slopes from 0.03 to 0.2.
+Orders that go through (`diffraction_dielectric`), from above into keratin, against Rayleigh's
+expansion, with light across the grooves (azimuth 0°), between and along them; steepest slopes from
+0.03 to 0.2.
 Deviation of colours within {GRAZING:g}° of the normal, Kirchhoff's model / `small_slope`, the
 default; conserving energy does not change them:
 

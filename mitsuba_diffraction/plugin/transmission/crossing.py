@@ -11,7 +11,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..boundary import LEVEL, Jones, turn, turned
-from ..directions import Pair, Place, in_patch
+from ..directions import Pair, TablePoint, in_patch
 from ..fresnel import root
 from ..layers import transmittances
 from ..types import Float, Interaction, Mask, Rotation, Vector3f
@@ -39,9 +39,9 @@ class Turned(Pair):
         self.uv, self.w = -n * self.uv, n * self.w
 
     @property
-    def place(self) -> Place:
+    def place(self) -> TablePoint:
         """Of the look-up; see `reached`."""
-        return Place(dr.select(self.reached, self.uv, 0.0), self.w)
+        return TablePoint(dr.select(self.reached, self.uv, 0.0), self.w)
 
     @property
     def reached(self) -> Mask:
@@ -79,7 +79,7 @@ class Crossing:
         w = self.q - self.q0
         reached = dr.squared_norm(total) < _FARTHEST**2
         self.active = active & reached
-        self.place = Place(
+        self.place = TablePoint(
             dr.select(self.active, dr.select(w > 0.0, -total, total), 0.0),
             dr.maximum(dr.abs(w), _LEAST_W),
         )

@@ -112,9 +112,9 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
         If the BSDF does not diffract, or has what shaders do not know; if a method is unknown, or
         the table does not suit it.
     """
-    from ...plugin.bsdf import Diffraction  # which only a variant has
+    from ...plugin.surface import DiffractingSurface  # which only a variant has
 
-    if not isinstance(bsdf, Diffraction):
+    if not isinstance(bsdf, DiffractingSurface):
         raise DiffractionError(
             f"bsdf={type(bsdf).__name__} does not diffract: give one of type 'diffraction', as "
             "mi.load_dict(md.bsdf_dict(...)) makes it"
