@@ -11,6 +11,7 @@ from mitsuba_diffraction.optics import fresnel
 from mitsuba_diffraction.tables.energy.conservation import Surface
 from mitsuba_diffraction.tables.energy.gain import Boundary, Gain
 from mitsuba_diffraction.tables.energy.grid import LAST_ANGLE, DirectionGrid
+from mitsuba_diffraction.tables.energy.scaling import scaled
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from mitsuba_diffraction.tables.energy.transport import Orders
 from tests.support.directions import polar
@@ -156,3 +157,12 @@ def test_the_grid_interpolates_what_is_linear_and_goes_round():
     round_ = np.cos(grid.phi).astype(np.float32) + np.zeros((11, 1), np.float32)
     middle = grid.interpolation(0.5, np.radians([345.0, -15.0]))(round_)
     assert middle == pytest.approx(0.5 * (1.0 + np.cos(np.radians(30.0))), abs=1e-6)
+
+
+def test_sums_below_zero_leave_the_scale_a_number():
+    # series of few terms, where next to nothing is reflected
+    kernel = np.array([[-0.4, 0.1], [0.1, 1.2]], np.float32)
+    aim = np.minimum(kernel.sum(axis=1), 1.0)
+    scale = scaled(lambda s: kernel @ s, aim, 2.0, 8)
+    assert np.all(np.isfinite(scale))
+    assert scale[1] * (kernel @ scale)[1] == pytest.approx(1.0, rel=0.05)
