@@ -108,10 +108,20 @@ def _range(values: NDArray[np.floating]) -> list[float]:
 
 
 def energy_warnings(summary: dict[str, Any]) -> list[str]:
-    """Which materials lose much."""
-    return [
-        f"made of {name}, the model gains energy: up to {100 * found['taken, largest']:.0f} % is "
+    """Say which materials lose much, and which lose light that the model does not gain."""
+    much = [
+        f"made of {name}, the model gains energy: up to {100 * figures['taken, largest']:.0f} % is "
         "taken (up to 80° from the normal; energy_conserving=false keeps it)"
-        for name, found in summary.items()
-        if found["taken, largest"] > MUCH
+        for name, figures in summary.items()
+        if figures["taken, largest"] > MUCH
+    ]
+    lost = {
+        name: 1.0 - figures["conserved over raw where that is at most 1"][0]
+        for name, figures in summary.items()
+    }
+    return much + [
+        f"made of {name}, directions that gain nothing lose up to {100 * share:.0f} %, too: strong "
+        "orders become propagating between the scale's directions, as on gratings (docs/energy.md)"
+        for name, share in lost.items()
+        if share > MUCH
     ]
