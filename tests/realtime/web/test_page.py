@@ -144,7 +144,7 @@ def test_sliders_change_the_picture(page_file: Path, tab: Any) -> None:
             WebGL2RenderingContext.prototype.getParameter = function (name) {
                 return name === this.MAX_TEXTURE_SIZE ? 64 : all.call(this, name);
             }""",
-            "this device has 64",
+            "this device supports 64",
         ),
     ],
 )
