@@ -15,7 +15,7 @@ PLUGINS = ("diffraction", "diffraction_dielectric")
 
 
 class HeightData(mi.Object):
-    """A height field that a dictionary of Mitsuba's can hold, with all that it knows of itself."""
+    """Height field in an object that a dictionary of Mitsuba's can hold."""
 
     def __init__(self, field: HeightField) -> None:
         super().__init__()

@@ -29,7 +29,7 @@ from .types import Buffer, Colour, Float, Index, Interaction, Vector2f
 
 
 class PolarCoordinates:
-    """Where (u, v) lies between the rings and azimuths of a colour table."""
+    """Position of (u, v) between the rings and azimuths of a colour table."""
 
     def __init__(self, table: ColourTable) -> None:
         grid = table.grid
@@ -72,7 +72,7 @@ class ColourLookup:
         return mi.Color3f(*others) + self.zeroth(uv, z)
 
     def zeroth(self, uv: Vector2f, z: Float) -> Colour:
-        """That of order 0."""
+        """Return the RGB of order 0."""
         radius = dr.sqrt(dr.maximum(dr.squared_norm(uv), 1e-14))
         return mi.Color3f(*self._zeroth_order(radius, z))
 
