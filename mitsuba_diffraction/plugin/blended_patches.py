@@ -137,16 +137,16 @@ class DiffractionMix(mi.BSDF):
         chosen, weight, share = mi.UInt32(_ALL), mi.Float(0.0), mi.Float(0.0)
         lower = mi.Float(0.0)
         for n, one, own, first in self._asked(ctx):
-            mine = (shares[n] > 0.0) & (sample1 >= lower) & (sample1 < lower + shares[n])
-            left = (sample1 - lower) * dr.rcp(dr.select(mine, shares[n], 1.0))
+            here = (shares[n] > 0.0) & (sample1 >= lower) & (sample1 < lower + shares[n])
+            left = (sample1 - lower) * dr.rcp(dr.select(here, shares[n], 1.0))
             lower = lower + shares[n]
             draw = functools.partial(_drawn, one, own, si, left, sample2)
-            drawn, of_drawn = _where(mine, draw, (result, value))
-            result, value = dr.select(mine, drawn, result), dr.select(mine, of_drawn, value)
-            result.sampled_component += dr.select(mine, mi.UInt32(first), 0)
-            chosen = dr.select(mine, mi.UInt32(n), chosen)
-            weight = dr.select(mine, weights[n], weight)
-            share = dr.select(mine, shares[n], share)
+            drawn, of_drawn = _where(here, draw, (result, value))
+            result, value = dr.select(here, drawn, result), dr.select(here, of_drawn, value)
+            result.sampled_component += dr.select(here, mi.UInt32(first), 0)
+            chosen = dr.select(here, mi.UInt32(n), chosen)
+            weight = dr.select(here, weights[n], weight)
+            share = dr.select(here, shares[n], share)
         smooth = ~mi.has_flag(result.sampled_type, mi.BSDFFlags.Delta) & (result.pdf > 0.0)
         others, density = self._sum(
             ctx,
@@ -206,13 +206,13 @@ class DiffractionMix(mi.BSDF):
 
     def _weights_at(self, si: Interaction, active: Mask) -> list[Float]:
         """Return the surfaces' weights, of sum 1; 0 where inactive or where all are 0."""
-        given = [_weight_at(weight, si, active) for weight in self.weights.values()]
-        rest = dr.maximum(1.0 - sum(one for one in given if one is not None), 0.0)
-        found = [rest if one is None else one for one in given]
-        total: Float = sum(found, mi.Float(0.0))
+        explicit = [_weight_at(weight, si, active) for weight in self.weights.values()]
+        rest = dr.maximum(1.0 - sum(one for one in explicit if one is not None), 0.0)
+        weights = [rest if one is None else one for one in explicit]
+        total: Float = sum(weights, mi.Float(0.0))
         some = mi.Mask(active) & (total > 0.0)
         scale = dr.select(some, dr.rcp(dr.select(some, total, 1.0)), 0.0)
-        return [one * scale for one in found]
+        return [one * scale for one in weights]
 
     def _shares(self, ctx: Context, weights: list[Float]) -> list[Float]:
         """Return shares of the samples: the weights; for a component of one surface, all."""
@@ -227,8 +227,8 @@ class DiffractionMix(mi.BSDF):
             if ctx.component == _ALL:
                 yield n, one, ctx, first
             elif first <= ctx.component < first + one.component_count():
-                own = mi.BSDFContext(ctx.mode, ctx.type_mask, ctx.component - first)
-                yield n, one, own, 0
+                context = mi.BSDFContext(ctx.mode, ctx.type_mask, ctx.component - first)
+                yield n, one, context, 0
             first += one.component_count()
 
     def _sum(
@@ -244,10 +244,10 @@ class DiffractionMix(mi.BSDF):
         totals = list(nothing)
         for n, one, own, _ in self._asked(ctx):
             on = mi.Mask((shares[0][n] > 0.0) & where(n))
-            found = _where(on, functools.partial(ask, one, own), nothing)
+            answers = _where(on, functools.partial(ask, one, own), nothing)
             totals = [
                 total + dr.select(on, part * share[n], 0.0)
-                for total, part, share in zip(totals, found, shares, strict=True)
+                for total, part, share in zip(totals, answers, shares, strict=True)
             ]
         return totals
 
@@ -297,7 +297,7 @@ def _weights(
     """
     if len(names) < 2:
         raise DiffractionError(f"diffraction_mix takes two nested BSDFs or more, got {len(names)}")
-    given = [name for name in props.keys() if name.startswith(_PREFIX)]  # noqa: SIM118
+    weighted = [name for name in props.keys() if name.startswith(_PREFIX)]  # noqa: SIM118
     known = [_PREFIX + name for name in names]
     for name in props.keys():  # noqa: SIM118 - Properties is no mapping
         if name not in (*known, *names, "id"):
@@ -305,8 +305,8 @@ def _weights(
                 f"unknown parameter '{name}' of diffraction_mix; its surfaces are "
                 f"{', '.join(names)}, and their weights {', '.join(known)}"
             )
-    if len(given) < len(names) - 1:
-        missing = ", ".join(name for name in known if name not in given)
+    if len(weighted) < len(names) - 1:
+        missing = ", ".join(name for name in known if name not in weighted)
         raise DiffractionError(f"give weights for all surfaces but one; there is no {missing}")
     return {name: _weight(props, _PREFIX + name, objects) for name in names}
 

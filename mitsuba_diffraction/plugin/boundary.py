@@ -237,13 +237,13 @@ class _Path:
         turn0 = dr.fma(x, first.y, -y * first.x)
         turn = dr.fma(y, second.x, -x * second.y)
         length0, length = (dr.fma(t, t, z * z) for t in (turn0, turn))
-        found = (length0 > LEVEL) & (length > LEVEL)
-        inverse = dr.rsqrt(dr.select(found, length0, 1.0)) * dr.rsqrt(dr.select(found, length, 1.0))
+        apart = (length0 > LEVEL) & (length > LEVEL)
+        inverse = dr.rsqrt(dr.select(apart, length0, 1.0)) * dr.rsqrt(dr.select(apart, length, 1.0))
         # Where both directions are one, any facet's axis does: s0
-        self._cc = dr.select(found, turn * turn0 * inverse, self._dot)
-        self._cs = dr.select(found, turn * z * inverse, 0.0)
-        self._sc = dr.select(found, -z * turn0 * inverse, self._cross)
-        self._ss = dr.select(found, -z * z * inverse, 0.0)
+        self._cc = dr.select(apart, turn * turn0 * inverse, self._dot)
+        self._cs = dr.select(apart, turn * z * inverse, 0.0)
+        self._sc = dr.select(apart, -z * turn0 * inverse, self._cross)
+        self._ss = dr.select(apart, -z * z * inverse, 0.0)
 
     def kirchhoff(self, index: Index) -> Jones:
         """Return 2 cosθi cosθo K, eq. 7 (`optics.boundary.kirchhoff`)."""
@@ -261,8 +261,8 @@ class _Path:
     def small_slope(self, index: Index) -> Jones:
         """Return 2 cosθi cosθo B, eq. 8 (`optics.boundary.small_slope`)."""
         ends = faces(self._q0, self._square0, index), faces(self._q, self._square, index)
-        found = [self._of_face(*both) for both in zip(*ends, strict=True)]
-        return tuple(sum(x[1:], x[0]) for x in zip(*found, strict=True))
+        parts = [self._of_face(*both) for both in zip(*ends, strict=True)]
+        return tuple(sum(x[1:], x[0]) for x in zip(*parts, strict=True))
 
     def _of_face(self, came: Face, there: Face) -> Jones:
         contrast = came.contrast * self._scale

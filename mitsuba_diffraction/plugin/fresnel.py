@@ -84,13 +84,13 @@ def amplitudes(cosine: Float, square: Float, index: Index) -> tuple[Number, Numb
             (epsilon * cosine - inside) * dr.rcp(epsilon * cosine + inside)
         )
     _, film, within, once, back_s, back_p = _film(square, index)
-    found = []
+    pairs = []
     for q, back in ((mi.Complex2f(cosine, 0.0), back_s), (film * cosine, back_p)):
         there = back * once * once
-        found.append(
+        pairs.append(
             (q - within + (q + within) * there) * dr.rcp(q + within + (q - within) * there)
         )
-    return found[0], found[1]
+    return pairs[0], pairs[1]
 
 
 def _film(square: Float, index: Filmed) -> tuple[Number, ...]:
@@ -246,11 +246,11 @@ class Conductor:
         if mi.is_monochromatic:
             objects = {name: _at(material, name, wavelength) for name in ("eta", "k")}
         parts = [ObjectValues(name, objects[name], INDEX_PARTS[name]) for name in INDEX_PARTS]
-        made = cls(*parts, material)
+        conductor = cls(*parts, material)
         if mi.is_rgb:
             index = _tabulated(material, "eta", _VISIBLE) + 1j * _tabulated(material, "k", _VISIBLE)
-            made._spectrum = index, made._channels()
-        return made
+            conductor._spectrum = index, conductor._channels()
+        return conductor
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R for the cosine of the angle to the half vector, at si.wavelengths."""
@@ -312,13 +312,13 @@ def _load(plugin: str, **parameters: float | str) -> BSDF:
     try:
         return mi.load_dict({"type": plugin, **parameters})
     except Exception as error:  # Mitsuba throws RuntimeError, over several lines
-        given = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
+        arguments = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
         reason = " ".join(str(error).split())
         if plugin == "conductor":
             raise DiffractionError(_unknown_conductor(str(parameters["material"]))) from error
         raise DiffractionError(
-            f"{given} is no material that Mitsuba knows ({reason[:200]}); give a number, a name "
-            "from Mitsuba's table of materials, or eta and k"
+            f"{arguments} is no material that Mitsuba knows ({reason[:200]}); give a number, a "
+            "name from Mitsuba's table of materials, or eta and k"
         ) from error
 
 
@@ -337,9 +337,9 @@ def _unknown_conductor(material: str) -> str:
 def _conductors() -> list[str]:
     """Return names of tabulated conductors, without second entries from Palik's table."""
     folder = Path(str(mi.file_resolver().resolve("data/ior")))
-    found = {file.name.removesuffix(".eta.spd") for file in folder.glob("*.eta.spd")}
+    names = {file.name.removesuffix(".eta.spd") for file in folder.glob("*.eta.spd")}
     return sorted(
-        (name for name in found if name.removesuffix("_palik") not in found - {name}),
+        (name for name in names if name.removesuffix("_palik") not in names - {name}),
         key=str.lower,
     )
 

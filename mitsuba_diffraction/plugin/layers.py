@@ -182,14 +182,14 @@ class UnderFilm:
 
     def indices(self, si: Interaction, active: Mask) -> list[Filmed]:
         """Return the filmed index of each channel; in RGB variants, of each wavelength summed."""
-        found = [_complex(n) for n in self.material.indices(si, active)]
+        indices = [_complex(n) for n in self.material.indices(si, active)]
         waves = self._wavelengths(si)
         if self.channels is not None:
-            found = _between(found, self.channels.wavelengths)
-        elif len(found) == 1:
-            found *= len(waves)
+            indices = _between(indices, self.channels.wavelengths)
+        elif len(indices) == 1:
+            indices *= len(waves)
         film, depth = mi.Complex2f(self.film.eta, self.k), self.thickness * (2.0 * dr.pi)
-        return [Filmed(n, film, depth * dr.rcp(w)) for n, w in zip(found, waves, strict=True)]
+        return [Filmed(n, film, depth * dr.rcp(w)) for n, w in zip(indices, waves, strict=True)]
 
     def summed(self, values: list[Float]) -> list[Float]:
         """The channels' values of those of `indices`."""

@@ -71,12 +71,12 @@ def film_of(
 
     wavelength : nm, of mono variants; shortest : the least that the table serves.
     """
-    given = [name for name in ("film_ior", "film_k", "film_thickness") if name in props]
-    if not given:
+    parameters = [name for name in ("film_ior", "film_k", "film_thickness") if name in props]
+    if not parameters:
         return material
-    if not {"film_ior", "film_thickness"} <= set(given):
+    if not {"film_ior", "film_thickness"} <= set(parameters):
         raise DiffractionError(
-            f"{given[0]} alone is no film; give both film_ior and film_thickness (nm)"
+            f"{parameters[0]} alone is no film; give both film_ior and film_thickness (nm)"
         )
     if isinstance(material, Perfect):
         raise DiffractionError("film_ior needs a material with a refractive index beneath it")

@@ -60,9 +60,9 @@ def name_of(element: Any, number: int | None = None) -> str:
     element : of Mitsuba's, with `id()`.
     number : of a shape, its place in `scene.shapes()`, counted from 0.
     """
-    own = own_id(element.id())
-    if own:
-        return own
+    scene_id = own_id(element.id())
+    if scene_id:
+        return scene_id
     file = _FILE.match(str(element))
     if file:
         kind = f"the mesh {Path(file[1]).name}"

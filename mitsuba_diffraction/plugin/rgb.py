@@ -133,14 +133,14 @@ class RGBPower:
         self._lookup = ColourLookup(table)
         self._coordinates = self._lookup.coordinates
         self._z_max = table.z_max
-        found = colour_proposals(table)
-        self._rings, self._bins = found.rings.shape[1], table.grid.bins
+        proposals = colour_proposals(table)
+        self._rings, self._bins = proposals.rings.shape[1], table.grid.bins
         self._most = max(table.grid.counts)
-        self._ring_sums = upload(mi.Float, found.rings)
-        self._azimuth_sums = upload(mi.Float, found.azimuths)
-        self._occupied = upload(mi.Float, found.occupied.astype("float32"))
-        self._zs = len(found.order_0)
-        self._order_0 = upload(mi.Float, found.order_0)
+        self._ring_sums = upload(mi.Float, proposals.rings)
+        self._azimuth_sums = upload(mi.Float, proposals.azimuths)
+        self._occupied = upload(mi.Float, proposals.occupied.astype("float32"))
+        self._zs = len(proposals.order_0)
+        self._order_0 = upload(mi.Float, proposals.order_0)
         self._wavenumbers = [mi.Float(k) for k in wavenumber(RGB_WAVELENGTHS).tolist()]
         # 1/(2·variance) of the lobes in (u, v)
         self._sharpness = [(2.0 * math.pi * table.sigma / lam) ** 2 for lam in LOBES]

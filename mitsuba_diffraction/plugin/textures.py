@@ -115,9 +115,9 @@ class VaryingHeightScale:
         require_raw(texture, "height_scale", "factors")
         self.high = self.range()[1] if most is None else most
         if not 0.0 < self.high <= 1e3:  # also refuses NaN
-            given = "its largest factor" if most is None else "height_scale_max"
+            described = "its largest factor" if most is None else "height_scale_max"
             raise DiffractionError(
-                f"height_scale: {given}, {self.high:g}, must be above 0 and at most 1000"
+                f"height_scale: {described}, {self.high:g}, must be above 0 and at most 1000"
             )
         if refused := self.refusal():
             raise DiffractionError(refused)

@@ -122,13 +122,13 @@ def _inside(below: Vector3f, n: Float) -> Vector3f:
 
 def crossing_axes(came: Vector3f, left: Vector3f) -> tuple[Vector3f, Vector3f]:
     """Return the axes s of light along two directions (`optics.boundary`)."""
-    found = []
+    axes = []
     for direction in (came, left):
         square = dr.square(direction.x) + dr.square(direction.y)
         slanted = square > LEVEL
         inverse = dr.rsqrt(dr.select(slanted, square, 1.0))
-        found.append((slanted, mi.Vector3f(-direction.y * inverse, direction.x * inverse, 0.0)))
-    (is_came, s_came), (is_left, s_left) = found
+        axes.append((slanted, mi.Vector3f(-direction.y * inverse, direction.x * inverse, 0.0)))
+    (is_came, s_came), (is_left, s_left) = axes
     s_came = dr.select(is_came, s_came, dr.select(is_left, s_left, mi.Vector3f(0.0, 1.0, 0.0)))
     return s_came, dr.select(is_left, s_left, s_came)
 
@@ -202,7 +202,7 @@ def tangent_plane(crossing: Crossing, axes: tuple[Vector3f, Vector3f]) -> Jones:
     t_s, t_p = scale * dr.rcp(cos_in + n * cos_out), scale * dr.rcp(n * cos_in + cos_out)
     axis = dr.cross(inside, above)
     square = dr.squared_norm(axis)
-    found = square > LEVEL
-    axis = dr.select(found, axis * dr.rsqrt(dr.select(found, square, 1.0)), axes[0])
+    slanted = square > LEVEL
+    axis = dr.select(slanted, axis * dr.rsqrt(dr.select(slanted, square, 1.0)), axes[0])
     zero = mi.Float(0.0)
     return turned((t_s, zero, zero, t_p), turn(axes[1], axis, inside), turn(axis, axes[0], -above))
