@@ -78,8 +78,8 @@ def remove_abandoned(folder: Path, stem: str, suffix: str) -> None:
     name = re.compile(rf"\.{stem}\.{_HOST}-(\d+)-\w+{re.escape(suffix)}")
     with contextlib.suppress(OSError):  # a folder that cannot be read is reported by the writer
         for entry in folder.iterdir():
-            found = name.fullmatch(entry.name)
-            if found and not _lives(int(found[1])):
+            match = name.fullmatch(entry.name)
+            if match and not _lives(int(match[1])):
                 entry.unlink(missing_ok=True)
 
 

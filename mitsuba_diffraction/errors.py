@@ -56,8 +56,8 @@ def shortened(text: str) -> str:
     A text that still has over 500 characters loses its middle, too.
     """
 
-    def cut(found: re.Match[str]) -> str:
-        return _cut(found[0], _WORD)
+    def cut(match: re.Match[str]) -> str:
+        return _cut(match[0], _WORD)
 
     return _cut(_LONG.sub(cut, text), _MESSAGE)
 

@@ -35,7 +35,7 @@ _SAMPLES = (
     "some samples are below zero, as colours outside of sRGB are, or no numbers; they are kept"
 )
 
-# Of a terminal that reports no size, as in some containers and editors.
+# Columns and rows of a terminal that reports no size, as in some containers and editors.
 _SIZE = 80, 24
 
 # Below it a bar would only flash by.
@@ -229,16 +229,16 @@ def say_interrupted() -> None:
 
 def _watch(reader: socket.socket, left: threading.Event) -> None:
     """Wait for signals; exit if the main thread has not left `GRACE` seconds after one."""
-    before = 0
+    interrupts = 0
     while received := reader.recv(1):
         number = signal.Signals(received[0])
         if number not in _CODES:
             continue
         if number == signal.SIGINT:
-            before += 1
+            interrupts += 1
             # a rendering has a handler of its own, which keeps the picture so far
-            own = signal.getsignal(signal.SIGINT) is not signal.default_int_handler
-            if own and before == 1:
+            handled = signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+            if handled and interrupts == 1:
                 continue
         if not left.wait(GRACE):
             remove_temporaries()

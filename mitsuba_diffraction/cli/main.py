@@ -42,7 +42,7 @@ from .console import (
 from .options import STDOUT
 from .report import check_writable
 
-#: What declares each sub-command, in the order of --help.
+#: Functions that declare the sub-commands, in the order of --help.
 COMMANDS = (
     precompute.add_parser, info.add_parser, tangents.add_parser, plan.add_parser,
     render.add_parser, brdf_map.add_parser, evaluate.add_parser, survey.add_parser,

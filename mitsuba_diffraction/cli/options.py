@@ -84,12 +84,14 @@ def number_between(low: float, high: float) -> Callable[[str], float]:
     return _number(float, low, high, f"a number from {low:g} to {high:g}")
 
 
-def _number(kind: Callable[[str], Any], low: float, high: float, what: str) -> Callable[[str], Any]:
+def _number(
+    kind: Callable[[str], Any], low: float, high: float, expected: str
+) -> Callable[[str], Any]:
     def number(text: str) -> Any:
         with contextlib.suppress(ValueError):
             if low <= (value := kind(text)) <= high:
                 return value
-        raise argparse.ArgumentTypeError(f"expected {what}, got {quoted(text)}")
+        raise argparse.ArgumentTypeError(f"expected {expected}, got {quoted(text)}")
 
     return number
 
@@ -138,7 +140,7 @@ def load_options(args: argparse.Namespace) -> LoadOptions:
     return LoadOptions.parse(**{name: getattr(args, name) for name in _HEIGHTS})
 
 
-def given_for_heights(args: argparse.Namespace) -> list[str]:
+def used_heights_options(args: argparse.Namespace) -> list[str]:
     """List the options for reading heights that are on the command line."""
     return [_option(name) for name in _HEIGHTS if getattr(args, name) is not None]
 
@@ -154,8 +156,8 @@ def add_source(parser: argparse.ArgumentParser, *, tables: bool = False) -> None
 
 def add_output(parser: argparse.ArgumentParser, text: str, *suffixes: str, **more: Any) -> None:
     """Add `--output`: a file with one of these suffixes, or a folder."""
-    given = {"type": path_ending_in(*suffixes), "metavar": "OUT"} if suffixes else {"type": Path}
-    parser.add_argument("-o", "--output", help=text, **{"metavar": "FOLDER", **given, **more})
+    kind = {"type": path_ending_in(*suffixes), "metavar": "OUT"} if suffixes else {"type": Path}
+    parser.add_argument("-o", "--output", help=text, **{"metavar": "FOLDER", **kind, **more})
 
 
 def add_own_patch(parser: argparse.ArgumentParser) -> None:
@@ -169,8 +171,8 @@ def add_own_patch(parser: argparse.ArgumentParser) -> None:
 
 def check_own_patch(args: argparse.Namespace) -> None:
     """Refuse options for reading heights where no file is named, with a usage error."""
-    if args.heights is None and given_for_heights(args):
-        args.parser.error(f"{given_for_heights(args)[0]} needs a file of heights")
+    if args.heights is None and used_heights_options(args):
+        args.parser.error(f"{used_heights_options(args)[0]} needs a file of heights")
 
 
 def own_patch(args: argparse.Namespace) -> HeightField | None:
@@ -201,8 +203,8 @@ def table_options(args: argparse.Namespace) -> dict[str, Any]:
 
     Raises a DiffractionError if a value is not allowed.
     """
-    given = {name: getattr(args, name, None) for name in (*_TABLE, "wavelength_range")}
-    return {name: checked(name, value) for name, value in given.items() if value is not None}
+    values = {name: getattr(args, name, None) for name in (*_TABLE, "wavelength_range")}
+    return {name: checked(name, value) for name, value in values.items() if value is not None}
 
 
 def add_direction(group: Group, *, theta: float = 0.0, phi: float | None = 0.0) -> None:
@@ -274,7 +276,7 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--sensor", metavar="N", type=whole_number(0), default=0,
-        help="which sensor, counted from 0; default: 0",
+        help="number of the sensor, from 0; default: 0",
     )  # fmt: skip
 
 
@@ -304,14 +306,18 @@ def add_samples(parser: argparse.ArgumentParser, least: int, default: int | None
     )  # fmt: skip
     parser.add_argument(
         "--seed", metavar="N", type=whole_number(0), default=0,
-        help="of the random numbers; default: 0",
+        help="seed of the random numbers; default: 0",
     )  # fmt: skip
 
 
-def add_json(parser: argparse.ArgumentParser, what: str = "the figures", **more: Any) -> None:
+def add_json(parser: argparse.ArgumentParser, content: str = "the figures", **more: Any) -> None:
     """Add a file for the figures that are printed; `main` checks that it can be written."""
     parser.add_argument(
-        "--json", metavar="FILE", type=path_ending_in(".json"), help=f"write {what} as JSON", **more
+        "--json",
+        metavar="FILE",
+        type=path_ending_in(".json"),
+        help=f"write {content} as JSON",
+        **more,
     )
 
 

@@ -46,8 +46,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
         subparsers, "render", run, "render a Mitsuba scene",
         "Render an XML scene to a linear EXR and a PNG beside it. Ctrl-C stops after the "
         "current pass and keeps the picture so far. With --frames, render a folder of PNG "
-        "files while parameters of the scene change; frames that are there already, with the "
-        "same settings, are kept, so an interrupted run goes on where it was.",
+        "files while parameters of the scene change; existing frames with the same "
+        "settings are kept, so an interrupted run can be continued.",
     )  # fmt: skip
     options.add_scene(parser)
     options.add_output(
@@ -63,8 +63,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--plan", nargs="*", metavar="RECIPE.toml", type=recipe_file,
-        help="render with tables of only what the scene needs: plan them first, or as in recipes "
-        "that `plan -o` wrote",
+        help="render with tables limited to what the scene needs: by the recipes of `plan -o`, or "
+        "without any, planned first",
     )  # fmt: skip
     add_plan_options(parser)
     options.add_json(parser, "what was rendered")
@@ -146,13 +146,13 @@ def _on_workers(args: argparse.Namespace) -> int:
     parameters = options.scene_parameters(args)
     outputs = _outputs(args)
 
-    from ..cluster.frames import Wanted
+    from ..cluster.frames import FrameRequest
 
     start = time.perf_counter()
     variant = set_variant(args.mode)
     keep = outputs.named.with_name(f"{outputs.named.name}.passes")
     with mitsuba_warnings(), client_of(args) as client:
-        film = film_of(args, client, [Wanted(parameters, args.spp, args.seed)], variant, keep)
+        film = film_of(args, client, [FrameRequest(parameters, args.spp, args.seed)], variant, keep)
         if outputs.only_png:
             _check_colours(film.scene, film.sensor, args, outputs.png)
         with Bar(args, unit=" tasks", delay=0) as bar, Stop() as stop:
@@ -287,10 +287,10 @@ def _frames_on_workers(
     args: argparse.Namespace, to_do: Sequence[Frame], folder: Path
 ) -> tuple[int, dict[str, Any]]:
     """Render frames on workers; return how many were finished, and what the workers did."""
-    from ..cluster.frames import Wanted
+    from ..cluster.frames import FrameRequest
 
     variant, done = set_variant(args.mode), 0
-    wanted = [Wanted(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]
+    wanted = [FrameRequest(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]
     with mitsuba_warnings(), client_of(args) as client:
         film = film_of(args, client, wanted, variant, folder / "passes")
         with Bar(args, unit=" tasks", delay=0) as bar, Stop() as stop:
@@ -334,20 +334,20 @@ def _folder_and_film(args: argparse.Namespace) -> tuple[Path, Path | None]:
 
 
 def _frames(args: argparse.Namespace, folder: Path) -> list[Frame]:
-    given = options.scene_parameters(args)
-    animated = [one.name for one in args.animate]
+    fixed = options.scene_parameters(args)
+    animated = [change.name for change in args.animate]
     names = animated + args.turn
     for name in names:
         if names.count(name) > 1:
             args.parser.error(f"{name!r} is set more than once; keep one --animate or --turn of it")
     for name in animated:
-        if name in given:
+        if name in fixed:
             args.parser.error(
                 f"argument -D: --animate {name}= sets its value in every frame; leave "
-                f"-D {name}={given[name]} out"
+                f"-D {name}={fixed[name]} out"
             )
-    every = values_of_frames(args.scene, given, args.frames, args.animate, args.turn)
-    content = digest_of(args.scene, given)
+    every = values_of_frames(args.scene, fixed, args.frames, args.animate, args.turn)
+    content = digest_of(args.scene, fixed)
     return [
         Frame(
             folder / f"frame_{n:04d}.png",

@@ -39,7 +39,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         ".png",
     )  # fmt: skip
     parser.add_argument(
-        "--values", metavar="V", nargs="+", help="of the parameter; default: the thesis'"
+        "--values", metavar="V", nargs="+", help="values to compare; default: those of the thesis"
     )
     _add_options(parser.add_argument_group("the maps"))
     options.add_json(parser)
@@ -57,7 +57,7 @@ def _add_options(group: argparse._ArgumentGroup) -> None:
     options.add_exposure(group, None, "of all maps, in stops; default: the best map's own")
     options.add_table(group, options.TABLE_NAMES, coherence="patch")
     add_relative(group)
-    group.add_argument("--int-ior", metavar="N", help="of --relative; default: 1.5")
+    group.add_argument("--int-ior", metavar="N", help="index for --relative; default: 1.5")
     group.add_argument(
         "--compiled", action=argparse.BooleanOptionalAction, default=True,
         help="time spectral and flss in compiled code, in a sweep over methods",
@@ -117,8 +117,8 @@ def _values(args: argparse.Namespace) -> list[Any] | None:
     try:
         return [int(v) if args.kind == "terms" else float(v) for v in args.values]
     except ValueError as error:
-        given = " ".join(args.values)
-        raise DiffractionError(f"--values: expected numbers, got '{given}'") from error
+        text = " ".join(args.values)
+        raise DiffractionError(f"--values: expected numbers, got '{text}'") from error
 
 
 def _compiled(
@@ -131,15 +131,15 @@ def _compiled(
     variant = set_variant(None)
     tables = {k: settings[k] for k in ("coherence_width", "tolerance") if k in settings}
     resolution = 2 * args.resolution  # below it Python's share shows
-    found = time_compiled(
+    times = time_compiled(
         patch, light, resolution=resolution, samples=args.samples, step=settings["step"],
         progress=bar, **tables,
     )  # fmt: skip
     return [
         f"compiled ({variant} and RGB), {resolution} x {resolution} pixels, 360–830 nm in steps of "
         f"{settings['step']:g} nm:",
-        f"  flss {found.flss:.3g} s; spectral {found.spectral:.3g} s, {found.ratio:.3g}× as fast; "
-        f"lut {found.colours:.3g} s, {found.colour_ratio:.3g}× as fast",
+        f"  flss {times.flss:.3g} s; spectral {times.spectral:.3g} s, {times.ratio:.3g}× as fast; "
+        f"lut {times.colours:.3g} s, {times.colour_ratio:.3g}× as fast",
     ]
 
 

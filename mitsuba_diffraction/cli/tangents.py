@@ -26,7 +26,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "a mesh without them gets some that carry only the direction. On a closed surface that "
         "is no torus every field has singular points, around which the patch turns.",
     )  # fmt: skip
-    parser.add_argument("mesh", metavar="MESH", type=Path, help="what to read")
+    parser.add_argument("mesh", metavar="MESH", type=Path, help="mesh to read")
     options.add_output(parser, "PLY to write", ".ply", required=True)
     parser.add_argument(
         "--along", choices=_GUIDES, default="smooth",
@@ -35,8 +35,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--turn", metavar="DEGREES", type=number_between(-360, 360), default=0.0,
-        help="from there to the patch's x axis, counter-clockwise seen from outside, e.g. -90 to "
-        "lay its y axis along the field; default: 0",
+        help="angle from the field to the patch's x axis, counter-clockwise seen from outside, "
+        "e.g. -90 to lay its y axis along the field; default: 0",
     )  # fmt: skip
     parser.add_argument(
         "--smoothing", metavar="S", type=number_between(1e-4, 1), default=0.03,

@@ -14,9 +14,9 @@ from .console import say, say_warning
 from .options import whole_number
 
 if TYPE_CHECKING:
-    from ..cluster.frames import Film, Wanted
+    from ..cluster.frames import Film, FrameRequest
 
-#: As `cluster.workers.VARIABLE`, which imports more than --help has time for.
+#: Copy of `cluster.workers.VARIABLE`, whose module imports too much for --help.
 VARIABLE = "DASK_SCHEDULER_ADDRESS"
 
 
@@ -46,10 +46,10 @@ def on_workers(args: argparse.Namespace) -> bool:
     """Say whether the command runs on workers; contradictory options are a usage error."""
     if args.workers and args.scheduler:
         args.parser.error("argument --workers: starts workers; --scheduler has its own")
-    found = bool(args.workers or args.scheduler or os.environ.get(VARIABLE))
-    if getattr(args, "threads", None) and not found:
+    wanted = bool(args.workers or args.scheduler or os.environ.get(VARIABLE))
+    if getattr(args, "threads", None) and not wanted:
         args.parser.error("argument --threads: is for --workers or --scheduler")
-    return found
+    return wanted
 
 
 def worker_threads(args: argparse.Namespace) -> int:
@@ -72,7 +72,7 @@ def client_of(args: argparse.Namespace) -> Iterator[Any]:
 
 
 def film_of(
-    args: argparse.Namespace, client: Any, frames: Sequence[Wanted], variant: str, keep: Path
+    args: argparse.Namespace, client: Any, frames: Sequence[FrameRequest], variant: str, keep: Path
 ) -> Film:
     """Return the renderer of the command's frames on workers."""
     from ..cluster.frames import Film

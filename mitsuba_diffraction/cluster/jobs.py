@@ -16,7 +16,7 @@ from ..progress import Progress
 from ..settings import TableSettings
 from ..tables.build.build import build_with
 from ..tables.table import DiffractionTable
-from .tasks import Failed, Lacking, SceneFiles, check_versions, failure, versions
+from .tasks import Failed, MissingFiles, SceneFiles, check_versions, failure, versions
 from .workers import check_workers, outcome, wait_for_scheduler, workers_of
 
 _POLL = 0.02  # seconds
@@ -78,7 +78,7 @@ class HasFiles(Protocol):
         """Files of the job, known by content."""
 
 
-def each(
+def run_jobs(
     client: Any, work: Callable[..., Any], jobs: Sequence[HasFiles]
 ) -> Iterator[tuple[int, Any]]:
     """Do `work(job, contents)` for each job, and yield its number and result.
@@ -86,7 +86,7 @@ def each(
     Parameters
     ----------
     client : `distributed.Client`, or None to do all here.
-    work : gives `Lacking` for files that it needs by content.
+    work : gives `MissingFiles` for files that it needs by content.
     jobs : any.
 
     Returns
@@ -106,22 +106,22 @@ def each(
     try:
         while waiting:
             for future in [future for future in waiting if future.done()]:
-                n, found = waiting.pop(future), outcome(future)
-                if found is None:
+                n, result = waiting.pop(future), outcome(future)
+                if result is None:
                     wait_for_scheduler(client)
                     waiting[client.submit(work, jobs[n], pure=False)] = n
-                elif isinstance(found, Lacking):
-                    again = client.submit(work, jobs[n], _contents(jobs[n], found), pure=False)
+                elif isinstance(result, MissingFiles):
+                    again = client.submit(work, jobs[n], _contents(jobs[n], result), pure=False)
                     waiting[again] = n
                 else:
-                    yield n, found
+                    yield n, result
             time.sleep(_POLL)
     finally:
         for future in waiting:
             future.cancel()
 
 
-def _contents(job: HasFiles, lacking: Lacking) -> Mapping[str, bytes]:
+def _contents(job: HasFiles, lacking: MissingFiles) -> Mapping[str, bytes]:
     wanted = set(lacking.digests)
     return {d: Path(path).read_bytes() for path, d in job.files.files if d in wanted}
 
@@ -172,15 +172,15 @@ class OrderedMap:
                 future.cancel()
 
     def _result(self, waiting: deque[tuple[Any, Any]]) -> Any:
-        while (found := outcome(waiting[0][1])) is None:
+        while (answer := outcome(waiting[0][1])) is None:
             wait_for_scheduler(self._client)
             self.retries += len(waiting)
             for n, (call, _) in enumerate(waiting):
                 waiting[n] = call, self._submitted(call)
-        if isinstance(found, Failed):
-            raise DiffractionError(f"worker {found.worker}: {found.text}")
+        if isinstance(answer, Failed):
+            raise DiffractionError(f"worker {answer.worker}: {answer.text}")
         waiting.popleft()
-        result, seconds = found
+        result, seconds = answer
         self.tasks += 1
         self.busy += seconds
         return result
@@ -198,7 +198,7 @@ def _done(content: bytes) -> tuple[Any, float] | Failed:
     start = time.perf_counter()
     try:
         wanted, work, argument = pickle.loads(content)
-        check_versions(wanted)  # of a worker that has come late
+        check_versions(wanted)  # a late worker has not been checked
         return work(argument), time.perf_counter() - start
     except Exception as error:
         return failure(error)

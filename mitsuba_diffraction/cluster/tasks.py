@@ -41,18 +41,18 @@ class Task:
     variant: str
     sensor: int
     preview: bool
-    film: str  # what the client takes the film to be, see `film_of`
+    film: str  # the client's film, see `film_of`
     # frame, first: numbers of the frame and of the first pass, for people
     frame: int
     first: int
     passes: tuple[Pass, ...]  # seeds and samples
-    versions: tuple[str, ...]  # of the packages that decide the bits of a picture
-    threads: int  # of Dr.Jit; 0 for one a core
+    versions: tuple[str, ...]  # packages that decide the bits of a picture
+    threads: int  # threads of Dr.Jit; 0 for one a core
 
     @property
     def key(self) -> str:
         """Key of the sum: all that decides it, except the threads and processor that add it up."""
-        passes = [(one.seed, one.spp) for one in self.passes]
+        passes = [(render.seed, render.spp) for render in self.passes]
         what = (self.files.digest, self.variant, self.sensor, self.preview, self.film, passes)
         return key_of("passes", *what, self.versions)
 
@@ -69,12 +69,12 @@ class Sums:
     raw: NDArray[np.float64]  # (ny, nx, channels), the sum of the films' raw storage
     where: str  # processor and Dr.Jit threads, which decide the last bits
     worker: str  # address
-    seconds: float  # of work, loading included
+    seconds: float  # time of the work, loading included
     peak: int  # bytes of the process at most
 
 
 @dataclass(frozen=True)
-class Lacking:
+class MissingFiles:
     """Answer of a worker that lacks files, by their digests."""
 
     digests: tuple[str, ...]
@@ -93,13 +93,15 @@ def versions() -> tuple[str, ...]:
     return tuple(version(name) for name in _PACKAGES)
 
 
-def run_task(task: Task, contents: Mapping[str, bytes] | None = None) -> Sums | Lacking | Failed:
+def run_task(
+    task: Task, contents: Mapping[str, bytes] | None = None
+) -> Sums | MissingFiles | Failed:
     """Do a task in this process. contents: content of files that are missing here, by digest."""
     try:
         task.files.keep(contents or {})
         lacking = task.files.missing()
         if lacking:
-            return Lacking(tuple(lacking))
+            return MissingFiles(tuple(lacking))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the client has loaded the scene, and said them
             return _sums(task)
@@ -131,22 +133,22 @@ def _sums(task: Task) -> Sums:
             "take one process, or a run for each"
         )
     total: Any = 0.0
-    for one in task.passes:
-        total = total + render_pass(scene, sensor, one)
+    for render in task.passes:
+        total = total + render_pass(scene, sensor, render)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     where = f"{processor()}, {threads} threads"
     return Sums(total, where, worker_address(), time.perf_counter() - start, peak)
 
 
 @lru_cache(1)
-def _scene(files: SceneFiles, variant: str, sensor: int, preview: bool) -> tuple[Any, Any]:
+def _scene(files: SceneFiles, variant: str, number: int, preview: bool) -> tuple[Any, Any]:
     """Load the scene of a task; the one before stays loaded meanwhile, for what both need."""
     path, values = files.here()
     scene = load_scene(path, values)
-    found = sensor_of(scene, sensor)
+    sensor = sensor_of(scene, number)
     if preview:
-        shrink(found)
-    return scene, found
+        shrink(sensor)
+    return scene, sensor
 
 
 def film_of(scene: Any, sensor: Any) -> str:
@@ -158,11 +160,11 @@ def film_of(scene: Any, sensor: Any) -> str:
 
 def check_versions(wanted: tuple[str, ...]) -> None:
     """Refuse to work with other package versions than the client's."""
-    found = versions()
-    for name, mine, theirs in zip(_PACKAGES, found, wanted, strict=True):
-        if mine != theirs:
+    installed = versions()
+    for name, here, there in zip(_PACKAGES, installed, wanted, strict=True):
+        if here != there:
             raise DiffractionError(
-                f"it has {name} {mine}, and the client {theirs}: pictures of both need not agree; "
+                f"it has {name} {here}, and the client {there}: pictures of both need not agree; "
                 "install the same version on both"
             )
 
@@ -199,11 +201,11 @@ class SceneFiles:
     files: tuple[tuple[str, str], ...]  # absolute paths on the client, SHA-256 of their contents
 
     @classmethod
-    def of(cls, scene: Path, values: Mapping[str, str]) -> SceneFiles:
+    def from_scene(cls, scene: Path, values: Mapping[str, str]) -> SceneFiles:
         """Read the digests of the files of an XML scene."""
         absolute = Path(os.path.abspath(scene))
-        found = {os.path.abspath(path) for path in files_of(absolute, values)}
-        files = tuple((path, _digest(path, *_stamp(path))) for path in sorted(found))
+        paths = {os.path.abspath(path) for path in files_of(absolute, values)}
+        files = tuple((path, _digest(path, *_stamp(path))) for path in sorted(paths))
         return cls(str(absolute), tuple(sorted(values.items())), files)
 
     @property

@@ -47,7 +47,7 @@ def connect(
     if count is not None:
         import dask
 
-        # by the processes that are started: Ctrl-C is for the client
+        # the processes that are started ignore Ctrl-C: it is for the client
         with _ctrl_c_ignored(), _silent_tracker():
             cluster = distributed.LocalCluster(
                 n_workers=count, threads_per_worker=1, processes=True,
@@ -116,8 +116,8 @@ def check_workers(client: Any, variant: str | None) -> list[str]:
                 f"worker {address} has {about['nthreads']} Dask threads, of which Dr.Jit takes one "
                 "at a time: start it with 'dask worker --nthreads 1'"
             )
-    found = client.run(_trouble, versions(), variant, on_error="return")
-    answers = {a: trouble for a, trouble in found.items() if not isinstance(trouble, OSError)}
+    reasons = client.run(_trouble, versions(), variant, on_error="return")
+    answers = {a: trouble for a, trouble in reasons.items() if not isinstance(trouble, OSError)}
     for address, trouble in answers.items():  # the others have just gone
         if trouble is not None:
             raise DiffractionError(f"worker {address} is of no use: {one_line(str(trouble))}")

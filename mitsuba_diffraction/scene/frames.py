@@ -25,7 +25,7 @@ FILMS: dict[str, dict[str, Any]] = {
 }
 #: Why a frame that is not there is rendered.
 MISSING = ("", "")
-_KEY = "mitsuba-diffraction"  # of the text in a frame's PNG
+_KEY = "mitsuba-diffraction"  # key of the text in a frame's PNG
 
 
 @dataclass(frozen=True)
@@ -145,10 +145,10 @@ def write_film(frames: Sequence[Path], film: Path, fps: float) -> None:
             picture.close()
 
 
-def digest_of(scene: Path, given: Mapping[str, str]) -> str:
+def digest_of(scene: Path, values: Mapping[str, str]) -> str:
     """Return the digest of a scene, its includes, and every file that it names."""
     content = hashlib.sha256()
-    for file in files_of(scene, given):
+    for file in files_of(scene, values):
         content.update(file.name.encode())
         content.update(file.read_bytes())
     return content.hexdigest()[:32]
@@ -161,7 +161,7 @@ def _settings_in(png: Path) -> dict[str, Any] | None:
     try:
         with Image.open(png) as image:
             text = getattr(image, "text", {}).get(_KEY, "")
-        found = json.loads(text[1:-1])  # Mitsuba puts it into quotes
+        settings = json.loads(text[1:-1])  # Mitsuba puts it into quotes
     except (OSError, ValueError, SyntaxError):
         return None
-    return found if isinstance(found, dict) else None
+    return settings if isinstance(settings, dict) else None

@@ -28,7 +28,7 @@ _LOADING = re.compile(
 _INSTANTIATE = re.compile(r'failed to instantiate (?P<kind>\w+) plugin of type "(?P<type>[^"]+)": ')
 _NOT_FOUND = re.compile(r'\[PluginManager\] Plugin "[^"]+" not found!')
 _TRACEBACK = re.compile(r"Traceback \(most recent call last\):\n(?:[ \t].*\n)*(?:[\w.]+: (?=\S))?")
-# What a Python plugin raises that says nothing of the scene
+# Exceptions of a Python plugin that say nothing about the scene
 _NO_ERROR = re.compile(r"^(KeyboardInterrupt|MemoryError|SystemExit): ?(\d*)", re.M)
 _UNREAD = re.compile(
     r'Found \d+ unreferenced (?:property|properties) in (\w+) plugin of type "([^"]+)":'
@@ -137,8 +137,8 @@ def shrink(sensor: Any) -> None:
 
 def preview_samples(sensor: Any, preview: bool) -> int:
     """Return the scene's own samples per pixel; for a preview at most 16."""
-    own = int(sensor.sampler().sample_count())
-    return min(own, 16) if preview else own
+    samples = int(sensor.sampler().sample_count())
+    return min(samples, 16) if preview else samples
 
 
 def sensor_of(scene: Any, index: int) -> Any:
@@ -183,18 +183,18 @@ def plain_text(error: BaseException) -> str:
     return text
 
 
-def error_of(what: str, error: BaseException) -> BaseException:
+def error_of(failed: str, error: BaseException) -> BaseException:
     """Return the error to raise for Mitsuba's exception.
 
     Mitsuba makes a RuntimeError of whatever a Python plugin raises: Ctrl-C, an exit and lack of
-    memory are themselves again, anything else is a DiffractionError that begins with `what`.
+    memory are themselves again, anything else is a DiffractionError that begins with `failed`.
     """
-    found = _NO_ERROR.search(_words(error))
-    if found is None:
-        return DiffractionError(f"{what}: {plain_text(error)}")
-    if found[1] == "SystemExit":
-        return SystemExit(int(found[2] or 1))
-    return KeyboardInterrupt() if found[1] == "KeyboardInterrupt" else MemoryError()
+    original = _NO_ERROR.search(_words(error))
+    if original is None:
+        return DiffractionError(f"{failed}: {plain_text(error)}")
+    if original[1] == "SystemExit":
+        return SystemExit(int(original[2] or 1))
+    return KeyboardInterrupt() if original[1] == "KeyboardInterrupt" else MemoryError()
 
 
 def _words(error: BaseException) -> str:
@@ -204,24 +204,24 @@ def _words(error: BaseException) -> str:
     return str(error)
 
 
-def _no_ply(found: re.Match[str]) -> str:
+def _no_ply(match: re.Match[str]) -> str:
     """Say what to do about a mesh of another format where a PLY is expected."""
-    file = PurePath(found["file"])
+    file = PurePath(match["file"])
     todo = f"run 'mitsuba-diffraction tangents {file} -o mesh.ply' first, and use mesh.ply"
-    if not found["why"].startswith("invalid PLY"):
+    if not match["why"].startswith("invalid PLY"):
         return f"'{file}' has polygons, of which Mitsuba reads only triangles: {todo}"
     if file.suffix.lower() in (".ply", ""):
-        return f"'{file}' is no undamaged PLY: {found['why']}; export the mesh again"
+        return f"'{file}' is no undamaged PLY: {match['why']}; export the mesh again"
     if file.suffix.lower() not in (".obj", ".serialized"):
         todo = "convert it to PLY or OBJ"
     return f"'{file}' is no PLY mesh, which the scene expects: {todo}"
 
 
-def _unused(found: re.Match[str]) -> str:
+def _unused(match: re.Match[str]) -> str:
     """Name parameters that are given and that nothing in the scene reads."""
-    names = re.findall(r"\$(\w+)=", found["list"])
+    names = re.findall(r"\$(\w+)=", match["list"])
     if not names:
-        return found[0]
+        return match[0]
     return (
         f"nothing in the scene uses {', '.join('$' + name for name in names)}, although it "
         f"declares it: write ${names[0]} where its value is to go, or leave "

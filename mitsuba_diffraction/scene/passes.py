@@ -95,7 +95,7 @@ def _write(bitmap: Any, path: Path) -> None:
     with atomic_path(path) as temporary:
         try:
             bitmap.write(str(temporary))
-        except RuntimeError as error:  # what Mitsuba makes of a full disk
+        except RuntimeError as error:  # Mitsuba's exception for a full disk
             reason = one_line(str(error)).rpartition(": ")[2]
             raise DiffractionError(
                 f"cannot write '{path}': {reason}; nothing was left behind"

@@ -1,6 +1,6 @@
 """A table as plain data, without its coefficients, for files and the cache; checked when read.
 
-Whatever `described` lets pass can be looked up anywhere without reading outside the table: every
+Whatever `parse_document` accepts can be looked up anywhere without reading outside the table: each
 field has its type, size and range, and agrees with the others.
 """
 
@@ -83,7 +83,7 @@ def _given(record: Expansion | Grid) -> dict[str, Any]:
 
 
 @dataclasses.dataclass(frozen=True)
-class Described:
+class TableDescription:
     """Table without its coefficients.
 
     Attributes
@@ -112,7 +112,7 @@ class Described:
         return DiffractionTable(coefficients=coefficients, **self.fields)
 
 
-def described(document: Any) -> Described:
+def parse_document(document: Any) -> TableDescription:
     """Read the result of `document_of`, checked field by field and against each other.
 
     Raises
@@ -150,10 +150,12 @@ def described(document: Any) -> Described:
     with np.errstate(over="ignore"):
         largest = np.abs(table.order_0_at(kappa)).max()
     _require(largest <= _LARGEST_POWER, f"order_0 of a size of {largest:.3g}")
-    size = 4 * math.prod(Described({"expansion": expansion, "grid": grid}).shape)
+    size = 4 * math.prod(TableDescription({"expansion": expansion, "grid": grid}).shape)
     _require(size <= MAX_BYTES, f"{size:.3g} bytes of coefficients")
     values = {field.name: getattr(table, field.name) for field in dataclasses.fields(table)}
-    return Described({name: value for name, value in values.items() if name != "coefficients"})
+    return TableDescription(
+        {name: value for name, value in values.items() if name != "coefficients"}
+    )
 
 
 def _check_agreement(table: DiffractionTable) -> None:

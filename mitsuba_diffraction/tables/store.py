@@ -30,7 +30,7 @@ from ..heights.validity import TEXTS_VERSION
 from ..settings import TableSettings
 from .colour.build import PolarGrid
 from .colour.table import COLOUR_VERSION, ColourTable
-from .document import described, document_of, plain
+from .document import document_of, parse_document, plain
 from .expansion import Expansion
 from .table import FORMAT_VERSION, DiffractionTable
 
@@ -40,8 +40,6 @@ VARIABLE = "MITSUBA_DIFFRACTION_CACHE"
 MAX_BYTES = 4 << 30
 
 SUFFIX = ".cache"
-#: Also of files that earlier versions kept.
-_PATTERNS = (f"*{SUFFIX}", "*.exr", "*.npz", "albedo-*.npy")
 _MAGIC = "mitsuba_diffraction cache"
 #: Bytes that the first line is filled up to, and the second, a number; arrays begin at multiples of
 #: the last.
@@ -53,14 +51,14 @@ _making: dict[tuple[str, str], threading.Lock] = {}
 
 def cache_folder() -> Path | None:
     """Return $MITSUBA_DIFFRACTION_CACHE, or the user's cache folder; None without a home."""
-    own = os.environ.get(VARIABLE)
-    if own:
-        return Path(own)
+    chosen = os.environ.get(VARIABLE)
+    if chosen:
+        return Path(chosen)
     try:
         folder = platformdirs.user_cache_path("mitsuba_diffraction", appauthor=False)
     except RuntimeError:
         return None
-    return folder if folder.is_absolute() else None  # "~" as earlier versions leave it
+    return folder if folder.is_absolute() else None  # not "~", without a home
 
 
 @dataclass(frozen=True)
@@ -103,13 +101,13 @@ def kept(
     make : makes it.
     pack, unpack : to a record, and back; unpack raises ValueError for what does not fit.
     """
-    found = memory.get(key)
-    if found is None:
+    value = memory.get(key)
+    if value is None:
         with _making.setdefault((kind, key), threading.Lock()):
-            found = memory.get(key)
-            if found is None:
-                found = memory[key] = _from_disk(kind, key, make, pack, unpack)
-    return found
+            value = memory.get(key)
+            if value is None:
+                value = memory[key] = _from_disk(kind, key, make, pack, unpack)
+    return value
 
 
 def _from_disk(
@@ -123,14 +121,14 @@ def _from_disk(
     if folder is None:
         return make()
     path, title = folder / f"{kind}-{key[:32]}{SUFFIX}", f"{_MAGIC} {kind} {key}"
-    found = _found(path, title, unpack)
-    if found is None:
+    value = _found(path, title, unpack)
+    if value is None:
         with _locked(path):
-            found = _found(path, title, unpack)  # made by whoever was waited for
-            if found is None:
-                found = make()
-                _keep(path, title, pack(found))
-    return found
+            value = _found(path, title, unpack)  # made by whoever was waited for
+            if value is None:
+                value = make()
+                _keep(path, title, pack(value))
+    return value
 
 
 @contextlib.contextmanager
@@ -154,9 +152,9 @@ def _locked(path: Path) -> Iterator[None]:
 def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
     """Read the value in a file; None if it is missing, or damaged, with a warning."""
     try:
-        found = unpack(read_record(path, title))
+        value = unpack(read_record(path, title))
         os.utime(path)  # recently used ones are kept longest
-        return found
+        return value
     except OSError:
         return None
     except (ValueError, LookupError, TypeError, MemoryError, RecursionError) as error:
@@ -183,13 +181,13 @@ def read_record(path: Path, title: str) -> Record:
         raise ValueError("its checksum or its key is another's")
     length = int(content[_HEAD : 2 * _HEAD].tobytes())
     place = 2 * _HEAD + _aligned(length)
-    described = json.loads(content[2 * _HEAD : 2 * _HEAD + length].tobytes())
+    header = json.loads(content[2 * _HEAD : 2 * _HEAD + length].tobytes())
     arrays = []
-    for kind, shape in described["arrays"]:
+    for kind, shape in header["arrays"]:
         size = math.prod(shape) * np.dtype(kind).itemsize
         arrays.append(content[place : place + size].view(kind).reshape(shape))
         place += _aligned(size)
-    return Record(described["document"], arrays)
+    return Record(header["document"], arrays)
 
 
 def _keep(path: Path, title: str, record: Record) -> None:
@@ -209,8 +207,8 @@ def write_record(path: Path, title: str, record: Record) -> None:
         If it cannot be written.
     """
     arrays = [np.ascontiguousarray(array) for array in record.arrays]
-    described = [[array.dtype.str, array.shape] for array in arrays]
-    text = json.dumps({"document": record.document, "arrays": described}).encode()
+    shapes = [[array.dtype.str, array.shape] for array in arrays]
+    text = json.dumps({"document": record.document, "arrays": shapes}).encode()
     texts = [np.frombuffer(t, np.uint8) for t in (str(len(text)).encode().ljust(_HEAD), text)]
     blocks = [*texts, *(array.reshape(-1).view(np.uint8) for array in arrays)]
     padded = [np.pad(block, (0, _aligned(block.size) - block.size)) for block in blocks]
@@ -236,8 +234,7 @@ def _aligned(size: int) -> int:
 def _prune(folder: Path) -> None:
     """Remove the files unused for longest until the folder is small enough."""
     remove_abandoned(folder, r"\w+-\w+", SUFFIX)
-    found = {path for pattern in _PATTERNS for path in folder.glob(pattern)}
-    newest = sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
+    newest = sorted(folder.glob(f"*{SUFFIX}"), key=lambda path: path.stat().st_mtime, reverse=True)
     total = 0
     for n, path in enumerate(newest):
         total += path.stat().st_size
@@ -271,11 +268,11 @@ def _table_record(table: DiffractionTable) -> Record:
 
 
 def _table_of(record: Record) -> DiffractionTable:
-    found = described(record.document)
+    description = parse_document(record.document)
     (coefficients,) = record.arrays
-    if coefficients.shape != found.shape:
-        raise ValueError(f"coefficients of another shape than {found.shape}")
-    return found.table(coefficients)
+    if coefficients.shape != description.shape:
+        raise ValueError(f"coefficients of another shape than {description.shape}")
+    return description.table(coefficients)
 
 
 def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:

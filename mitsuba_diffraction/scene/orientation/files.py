@@ -8,6 +8,7 @@ import re
 import struct
 import tempfile
 from pathlib import Path
+from typing import NamedTuple
 
 import mitsuba as mi
 import numpy as np
@@ -22,7 +23,7 @@ from .trimesh import TriangleMesh
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# what Mitsuba throws, text that is not UTF-8, and sizes beyond the memory
+# Mitsuba's exceptions, text that is not UTF-8, and sizes beyond the memory
 _UNREAD = (RuntimeError, ValueError, MemoryError)
 
 KINDS = {".ply": "ply", ".obj": "obj", ".serialized": "serialized"}
@@ -34,7 +35,23 @@ _CODES = {
 }  # fmt: skip
 
 
-def load_mesh(path: str | os.PathLike[str]) -> tuple[Floats, Floats | None, Floats | None, Ints]:
+class MeshArrays(NamedTuple):
+    """Arrays of a triangle mesh.
+
+    Attributes
+    ----------
+    positions, normals : (n, 3); normals may be absent.
+    uv : (n, 2) texture coordinates, or None.
+    faces : (m, 3) indices of vertices.
+    """
+
+    positions: Floats
+    normals: Floats | None
+    uv: Floats | None
+    faces: Ints
+
+
+def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
     """Read a mesh file.
 
     Reads what Mitsuba reads, .ply, .obj, .serialized, and PLY files of polygons.
@@ -68,7 +85,7 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[Floats, Floats | None, Floa
 
     normals = array("vertex_normals", 3) if mesh.has_vertex_normals() else None
     uv = array("vertex_texcoords", 2) if mesh.has_vertex_texcoords() else None
-    return array("vertex_positions", 3), normals, uv, faces
+    return MeshArrays(array("vertex_positions", 3), normals, uv, faces)
 
 
 def _vertices_and_faces(file: Path, kind: str) -> tuple[int, Ints]:
@@ -136,14 +153,14 @@ def write_ply(
         If the file cannot be written.
     """
     _need_variant()
-    made = mi.Mesh(
+    written = mi.Mesh(
         "mesh", len(mesh.positions), len(mesh.faces),
         has_vertex_normals=True, has_vertex_texcoords=with_uv,
     )  # fmt: skip
     if mesh.orientation is not None:
         turn = np.pad(mesh.orientation, [(0, 0), (0, 1)])
-        made.add_attribute(ORIENTATION, 3, turn.ravel())
-    values = mi.traverse(made)
+        written.add_attribute(ORIENTATION, 3, turn.ravel())
+    values = mi.traverse(written)
     values["vertex_positions"] = mesh.positions.ravel()
     values["vertex_normals"] = mesh.normals.ravel()
     if with_uv:
@@ -152,8 +169,8 @@ def write_ply(
     values.update()
     with atomic_path(path) as temporary:
         try:
-            made.write_ply(str(temporary))
-        except RuntimeError as error:  # what Mitsuba makes of a full disk
+            written.write_ply(str(temporary))
+        except RuntimeError as error:  # Mitsuba's exception for a full disk
             raise DiffractionError(f"cannot write '{path}': {one_line(str(error))}") from error
         # Mitsuba writes no comments: they follow the line that names the format
         lines = Path(temporary).read_bytes().split(b"\n", 2)
@@ -173,7 +190,7 @@ def triangulated_ply(data: bytes) -> bytes | None:
     """
     try:
         return _triangulated(data)
-    # what a damaged header or body makes of its numbers and names
+    # numbers and names of a damaged header or body
     except (struct.error, ValueError, LookupError, OverflowError, MemoryError):
         return None
 

@@ -33,11 +33,11 @@ BREAK = 60.0
 # longer than this many of its own edges, or than this share of the mesh, is a line.
 _EDGES, _SHARE = 4.0, 0.2
 
-MOST_TURNING = 0.05  # of the surface, on which the direction may turn too fast
-LONG = 0.05  # of the mesh's size: breaks that are longer in all are seen
+MOST_TURNING = 0.05  # share of the surface on which the direction may turn too fast
+LONG = 0.05  # share of the mesh's size: longer breaks, all together, are visible
 TURN = 30.0  # degrees between neighbours from which on a seam shows
 
-FLAT = 1e-3  # of the typical ratio of texture area to surface area: as good as none
+FLAT = 1e-3  # share of the typical ratio of texture area to surface area: taken for none
 
 
 def _turning(orientation: Floats) -> Bools:
@@ -120,7 +120,7 @@ class TangentReport:
     stretch: float  # median ratio of |dp/du| to |dp/dv| (1: no direction is stretched)
     # length of the lines along which the direction breaks, in the unit of the positions
     broken: float
-    size: float  # of the mesh, its longest side along an axis
+    size: float  # longest side of the mesh along an axis
     has_orientation: bool = False
 
     @property

@@ -14,7 +14,7 @@ from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.build.describe import roughness_of
 from mitsuba_diffraction.tables.build.slope_ratios import slope_ratios
 from mitsuba_diffraction.tables.build.windows import windows_of
-from mitsuba_diffraction.tables.document import described, document_of, plain
+from mitsuba_diffraction.tables.document import document_of, parse_document, plain
 from tests.support.directions import rough_patch
 
 #: Of few orders, and of many; not square.
@@ -164,10 +164,10 @@ def test_of_a_damaged_file_it_is_refused(name, value):
     table = DiffractionTable.build(FEW, second_order=True, coherence_width=6.0, tolerance=0.01)
     document = document_of(table)
     assert table.summary()["second_order"]["applied"] is True
-    described(json.loads(json.dumps(document, default=plain)))
+    parse_document(json.loads(json.dumps(document, default=plain)))
     document["slope_ratios"][name] = value
     with pytest.raises(ValueError, match=r".+"):
-        described(json.loads(json.dumps(document, default=plain)))
+        parse_document(json.loads(json.dumps(document, default=plain)))
 
 
 def test_other_words_than_true_and_false_are_refused():
