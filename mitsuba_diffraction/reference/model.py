@@ -18,9 +18,9 @@ the medium above it. Lengths are in µm. The equations have the numbers of docs/
 (2) are orders of the phase screen exp(iκh); (3) is the power under a Gaussian window exp(−r²/2σ²),
 averaged over its positions (Stam 1999, eq. 7–12). K is Kirchhoff's tangent plane: Fresnel's r_s and
 r_p at the half vector, T the turn between the axes of the surface and the facet's. B is first-order
-small slope (Rice 1951; Voronovich 1985), (10) its second order (Voronovich 1994): c_l and c_t depend
-on directions and index, r_l and r_t on the squared slopes along and across q_j, D in r = a* D/|a|².
-Rows and columns of J are s and p, outgoing and incoming. Indices and results are arrays (n,) as in
+small slope (Rice 1951; Voronovich 1985), (10) its second order (Voronovich 1994): c_l, c_t depend
+on directions and index, r = a* D/|a|² on the spectra D of squared slopes along and across q_j. Rows
+and columns of J are s and p, outgoing and incoming. Indices and results are arrays (n,) as in
 `Light`. coat.py, film.py and transmission.py wrap this.
 """
 

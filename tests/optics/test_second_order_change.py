@@ -20,9 +20,7 @@ Q_LIMIT = 2.0 * float(wavenumber(VISIBLE[0]))
 
 
 def measured(field) -> float:
-    grid = CellGrid.for_patches(
-        field.extent, field.rms_height, Q_LIMIT, (Q_LIMIT, Q_LIMIT), Q_LIMIT
-    )
+    grid = CellGrid.for_patches(field.extent, field.rms_height, Q_LIMIT)
     sums = CellSums.of_patches([(field, np.ones((1, 1)))], grid)
     roughness = blend.ScaleRoughness.from_heights(field.heights, field.pixel_size)
     return colour_change(sums, sums.ratios(), roughness, VISIBLE)
@@ -87,9 +85,7 @@ def test_a_flat_surface_has_no_change():
 
 def test_true_and_false_apply_whatever_the_change():
     field = gratings.sinusoidal(2.5, 0.1, periods=1, pixels_per_period=16, rows=2)
-    grid = CellGrid.for_patches(
-        field.extent, field.rms_height, Q_LIMIT, (Q_LIMIT, Q_LIMIT), Q_LIMIT
-    )
+    grid = CellGrid.for_patches(field.extent, field.rms_height, Q_LIMIT)
     ratios = CellSums.of_patches([(field, np.ones((1, 1)))], grid).ratios()
     for change, auto in ((0.049, False), (0.05, True)):
         changed = dataclasses.replace(ratios, change=change)

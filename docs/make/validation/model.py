@@ -164,9 +164,7 @@ def second_order(
 def slope_ratios(patch: HeightField) -> SlopeRatios:
     """Return the slope ratios of a patch that tiles the plane."""
     q_limit = 2.0 * float(wavenumber(SHORTEST))
-    grid = CellGrid.for_patches(
-        patch.extent, patch.rms_height, q_limit, (q_limit, q_limit), q_limit
-    )
+    grid = CellGrid.for_patches(patch.extent, patch.rms_height, q_limit)
     return CellSums.of_patches([(patch, np.ones((1, 1)))], grid).ratios()
 
 
