@@ -24,7 +24,7 @@ from ..tables.energy.gain import GRAZING, fades
 from ..tables.energy.grid import FINE, DirectionalTable
 from ..tables.energy.store import Energy, mean_exponents
 from ..tables.table import DiffractionTable
-from .boundary import Boundary, Kirchhoff
+from .boundary import Boundary, SmallSlope
 from .direction_lookup import DirectionLookup, between, scales_of
 from .directions import Pair
 from .fresnel import Inside, Perfect, Reflectance
@@ -66,16 +66,15 @@ class EnergyModel:
         low, high = table.wavelength_range
         if mi.is_monochromatic:
             low = high = wavelength
-        kirchhoff = isinstance(boundary, Kirchhoff)
         self.conserving, self._material = conserving, boundary.material
         self._indices, self._exact = (
             partial(_rounded_indices, self._material, step) for step in (INDEX_STEP, FILM_STEP)
         )
-        model = "kirchhoff" if kirchhoff else "small_slope"
+        model = str(boundary)
         self._energy = Energy(table, model, self._indices, (low, high))
         self._fades = fades(model)
         self._warned = False
-        self._filmed = isinstance(self._material, UnderFilm) and not kirchhoff
+        self._filmed = isinstance(self._material, UnderFilm) and isinstance(boundary, SmallSlope)
         self._scale, self._mean = DirectionLookup(), DirectionLookup()
         self._reflected = DirectionLookup()
 
