@@ -20,11 +20,11 @@ from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS, response
 from ..optics.mean_second_order import limited
 from ..tables.energy.conservation import Conservation
-from ..tables.energy.gain import GRAZING, fades
 from ..tables.energy.grid import FINE, DirectionalTable
-from ..tables.energy.store import Energy, mean_exponents
+from ..tables.energy.store import Energy
+from ..tables.film import mean_exponents
 from ..tables.table import DiffractionTable
-from .boundary import Boundary, Kirchhoff
+from .boundary import Boundary, SmallSlope
 from .direction_lookup import DirectionLookup, between, scales_of
 from .directions import Pair
 from .fresnel import Inside, Perfect, Reflectance
@@ -66,16 +66,14 @@ class EnergyModel:
         low, high = table.wavelength_range
         if mi.is_monochromatic:
             low = high = wavelength
-        kirchhoff = isinstance(boundary, Kirchhoff)
         self.conserving, self._material = conserving, boundary.material
         self._indices, self._exact = (
             partial(_rounded_indices, self._material, step) for step in (INDEX_STEP, FILM_STEP)
         )
-        model = "kirchhoff" if kirchhoff else "small_slope"
+        model = str(boundary)
         self._energy = Energy(table, model, self._indices, (low, high))
-        self._fades = fades(model)
         self._warned = False
-        self._filmed = isinstance(self._material, UnderFilm) and not kirchhoff
+        self._filmed = isinstance(self._material, UnderFilm) and isinstance(boundary, SmallSlope)
         self._scale, self._mean = DirectionLookup(), DirectionLookup()
         self._reflected = DirectionLookup()
 
@@ -150,18 +148,12 @@ class EnergyModel:
         return between(ratios, nodes, height_scale)
 
     @property
-    def fades(self) -> bool:
-        """Whether the factor has `tables.energy.gain.fade`."""
-        return self._fades
-
-    @property
     def takes(self) -> int:
         """By what the BSDF is multiplied: 0 where it is by nothing."""
         return self._scale.present + 2 * self._mean.present
 
     def factor(self, pair: Pair, wavenumbers: list[Float], height_scale: Float) -> Colour:
-        """s(ωi) s(ωo), per channel; of a film g(ωi) g(ωo) as well (`optics.mean_second_order`), of
-        Kirchhoff's model `tables.energy.gain.fade`.
+        """s(ωi) s(ωo), per channel; of a film g(ωi) g(ωo) as well (`optics.mean_second_order`).
 
         height_scale : the one given to `update`; needed where derivatives with respect to it are,
             and where it varies.
@@ -175,9 +167,6 @@ class EnergyModel:
                     strict=True,
                 )
                 found *= mi.UnpolarizedSpectrum([one * other for one, other in both])
-        if self._fades:
-            one, other = dr.minimum(pair.cos_i, GRAZING), dr.minimum(pair.cos_o, GRAZING)
-            found *= dr.square(dr.minimum(one, other) * dr.rcp(dr.maximum(one, other)))
         return found
 
     def reflected(

@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import mitsuba as mi
-
 from ...errors import DiffractionError
 from ...heights.recipes import Recipe
 from ...optics.second_order_change import applies
@@ -98,14 +96,6 @@ def _check(session: Session) -> None:
     if not session.bsdfs:
         raise DiffractionError(
             "the scene has no BSDF 'diffraction'; there is nothing to plan, render it as it is"
-        )
-    passed = {
-        name for name, bsdf in session.bsdfs if mi.has_flag(bsdf.flags(), mi.BSDFFlags.Transmission)
-    }
-    if passed:
-        raise DiffractionError(
-            f"light goes through {', '.join(sorted(passed))}, which plans do not record; render "
-            "the scene without a plan"
         )
     if not session.tables:
         raise DiffractionError(

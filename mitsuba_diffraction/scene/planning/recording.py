@@ -71,20 +71,13 @@ class Session:
     def __enter__(self) -> Self:
         if not _one_at_a_time.acquire(blocking=False):
             raise DiffractionError("a scene is being planned already; load one at a time")
-        from ...plugin.transmission.bsdf import DiffractionDielectric
-
-        mi.register_bsdf("diffraction", lambda props: self._make(_kind(self), props))
-        mi.register_bsdf(
-            "diffraction_dielectric", lambda props: self._make(DiffractionDielectric, props)
-        )
+        mi.register_bsdf("diffraction", self._make)
         return self
 
     def __exit__(self, *_: object) -> None:
         from ...plugin.bsdf import Diffraction
-        from ...plugin.transmission.bsdf import DiffractionDielectric
 
         mi.register_bsdf("diffraction", Diffraction)
-        mi.register_bsdf("diffraction_dielectric", DiffractionDielectric)
         _one_at_a_time.release()
 
     def load(self, load: Callable[[], Any]) -> Any:
@@ -95,8 +88,8 @@ class Session:
         finally:
             self.close()
 
-    def _make(self, kind: type[BSDF], props: Properties) -> BSDF:
-        bsdf = kind(props, self.table)
+    def _make(self, props: Properties) -> BSDF:
+        bsdf = _kind(self)(props, self.table)
         heights = bsdf.table.source.get("name") or "heights without a name"
         name = own_id(props.id()) or f"a diffraction BSDF without id (of {heights})"
         self.bsdfs.append((name, bsdf))

@@ -15,6 +15,9 @@ from .settings import EnergySettings
 
 Floats = NDArray[np.floating[Any]]
 
+#: Least sum that is scaled.
+_LEAST = np.float32(1e-6)
+
 
 def scaled(
     transport: Callable[[Any], Floats], aim: Floats, largest: Real | float, sweeps: int
@@ -25,8 +28,10 @@ def scaled(
     largest : upper limit of s.
     """
     s = np.ones_like(aim, np.float32)
+    # series of few terms may sum to less than 0 where next to nothing is reflected
+    aim = np.maximum(aim, _LEAST)
     for _ in range(sweeps):
-        s = s * np.sqrt(aim / np.maximum(s * transport(s), 1e-6))
+        s = s * np.sqrt(aim / np.maximum(s * transport(s), _LEAST))
         s = np.minimum(s, largest).astype(np.float32)
     return s
 
