@@ -22,7 +22,7 @@ from mitsuba_diffraction.optics.fresnel import Filmed, reflectance
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.optics.mean_second_order import limited, mean_gain
 from mitsuba_diffraction.plugin.layers import Channels
-from mitsuba_diffraction.tables.energy.film import exponents
+from mitsuba_diffraction.tables.film import exponents
 from tests.support.directions import as_single, polar
 from tests.support.lanes import evaluated, interaction, refusal
 from tests.support.layered import FLAT, PATCH, WIDTH, assert_values_are_the_reference_s, load, pairs

@@ -8,7 +8,7 @@ import pytest
 from mitsuba_diffraction.optics import mean_second_order
 from mitsuba_diffraction.optics.blend import ScaleRoughness
 from mitsuba_diffraction.optics.fresnel import Filmed
-from mitsuba_diffraction.tables.energy.film import exponents
+from mitsuba_diffraction.tables.film import exponents
 from tests.support.directions import rough_patch
 
 pytestmark = pytest.mark.thorough
