@@ -5,7 +5,7 @@ Contents
 HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
-maps               what a surface reflects in every direction, as pictures
+maps               pictures of the BRDF over all directions
 period_fit         periods of a patch from its response to a beam, by the grating equation
 tradeoff           accuracy against speed and memory, setting by setting
 glsl               the realtime renderer
@@ -15,7 +15,7 @@ cluster            rendering on many processes and machines
 web                pages that show a scene in a browser or a notebook
 reference          the BRDF straight from its integral, in double precision
 bsdf_dict          a dictionary for `mi.load_dict` from arrays
-DiffractionError   what every bad input raises, in one line
+DiffractionError   error of every bad input, in one line
 
 Importing the package registers the BSDF plugin `diffraction` in the current variant of Mitsuba and
 in every variant that is set later.

@@ -1,4 +1,4 @@
-"""Writing files so that a crash, a full disk or Ctrl-C never leaves half of one."""
+"""Files written whole: a crash, a full disk or Ctrl-C never leaves half of one."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _in_use: set[Path] = set()
 
 @contextlib.contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Give a temporary path beside `path`; rename it there on success, remove it otherwise.
+    """Yield a temporary path beside `path`; rename it there on success, remove it otherwise.
 
     The temporary name keeps the suffix of `path`, since image writers choose a format by it. What a
     killed process left of the same file is removed.
@@ -78,8 +78,8 @@ def remove_abandoned(folder: Path, stem: str, suffix: str) -> None:
     name = re.compile(rf"\.{stem}\.{_HOST}-(\d+)-\w+{re.escape(suffix)}")
     with contextlib.suppress(OSError):  # a folder that cannot be read is reported by the writer
         for entry in folder.iterdir():
-            found = name.fullmatch(entry.name)
-            if found and not _lives(int(found[1])):
+            match = name.fullmatch(entry.name)
+            if match and not _lives(int(match[1])):
                 entry.unlink(missing_ok=True)
 
 

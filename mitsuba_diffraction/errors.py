@@ -1,4 +1,4 @@
-"""What goes wrong, in one line that says what to do."""
+"""Errors and warnings: one line that says what is wrong, where, and what to do."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LONG = re.compile(rf"(?<![^\s(=])'[^'\n]{{{_WORD - 1},}}'|[^\s']{{{_WORD + 1},}
 
 
 class DiffractionError(ValueError):
-    """Bad input: the text is one line with what, where, the allowed values and the way out.
+    """Bad input, in one line: what, where, the allowed values and what to do.
 
     Names of thousands of characters are shortened in it, see `shortened`.
     """
@@ -27,7 +27,7 @@ class DiffractionError(ValueError):
 
 
 class DiffractionWarning(UserWarning):
-    """The result is usable, but outside the range where the model or the data can be trusted."""
+    """The result is usable, but outside the range in which the model or the data can be trusted."""
 
 
 def warn(text: str) -> None:
@@ -51,13 +51,13 @@ def _is_internal(frame: FrameType) -> bool:
 
 
 def shortened(text: str) -> str:
-    """The text with every long word, usually a path, and every long quotation cut in its middle.
+    """Shorten every long word, usually a path, and every long quotation, by cutting out its middle.
 
-    What is still over 500 characters loses its middle, too.
+    A text that still has over 500 characters loses its middle, too.
     """
 
-    def cut(found: re.Match[str]) -> str:
-        return _cut(found[0], _WORD)
+    def cut(match: re.Match[str]) -> str:
+        return _cut(match[0], _WORD)
 
     return _cut(_LONG.sub(cut, text), _MESSAGE)
 
@@ -70,11 +70,11 @@ def _cut(text: str, most: int) -> str:
 
 
 def one_line(text: str) -> str:
-    """The text with every run of white space, line ends included, made one blank."""
+    """Replace every run of white space, line ends included, by one blank."""
     return " ".join(text.split())
 
 
 def quoted(value: object) -> str:
-    """A value as an error quotes it: in one line of at most 80 characters."""
+    """Return a value as an error quotes it: in one line of at most 80 characters."""
     text = one_line(repr(value))
     return text if len(text) <= 80 else text[:77] + "..."

@@ -1,4 +1,4 @@
-"""How work that takes a while tells how far it is."""
+"""Progress callbacks of long work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The arguments of a table, declared once: names, defaults, allowed values and help.
+"""Settings of a table, declared once: names, defaults, allowed values and help.
 
 The builder, the plugin, recipes, the commands and the header of a table's file all read them here.
 """
@@ -14,23 +14,23 @@ from typing import Any
 from .errors import DiffractionError, quoted
 
 COHERENCES = ("ensemble", "patch")
-#: Of scenes and the reference besides: one window, centred where the light falls. The table is
-#: that of "patch", whose amplitudes are those of all places but for their phases.
+#: Third coherence, for scenes and the reference: one window, centred where the light falls. It uses
+#: the table of "patch"; another position changes only the phases of the amplitudes.
 SURFACE = "surface"
 BASES = ("svd", "chebyshev", "taylor")
-#: Most bins that a look-up reads in each direction: more would take minutes.
+#: Largest number of bins that a look-up reads in each direction: more would take minutes.
 MAX_TAPS = 64
-#: Most terms of a series.
+#: Largest number of terms of a series.
 MAX_TERMS = 400
 #: Largest factor on heights.
 MAX_HEIGHT_SCALE = 1e3
-#: Widest coherence window, µm. That of sunlight is 65 µm; the lobes of much wider ones are narrower
-#: than the cells that directions are drawn from.
+#: Widest coherence window, µm. Sunlight has 65 µm; lobes of much wider windows are narrower than
+#: the cells from which directions are drawn.
 MAX_COHERENCE_WIDTH = 500.0
 
 
 def _setting(default: Any, check: Callable[[Any], Any], help: str, must: str, **more: Any) -> Any:
-    """A field that `check` settles the type of, or raises ValueError for what is not `must`."""
+    """Declare a field; `check` returns the value in its type, or raises ValueError."""
     return field(default=default, metadata={"check": check, "help": help, "must": must, **more})
 
 
@@ -56,7 +56,7 @@ def _among(*choices: str) -> Callable[[Any], str]:
 
 
 def _between(low: float, high: float) -> Callable[[Any], float]:
-    """A number above `low`, up to `high`."""
+    """Return a check for a number above `low` and up to `high`."""
 
     def check(value: Any) -> float:
         number = _number(value)
@@ -80,7 +80,7 @@ def _count(most: int) -> Callable[[Any], int | None]:
 
 
 def _pair(value: Any) -> tuple[float, float]:
-    low, high = (_number(one) for one in value)
+    low, high = (_number(end) for end in value)
     return low, high
 
 
@@ -120,9 +120,9 @@ def _choices(*names: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class TableSettings:
-    """What a table is built with; lengths in µm, wavelengths in nm.
+    """Settings with which a table is built; lengths in µm, wavelengths in nm.
 
-    Values are checked, and their types settled, when one is made: of numbers also their text.
+    The constructor checks values and converts their types; it accepts numbers as text.
 
     Attributes
     ----------
@@ -130,8 +130,8 @@ class TableSettings:
     coherence : "ensemble" (window power averaged over its position) or "patch" (one window).
     basis : "svd" (also as "auto"), "chebyshev" or "taylor"; see `tables.expansion`.
     tolerance : relative error of ⟨|P|²⟩ at the worst κ, as `tables.build.error` measures it.
-    terms : coefficients of a series; None for as many as the tolerance takes.
-    taps : bins read in each direction; None for as many as the tolerance takes.
+    terms : coefficients of a series; None for as many as the tolerance requires.
+    taps : bins read in each direction; None for as many as the tolerance requires.
     wavelength_range : nm; the shortest sets the largest frequency that light can probe.
     height_scale_max : largest factor on the heights that the table serves.
     frequency_limit : half axes along x and y, in rad/µm, of the ellipse of spatial frequencies
@@ -203,15 +203,15 @@ class TableSettings:
         """Whether amplitudes are added, not powers."""
         return self.coherence == "patch"
 
-    def given(self) -> dict[str, Any]:
-        """The settings by name, without those that are None or false: as JSON has them."""
+    def as_json(self) -> dict[str, Any]:
+        """Return the settings by name, without those that are None or False."""
         values = ((name, getattr(self, name)) for name in _BY_NAME)
         return {name: value for name, value in values if value not in (None, False)}
 
 
 _BY_NAME: dict[str, Field[Any]] = {item.name: item for item in fields(TableSettings)}
 
-#: Those that scenes and recipes may set.
+#: Settings that scenes and recipes may give.
 SCENE_SETTINGS = (
     *("coherence_width", "coherence", "basis", "tolerance", "terms", "windows", "second_order"),
 )
@@ -219,7 +219,7 @@ RECIPE_SETTINGS = (*SCENE_SETTINGS, "wavelength_range", "height_scale_max", "fre
 
 
 def checked(name: str, value: Any) -> Any:
-    """A setting's value in its own type.
+    """Return a setting's value in the setting's type.
 
     Raises
     ------
@@ -236,14 +236,14 @@ def checked(name: str, value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Setting:
-    """A field of `TableSettings`, for people.
+    """Description of a field of `TableSettings` for help texts.
 
     Attributes
     ----------
-    help, default_text : what it is, and what it is by default.
-    choices : the words that it can be, or None.
-    metavar : names for its value, or for each of several.
-    type : of its value: int, float or str.
+    help, default_text : meaning of the setting, and its default in words.
+    choices : allowed words, or None.
+    metavar : name of its value, or of each of several values.
+    type : type of its value: int, float or str.
     """
 
     help: str
@@ -254,13 +254,13 @@ class Setting:
 
 
 def described_setting(name: str) -> Setting:
-    """The field of this name."""
+    """Describe the field of this name."""
     default, described = _BY_NAME[name].default, _BY_NAME[name].metadata
     values = default if isinstance(default, tuple) else (default,)
     text = " ".join(value if isinstance(value, str) else f"{value:g}" for value in values if value)
     return Setting(
         help=described["help"],
-        default_text=text or described.get("text", "as many as the tolerance takes"),
+        default_text=text or described.get("text", "as many as the tolerance requires"),
         choices=described.get("choices"),
         metavar=described.get("metavar"),
         type=described.get("type", int if default is None else float),

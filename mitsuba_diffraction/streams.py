@@ -1,4 +1,4 @@
-"""What a library prints past Python about a damaged file, which our own error says in one line.
+"""Silence for libraries that print about damaged files, which our own errors report in one line.
 
 A process's streams belong to its program. The package leaves them alone, unless the program is its
 own command line.
@@ -19,7 +19,7 @@ _programs = 0
 
 @contextlib.contextmanager
 def own_program() -> Iterator[None]:
-    """Inside, the streams are ours: `without_chatter` keeps them clean."""
+    """Mark the streams of the process as ours inside: `without_chatter` keeps them clean."""
     global _programs
     _programs += 1
     try:
@@ -30,7 +30,7 @@ def own_program() -> Iterator[None]:
 
 @contextlib.contextmanager
 def without_chatter() -> Iterator[None]:
-    """Inside, nothing reaches stdout or stderr, in a program of ours; else it does nothing."""
+    """Let nothing reach stdout or stderr inside, in a program of ours; elsewhere do nothing."""
     if not _programs:
         yield
         return
@@ -51,7 +51,7 @@ def without_chatter() -> Iterator[None]:
 
 
 def _flush() -> None:
-    """What waits in buffers goes where it was meant to: Python's, and those of C."""
+    """Flush the buffers of Python and of C."""
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError):  # a pipe that nobody reads, or closed
             stream.flush()

@@ -28,6 +28,16 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("filterwarnings", "ignore::mitsuba_diffraction.DiffractionWarning")
 
 
+_THOROUGH = re.compile(r"^pytestmark = \[?\s*pytest\.mark\.thorough", re.M)
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Pass over files whose tests would all be deselected: importing them takes seconds."""
+    if config.option.markexpr != "not thorough" or collection_path.suffix != ".py":
+        return None
+    return bool(_THOROUGH.search(collection_path.read_text("utf-8"))) or None
+
+
 @pytest.fixture(scope="session", autouse=True)
 def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """The cache of tables, for this session alone: tests never touch the user's.
@@ -110,11 +120,12 @@ def own_vectors() -> Iterator[int]:
 @pytest.fixture(scope="module")
 def coarse() -> Iterator[None]:
     """Energy conserved coarsely, for modules that do not ask how well it is."""
+    from mitsuba_diffraction.tables.energy.settings import use_energy_settings
     from tests.support.coarse import coarse_energy
 
-    with pytest.MonkeyPatch.context() as patch:
-        coarse_energy(patch.setattr)
-        yield
+    before = coarse_energy()
+    yield
+    use_energy_settings(before)
 
 
 @pytest.fixture(scope="session")

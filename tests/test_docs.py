@@ -10,19 +10,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.scene.parameters import parameters_of
 from scenes.make.__main__ import build_parser as meshes_parser
 from tests.support import ROOT
-from tests.support.clone import small_clone
 from tests.support.pages import FENCE, PAGES, blocks, spans, typed
 
 pytestmark = pytest.mark.usefixtures("coarse")
 
-DENOISER = importlib.util.find_spec("pyoidn") is not None
 PACKAGE = Path(md.__file__).parent
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -142,7 +139,11 @@ def test_no_code_block_escapes():
     for page in PAGES:
         found = FENCE.findall(PAGES[page])
         # drawings; commands and configurations of Dask
-        drawn = {"ARCHITECTURE.md": {""}, "docs/cluster.md": {"text", "toml"}}.get(page, set())
+        drawn = {
+            "ARCHITECTURE.md": {""},
+            "docs/cluster.md": {"text", "toml"},
+            "docs/extending.md": {"text"},
+        }.get(page, set())
         assert {language for language, _ in found} <= {"sh", "python", "xml", "json"} | drawn, page
         assert PAGES[page].count("```") == 2 * len(found), page
     # test_readme.py runs the first of each
@@ -163,34 +164,13 @@ def test_modules_that_it_names_exist(page):
     ids=lambda value: value if value in PAGES else "",
 )
 def test_xml_blocks_set_parameters_that_exist(page, text, some_variant):
-    from mitsuba_diffraction.plugin.parameters import NAMES
+    from mitsuba_diffraction.plugin.surface_parameters import NAMES
 
     root = ElementTree.fromstring(f"<scene>{text}</scene>")
-    for bsdf in root.iterfind(".//bsdf[@type='diffraction']"):
-        named = {child.get("name") for child in bsdf if child.tag != "bsdf"}
-        assert named <= set(NAMES)
-
-
-@pytest.fixture(scope="module")
-def inputs(tmp_path_factory) -> Path:
-    """A folder with the files that examples name."""
-    folder = small_clone(tmp_path_factory.mktemp("inputs"))
-    x = np.arange(32)
-    rows = np.tile(np.uint8(127 + 127 * np.sin(2 * np.pi * x / 32)), (32, 1))
-    Image.fromarray(rows).save(folder / "scale.png")
-    return folder
-
-
-# the example's smooth heights are far from what its pixel size would resolve
-@pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
-@pytest.mark.parametrize("page", [p for p in PAGES if p != "README.md" and blocks(p, "python")])
-def test_the_python_blocks_of_a_page_run(page, inputs, monkeypatch, some_variant):
-    monkeypatch.chdir(inputs)
-    here = [text for text in blocks(page, "python") if DENOISER or "import pyoidn" not in text]
-    for text in here:  # one after the other: they read what those before have written
-        exec(re.sub(r"\.advance\(\d+\)", ".advance(2)", text), {})  # of many frames two
-    if len(here) < len(blocks(page, "python")):
-        pytest.skip("a denoiser needs the extra denoise; the other blocks ran")
+    for plugin, names in NAMES.items():
+        for bsdf in root.iterfind(f".//bsdf[@type='{plugin}']"):
+            named = {child.get("name") for child in bsdf if child.tag != "bsdf"}
+            assert named <= set(names)
 
 
 def test_patches_lie_on_shapes_as_the_page_says():

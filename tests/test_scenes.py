@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from mitsuba_diffraction.heights.recipes import Recipe
 from mitsuba_diffraction.scene.parameters import parameters_of
+from tests.support.scenes import SCENES, SMALL, gentle_patch, rendered
 
-SCENES = Path(__file__).resolve().parent.parent / "scenes"
+# the look-alikes are as steep as the real scales, which the package says every time
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+    pytest.mark.usefixtures("coarse"),
+]
+
 LARGE = ("sphere", "snake", "xenopeltis")
 STUDIO = (
     "cd",
@@ -24,30 +28,11 @@ STUDIO = (
     "film",
     "spectrometer",
 )
-SMALL = {"spp": "4", "resx": "48", "resy": "40"}
-
-# the look-alikes are as steep as the real scales, which the package says every time
-pytestmark = [
-    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
-    pytest.mark.usefixtures("coarse"),
-]
 
 
-def _render(name: str, **parameters: str) -> np.ndarray:
-    import mitsuba as mi
-
-    scene = mi.load_file(str(SCENES / f"{name}.xml"), **(SMALL | parameters))
-    return np.array(mi.render(scene, seed=1))
-
-
-@pytest.mark.parametrize("name", ["plate", *LARGE])
-@pytest.mark.usefixtures("variant")
-def test_it_renders_at_its_defaults(name: str) -> None:
-    image = _render(name)
-    assert image.shape == (40, 48, 3)
-    assert np.isfinite(image).all()
-    # shown as it is: neither black nor burnt out
-    assert 0.02 < np.median(image.mean(axis=2)) < 0.8
+@pytest.fixture(scope="module")
+def gentle(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    return gentle_patch(tmp_path_factory.mktemp("patch"))
 
 
 @pytest.mark.usefixtures("variant")
@@ -61,30 +46,6 @@ def test_two_patches_share_the_snake_s_skin(gentle: dict[str, str]) -> None:
     (name,) = (name for name, _ in values if name.endswith("weight_first.data"))
     weight = values[name]
     assert np.array(weight)[[0, 32, -1], 0, 0] == pytest.approx([0.0, 1.0, 0.0])
-
-
-@pytest.fixture(scope="module")
-def gentle(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Parameters of any scene: a grating whose table and bound take a second."""
-    from mitsuba_diffraction.heights import gratings
-
-    field = gratings.sinusoidal(period=1.6, depth=0.05, periods=4, rows=4)
-    file = tmp_path_factory.mktemp("patch") / "gentle.npy"
-    np.save(file, field.heights)
-    return {"patch": str(file), "pixel_size": str(field.pixel_size[0]), "coherence_width": "10"}
-
-
-@pytest.mark.parametrize("name", ["film", "spectrometer", "scales_macro", "snake"])
-@pytest.mark.usefixtures("variant")
-def test_it_renders_with_a_gentle_patch(name: str, gentle: dict[str, str]) -> None:
-    tiny = {"spp": "2", "resx": "24", "resy": "20"}
-    given = tiny | {key: gentle[key] for key in ("patch", "pixel_size")}
-    if name == "snake":
-        given |= {"skin": "skin_two.xml", "second_patch": gentle["patch"]}
-    image = _render(name, **given)
-    assert image.shape == (20, 24, 3)
-    assert np.isfinite(image).all()
-    assert image.max() > 0.0
 
 
 @pytest.mark.parametrize("name", [*STUDIO, "plate", *LARGE])
@@ -134,17 +95,6 @@ def test_the_patch_of_the_cd_follows_the_radius(gentle: dict[str, str]) -> None:
         assert (towards(sign * across) < 1e-3 * order).all()
 
 
-@pytest.mark.usefixtures("variant")
-def test_the_snake_fills_half_of_the_picture() -> None:
-    import mitsuba as mi
-
-    scene = mi.load_file(str(SCENES / "snake.xml"), **SMALL)
-    depth = mi.load_dict({"type": "aov", "aovs": "shape:shape_index"})
-    index = np.array(mi.render(scene, integrator=depth, spp=4))[..., 0]
-    ground = [shape.id() for shape in scene.shapes()].index("ground")
-    assert (np.abs(index - ground) > 0.5).mean() > 0.5
-
-
 @pytest.mark.parametrize(
     ("azimuth", "elevation"), [(0, 10), (120, 42), (215, 45), (-30, 80)], ids=str
 )
@@ -173,19 +123,6 @@ def test_the_sun_stands_where_the_angles_say(azimuth: float, elevation: float) -
 
 
 @pytest.mark.usefixtures("variant")
-def test_colours_move_with_the_lamp() -> None:
-    """Turning the lamp by some degrees moves another part of the spectrum over the plate."""
-    more = {"spp": "32", "lamp_radius": "3"}
-    middle = slice(14, 26), slice(14, 34)
-    blue, red = (
-        _render("plate", lamp_azimuth=azimuth, **more)[middle].mean(axis=(0, 1))
-        for azimuth in ("54", "46")
-    )
-    # the orders lie across the plate, blue nearest to the mirror direction
-    assert blue[2] / blue[0] > 1.3 * red[2] / red[0]
-
-
-@pytest.mark.usefixtures("variant")
 def test_a_patch_of_the_user_replaces_the_default(gentle: dict[str, str]) -> None:
     own = {name: gentle[name] for name in ("patch", "pixel_size")}
-    assert np.isfinite(_render("plate", **own)).all()
+    assert np.isfinite(rendered("plate", **own)).all()

@@ -9,10 +9,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tables.energy.conservation import Index, albedos, most_kept
-from ..tables.energy.links import Medium
-from ..tables.energy.sides import Sides
+from ..tables.energy.conservation import Index, Surface
 from ..tables.energy.store import Energy, SidesEnergy
+from ..tables.energy.transmission import Medium, Sides
+from ..tables.energy.transport import Orders
 from ..tables.table import DiffractionTable
 
 #: Polar angles (degrees) and wavelengths (nm) looked at, at `AZIMUTHS` azimuths each.
@@ -29,8 +29,7 @@ def energy_summary(table: DiffractionTable) -> dict[str, Any]:
     """For each material what is reflected, before and after, and how much of it is taken.
 
     The albedos are sums over the orders at 24 azimuths of seven angles up to 80° at 450, 550 and
-    650 nm, not at the directions for which the scale was made. Beside it, what a reciprocal BRDF of
-    the same orders keeps at best: a bound for gratings, found on a grid of directions for others.
+    650 nm, not at the directions for which the scale was made.
     """
     materials: dict[str, tuple[str, Index]] = {
         "dielectric 1.5": ("small_slope", lambda wavelengths: np.full(len(wavelengths), 1.5 + 0j)),
@@ -53,10 +52,8 @@ def _aluminium(wavelengths: NDArray[np.float64]) -> NDArray[np.complex128]:
 def _of_material(table: DiffractionTable, model: str, index: Index) -> dict[str, Any]:
     found = Energy(table, model, index, table.wavelength_range).at(1.0)
     theta, phi = np.radians(ANGLES), _azimuths()
-    pairs = [
-        albedos(table, 1.0, model, index, found, theta, phi, wavelength)
-        for wavelength in WAVELENGTHS
-    ]
+    surface = Surface(Orders(table), model, index)
+    pairs = [surface.albedos(found.scale, theta, phi, wavelength) for wavelength in WAVELENGTHS]
     raw, kept = (np.stack(part).astype(float) for part in zip(*pairs, strict=True))
     taken = 1.0 - kept / raw
     gains = raw > 1.0
@@ -75,20 +72,13 @@ def _of_material(table: DiffractionTable, model: str, index: Index) -> dict[str,
         result["conserved where raw is above 1"] = _range(kept[gains])
         inside = (kept[gains] >= 0.97) & (kept[gains] <= 1.001)
         result["between 0.97 and 1.001 there"] = round(float(inside.mean()), 3)
-    if found.scale is not None:
-        most = np.stack(
-            [most_kept(table, 1.0, model, index, theta, phi, one) for one in WAVELENGTHS]
-        )
-        result["reciprocity lets be kept"] = round(float(most.min()), 3)
-        result["kept over that"] = _range(kept / np.minimum(raw, 1.0) / most)
     return result
 
 
 def sides_summary(table: DiffractionTable) -> dict[str, Any]:
     """R + T of a lossless dielectric of index 1.5 and of a thin sheet of it, as it is and scaled.
 
-    Least and largest of 24 azimuths at 450, 550 and 650 nm, of light from above and from below; and
-    the largest share of it that is spread over all directions.
+    Least and largest of 24 azimuths at 450, 550 and 650 nm, of light from above and from below.
     """
     theta, phi = np.radians(PASSED), _azimuths()
     result: dict[str, Any] = {}
@@ -105,8 +95,6 @@ def sides_summary(table: DiffractionTable) -> dict[str, Any]:
             for m, side in enumerate(("above", "below"))
             for n, kind in enumerate(("R + T", "R + T, conserved"))
         }
-        spread = [float(model.spread(scale, theta, phi, one).max()) for one in WAVELENGTHS]
-        result[name]["spread, largest"] = round(max(spread), 3)
     return result
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..heights.field import HeightField
 from ..heights.spectra import FloatArray, far_field, height_spectrum, order_powers, profile
-from ..tables.energy.conservation import FINE
+from ..tables.energy.grid import FINE
 from ..tables.energy.transport import Orders
 from ..tables.table import DiffractionTable
 
@@ -141,14 +141,16 @@ def albedo_figure(table: DiffractionTable) -> Figure:
     (shaded) and their mean. Right: the largest over the wavelengths, against both angles; the
     colour scale is centred at 1, where energy is conserved, and ends at the largest value at 80°.
     """
-    orders, weights = Orders(table), np.ones((FINE.polar + 1, FINE.azimuthal), np.float32)
+    orders, weights = Orders(table), FINE.ones
     theta = LAST * (1.0 - np.linspace(1.0, 0.0, 64) ** 1.5)  # denser towards grazing angles
     phi = np.arange(0.0, 360.1, 5.0)
     wavelengths = np.geomspace(*table.wavelength_range, WAVELENGTHS)
     azimuths = np.radians(np.concatenate([AZIMUTHS, phi]))
     albedo = np.array(
         [
-            orders.transport(np.radians(theta), azimuths, w, "kirchhoff", None, FINE)(weights)
+            orders.transport(np.radians(theta), azimuths, orders.gain(w, "kirchhoff", None), FINE)(
+                weights
+            )
             for w in wavelengths.tolist()
         ]
     )

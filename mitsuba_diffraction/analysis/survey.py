@@ -33,8 +33,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..atomic import atomic_path
-from ..cluster.jobs import each
-from ..cluster.tasks import Failed, Lacking, SceneFiles
+from ..cluster.jobs import run_jobs
+from ..cluster.tasks import Failed, MissingFiles, SceneFiles
 from ..errors import DiffractionError, DiffractionWarning, one_line
 from ..files import read_text, readable_file
 from ..heights.field import HeightField
@@ -143,12 +143,12 @@ class Measured:
     files: dict[str, bytes]
 
 
-def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured | Lacking:
+def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured | MissingFiles:
     """Measure one scan in this process; the row's `reason` has the error, if any."""
     job.files.keep(contents or {})
     lacking = job.files.missing()
     if lacking:
-        return Lacking(tuple(lacking))
+        return MissingFiles(tuple(lacking))
     start = time.perf_counter()
     row: dict[str, Any] = {"reason": ""}
     files: dict[str, bytes] = {}
@@ -297,7 +297,7 @@ def run_survey(
             rows[n] = stored
     todo = list(jobs)
     progress(0, len(todo), "scans")
-    results = each(client, measure, [jobs[n] for n in todo])
+    results = run_jobs(client, measure, [jobs[n] for n in todo])
     for done, (which, result) in enumerate(results, 1):
         n = todo[which]
         if isinstance(result, Failed):
@@ -313,7 +313,7 @@ def run_survey(
 
 def _files_of(file: Path) -> SceneFiles:
     """Return the scan's files, after a check of the recipe if it is one."""
-    files = SceneFiles.of(readable_file(file), {})
+    files = SceneFiles.from_scene(readable_file(file), {})
     if is_recipe(file):
         Recipe.load(file)
     return files

@@ -6,7 +6,7 @@ import argparse
 import time
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..errors import DiffractionError, DiffractionWarning
 from ..optics.colour import ILLUMINANTS
@@ -24,7 +24,7 @@ _TABLE = {
 }  # fmt: skip
 # Options that are parameters of the BSDF, by the plugin's own names.
 _SURFACE = ("material", "int_ior", "coat_ior", "model", "orientation", "height_scale")
-# What only the renderer's BSDF knows.
+# Options that only the renderer's BSDF has.
 _OF_THE_BSDF = (
     "mode", "material", "coat_ior", "model", "orientation", "height_scale", "basis", "second_order",
 )  # fmt: skip
@@ -48,7 +48,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     group = parser.add_argument_group("methods of the 2014 thesis")
     options.add_method(
         group, None,
-        "evaluate by this method in NumPy instead of the renderer's BSDF; R is 1, the light D65",
+        "method to evaluate in NumPy, instead of the renderer's BSDF, for R = 1 and light D65",
     )  # fmt: skip
     add_relative(group)
     options.add_heights(parser)
@@ -75,7 +75,7 @@ def _add_map_options(group: argparse._ArgumentGroup) -> None:
     )
     options.add_exposure(
         group, None,
-        "of the PNG, in stops; default: half of the diffracted light is darker than white",
+        "exposure of the PNG in stops; default: half of the diffracted light is darker than white",
     )  # fmt: skip
     group.add_argument(
         "--spectral", action="store_true", help="also write every band as a channel of the EXR"
@@ -83,25 +83,28 @@ def _add_map_options(group: argparse._ArgumentGroup) -> None:
 
 
 def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:
-    """Declare what reflects; see `surface_bsdf`. turned: whether the patch can be."""
+    """Declare the options of a reflecting surface; see `surface_bsdf`.
+
+    turned: include its orientation.
+    """
     group.add_argument(
         "--material", metavar="NAME",
         help="conductor, e.g. Al, or none for a reflectance of 1; default: none",
     )  # fmt: skip
     group.add_argument(
-        "--int-ior", metavar="N", help="a dielectric of this index (or name) instead, e.g. 1.5"
+        "--int-ior", metavar="N", help="dielectric of this index (or name) instead, e.g. 1.5"
     )
     group.add_argument(
-        "--coat-ior", metavar="N", type=float, help="a flat clear coat of this index over it"
+        "--coat-ior", metavar="N", type=float, help="index of a flat clear coat over the surface"
     )
     group.add_argument(
         "--model", choices=("small_slope", "kirchhoff"),
-        help="what the material makes of the light; default: small_slope where there is an index",
+        help="model of the boundary; default: small_slope for materials with an index",
     )  # fmt: skip
     if turned:
-        group.add_argument("--orientation", metavar="DEG", type=float, help="turns the patch")
+        group.add_argument("--orientation", metavar="DEG", type=float, help="angle of the patch")
     group.add_argument(
-        "--height-scale", metavar="S", type=number_between(1e-6, 1000), help="multiplies heights"
+        "--height-scale", metavar="S", type=number_between(1e-6, 1000), help="factor on the heights"
     )
     options.add_table(group, tuple(_TABLE), **_TABLE)
 
@@ -116,7 +119,7 @@ def add_relative(group: argparse._ArgumentGroup) -> None:
 
 
 def gain_of(args: argparse.Namespace) -> Any:
-    """The gain factor of --relative, or `None`.
+    """Return the gain factor of --relative, or None without it.
 
     Raises a DiffractionError if --int-ior is no number.
     """
@@ -147,14 +150,15 @@ def run(args: argparse.Namespace) -> int:
         args.parser.error(f"argument --spectral: bands need an EXR, e.g. -o {output.stem}.exr")
     written = [png] if only_png else [output, png]
     check_outputs(written, [args.source], "map")
-    options.load_options(args)  # what does not fit is reported before Mitsuba is loaded
+    options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
     from ..analysis.maps import Bands, save_exr, save_png
 
     spectrum = options.wavelengths(args)
     bands = Bands.choose(spectrum["wavelength_range"], spectrum["step"], args.wavelength)
     evaluate = _by_bsdf if args.method is None else _by_method
-    result, surface, how = evaluate(args, bands, spectrum)
+    evaluated = evaluate(args, bands, spectrum)
+    result, surface = evaluated.result, evaluated.surface
     exposure = None if bands.is_single else args.exposure
     if not only_png:
         notes = {"source": str(args.source), "surface": surface}
@@ -166,17 +170,25 @@ def run(args: argparse.Namespace) -> int:
     seconds = time.perf_counter() - start
     print(
         f"{' and '.join(map(str, written))}: {args.resolution} x {args.resolution} pixels, "
-        f"{result.samples} samples per pixel, {bands}{shown}, {seconds:.1f} s, {how}"
+        f"{result.samples} samples per pixel, {bands}{shown}, {seconds:.1f} s, {evaluated.method}"
     )
     save_report(args, {"source": args.source, "files": written, "theta": args.theta,
                        "phi": args.phi, "pixels": args.resolution, "samples": result.samples,
-                       "bands": str(bands), "surface": surface, "how": how,
+                       "bands": str(bands), "surface": surface, "method": evaluated.method,
                        "seconds": seconds})  # fmt: skip
     return 0
 
 
-def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> tuple[Any, ...]:
-    """A map by the renderer's BSDF, what reflects, and how it was made."""
+class Evaluated(NamedTuple):
+    """A map, its surface and the method of its evaluation, both in words."""
+
+    result: Any
+    surface: str
+    method: str
+
+
+def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> Evaluated:
+    """Map the renderer's BSDF."""
     from ..analysis.maps import Light, brdf_map, check_map
     from .console import mitsuba_warnings
 
@@ -190,11 +202,11 @@ def _by_bsdf(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> 
             illuminant=args.illuminant, cosine=args.cosine, spectral=args.spectral, progress=bar,
             wavelength=args.wavelength, **spectrum,
         )  # fmt: skip
-    return result, _surface(bsdf), variant
+    return Evaluated(result, _surface(bsdf), variant)
 
 
-def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> tuple[Any, ...]:
-    """The same by a method of the thesis."""
+def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -> Evaluated:
+    """Map a method of the thesis."""
     from ..analysis.maps import Light, check_map
     from ..thesis.methods import make
     from ..thesis.methods.make import method_map
@@ -208,7 +220,7 @@ def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -
     with Bar(args) as bar, warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
         method = make(
-            options.in_library(args.method), patch, period=args.period, progress=bar,
+            args.method, patch, period=args.period, progress=bar,
             **settings, **spectrum,
         )  # fmt: skip
         start = time.perf_counter()
@@ -218,11 +230,11 @@ def _by_method(args: argparse.Namespace, bands: Any, spectrum: dict[str, Any]) -
         )  # fmt: skip
     quantity = "relative reflectance" if args.relative else "R = 1"
     how = f"method {args.method}: {time.perf_counter() - start:.2f} s for the map"
-    return result, f"{quantity}; method {args.method}", how
+    return Evaluated(result, f"{quantity}; method {args.method}", how)
 
 
 def _refuse_contradictions(args: argparse.Namespace) -> None:
-    """Usage errors that argparse does not find by itself."""
+    """Refuse contradictory options that argparse does not find, with a usage error."""
     refused: list[str] = []
     if args.wavelength is not None:
         refused = [
@@ -253,22 +265,22 @@ def _refuse_contradictions(args: argparse.Namespace) -> None:
 
 
 def surface_bsdf(args: argparse.Namespace) -> Any:
-    """The plugin for what `add_surface` and `add_heights` read, in the variant that is set."""
+    """Return the BSDF of `add_surface` and `add_heights`, in the variant that is set."""
     import mitsuba as mi
 
     from ..plugin.bsdf import Diffraction
 
-    given = {n: getattr(args, n) for n in _SURFACE if getattr(args, n, None) is not None}
+    parameters = {n: getattr(args, n) for n in _SURFACE if getattr(args, n, None) is not None}
     settings = {k: v for k, v in options.table_options(args).items() if k in _TABLE}
-    for option in options.given_for_heights(args):
+    for option in options.used_heights_options(args):
         name = option.removeprefix("--").replace("-", "_")
-        given[name] = getattr(args, name)
-    if "int_ior" not in given:
-        given.setdefault("material", "none")
-    elif _is_number(given["int_ior"]):
-        given["int_ior"] = float(given["int_ior"])
+        parameters[name] = getattr(args, name)
+    if "int_ior" not in parameters:
+        parameters.setdefault("material", "none")
+    elif _is_number(parameters["int_ior"]):
+        parameters["int_ior"] = float(parameters["int_ior"])
     props = mi.Properties("diffraction")
-    for name, value in {"heightfield": str(args.source), **settings, **given}.items():
+    for name, value in {"heightfield": str(args.source), **settings, **parameters}.items():
         props[name] = value
     return Diffraction(props)
 
@@ -282,7 +294,7 @@ def _is_number(text: str) -> bool:
 
 
 def _surface(bsdf: Any) -> str:
-    """What reflects, in a line."""
+    """Describe the reflecting surface in a line."""
     table, scale, turn = bsdf.table, bsdf.height_scale[0], bsdf.orientation.degrees[0]
     return "; ".join(
         [

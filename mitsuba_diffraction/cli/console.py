@@ -1,4 +1,4 @@
-"""What the command line says on stderr, one line per error and per warning, and bars; Ctrl-C.
+"""Lines of the command line on stderr: errors, warnings, progress bars; and the handling of Ctrl-C.
 
 Ctrl-C or SIGTERM ends a command at once, even while Mitsuba holds the main thread. Python runs its
 signal handlers on the main thread, between two of its own instructions. While a scene loads that
@@ -35,7 +35,7 @@ _SAMPLES = (
     "some samples are below zero, as colours outside of sRGB are, or no numbers; they are kept"
 )
 
-# Of a terminal that reports no size, as in some containers and editors.
+# Columns and rows of a terminal that reports no size, as in some containers and editors.
 _SIZE = 80, 24
 
 # Below it a bar would only flash by.
@@ -72,7 +72,7 @@ def say_warning(text: str) -> None:
 
 @contextlib.contextmanager
 def warnings_in_one_line() -> Iterator[None]:
-    """Inside, every Python warning is printed as one line, a text that comes again only once."""
+    """Print every Python warning inside as one line, and each text only once."""
     say = saying_once()
 
     def show(message: Warning | str, category: type[Warning], *_: object) -> None:
@@ -86,7 +86,7 @@ def warnings_in_one_line() -> Iterator[None]:
 
 
 def saying_once() -> Callable[[str], None]:
-    """A `say_warning` that says each text only once."""
+    """Return a `say_warning` that prints each text only once."""
     said: set[str] = set()
 
     def say(text: str) -> None:
@@ -99,7 +99,7 @@ def saying_once() -> Callable[[str], None]:
 
 @contextlib.contextmanager
 def mitsuba_warnings() -> Iterator[None]:
-    """Inside, Mitsuba's warnings are printed like this program's, each once.
+    """Print Mitsuba's warnings inside like this program's, each once.
 
     A variant must be set.
     """
@@ -132,12 +132,12 @@ def mitsuba_warnings() -> Iterator[None]:
 
 
 def _without_stamp(text: str) -> str:
-    """A line of Mitsuba's log without date, level and class."""
+    """Strip date, level and class from a line of Mitsuba's log."""
     return _STAMP.sub("", text.strip())
 
 
 class Bar:
-    """A progress bar, or nothing if the user is not looking.
+    """Progress bar, or nothing where nobody looks.
 
     args : the parsed command line; `args.progress` is true, false, or `None` for "if a terminal".
     delay : seconds before the bar is first drawn.
@@ -151,7 +151,7 @@ class Bar:
         self._bar: Any = None
 
     def __call__(self, done: int, total: int, text: str) -> None:
-        """Show `done` of `total`; both may start again, for a second stage.
+        """Show `done` of `total`; both may start again for a second stage.
 
         A stage whose `total` is 0 has no known length: only its text is shown, at once.
         """
@@ -191,7 +191,7 @@ class Bar:
 
 
 def _size() -> tuple[int, int] | tuple[None, None]:
-    """Columns and rows to draw in, or None for those of the terminal, which may change."""
+    """Return the columns and rows to draw in; None for those of the terminal, which may change."""
     with contextlib.suppress(OSError, ValueError):
         if 0 in os.get_terminal_size(sys.stderr.fileno()):
             return _SIZE
@@ -200,7 +200,7 @@ def _size() -> tuple[int, int] | tuple[None, None]:
 
 @contextlib.contextmanager
 def ended_at_once() -> Iterator[None]:
-    """Inside, a signal unwinds the main thread, or ends the process without its temporary files."""
+    """Let a signal unwind the main thread inside, or end the process and its temporary files."""
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread may set handlers
         return
@@ -223,22 +223,22 @@ def ended_at_once() -> Iterator[None]:
 
 
 def say_interrupted() -> None:
-    """What every interrupted command says last."""
+    """Print the last line of an interrupted command."""
     say("interrupted; nothing half-written was left behind")
 
 
 def _watch(reader: socket.socket, left: threading.Event) -> None:
-    """Wait for signals; exit if the main thread has not left a while after one."""
-    before = 0
+    """Wait for signals; exit if the main thread has not left `GRACE` seconds after one."""
+    interrupts = 0
     while received := reader.recv(1):
         number = signal.Signals(received[0])
         if number not in _CODES:
             continue
         if number == signal.SIGINT:
-            before += 1
+            interrupts += 1
             # a rendering has a handler of its own, which keeps the picture so far
-            own = signal.getsignal(signal.SIGINT) is not signal.default_int_handler
-            if own and before == 1:
+            handled = signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+            if handled and interrupts == 1:
                 continue
         if not left.wait(GRACE):
             remove_temporaries()

@@ -8,7 +8,7 @@ import time
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import DiffractionError, DiffractionWarning
 from ..settings import TableSettings
@@ -108,9 +108,7 @@ def run(args: argparse.Namespace) -> int:
     settings |= spectrum
     with Bar(args) as bar, warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)  # said above
-        method = make(
-            options.in_library(args.method), patch, period=args.period, progress=bar, **settings
-        )
+        method = make(args.method, patch, period=args.period, progress=bar, **settings)
         response = measure(
             method.brdf, beam, steps, angles, sigma=method.sigma, label=args.method,
             progress=bar,
@@ -152,16 +150,27 @@ def run(args: argparse.Namespace) -> int:
 
 
 def periods_along(gratings: Sequence[Periodicity], phi: float) -> list[float]:
-    """Periods in µm that gratings have in a plane of incidence at an azimuth, in degrees."""
+    """Return the periods in µm of gratings in a plane of incidence, by its azimuth in degrees."""
     cosines = [abs(math.cos(math.radians(g.direction - phi))) for g in gratings]
     # a plane along the grooves meets none of their orders
     return [g.period / c for g, c in zip(gratings, cosines, strict=True) if c > _LEAST_COSINE]
 
 
-def _followed(
-    response: Response, order: int, held: Sequence[float]
-) -> tuple[Ridge, Fit | None, tuple[str, str]]:
-    """The ridge that obeys the grating equation and its fit, or an empty one and none; and a line.
+class FollowedRidge(NamedTuple):
+    """Ridge of maxima and the fit of its period; an empty ridge and None if no period fits.
+
+    Attributes
+    ----------
+    line : label and text for people.
+    """
+
+    ridge: Ridge
+    fit: Fit | None
+    line: tuple[str, str]
+
+
+def _followed(response: Response, order: int, held: Sequence[float]) -> FollowedRidge:
+    """Find the ridge that obeys the grating equation, and fit its period.
 
     Raises a DiffractionError if there are too few maxima to look for one.
     """
@@ -173,13 +182,13 @@ def _followed(
     ridge = ridge_of(response, order, period=period)
     fit = fit_period(ridge)
     if period is not None:
-        return ridge, fit, _fitted(fit)
+        return FollowedRidge(ridge, fit, _fitted(fit))
     nothing = np.full(response.wavelengths.size, np.nan)
     why = (
         "none: the light on this side follows no grating equation (the brightest angles alone "
         f"would give {1e3 * fit.period:.4g} nm)"
     )
-    return Ridge(response, order, nothing, nothing), None, ("fitted", why)
+    return FollowedRidge(Ridge(response, order, nothing, nothing), None, ("fitted", why))
 
 
 def viewing_angles(
@@ -217,7 +226,7 @@ def _windows(
     args: argparse.Namespace, patch: Any, settings: dict[str, Any], beam: Any, steps: Any,
     angles: Any, fit: Fit | None, bar: Bar,
 ) -> tuple[list[tuple[str, str]], dict[str, Any]]:  # fmt: skip
-    """What single windows show, and the thesis' procedure: lines, and entries of the NPZ."""
+    """Measure single windows by the thesis' procedure: lines to print, and entries of the NPZ."""
     if args.positions == 0 or fit is None:
         return [], {}
     from ..thesis.methods import make
@@ -226,22 +235,22 @@ def _windows(
     few = steps[:: max(1, steps.size // _FEW)]
     # the look-up in the package's own series: a single window's amplitudes
     single = {**settings, "coherence": "patch"}
-    table = make("default", patch, progress=bar, **single).table  # type: ignore[attr-defined]
+    table = make("spectral", patch, progress=bar, **single).table  # type: ignore[attr-defined]
     lines: list[tuple[str, str]] = []
     more: dict[str, Any] = {}
     try:
-        found = window_fits(
+        fits = window_fits(
             table, beam, few, angles, count=args.positions, order=args.order,
             period=None if fit is None else fit.period, progress=bar,
         )  # fmt: skip
     except DiffractionError as error:
         lines.append(("windows", str(error)))
     else:
-        periods = 1e3 * found.periods
-        more |= {"window_periods": found.periods, "window_places": found.centres}
+        periods = 1e3 * fits.periods
+        more |= {"window_periods": fits.periods, "window_places": fits.centres}
         lines.append(
             ("windows", f"{periods.size} of {args.positions} window positions: "
-             f"{1e3 * found.mean:.5g} ± {1e3 * found.spread:.2g} nm, {periods.min():.5g} to "
+             f"{1e3 * fits.mean:.5g} ± {1e3 * fits.spread:.2g} nm, {periods.min():.5g} to "
              f"{periods.max():.5g} nm")
         )  # fmt: skip
     try:

@@ -28,21 +28,21 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "Describe a table, a file of heights, a recipe, or a mesh (PLY, OBJ, serialized) and "
         "whether its tangents suit a measured patch.",
     )  # fmt: skip
-    parser.add_argument("file", metavar="FILE", type=Path, help="what to describe")
+    parser.add_argument("file", metavar="FILE", type=Path, help="table, heights, recipe or mesh")
     options.add_json(parser, "the description", nargs="?", const=options.STDOUT)
     parser.add_argument(
         "--albedo", metavar="OUT", type=path_ending_in(".png", ".pdf", ".svg"),
-        help="of a table: plot its raw directional albedo against angle and azimuth",
+        help="plot a table's raw directional albedo against angle and azimuth",
     )  # fmt: skip
     parser.add_argument(
         "--energy", action="store_true",
-        help="of a table: what it reflects and what energy conservation takes, made of three "
-        "materials; and R + T of a dielectric and of a thin sheet, as it is and conserved",
+        help="a table's albedo for three materials, raw and conserved, and R + T of a dielectric "
+        "and of a thin sheet",
     )  # fmt: skip
     parser.add_argument(
         "--picture", metavar="OUT", type=path_ending_in(".png", ".pdf", ".svg"),
-        help="of heights or a recipe: draw them, their distribution and spectrum, and the light "
-        "that they scatter",
+        help="draw heights or a recipe's: the patch, its distribution and spectrum, and the light "
+        "that it scatters",
     )  # fmt: skip
     options.add_heights(parser)
 
@@ -95,10 +95,10 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     return _heights(file, args)
 
 
-def _refuse_heights_options(args: argparse.Namespace, what: str) -> None:
-    given = options.given_for_heights(args)
-    if given:
-        args.parser.error(f"argument {given[0]}: '{args.file}' is {what}, not heights")
+def _refuse_heights_options(args: argparse.Namespace, kind: str) -> None:
+    refused = options.used_heights_options(args)
+    if refused:
+        args.parser.error(f"argument {refused[0]}: '{args.file}' is {kind}, not heights")
 
 
 def _table(file: Path) -> dict[str, Any]:
@@ -112,9 +112,9 @@ def _energy(file: Path) -> dict[str, Any]:
     from ..tables import DiffractionTable
 
     table = DiffractionTable.load(file)
-    found = energy_summary(table)
-    both = sides_summary(table)
-    return {"energy": found, "both sides": both, "warnings": energy_warnings(found)}
+    reflected = energy_summary(table)
+    transmitted = sides_summary(table)
+    return {"energy": reflected, "both sides": transmitted, "warnings": energy_warnings(reflected)}
 
 
 def _plot_albedo(file: Path, output: Path) -> None:
@@ -155,11 +155,11 @@ def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _periods(field: HeightField) -> dict[str, list[str]]:
-    """The gratings that the patch holds, if any."""
+    """Return the gratings found in the patch, if any."""
     from ..heights.spectra import dominant_periods
 
-    found = [str(grating) for grating in dominant_periods(field)]
-    return {"periods": found} if found else {}
+    periods = [str(grating) for grating in dominant_periods(field)]
+    return {"periods": periods} if periods else {}
 
 
 def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:

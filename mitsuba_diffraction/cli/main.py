@@ -1,8 +1,8 @@
 """Parser of the command line, and the boundary at which every error becomes one line.
 
-A sub-command is a function that declares its parser, by `options.add_command`, and one that runs it
-and returns the exit code. That one imports what it needs (Mitsuba above all), so that `--help` and
-`--version` answer at once.
+A sub-command is two functions: one declares its parser by `options.add_command`, the other runs it
+and returns the exit code. The second imports what it needs (Mitsuba above all), so that `--help`
+and `--version` answer at once.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from .console import (
 from .options import STDOUT
 from .report import check_writable
 
-#: What declares each sub-command, in the order of --help.
+#: Functions that declare the sub-commands, in the order of --help.
 COMMANDS = (
     precompute.add_parser, info.add_parser, tangents.add_parser, plan.add_parser,
     render.add_parser, brdf_map.add_parser, evaluate.add_parser, survey.add_parser,
@@ -54,7 +54,7 @@ FAILED = 1
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that shortens what it quotes."""
+    """Argument parser whose errors shorten the values that they quote."""
 
     def error(self, message: str) -> NoReturn:
         super().error(shortened(message))
@@ -76,7 +76,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """The parser with all sub-commands."""
+    """Build the parser with all sub-commands."""
     parser = _Parser(
         prog=PROGRAM, description="Diffraction of measured height fields, for Mitsuba 3."
     )
@@ -96,9 +96,9 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def _add_common(group: argparse._ActionsContainer) -> None:
-    """Options that may stand before or after the name of the sub-command.
+    """Add the options that may stand before or after the name of the sub-command.
 
-    They are without defaults: those of the sub-command would override what stands before it.
+    They have no defaults, which would override values given before the name.
     """
     group.add_argument(
         "--debug",

@@ -1,8 +1,8 @@
 """Options that several commands share, each declared once, and types of arguments.
 
-What does not fit is a usage error that quotes the value. `add_…` functions declare options on a
-parser or a group; the functions beside them read what was given. Modules of the library are
-imported where values are read, so that --help answers at once.
+A value that does not fit is a usage error that quotes it. `add_…` functions declare options on a
+parser or a group; the functions beside them read the values. Modules of the library are imported
+where values are read, so that --help answers at once.
 """
 
 from __future__ import annotations
@@ -30,12 +30,9 @@ WAVELENGTH_RANGE, STEP = TableSettings.wavelength_range, 5.0
 #: `--json` without a file, which only `info` has: printed instead of the text.
 STDOUT = Path("-")
 
-#: Ways to add up a spectrum, by the name that every --method uses.
+#: Ways to add up a spectrum: names of `thesis.methods`, without its imports.
 METHODS = ("spectral", "flss", "nmm", "pq", "pq-sinc", "rainbow")
 
-#: What `thesis.methods` and earlier versions of the command line call some of them.
-_IN_LIBRARY = {"spectral": "default"}
-_IN_COMMANDS = {name: ours for ours, name in _IN_LIBRARY.items()}
 _HEIGHTS: dict[str, tuple[str, str]] = {
     "pixel_size": ("DX[,DY]", "µm between samples; overrides what the file states"),
     "max_height": (
@@ -63,7 +60,7 @@ TABLE_NAMES = ("coherence_width", "coherence", "tolerance", "terms")
 
 
 def path_ending_in(*suffixes: str) -> Callable[[str], Path]:
-    """A path whose suffix is one of those given."""
+    """Return a type of argument: a path with one of the suffixes."""
 
     def path(text: str) -> Path:
         result = Path(text)
@@ -78,27 +75,29 @@ def path_ending_in(*suffixes: str) -> Callable[[str], Path]:
 
 
 def whole_number(least: int) -> Callable[[str], int]:
-    """A whole number that is at least `least` and fits 31 bits."""
+    """Return a type of argument: a whole number of at least `least` that fits 31 bits."""
     return _number(int, least, 2**31 - 1, f"a whole number from {least}")
 
 
 def number_between(low: float, high: float) -> Callable[[str], float]:
-    """A number from `low` to `high`; NaN is none."""
+    """Return a type of argument: a number from `low` to `high`, and not NaN."""
     return _number(float, low, high, f"a number from {low:g} to {high:g}")
 
 
-def _number(kind: Callable[[str], Any], low: float, high: float, what: str) -> Callable[[str], Any]:
+def _number(
+    kind: Callable[[str], Any], low: float, high: float, expected: str
+) -> Callable[[str], Any]:
     def number(text: str) -> Any:
         with contextlib.suppress(ValueError):
             if low <= (value := kind(text)) <= high:
                 return value
-        raise argparse.ArgumentTypeError(f"expected {what}, got {quoted(text)}")
+        raise argparse.ArgumentTypeError(f"expected {expected}, got {quoted(text)}")
 
     return number
 
 
 def definition(text: str) -> tuple[str, str]:
-    """KEY=VALUE."""
+    """Parse KEY=VALUE."""
     key, equals, value = text.partition("=")
     if not (equals and key):
         raise argparse.ArgumentTypeError(f"expected KEY=VALUE, got {quoted(text)}")
@@ -106,7 +105,7 @@ def definition(text: str) -> tuple[str, str]:
 
 
 def change(text: str) -> Change:
-    """KEY=FROM:TO, a parameter of a scene that changes."""
+    """Parse KEY=FROM:TO, a parameter of a scene that changes."""
     try:
         return change_of(text)
     except DiffractionError as error:
@@ -116,7 +115,7 @@ def change(text: str) -> Change:
 def add_command(
     subparsers: Subparsers, name: str, run: Callable[..., int], help: str, description: str
 ) -> argparse.ArgumentParser:
-    """The parser of a sub-command, which knows what runs it: `main` calls run(args)."""
+    """Add the parser of a sub-command, which `main` runs by calling run(args)."""
     parser: argparse.ArgumentParser = subparsers.add_parser(
         name, help=help, description=description
     )
@@ -125,14 +124,14 @@ def add_command(
 
 
 def add_heights(parser: argparse.ArgumentParser) -> None:
-    """How a file of heights is read; the values are checked by `load_options`."""
+    """Add the options for reading a file of heights; `load_options` checks their values."""
     group = parser.add_argument_group("reading heights")
     for name, (metavar, text) in _HEIGHTS.items():
         group.add_argument(_option(name), metavar=metavar, help=text)
 
 
 def load_options(args: argparse.Namespace) -> LoadOptions:
-    """How heights are read, as `HeightField.load` takes it.
+    """Return the options for reading heights, as `HeightField.load` takes them.
 
     Raises a DiffractionError if a value does not fit.
     """
@@ -141,13 +140,13 @@ def load_options(args: argparse.Namespace) -> LoadOptions:
     return LoadOptions.parse(**{name: getattr(args, name) for name in _HEIGHTS})
 
 
-def given_for_heights(args: argparse.Namespace) -> list[str]:
-    """Options for reading heights that stand on the command line."""
+def used_heights_options(args: argparse.Namespace) -> list[str]:
+    """List the options for reading heights that are on the command line."""
     return [_option(name) for name in _HEIGHTS if getattr(args, name) is not None]
 
 
 def add_source(parser: argparse.ArgumentParser, *, tables: bool = False) -> None:
-    """What is evaluated; see `load_patch`. tables: whether a table will do."""
+    """Add the argument SOURCE, which `load_patch` reads. tables: whether it may be a table."""
     accepted = "table, recipe (.toml), or heights of any format"
     parser.add_argument(
         "source", metavar="SOURCE", type=Path,
@@ -156,13 +155,13 @@ def add_source(parser: argparse.ArgumentParser, *, tables: bool = False) -> None
 
 
 def add_output(parser: argparse.ArgumentParser, text: str, *suffixes: str, **more: Any) -> None:
-    """Where results go: a file with one of these suffixes, or else a folder."""
-    given = {"type": path_ending_in(*suffixes), "metavar": "OUT"} if suffixes else {"type": Path}
-    parser.add_argument("-o", "--output", help=text, **{"metavar": "FOLDER", **given, **more})
+    """Add `--output`: a file with one of these suffixes, or a folder."""
+    kind = {"type": path_ending_in(*suffixes), "metavar": "OUT"} if suffixes else {"type": Path}
+    parser.add_argument("-o", "--output", help=text, **{"metavar": "FOLDER", **kind, **more})
 
 
 def add_own_patch(parser: argparse.ArgumentParser) -> None:
-    """A patch of the user's own, with how it is read; see `own_patch`."""
+    """Add a patch of the user's own and the options for reading it; see `own_patch`."""
     parser.add_argument(
         "heights", metavar="HEIGHTS", type=Path, nargs="?",
         help="patch to measure, from any file of heights; default: gratings.elaphe_like",
@@ -171,20 +170,20 @@ def add_own_patch(parser: argparse.ArgumentParser) -> None:
 
 
 def check_own_patch(args: argparse.Namespace) -> None:
-    """Refuse options for reading heights where no file is named; a usage error."""
-    if args.heights is None and given_for_heights(args):
-        args.parser.error(f"{given_for_heights(args)[0]} needs a file of heights")
+    """Refuse options for reading heights where no file is named, with a usage error."""
+    if args.heights is None and used_heights_options(args):
+        args.parser.error(f"{used_heights_options(args)[0]} needs a file of heights")
 
 
 def own_patch(args: argparse.Namespace) -> HeightField | None:
-    """The patch that was named, or None."""
+    """Return the patch that is named, or None."""
     from ..heights.load import load_heights
 
     return None if args.heights is None else load_heights(args.heights, load_options(args))
 
 
 def add_table(group: Group, names: Sequence[str] = _TABLE, **defaults: str) -> None:
-    """The settings of a table; `defaults` are texts that replace what the help says of one's."""
+    """Add the settings of a table. defaults: texts for the help in place of the default values."""
     for name in names:
         item = described_setting(name)
         kind: dict[str, Any] = {"choices": item.choices}
@@ -200,16 +199,16 @@ def add_table(group: Group, names: Sequence[str] = _TABLE, **defaults: str) -> N
 
 
 def table_options(args: argparse.Namespace) -> dict[str, Any]:
-    """The settings of a table that were given, by name.
+    """Return the settings of a table that are on the command line, by name.
 
     Raises a DiffractionError if a value is not allowed.
     """
-    given = {name: getattr(args, name, None) for name in (*_TABLE, "wavelength_range")}
-    return {name: checked(name, value) for name, value in given.items() if value is not None}
+    values = {name: getattr(args, name, None) for name in (*_TABLE, "wavelength_range")}
+    return {name: checked(name, value) for name, value in values.items() if value is not None}
 
 
 def add_direction(group: Group, *, theta: float = 0.0, phi: float | None = 0.0) -> None:
-    """The direction of the light, degrees; without a `phi` it is across the patch's grooves."""
+    """Add the direction of the light in degrees; without `phi` it is across the patch's grooves."""
     group.add_argument(
         "--theta", metavar="DEG", type=float, default=theta,
         help=f"angle of the light from the normal, 0 to below 90; default: {theta:g}",
@@ -222,12 +221,12 @@ def add_direction(group: Group, *, theta: float = 0.0, phi: float | None = 0.0) 
 
 
 def add_wavelength_range(group: Group) -> None:
-    """The spectrum, nm."""
+    """Add the limits of the spectrum, nm."""
     add_table(group, ("wavelength_range",))
 
 
 def add_wavelengths(group: Group) -> None:
-    """The spectrum and its step, nm; see `wavelengths`."""
+    """Add the limits of the spectrum and its step, nm; see `wavelengths`."""
     add_wavelength_range(group)
     group.add_argument(
         "--step", metavar="NM", type=float, help=f"between wavelengths; default: {STEP:g}"
@@ -235,33 +234,23 @@ def add_wavelengths(group: Group) -> None:
 
 
 def wavelengths(args: argparse.Namespace) -> dict[str, Any]:
-    """The arguments `wavelength_range` and `step`, nm."""
+    """Return the arguments `wavelength_range` and `step`, nm."""
     step = STEP if args.step is None else args.step
     return {"wavelength_range": tuple(args.wavelength_range or WAVELENGTH_RANGE), "step": step}
 
 
 def add_resolution(group: Group, pixels: int) -> None:
-    """The size of a map."""
+    """Add the size of a map."""
     group.add_argument(
         "--resolution", metavar="N", type=int, default=pixels,
         help=f"pixels a side; default: {pixels}",
     )  # fmt: skip
 
 
-def method(text: str) -> str:
-    """A method's name; those of earlier versions are taken as well."""
-    return _IN_COMMANDS.get(text, text)
-
-
-def in_library(name: str) -> str:
-    """What `thesis.methods` calls a method."""
-    return _IN_LIBRARY.get(name, name)
-
-
 def add_method(group: Group, default: str | None, text: str) -> None:
-    """How the spectrum is added up by the evaluators of the thesis, and the period some need."""
+    """Add the method that sums the spectrum, and the period that some methods need."""
     group.add_argument(
-        "--method", type=method, choices=METHODS, default=default,
+        "--method", choices=METHODS, default=default,
         help=text + (f"; default: {default}" if default else ""),
     )  # fmt: skip
     group.add_argument(
@@ -271,14 +260,14 @@ def add_method(group: Group, default: str | None, text: str) -> None:
 
 
 def add_exposure(group: Group, default: float | None, text: str) -> None:
-    """Stops of a picture."""
+    """Add the exposure of a picture in stops."""
     group.add_argument(
         "--exposure", metavar="EV", type=number_between(-100, 100), default=default, help=text
     )
 
 
 def add_scene(parser: argparse.ArgumentParser) -> None:
-    """A scene, its parameters, variant and sensor."""
+    """Add a scene, its parameters, variant and sensor."""
     parser.add_argument("scene", metavar="SCENE", type=Path, help="Mitsuba XML file")
     add_mode(parser)
     parser.add_argument(
@@ -287,12 +276,12 @@ def add_scene(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--sensor", metavar="N", type=whole_number(0), default=0,
-        help="which sensor, counted from 0; default: 0",
+        help="number of the sensor, from 0; default: 0",
     )  # fmt: skip
 
 
 def add_mode(parser: argparse.ArgumentParser) -> None:
-    """Mitsuba's variant."""
+    """Add Mitsuba's variant."""
     parser.add_argument(
         "-m", "--mode", metavar="VARIANT",
         help="Mitsuba variant; default: cuda_ad_spectral with a GPU, else llvm_ad_spectral",
@@ -300,7 +289,7 @@ def add_mode(parser: argparse.ArgumentParser) -> None:
 
 
 def scene_parameters(args: argparse.Namespace) -> dict[str, str]:
-    """The values of -D; one that is given twice is a usage error."""
+    """Return the values of -D; a parameter given twice is a usage error."""
     parameters = dict(args.parameters)
     if len(parameters) < len(args.parameters):
         twice = next(k for k in parameters if [n for n, _ in args.parameters].count(k) > 1)
@@ -309,7 +298,7 @@ def scene_parameters(args: argparse.Namespace) -> dict[str, str]:
 
 
 def add_samples(parser: argparse.ArgumentParser, least: int, default: int | None) -> None:
-    """Samples per pixel and the seed of their random numbers."""
+    """Add samples per pixel and the seed of their random numbers."""
     shown = "the scene's" if default is None else str(default)
     parser.add_argument(
         "-s", "--spp", metavar="N", type=whole_number(least), default=default,
@@ -317,14 +306,18 @@ def add_samples(parser: argparse.ArgumentParser, least: int, default: int | None
     )  # fmt: skip
     parser.add_argument(
         "--seed", metavar="N", type=whole_number(0), default=0,
-        help="of the random numbers; default: 0",
+        help="seed of the random numbers; default: 0",
     )  # fmt: skip
 
 
-def add_json(parser: argparse.ArgumentParser, what: str = "the figures", **more: Any) -> None:
-    """A file for the figures that are printed; `main` checks that it can be written."""
+def add_json(parser: argparse.ArgumentParser, content: str = "the figures", **more: Any) -> None:
+    """Add a file for the figures that are printed; `main` checks that it can be written."""
     parser.add_argument(
-        "--json", metavar="FILE", type=path_ending_in(".json"), help=f"write {what} as JSON", **more
+        "--json",
+        metavar="FILE",
+        type=path_ending_in(".json"),
+        help=f"write {content} as JSON",
+        **more,
     )
 
 
@@ -333,7 +326,7 @@ def _option(name: str) -> str:
 
 
 def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
-    """Heights of `args.source`, and the settings of tables: a recipe's, overridden by options.
+    """Return the heights of `args.source`, and settings of tables: a recipe's and then options.
 
     Raises a DiffractionError if the source is a table or no heights, or an option does not fit.
     """
@@ -359,7 +352,7 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
 
 
 def table_warnings(field: HeightField, settings: TableSettings) -> list[str]:
-    """What a table of these heights will be warned of, or be refused for by its size alone."""
+    """List the warnings of a table of these heights, or its refusal if size alone decides."""
     from ..heights.validity import window_warning
     from ..tables.build.checks import check_window
 

@@ -27,7 +27,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     parser = options.add_command(
         subparsers, "precompute", run, "build the table of a height field",
         "Build a table of diffraction orders from measured or made heights, and measure its "
-        "error. What a recipe says is overridden by options.",
+        "error. Options override the settings of a recipe.",
     )  # fmt: skip
     parser.add_argument(
         "sources", metavar="SOURCE", nargs="+", type=Path,
@@ -58,13 +58,13 @@ def run(args: argparse.Namespace) -> int:
         args.parser.error("argument SOURCE: recipes and other files cannot be mixed")
     if len(recipes) > 1 and args.output is not None:
         args.parser.error("argument -o/--output: one name, but there are several recipes")
-    made = [_precompute([recipe], args) for recipe in recipes]
-    save_report(args, made[0] if len(made) == 1 else {"tables": made})
+    summaries = [_precompute([recipe], args) for recipe in recipes]
+    save_report(args, summaries[0] if len(summaries) == 1 else {"tables": summaries})
     return 0
 
 
 def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, Any]:
-    """One table, of a recipe or of one or several files, and what is in it."""
+    """Build one table of a recipe, or of one or several files, and return its summary."""
     from ..heights.load import load_heights
     from ..heights.read import is_recipe
     from ..heights.recipes import Recipe
@@ -73,15 +73,15 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
 
     start = time.perf_counter()
     how = options.load_options(args)
-    given = options.table_options(args)
+    chosen = options.table_options(args)
     recipe = Recipe.load(sources[0]) if is_recipe(sources[0]) else None
     inputs = list(sources)
     if recipe is not None:
-        given = {**recipe.table, **given}
+        chosen = {**recipe.table, **chosen}
         inputs += recipe.sources
     elif len(sources) > 1 and args.output is None:
         args.parser.error("argument -o/--output: name the one table of these files")
-    settings = TableSettings(**given)
+    settings = TableSettings(**chosen)
     if (args.workers or args.scheduler) and settings.windows is None:
         args.parser.error("argument --workers, --scheduler: are for windows, see --windows")
     by_recipe = recipe is not None and args.output is None
@@ -119,7 +119,7 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
 def _built(
     args: argparse.Namespace, fields: Sequence[HeightField], settings: TableSettings, bar: Progress
 ) -> tuple[DiffractionTable, dict[str, Any]]:
-    """The table, and what workers did for it, if there are any and it is of windows."""
+    """Build the table; also return what workers did for it, where they build windows."""
     from ..tables.build.build import build_with
 
     if settings.windows is None or not on_workers(args):
@@ -145,7 +145,7 @@ def _second_order_line(table: DiffractionTable) -> str:
 def _report(
     fields: Sequence[HeightField], table: DiffractionTable, output: Path, seconds: float
 ) -> Iterator[tuple[str, str]]:
-    """What was made of what, how good it is, and what it cost."""
+    """Yield lines on the patch, the table, its error and its cost, each with its label."""
     for field in fields:
         (ny, nx), (dx, dy), (lx, ly) = field.shape, field.pixel_size, field.extent
         patch = (

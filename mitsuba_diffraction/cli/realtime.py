@@ -29,20 +29,22 @@ def add_view(subparsers: options.Subparsers) -> None:
         "S takes a screenshot, P sends the view to the path tracer, R resets, Esc closes.",
     )  # fmt: skip
     options.add_scene(parser)
-    parser.add_argument("--method", choices=METHODS, default="lut", help="default: lut")
+    parser.add_argument(
+        "--method", choices=METHODS, default="lut", help="method of the shaders; default: lut"
+    )
     options.add_exposure(parser, 0.0, "stops to start with: +1 doubles the light; default: 0")
     parser.add_argument(
         "--size", metavar="WxH", type=_size, default=(1280, 800),
-        help="of the window, pixels; default: 1280x800",
+        help="size of the window in pixels; default: 1280x800",
     )  # fmt: skip
     options.add_output(parser, "for screenshots; default: the current folder", default=Path())
     parser.add_argument(
         "--frames", metavar="N", type=whole_number(0), default=0,
-        help="close after so many and print their time; default: 0, never",
+        help="close the window after N frames and print their time; default: 0, never",
     )  # fmt: skip
     parser.add_argument(
         "--window", choices=("pyglet", "glfw", "sdl2", "headless"), default="pyglet",
-        help="what opens the window; glfw and sdl2 need packages of their own, headless opens none",
+        help="toolkit of the window; glfw and sdl2 need further packages, headless opens none",
     )  # fmt: skip
 
 
@@ -83,7 +85,7 @@ def add_compare(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--method", nargs="+", metavar="NAME", choices=(*METHODS, "all"), default=["lut"],
-        help=f"of the shaders: some of {', '.join(METHODS)}, or all; default: lut",
+        help=f"methods of the shaders: {', '.join(METHODS)}, or all; default: lut",
     )  # fmt: skip
     options.add_samples(parser, 2, 1024)
     parser.add_argument(
@@ -92,7 +94,7 @@ def add_compare(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--frames", metavar="N", type=whole_number(4), default=512,
-        help="of progressive light, in which lut and spectral are drawn; default: 512",
+        help="frames of progressive light for lut and spectral; default: 512",
     )  # fmt: skip
     parser.add_argument(
         "--supersampling", metavar="N", type=whole_number(1), default=8,
@@ -122,11 +124,11 @@ def compare(args: argparse.Namespace) -> int:
             _scene(args, parameters), str(args.scene), variant, folder, args.sensor, args.spp,
             args.full_spp, args.frames // 4 * 4, args.supersampling, args.seed, bar,
         )  # fmt: skip
-        found = comparison.run(METHODS if every else args.method, leave_out=every)
-    found = {"scene": found["scene"], "parameters": parameters, **found}
-    save_json(folder / "compare.json", found)
-    save_report(args, found)
-    print(markdown(plain(found)))
+        figures = comparison.run(METHODS if every else args.method, leave_out=every)
+    figures = {"scene": figures["scene"], "parameters": parameters, **figures}
+    save_json(folder / "compare.json", figures)
+    save_report(args, figures)
+    print(markdown(plain(figures)))
     print(f"{folder}: pictures, sheets and compare.json, {time.perf_counter() - start:.0f} s")
     return 0
 
@@ -137,7 +139,7 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
         "write a page that shows a scene in a browser, without a server",
         "Write one self-contained page of HTML, of at most 25 MB, that draws a scene with "
         "WebGL 2: orbit, pan, zoom, and drag the light. Tables are rounded to as many digits "
-        "as fit; the ΔE2000 that this makes is printed and stands on the page.",
+        "as fit; the resulting ΔE2000 is printed, and shown on the page.",
     )  # fmt: skip
     options.add_scene(parser)
     parser.add_argument(
@@ -145,7 +147,7 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
     )
     parser.add_argument(
         "--method", choices=(*WEB_METHODS, "all"), default="all",
-        help="that the page offers; all leaves out what does not fit; default: all",
+        help="method on the page; all leaves out those that do not suit the scene; default: all",
     )  # fmt: skip
     options.add_json(parser, "what the page shows")
 
@@ -213,7 +215,7 @@ def export_shader(args: argparse.Namespace) -> int:
         args.parser.error("argument --int-ior: not allowed with argument --material")
     folder = args.output or Path(f"{args.source.stem}-shader")
     check_outputs([folder / "constants.json"], [args.source], "shader", make_folder=True)
-    options.load_options(args)  # what does not fit is reported before Mitsuba is loaded
+    options.load_options(args)  # wrong options are reported before Mitsuba is loaded
 
     from ..realtime.glsl.export import export_shader
 
@@ -236,7 +238,7 @@ def export_shader(args: argparse.Namespace) -> int:
 
 
 def _set_variant(args: argparse.Namespace) -> str:
-    """The variant that is asked for, set, if shaders can read scenes in it."""
+    """Set the requested variant if shaders can read scenes in it, and return its name."""
     from ..realtime.glsl.scene import check_variant
 
     variant = set_variant(args.mode)
@@ -245,14 +247,14 @@ def _set_variant(args: argparse.Namespace) -> str:
 
 
 def _scene(args: argparse.Namespace, parameters: dict[str, str]) -> Any:
-    """The scene, which has the sensor that is asked for."""
+    """Load the scene, and check that it has the requested sensor."""
     scene = load_scene(args.scene, parameters)
     sensor_of(scene, args.sensor)
     return scene
 
 
 def _size(text: str) -> tuple[int, int]:
-    found = re.fullmatch(r"(\d{2,5})x(\d{2,5})", text)
-    if not found:
+    match = re.fullmatch(r"(\d{2,5})x(\d{2,5})", text)
+    if not match:
         raise argparse.ArgumentTypeError(f"expected a size like 1280x800, got {text!r}")
-    return int(found[1]), int(found[2])
+    return int(match[1]), int(match[2])

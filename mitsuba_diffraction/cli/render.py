@@ -1,6 +1,6 @@
 """`mitsuba-diffraction render`: from an XML scene to a picture.
 
-With --frames: which frames there are, why each is rendered, and the film of them.
+With --frames: which frames exist, why each of the others is rendered, and the film of them.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..errors import DiffractionError
 from ..scene.frames import FILMS, MISSING, Frame, digest_of, render_frames, write_film, write_frame
@@ -46,8 +46,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
         subparsers, "render", run, "render a Mitsuba scene",
         "Render an XML scene to a linear EXR and a PNG beside it. Ctrl-C stops after the "
         "current pass and keeps the picture so far. With --frames, render a folder of PNG "
-        "files while parameters of the scene change; frames that are there already, with the "
-        "same settings, are kept, so an interrupted run goes on where it was.",
+        "files while parameters of the scene change; existing frames with the same "
+        "settings are kept, so an interrupted run can be continued.",
     )  # fmt: skip
     options.add_scene(parser)
     options.add_output(
@@ -63,8 +63,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--plan", nargs="*", metavar="RECIPE.toml", type=recipe_file,
-        help="render with tables of only what the scene needs: plan them first, or as in recipes "
-        "that `plan -o` wrote",
+        help="render with tables limited to what the scene needs: by the recipes of `plan -o`, or "
+        "without any, planned first",
     )  # fmt: skip
     add_plan_options(parser)
     options.add_json(parser, "what was rendered")
@@ -111,33 +111,50 @@ def run(args: argparse.Namespace) -> int:
     return _on_workers(args) if on_workers(args) else _run_one(args)
 
 
-def _outputs(args: argparse.Namespace) -> tuple[Path, Path, bool]:
-    """What `-o` names, the PNG, and whether that is all."""
+class Outputs(NamedTuple):
+    """Files of a picture.
+
+    Attributes
+    ----------
+    named : the file of `-o`, an EXR or a PNG.
+    png : the PNG.
+    """
+
+    named: Path
+    png: Path
+
+    @property
+    def only_png(self) -> bool:
+        """Whether no EXR is written."""
+        return self.named == self.png
+
+
+def _outputs(args: argparse.Namespace) -> Outputs:
+    """Return the files of `-o`, or of its default, after checking that they can be written."""
     output = args.output or Path(args.scene.with_suffix(".exr").name)
     if output.suffix.lower() not in (".exr", ".png"):
         args.parser.error(
             f"argument -o: expected a name ending in .exr or .png, got {str(output)!r}"
         )
-    only_png = output.suffix.lower() == ".png"
-    png = output if only_png else output.with_suffix(".png")
+    png = output if output.suffix.lower() == ".png" else output.with_suffix(".png")
     for path in dict.fromkeys((output, png)):
         check_writable(path)
-    return output, png, only_png
+    return Outputs(output, png)
 
 
 def _on_workers(args: argparse.Namespace) -> int:
     parameters = options.scene_parameters(args)
-    outputs = output, _, only_png = _outputs(args)
+    outputs = _outputs(args)
 
-    from ..cluster.frames import Wanted
+    from ..cluster.frames import FrameRequest
 
     start = time.perf_counter()
     variant = set_variant(args.mode)
-    keep = output.with_name(f"{output.name}.passes")
+    keep = outputs.named.with_name(f"{outputs.named.name}.passes")
     with mitsuba_warnings(), client_of(args) as client:
-        film = film_of(args, client, [Wanted(parameters, args.spp, args.seed)], variant, keep)
-        if only_png:
-            _check_colours(film.scene, film.sensor, args, output)
+        film = film_of(args, client, [FrameRequest(parameters, args.spp, args.seed)], variant, keep)
+        if outputs.only_png:
+            _check_colours(film.scene, film.sensor, args, outputs.png)
         with Bar(args, unit=" tasks", delay=0) as bar, Stop() as stop:
             for result in film.render(stop, bar):
                 report = _finish(args, result, outputs, variant, start)
@@ -150,7 +167,7 @@ def _on_workers(args: argparse.Namespace) -> int:
 
 def _run_one(args: argparse.Namespace) -> int:
     parameters = options.scene_parameters(args)
-    outputs = output, _, only_png = _outputs(args)
+    outputs = _outputs(args)
 
     start = time.perf_counter()
     variant = set_variant(args.mode)
@@ -164,8 +181,8 @@ def _run_one(args: argparse.Namespace) -> int:
             if args.preview:
                 shrink(sensor)
             spp = spp or preview_samples(sensor, args.preview)
-            if only_png:
-                _check_colours(scene, sensor, args, output)
+            if outputs.only_png:
+                _check_colours(scene, sensor, args, outputs.png)
             with Stop() as stop:
                 result = render_passes(
                     scene, sensor, spp=spp, seed=args.seed, variant=variant, stop=stop,
@@ -182,25 +199,24 @@ def _run_one(args: argparse.Namespace) -> int:
 
 
 def _finish(
-    args: argparse.Namespace, result: Result, outputs: tuple[Path, Path, bool], variant: str,
+    args: argparse.Namespace, result: Result, outputs: Outputs, variant: str,
     start: float,
 ) -> dict[str, Any]:  # fmt: skip
-    """Write the picture, with warnings of what it lacks, and say so; the figures for --json."""
-    output, png, only_png = outputs
+    """Write the picture, print warnings and a summary, and return the figures for --json."""
     bad = count_bad(result.bitmap)
     if bad:
         say_warning(f"{bad} pixels are not finite (NaN or infinite); they are black in a PNG")
     written = []
-    if not only_png:
+    if not outputs.only_png:
         origin = {"scene": str(args.scene), "variant": variant, "seed": args.seed}
-        write_exr(result.bitmap, output, {**origin, "spp": result.spp})
-        written.append(output)
+        write_exr(result.bitmap, outputs.named, {**origin, "spp": result.spp})
+        written.append(outputs.named)
     colours = colours_of(result.bitmap)
     if colours is None:
         say_warning("the film holds no colours that a PNG could show; only the EXR was written")
     else:
-        write_png(colours, png, args.exposure)
-        written.append(png)
+        write_png(colours, outputs.png, args.exposure)
+        written.append(outputs.png)
     width, height = result.bitmap.size()
     samples = "1 sample" if result.spp == 1 else f"{result.spp} samples"
     seconds = time.perf_counter() - start
@@ -216,7 +232,7 @@ def _finish(
 
 
 def _check_colours(scene: Any, sensor: Any, args: argparse.Namespace, output: Path) -> None:
-    """Refuse a film that will hold nothing for a PNG, before the work is done."""
+    """Refuse a film without colours for a PNG, before the work is done."""
     film = sensor.film()
     film.prepare(integrator_of(scene).aov_names())
     if colours_of(film.bitmap()) is None:
@@ -227,7 +243,7 @@ def _check_colours(scene: Any, sensor: Any, args: argparse.Namespace, output: Pa
 
 
 def _run_frames(args: argparse.Namespace) -> int:
-    """Render the frames that are not there yet, then the film; return the exit code."""
+    """Render the frames that are missing or outdated, then the film; return the exit code."""
     folder, film = _folder_and_film(args)
     check_writable(folder / "frame_0000.png", make_folder=True)
     if film is not None:
@@ -270,11 +286,11 @@ def _run_frames(args: argparse.Namespace) -> int:
 def _frames_on_workers(
     args: argparse.Namespace, to_do: Sequence[Frame], folder: Path
 ) -> tuple[int, dict[str, Any]]:
-    """Render frames on workers; how many came before Ctrl-C, and what the workers did."""
-    from ..cluster.frames import Wanted
+    """Render frames on workers; return how many were finished, and what the workers did."""
+    from ..cluster.frames import FrameRequest
 
     variant, done = set_variant(args.mode), 0
-    wanted = [Wanted(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]
+    wanted = [FrameRequest(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]
     with mitsuba_warnings(), client_of(args) as client:
         film = film_of(args, client, wanted, variant, folder / "passes")
         with Bar(args, unit=" tasks", delay=0) as bar, Stop() as stop:
@@ -286,7 +302,7 @@ def _frames_on_workers(
 
 
 def _say_why(reasons: Mapping[Path, tuple[str, str] | None]) -> None:
-    """Which frames are kept, and for what reason others are not."""
+    """Print how many frames are kept, and why others are rendered again."""
     examples: dict[str, tuple[Path, str]] = {}
     again: Counter[str] = Counter()
     for path, reason in reasons.items():
@@ -305,7 +321,7 @@ def _say_why(reasons: Mapping[Path, tuple[str, str] | None]) -> None:
 
 
 def _folder_and_film(args: argparse.Namespace) -> tuple[Path, Path | None]:
-    """The folder of the frames, and the film."""
+    """Return the folder of the frames, and the film, if there is one."""
     output = args.output or Path(f"{args.scene.stem}_frames")
     if output.suffix.lower() in FILMS:
         return output.with_suffix(""), output
@@ -318,20 +334,20 @@ def _folder_and_film(args: argparse.Namespace) -> tuple[Path, Path | None]:
 
 
 def _frames(args: argparse.Namespace, folder: Path) -> list[Frame]:
-    given = options.scene_parameters(args)
-    animated = [one.name for one in args.animate]
+    fixed = options.scene_parameters(args)
+    animated = [change.name for change in args.animate]
     names = animated + args.turn
     for name in names:
         if names.count(name) > 1:
             args.parser.error(f"{name!r} is set more than once; keep one --animate or --turn of it")
     for name in animated:
-        if name in given:
+        if name in fixed:
             args.parser.error(
                 f"argument -D: --animate {name}= sets its value in every frame; leave "
-                f"-D {name}={given[name]} out"
+                f"-D {name}={fixed[name]} out"
             )
-    every = values_of_frames(args.scene, given, args.frames, args.animate, args.turn)
-    content = digest_of(args.scene, given)
+    every = values_of_frames(args.scene, fixed, args.frames, args.animate, args.turn)
+    content = digest_of(args.scene, fixed)
     return [
         Frame(
             folder / f"frame_{n:04d}.png",

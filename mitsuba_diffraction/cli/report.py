@@ -1,4 +1,4 @@
-"""Where results go, checked before hours of work; plain data as text for people and as JSON."""
+"""Outputs checked before hours of work; plain data as text for people and as JSON."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _INDENT = "  "
 
 
 def lines_of(data: Mapping[str, Any], depth: int = 0) -> Iterator[str]:
-    """One line per value: keys in words, aligned; nested mappings indented below their key."""
+    """Yield a line for each value: keys in words, aligned; nested mappings are indented."""
     rows = [(*_label(key), value) for key, value in data.items()]
     width = max((len(label) for label, _, value in rows if not _nested(value)), default=0)
     margin = _INDENT * depth
@@ -40,7 +40,7 @@ def lines_of(data: Mapping[str, Any], depth: int = 0) -> Iterator[str]:
 
 
 def plain(value: Any) -> Any:
-    """The same data for JSON, which has neither NaN nor infinity: they become null."""
+    """Convert data for JSON, which has neither NaN nor infinity: they become null."""
     if is_dataclass(value) and not isinstance(value, type):
         value = asdict(value)
     if isinstance(value, Mapping):
@@ -57,7 +57,7 @@ def plain(value: Any) -> Any:
 
 
 def save_json(path: Path, data: Mapping[str, Any]) -> None:
-    """Write `plain` data.
+    """Write data as JSON.
 
     Raises a DiffractionError if the file cannot be written.
     """
@@ -67,7 +67,7 @@ def save_json(path: Path, data: Mapping[str, Any]) -> None:
 
 
 def save_report(args: argparse.Namespace, data: Mapping[str, Any]) -> None:
-    """Write the file of --json, if one is asked for."""
+    """Write the file of --json, if it is requested."""
     if args.json is not None:
         save_json(args.json, data)
 
@@ -111,9 +111,9 @@ def _text(value: Any, joint: str = " x ") -> str:
 
 
 def check_writable(path: Path, *, make_folder: bool = False) -> None:
-    """Refuse an output that could not be written, leaving nothing behind.
+    """Refuse an output that cannot be written; nothing is left behind.
 
-    path : the file to come.
+    path : the output.
     make_folder : a missing folder will be made, so the nearest existing one has to be writable.
 
     Raises a DiffractionError if the folder is missing or cannot be written, or `path` is a folder.
@@ -136,9 +136,9 @@ def check_writable(path: Path, *, make_folder: bool = False) -> None:
 def check_outputs(
     outputs: Iterable[Path], sources: Iterable[Path], what: str, *, make_folder: bool = False
 ) -> None:
-    """The same for all files of a command, none of which may be one that it reads.
+    """Refuse outputs of a command that cannot be written, or that would overwrite an input.
 
-    what : is written, in a word.
+    what : the kind of output, a word for the message.
 
     Raises a DiffractionError as in `check_writable`, or if a source would be overwritten.
     """

@@ -23,7 +23,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "For each scan build its table, map its BRDF and measure its heights, the gratings in "
         "it, the colours that it shows and how much they change with direction. Writes "
         "survey.csv, contact sheets, and a table and a map of each scan. A scan that fails is "
-        "a row with its reason; a second run does only what is new.",
+        "a row with its reason; a second run measures only new scans.",
     )  # fmt: skip
     parser.add_argument(
         "files", metavar="FILE", type=Path, nargs="+", help="scans of any format, or recipes"
@@ -36,7 +36,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--theta", metavar="DEG", type=number_between(0, 89), default=30.0,
-        help="of the light, from the normal, across the strongest grating's grooves; default: 30",
+        help="angle of the light from the normal, across the strongest grating; default: 30",
     )  # fmt: skip
     parser.add_argument(
         "--resolution", metavar="N", type=whole_number(8), default=160,

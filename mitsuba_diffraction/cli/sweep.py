@@ -39,7 +39,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         ".png",
     )  # fmt: skip
     parser.add_argument(
-        "--values", metavar="V", nargs="+", help="of the parameter; default: the thesis'"
+        "--values", metavar="V", nargs="+", help="values to compare; default: those of the thesis"
     )
     _add_options(parser.add_argument_group("the maps"))
     options.add_json(parser)
@@ -57,7 +57,7 @@ def _add_options(group: argparse._ArgumentGroup) -> None:
     options.add_exposure(group, None, "of all maps, in stops; default: the best map's own")
     options.add_table(group, options.TABLE_NAMES, coherence="patch")
     add_relative(group)
-    group.add_argument("--int-ior", metavar="N", help="of --relative; default: 1.5")
+    group.add_argument("--int-ior", metavar="N", help="index for --relative; default: 1.5")
     group.add_argument(
         "--compiled", action=argparse.BooleanOptionalAction, default=True,
         help="time spectral and flss in compiled code, in a sweep over methods",
@@ -81,11 +81,11 @@ def run(args: argparse.Namespace) -> int:
     if args.period is not None:
         settings["period"] = args.period
     if values is None and args.kind == "method" and gain is not None:
-        values = [options.in_library(name) for name in options.METHODS if name != "rainbow"]
+        values = [name for name in options.METHODS if name != "rainbow"]
     with Bar(args) as bar, warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)
         result = sweep(
-            args.kind, patch, light, values=values, method=options.in_library(args.method),
+            args.kind, patch, light, values=values, method=args.method,
             gain=gain, resolution=args.resolution, samples=args.samples, progress=bar, **settings,
         )  # fmt: skip
         compiled = _compiled(args, patch, light, settings, bar)
@@ -109,16 +109,16 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _values(args: argparse.Namespace) -> list[Any] | None:
-    """The values given, as the sweep takes them."""
+    """Return the values on the command line in the form that the sweep takes."""
     if args.values is None:
         return None
     if args.kind == "method":
-        return [options.in_library(value) for value in args.values]
+        return list(args.values)
     try:
         return [int(v) if args.kind == "terms" else float(v) for v in args.values]
     except ValueError as error:
-        given = " ".join(args.values)
-        raise DiffractionError(f"--values: expected numbers, got '{given}'") from error
+        text = " ".join(args.values)
+        raise DiffractionError(f"--values: expected numbers, got '{text}'") from error
 
 
 def _compiled(
@@ -131,30 +131,30 @@ def _compiled(
     variant = set_variant(None)
     tables = {k: settings[k] for k in ("coherence_width", "tolerance") if k in settings}
     resolution = 2 * args.resolution  # below it Python's share shows
-    found = time_compiled(
+    times = time_compiled(
         patch, light, resolution=resolution, samples=args.samples, step=settings["step"],
         progress=bar, **tables,
     )  # fmt: skip
     return [
         f"compiled ({variant} and RGB), {resolution} x {resolution} pixels, 360–830 nm in steps of "
         f"{settings['step']:g} nm:",
-        f"  flss {found.flss:.3g} s; spectral {found.spectral:.3g} s, {found.ratio:.3g}× as fast; "
-        f"lut {found.colours:.3g} s, {found.colour_ratio:.3g}× as fast",
+        f"  flss {times.flss:.3g} s; spectral {times.spectral:.3g} s, {times.ratio:.3g}× as fast; "
+        f"lut {times.colours:.3g} s, {times.colour_ratio:.3g}× as fast",
     ]
 
 
 def _title(step: Any, result: Any) -> str:
     if result.reference is None:
-        return options.method(step.label)
+        return step.label
     if step.label == result.reference:
-        return f"{options.method(step.label)} (reference)"
-    return f"{options.method(step.label)}; ΔE {step.difference.delta_e:.2g}"
+        return f"{step.label} (reference)"
+    return f"{step.label}; ΔE {step.difference.delta_e:.2g}"
 
 
 def _lines(result: Any) -> list[str]:
     lines = []
     for step in result.steps:
-        text = f"{options.method(step.label):<12} {step.seconds:7.2f} s"
+        text = f"{step.label:<12} {step.seconds:7.2f} s"
         if step.label == result.reference:
             text += "  reference"
         elif math.isfinite(step.difference.delta_e):
@@ -181,5 +181,5 @@ def _save(path: Path, result: Any) -> None:
 
 
 def _row(step: Any) -> dict[str, Any]:
-    value = options.method(step.value) if isinstance(step.value, str) else step.value
+    value = step.value
     return dict(zip(_COLUMNS, (value, step.seconds, *step.difference), strict=True))

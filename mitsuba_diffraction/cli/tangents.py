@@ -26,7 +26,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "a mesh without them gets some that carry only the direction. On a closed surface that "
         "is no torus every field has singular points, around which the patch turns.",
     )  # fmt: skip
-    parser.add_argument("mesh", metavar="MESH", type=Path, help="what to read")
+    parser.add_argument("mesh", metavar="MESH", type=Path, help="mesh to read")
     options.add_output(parser, "PLY to write", ".ply", required=True)
     parser.add_argument(
         "--along", choices=_GUIDES, default="smooth",
@@ -35,8 +35,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--turn", metavar="DEGREES", type=number_between(-360, 360), default=0.0,
-        help="from there to the patch's x axis, counter-clockwise seen from outside, e.g. -90 to "
-        "lay its y axis along the field; default: 0",
+        help="angle from the field to the patch's x axis, counter-clockwise seen from outside, "
+        "e.g. -90 to lay its y axis along the field; default: 0",
     )  # fmt: skip
     parser.add_argument(
         "--smoothing", metavar="S", type=number_between(1e-4, 1), default=0.03,
@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _todo(along: str, report: TangentReport) -> str:
-    """What to do about a field that breaks."""
+    """Advise what to do about a field that breaks."""
     others = " or ".join(guide for guide in ("smooth", "body") if guide != along)
     todo = f"choose another guide, --along {others}"
     if report.turns_fast:  # triangles are large beside what the field must turn
@@ -98,7 +98,7 @@ def _todo(along: str, report: TangentReport) -> str:
 
 
 def _places(places: object, indices: object, report: TangentReport) -> str:
-    """The singular points in one line, or that the field has none."""
+    """Name the singular points in one line, or say that the field has none."""
     import numpy as np
 
     points, turns = np.asarray(places), np.asarray(indices)

@@ -34,14 +34,14 @@ def add_parser(subparsers: options.Subparsers) -> None:
     budget = parser.add_argument_group("recommend a setting with")
     budget.add_argument(
         "--max-error", metavar="E", type=number_between(0.0, 1.0),
-        help="a measured error of at most this; default: 1e-3",
+        help="largest measured error; default: 1e-3",
     )  # fmt: skip
     budget.add_argument(
-        "--memory", metavar="MB", type=number_between(0.0, 1e6), help="a table of at most this"
+        "--memory", metavar="MB", type=number_between(0.0, 1e6), help="largest table"
     )
     budget.add_argument(
         "--time", metavar="X", type=number_between(0.0, 1e6),
-        help="an eval that takes at most X times as long as roughconductor's",
+        help="longest time of eval, as a multiple of roughconductor's",
     )  # fmt: skip
     options.add_json(parser)
     options.add_own_patch(parser)
@@ -110,8 +110,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _budget(args: argparse.Namespace) -> dict[str, float | None]:
-    """What is asked for; the default tolerance, if nothing is."""
-    given = {"tolerance": args.max_error, "megabytes": args.memory, "relative": args.time}
-    if all(value is None for value in given.values()):
-        given["tolerance"] = 1e-3
-    return given
+    """Limits of the recommended setting; by default, an error of 1e-3."""
+    budget = {"tolerance": args.max_error, "megabytes": args.memory, "relative": args.time}
+    if all(value is None for value in budget.values()):
+        budget["tolerance"] = 1e-3
+    return budget

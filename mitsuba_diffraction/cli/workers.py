@@ -1,4 +1,4 @@
-"""Options of commands that may run on workers, and pictures that come from them."""
+"""Options of commands that may run on workers, and pictures rendered on them."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from .console import say, say_warning
 from .options import whole_number
 
 if TYPE_CHECKING:
-    from ..cluster.frames import Film, Wanted
+    from ..cluster.frames import Film, FrameRequest
 
-#: As `cluster.workers.VARIABLE`, which imports more than --help has time for.
+#: Copy of `cluster.workers.VARIABLE`, whose module imports too much for --help.
 VARIABLE = "DASK_SCHEDULER_ADDRESS"
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:
-    """Which workers, if any."""
+    """Add the options that choose workers."""
     group = parser.add_argument_group("workers (extra `cluster`)")
     group.add_argument(
         "--workers", metavar="N", type=whole_number(1), help="start N processes here for it"
@@ -34,7 +34,7 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def add_threads(parser: argparse.ArgumentParser) -> None:
-    """Of Dr.Jit, in workers."""
+    """Add the number of Dr.Jit threads of a worker."""
     parser.add_argument(
         "--threads", metavar="N", type=whole_number(1),
         help="Dr.Jit threads of a worker; default: its share of this machine's cores, or with "
@@ -43,17 +43,17 @@ def add_threads(parser: argparse.ArgumentParser) -> None:
 
 
 def on_workers(args: argparse.Namespace) -> bool:
-    """Whether the command is for workers; a usage error where the options contradict."""
+    """Say whether the command runs on workers; contradictory options are a usage error."""
     if args.workers and args.scheduler:
         args.parser.error("argument --workers: starts workers; --scheduler has its own")
-    found = bool(args.workers or args.scheduler or os.environ.get(VARIABLE))
-    if getattr(args, "threads", None) and not found:
+    wanted = bool(args.workers or args.scheduler or os.environ.get(VARIABLE))
+    if getattr(args, "threads", None) and not wanted:
         args.parser.error("argument --threads: is for --workers or --scheduler")
-    return found
+    return wanted
 
 
 def worker_threads(args: argparse.Namespace) -> int:
-    """Dr.Jit threads of a worker; 0 for as many as it has cores."""
+    """Return the Dr.Jit threads of a worker; 0 for one a core."""
     if args.threads or not args.workers:
         return args.threads or 0
     return max(1, len(os.sched_getaffinity(0)) // int(args.workers))
@@ -61,7 +61,7 @@ def worker_threads(args: argparse.Namespace) -> int:
 
 @contextlib.contextmanager
 def client_of(args: argparse.Namespace) -> Iterator[Any]:
-    """The workers that were asked for; says where to watch them."""
+    """Connect to the requested workers, and print the address of their pages."""
     from ..cluster.workers import connect
 
     has_page = importlib.util.find_spec("bokeh") is not None
@@ -72,9 +72,9 @@ def client_of(args: argparse.Namespace) -> Iterator[Any]:
 
 
 def film_of(
-    args: argparse.Namespace, client: Any, frames: Sequence[Wanted], variant: str, keep: Path
+    args: argparse.Namespace, client: Any, frames: Sequence[FrameRequest], variant: str, keep: Path
 ) -> Film:
-    """What renders frames of the command's scene on workers."""
+    """Return the renderer of the command's frames on workers."""
     from ..cluster.frames import Film
 
     film = Film(
@@ -86,7 +86,7 @@ def film_of(
 
 
 def say_report(film: Film) -> dict[str, Any]:
-    """Print what the workers did in a line; the same as plain data."""
+    """Print what the workers did in a line, and return it as plain data."""
     report = film.report.summary()
     kept = f", {report['kept']} kept from before" if report["kept"] else ""
     lost = f", {report['lost']} workers lost" if report["lost"] else ""

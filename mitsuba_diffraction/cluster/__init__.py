@@ -1,14 +1,14 @@
-"""Many processes and machines, on Dask: frames and groups of passes are its tasks.
+"""Rendering and building on many processes and machines, with Dask.
 
 Contents
 --------
 connect  to workers that are started here, or to a running cluster: `md.cluster.connect`
-render   a scene, on workers: `md.cluster.render`
-build    the table of a wide scan, its windows on workers: `md.cluster.build`
-frames   frames after frames, each from tasks that workers do in any order; sums kept on disk
-tasks    what a worker does and gives back; the files of a scene, copied where they are missing
-jobs     independent jobs, here or on workers, as they are done or in their order
-workers  starts workers here, or finds those of a running cluster, and refuses those of no use
+render   a scene on workers: `md.cluster.render`
+build    the table of a wide scan on workers, window by window: `md.cluster.build`
+frames   frames from tasks that workers finish in any order; sums stored on disk
+tasks    the work and the result of a task; the files of a scene, copied where they are missing
+jobs     independent jobs, here or on workers: scans as they finish, windows in order
+workers  workers started here or found on a cluster, and refused where they cannot serve
 """
 
 from .frames import render

@@ -1,4 +1,4 @@
-"""Frames from the tasks of many workers: submitted, kept on disk, added up in order, developed."""
+"""Frames rendered by tasks on workers: submitted, stored on disk, added up in order, developed."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def render(
     name = set_variant(variant)
     with tempfile.TemporaryDirectory() as temporary, Stop() as stop:
         film = Film(
-            client, Path(scene), [Wanted(dict(parameters or {}), spp, seed)], name,
+            client, Path(scene), [FrameRequest(dict(parameters or {}), spp, seed)], name,
             keep=Path(keep or Path(temporary) / "passes"), warn=warn, sensor=sensor,
             preview=preview, threads=threads,
         )  # fmt: skip
@@ -91,7 +91,7 @@ def render(
 
 @dataclass
 class Report:
-    """What a run on workers cost."""
+    """Cost of a run on workers."""
 
     tasks: int = 0  # that were done now
     kept: int = 0  # that had been kept
@@ -99,23 +99,23 @@ class Report:
     # a worker that died are given to others by the scheduler
     retries: int = 0
     lost: int = 0  # workers that were there and are not any more
-    seconds: float = 0.0  # of the client's clock
+    seconds: float = 0.0  # wall time of the client
     busy: float = 0.0  # seconds of all workers' work
-    bytes: int = 0  # of sums that came from workers
+    bytes: int = 0  # size of the sums that came from workers
     peak: int = 0  # bytes of memory that a worker has taken at most
     # workers, where: addresses, and processors with threads, of what has been added up
     workers: set[str] = field(default_factory=set)
     where: set[str] = field(default_factory=set)
 
     def summary(self) -> dict[str, Any]:
-        """As plain data, with what a task cost besides its work."""
+        """Return plain data, with the time that a task costs besides its work."""
         plain = {k: sorted(v) if isinstance(v, set) else v for k, v in vars(self).items()}
         count = len(self.workers) or 1
         idle = self.seconds * count - self.busy
         return plain | {"overhead_per_task_s": idle / self.tasks if self.tasks else 0.0}
 
     def add(self, sums: Sums, new: bool) -> None:
-        """Count one sum."""
+        """Count one sum. new: rendered in this run."""
         self.where.add(sums.where)
         if not new:
             self.kept += 1
@@ -128,8 +128,8 @@ class Report:
 
 
 @dataclass(frozen=True)
-class Wanted:
-    """A frame: values of the scene's parameters, samples (None: the scene's), and seed."""
+class FrameRequest:
+    """Request for a frame: values of the scene's parameters, samples (None: the scene's), seed."""
 
     values: Mapping[str, str]
     spp: int | None
@@ -159,7 +159,7 @@ class Film:
         self,
         client: Any,
         scene: Path,
-        frames: Sequence[Wanted],
+        frames: Sequence[FrameRequest],
         variant: str,
         *,
         keep: Path,
@@ -173,38 +173,40 @@ class Film:
         self._client, self._kept, self._warn = client, Kept(keep, warn), warn
         self._scene = load_scene(scene, frames[0].values)
         self._sensor = sensor_of(self._scene, sensor)
-        own = preview_samples(self._sensor, preview)
+        default_samples = preview_samples(self._sensor, preview)
         if preview:
             shrink(self._sensor)
         film = film_of(self._scene, self._sensor)
         self._frames: list[list[Task]] = []
         for number, frame in enumerate(frames):
-            files, first, mine = SceneFiles.of(scene, frame.values), 0, []
-            for group in groups_of(passes_of(self._sensor, frame.spp or own, frame.seed, variant)):
-                mine.append(
+            files, first, tasks = SceneFiles.from_scene(scene, frame.values), 0, []
+            for group in groups_of(
+                passes_of(self._sensor, frame.spp or default_samples, frame.seed, variant)
+            ):
+                tasks.append(
                     Task(files, variant, sensor, preview, film, number, first, tuple(group),
                          versions(), threads)
                 )  # fmt: skip
                 first += len(group)
-            self._frames.append(mine)
+            self._frames.append(tasks)
         pixels = int(np.prod(self._sensor.film().crop_size()))
-        largest = max(one.spp for mine in self._frames for task in mine for one in task.passes)
+        largest = max(one.spp for tasks in self._frames for task in tasks for one in task.passes)
         self.needed = BYTES_A_PROCESS + BYTES_A_SAMPLE * pixels * largest
         for line in memory_warnings(client, self.needed):
             warn(line)
 
     @property
     def sensor(self) -> Any:
-        """The sensor of frame 0, with its film."""
+        """Sensor of frame 0, with its film."""
         return self._sensor
 
     @property
     def scene(self) -> Any:
-        """The scene of frame 0."""
+        """Scene of frame 0."""
         return self._scene
 
     def render(self, stop: Stop, progress: Progress) -> Iterator[Result]:
-        """Frame after frame; ends early once asked to stop.
+        """Yield frame after frame; end early once asked to stop.
 
         Raises
         ------
@@ -217,10 +219,10 @@ class Film:
             for tasks in self._frames:
                 total: Any = 0.0
                 for task in tasks:
-                    found = sums.of(task)
-                    if found is None:
+                    sum_of_task = sums.wait_for(task)
+                    if sum_of_task is None:
                         return
-                    total = total + found.raw
+                    total = total + sum_of_task.raw
                 spp = sum(one.spp for task in tasks for one in task.passes)
                 picture = developed(self._scene, self._sensor, total, spp)
                 self.report.seconds = time.perf_counter() - start
@@ -244,13 +246,13 @@ class Film:
         return len(there)
 
     def forget(self, frame: int) -> None:
-        """Remove what was kept of a frame."""
+        """Remove the stored sums of a frame."""
         for task in self._frames[frame]:
             self._kept.forget(task)
 
 
 class _InOrder:
-    """Gives out tasks ahead of what is added up, and takes results in whatever order they come."""
+    """Submits tasks ahead of the sum that is due, and collects results as they come."""
 
     def __init__(self, film: Film, stop: Stop, progress: Progress) -> None:
         self._film, self._stop, self._progress = film, stop, progress
@@ -262,16 +264,16 @@ class _InOrder:
         self._contents: dict[str, Any] = {}
         self._counted = (-math.inf, 1)
 
-    def of(self, task: Task) -> Sums | None:
-        """The sums of a task; None once asked to stop."""
+    def wait_for(self, task: Task) -> Sums | None:
+        """Return the sums of a task; None once asked to stop."""
         kept = self._film._kept
         while True:
             if task.key in self._ready or task in kept:
                 new = task.key in self._ready
-                found = self._ready.pop(task.key, None) or kept.read(task)
-                if found is not None:
-                    self._film.report.add(found, new)
-                    return found
+                result = self._ready.pop(task.key, None) or kept.read(task)
+                if result is not None:
+                    self._film.report.add(result, new)
+                    return result
                 if task not in self._with.values() and task not in self._waiting:
                     self._waiting.append(task)  # it was damaged
             if self._stop.asked:
@@ -282,7 +284,7 @@ class _InOrder:
             time.sleep(_POLL)
 
     def cancel(self) -> None:
-        """Take back what nobody waits for."""
+        """Cancel tasks whose results nobody waits for."""
         for future in self._with:
             future.cancel()
         self._with.clear()
@@ -313,20 +315,20 @@ class _InOrder:
         report = self._film.report
         for future in [future for future in self._with if future.done()]:
             task = self._with.pop(future)
-            found = outcome(future)
-            if found is None:
+            answer = outcome(future)
+            if answer is None:
                 self._contents.clear()
                 wait_for_scheduler(self._film._client, self._stop)
-            if isinstance(found, Sums):
-                on_disk = self._film._kept.write(task, found)
+            if isinstance(answer, Sums):
+                on_disk = self._film._kept.write(task, answer)
                 held = sum(sums is not None for sums in self._ready.values())
-                self._ready[task.key] = None if on_disk and held >= HELD else found
+                self._ready[task.key] = None if on_disk and held >= HELD else answer
                 self._done += 1
-            elif isinstance(found, Failed):
-                raise DiffractionError(f"{task}, worker {found.worker}: {found.text}")
+            elif isinstance(answer, Failed):
+                raise DiffractionError(f"{task}, worker {answer.worker}: {answer.text}")
             else:
                 report.retries += 1
-                self._with[self._submitted(task, found.digests if found else ())] = task
+                self._with[self._submitted(task, answer.digests if answer else ())] = task
 
     def _tell(self, task: Task) -> None:
         frames = len(self._film._frames)
@@ -334,7 +336,7 @@ class _InOrder:
         self._progress(self._done, self._total, f"{what}{self._workers()} workers")
 
     def _workers(self) -> int:
-        """How many there are, asked for every other second."""
+        """Return the number of workers, counted every other second."""
         now = time.perf_counter()
         if now - self._counted[0] > _COUNTED:
             self._counted = now, self._film._count_workers()
@@ -369,10 +371,7 @@ class Kept:
         """Read a sum; None if there is none, or if it is damaged, which is removed."""
         try:
             record = read_record(self._file(task), _title(task))
-            sums = Sums(raw=record.arrays[0], **record.document)
-            if not np.isfinite(sums.raw).all():
-                raise ValueError("it is not finite")
-            return sums
+            return Sums(raw=record.arrays[0], **record.document)
         except FileNotFoundError:
             return None
         except (OSError, ValueError, LookupError, TypeError, MemoryError, RecursionError) as error:
@@ -393,5 +392,5 @@ class Kept:
 
 
 def _title(task: Task) -> str:
-    """First line of a sum's file: what it is, and the key of its task."""
+    """Return the first line of a sum's file: its kind, and the key of its task."""
     return f"mitsuba_diffraction sum {task.key}"

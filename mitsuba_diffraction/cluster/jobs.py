@@ -1,4 +1,4 @@
-"""Independent jobs, here or on workers, as they are done or in their order: scans, windows."""
+"""Independent jobs, here or on workers: scans as they finish, windows in their order."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..progress import Progress
 from ..settings import TableSettings
 from ..tables.build.build import build_with
 from ..tables.table import DiffractionTable
-from .tasks import Failed, Lacking, SceneFiles, check_versions, failure, versions
+from .tasks import Failed, MissingFiles, SceneFiles, check_versions, failure, versions
 from .workers import check_workers, outcome, wait_for_scheduler, workers_of
 
 _POLL = 0.02  # seconds
@@ -59,7 +59,7 @@ def build_on_workers(
     client: Any,
     progress: Progress | None = None,
 ) -> tuple[DiffractionTable, OrderedMap]:
-    """`build`, with what it cost."""
+    """Build as `build`, and return the table with the map that knows its cost."""
     if settings.windows is None:
         raise DiffractionError(
             "workers build tables of windows: set windows=auto (--windows auto), or do without "
@@ -71,22 +71,22 @@ def build_on_workers(
 
 
 class HasFiles(Protocol):
-    """A job that needs files."""
+    """Job that needs files."""
 
     @property
     def files(self) -> SceneFiles:
-        """These, by content."""
+        """Files of the job, known by content."""
 
 
-def each(
+def run_jobs(
     client: Any, work: Callable[..., Any], jobs: Sequence[HasFiles]
 ) -> Iterator[tuple[int, Any]]:
-    """Do `work(job, contents)` for each, and give its number with what came of it.
+    """Do `work(job, contents)` for each job, and yield its number and result.
 
     Parameters
     ----------
     client : `distributed.Client`, or None to do all here.
-    work : gives `Lacking` for files that it needs by content.
+    work : gives `MissingFiles` for files that it needs by content.
     jobs : any.
 
     Returns
@@ -106,28 +106,28 @@ def each(
     try:
         while waiting:
             for future in [future for future in waiting if future.done()]:
-                n, found = waiting.pop(future), outcome(future)
-                if found is None:
+                n, result = waiting.pop(future), outcome(future)
+                if result is None:
                     wait_for_scheduler(client)
                     waiting[client.submit(work, jobs[n], pure=False)] = n
-                elif isinstance(found, Lacking):
-                    again = client.submit(work, jobs[n], _contents(jobs[n], found), pure=False)
+                elif isinstance(result, MissingFiles):
+                    again = client.submit(work, jobs[n], _contents(jobs[n], result), pure=False)
                     waiting[again] = n
                 else:
-                    yield n, found
+                    yield n, result
             time.sleep(_POLL)
     finally:
         for future in waiting:
             future.cancel()
 
 
-def _contents(job: HasFiles, lacking: Lacking) -> Mapping[str, bytes]:
+def _contents(job: HasFiles, lacking: MissingFiles) -> Mapping[str, bytes]:
     wanted = set(lacking.digests)
     return {d: Path(path).read_bytes() for path, d in job.files.files if d in wanted}
 
 
 class OrderedMap:
-    """`map` on workers: results in the order of the arguments, of which few are under way at once.
+    """`map` on workers: results in the order of the arguments, a few of which are at work at once.
 
     Attributes
     ----------
@@ -142,12 +142,12 @@ class OrderedMap:
         self.busy = 0.0
 
     def summary(self) -> dict[str, Any]:
-        """What it cost, as plain data."""
+        """Return the cost as plain data."""
         names = "tasks", "retries", "bytes", "busy"
         return {name: getattr(self, name) for name in names}
 
     def __call__(self, work: Callable[[Any], Any], arguments: Iterable[Any]) -> Iterator[Any]:
-        """Results of `work` for each of the arguments.
+        """Yield the results of `work` for each of the arguments.
 
         Raises
         ------
@@ -172,15 +172,15 @@ class OrderedMap:
                 future.cancel()
 
     def _result(self, waiting: deque[tuple[Any, Any]]) -> Any:
-        while (found := outcome(waiting[0][1])) is None:
+        while (answer := outcome(waiting[0][1])) is None:
             wait_for_scheduler(self._client)
             self.retries += len(waiting)
             for n, (call, _) in enumerate(waiting):
                 waiting[n] = call, self._submitted(call)
-        if isinstance(found, Failed):
-            raise DiffractionError(f"worker {found.worker}: {found.text}")
+        if isinstance(answer, Failed):
+            raise DiffractionError(f"worker {answer.worker}: {answer.text}")
         waiting.popleft()
-        result, seconds = found
+        result, seconds = answer
         self.tasks += 1
         self.busy += seconds
         return result
@@ -194,11 +194,11 @@ class OrderedMap:
 
 
 def _done(content: bytes) -> tuple[Any, float] | Failed:
-    """A call's result and its seconds."""
+    """Run a pickled call; return its result and its seconds."""
     start = time.perf_counter()
     try:
         wanted, work, argument = pickle.loads(content)
-        check_versions(wanted)  # of a worker that has come late
+        check_versions(wanted)  # a late worker has not been checked
         return work(argument), time.perf_counter() - start
     except Exception as error:
         return failure(error)

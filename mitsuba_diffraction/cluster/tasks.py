@@ -1,6 +1,6 @@
-"""What a worker does: some passes of one frame, and the sum of their films.
+"""Work of a worker: some passes of one frame, and the sum of their films.
 
-A scene's files are known by content: used where they lie, or copied to where a worker lacks them.
+The files of a scene are known by content: used in place, or copied to where a worker lacks them.
 """
 
 from __future__ import annotations
@@ -34,25 +34,25 @@ _PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit")
 
 @dataclass(frozen=True)
 class Task:
-    """Passes of one frame, in the order that their films are added up."""
+    """Passes of one frame, in the order in which their films are added up."""
 
     files: SceneFiles  # the scene
     # variant, sensor, preview: as in `cluster.render`
     variant: str
     sensor: int
     preview: bool
-    film: str  # what the client takes the film to be, see `film_of`
+    film: str  # the client's film, see `film_of`
     # frame, first: numbers of the frame and of the first pass, for people
     frame: int
     first: int
     passes: tuple[Pass, ...]  # seeds and samples
-    versions: tuple[str, ...]  # of the packages that decide the bits of a picture
-    threads: int  # of Dr.Jit; 0 for one a core
+    versions: tuple[str, ...]  # packages that decide the bits of a picture
+    threads: int  # threads of Dr.Jit; 0 for one a core
 
     @property
     def key(self) -> str:
-        """Of the sum: of all that decides it, but how many threads of which processor add it up."""
-        passes = [(one.seed, one.spp) for one in self.passes]
+        """Key of the sum: all that decides it, except the threads and processor that add it up."""
+        passes = [(render.seed, render.spp) for render in self.passes]
         what = (self.files.digest, self.variant, self.sensor, self.preview, self.film, passes)
         return key_of("passes", *what, self.versions)
 
@@ -64,42 +64,44 @@ class Task:
 
 @dataclass(frozen=True)
 class Sums:
-    """What came of a task."""
+    """Result of a task."""
 
     raw: NDArray[np.float64]  # (ny, nx, channels), the sum of the films' raw storage
     where: str  # processor and Dr.Jit threads, which decide the last bits
     worker: str  # address
-    seconds: float  # of work, loading included
+    seconds: float  # time of the work, loading included
     peak: int  # bytes of the process at most
 
 
 @dataclass(frozen=True)
-class Lacking:
-    """A worker lacks files; by their digests."""
+class MissingFiles:
+    """Answer of a worker that lacks files, by their digests."""
 
     digests: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Failed:
-    """An error, as one line, and the worker's address."""
+    """Error of a task in one line, and the worker's address."""
 
     text: str
     worker: str
 
 
 def versions() -> tuple[str, ...]:
-    """Of the packages that decide the bits of a picture."""
+    """Return the versions of the packages that decide the bits of a picture."""
     return tuple(version(name) for name in _PACKAGES)
 
 
-def run_task(task: Task, contents: Mapping[str, bytes] | None = None) -> Sums | Lacking | Failed:
-    """Do a task in this process; `contents` are of files that are lacking here, by digest."""
+def run_task(
+    task: Task, contents: Mapping[str, bytes] | None = None
+) -> Sums | MissingFiles | Failed:
+    """Do a task in this process. contents: content of files that are missing here, by digest."""
     try:
         task.files.keep(contents or {})
         lacking = task.files.missing()
         if lacking:
-            return Lacking(tuple(lacking))
+            return MissingFiles(tuple(lacking))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the client has loaded the scene, and said them
             return _sums(task)
@@ -108,7 +110,7 @@ def run_task(task: Task, contents: Mapping[str, bytes] | None = None) -> Sums | 
 
 
 def failure(error: Exception) -> Failed:
-    """What a worker answers of an error, whose traceback is of no use elsewhere."""
+    """Return a worker's answer to an error, without its traceback."""
     text = str(error)
     if not isinstance(error, DiffractionError):
         text = f"unexpected {type(error).__name__}: {one_line(text)}"
@@ -131,45 +133,45 @@ def _sums(task: Task) -> Sums:
             "take one process, or a run for each"
         )
     total: Any = 0.0
-    for one in task.passes:
-        total = total + render_pass(scene, sensor, one)
+    for render in task.passes:
+        total = total + render_pass(scene, sensor, render)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     where = f"{processor()}, {threads} threads"
     return Sums(total, where, worker_address(), time.perf_counter() - start, peak)
 
 
 @lru_cache(1)
-def _scene(files: SceneFiles, variant: str, sensor: int, preview: bool) -> tuple[Any, Any]:
-    """The scene that this process rendered last, or the next one; what both need stays loaded."""
+def _scene(files: SceneFiles, variant: str, number: int, preview: bool) -> tuple[Any, Any]:
+    """Load the scene of a task; the one before stays loaded meanwhile, for what both need."""
     path, values = files.here()
     scene = load_scene(path, values)
-    found = sensor_of(scene, sensor)
+    sensor = sensor_of(scene, number)
     if preview:
-        shrink(found)
-    return scene, found
+        shrink(sensor)
+    return scene, sensor
 
 
 def film_of(scene: Any, sensor: Any) -> str:
-    """All that the sum of passes depends on, as text: size, crop, filter, channels."""
+    """Describe all that the sum of passes depends on as text: size, crop, filter, channels."""
     film = sensor.film()
     offset, size = film.crop_offset(), film.crop_size()
     return f"{film} {offset} {size} {integrator_of(scene).aov_names()}"
 
 
 def check_versions(wanted: tuple[str, ...]) -> None:
-    """Refuse to work with other packages than the client's."""
-    found = versions()
-    for name, mine, theirs in zip(_PACKAGES, found, wanted, strict=True):
-        if mine != theirs:
+    """Refuse to work with other package versions than the client's."""
+    installed = versions()
+    for name, here, there in zip(_PACKAGES, installed, wanted, strict=True):
+        if here != there:
             raise DiffractionError(
-                f"it has {name} {mine}, and the client {theirs}: pictures of both need not agree; "
+                f"it has {name} {here}, and the client {there}: pictures of both need not agree; "
                 "install the same version on both"
             )
 
 
 @lru_cache(1)
 def processor() -> str:
-    """The kind of this machine's processor."""
+    """Return the kind of this machine's processor."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:
             names = [
@@ -181,7 +183,7 @@ def processor() -> str:
 
 
 def worker_address() -> str:
-    """Of this process, as Dask names it."""
+    """Return the address of this process in Dask."""
     from distributed import get_worker
 
     try:
@@ -199,26 +201,26 @@ class SceneFiles:
     files: tuple[tuple[str, str], ...]  # absolute paths on the client, SHA-256 of their contents
 
     @classmethod
-    def of(cls, scene: Path, values: Mapping[str, str]) -> SceneFiles:
-        """Those of an XML file, read now."""
+    def from_scene(cls, scene: Path, values: Mapping[str, str]) -> SceneFiles:
+        """Read the digests of the files of an XML scene."""
         absolute = Path(os.path.abspath(scene))
-        found = {os.path.abspath(path) for path in files_of(absolute, values)}
-        files = tuple((path, _digest(path, *_stamp(path))) for path in sorted(found))
+        paths = {os.path.abspath(path) for path in files_of(absolute, values)}
+        files = tuple((path, _digest(path, *_stamp(path))) for path in sorted(paths))
         return cls(str(absolute), tuple(sorted(values.items())), files)
 
     @property
     def digest(self) -> str:
-        """Changes when the scene, a value or a file does; not with the folder all lie in."""
+        """Digest of the scene, its values and its files, wherever they all lie."""
         root = os.path.dirname(self.scene)
         contents = [(os.path.relpath(path, root), digest) for path, digest in self.files]
         return key_of(os.path.basename(self.scene), self.values, contents)
 
     def missing(self) -> list[str]:
-        """Digests of the files that this machine has neither in place nor copied."""
+        """List digests of the files that this machine has neither in place nor copied."""
         return sorted({digest for path, digest in self.files if not self._found(path, digest)})
 
     def keep(self, contents: Mapping[str, bytes]) -> None:
-        """Write the copies that are missing; `contents` by digest."""
+        """Write copies of missing files. contents: by digest."""
         for path, digest in self.files:
             if digest in contents and not self._found(path, digest):
                 copy = self._copy(path)
@@ -227,7 +229,7 @@ class SceneFiles:
                     temporary.write_bytes(contents[digest])
 
     def here(self) -> tuple[Path, dict[str, str]]:
-        """The scene and its values on this machine: in place, or copies of all."""
+        """Return the scene and its values on this machine: in place, or copies of all."""
         if all(_has(path, digest) for path, digest in self.files):
             return Path(self.scene), dict(self.values)
         for path, digest in self.files:  # paths are relative to the scene: copies lie together
@@ -258,6 +260,6 @@ def _stamp(path: str) -> tuple[int, int]:
 
 @lru_cache(4096)
 def _digest(path: str, *stamp: int) -> str:
-    """SHA-256 of a file, read anew only when its time or size has changed."""
+    """Return the SHA-256 of a file, read again only when its time or size has changed."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

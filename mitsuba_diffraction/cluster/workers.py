@@ -1,4 +1,4 @@
-"""Workers: started here, or those of a running cluster; which are of use, and what they are."""
+"""Workers: started here, or of a running cluster; which of them can serve."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def connect(
     *,
     patience: float = 10.0,
 ) -> Iterator[Any]:
-    """A `distributed.Client`: of `count` processes started here, or of a running cluster.
+    """Yield a `distributed.Client`: of `count` processes started here, or of a running cluster.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def connect(
     if count is not None:
         import dask
 
-        # by the processes that are started: Ctrl-C is for the client
+        # the processes that are started ignore Ctrl-C: it is for the client
         with _ctrl_c_ignored(), _silent_tracker():
             cluster = distributed.LocalCluster(
                 n_workers=count, threads_per_worker=1, processes=True,
@@ -80,7 +80,7 @@ def connect(
 
 
 def require_dask() -> Any:
-    """The module `distributed`."""
+    """Import the module `distributed`."""
     try:
         import distributed
     except ImportError as error:
@@ -91,7 +91,7 @@ def require_dask() -> Any:
 
 
 def check_workers(client: Any, variant: str | None) -> list[str]:
-    """Refuse workers that are of no use, by name; the addresses of all.
+    """Refuse workers that cannot serve, by name, and return the addresses of all.
 
     Parameters
     ----------
@@ -116,8 +116,8 @@ def check_workers(client: Any, variant: str | None) -> list[str]:
                 f"worker {address} has {about['nthreads']} Dask threads, of which Dr.Jit takes one "
                 "at a time: start it with 'dask worker --nthreads 1'"
             )
-    found = client.run(_trouble, versions(), variant, on_error="return")
-    answers = {a: trouble for a, trouble in found.items() if not isinstance(trouble, OSError)}
+    reasons = client.run(_trouble, versions(), variant, on_error="return")
+    answers = {a: trouble for a, trouble in reasons.items() if not isinstance(trouble, OSError)}
     for address, trouble in answers.items():  # the others have just gone
         if trouble is not None:
             raise DiffractionError(f"worker {address} is of no use: {one_line(str(trouble))}")
@@ -125,7 +125,7 @@ def check_workers(client: Any, variant: str | None) -> list[str]:
 
 
 def workers_of(client: Any) -> dict[str, Any]:
-    """What the scheduler knows of its workers, by address; of none while it is gone."""
+    """Return the scheduler's description of its workers, by address; nothing while it is gone."""
     if client.status != "running":  # it would be waited for
         return {}
     try:
@@ -135,7 +135,7 @@ def workers_of(client: Any) -> dict[str, Any]:
 
 
 def outcome(future: Any) -> Any:
-    """What a task gave: `Failed` if its workers died; None if it was lost with the scheduler."""
+    """Return the result of a task: `Failed` if its workers died; None if the scheduler lost it."""
     distributed = require_dask()
     try:
         return future.result()
@@ -150,7 +150,7 @@ def outcome(future: Any) -> Any:
 
 
 def wait_for_scheduler(client: Any, stop: Stop | None = None) -> None:
-    """Until it answers again, or `stop` is asked."""
+    """Wait until the scheduler answers again, or `stop` is asked."""
     end = time.monotonic() + _PATIENCE
     while client.status != "running" and not (stop and stop.asked):
         if client.status == "closed" or time.monotonic() > end:
@@ -162,7 +162,7 @@ def wait_for_scheduler(client: Any, stop: Stop | None = None) -> None:
 
 
 def memory_warnings(client: Any, needed: float) -> Iterator[str]:
-    """Lines on workers whose memory limit is below what a task is estimated to need, in bytes."""
+    """Yield lines on workers whose memory limit is below the estimated need of a task, in bytes."""
     for address, about in workers_of(client).items():
         limit = about.get("memory_limit") or 0
         if 0 < limit < needed:
@@ -173,7 +173,7 @@ def memory_warnings(client: Any, needed: float) -> Iterator[str]:
 
 
 def _trouble(wanted: tuple[str, ...], variant: str | None) -> str | None:
-    """What keeps this process from being of use; None if nothing does."""
+    """Return the reason why this process cannot serve, or None."""
     from ..scene.load import set_variant
 
     try:
@@ -186,7 +186,7 @@ def _trouble(wanted: tuple[str, ...], variant: str | None) -> str | None:
 
 
 def _apart(distributed: Any) -> Any:
-    """A plugin that takes workers out of the terminal's reach, late ones too.
+    """Return a plugin that takes workers out of the terminal's reach, late ones too.
 
     Mitsuba answers Ctrl-C itself while it renders, and a scalar variant leaves its pass unfinished.
     """
@@ -201,7 +201,7 @@ def _apart(distributed: Any) -> Any:
 
 @contextlib.contextmanager
 def _silent_tracker() -> Iterator[None]:
-    """Inside, Python starts its tracker of semaphores so that it says nothing of a client's end."""
+    """Silence Python's tracker of semaphores, which starts inside, at a client's abrupt end."""
     name, before = "PYTHONWARNINGS", os.environ.get("PYTHONWARNINGS")
     line = "ignore:resource_tracker:UserWarning"
     os.environ[name] = f"{before},{line}" if before else line

@@ -1,27 +1,25 @@
-"""How much of each boundary: the small-slope model's Jones matrix, (1−s) K + s B (NumPy, float64).
+"""Blend of Kirchhoff's matrix K and small slope's B: J = (1−s) K + s B (NumPy, float64).
 
-Perturbation's B is right where the surface is smooth against the wavelength, at any angle;
-Kirchhoff's K where it is rough and gentle, so that facets reflect. What counts is how rough it is
-at the scales that make the order q: waves much longer than 2π/q tilt and shift what makes the
-order, and do not make it; roughness much finer dims it. So
+B is right at any angle for surfaces that are smooth against the wavelength. K is right for rough
+and gentle surfaces, where facets reflect. The share s of B depends on the roughness at the scales
+that make the order q. Waves much longer than 2π/q tilt and shift the structure that makes the
+order; much finer roughness dims the order. Eq. (9) of docs/theory.md:
 
     s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3),
     σ_q² = Σ_q' |h_q'|² (1 − exp(−(4q'/q)⁴)) exp(−(q'/2q)⁴),
 
 where σ_q² is the height variance of the components q' from about a fifth to twice the order's
-frequency and R₀ = |(n−1)/(n+1)|² what a flat surface reflects along its normal. At κσ_q = 1.2 of a
-dielectric, 0.95 of a metal, both have half a share.
+frequency, and R₀ = |(n−1)/(n+1)|² the reflectance of a flat surface along its normal. s is ½ at
+κσ_q = 1.2 on a dielectric and at 0.95 on a metal. s is symmetric in ωi and ωo, and smooth in both
+and in the wavelength.
 
-The first correction to B is of order (κσ)². The local curvature approximation has it (Elfouhaily,
-Guignard, Awadallah and Thompson 2003, Waves in Random Media 13, 321): s = 1 − (κσ)²/2 for a
-sinusoid's first order. On a metal, whose K and B differ by the facet's tilt alone, that is right:
-it halves the errors of either polarisation on gentle aluminium at normal incidence. On a dielectric
-they differ by Brewster's angle too, there K is so far from B in oblique light that a small share of
-it does more harm than good. Hence R₀. Band and fourth power are chosen against rigorous solutions,
-see docs/validation.md. On metals neither another band nor other constants, nor weights of their own
-for the mean and the difference of the polarisations, make fewer gratings worse than Kirchhoff
-without giving away more elsewhere. s is symmetric in ωi and ωo, and smooth in both and in the
-wavelength.
+The term with R₀ is the first correction to B, of order (κσ)², in the local curvature approximation
+(Elfouhaily, Guignard, Awadallah and Thompson 2003, Waves in Random Media 13, 321): s = 1 − (κσ)²/2
+for a sinusoid's first order. On a metal K and B differ by the facet's tilt alone, and the
+correction halves the errors of either polarisation on gentle aluminium at normal incidence. On a
+dielectric K and B also differ by Brewster's angle: in oblique light K is so far off that even a
+small share of it increases the error. R₀ makes the correction small there. The band and the fourth
+power are chosen by rigorous solutions (docs/validation.md).
 """
 
 from __future__ import annotations
@@ -36,7 +34,7 @@ from . import boundary, fresnel
 from .boundary import Complex, Real
 from .fresnel import Index
 
-#: Components are told apart to this part of an octave; lines of a grating stay where they are.
+#: Frequencies within this part of an octave share a bin, at the mean frequency of their power.
 _BINS_PER_OCTAVE = 256
 #: Nodes of a `RoughnessTable`: linear interpolation is then within 5e-4 of the largest.
 NODES_PER_OCTAVE = 32
@@ -56,8 +54,8 @@ class ScaleRoughness:
     variance: Real
 
     @classmethod
-    def of(cls, heights: ArrayLike, pixel_size: tuple[float, float]) -> ScaleRoughness:
-        """That of heights (ny, nx) in µm; pixel_size is (dx, dy) in µm."""
+    def from_heights(cls, heights: ArrayLike, pixel_size: tuple[float, float]) -> ScaleRoughness:
+        """Return the roughness of heights (ny, nx) in µm; pixel_size is (dx, dy) in µm."""
         surface = np.asarray(heights, np.float64)
         ny, nx = surface.shape
         power = np.abs(np.fft.fft2(surface) / surface.size) ** 2
@@ -70,12 +68,12 @@ class ScaleRoughness:
         total = np.bincount(which, weight).astype(np.float64)
         # the mean over the power in a bin; a bin without any may lie anywhere
         moment = np.bincount(which, weight * length).astype(np.float64)
-        found = total > 0
-        return cls(moment[found] / total[found], total[found])
+        filled = total > 0
+        return cls(moment[filled] / total[filled], total[filled])
 
     @classmethod
     def mean(cls, patches: Sequence[ScaleRoughness]) -> ScaleRoughness:
-        """That of several patches of one surface, whose powers are averaged."""
+        """Average the variances of several patches of one surface."""
         frequency = np.concatenate([patch.frequency for patch in patches])
         variance = np.concatenate([patch.variance for patch in patches]) / len(patches)
         order = np.argsort(frequency, kind="stable")
@@ -97,7 +95,7 @@ class ScaleRoughness:
 
 
 def shares(frequency: ArrayLike, q: ArrayLike) -> Real:
-    """What components of these frequencies (n,) have in the σ_q² of an order's q, (..., n)."""
+    """Weights of components of these frequencies (n,) in the σ_q² of an order's q, (..., n)."""
     order = np.abs(np.asarray(q, np.float64))
     with np.errstate(divide="ignore", over="ignore", under="ignore"):
         ratio = (np.asarray(frequency) / order[..., None]) ** 4  # infinite at q = 0: no component
@@ -111,7 +109,7 @@ class RoughnessTable:
     Attributes
     ----------
     first : log2 of the lowest node's q in rad/µm; below it σ_q² is the first node's.
-    nodes : (n,) µm², at least two; beyond the last it is that one's.
+    nodes : (n,) µm², at least two; beyond the last σ_q² is the last node's.
     """
 
     first: float
@@ -130,7 +128,7 @@ class RoughnessTable:
 
 
 def weight(kappa: ArrayLike, variance: ArrayLike, index: Index) -> Real:
-    """s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3) of any shapes that broadcast.
+    """s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3), for any shapes that broadcast.
 
     Parameters
     ----------

@@ -1,24 +1,20 @@
-"""What the material makes of the light: Jones matrices of a pair of directions (NumPy, float64).
+"""Jones matrices K and B of a boundary for a pair of directions, bare or filmed (NumPy, float64).
 
-A surface of heights h diffracts the plane wave along −ωi into the plane wave along ωo with
+`reference.model` has the same matrices for a bare material in their shortest form, with the
+equations that they stand in. Tables, and the twins of the plugin, take them from here.
 
-    f = 4 cosθi cosθo · N / (λ² A w²) · ⟨|P|²⟩,   w = cosθi + cosθo,
-
-where ⟨|P|²⟩ and A know the heights alone (see `reference`), and N, the mean power of the Jones
-matrix for unpolarised light, knows directions and index alone. Two matrices are given here:
-
-- the *small-slope approximation* of first order (Voronovich 1985), whose matrix B is Rice's (1951)
-  coefficient of first-order perturbation: exact for gentle slopes at any angle as κh → 0;
-- *Kirchhoff's* tangent plane, whose matrix K is Fresnel's at the half vector: exact for wide
-  facets, as the wavelength → 0.
+- B is the small-slope approximation of first order (Voronovich 1985), with the coefficients of
+  Rice (1951): exact for gentle slopes at any angle as κh → 0.
+- K is Kirchhoff's tangent plane, Fresnel's coefficients at the half vector: exact for wide facets
+  as the wavelength → 0.
 
 Both are Fresnel's coefficients in the mirror direction (Elfouhaily and Guérin 2004, "A critical
 survey of approximate scattering wave theories from random rough surfaces", sections 3 and 4).
 
-Conventions. Time exp(−iωt), so an absorbing index is n + ik with k ≥ 0. Light travels along
-d = −ωi, then along d = ωo; s = ẑ×d/|ẑ×d| and p = d×s, so that (s, p, d) is right-handed, as
-Mitsuba's bases are. Then r_s and r_p of a mirror have opposite signs at normal incidence. Row 0
-and column 0 of a matrix are s, row 1 and column 1 are p: E_out = J E_in.
+Conventions: time is exp(−iωt), so an absorbing index is n + ik with k ≥ 0. Light travels along
+d = −ωi, then along d = ωo. The axes are s = ẑ×d/|ẑ×d| and p = d×s, so that (s, p, d) is
+right-handed, as Mitsuba's bases are. Then r_s and r_p of a mirror have opposite signs at normal
+incidence. Row 0 and column 0 of a matrix are s, row 1 and column 1 are p: E_out = J E_in.
 """
 
 from __future__ import annotations
@@ -47,24 +43,24 @@ def small_slope(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
         B_ps =  (ε−1) q'  ẑ·(k̂0×k̂)                 / ((εq+q')(q0+q0'))    s in, p out
         B_sp =  (ε−1) q0' ẑ·(k̂0×k̂)                 / ((q+q')(εq0+q0'))    p in, s out
 
-    These are products of the fields E0 and E that light along ωi and along ωo makes at the flat
-    interface, (ε−1) (E·E0 tangential + D D0/ε normal) over 4 q q0, by the reciprocity theorem
-    (Elson 1977, Applied Optics 16, 2872). Under a film that follows the heights both interfaces
-    are displaced alike, and their products add up; for k = k0 they are r_s and r_p of the film.
+    By the reciprocity theorem they are products of the fields E0 and E of light along ωi and along
+    ωo at the flat interface, (ε−1) (E·E0 tangential + D D0/ε normal) over 4 q q0 (Elson 1977,
+    Applied Optics 16, 2872). A film that follows the heights has two interfaces, which are
+    displaced alike: their products add up. For k = k0 the sums are r_s and r_p of the film.
 
     Parameters
     ----------
     wi, wo : (..., 3) unit vectors above the surface, pointing away from it.
-    index : (...) n + ik of the material over that of the medium above it, finite, k ≥ 0; or that
-        under a film, `fresnel.Filmed`.
+    index : (...) n + ik of the material over that of the medium above it, finite, k ≥ 0; or
+        the index under a film, `fresnel.Filmed`.
     """
     s_in, s_out = polarisation_axes(wi, wo)
     incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
     sine0, sine = np.hypot(*_xy(incident)), np.hypot(*_xy(outgoing))
-    # s turned by a quarter of a turn is k̂, so products of the axes are those of k̂
+    # k̂ is s turned by 90°, so products of the s axes equal products of k̂
     (x0, y0), (x, y) = _xy(s_in), _xy(s_out)
     dot, cross = x0 * x + y0 * y, x0 * y - y0 * x
-    found = [
+    products = [
         jones_matrix(
             ss=-there.s * came.s * dot,
             sp=there.s * came.x * cross,
@@ -78,11 +74,11 @@ def small_slope(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
             strict=True,
         )
     ]
-    return np.asarray(sum(found[1:], found[0]))
+    return np.asarray(sum(products[1:], products[0]))
 
 
 def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
-    """Jones matrices K of the tangent-plane approximation, (..., 2, 2); arguments as above.
+    """Jones matrices K of the tangent plane, (..., 2, 2); arguments as for `small_slope`.
 
     Fresnel's coefficients of a facet that mirrors ωi to ωo, between the axes of that facet and
     those of the surface, times (1 + ωi·ωo)/(2 cosθi cosθo): for unpolarised light
@@ -108,54 +104,54 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
 def polarisation_axes(wi: ArrayLike, wo: ArrayLike) -> tuple[Real, Real]:
     """Unit vectors s = ẑ×d/|ẑ×d| of the incident and the outgoing light, (..., 3) each.
 
-    Along the normal, where any axis would do, s is that of the other direction; y if both are
-    (light in the x–z plane).
+    Along the normal any axis would do: s is taken from the other direction, or y if both directions
+    are the normal (light in the x–z plane).
     """
     incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
     incident, outgoing = np.broadcast_arrays(incident, outgoing)
-    s_in, found_in = _horizontal(-incident)
-    s_out, found_out = _horizontal(outgoing)
+    s_in, slanted_in = _horizontal(-incident)
+    s_out, slanted_out = _horizontal(outgoing)
     y = np.array([0.0, 1.0, 0.0])
-    first = np.where(found_in, s_in, np.where(found_out, s_out, y))
-    return first, np.where(found_out, s_out, first)
+    first = np.where(slanted_in, s_in, np.where(slanted_out, s_out, y))
+    return first, np.where(slanted_out, s_out, first)
 
 
 def unpolarised(jones: ArrayLike) -> Real:
-    """N = ½ Σ|J|², the power that unpolarised light of unit power has after `jones`, (...)."""
-    matrix = np.asarray(jones, np.complex128)
-    return np.asarray(0.5 * np.sum(np.abs(matrix) ** 2, axis=(-2, -1)), np.float64)
+    """N = ½ Σ|J|², the power of unpolarised light of unit power after `jones`, (...)."""
+    entries = np.asarray(jones, np.complex128)
+    return np.asarray(0.5 * np.sum(np.abs(entries) ** 2, axis=(-2, -1)), np.float64)
 
 
 def mueller(jones: ArrayLike) -> Real:
-    """Mueller matrices (..., 4, 4) of Jones matrices, for the Stokes vectors that Mitsuba has.
+    """Mueller matrices (..., 4, 4) of Jones matrices, for Mitsuba's Stokes vectors.
 
     S = (|E_s|²+|E_p|², |E_s|²−|E_p|², 2 Re E_s E_p*, 2 Im E_s E_p*): with axes (s, p, d) and time
-    as above, S₃ > 0 turns clockwise for who looks into the light.
+    as above, S₃ > 0 turns clockwise for an observer who looks into the light.
     """
-    matrix = np.asarray(jones, np.complex128)
-    # E_out ⊗ E_out* = (J ⊗ J*) (E_in ⊗ E_in*), and Stokes' vector is a linear map of that
-    pairs = np.einsum("...ik,...jl->...ijkl", matrix, matrix.conj())
-    coherency = pairs.reshape(*matrix.shape[:-2], 4, 4)
+    entries = np.asarray(jones, np.complex128)
+    # E_out ⊗ E_out* = (J ⊗ J*) (E_in ⊗ E_in*), and the Stokes vector is a linear map of it
+    pairs = np.einsum("...ik,...jl->...ijkl", entries, entries.conj())
+    coherency = pairs.reshape(*entries.shape[:-2], 4, 4)
     stokes = np.array([[1, 0, 0, 1], [1, 0, 0, -1], [0, 1, 1, 0], [0, -1j, 1j, 0]])
     return np.asarray((stokes @ coherency @ np.linalg.inv(stokes)).real, np.float64)
 
 
 def _horizontal(direction: Real) -> tuple[Real, NDArray[np.bool_]]:
-    """ẑ×d normalised (arbitrary along the normal), and whether it is any length to speak of."""
+    """ẑ×d normalised (arbitrary along the normal), and whether d differs from the normal."""
     x, y = _xy(direction)
     length = np.hypot(x, y)
-    found = length > _NORMAL
-    safe = np.where(found, length, 1.0)
-    return np.stack([-y / safe, x / safe, np.zeros_like(x)], axis=-1), found[..., None]
+    slanted = length > _NORMAL
+    safe = np.where(slanted, length, 1.0)
+    return np.stack([-y / safe, x / safe, np.zeros_like(x)], axis=-1), slanted[..., None]
 
 
 def facet_axis(incident: Real, outgoing: Real, fallback: Real) -> Real:
-    """s of a facet that mirrors ωi to ωo: normal to both; any where they are one direction."""
+    """s of a facet that mirrors ωi to ωo, normal to both; `fallback` where they are parallel."""
     # (ωi+ωo)×(−ωi) = ωi×ωo: the direction of ẑ×d with the half vector for ẑ
     normal = np.cross(incident, outgoing)
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
-    found = length > _NORMAL
-    return np.where(found, normal / np.where(found, length, 1.0), fallback)
+    apart = length > _NORMAL
+    return np.where(apart, normal / np.where(apart, length, 1.0), fallback)
 
 
 def turn(to: Real, start: Real, direction: Real) -> Complex:
@@ -166,7 +162,7 @@ def turn(to: Real, start: Real, direction: Real) -> Complex:
 
 
 def jones_matrix(*, ss: ArrayLike, sp: ArrayLike, ps: ArrayLike, pp: ArrayLike) -> Complex:
-    """[[ss, sp], [ps, pp]]: first the outgoing, then the incident polarisation."""
+    """[[ss, sp], [ps, pp]]; the first letter is the outgoing polarisation."""
     entries = np.broadcast_arrays(*(np.asarray(x, np.complex128) for x in (ss, sp, ps, pp)))
     return np.stack(entries, axis=-1).reshape(*entries[0].shape, 2, 2)
 

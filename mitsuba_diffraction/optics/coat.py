@@ -1,23 +1,23 @@
 """A flat clear coat over a structure, too thick for its two faces to interfere (NumPy, float64).
 
 Light is refracted into the coat, diffracted there at λ/n, and refracted out again. Tangential parts
-k·u stay what they are; the normal part of ωi + ωo in optical units, n w', grows by up to n, and so
-does κ. Each way the face transmits the shares T_s and T_p of the powers of both polarisations
-(Born and Wolf, section 1.5.2), and cosθ dω grows by n² on the way out, so that
+k·u do not change; the normal part n w' of ωi + ωo, in optical units, grows by up to n, and so does
+κ. At each passage the face transmits T_s and T_p of the powers of both polarisations (Born and
+Wolf, section 1.5.2), and cosθ dω grows by n² on the way out, so that
 
     f = 1/n² · 4 cosθi' cosθo' · N' / (λ'² A w'²) · ⟨|P|²⟩,   J'_ab = √(T_a(ωo) T_b(ωi) G_ab) J_ab,
 
-and the face itself is a mirror. G is light that the face sends back to the structure. Between two
-mirrors of reflectances R and ρ the powers add up to 1/(1 − Rρ) (Born and Wolf, section 7.6, without
-interference); with ρ_a(ωo), ρ_b(ωi) of the flat structure and the mean √(R_a ρ_a R_b ρ_b) of both
+and the face itself is a mirror. G sums the light that the face sends back to the structure. Between
+two mirrors of reflectances R and ρ the powers add up to 1/(1 − Rρ) (Born and Wolf, section 7.6,
+without interference). With ρ_a(ωo), ρ_b(ωi) of the flat structure and the geometric mean of both
 directions,
 
     G_ab = 1 / max(1 − √(R_a ρ_a R_b ρ_b), max(ρ_a, ρ_b) (1 − min(R_a, R_b))).
 
-For a flat structure that is the exact sum. It is reciprocal; and by the second term T G ρ is at
-most 1 in either direction, so that a coat never reflects more than it gets while the structure
+For a flat structure this sum is exact. It is reciprocal. By the second term T G ρ is at most 1 in
+either direction, so a coated structure never reflects more than it receives while the structure
 reflects no more than a flat one. Light that the structure sends beyond the critical angle is lost,
-though all of it comes back and some leaves in the end: docs/validation.md says how much.
+although the face returns all of it and some leaves in the end (docs/validation/layers.md).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""From spectra to colours, through colour-science: the one place of the project that does it.
+"""Conversion of spectra to colours, by colour-science; no other module of the project does it.
 
 The observer is the CIE 1931 2° standard observer, the display sRGB (IEC 61966-2-1), and the eye is
 adapted to the illuminant, so that what reflects all wavelengths alike is white, (1, 1, 1), under
@@ -23,8 +23,8 @@ SHORTEST, LONGEST = 360.0, 830.0
 _OBSERVER = "CIE 1931 2 Degree Standard Observer"
 
 
-#: Mean wavelength of what makes linear red, green and blue under D65, nm: ∫λ s̄ dλ / ∫s̄ dλ. What is
-#: even in λ has there its value in the channel.
+#: Mean wavelength of linear red, green and blue under D65, nm: ∫λ s̄ dλ / ∫s̄ dλ. A quantity that is
+#: linear in λ has its channel's value there.
 RGB_WAVELENGTHS = (642.4, 543.0, 440.8)
 
 
@@ -37,11 +37,11 @@ def check_illuminant(illuminant: str) -> None:
 
 
 def response(wavelength: ArrayLike, illuminant: str = "D65") -> NDArray[np.float64]:
-    """What a reflectance of 1 adds to X, Y and Z per nanometre, shape (..., 3), 1/nm.
+    """Contribution of a reflectance of 1 to X, Y and Z per nanometre, shape (..., 3), 1/nm.
 
-    This is S(λ)·(x̄, ȳ, z̄)(λ) / ∫ S ȳ dλ: a reflectance of 1 at all wavelengths has Y = 1. The
-    tables, at 1 nm (the observer) and 5 nm (D65), are interpolated linearly, as CIE 15 asks for
-    D65; outside 360–830 nm the result is 0.
+    The result is S(λ)·(x̄, ȳ, z̄)(λ) / ∫ S ȳ dλ, so a reflectance of 1 at all wavelengths has Y = 1.
+    The tables, at 1 nm (the observer) and 5 nm (D65), are interpolated linearly, as CIE 15
+    prescribes for D65; outside 360–830 nm the result is 0.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def response(wavelength: ArrayLike, illuminant: str = "D65") -> NDArray[np.float
 
 
 def daylight(wavelength: ArrayLike) -> NDArray[np.float64]:
-    """D65 of luminance 1 as renderers count: scaled so that ∫ S ȳ dλ = ∫ ȳ dλ, shape of λ (nm)."""
+    """D65 of luminance 1, scaled as in renderers so that ∫ S ȳ dλ = ∫ ȳ dλ, shape of λ (nm)."""
     import colour
 
     observer, light = colour.MSDS_CMFS[_OBSERVER], colour.SDS_ILLUMINANTS["D65"]
@@ -78,34 +78,34 @@ def linear_srgb(xyz: NDArray[np.floating], illuminant: str = "D65") -> NDArray[n
 def metal_tint(
     wavelengths: ArrayLike, reflectance: ArrayLike, channels: ArrayLike
 ) -> NDArray[np.float64]:
-    """T (3, 3), for colours of a metal: T @ (channels · colour) stands for ∫ R(λ) s̄(λ) P(λ) dλ.
+    """T (3, 3) for colours of a metal: T @ (channels · colour) approximates ∫ R(λ) s̄(λ) P(λ) dλ.
 
-    A metal of a colour of its own weighs the wavelengths within a channel differently, so that one
-    reflectance a channel makes lines of light of the wrong hue. T is right for white light
-    (P = 1), and else of least squares over lines of one wavelength.
+    A coloured metal weights the wavelengths within a channel, so that one reflectance for each
+    channel gives spectral lines a wrong hue. T is exact for white light (P = 1), and otherwise the
+    least-squares fit over lines of one wavelength.
 
     Parameters
     ----------
     wavelengths : (n,) nm, evenly over the visible.
-    reflectance : (n,) R there.
-    channels : (3,) what red, green and blue are multiplied with instead; where next to nothing is
-        reflected T is 1.
+    reflectance : (n,) R at these wavelengths.
+    channels : (3,) reflectances of red, green and blue that T corrects; T is 1 where one is below
+        1e-9.
     """
-    own = np.asarray(channels, np.float64)
-    if own.min() < 1e-9:
+    factors = np.asarray(channels, np.float64)
+    if factors.min() < 1e-9:
         return np.eye(3)
     lines = linear_srgb(response(wavelengths))  # s̄, (n, 3)
     reflected = np.asarray(reflectance, np.float64)[:, None] * lines
     white = lines.sum(axis=0)
     inverse = np.linalg.inv(lines.T @ lines)
-    found = reflected.T @ lines @ inverse
+    fit = reflected.T @ lines @ inverse
     multiplier = inverse @ white / (white @ inverse @ white)
-    found += np.outer(reflected.sum(axis=0) - found @ white, multiplier)
-    return np.asarray(found / own)
+    fit += np.outer(reflected.sum(axis=0) - fit @ white, multiplier)
+    return np.asarray(fit / factors)
 
 
 def encode_srgb(linear: ArrayLike) -> NDArray[np.float64]:
-    """What a display is sent, 0 to 1: clipped, with the transfer curve of sRGB."""
+    """Encode linear sRGB for a display: clip to 0 to 1 and apply the transfer curve of sRGB."""
     import colour
 
     return np.asarray(colour.cctf_encoding(np.clip(linear, 0.0, 1.0), function="sRGB"))
@@ -114,13 +114,13 @@ def encode_srgb(linear: ArrayLike) -> NDArray[np.float64]:
 def delta_e(
     reference: ArrayLike, other: ArrayLike, *, exposure: float | None = None, least: float = 0.01
 ) -> NDArray[np.float64]:
-    """ΔE2000 between what a display shows of two pictures; NaN where there is next to no light.
+    """ΔE2000 between two pictures as a display shows them; NaN where there is almost no light.
 
     Parameters
     ----------
     reference, other : linear sRGB, shape (..., 3).
-    exposure : factor on both; by default the one that makes the reference's 95th percentile of
-        Y white. Then both are clipped to what the display shows.
+    exposure : factor on both; by default the 95th percentile of the reference's Y becomes white.
+        Then both are clipped to the display's range.
     least : Y of the reference, exposed, that a pixel must have; 0 counts all.
     """
     import colour

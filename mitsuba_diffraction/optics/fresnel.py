@@ -16,14 +16,14 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Filmed:
-    """The index of a material under a thin film, wherever an index is asked for.
+    """Index of a material under a thin film; accepted wherever an index is.
 
     Attributes
     ----------
     index : (...) n + ik of the material over that of the medium above the film.
-    film : (...) n + ik of the film, likewise.
-    depth : (...) 2πd/λ of the film's thickness d, λ in the medium above it. The film's lower face
-        is the upper one displaced by d along the vertical.
+    film : (...) n + ik of the film over that of the medium above it.
+    depth : (...) 2πd/λ with the film's thickness d and the wavelength λ in the medium above it. The
+        film's lower face is the upper one displaced by d along the vertical.
     """
 
     index: ArrayLike
@@ -31,11 +31,11 @@ class Filmed:
     depth: ArrayLike
 
     def tilted(self, cosine: ArrayLike) -> Filmed:
-        """That on a facet whose normal has this cosine to the vertical, along which d is."""
+        """Return the film on a facet whose normal has this cosine to the vertical."""
         return Filmed(self.index, self.film, np.asarray(self.depth) * np.asarray(cosine))
 
     def __getitem__(self, key: Any) -> Filmed:
-        """That of some elements of all three, which have one shape then."""
+        """Select elements of all three parts, broadcast to one shape."""
         return Filmed(*(part[key] for part in np.broadcast_arrays(*self.parts)))
 
     @property
@@ -47,7 +47,7 @@ class Filmed:
         return material, film, depth
 
 
-#: n + ik over that of the medium above, of any shape, or that of a material under a film.
+#: Index n + ik over that of the medium above, of any shape, or of a material under a film.
 Index = ArrayLike | Filmed
 
 
@@ -71,9 +71,9 @@ class Face:
 
 
 def faces(cosine: ArrayLike, squared_sine: ArrayLike, index: Index) -> list[Face]:
-    """The interface of a material, or both of its film, and what light of an angle does there.
+    """Return fields at the interface of a material, or at both interfaces of its film.
 
-    Born and Wolf, Principles of Optics, section 1.6.4, of one film.
+    Films are those of Born and Wolf, Principles of Optics, section 1.6.4.
     """
     q, square = np.asarray(cosine, np.float64), np.asarray(squared_sine, np.float64)
     if not isinstance(index, Filmed):

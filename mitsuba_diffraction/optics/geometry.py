@@ -19,7 +19,7 @@ def sigma_of(coherence_width: float) -> float:
 
 
 def check_angles(theta: float, phi: float) -> None:
-    """Refuse the direction of a light that is none.
+    """Refuse a light's direction that is not above the horizon.
 
     Parameters
     ----------

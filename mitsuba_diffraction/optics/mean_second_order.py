@@ -1,35 +1,35 @@
-"""Light that heights under a film scatter there and back: the second order's mean (NumPy, float64).
+"""Mean of the second order of small slope under a film, for either direction (NumPy, float64).
 
-Small slope's B is of first order in the heights. Of what the next orders add to it on average over
-Gaussian heights (Voronovich 1994, Waves in Random Media 4, 337) one part is of either direction
-alone: on its way to and from the order the wave is scattered to some other wave and back. That is
-what the coherent wave loses (Ishimaru 1978, Wave Propagation and Scattering in Random Media,
-chapter 14). Under a film the other wave is on another part of the fringes, which counts where they
-are narrow. With r of the flat film and r₂ what the second order adds to it on average, the power of
-the mirrored wave is exp(2m) times that of first order, |r|² exp(−(κσ)²),
+Small slope's B is of first order in the heights. One part of the next orders' mean over Gaussian
+heights (Voronovich 1994, Waves in Random Media 4, 337) depends on one direction alone: on its way
+to or from the order, the wave is scattered to another wave and back. The coherent wave loses this
+light (Ishimaru 1978, Wave Propagation and Scattering in Random Media, chapter 14). Under a film the
+other wave is on another part of the fringes, which matters where they are narrow. With r of the
+flat film, and r₂ the mean that the second order adds to it, the power of the mirrored wave is
+exp(2m) times that of first order, |r|² exp(−(κσ)²),
 
     m = Σ Re r* (r₂ + (κσ)² r/2) / Σ |r|²   over s and p,   κ = 2k cosθ, σ² the variance,
 
-and what the film adds to the power of any order, from ωi to ωo, is taken for
+and the film's effect on the power of any order, from ωi to ωo, is taken as
 
-    g(ωi) g(ωo),   ln g = m of the film less m of the material without it, limited (`LIMIT`):
+    g(ωi) g(ωo),   ln g = m of the film − m of the material without it, limited (`LIMIT`).
 
-symmetric, 1 where the film is none, and of heights times a factor with ln g times its square. Only
-waves in between that are φ apart in the film's fringes count, each by 1 − exp(−φ²),
+It is symmetric, and 1 for a film without contrast; a factor on the heights multiplies ln g by its
+square. A wave in between has the weight 1 − exp(−φ²), with φ its distance in the film's fringes:
 
-    φ = 2d Re(β(k) − β(u)),   β = √(ε_film − k²):
+    φ = 2d Re(β(k) − β(u)),   β = √(ε_film − k²).
 
-what the others take away, light that changes its direction gives back, as it does without a film,
-where m gains nothing (docs/validation.md). The heights' spectrum is taken for isotropic,
-so that g is of the angle to the normal alone.
+Light that changes its direction returns what the other waves take, as it does without a film, where
+m gains nothing (docs/validation/layers.md). The heights' spectrum is assumed isotropic, so that g
+depends on the angle to the normal alone.
 
 r₂ is from the boundary conditions at both faces, both of the heights h: E_t + ∇h E_z and
 H_t + ∇h H_z are continuous. With [x] for x above a face less x below it, a wave of tangential k
 drives waves of u = k + ξ, to the first order, by jumps of the tangential fields
 
-    J_E = i u [1/ε] D_z,   J_H = i [ε] ẑ×E_t,
+    J_E = i u [1/ε] D_z,   J_H = i [ε] ẑ×E_t.
 
-and these, E' and H', with all of second order at one place, drive the first wave by
+Their fields E' and H', and the terms of second order at one point, drive the first wave by jumps
 
     J_E = i k [E'_z] + ½ [ε] E_t,   J_H = i ẑ×[ε E'_t] − ½ [ε] H_t.
 
@@ -53,19 +53,19 @@ Real = NDArray[np.float64]
 
 #: Raised whenever the computation changes.
 VERSION = 2
-#: x is taken for x/(1 + (x/LIMIT)⁴): where the second order is as large as the first, no series in
-#: the heights says anything, and facets reflect.
+#: ln g = x is replaced by x/(1 + (x/LIMIT)⁴): where the second order is as large as the first, a
+#: series in the heights does not converge, and facets reflect.
 LIMIT = 0.5
-#: Angles to the normal at which ln g is computed for as many or more; linear in between.
+#: Number of angles from which on ln g is interpolated linearly between this many nodes.
 NODES = 46
 #: Azimuths of ξ, from 0 to π.
 _AZIMUTHS = 12
-#: i|ε − 1| times this is added to ε of film and material, so that a mode that the film guides is no
-#: pole between nodes. A third or three times of it changes docs/validation.md's films by 0.5 %.
+#: i|ε − 1| times this is added to ε of film and material, so that a guided mode is no pole between
+#: nodes. A third or three times of it changes the films of docs/validation/layers.md by 0.5 %.
 _WIDTH = 0.01
-#: A spectrum is of bands, so many an octave, and each of a few lines: g has no finer features.
+#: Bands of the spectrum in an octave, and lines in a band: g has no finer features.
 _PER_OCTAVE, _LINES = 4, 3
-#: Share of the variance that is none.
+#: Bands with less than this share of the variance are left out.
 _LEAST = 1e-5
 _HORIZON = np.radians(89.5)
 
@@ -77,27 +77,27 @@ def mean_gain(
     wavenumber: float,
     height_scale: float = 1.0,
 ) -> Real:
-    """g of light at angles of this cosine to the normal, shaped as the cosine.
+    """g at angles of this cosine to the normal, shaped as the cosine.
 
     Parameters
     ----------
-    index : of the film at one wavelength.
+    index : the film at one wavelength.
     roughness : of the surface.
     wavenumber : 2π/λ in the medium above the film, rad/µm.
     height_scale : factor on the heights.
     """
-    given = np.clip(np.asarray(cosine, np.float64), np.cos(_HORIZON), 1.0)
-    if given.size < NODES:
-        found = exponents(given.ravel(), index, roughness, wavenumber).reshape(given.shape)
+    clipped = np.clip(np.asarray(cosine, np.float64), np.cos(_HORIZON), 1.0)
+    if clipped.size < NODES:
+        log_gain = exponents(clipped.ravel(), index, roughness, wavenumber).reshape(clipped.shape)
     else:
         numbers = (complex(part) for part in index.parts)
         nodes = _at_nodes(roughness, *numbers, float(wavenumber))
-        found = np.interp(np.arccos(given), _angles(), nodes)
-    return limited(found * height_scale**2)
+        log_gain = np.interp(np.arccos(clipped), _angles(), nodes)
+    return limited(log_gain * height_scale**2)
 
 
 def limited(exponent: ArrayLike) -> Real:
-    """g, (...), of its logarithm as it is without a limit."""
+    """g, (...), from its logarithm before the limit."""
     x = np.asarray(exponent, np.float64)
     return np.exp(x / (1.0 + (x / LIMIT) ** 4))
 
@@ -105,7 +105,7 @@ def limited(exponent: ArrayLike) -> Real:
 def exponents(
     cosine: Real, index: Filmed, roughness: ScaleRoughness | RoughnessTable, wavenumber: float
 ) -> Real:
-    """ln g (t,) at cosines (t,), without its limit; arguments as `mean_gain`."""
+    """ln g (t,) before the limit at cosines (t,); other arguments as for `mean_gain`."""
     material, film, depth = index.parts
     bare, heights = Filmed(material, film, np.zeros_like(depth)), _heights(roughness, wavenumber)
     return _of_waves(cosine, index, *heights, index) - _of_waves(cosine, bare, *heights, index)
@@ -114,7 +114,7 @@ def exponents(
 def coherent(
     cosine: Real, index: complex, roughness: ScaleRoughness | RoughnessTable, wavenumber: float
 ) -> Real:
-    """m (t,) of a material without a film, all waves in between; arguments likewise."""
+    """m (t,) of a material without a film, over all waves in between, at cosines (t,)."""
     return _of_waves(cosine, Filmed(index, index, 0.0), *_heights(roughness, wavenumber))
 
 
@@ -122,7 +122,7 @@ def _heights(roughness: ScaleRoughness | RoughnessTable, wavenumber: float) -> t
     """|ξ| of the heights' components, (n,), and their variances."""
     spectrum = _spectrum(roughness)
     step = _lines(spectrum.frequency / wavenumber)
-    # What is finer than light scatters it to no wave that travels
+    # Components finer than the wavelength scatter into no wave that travels
     power = np.exp(-((0.5 * step) ** 4)) * wavenumber**2
     return step, power * np.repeat(spectrum.variance / _LINES, _LINES)
 
@@ -144,7 +144,7 @@ def _angles() -> Real:
 
 @lru_cache(maxsize=32)
 def _spectrum(roughness: ScaleRoughness | RoughnessTable) -> ScaleRoughness:
-    """Few components; of a table the positive ones that have its σ_q²."""
+    """A few components of the roughness; for a table, positive components with its σ_q²."""
     if isinstance(roughness, RoughnessTable):
         return _components(roughness)
     place = np.round(np.log2(roughness.frequency) * _PER_OCTAVE).astype(int)
@@ -156,12 +156,13 @@ def _spectrum(roughness: ScaleRoughness | RoughnessTable) -> ScaleRoughness:
 
 
 def _lines(frequency: Real) -> Real:
-    """(n · _LINES,) of bands (n,)."""
+    """Frequencies (n · _LINES,) of the lines in bands (n,)."""
     places = (np.arange(_LINES) + 0.5) / _LINES - 0.5
     return np.asarray(frequency[:, None] * 2.0 ** (places / _PER_OCTAVE)).ravel()
 
 
 def _components(roughness: RoughnessTable) -> ScaleRoughness:
+    """Fit positive components to the nodes of a table."""
     nodes = roughness.frequencies
     first, last = np.log2(nodes[[0, -1]])
     frequency = 2.0 ** np.arange(first, last + 1.0, 1.0 / _PER_OCTAVE)
@@ -173,7 +174,7 @@ def _components(roughness: RoughnessTable) -> ScaleRoughness:
 def _of_waves(
     cosine: Real, index: Filmed, step: Real, power: Real, fringes: Filmed | None = None
 ) -> Real:
-    """m (t,) of one film; step, power : `_heights`; fringes : of a film, in which φ is."""
+    """m (t,) of one film; step, power : from `_heights`; fringes : the film that defines φ."""
     sine = np.sqrt(1.0 - cosine**2)
     azimuth = _azimuths()
     ux = sine[:, None, None] + step[:, None] * np.cos(azimuth)
@@ -197,9 +198,9 @@ def _of_waves(
 
 
 def _apart(square: Real, between: Real, index: Filmed) -> Real:
-    """φ of waves of two squared tangential lengths."""
+    """φ between waves of two squared tangential lengths."""
     _, film, depth = index.parts
-    first, second = (decaying_root(film**2 - one + 0j).real for one in (square, between))
+    first, second = (decaying_root(film**2 - k2 + 0j).real for k2 in (square, between))
     return np.asarray(2.0 * depth.real * (first - second))
 
 
@@ -210,7 +211,8 @@ def _azimuths() -> Real:
 class _Light(NamedTuple):
     """Tangential fields of light of one polarisation below both faces, (2, t).
 
-    amplitude : E across k of s light, or H across it of p light; other : H, or E, along k.
+    amplitude : E across k of s light, or H across k of p light.
+    other : H along k of s light, or E along k of p light.
     """
 
     p: bool
@@ -219,7 +221,7 @@ class _Light(NamedTuple):
 
 
 def _jumps(between: _Film, came: _Light, sine: Real, turn: tuple[Real, Real]) -> Complex:
-    """[E'_z], [ε E'_t] along k and across it, of waves in between, (3, 2 faces, ...)."""
+    """Jumps [E'_z], [ε E'_t] along k and across k of waves in between, (3, 2 faces, ...)."""
     cos, sin = turn
     length = np.sqrt(between.square)
     first, second = came.amplitude[:, :, None, None], came.other[:, :, None, None]
@@ -239,8 +241,8 @@ def _jumps(between: _Film, came: _Light, sine: Real, turn: tuple[Real, Real]) ->
 class _Film:
     """Waves of one tangential length in air, film and material, of either polarisation.
 
-    Of s light E across k is called the amplitude, and H along it is −q times that of a wave that
-    goes up; of p light H across, and E along is q/ε times that.
+    The amplitude of s light is E across k; for a wave that goes up H along k is −q times it. The
+    amplitude of p light is H across k; E along k is q/ε times it.
     """
 
     def __init__(self, square: Real, index: Filmed) -> None:
@@ -256,12 +258,12 @@ class _Film:
     def came(self, p: bool) -> _Light:
         """Fields of light that comes down from above with an amplitude of 1."""
         above = self._ratios(p)[0]
-        one, nothing = np.ones_like(above), np.zeros_like(above)
-        found = self.driven(p, np.stack([one, nothing]), np.stack([-above, nothing]))
-        return _Light(p, *(below for _, below in found))
+        unit, zero = np.ones_like(above), np.zeros_like(above)
+        fields = self.driven(p, np.stack([unit, zero]), np.stack([-above, zero]))
+        return _Light(p, *(below for _, below in fields))
 
     def returned(self, came: _Light, jumps: Complex, sine: Real, variance: float) -> Complex:
-        """What waves in between add to the amplitude that goes up, (t,)."""
+        """Amplitude that waves in between add to the wave that goes up, (t,)."""
         half = 0.5 * variance * self.steps[:, None]
         normal, along, across = jumps
         if came.p:
@@ -271,9 +273,9 @@ class _Film:
         return np.asarray(self.driven(came.p, *driving)[0][0, 0])
 
     def driven(self, p: bool, jump: Complex, other: Complex) -> tuple[Complex, Complex]:
-        """Amplitudes, and the fields along k, (2, 2 faces, ...): above each face and below it.
+        """Amplitudes, and fields along k, (2, 2 faces, ...): above each face and below it.
 
-        jump, other : (2 faces, ...) by how much what drives them jumps, in either.
+        jump, other : (2 faces, ...) driving jumps of the amplitude and of the field along k.
         """
         above, film, below = self._ratios(p)
         once = self._once
@@ -289,7 +291,7 @@ class _Film:
         return amplitude, np.array(along)
 
     def _ratios(self, p: bool) -> list[Complex]:
-        """Fields along k over the amplitude, of waves that go up."""
+        """Ratio of the field along k to the amplitude for waves that go up."""
         if p:
             return [q / e for q, e in zip(self._q, self.epsilons, strict=True)]
         return [-q for q in self._q]

@@ -1,8 +1,8 @@
 """The second order of the small-slope approximation, as a factor on the first (NumPy, float64).
 
 Voronovich 1994 (Waves in Random Media 4, 337): with B and B₂ the first two orders of perturbation,
-R = −2i q0 B ĥ + q0 Σ_u B₂ ĥ ĥ, spectra ĥ and a of the heights and of exp(−iQh), Q = q + q0, and ξ
-what the surface adds to a wave, evanescent ones too,
+R = −2i q0 B ĥ + q0 Σ_u B₂ ĥ ĥ, ĥ and a the spectra of the heights and of exp(−iQh), Q = q + q0, and
+ξ the frequency that the surface adds to a wave (evanescent waves included),
 
     R(k) = 2 q0/Q · [B a(k−k0) + i/4 Σ_ξ M ĥ(ξ) a(k−k0−ξ)],   M = B₂(k−ξ) + B₂(k0+ξ) + 2QB.
 
@@ -13,13 +13,16 @@ spectrum of (∂_l h)² exp(−iQh). For unpolarised light the power of the firs
 
     |1 + s (c_l r_l + c_t r_t)|²,   c = −Q/4 Σ B* C / Σ |B|²,   r = a* D / |a|²,
 
-s the share of small slope in the model (`blend.weight`). c knows directions
-and index alone, is symmetric in ωi and ωo and even in the azimuth between them. It is for
-dielectrics: on metals surface plasmons are a pole of M that no such form has. Towards the normal,
-where there is little to gain, the form errs by more than that: c is faded by `obliqueness`, a
-choice by rigorous solutions (docs/validation.md). Lengths over 2π/λ.
+with s the share of small slope in the model (`blend.weight`). This is eq. (10) of docs/theory.md.
 
-The heights enter through r alone (`slope_ratios`).
+- c depends on the directions and the index alone. It is symmetric in ωi and ωo, and even in the
+  azimuth between them.
+- r depends on the heights alone (`slope_ratios`).
+- The form is for dielectrics: on metals surface plasmons are a pole of M, which it cannot have.
+- Towards the normal the second order is small and the form's error exceeds it. There c is
+  attenuated by `obliqueness`, chosen by rigorous solutions (docs/validation.md).
+
+Lengths are over 2π/λ.
 """
 
 from __future__ import annotations
@@ -35,21 +38,21 @@ from .fresnel import decaying_root
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
-#: Most that the second order adds to an amplitude, of the first: power grows to 2.25 at most.
+#: Largest amplitude that the second order adds, relative to the first: powers grow to 2.25 at most.
 LIMIT = 0.5
-#: Frequency that slopes are filtered at, 1/(1 + (ξ/F)²): that of light at grazing angles.
+#: Frequency F of the slopes' filter 1/(1 + (ξ/F)²): that of light at grazing angles.
 CUTOFF = 2.0
-#: Nodes of a `CoefficientTable` along θi, θo and the azimuth.
+#: Nodes of `coefficient_table` along θi, θo and the azimuth.
 NODES = 17
 
 # M is sampled on circles about (k−k0)/2, up to three times the width, where waves travel
 _WIDTH, _RADII, _AZIMUTHS = 0.55, 8, 6
-# Of the weight 1/|ξ||k−k0−ξ| where either is 0
+# Added to |ξ||k−k0−ξ| in the weight 1/(|ξ||k−k0−ξ|), which is infinite where either is 0
 _LEVEL = 0.02
-# Of the equations' trace: at k = k0 both components are one
+# Regularisation in units of the equations' trace: at k = k0 l and t are equivalent
 _RIDGE = 1e-6
 _NO_CONTRAST = 1e-4
-# Last node, rad: where cosines are 0 so is c, over 0
+# Last node, rad: at 90° c is 0/0
 _HORIZON = np.radians(89.9)
 
 
@@ -74,10 +77,10 @@ def axes(vector: Complex, index: complex) -> Complex:
 class Perturbation:
     """B and B₂ of light from one direction, between `axes`.
 
-    They solve ∫ (E×H' − E'×H)·n dS = 0 for waves above the surface and test waves that go down in
-    the material (Brown, Celli, Haller and Marvin 1984, Surface Science 136, 381), order by order.
-    Of plane waves the integrand is (κ+κ')·(e×(κ'×e') − e'×(κ×e)) = (n² − 1) e·e', fields being
-    transverse.
+    They solve ∫ (E×H' − E'×H)·n dS = 0, order by order, for waves above the surface and test waves
+    that go down in the material (Brown, Celli, Haller and Marvin 1984, Surface Science 136, 381).
+    For plane waves the integrand is (κ+κ')·(e×(κ'×e') − e'×(κ×e)) = (n² − 1) e·e', since their
+    fields are transverse.
 
     Parameters
     ----------
@@ -110,7 +113,7 @@ class Perturbation:
         return np.asarray(-1j * self._inverse(k) @ (lit + back))
 
     def _driving(self, k: Real) -> list[tuple[Complex, Complex]]:
-        """What drives waves along k: light that comes, and what a level surface reflects of it."""
+        """Fluxes into waves along k of the incident light and of its flat reflection, and γ."""
         (lit, gamma), (back, gamma_back) = (self._against(k, w) for w in (self._came, self._up))
         return [(lit, gamma), (back @ self._flat, gamma_back)]
 
@@ -119,23 +122,23 @@ class Perturbation:
         return np.asarray(gamma * np.linalg.inv(flux))
 
     def _against(self, k: Real, wave: Complex) -> tuple[Complex, Complex]:
-        """What test waves −k that go down in the material have of waves; κ_z + κ'_z."""
+        """Flux of waves against test waves −k that go down in the material, and γ = κ_z + κ'_z."""
         to = _wave(k, self._index) * [-1, -1, -1]
         tests, fields = axes(to, self._index), axes(wave, 1.0)
         products = [np.einsum("...i,...i", one, e) for one in tests for e in fields]
-        found = np.stack(products, axis=-1)
-        flux = (self._index**2 - 1.0) * found.reshape(*found.shape[:-1], 2, 2)
+        stacked = np.stack(products, axis=-1)
+        flux = (self._index**2 - 1.0) * stacked.reshape(*stacked.shape[:-1], 2, 2)
         return flux, (wave + to)[..., 2, None, None]
 
 
 def _wave(tangential: Real, index: complex) -> Complex:
-    """Wave vectors (..., 3) that go up in a medium, or fade."""
+    """Wave vectors (..., 3) that go up in a medium, or decay."""
     normal = decaying_root(index**2 - np.sum(tangential**2, axis=-1) + 0j)
     return np.concatenate([tangential, normal[..., None]], axis=-1)
 
 
 def slope_coefficients(wi: ArrayLike, wo: ArrayLike, index: complex) -> Complex:
-    """c_l and c_t, (n, 2): M as squared slopes, by least squares over the waves that travel.
+    """c_l and c_t, (n, 2): fit of M by products of slopes over the waves that travel.
 
     Parameters
     ----------
@@ -169,23 +172,23 @@ def slope_coefficients(wi: ArrayLike, wo: ArrayLike, index: complex) -> Complex:
     trace = np.trace(matrix, axis1=1, axis2=2)[:, None, None]
     onto = np.einsum("nmab,nab->nm", kernel, first.conj())
     right = np.einsum("nm,nmi,nm->ni", weight, products, onto)
-    found = np.linalg.solve(matrix + _RIDGE * trace * np.eye(2), right[..., None])[..., 0]
+    fit = np.linalg.solve(matrix + _RIDGE * trace * np.eye(2), right[..., None])[..., 0]
     power = np.sum(np.abs(first) ** 2, axis=(1, 2))
-    faded = obliqueness(incident[2], outgoing[:, 2])[:, None]
-    return np.asarray(-0.25 * faded * kappa[:, 0, 0] * found / power[:, None])
+    oblique = obliqueness(incident[2], outgoing[:, 2])[:, None]
+    return np.asarray(-0.25 * oblique * kappa[:, 0, 0] * fit / power[:, None])
 
 
 def obliqueness(cos_i: ArrayLike, cos_o: ArrayLike) -> Real:
-    """What c is multiplied by: 0 along the normal to 1 from 45° of both directions on."""
+    """Factor on c: 0 along the normal, 1 where both directions are beyond 45°."""
     mean = 0.5 * (np.asarray(cos_i, np.float64) + np.asarray(cos_o, np.float64))
     return np.asarray(np.minimum(1.0, 2.0 * (1.0 - mean**2)))
 
 
 @lru_cache(maxsize=16)
 def coefficient_table(index: float) -> Complex:
-    """c on nodes (θi, θo, azimuth of ωo from that of −ωi, 2), each even from 0 to its end.
+    """c at nodes (θi, θo, azimuth of ωo from that of −ωi, 2), evenly from 0 to π/2, π/2 and π.
 
-    `NODES` each, to π/2 and π; symmetric in the first two. Half a second of work.
+    There are `NODES` along each axis; c is symmetric in the first two. It costs half a second.
     """
     polar = np.clip(np.linspace(0.0, 0.5 * np.pi, NODES), 1e-3, _HORIZON)
     azimuth = np.linspace(0.0, np.pi, NODES)
@@ -194,14 +197,14 @@ def coefficient_table(index: float) -> Complex:
         out, turn = np.meshgrid(polar[n:], azimuth, indexing="ij")
         wi = np.array([-np.sin(theta), 0.0, np.cos(theta)])
         wo = np.stack([np.sin(out) * np.cos(turn), np.sin(out) * np.sin(turn), np.cos(out)], -1)
-        found = slope_coefficients(wi, wo.reshape(-1, 3), index).reshape(*out.shape, 2)
-        table[n, n:] = table[n:, n] = found
+        rows = slope_coefficients(wi, wo.reshape(-1, 3), index).reshape(*out.shape, 2)
+        table[n, n:] = table[n:, n] = rows
     table.setflags(write=False)
     return table
 
 
 def interpolated(index: float, wi: ArrayLike, wo: ArrayLike) -> Complex:
-    """`slope_coefficients` by `coefficient_table`, linear in between; wi and wo (n, 3)."""
+    """Interpolate `coefficient_table` linearly at wi and wo, (n, 3)."""
     incident, outgoing = np.broadcast_arrays(*(np.asarray(w, np.float64) for w in (wi, wo)))
     nodes = np.linspace(0.0, 0.5 * np.pi, NODES)
     angles = [np.arccos(np.clip(w[..., 2], 0.0, 1.0)) for w in (incident, outgoing)]
@@ -213,7 +216,7 @@ def interpolated(index: float, wi: ArrayLike, wo: ArrayLike) -> Complex:
 
 
 def factor(coefficients: ArrayLike, ratios: ArrayLike, share: ArrayLike) -> Real:
-    """|1 + s (c_l r_l + c_t r_t)|², (...): what unpolarised light's power is multiplied by.
+    """|1 + s (c_l r_l + c_t r_t)|², (...), the factor on the power of unpolarised light.
 
     Parameters
     ----------

@@ -2,15 +2,14 @@
 
 A dielectric of index 1.5 is lit from 60° at eight azimuths. For each wavelength the change is
 Σ |ΔP| / Σ P over all orders but order 0 that leave within 85° of the normal, with P the power of an
-order to first order and ΔP what the second order adds. Orders in a cell of `slope_ratios` share a
-direction and a ratio, at a third of a cell's width. The sums run over azimuths and wavelengths.
+order to first order and ΔP what the second order adds. Where patches have many orders, those in a
+third of a cell of `slope_ratios` share a direction. The sums run over azimuths and wavelengths.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 from . import blend, boundary
 from .blend import RoughnessTable, ScaleRoughness
@@ -27,8 +26,6 @@ _THETA, _GRAZING = np.radians(60.0), np.radians(85.0)
 _AZIMUTHS = 2.0 * np.pi * (np.arange(8) + 0.25) / 8
 # Wavelengths as shares of a table's range: 454, 548 and 642 nm of the visible
 _SHARES = (0.2, 0.4, 0.6)
-# Directions in a cell along each axis, where the cell holds many orders
-_PER_CELL = 3
 
 Real = NDArray[np.float64]
 
@@ -48,7 +45,8 @@ def colour_change(
 
     wavelength_range : shortest and longest wavelength of the table, nm.
     """
-    q, shortest = _frequencies(ratios), wavelength_range[0]
+    q = np.stack(np.meshgrid(*sums.grid.fine_frequencies), axis=-1).reshape(-1, 2)
+    shortest = wavelength_range[0]
     wavelengths = shortest + (wavelength_range[1] - shortest) * np.array(_SHARES)
     changed = total = 0.0
     for wave in wavenumber(wavelengths):
@@ -65,7 +63,7 @@ def colour_change(
             jones = blend.jones(wi, wo, _INDEX, share)
             # Power of an order: 4 cosθi cosθo N |a|² / w²
             power = normal * boundary.unpolarised(jones) / (wi[2] + normal) ** 2
-            power *= _powers(sums, q[leaves], kappa)
+            power *= _powers(sums, leaves, kappa)
             c = interpolated(_INDEX, wi, wo)
             change = factor(c, ratios.at(q[leaves], kappa), share) - 1.0
             changed += float(np.sum(power * np.abs(change)))
@@ -73,19 +71,12 @@ def colour_change(
     return changed / total if total > 0.0 else 0.0
 
 
-def _frequencies(ratios: SlopeRatios) -> Real:
-    """Spatial frequencies (n, 2) of orders, or evenly in cells that hold many, rad/µm."""
-    axes = []
-    for middle, width, alone in zip(ratios.middle, ratios.cell, ratios.orders, strict=True):
-        count = (2 * middle + 1) * (1 if alone else _PER_CELL)
-        axes.append((np.arange(count) - 0.5 * (count - 1)) * width / (1 if alone else _PER_CELL))
-    return np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
-
-
-def _powers(sums: CellSums, q: Real, kappa: Real) -> Real:
-    """Σ|a|² of the cells at q (n, 2) and κ (n,); |a|²/κ² is interpolated linearly."""
-    nodes, cells = sums.grid.summed, q / sums.grid.cell + np.array(sums.grid.middle)
-    depth = np.interp(kappa, nodes, np.arange(len(nodes)))
-    per_square = sums.power / nodes[:, None, None] ** 2
-    coordinates = np.stack([depth, cells[:, 1], cells[:, 0]])
-    return np.asarray(map_coordinates(per_square, coordinates, order=1) * kappa**2, np.float64)
+def _powers(sums: CellSums, cells: NDArray[np.bool_], kappa: Real) -> Real:
+    """Σ|a|² of these of the finer cells at κ, (n,); |a|²/κ² is interpolated linearly."""
+    nodes = sums.grid.summed
+    depth = np.clip(np.interp(kappa, nodes, np.arange(len(nodes))), 0.0, len(nodes) - 1.001)
+    lower = depth.astype(int)
+    per_square = (sums.fine_power / nodes[:, None, None] ** 2).reshape(len(nodes), -1)
+    columns = np.flatnonzero(cells)
+    low, high = per_square[lower, columns], per_square[lower + 1, columns]
+    return np.asarray((low + (depth - lower) * (high - low)) * kappa**2, np.float64)

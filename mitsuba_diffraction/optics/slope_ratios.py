@@ -41,6 +41,8 @@ STEP_OF_ORDERS = 1 / 12
 BETWEEN = 0.8
 #: Least power in a cell that has a ratio: less is rounding in single precision.
 LEAST = 1e-12
+#: Finer cells along each axis of a cell that holds many orders, for `CellSums.fine_power`.
+FINER = 3
 #: Largest |r| times the gate: any larger one reaches `second_order.LIMIT`.
 MOST = 100.0
 
@@ -58,7 +60,7 @@ class Slopes:
     gate: float
 
     @classmethod
-    def of(
+    def from_heights(
         cls, heights: ArrayLike, pixel_size: tuple[float, float], weight: Real | float = 1.0
     ) -> Slopes:
         """Return the products for heights (ny, nx) in µm.
@@ -156,21 +158,23 @@ class CellGrid:
     summed: Real
 
     @classmethod
-    def of(
+    def for_patches(
         cls,
         extent: tuple[float, float],
         rms_height: float,
         q_limit: float,
-        reach: tuple[float, float],
-        kappa_max: float,
+        reach: tuple[float, float] | None = None,
+        kappa_max: float | None = None,
     ) -> CellGrid:
         """Choose the grid for patches of this extent and RMS height, both in µm.
 
         q_limit : largest q that light of the shortest wavelength probes, rad/µm.
-        kappa_max : largest κ that is looked up, rad/µm.
+        reach : largest q along x and y that is looked up, rad/µm; None for `q_limit`.
+        kappa_max : largest κ that is looked up, rad/µm; None for `q_limit`.
         """
+        reach = reach or (q_limit, q_limit)
         first = q_limit * FIRST
-        last = max(2.0 * first, kappa_max)
+        last = max(2.0 * first, kappa_max or q_limit)
         spacing = [2.0 * np.pi / length for length in extent]
         orders = [step >= 0.5 * CELL * q_limit for step in spacing]
         cell = [
@@ -190,6 +194,18 @@ class CellGrid:
             np.linspace(first, last, count) if few else nodes,
         )
 
+    @property
+    def fine_frequencies(self) -> tuple[Real, Real]:
+        """Centres of the finer cells along x and y, rad/µm."""
+        x, y = (
+            np.arange(-middle * n, middle * n + 1) * width / n
+            for middle, width, n in (
+                (middle, width, 1 if alone else FINER)
+                for middle, width, alone in zip(self.middle, self.cell, self.orders, strict=True)
+            )
+        )
+        return x, y
+
 
 @dataclass(frozen=True, eq=False)
 class CellSums:
@@ -199,33 +215,44 @@ class CellSums:
     ----------
     power : (m, ny, nx) Σ|a|², without order 0.
     products : (m, 2, ny, nx) Σ a* D_l and Σ a* D_t.
+    fine_power : (m, ny', nx') Σ|a|² in the cells of `grid.fine_frequencies`.
     gate : mean gate of the patches.
     """
 
     grid: CellGrid
     power: Floats
     products: Single
+    fine_power: Floats
     gate: float
 
     @classmethod
-    def of(cls, patches: Iterable[tuple[HeightField, Real]], grid: CellGrid) -> CellSums:
+    def of_patches(cls, patches: Iterable[tuple[HeightField, Real]], grid: CellGrid) -> CellSums:
         """Add up patches, each with the taper of its screens; four transforms a patch and κ."""
         (middle_x, middle_y), nodes = grid.middle, grid.summed
         sums = np.zeros((len(nodes), 3, 2 * middle_y + 1, 2 * middle_x + 1), np.complex64)
+        finer = [1 if alone else FINER for alone in grid.orders]
+        fine_y, fine_x = (len(q) for q in grid.fine_frequencies[::-1])
+        fine = np.zeros((len(nodes), fine_y, fine_x), np.float32)
         gates = []
         for patch, taper in patches:
-            slopes = Slopes.of(patch.heights, patch.pixel_size, taper**2)
+            slopes = Slopes.from_heights(patch.heights, patch.pixel_size, taper**2)
             gates.append(slopes.gate)
-            factors, orders = slopes.products.astype(np.float32), _Orders.of(patch, grid.reach)
+            factors, orders = slopes.products.astype(np.float32), _Orders.within(patch, grid.reach)
             del slopes  # as large as the transforms' working memory
             x, y = (
                 _tents(q / w, m) for q, w, m in zip(orders.q, grid.cell, grid.middle, strict=True)
             )
-            for total, kappa in zip(sums, nodes, strict=True):
+            narrow_x, narrow_y = (
+                _tents(q / w * n, m * n)
+                for q, w, m, n in zip(orders.q, grid.cell, grid.middle, finer, strict=True)
+            )
+            for total, powers, kappa in zip(sums, fine, nodes, strict=True):
                 a, *products = _spectra(patch, factors, taper, kappa, orders)
                 for cells, product in zip(total, orders.products(a, products), strict=True):
                     cells += y @ product @ x.T
-        return cls(grid, np.ascontiguousarray(sums[:, 0].real), sums[:, 1:], float(np.mean(gates)))
+                powers += narrow_y @ (orders.inside * np.abs(a) ** 2) @ narrow_x.T
+        power = np.ascontiguousarray(sums[:, 0].real)
+        return cls(grid, power, sums[:, 1:], fine, float(np.mean(gates)))
 
     def ratios(self) -> SlopeRatios:
         """Return r times the gate at all nodes, rounded to half floats; `change` is NaN."""
@@ -261,7 +288,7 @@ class _Orders:
     inside: Floats
 
     @classmethod
-    def of(cls, patch: HeightField, reach: Sequence[float]) -> _Orders:
+    def within(cls, patch: HeightField, reach: Sequence[float]) -> _Orders:
         every = [
             2.0 * np.pi * np.fft.fftfreq(n, d)
             for n, d in zip(patch.shape[::-1], patch.pixel_size, strict=True)

@@ -1,20 +1,30 @@
-"""What a dielectric boundary makes of the light that goes through it: Jones matrices (NumPy).
+"""Jones matrices of light that goes through a dielectric boundary (NumPy, float64).
 
-With w = n cosθt − cosθi, lengths over 2π/λ and q = 2π/λ (ωi + n ωo) tangential, the light that goes
-from above into a dielectric of index n has
+With w = n cosθt − cosθi, lengths over 2π/λ and q = 2π/λ (ωi + n ωo) tangential, light that goes
+from above into a dielectric of index n has the BTDF
 
     f = n² · 4 cosθi n cosθt N / (λ² A w²) · ⟨|P|²⟩,   ⟨|P|²⟩ at −q and κ = 2π w/λ,
 
-with N the mean power of the Jones matrix as in `boundary`: orders add up to a flat interface's
-transmittance as κh → 0. f/n² is the same for reversed light. Where w → 0, so does ⟨|P|²⟩ but for
-order 0, whose lobe is not there.
+with N the mean power of the Jones matrix as in `boundary`. Orders add up to a flat interface's
+transmittance as κh → 0. f/n² is the same for reversed light.
+
+As w → 0 the power of all orders but order 0 vanishes. In the lobe of order 0 N/w² has no bound,
+although the heights do not decide how a flat interface transmits a lobe of some width. Order 0
+therefore has the flat transmittances of both directions:
+
+    f_0 = n² · 4πσ²/λ² · N_0 |a_0(κ)|² exp(−σ²q²),
+
+with N_0 of `order_0`, the geometric mean over both directions. In the middle of the lobe it equals
+4 cosθi n cosθt N/w²; elsewhere it is finite.
 
 - Small slope: first-order perturbation (Rice 1951; Voronovich 1985), from the fields that light
   along ωi and reversed light along ωo make at the flat interface, as in `boundary.small_slope`.
-- Kirchhoff's tangent plane: Fresnel's coefficients of the facet that refracts ωi to ωo, along
-  ωi + n ωo, in the limit of short waves that of Walter, Marschner, Li and Torrance 2007 (eq. 21).
+- Kirchhoff's tangent plane: Fresnel's coefficients at the facet that refracts ωi to ωo, whose
+  normal is along ωi + n ωo. The limit for short waves is that of Walter, Marschner, Li and Torrance
+  2007 (eq. 21).
 
-In the refracted direction both are w/(2 cosθi) times Fresnel's t_s and t_p. Axes as in `boundary`.
+In the refracted direction both are w/(2 cosθi) times Fresnel's t_s and t_p. The axes are those of
+`boundary`.
 """
 
 from __future__ import annotations
@@ -22,7 +32,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .boundary import Complex, Real, polarisation_axes, turn
+from .boundary import Complex, Real, facet_axis, polarisation_axes, turn
 from .fresnel import amplitudes, decaying_root
 
 
@@ -74,7 +84,8 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
     cos_out = -np.sum(outgoing * normal, axis=-1)
     refracts = (cos_in > 0) & (cos_out > 0)
     cos_in = np.where(refracts, cos_in, 1.0)
-    axis = _facet_axis(incident, outgoing, s_in)
+    # The normal along −(ωi + n ωo): (ωi + n ωo)×ωi is along ωo×ωi, reversed for n > 1
+    axis = facet_axis(outgoing, incident, s_in)
     scale = np.where(refracts, cos_out * cos_in * length[..., 0], 0.0)
     scale /= -incident[..., 2] * outgoing[..., 2]
     t_s, t_p = scale / (cos_in + n * cos_out), scale / (n * cos_in + cos_out)
@@ -83,11 +94,53 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
     return np.asarray(turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident))
 
 
+def order_0(wi: ArrayLike, wo: ArrayLike, index: float, *, thin: bool = False) -> Complex:
+    """Jones matrices of order 0, (..., 2, 2), whose mean power is N_0.
+
+    The entries are products of √√T of either direction and polarisation, turned from one plane of
+    incidence to the other. The matrix is symmetric, and √T in the refracted direction.
+
+    Parameters
+    ----------
+    wi : (..., 3) unit vectors above the surface; wo : unit vectors below it, in the dielectric or,
+        if `thin`, beyond the flat other side of a sheet.
+    """
+    s_in, s_out = polarisation_axes(wi, wo)
+    cosines = np.asarray(wi, np.float64)[..., 2], -np.asarray(wo, np.float64)[..., 2]
+    came, left = (
+        flat_transmittances(cosine, index, thin, side) ** 0.25
+        for side, cosine in enumerate(cosines)
+    )
+    dot = np.sum(s_in * s_out, axis=-1)
+    cross = s_in[..., 0] * s_out[..., 1] - s_in[..., 1] * s_out[..., 0]
+    rows = [
+        [left[0] * came[0] * dot, -left[0] * came[1] * cross],
+        [left[1] * came[0] * cross, left[1] * came[1] * dot],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2).astype(np.complex128)
+
+
+def flat_transmittances(cosine: ArrayLike, index: float, thin: bool, side: int) -> Real:
+    """Transmittances of s and p light by the flat surface, (2, ...).
+
+    Parameters
+    ----------
+    cosine : of the direction to the normal, where it is measured: in the dielectric if below.
+    index : of the dielectric over that of the medium above it.
+    thin : whether below is beyond the flat other side of a sheet (`out_of_sheet`).
+    side : 0 above the surface, 1 below.
+    """
+    relative = 1.0 / index if side and not thin else index
+    back = np.minimum(np.abs(np.stack(amplitudes(cosine, relative))) ** 2, 1.0)
+    return np.asarray((1.0 - back) / (1.0 + back) if thin else 1.0 - back)
+
+
 def out_of_sheet(jones: ArrayLike, wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
     """Jones matrices (..., 2, 2) of light that leaves a thin sheet through its flat other side.
 
-    That transmits T_b, and what goes to and fro between two mirrors of reflectances R as if both
-    were flat adds up to 1/(1 − R R) (Born and Wolf, section 7.6, without interference):
+    The flat side transmits T. Light that goes to and fro between the sides, as between two flat
+    mirrors of reflectances R, adds up to 1/(1 − R R) (Born and Wolf, section 7.6, without
+    interference):
 
         J'_ab = √(T_a(ωo) / (1 − R_a(ωo) R_b(ωi))) J_ab.
 
@@ -101,12 +154,3 @@ def out_of_sheet(jones: ArrayLike, wi: ArrayLike, wo: ArrayLike, index: float) -
     )
     both = left[..., :, None] * came[..., None, :]
     return np.asarray(np.sqrt((1.0 - left[..., :, None]) / (1.0 - both)) * np.asarray(jones))
-
-
-def _facet_axis(incident: Real, outgoing: Real, fallback: Real) -> Real:
-    """s of the facet that refracts ωi to ωo: normal to both, along that of light on a level one."""
-    # h × (−ωi) of h along −(ωi + n ωo) is along ωo × … = ωi × ωo reversed for n > 1
-    normal = np.cross(outgoing, incident)
-    length = np.linalg.norm(normal, axis=-1, keepdims=True)
-    found = length > 1e-12
-    return np.where(found, normal / np.where(found, length, 1.0), fallback)

@@ -1,15 +1,19 @@
-"""What the BSDF plugin is made of (Dr.Jit).
+"""The BSDF plugins and their parts (Dr.Jit).
 
 Contents
 --------
-bsdf            `Diffraction`, the plugin; its docstring is docs/parameters.md
+bsdf            `Diffraction`, the plugin that reflects; its docstring is docs/parameters.md
+transmission    the plugin `diffraction_dielectric`, which lets light through as well
+surface         `DiffractingSurface`, the part that both plugins share
 blended_patches  the plugin `diffraction_mix`: several surfaces in one, by weights
-registration    both are registered in every variant
+registration    registration of the plugins in every variant
 dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives
-parameters      read from Mitsuba's Properties, checked
+parameters      parameters of `diffraction`, read from Mitsuba's Properties and checked
+surface_parameters  parameters that both plugins have: the surface and its table
+support         features that go together, declared by each choice of a scene
 properties      words, flags and numbers from them, refused by name; what elements are called
-materials       what the surface is made of: indices, coat, film, model
+materials       material, coat and film
 parameter_changes  changeable parameters, their checks; what `dr.freeze` must know of a BSDF
 sources         from what a scene names to a table, built once
 textures        height scale and orientation that vary; whether a mesh has what its BSDF reads
@@ -26,7 +30,6 @@ direction_lookup  tabulated functions of direction inside a kernel
 boundary        what the material makes of the light, with its polarisation
 second_order    what light diffracted twice makes of orders
 fresnel         what dielectric, conductor or mirror reflect; fields at an interface or a film
-transmission    light that goes through a dielectric or a thin sheet
 layers          a clear coat, a thin film, and how much light reaches what lies beneath
 memory          arrays in the variant's memory, and reading them
 """

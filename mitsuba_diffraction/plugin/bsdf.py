@@ -1,7 +1,8 @@
-"""The Mitsuba BSDF plugin `diffraction`: measured surfaces that diffract.
+"""The Mitsuba BSDF plugin `diffraction`: measured surfaces that diffract the light they reflect.
 
 Parameters, with defaults in brackets; ∂: differentiable. Lengths are in µm, wavelengths in nm.
-`docs/parameters.md` is made of this text.
+`docs/parameters.md` is made of this text. Surfaces that light goes through as well are of the
+plugin `diffraction_dielectric`.
 
 The surface
 -----------
@@ -102,19 +103,6 @@ film_thickness : float ∂ [none]
     2 n d = 12 µm. RGB variants sum its colours over wavelengths, apart from those of the orders.
 film_k : float ∂ [0]
     The film's absorption, the k of n + ik over that of the medium above it; not over a nested BSDF.
-transmission : boolean [false]
-    Light goes through the dielectric, from both sides: orders of κ = k (n cosθt − cosθi). The side
-    that normals point to has ext_ior, the other one int_ior, which is at least 1.01 times that.
-    Component 0 is what is reflected, 1 what goes through. Orders that change the tangential part by
-    more than 2/λ are left out. It excludes coat, film, nested BSDF and shadowing. energy_conserving
-    makes R + T 1, since a dielectric loses no light: order 0 is multiplied by c(ωi) c(ωo), c on the
-    directions of both sides, and where that is not enough all is scaled likewise, by at most 1.5²;
-    what is still missing of steep slopes is spread over all directions where some is missing. A few
-    seconds' work, kept in the cache, in steps of 0.01 of eta.
-thin : boolean [false]
-    Light goes through a sheet, whose other side is flat; both sides have ext_ior. What that side
-    sends back is summed as between two mirrors. Light beyond the sheet's critical angle is lost,
-    unless energy_conserving puts it back, into order 0 first.
 model : string [small_slope]
     `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
     where the surface is rough at the scale of an order; polarised variants have its Mueller
@@ -135,12 +123,12 @@ second_order : string or boolean [auto]
 energy_conserving : boolean [true]
     Where the model reflects more than it gets, multiplies it by s(ωi) s(ωo), a scale of directions
     found for this table, model, material and each wavelength, so that no more is reflected than
-    comes in: reciprocal. Kirchhoff's model fades within 5° of the horizon as well. Dielectrics gain
-    nothing and are as they are; blazed metal gratings lose some of the light of directions that
-    gain nothing, too (docs/energy.md has figures). `false` is the model as it is, for checks. The
-    scale takes a second or more the first time, and is kept in the cache. It follows height_scale,
-    interpolated between a few: an optimisation waits where it enters such an interval for the first
-    time. For its derivative, enable that of height_scale before parameters.update().
+    comes in: reciprocal. Dielectrics gain nothing and are as they are; metal gratings lose some
+    per cent of the light of directions that gain nothing, too (docs/energy.md has figures). `false`
+    is the model as it is, for checks. The scale takes seconds the first time, and is cached. It
+    follows height_scale, interpolated between a few: an optimisation waits where it enters such an
+    interval for the first time. For its derivative, enable that of height_scale before
+    parameters.update().
 shadowing : string [none]
     `vcavity`: the surface shadows itself like long V-shaped grooves (Torrance and Sparrow 1967);
     `none`.
@@ -204,28 +192,24 @@ from __future__ import annotations
 
 import functools
 import operator
-import weakref
 from collections.abc import Iterator
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tables.energy.conservation import DirectionalTable
-from .boundary import Boundary, Kirchhoff
+from ..tables.energy.grid import DirectionalTable
+from .boundary import Kirchhoff
 from .directions import Pair, from_patch, in_patch, vcavity
 from .energy import EnergyModel
-from .fresnel import tinted
 from .layers import CoatedPair, Transmission, UnderFilm
-from .llvm import require_loaded_llvm
-from .parameter_changes import Bounded, ObjectValues, arrays_within, marks, take_changes
-from .parameters import ABSORBED, read_parameters
-from .power import power_model
+from .parameter_changes import ObjectValues, check_parameters
+from .parameters import read_parameters
 from .sampling import EVEN, direction_of, with_even_share
 from .sources import TableProvider, from_cache
-from .textures import LEAST_SCALE, PLACED, VaryingHeightScale
+from .support import ABSORBING, refusal
+from .surface import ALL_COMPONENTS, DiffractingSurface
 from .types import (
     BSDF,
     Callback,
@@ -241,73 +225,40 @@ from .types import (
     Vector3f,
 )
 
-#: The component of a context that asks for all of them.
-_ALL = 0xFFFFFFFF
 
+class Diffraction(DiffractingSurface):
+    """Reflection by a surface that diffracts; its symbols are those of `reference.model`.
 
-class Diffraction(mi.BSDF):
-    """Diffraction by a measured height field."""
+    f cosθo = 4πσ² ⟨|P|²⟩ N' / (λ² w² cosθi),   N' = ½ Σ |2 cosθi cosθo J|²
+    """
 
     def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
-        require_loaded_llvm()
-        super().__init__(props)
-        parameters = read_parameters(props, provider)
-        self.table = parameters.table
-        self.places, self.heights = parameters.places, parameters.heights
-        self.fresnel = parameters.reflectance
-        self.boundary, self.coat = parameters.boundary, parameters.coat
-        self.mirror = Kirchhoff(self.coat) if self.coat is not None else None
-        self.nested: BSDF = parameters.nested  # or None
-        self.through = parameters.through
-        self._second_order = parameters.second_order
-        self._set_height_scale(parameters.height_scale, parameters.optical)
-        self.orientation = parameters.orientation
-        self.layering = parameters.layering
-        self.vcavity = parameters.vcavity
-        self.power = power_model(self.table, parameters.wavelength, self.places)
-        mean = self.table if self.places is None else self.table.averaged
-        # Under a coat, or of light that goes through, nothing is known of the albedo
-        self._energy = (
-            EnergyModel(mean, self.boundary, parameters.wavelength, parameters.energy_conserving)
-            if self.coat is None and self.through is None
-            else None
-        )
-        self.area_factor = 4.0 * dr.pi * self.table.sigma**2  # 4π²σ⁴ over the window's area πσ²
-        front = mi.BSDFFlags.FrontSide
-        glossy = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.Anisotropic | front
-        components = [glossy] if self.through is None else self.through.flags()
+        read = read_parameters(props, provider)
+        super().__init__(props, read.surface, read.reflectance)
+        self.boundary, self.coat = read.boundary, read.coat
+        self.mirror = None if self.coat is None else Kirchhoff(self.coat)
+        self.nested: BSDF = read.nested  # or None
+        self.layering, self.vcavity = read.layering, read.vcavity
+        self.only_traced = read.only_traced
+        self._second_order = read.second_order
+        self._energy = None
+        if read.scales_energy:
+            mean, conserving = read.surface.mean_table, read.surface.energy_conserving
+            self._energy = EnergyModel(mean, self.boundary, self.wavelength, conserving)
+        glossy = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.Anisotropic | mi.BSDFFlags.FrontSide
+        components = [glossy]
         if self.nested is not None:
             components += [self.nested.flags(n) for n in range(self.nested.component_count())]
-        self.m_components = components  # at once: what it gives back is a copy
-        self.m_flags = functools.reduce(operator.or_, components)
-        self.parameters = [*self._scale_changeable, *self.orientation.changeable]
-        self.parameters += self.fresnel.changeable
-        if self.nested is not None:
             self.parameters.append(ObjectValues("nested", self.nested))
-        self.mix: weakref.ref[Any] | None = None
+        self.m_components = components  # at once: reading it makes a copy
+        self.m_flags = functools.reduce(operator.or_, components)
+        check_parameters([self])
         self.derive()
-
-    def _set_height_scale(self, given: float | VaryingHeightScale, optical: float) -> None:
-        """A bounded number; or factors that vary, of which `height_scale` is the largest."""
-        if isinstance(given, VaryingHeightScale):
-            self._scale: VaryingHeightScale | Bounded = given
-            self._scale_changeable = given.changeable
-            self._varying: VaryingHeightScale | None = given
-            self.height_scale: Float = mi.Float(given.high)
-            return
-        most = self.table.height_scale_max / optical
-        bounded = Bounded(
-            "height_scale", given, LEAST_SCALE, most, functools.partial(_scale_refusal, most)
-        )
-        self._scale, self._varying, self.height_scale = bounded, None, bounded.value
-        self._scale_changeable = (bounded,)
 
     # ------------------------------------------------------------------ Mitsuba's interface
 
     def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
-        """f·cosθo per wavelength; where light goes through, as the context's mode has it."""
-        if self.through is not None:
-            return self.through.eval_pdf(self, ctx, si, wo, active)[0]
+        """Return f cosθo per wavelength."""
         active = self._above(si, wo, active)
         above, nested = self._lobes(ctx)
         value = mi.Spectrum(0.0)
@@ -321,9 +272,7 @@ class Diffraction(mi.BSDF):
         return dr.select(active, value, 0.0)
 
     def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
-        """Density of `sample` per solid angle."""
-        if self.through is not None:
-            return self.through.eval_pdf(self, ctx, si, wo, active)[1]
+        """Return the density of `sample` per solid angle."""
         active = self._above(si, wo, active)
         above, nested = self._lobes(ctx)
         density = mi.Float(0.0)
@@ -338,9 +287,7 @@ class Diffraction(mi.BSDF):
     def eval_pdf(
         self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
     ) -> tuple[Spectrum, Float]:
-        """`eval` and `pdf` at once."""
-        if self.through is not None:
-            return self.through.eval_pdf(self, ctx, si, wo, active)
+        """Return `eval` and `pdf` at once."""
         active = self._above(si, wo, active)
         above, nested = self._lobes(ctx)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
@@ -352,9 +299,9 @@ class Diffraction(mi.BSDF):
             value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
         if nested is not None:
             beneath = mi.Spectrum(self._beneath(si, wo, active))
-            its_value, its_density = self.nested.eval_pdf(nested, si, wo, active)
-            value += beneath * its_value
-            density = dr.lerp(its_density, density, self._glossy_share(above, si, active))
+            nested_value, nested_density = self.nested.eval_pdf(nested, si, wo, active)
+            value += beneath * nested_value
+            density = dr.lerp(nested_density, density, self._glossy_share(above, si, active))
         return dr.select(active, value, 0.0), dr.select(active, density, 0.0)
 
     def sample(
@@ -365,13 +312,11 @@ class Diffraction(mi.BSDF):
         sample2: Vector2f,
         active: Mask = True,
     ) -> tuple[Sample, Spectrum]:
-        """A direction, and f·cosθo over its density.
+        """Draw a direction; return it with f cosθo over its density.
 
-        Of what lies beneath, lobes of one direction are returned alone: the diffraction has no
-        share in them. All others are mixed with it, in value and density.
+        Lobes of a nested BSDF that have a single direction are returned alone: the diffraction has
+        no share in them. All others are mixed with it, in value and density.
         """
-        if self.through is not None:
-            return self.through.sample(self, ctx, si, sample1, sample2, active)
         active = mi.Mask(active) & (mi.Frame3f.cos_theta(si.wi) > 0.0)
         above, nested = self._lobes(ctx)
         result = dr.zeros(mi.BSDFSample3f)
@@ -401,234 +346,52 @@ class Diffraction(mi.BSDF):
         return result, dr.select(active, value, 0.0)
 
     def eval_diffuse_reflectance(self, si: Interaction, active: Mask = True) -> Spectrum:
-        """What a denoiser takes for the surface's colour: its reflectance at normal incidence.
-
-        That of the interface, and of what lies beneath; 0 to 1, the same from every direction.
-        """
+        """Return the reflectance at normal incidence, nested BSDF included, for denoisers."""
         reflectance = mi.Spectrum(self.fresnel.reflectance(mi.Float(1.0), si, active))
         if self.nested is not None:
             level = mi.SurfaceInteraction3f(si)
             level.wi = mi.Vector3f(0.0, 0.0, 1.0)
             beneath = self._beneath(level, level.wi, active)
-            own = self.nested.eval_diffuse_reflectance(level, active)
-            reflectance = self.layering.above * reflectance + mi.Spectrum(beneath) * own
+            nested = self.nested.eval_diffuse_reflectance(level, active)
+            reflectance = self.layering.above * reflectance + mi.Spectrum(beneath) * nested
         return dr.select(active, dr.clip(reflectance, 0.0, 1.0), 0.0)
 
     def traverse(self, callback: Callback) -> None:
-        """Expose what may change between renderings without another table."""
-        self._scale.traverse(callback)
-        self.orientation.traverse(callback)
-        self.fresnel.traverse(callback)
+        """Expose the parameters that may change without another table."""
+        super().traverse(callback)
         if self.nested is not None:
             callback.put("nested", self.nested, mi.ParamFlags.Differentiable)
-
-    def parameters_changed(self, keys: list[str]) -> None:
-        """Take all changes, or none of them.
-
-        Raises
-        ------
-        DiffractionError
-            If a parameter is out of bounds, as a height_scale that the table does not serve. All
-            parameters then have their last values.
-        """
-        mix = self.mix and self.mix()
-        take_changes(self, mix.together if mix else [self])
-
-    def refusals(self) -> Iterator[str | None]:
-        """See `Changing.refusals`."""
-        yield self._optical_refusal()
-        if self._varying is not None:
-            yield self._varying.refusal()
-        if isinstance(self.fresnel, UnderFilm):
-            yield self.fresnel.refusal()
-            if self.nested is not None and self.fresnel.numbers()[0].imag:
-                yield ABSORBED
-
-    def derive(self) -> None:
-        """Compute what depends on the parameters: scales of energy, and what `dr.freeze` sees."""
-        self.fresnel.derive()
-        largest = dr.slice(dr.max(dr.detach(self.height_scale)))
-        differentiable = dr.grad_enabled(self.height_scale)
-        lowest = self._varying.range()[0] if self._varying else None
-        if self._energy is not None:
-            beneath = self.nested is not None and isinstance(self.layering, Transmission)
-            self._energy.update(largest, differentiable, beneath, lowest)
-        if self.through is not None and self.through.balance is not None:
-            self.through.balance.update(largest, differentiable, lowest)
-        if self._second_order is not None:
-            self._second_order.update()
-        held = arrays_within(
-            self.power,
-            self._energy,
-            self.orientation,
-            self.fresnel,
-            self.boundary,
-            self.mirror,
-            self.through,
-            self._varying,
-            self._second_order,
-        )
-        self._for_freezing = held + marks(
-            self.table,
-            str(self.places),
-            str(self._varying),
-            self.vcavity,
-            str(self.layering),
-            str(self.boundary),
-            self.coat is None,
-            self._second_order is None,
-            self.through is None or self.through.thin,
-            self._takes,
-            getattr(self.boundary.material, "reflects_all", False),  # other kernels
-            getattr(self.boundary.material, "channels", None),
-            getattr(self.boundary.material, "tint", None) is None,
-        )
-
-    def _optical_refusal(self) -> str | None:
-        """Reason why heights times the index that they are in are beyond the table, or None."""
-        medium = self.coat
-        if self.through is not None:
-            medium = self.through.material
-        if medium is None:
-            return None
-        name = "coat" if self.coat else "int"
-        optical = float(dr.slice(dr.max(dr.detach(self.height_scale * medium.eta))))
-        if optical <= self.table.height_scale_max * (1.0 + 1e-6):
-            return None
-        return (
-            f"height_scale times {'coat_' if self.coat else ''}eta is {optical:g}, beyond the "
-            f"table's {self.table.height_scale_max:g}; load the plugin anew with that {name}_ior"
-        )
-
-    @property
-    def model(self) -> str:
-        """What the material makes of the light, for people."""
-        return f"{self.boundary}, second order" if self._second_order else str(self.boundary)
-
-    @property
-    def second_order_index(self) -> float | None:
-        """Index that the second order of small slope is for; None without it."""
-        return None if self._second_order is None else self._second_order.index
-
-    @property
-    def only_traced(self) -> str | None:
-        """What it has that only the path tracer shows."""
-        if self.places is not None:
-            return "coherence='surface'"
-        if self.through is not None:
-            return "light that goes through"
-        if isinstance(self.fresnel, UnderFilm):
-            return "a thin film"
-        return "a height_scale that varies" if self._varying else None
-
-    @property
-    def energy_conserving(self) -> bool:
-        """Whether it takes what it would reflect too much."""
-        if self.through is not None:
-            return self.through.balance is not None
-        return self._energy is not None and self._energy.conserving
-
-    def energy_scale(self, height_scale: float) -> tuple[NDArray[np.float32], bool] | None:
-        """What conserves energy, for who knows no wavelengths: s, and whether it fades as well.
-
-        s : (polar + 1, azimuthal) on `tables.energy.conservation.FINE`; None where nothing is.
-        """
-        if self._energy is None or not self._energy.conserving:
-            return None
-        scale = self._energy.brightness(height_scale)
-        return None if scale is None else (scale, self._energy.fades)
-
-    def reflected_ratio(self, height_scale: float) -> DirectionalTable | None:
-        """Its albedo over the flat interface's reflectance, where T = 1 − a goes on beneath."""
-        beneath = self.nested is not None and isinstance(self.layering, Transmission)
-        return self._energy.ratio(height_scale) if beneath and self._energy is not None else None
-
-    @property
-    def _takes(self) -> int:
-        balance = self._energy if self.through is None else self.through.balance
-        return 0 if balance is None else balance.takes
-
-    def to_string(self) -> str:
-        """All parameters, for people."""
-        nested = "" if self.nested is None else f"  nested = {self.nested},\n"
-        places = "" if self.places is None else f"  {PLACED}, {self.places},\n"
-        return (
-            "Diffraction[\n"
-            f"  table = {self.table},\n"
-            f"  coherence_width = {self.table.coherence_width:g} µm,\n"
-            f"{places}"
-            f"  tolerance = {self.table.tolerance:g},\n"
-            f"  surface = {self.fresnel},\n"
-            f"  model = {self.model},\n"
-            f"  height_scale = {self._varying or f'{dr.slice(self.height_scale):g}'},\n"
-            f"  energy_conserving = {'true' if self.energy_conserving else 'false'},\n"
-            f"  orientation = {self.orientation},\n"
-            f"{self._sides()}"
-            f"  shadowing = {'vcavity' if self.vcavity else 'none'},\n"
-            f"  layering = {self.layering},\n"
-            f"{nested}]"
-        )
-
-    def _sides(self) -> str:
-        if self.through is None:
-            return ""
-        return f"  {'thin' if self.through.thin else 'transmission'} = true,\n"
 
     # ------------------------------------------------------------------ the model
 
     def diffracted(
         self, ctx: Context, si: Interaction, pair: Pair, power: Colour, active: Mask
     ) -> Spectrum:
-        """N' / (λ² A w² cosθi) · ⟨|P|²⟩, that is f·cosθo of diffraction alone (see `boundary`).
+        """Return f cosθo of the structure, and of the coat's face where there is one.
 
-        Under a coat that of its face too, the lobe of a flat patch.
-
-        power : what the power model says of this pair of directions.
+        power : ⟨|P|²⟩ / (4π²σ⁴ λ²) of the pair in 1/µm², eq. 2 and 3, from the power model.
         """
-        value = self.lobe(ctx, si, pair, self.boundary, active, power)
+        k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
+        # Eq. 4 without power and N
+        factor = self.geometry(pair)
+        if self.vcavity:
+            factor *= vcavity(pair.cos_i, pair.cos_o, pair.one_plus_dot)
+        if self._second_order is not None:
+            # Eq. 10: Σ F_j |a_j|² over orders other than 0, which keeps its power. Others keep
+            # theirs as well where a mirror's lobe, the most that order 0 can have, outshines them
+            mirror = dr.abs(self.power.flat(pair, si))
+            others = power - dr.clip(power, -mirror, mirror)  # colours may be negative
+            added = self._second_order.added(pair, scale, k)
+            power = power + others * mi.UnpolarizedSpectrum(added)
+        power = factor * power
+        if self._energy is not None and self._energy.takes:
+            # s(ωi) s(ωo), by which no direction reflects more than it receives
+            power *= self._energy.factor(pair, k, scale)
+        # Eq. 5 to 9: N' or a Mueller matrix from Jones matrices
+        value = self.lobe(ctx, si, pair, self.boundary, power, active)
         if self.mirror is not None:
             value += self.face(ctx, si, pair.outer, self.mirror, active)
         return value
-
-    def lobe(
-        self,
-        ctx: Context,
-        si: Interaction,
-        pair: Pair,
-        boundary: Boundary,
-        active: Mask,
-        power: Colour | None = None,
-    ) -> Spectrum:
-        """f·cosθo of the structure alone; power : what the power model says, if it was asked."""
-        w = pair.cos_i + pair.cos_o
-        outside = self.area_factor * dr.rcp(dr.square(w) * pair.cos_i)
-        if isinstance(pair, CoatedPair):
-            outside *= pair.outer.cos_o * dr.rcp(pair.cos_o)
-        if self.vcavity:
-            outside *= vcavity(pair.cos_i, pair.cos_o, pair.one_plus_dot)
-        wavenumbers, scale = self.power.wavenumbers(si), self.scale_at(si, active)
-        if power is None:
-            power = self.power.power(pair, scale, si)
-        if self._second_order is not None:
-            # order 0 keeps its power, and others where a mirror's lobe, its most, outshines them
-            mirror = dr.abs(self.power.flat(pair, si))
-            others = power - dr.clip(power, -mirror, mirror)  # colours may be negative
-            added = self._second_order.added(pair, scale, wavenumbers)
-            power = power + others * mi.UnpolarizedSpectrum(added)
-        factor = boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)
-        power = outside * power
-        if self._energy is not None and self._energy.takes:
-            power *= self._energy.factor(pair, wavenumbers, scale)
-        return dr.select(active, tinted(mi.Spectrum(power) * factor, boundary.material), 0.0)
-
-    def face(
-        self, ctx: Context, si: Interaction, pair: Pair, mirror: Boundary, active: Mask
-    ) -> Spectrum:
-        """f·cosθo of a flat face: the lobe of a flat patch."""
-        wavenumbers = self.power.wavenumbers(si)
-        outside = self.area_factor * dr.rcp(dr.square(pair.w) * pair.cos_i)
-        factor = mirror.factor(pair, self.height_scale, wavenumbers, si, active, ctx.mode)
-        return dr.select(active, mi.Spectrum(outside * self.power.flat(pair, si)) * factor, 0.0)
 
     def _beneath(self, si: Interaction, wo: Vector3f, active: Mask) -> Colour:
         """Factor of the nested BSDF."""
@@ -642,16 +405,13 @@ class Diffraction(mi.BSDF):
             )
         return self.layering.beneath(si, wo, active, ratios)
 
-    def scale_at(self, si: Interaction, active: Mask) -> Float:
-        """The factor on the heights at points of the surface."""
-        return self._varying.at(si, active) if self._varying else self.height_scale
-
     def _drawing_scale(self, si: Interaction, active: Mask) -> Float:
-        """What directions are drawn for: under a coat κ is as if heights were larger."""
+        """Height scale to draw directions for: under a coat κ is as if heights were larger."""
         scale = self.scale_at(si, active)
         return scale if self.coat is None else scale * self.coat.eta
 
     def _pair(self, si: Interaction, wo: Vector3f, active: Mask) -> Pair:
+        """Eq. 1: (u, v, w) = ωi + ωo in the patch's frame, within a coat where there is one."""
         pair = Pair(si, wo, self.orientation.rotation(si, active), active)
         return pair if self.coat is None else CoatedPair(pair, self.coat.eta)
 
@@ -660,19 +420,19 @@ class Diffraction(mi.BSDF):
         return mi.Mask(active) & (cos_i > 0.0) & (cos_o > 0.0)
 
     def _lobes(self, ctx: Context) -> tuple[bool, Context | None]:
-        """Whether a context asks for the diffraction, and what it asks of the nested BSDF."""
+        """Whether a context asks for the diffraction, and its request to the nested BSDF."""
         above = ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0)
         if self.nested is None or ctx.component == 0:
             return above, None
         lobes = self.nested.flags()
         asked = mi.BSDFContext(ctx.mode, ctx.type_mask, ctx.component)
-        if ctx.component != _ALL:
+        if ctx.component != ALL_COMPONENTS:
             asked.component -= 1
             lobes = self.nested.flags(asked.component)
         return above, asked if ctx.type_mask & int(lobes) & int(mi.BSDFFlags.All) else None
 
     def _draw(self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask) -> Vector3f:
-        """A direction, possibly below the surface (then it has no density and no value)."""
+        """Draw a direction, possibly below the surface, where it has no density and no value."""
         uv = self.power.draw(
             mi.Frame3f.cos_theta(si.wi),
             dr.detach(self._drawing_scale(si, active)),
@@ -685,20 +445,93 @@ class Diffraction(mi.BSDF):
         return dr.select(sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), ordered)
 
     def _glossy_share(self, above: bool, si: Interaction, active: Mask) -> Float:
-        """Share of the samples for diffraction where something lies beneath: by reflected power."""
+        """Share of the samples for diffraction over a nested BSDF: by reflected power."""
         if not above:
             return mi.Float(0.0)
         reflectance = self.fresnel.reflectance(mi.Frame3f.cos_theta(si.wi), si, active)
         mean = dr.mean(mi.unpolarized_spectrum(reflectance))
-        # What lies beneath is taken to return half of what it gets
+        # A nested BSDF is taken to return half of the light that it receives
         return dr.clip(mean / (0.5 + 0.5 * mean), 0.1, 0.9)
 
+    # ------------------------------------------------------------------ changes of parameters
 
-def _scale_refusal(most: float, height_scale: float) -> str:
-    return (
-        f"height_scale={height_scale:g} is outside what the table serves, above 0 and up to "
-        f"{most:g}; load the plugin anew with that height_scale"
-    )
+    def refusals(self) -> Iterator[str | None]:
+        """See `Changing.refusals`."""
+        yield from super().refusals()
+        if self.coat is not None:
+            yield self.optical_refusal(self.coat.eta, "coat_eta", "coat_ior")
+        if isinstance(self.fresnel, UnderFilm):
+            yield self.fresnel.refusal()
+            if self.nested is not None and self.fresnel.absorbs:
+                yield refusal("a nested BSDF", ABSORBING)
+
+    def derive(self) -> None:
+        """Compute what depends on the parameters: indices, scales of energy, the second order."""
+        self.fresnel.derive()
+        if self._energy is not None:
+            scales = self.scale_range()
+            self._energy.update(
+                scales.largest, scales.differentiable, self._light_beneath, scales.lowest
+            )
+        if self._second_order is not None:
+            self._second_order.update()
+        material = self.boundary.material
+        self.freeze(
+            (self._energy, self.fresnel, self.boundary, self.mirror, self._second_order),
+            self.vcavity,
+            str(self.layering),
+            str(self.boundary),
+            self.coat is None,
+            self._second_order is None,
+            0 if self._energy is None else self._energy.takes,
+            getattr(material, "reflects_all", False),  # other kernels
+            getattr(material, "channels", None),
+            getattr(material, "tint", None) is None,
+        )
+
+    @property
+    def _light_beneath(self) -> bool:
+        """Whether light that is not reflected goes on to a nested BSDF, by the albedo."""
+        return self.nested is not None and isinstance(self.layering, Transmission)
+
+    # ------------------------------------------------------------------ for people and shaders
+
+    @property
+    def model(self) -> str:
+        """Name of the boundary model, for people."""
+        return f"{self.boundary}, second order" if self._second_order else str(self.boundary)
+
+    @property
+    def second_order_index(self) -> float | None:
+        """Index that the second order's coefficients are for; None without it."""
+        return None if self._second_order is None else self._second_order.index
+
+    @property
+    def energy_conserving(self) -> bool:
+        """Whether the BSDF is scaled so that it never reflects more than it receives."""
+        return self._energy is not None and self._energy.conserving
+
+    def energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
+        """Return s of the mean wavelength, for shaders; None where all s are 1.
+
+        (polar + 1, azimuthal) on `tables.energy.grid.FINE`.
+        """
+        if self._energy is None or not self._energy.conserving:
+            return None
+        return self._energy.brightness(height_scale)
+
+    def reflected_ratio(self, height_scale: float) -> DirectionalTable | None:
+        """Return albedo over flat reflectance, by which light goes on to a nested BSDF."""
+        if not self._light_beneath or self._energy is None:
+            return None
+        return self._energy.ratio(height_scale)
+
+    def to_string(self) -> str:
+        """Describe all parameters, for people."""
+        extra = {"shadowing": "vcavity" if self.vcavity else "none", "layering": self.layering}
+        if self.nested is not None:
+            extra["nested"] = self.nested
+        return self.described("Diffraction", self.model, self.energy_conserving, extra)
 
 
 mi.register_bsdf("diffraction", Diffraction)

@@ -10,23 +10,30 @@ import mitsuba as mi
 from ..errors import DiffractionError, quoted
 from ..heights.field import HeightField
 
+#: BSDFs of a single height field.
+PLUGINS = ("diffraction", "diffraction_dielectric")
+
 
 class HeightData(mi.Object):
-    """A height field that a dictionary of Mitsuba's can hold, with all that it knows of itself."""
+    """Height field in an object that a dictionary of Mitsuba's can hold."""
 
     def __init__(self, field: HeightField) -> None:
         super().__init__()
         self.field = field
 
 
-def bsdf_dict(field: HeightField | str | os.PathLike[str], **parameters: Any) -> dict[str, Any]:
-    """The plugin `diffraction` for a height field in memory, or for a file.
+def bsdf_dict(
+    field: HeightField | str | os.PathLike[str], plugin: str = "diffraction", **parameters: Any
+) -> dict[str, Any]:
+    """Return the dictionary of a BSDF for a height field in memory, or for a file.
 
     Parameters
     ----------
     field : heights in µm; or the path of a file, as for the parameter `heightfield`.
+    plugin : `diffraction`, which reflects light, or `diffraction_dielectric`, which lets it through
+        as well.
     parameters : any other parameter of the plugin, e.g. material="Al", tolerance=1e-4; None is
-        the same as to leave it out.
+        the same as leaving it out.
 
     Returns
     -------
@@ -35,14 +42,18 @@ def bsdf_dict(field: HeightField | str | os.PathLike[str], **parameters: Any) ->
     Raises
     ------
     DiffractionError
-        If `field` is neither heights nor a path.
+        If `field` is neither heights nor a path, or there is no such plugin.
     """
-    given = {name: value for name, value in parameters.items() if value is not None}
+    if plugin not in PLUGINS:
+        raise DiffractionError(
+            f"bsdf_dict: plugin={quoted(plugin)} is unknown; choose one of {', '.join(PLUGINS)}"
+        )
+    arguments = {name: value for name, value in parameters.items() if value is not None}
     if isinstance(field, str | os.PathLike):
-        return {"type": "diffraction", "heightfield": os.fspath(field), **given}
+        return {"type": plugin, "heightfield": os.fspath(field), **arguments}
     if not isinstance(field, HeightField):
         raise DiffractionError(
             f"bsdf_dict: expected a HeightField or the path of a file, got {quoted(field)}; make "
             "one of an array with HeightField(heights, pixel_size)"
         )
-    return {"type": "diffraction", "data": HeightData(field), **given}
+    return {"type": plugin, "data": HeightData(field), **arguments}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import drjit as dr
 import mitsuba as mi
@@ -13,15 +12,11 @@ from numpy.typing import NDArray
 
 from ..optics.colour import linear_srgb, response
 from ..optics.geometry import wavenumber
-from ..tables.energy.conservation import DirectionalTable
-from ..tables.energy.grating import DENSE, ENDS, Grating
-from ..tables.energy.grid import SHARE, DirectionGrid
+from ..tables.energy.grid import SHARE, DirectionalTable
 from .memory import index_between, read_record, upload
 from .types import Buffer, Float, Index, Vector2f
 
 Array = NDArray[np.float32]
-#: Directions of a grating's s in RGB, whose channels are means over wavelengths.
-_COLOURS = DirectionGrid(80, 120)
 
 
 class DirectionLookup:
@@ -35,7 +30,6 @@ class DirectionLookup:
         self._low, self._slope = mi.Float(0.0), mi.Float(0.0)
         self._first, self._pages_per_log = mi.Float(0.0), mi.Float(0.0)
         self._pages = self._polar = self._azimuthal = 1
-        self._grating: Grating | None = None
 
     def update(
         self,
@@ -48,7 +42,6 @@ class DirectionLookup:
         self.present = tables is not None
         if tables is None:
             return
-        self._grating = None if mi.is_rgb else tables[0].grating
         maps = np.stack([_pages(table) for table in tables])
         self._pages, self._polar, self._azimuthal = maps.shape[1:4]
         self._last, self._varies = len(nodes) - 2, varies
@@ -73,26 +66,21 @@ class DirectionLookup:
         share = None
         if self._nodes is not None and (self._varies or dr.grad_enabled(height_scale)):
             share = (height_scale - self._low) * self._slope
-        if self._grating is None:
-            at = self._cell(*self._place(tangential, cosine))
-            cells = [at] * len(wavenumbers)
-        else:
-            cells = [self._cell(*_chain(self._grating, tangential, k)) for k in wavenumbers]
+        cell, s, t = self._cell(*self._place(tangential, cosine))
 
-        def page(n: Index, at: tuple[Index, Float, Float]) -> Float:
-            cell, s, t = at
+        def page(n: Index) -> Float:
             corners = self._corners(n * (self._polar * self._azimuthal) + cell, share)
             return dr.lerp(dr.lerp(*corners[:2], t), dr.lerp(*corners[2:], t), s)
 
         if mi.is_rgb or self._pages == 1:
             last = self._pages - 1
-            return [page(mi.UInt32(min(n, last)), at) for n, at in enumerate(cells)]
-        found = []
-        for k, at in zip(wavenumbers, cells, strict=True):
+            return [page(mi.UInt32(min(n, last))) for n in range(len(wavenumbers))]
+        values = []
+        for k in wavenumbers:
             place = (self._first - dr.log2(k)) * self._pages_per_log
             n = mi.UInt32(index_between(place, 0.0, self._pages - 2.0))
-            found.append(dr.lerp(page(n, at), page(n + 1, at), dr.clip(place - n, 0.0, 1.0)))
-        return found
+            values.append(dr.lerp(page(n), page(n + 1), dr.clip(place - n, 0.0, 1.0)))
+        return values
 
     def _place(self, tangential: Vector2f, cosine: Float) -> tuple[Float, Float]:
         """Row and column of a `DirectionGrid`."""
@@ -123,69 +111,28 @@ class DirectionLookup:
         return [dr.lerp(*both, share - lower) for both in zip(*ends, strict=True)]
 
 
-def scales_of(
-    found: Sequence[DirectionalTable | None], otherwise: float = 1.0
-) -> list[DirectionalTable] | None:
-    """s of each on the same directions, `otherwise` where it is None; nothing if all are."""
-    made = next((one for one in found if one is not None), None)
-    if made is None:
+def scales_of(tables: Sequence[DirectionalTable | None]) -> list[DirectionalTable] | None:
+    """Scales at several height scales, 1 where there is none; None if there is none at all."""
+    some = next((table for table in tables if table is not None), None)
+    if some is None:
         return None
-    others = replace(made, values=np.full_like(made.values, otherwise))
-    scales = [one or others for one in found]
-    return scales if made.grating is not None else alike(scales)
-
-
-def _chain(grating: Grating, tangential: Vector2f, wavenumber: Float) -> tuple[Float, Float]:
-    """Row and column of a `tables.energy.grating.GratingGrid`."""
-    cosine, sine = grating.axis
-    x = cosine * tangential.x + sine * tangential.y
-    y = cosine * tangential.y - sine * tangential.x
-    width, per_x = dr.safe_sqrt(dr.fma(-y, y, 1.0)), wavenumber / grating.spacing
-    parts, last, rows = grating.nodes - ENDS, grating.last, []
-    for one in (width - x, width + x):
-        xi = dr.maximum(one * per_x, 0.0)
-        whole = dr.floor(xi)
-        rest = xi - whole
-        root = dr.sqrt(rest / last)
-        within = root * dr.rcp(root + DENSE) * ((1.0 + DENSE) * parts)
-        beyond = (rest - last) * (ENDS / (1.0 - last)) + parts
-        rows.append(dr.fma(whole, grating.nodes, dr.select(rest < last, within, beyond)))
-    return rows[0], rows[1]
+    ones = DirectionalTable(some.wavelengths, np.ones_like(some.values))
+    return [table or ones for table in tables]
 
 
 def between(
     tables: list[DirectionalTable], nodes: tuple[float, float], height_scale: float
 ) -> DirectionalTable:
-    """Interpolated between two height scales."""
-    low, high = alike(tables)
+    """Interpolate between two height scales."""
+    low, high = tables
     width = nodes[1] - nodes[0]
     share = np.float32((height_scale - nodes[0]) / width if width > 0.0 else 0.0)
     return DirectionalTable(low.wavelengths, low.values * (1 - share) + high.values * share)
 
 
-def alike(tables: list[DirectionalTable]) -> list[DirectionalTable]:
-    """Albedos or scales, all on the directions and wavelengths of the finest."""
-    finest = max(tables, key=lambda table: table.values.size)
-    theta, phi = finest.grid.theta[:, None], finest.grid.phi
-    return [
-        table
-        if table.values.shape == finest.values.shape
-        else DirectionalTable(
-            finest.wavelengths,
-            np.stack([table.at(theta, phi, wavelength) for wavelength in finest.wavelengths]),
-        )
-        for table in tables
-    ]
-
-
 def _pages(table: DirectionalTable) -> Array:
     """All four corners of each cell together: (channels or wavelengths, rows, columns, 4)."""
-    if table.grating is not None and not mi.is_rgb:
-        values = np.pad(table.values, [(0, 0), (0, 0), (0, 1)], mode="edge")
-        right, values = values[:, :, 1:], table.values
-        corners = (values[:, :-1], right[:, :-1], values[:, 1:], right[:, 1:])
-        return np.stack(corners, axis=-1)
-    values = table.values if table.grating is None else table.on(_COLOURS).values
+    values = table.values
     if mi.is_rgb and len(values) > 1:
         values = np.tensordot(_sensitivities(table.wavelengths), values, 1).astype(np.float32)
     right = np.roll(values, -1, axis=2)
@@ -194,6 +141,6 @@ def _pages(table: DirectionalTable) -> Array:
 
 
 def _sensitivities(wavelengths: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How much each wavelength counts in red, green and blue, (3, n)."""
+    """Weights of the wavelengths in red, green and blue, (3, n)."""
     weights = np.maximum(linear_srgb(response(wavelengths)).T, 0.0) * wavelengths
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))

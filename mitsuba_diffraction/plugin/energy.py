@@ -19,12 +19,13 @@ from ..errors import warn
 from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS, response
 from ..optics.mean_second_order import limited
-from ..tables.energy.conservation import FINE, Conservation, DirectionalTable
-from ..tables.energy.gain import GRAZING, fades
-from ..tables.energy.store import Energy, mean_exponents
+from ..tables.energy.conservation import Conservation
+from ..tables.energy.grid import FINE, DirectionalTable
+from ..tables.energy.store import Energy
+from ..tables.film import mean_exponents
 from ..tables.table import DiffractionTable
-from .boundary import Boundary, Kirchhoff
-from .direction_lookup import DirectionLookup, alike, between, scales_of
+from .boundary import Boundary, SmallSlope
+from .direction_lookup import DirectionLookup, between, scales_of
 from .directions import Pair
 from .fresnel import Inside, Perfect, Reflectance
 from .layers import UnderFilm, plain
@@ -40,6 +41,9 @@ INDEX_STEP = 0.05
 FILM_STEP = 0.01
 #: And a film's thickness, nm.
 THICKNESS_STEP = 5.0
+#: Step of a height scale over which the slope of g is taken. g bends by less than 1e-3 of its slope
+#: over it, and single precision leaves four digits of the difference.
+NEAR = 2.0**-9
 #: Largest ratio of a film's albedo to that of the flat one.
 MOST_RATIO = 2.0
 #: What is taken beyond this share of a real material is warned of.
@@ -47,7 +51,7 @@ MUCH = 0.05
 
 
 class EnergyModel:
-    """Of one BSDF, at the height scale and the material last given.
+    """Scales of directions and albedo of a BSDF, at the height scale and material last set.
 
     Parameters
     ----------
@@ -62,16 +66,14 @@ class EnergyModel:
         low, high = table.wavelength_range
         if mi.is_monochromatic:
             low = high = wavelength
-        kirchhoff = isinstance(boundary, Kirchhoff)
         self.conserving, self._material = conserving, boundary.material
         self._indices, self._exact = (
             partial(_rounded_indices, self._material, step) for step in (INDEX_STEP, FILM_STEP)
         )
-        model = "kirchhoff" if kirchhoff else "small_slope"
+        model = str(boundary)
         self._energy = Energy(table, model, self._indices, (low, high))
-        self._fades = fades(model)
         self._warned = False
-        self._filmed = isinstance(self._material, UnderFilm) and not kirchhoff
+        self._filmed = isinstance(self._material, UnderFilm) and isinstance(boundary, SmallSlope)
         self._scale, self._mean = DirectionLookup(), DirectionLookup()
         self._reflected = DirectionLookup()
 
@@ -84,6 +86,9 @@ class EnergyModel:
     ) -> None:
         """Look up, or compute, what belongs to another height scale or material.
 
+        s is linear between height scales, 1 among them. At one of them its derivative is that of
+        the interval above; g has derivatives of its own.
+
         beneath : whether light goes on to something.
         lowest : where height scales vary, the least of them; then height_scale is the largest.
         """
@@ -94,8 +99,12 @@ class EnergyModel:
         else:
             nodes = self._energy.between(lowest, height_scale)
         if self._filmed:
-            means = [self._mean_gain(node) for node in nodes]
-            self._mean.update(means, nodes, height_scale, lowest is not None)
+            # g costs little at any height scale: its slope is taken there, and not from nodes of s,
+            # on both sides of which it differs by some per cent
+            near = [height_scale, height_scale + (NEAR if differentiable else 0.0)]
+            around = near if lowest is None else nodes
+            means = [self._mean_gain(node) for node in around]
+            self._mean.update(means, around, height_scale, lowest is not None)
         if not (self.conserving or beneath):
             return
         found = [self._energy.at(node) for node in nodes]
@@ -104,7 +113,7 @@ class EnergyModel:
             self._warn(found)
             self._scale.update(scales, nodes, height_scale, lowest is not None)
         if beneath:
-            ratios = [self._ratio(one) for one in alike([one.albedo for one in found])]
+            ratios = [self._ratio(one.albedo) for one in found]
             self._reflected.update(ratios, nodes, height_scale, lowest is not None)
 
     def _warn(self, found: list[Conservation]) -> None:
@@ -133,24 +142,18 @@ class EnergyModel:
         return np.average(scale.values, axis=0, weights=weights).astype(np.float32)
 
     def ratio(self, height_scale: float) -> DirectionalTable:
-        """What `reflected` looks up, for who draws without Dr.Jit."""
+        """Return the table that `reflected` looks up, for shaders."""
         nodes = self._energy.nodes(height_scale)
         ratios = [self._ratio(self._energy.at(node).albedo) for node in nodes]
         return between(ratios, nodes, height_scale)
 
     @property
-    def fades(self) -> bool:
-        """Whether the factor has `tables.energy.gain.fade`."""
-        return self._fades
-
-    @property
     def takes(self) -> int:
-        """By what the BSDF is multiplied: 0 where it is by nothing."""
+        """Number that tells which factors the BSDF is multiplied by; 0 for none."""
         return self._scale.present + 2 * self._mean.present
 
     def factor(self, pair: Pair, wavenumbers: list[Float], height_scale: Float) -> Colour:
-        """s(ωi) s(ωo), per channel; of a film g(ωi) g(ωo) as well (`optics.mean_second_order`), of
-        Kirchhoff's model `tables.energy.gain.fade`.
+        """s(ωi) s(ωo), per channel; of a film g(ωi) g(ωo) as well (`optics.mean_second_order`).
 
         height_scale : the one given to `update`; needed where derivatives with respect to it are,
             and where it varies.
@@ -164,9 +167,6 @@ class EnergyModel:
                     strict=True,
                 )
                 found *= mi.UnpolarizedSpectrum([one * other for one, other in both])
-        if self._fades:
-            one, other = dr.minimum(pair.cos_i, GRAZING), dr.minimum(pair.cos_o, GRAZING)
-            found *= dr.square(dr.minimum(one, other) * dr.rcp(dr.maximum(one, other)))
         return found
 
     def reflected(

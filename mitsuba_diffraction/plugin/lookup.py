@@ -152,11 +152,11 @@ class DeviceTable:
         def row_sum(start: Index, columns: range) -> list[Float]:
             total: list[Float] = []
             for i in columns:
-                found = of(self.read(start + i))
+                values = of(self.read(start + i))
                 if not total:
-                    total = [p * weights_x[i] for p in found]
+                    total = [v * weights_x[i] for v in values]
                 else:
-                    total = [dr.fma(p, weights_x[i], t) for p, t in zip(found, total, strict=True)]
+                    total = [dr.fma(v, weights_x[i], t) for v, t in zip(values, total, strict=True)]
             return total
 
         if self._looped:
@@ -177,11 +177,11 @@ class DeviceTable:
             return total
         total = []
         for j, columns in enumerate(self.grid.tapped()):
-            found = row_sum(first + j * columns_a_row, columns)
+            row = row_sum(first + j * columns_a_row, columns)
             if not total:
-                total = [p * weight_y(j) for p in found]
+                total = [p * weight_y(j) for p in row]
             else:
-                total = [dr.fma(p, weight_y(j), t) for p, t in zip(found, total, strict=True)]
+                total = [dr.fma(p, weight_y(j), t) for p, t in zip(row, total, strict=True)]
         return total
 
     def _over_windows(
@@ -207,9 +207,9 @@ class DeviceTable:
             for i in columns:
                 parts = self._components(self.read(start + i))
                 value = inner(parts[0], weights), inner(parts[1], weights)
-                sums = [_turned(value, x[i], found) for x, found in zip(across, sums, strict=True)]
-            for found, (cos, sin) in zip(sums, phases, strict=True):
-                total = _turned(found, (cos * weight, sin * weight), total)
+                sums = [_turned(value, x[i], row) for x, row in zip(across, sums, strict=True)]
+            for row, (cos, sin) in zip(sums, phases, strict=True):
+                total = _turned(row, (cos * weight, sin * weight), total)
             return total
 
         def next_row(phases: list[Rotation]) -> list[Rotation]:
@@ -284,20 +284,20 @@ def _turned(value: Rotation, angle: Rotation, total: Rotation) -> Rotation:
     return dr.fma(x, cos, dr.fma(y, sin, total[0])), dr.fma(y, cos, dr.fma(-x, sin, total[1]))
 
 
-def _summed(one: Rotation, other: Rotation) -> Rotation:
+def _summed(first: Rotation, second: Rotation) -> Rotation:
     """(cos, sin) of the sum of two angles, times what weights they have."""
-    (x, y), (cos, sin) = one, other
+    (x, y), (cos, sin) = first, second
     return dr.fma(x, cos, -y * sin), dr.fma(x, sin, y * cos)
 
 
 def _along(step: Rotation, weights: list[Float]) -> list[Rotation]:
     """(cos, sin) of 0, 1, 2 … steps, times weights."""
     phase: Rotation = (mi.Float(1.0), mi.Float(0.0))
-    found = []
+    rotations = []
     for weight in weights:
-        found.append((phase[0] * weight, phase[1] * weight))
+        rotations.append((phase[0] * weight, phase[1] * weight))
         phase = _summed(phase, step)
-    return found
+    return rotations
 
 
 def _log2(exponent: float) -> float:

@@ -1,4 +1,7 @@
-"""Arrays in the memory of the current variant, and reading them: all that knows scalar variants."""
+"""Upload arrays to the variant's device and gather from them.
+
+Hides the difference between JIT and scalar variants.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ PACKET = 16
 
 
 def upload(kind: Kind, values: NDArray[np.generic]) -> Buffer:
-    """A Dr.Jit array in memory of Dr.Jit's own, which starts at a cache line.
+    """Upload an array into memory of Dr.Jit's own, which starts at a cache line.
 
     On the CPU an array made from NumPy's may go on using NumPy's memory: aligned by chance, and
     mistaken for other arrays when a function recorded by `dr.freeze` runs again. Scalar variants
@@ -28,7 +31,7 @@ def upload(kind: Kind, values: NDArray[np.generic]) -> Buffer:
 
 
 def read(kind: Kind, source: Buffer, index: Index, active: Mask = True) -> Float | Index:
-    """One number of what `upload` made; 0 where it is not asked for."""
+    """Gather a number of an uploaded array; 0 where the lane is inactive."""
     if not dr.is_jit_v(mi.Float):
         return kind(source[index] if active else 0)
     return dr.gather(kind, source, index, active)
@@ -42,7 +45,7 @@ def float_of_bits(bits: Index) -> Float:
 
 
 def read_packets(source: Buffer, index: Index, floats: int) -> list[Packet]:
-    """The record with this index, of so many floats, in packets as large as divide it."""
+    """Gather the record with this index, of so many floats, in the largest packets that fit."""
     if not dr.is_jit_v(mi.Float):
         return [mi.ArrayXf(source[index * floats : (index + 1) * floats])]
     size = packet_size(floats)
@@ -55,7 +58,7 @@ def read_packets(source: Buffer, index: Index, floats: int) -> list[Packet]:
 
 
 def read_record(source: Buffer, index: Index, floats: int) -> list[Float]:
-    """The same, its floats one by one."""
+    """Gather the floats of the record with this index."""
     return [x for packet in read_packets(source, index, floats) for x in packet]
 
 

@@ -27,7 +27,7 @@ _VALUES = ("value", "values", "data")
 
 
 class Changeable(Protocol):
-    """A parameter that `mi.traverse` exposes, as `ParameterChanges` sees it."""
+    """A parameter that `mi.traverse` exposes."""
 
     def refusal(self) -> str | None:
         """Reason why the value that was set is not allowed, or None."""
@@ -122,7 +122,7 @@ class ObjectValues:
 
 
 class Changing(Protocol):
-    """A BSDF whose parameters change, as `take_changes` sees it.
+    """A BSDF whose parameters change.
 
     Attributes
     ----------
@@ -152,8 +152,7 @@ def take_changes(changed: Changing, together: Sequence[Changing]) -> None:
         With all that is refused. Everything is then as it was before.
     """
     try:
-        if refused := [line for one in together for line in _refused(one)]:
-            raise DiffractionError("; ".join(refused))
+        check_parameters(together)
         changed.derive()
     except BaseException:  # an interrupted computation leaves nothing half done either
         for one in together:
@@ -163,6 +162,18 @@ def take_changes(changed: Changing, together: Sequence[Changing]) -> None:
         raise
     for parameter in changed.parameters:
         parameter.keep()
+
+
+def check_parameters(together: Sequence[Changing]) -> None:
+    """Refuse parameters that are not allowed, each by itself or with each other.
+
+    Raises
+    ------
+    DiffractionError
+        With all that is refused.
+    """
+    if refused := [line for one in together for line in _refused(one)]:
+        raise DiffractionError("; ".join(refused))
 
 
 def _refused(changed: Changing) -> list[str]:
@@ -175,7 +186,7 @@ def _copy(value: Any) -> Any:
 
 
 def _numbers(value: Any) -> NDArray[np.float64]:
-    """All numbers of a value; none of transformations and the like."""
+    """Return all numbers of a value; none of transformations and the like."""
     if dr.is_array_v(value):
         return np.array(dr.detach(value), float).ravel()
     return np.array([value] if isinstance(value, int | float) else [], float)

@@ -13,19 +13,19 @@ import drjit as dr
 import mitsuba as mi
 
 from ..tables.table import DiffractionTable
-from .directions import Pair, Place
+from .directions import Pair, TablePoint
 from .lookup import device_table
 from .rgb import rgb_power
 from .sampling import order_sampler
 from .transmission.crossing import Crossing
 from .types import Colour, Float, Index, Interaction, Vector2f
-from .window_positions import Places, Window
+from .window_positions import Window, WindowPositions
 
 
 class PowerModel(Protocol):
-    """What the BSDF asks of the diffracted power."""
+    """Diffracted power in the variant's channels, and a density to draw directions from."""
 
-    def power(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
+    def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
         """⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm², per channel."""
 
     def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
@@ -39,11 +39,11 @@ class PowerModel(Protocol):
     def wavenumbers(self, si: Interaction) -> list[Float]:
         """2π/λ of each channel, rad/µm."""
 
-    def flat(self, pair: Pair | Place, si: Interaction) -> Colour:
-        """What `power` is of a flat surface."""
+    def flat(self, pair: Pair | TablePoint, si: Interaction) -> Colour:
+        """`power` of a flat surface."""
 
-    def zeroth(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
-        """What of `power` is order 0's, in ensembles."""
+    def zeroth(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
+        """Part of `power` that is order 0's, in ensembles."""
 
     def draw(
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
@@ -66,7 +66,7 @@ class SpectralPower:
     """
 
     def __init__(
-        self, table: DiffractionTable, wavelength: float, places: Places | None = None
+        self, table: DiffractionTable, wavelength: float, places: WindowPositions | None = None
     ) -> None:
         self.device, self._places = device_table(table), places
         self._sampler = order_sampler(table if places is None else table.averaged)
@@ -74,7 +74,7 @@ class SpectralPower:
         self._fixed = mi.Float(wavelength)
         dr.make_opaque(self._fixed)
 
-    def power(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
+    def power(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
         """See `PowerModel.power`."""
         functions = [self._power(pair, height_scale, si)]
         return mi.UnpolarizedSpectrum(self._each(functions, si, pair, height_scale)[0])
@@ -93,7 +93,7 @@ class SpectralPower:
         return mi.UnpolarizedSpectrum(powers), _mean(densities)
 
     def _power(
-        self, pair: Pair | Place, height_scale: Float, si: Interaction
+        self, pair: Pair | TablePoint, height_scale: Float, si: Interaction
     ) -> Callable[[Float], Float]:
         scaled_w = pair.w * height_scale
         if self._places is None or not isinstance(pair, Pair):
@@ -102,15 +102,15 @@ class SpectralPower:
             windows = self._places.at(si, pair.rotation)
 
         def of_wavelength(k: Float) -> Float:
-            found = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w, windows)
-            return found * dr.square(k * (0.5 / dr.pi))
+            total = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w, windows)
+            return total * dr.square(k * (0.5 / dr.pi))
 
         return of_wavelength
 
     def _density(self, pair: Pair | Crossing, height_scale: Float) -> Callable[[Float], Float]:
         def of_wavelength(k: Float) -> Float:
             strategy = self._sampler.strategy(k, pair.cos_i, dr.detach(height_scale))
-            return self._sampler.density(k * pair.uv, *strategy) * pair.cos_o * dr.square(k)
+            return self._sampler.density(k * pair.uv, strategy) * pair.cos_o * dr.square(k)
 
         return of_wavelength
 
@@ -132,13 +132,13 @@ class SpectralPower:
         """See `PowerModel.wavenumbers`."""
         return [dr.rcp(wavelength) * (2e3 * dr.pi) for wavelength in self._wavelengths(si)]
 
-    def zeroth(self, pair: Pair | Place, height_scale: Float, si: Interaction) -> Colour:
+    def zeroth(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
         """See `PowerModel.zeroth`."""
         scaled_w = pair.w * height_scale
         powers = [self.device.order_0(k * scaled_w) for k in self.wavenumbers(si)]
         return self.flat(pair, si) * mi.UnpolarizedSpectrum(powers)
 
-    def flat(self, pair: Pair | Place, si: Interaction) -> Colour:
+    def flat(self, pair: Pair | TablePoint, si: Interaction) -> Colour:
         """See `PowerModel.flat`: exp(−σ²k²|(u, v)|²)/λ²."""
         apart = -(self._sigma**2) * dr.squared_norm(pair.uv)
         squares = [dr.square(k) for k in self.wavenumbers(si)]
@@ -155,7 +155,7 @@ class SpectralPower:
         self,
         functions: Sequence[Callable[[Float], Float]],
         si: Interaction,
-        pair: Pair | Place | Crossing,
+        pair: Pair | TablePoint | Crossing,
         scale: Float,
     ) -> list[list[Float]]:
         """Each function(k) for each wavelength.
@@ -170,17 +170,17 @@ class SpectralPower:
             return [[function(k) for k in wavenumbers] for function in functions]
 
         def body(
-            n: Index, inputs: list[Float], found: list[list[Float]]
+            n: Index, inputs: list[Float], values: list[list[Float]]
         ) -> tuple[Index, list[Float], list[list[Float]]]:
             added = [
-                [*of_one[1:], function(inputs[0])]
-                for of_one, function in zip(found, functions, strict=True)
+                [*earlier[1:], function(inputs[0])]
+                for earlier, function in zip(values, functions, strict=True)
             ]
             return n + 1, [*inputs[1:], inputs[0]], added
 
         nothing = [[mi.Float(0.0) for _ in wavenumbers] for _ in functions]
         state = (mi.UInt32(0), wavenumbers, nothing)
-        return [list(one) for one in dr.while_loop(state, lambda n, *_: n < count, body)[2]]
+        return [list(values) for values in dr.while_loop(state, lambda n, *_: n < count, body)[2]]
 
 
 def _mean(values: list[Float]) -> Float:
@@ -188,7 +188,7 @@ def _mean(values: list[Float]) -> Float:
 
 
 def power_model(
-    table: DiffractionTable, wavelength: float, places: Places | None = None
+    table: DiffractionTable, wavelength: float, places: WindowPositions | None = None
 ) -> PowerModel:
-    """That of the current variant; places, which RGB variants do not know, as `SpectralPower`."""
+    """Make the model of the current variant; RGB variants know no `places`."""
     return rgb_power(table) if mi.is_rgb else SpectralPower(table, wavelength, places)

@@ -1,4 +1,4 @@
-"""The plugins `diffraction` and `diffraction_mix`, in every variant of Mitsuba that is set."""
+"""Registration of the plugins in every variant of Mitsuba that is set."""
 
 from __future__ import annotations
 
@@ -7,18 +7,19 @@ import sys
 
 import mitsuba as mi
 
-_PLUGINS = (f"{__package__}.bsdf", f"{__package__}.blended_patches")
+# Base classes first: the plugins inherit from `surface`
+_MODULES = ("surface", "bsdf", "transmission.bsdf", "blended_patches")
 
 
 def register(old: str | None, new: str | None) -> None:
     """Define the plugins for the variant just set: their base class is another in each."""
     if new is None:
         return
-    for plugin in _PLUGINS:
-        if plugin in sys.modules:
-            importlib.reload(sys.modules[plugin])
+    for module in (f"{__package__}.{name}" for name in _MODULES):
+        if module in sys.modules:
+            importlib.reload(sys.modules[module])
         else:
-            importlib.import_module(plugin)
+            importlib.import_module(module)
 
 
 mi.detail.add_variant_callback(register)

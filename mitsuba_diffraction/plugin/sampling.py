@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 import weakref
+from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -41,34 +42,49 @@ _samplers: weakref.WeakKeyDictionary[DiffractionTable, dict[str, OrderSampler]] 
 )
 
 
+class Strategy(NamedTuple):
+    """Parameters of drawing frequencies for one direction of incidence.
+
+    Attributes
+    ----------
+    share : of the samples that order 0 gets.
+    band : of κ, whose density the other orders are drawn from.
+    unit : of that band's levels.
+    """
+
+    share: Float
+    band: Index
+    unit: Float
+
+
 class OrderSampler:
     """Draws spatial frequencies for one wavelength, and says how densely."""
 
     def __init__(self, table: DiffractionTable) -> None:
-        found = proposals(table)
+        densities = proposals(table)
         self._sigma = table.sigma
-        self._origin, self._cell = found.origin, found.cell
-        self._rows, self._columns = found.columns.shape[1], found.columns.shape[2] - 1
-        self._words = found.levels.shape[2] // 4
-        self._row_sums = upload(mi.Float, found.rows)
-        self._column_sums = upload(mi.Float, found.columns)
-        self._levels = upload(mi.UInt32, found.levels.view(np.uint32))
-        self._lobes = found.lobes
+        self._origin, self._cell = densities.origin, densities.cell
+        self._rows, self._columns = densities.columns.shape[1], densities.columns.shape[2] - 1
+        self._words = densities.levels.shape[2] // 4
+        self._row_sums = upload(mi.Float, densities.rows)
+        self._column_sums = upload(mi.Float, densities.columns)
+        self._levels = upload(mi.UInt32, densities.levels.view(np.uint32))
+        self._lobes = densities.lobes
         # What a whole lobe of the window holds of a cell that it is in the middle of
-        self._within = [math.erf(0.5 * table.sigma * cell) for cell in found.cell]
+        self._within = [math.erf(0.5 * table.sigma * cell) for cell in densities.cell]
         largest = [
             table.sigma / (math.sqrt(math.pi) * within) if lobe else 1.0 / cell
-            for lobe, within, cell in zip(self._lobes, self._within, found.cell, strict=True)
+            for lobe, within, cell in zip(self._lobes, self._within, densities.cell, strict=True)
         ]
-        self._units = upload(mi.Float, found.units * np.float32(largest[0] * largest[1]))
-        self._order_0 = upload(mi.Float, found.order_0)
-        self._last_band = len(found.units) - 1.0
-        self._bands_per_kappa = len(found.units) / (BANDED * table.expansion.kappa_max)
-        self._last = len(found.order_0) - 1.0
+        self._units = upload(mi.Float, densities.units * np.float32(largest[0] * largest[1]))
+        self._order_0 = upload(mi.Float, densities.order_0)
+        self._last_band = len(densities.units) - 1.0
+        self._bands_per_kappa = len(densities.units) / (BANDED * table.expansion.kappa_max)
+        self._last = len(densities.order_0) - 1.0
         self._steps_per_kappa = self._last / table.expansion.kappa_max
 
-    def strategy(self, k: Float, cos_i: Float, height_scale: Float) -> tuple[Float, Index, Float]:
-        """Share of the samples that order 0 gets; the band of the other orders, and its unit."""
+    def strategy(self, k: Float, cos_i: Float, height_scale: Float) -> Strategy:
+        """Choose how to draw for wavenumber k and incident light at this cosine."""
         kappa = k * height_scale
         position = kappa * (cos_i + 0.5) * self._bands_per_kappa
         band = mi.UInt32(index_between(position, 0.0, self._last_band))
@@ -76,9 +92,9 @@ class OrderSampler:
         power = read(mi.Float, self._order_0, mi.UInt32(index_between(nearest, 0.0, self._last)))
         share = order_0_share(power, cos_i)
         unit = read(mi.Float, self._units, band)
-        return dr.select(unit > 0.0, share, 1.0), band, unit
+        return Strategy(dr.select(unit > 0.0, share, 1.0), band, unit)
 
-    def density(self, q: Vector2f, share: Float, band: Index, unit: Float) -> Float:
+    def density(self, q: Vector2f, strategy: Strategy) -> Float:
         """Density of drawing the frequency q, per (rad/µm)²."""
         variance = self._sigma**2
         glossy = dr.exp2(dr.squared_norm(q) * (-variance / math.log(2.0))) * (variance / dr.pi)
@@ -88,16 +104,16 @@ class OrderSampler:
         )
         inside = (x >= 0.0) & (y >= 0.0) & (x < self._columns) & (y < self._rows)
         column, row = mi.UInt32(dr.select(inside, x, 0.0)), mi.UInt32(dr.select(inside, y, 0.0))
-        index = (band * self._rows + row) * self._words + column // 4
+        index = (strategy.band * self._rows + row) * self._words + column // 4
         level = (read(mi.UInt32, self._levels, index, inside) >> (8 * (column & 3))) & 255
-        cell = unit * float_of_bits(level << SHIFT)
+        cell = strategy.unit * float_of_bits(level << SHIFT)
         if any(self._lobes):
             apart = mi.Float(0.0)
             for position, number, n in ((x, column, 0), (y, row, 1)):
                 if self._lobes[n]:
                     apart += dr.square((position - mi.Float(number) - 0.5) * self._cell[n])
             cell *= dr.exp2(apart * (-variance / math.log(2.0)))
-        return dr.lerp(cell, glossy, share)
+        return dr.lerp(cell, glossy, strategy.share)
 
     def draw(
         self, k: Float, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f

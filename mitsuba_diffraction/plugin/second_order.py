@@ -1,7 +1,7 @@
 """The second order of small slope as a factor on the power of orders (Dr.Jit).
 
-The twin of `optics.second_order`: c is looked up once for a pair of directions, r for each channel,
-at k (u, v) and κ; heights times a factor have r at κ times it, times its square.
+The twin of `optics.second_order`: c is looked up once for a pair of directions, r for each channel
+at k (u, v) and κ. A factor on the heights multiplies κ by the factor and r by its square.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from .memory import index_between, read_record, upload
 from .properties import flag
 from .types import Float, Index, Kind, Number, Properties
 
-#: Indices are rounded to this, for c.
+#: Step to which indices are rounded for c.
 INDEX_STEP = 0.01
-# Cosines this close to 1 are: a derivative of their angle is no number
+# Cosines are clipped to this: the derivative of an angle at 1 is infinite
 _NORMAL = 1.0 - 1e-7
 
 
@@ -92,17 +92,17 @@ def _differs(props: Properties, name: str, defaults: dict[str, str]) -> bool:
 
 
 class SecondOrder:
-    """Of one BSDF, at its index.
+    """Factor of the second order for one BSDF, at its index.
 
     Parameters
     ----------
-    material : what the surface is of.
-    boundary : its model, which says how much of small slope an order has.
-    ratios : r of its heights.
+    material : the surface's dielectric.
+    boundary : its model, which has the share of small slope in an order.
+    ratios : slope ratios of its heights.
 
     Attributes
     ----------
-    index : that c is for, to `INDEX_STEP`.
+    index : index of the coefficients c, rounded to `INDEX_STEP`.
     """
 
     def __init__(self, material: Dielectric, boundary: SmallSlope, ratios: SlopeRatios) -> None:
@@ -127,7 +127,7 @@ class SecondOrder:
         indices: list[Number] = [self._material.eta]
         shares = self._boundary.shares(pair, height_scale, wavenumbers, indices)
         c = self._coefficients.at(self._angles(pair))
-        found = []
+        factors = []
         for k, share in zip(wavenumbers, shares, strict=True):
             r = self._ratios.at(self._place(pair, height_scale, k))
             scale = (1.0 - share) * dr.square(height_scale)
@@ -135,8 +135,8 @@ class SecondOrder:
             imaginary = scale * (c[0] * r[1] + c[1] * r[0] + c[2] * r[3] + c[3] * r[2])
             square = dr.fma(real, real, imaginary * imaginary)
             least = dr.minimum(1.0, LIMIT * dr.rsqrt(dr.maximum(square, 1e-20)))
-            found.append(least * dr.fma(least, square, 2.0 * real))
-        return found
+            factors.append(least * dr.fma(least, square, 2.0 * real))
+        return factors
 
     def _angles(self, pair: Pair) -> list[Float]:
         """θi, θo and the azimuth of ωo from that of −ωi, in nodes."""
@@ -153,11 +153,11 @@ class SecondOrder:
 
     def _place(self, pair: Pair, height_scale: Float, k: Float) -> list[Float]:
         """κ, q_y and q_x, in nodes."""
-        found = [(k * pair.w * height_scale - self._first) * self._per_kappa]
+        nodes = [(k * pair.w * height_scale - self._first) * self._per_kappa]
         for axis, q in ((1, pair.uv.y), (0, pair.uv.x)):
             cells = dr.fma(k * q, 1.0 / self._cell[axis], self._middle[axis])
-            found.append(dr.round(cells) if self._orders[axis] else cells)
-        return found
+            nodes.append(dr.round(cells) if self._orders[axis] else cells)
+        return nodes
 
 
 class _Grid:

@@ -74,8 +74,9 @@ class Tabulated:
         kappa = np.clip(kappa, 0.0, np.nextafter(expansion.kappa_max, 0.0))
         parabola = np.linalg.inv(t[:, None] ** np.arange(3))
         # one record per cell, so that few packets fetch all of it
-        both = np.concatenate([functions_at(expansion, kappa), table.order_0_at(kappa)], axis=-1)
-        numbers = np.einsum("pn,cnt->cpt", parabola, both).reshape(len(start), 1, -1)
+        functions = functions_at(expansion, kappa), table.order_0_at(kappa)
+        numbers = np.einsum("pn,cnt->cpt", parabola, np.concatenate(functions, axis=-1))
+        numbers = numbers.reshape(len(start), 1, -1)
         self._record = Record.of(1, numbers.shape[2], unit=PACKET)
         self._parabolas = upload(mi.Float, self._record.pack(numbers.astype(np.float32)))
 

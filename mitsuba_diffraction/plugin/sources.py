@@ -1,4 +1,4 @@
-"""From what a scene names (an image, a recipe, a table, an array) to a table, built only once."""
+"""Tables of the sources that a scene names: images, recipes, tables, arrays; each built once."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def table_of_file(
     height_scale: float,
     provider: TableProvider,
 ) -> DiffractionTable:
-    """The table that a file is or makes: a table, a recipe, or a height field of any format.
+    """Return the table of a file: a table, a recipe, or a height field of any format.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def table_of_file(
 
 
 def heights_of_file(path: Path, must_be_table: bool, options: LoadOptions) -> HeightField:
-    """The heights that a scene names; the first of a recipe's several.
+    """Return the heights that a scene names; the first of a recipe's several.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def heights_of_file(path: Path, must_be_table: bool, options: LoadOptions) -> He
 
 
 def heights_of_tensor(data: Any, options: LoadOptions) -> HeightField:
-    """Heights (ny, nx) in µm, given as an array, or as what `bsdf_dict` makes of a HeightField.
+    """Return heights (ny, nx) in µm from an array, or from `bsdf_dict`'s HeightField.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def heights_of_tensor(data: Any, options: LoadOptions) -> HeightField:
 def table_of_heights(
     heights: HeightField, asked: Mapping[str, Any], height_scale: float, provider: TableProvider
 ) -> DiffractionTable:
-    """The table of a height field."""
+    """Return the table of a height field."""
     digest = heights.digest() + (" cut out" if heights.cut_out else "")  # warned of otherwise
     return provider(_request(digest, lambda: [heights], asked, height_scale, None))
 
@@ -200,11 +200,11 @@ def _file_digest(path: Path, options: LoadOptions) -> str:
 
 
 def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
-    """Changes when the recipe's heights may: its own text, its sources, or the generators."""
+    """Return a digest of the recipe's text, its sources and the generators."""
     files = [readable_file(source) for source in recipe.sources]
     if recipe.generator is not None:
         files += sorted(Path(gratings.__file__).parent.glob("*.py"))
-    arguments = [dict(one) for one in recipe.arguments]
+    arguments = [dict(patch) for patch in recipe.arguments]
     options_of_both = [recipe.options.specified(), options.specified()]
     return key_of(options_of_both, recipe.generator, arguments, *map(_sha256, files))
 
@@ -223,8 +223,8 @@ def _remedy(name: str) -> str:
 def _check_agreement(
     path: Path, table: DiffractionTable, options: LoadOptions, asked: Mapping[str, Any]
 ) -> None:
-    """A table fixes its own parameters: those given beside it must agree with it."""
-    own = {
+    """Refuse parameters of a scene that contradict its table, which fixes them."""
+    tabulated = {
         "coherence_width": table.coherence_width,
         "coherence": table.coherence,
         "basis": table.expansion.basis,
@@ -239,18 +239,18 @@ def _check_agreement(
             "it out, or build the table with '--second-order true', for coherence='ensemble'"
         )
     for name, value in asked.items():
-        if value != own[name] and not (name == "basis" and value == "auto"):
+        if value != tabulated[name] and not (name == "basis" and value == "auto"):
             raise DiffractionError(
-                f"{name}={value} contradicts the table '{path}', which has {name}={own[name]}; "
-                f"{_remedy(name)}, or build another table with 'mitsuba-diffraction precompute "
-                f"--{name.replace('_', '-')} {value}'"
+                f"{name}={value} contradicts the table '{path}', which has "
+                f"{name}={tabulated[name]}; {_remedy(name)}, or build another table with "
+                f"'mitsuba-diffraction precompute --{name.replace('_', '-')} {value}'"
             )
     for name, value in options.specified().items():
         raise DiffractionError(
             f"{name}={value} is for height fields, but '{path}' is a table and has its own; "
             f"leave {name} out, or say 'auto'"
         )
-    if table.wavelength_range[0] > SHORTEST_WAVELENGTH:
+    if not mi.is_monochromatic and table.wavelength_range[0] > SHORTEST_WAVELENGTH:
         raise DiffractionError(
             f"the table '{path}' starts at {table.wavelength_range[0]:g} nm, but Mitsuba renders "
             f"from {SHORTEST_WAVELENGTH:g} nm on; build it with '--wavelength-range 360 830'"

@@ -50,12 +50,6 @@ class Material:
     coat: float | None
     second_order: bool
 
-    @property
-    def is_default(self) -> bool:
-        """Whether `model.default_brdf` is the BRDF in an ensemble."""
-        bare = self.coat is None and not isinstance(self.index, Filmed)
-        return bare and self.model == "small_slope"
-
 
 def brdf(
     field: HeightField,
@@ -175,42 +169,47 @@ def _reflected(
     """Measured light where both directions are above the surface, 0 elsewhere."""
     assert material.index is not None
     lit = (light.wi[:, 2] > 0) & (light.wo[:, 2] > 0)
-    index, window = material.index[lit], window.at(lit)
-    light = Light(*(part[lit] for part in light))
     values = measure(np.zeros((len(lit), 2, 2), complex))
-    if not lit.any():
-        return values
-    if material.coat is not None:
-        inside, relative = coats.refracted_light(light, material.coat), index / material.coat
-        power, jones = _structure(field, inside, relative, material, window)
-        values[lit] = coats.reflected(
-            light, window.sigma, material.coat, relative, power, jones, measure
-        )
-    elif material.is_default and window.coherence == COHERENCES[0]:
-        values[lit] = models.default_brdf(
-            field, light, index, window.sigma, material.second_order, measure
-        )
-    else:
-        power, jones = _structure(field, light, index, material, window)
-        values[lit] = models.reflected(light, window.sigma, power, jones, measure)
+    if lit.any():
+        above = Light(*(part[lit] for part in light))
+        index = material.index[lit]
+        values[lit] = _lit(measure, field, above, index, material, window.at(lit))
     return values
 
 
-def _structure(
-    field: HeightField, light: Light, index: Complex | Filmed, material: Material, window: Window
-) -> tuple[Real, Complex]:
-    """⟨|P|²⟩ and J of the heights, in the medium where `light` and `index` are given."""
+def _lit(
+    measure: Measure,
+    field: HeightField,
+    light: Light,
+    index: Complex | Filmed,
+    material: Material,
+    window: Window,
+) -> Real:
+    """Measured light of directions above the surface."""
     if isinstance(index, Filmed):
         jones = films.jones(field, light, index, material.model)
-    elif material.model == "kirchhoff":
-        jones = models.kirchhoff(light, index)
-    else:
-        s = models.share(field, light, index)
-        jones = models.blended(
-            models.kirchhoff(light, index),
-            models.small_slope(light, index),
-            s,
+        power = window_power(field, *light, *window)
+        return models.reflected(light, window.sigma, power, jones, measure)
+    if material.coat is not None:
+        inside, relative = coats.refracted_light(light, material.coat), index / material.coat
+        power, jones = _structure(field, inside, relative, material, window)
+        return coats.reflected(light, window.sigma, material.coat, relative, power, jones, measure)
+    if material.model == "small_slope" and window.coherence == COHERENCES[0]:
+        return models.default_brdf(
+            field, light, index, window.sigma, material.second_order, measure
         )
-        if material.second_order:
-            return models.ensemble_power(field, light, window.sigma, (index, s)), jones
+    power, jones = _structure(field, light, index, material, window)
+    return models.reflected(light, window.sigma, power, jones, measure)
+
+
+def _structure(
+    field: HeightField, light: Light, index: Complex, material: Material, window: Window
+) -> tuple[Real, Complex]:
+    """⟨|P|²⟩ and J of the heights, in the medium where `light` and `index` are given."""
+    if material.model == "kirchhoff":
+        return window_power(field, *light, *window), models.kirchhoff(light, index)
+    s = models.share(field, light, index)
+    jones = models.blended(models.kirchhoff(light, index), models.small_slope(light, index), s)
+    if material.second_order:
+        return models.ensemble_power(field, light, window.sigma, (index, s)), jones
     return window_power(field, *light, *window), jones

@@ -53,17 +53,23 @@ def btdf(
         inside = refracted(below * [1, 1, -1], eta) * [1, 1, -1]
     k, total = wavenumber(lam), above + eta * inside
     kappa, sigma = -k * total[:, 2], sigma_of(width)
-    roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
+    roughness = blend.ScaleRoughness.from_heights(field.heights, field.pixel_size)
     jones = through.kirchhoff(above, inside, eta)
     if model == "small_slope":
         s = blend.weight(kappa, roughness.at(k * np.hypot(*total[:, :2].T)), eta)[:, None, None]
         jones = np.asarray((1 - s) * jones + s * through.small_slope(above, inside, eta))
     if thin:
         jones = through.out_of_sheet(jones, above, below, eta)
+    screens = [np.exp(1j * phase * field.heights) for phase in kappa]
+    frequency = -k[:, None] * total[:, :2]
     power = [
-        screen_power(np.exp(1j * phase * field.heights), field.pixel_size, x, y, sigma, coherence)
-        for phase, (x, y) in zip(kappa, -k[:, None] * total[:, :2], strict=True)
+        screen_power(screen, field.pixel_size, x, y, sigma, coherence)
+        for screen, (x, y) in zip(screens, frequency, strict=True)
     ]
-    cosines = -4 * above[:, 2] * eta * inside[:, 2]
-    factor = cosines / ((lam * 1e-3) ** 2 * np.pi * sigma**2 * total[:, 2] ** 2)
-    return np.where(lit, factor * boundary.unpolarised(jones) * power, 0.0)
+    lobe = 4 * np.pi**2 * sigma**4 * np.exp(-(sigma**2) * np.sum(frequency**2, axis=1))
+    # order 0 has what the flat surface transmits; speckle may be darker than it is on average
+    zeroth = np.minimum(np.abs([screen.mean() for screen in screens]) ** 2 * lobe, power)
+    cosines = -4 * above[:, 2] * eta * inside[:, 2] / np.maximum(total[:, 2] ** 2, 1e-12)
+    orders = cosines * boundary.unpolarised(jones) * (power - zeroth)
+    flat = boundary.unpolarised(through.order_0(above, below, eta, thin=thin)) * zeroth
+    return np.where(lit, (orders + flat) / ((lam * 1e-3) ** 2 * np.pi * sigma**2), 0.0)

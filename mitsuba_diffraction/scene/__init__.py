@@ -1,11 +1,11 @@
-"""Scenes: loaded, rendered in passes, planned, and meshes that a patch can follow.
+"""Scenes: loading, rendering in passes, planning, and meshes that a patch can follow.
 
 Contents
 --------
-load         a variant set and a scene loaded; what Mitsuba says, as lines of our own
+load         variants set and scenes loaded; Mitsuba's errors in one line
 parameters   names that -D may set, and values that change from frame to frame
-passes       rendering in passes of samples; EXR and PNG of it
+passes       rendering in passes of samples; EXR and PNG of the picture
 frames       frames of an animation, and a film of them
-planning     the tables that suffice for a scene
+planning     the recipes of tables that suffice for a scene
 orientation  directions that a patch follows over a mesh
 """

@@ -1,4 +1,4 @@
-"""A scene many times, in files that a later run with the same settings keeps."""
+"""Frames of an animation, in files that a later run with the same settings keeps."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ FILMS: dict[str, dict[str, Any]] = {
 }
 #: Why a frame that is not there is rendered.
 MISSING = ("", "")
-_KEY = "mitsuba-diffraction"  # of the text in a frame's PNG
+_KEY = "mitsuba-diffraction"  # key of the text in a frame's PNG
 
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame: its file, the scene's parameters, and the settings that decide its pixels."""
+    """A frame: its file, the scene's parameters, and the settings that decide its pixels."""
 
     png: Path
     values: dict[str, str]
@@ -38,11 +38,11 @@ class Frame:
 
     @property
     def exr(self) -> Path:
-        """The linear picture beside the PNG."""
+        """Linear picture beside the PNG."""
         return self.png.with_suffix(".exr")
 
     def outdated(self, with_exr: bool) -> tuple[str, str] | None:
-        """Why the frame has to be rendered, and an example; None if the file is this frame.
+        """Return the reason to render the frame and an example; None if the file is this frame.
 
         Raises a DiffractionError if the file there is something else.
         """
@@ -123,7 +123,7 @@ def write_frame(frame: Frame, bitmap: Any, scene: Path, variant: str, with_exr: 
 
 
 def write_film(frames: Sequence[Path], film: Path, fps: float) -> None:
-    """Join PNG files to an endless film, by the suffix an animated WebP or GIF.
+    """Join PNG files to an endless film, an animated WebP or GIF by its suffix.
 
     Raises a DiffractionError if Pillow cannot write such a file.
     """
@@ -145,23 +145,23 @@ def write_film(frames: Sequence[Path], film: Path, fps: float) -> None:
             picture.close()
 
 
-def digest_of(scene: Path, given: Mapping[str, str]) -> str:
-    """Changes when the scene, what it includes, or a file that it names does."""
+def digest_of(scene: Path, values: Mapping[str, str]) -> str:
+    """Return the digest of a scene, its includes, and every file that it names."""
     content = hashlib.sha256()
-    for file in files_of(scene, given):
+    for file in files_of(scene, values):
         content.update(file.name.encode())
         content.update(file.read_bytes())
     return content.hexdigest()[:32]
 
 
 def _settings_in(png: Path) -> dict[str, Any] | None:
-    """The settings that a frame was written with; None if it is none."""
+    """Read the settings that a frame was written with; None if the file is no frame."""
     from PIL import Image
 
     try:
         with Image.open(png) as image:
             text = getattr(image, "text", {}).get(_KEY, "")
-        found = json.loads(text[1:-1])  # Mitsuba puts it into quotes
+        settings = json.loads(text[1:-1])  # Mitsuba puts it into quotes
     except (OSError, ValueError, SyntaxError):
         return None
-    return found if isinstance(found, dict) else None
+    return settings if isinstance(settings, dict) else None

@@ -1,4 +1,4 @@
-"""Choosing a variant and loading a scene; what Mitsuba says about it in one line.
+"""Variants set and scenes loaded; Mitsuba's errors in one line.
 
 Mitsuba 3.9 throws RuntimeError (ImportError for variants) with a text such as
 
@@ -28,7 +28,7 @@ _LOADING = re.compile(
 _INSTANTIATE = re.compile(r'failed to instantiate (?P<kind>\w+) plugin of type "(?P<type>[^"]+)": ')
 _NOT_FOUND = re.compile(r'\[PluginManager\] Plugin "[^"]+" not found!')
 _TRACEBACK = re.compile(r"Traceback \(most recent call last\):\n(?:[ \t].*\n)*(?:[\w.]+: (?=\S))?")
-# What a Python plugin raises that says nothing of the scene
+# Exceptions of a Python plugin that say nothing about the scene
 _NO_ERROR = re.compile(r"^(KeyboardInterrupt|MemoryError|SystemExit): ?(\d*)", re.M)
 _UNREAD = re.compile(
     r'Found \d+ unreferenced (?:property|properties) in (\w+) plugin of type "([^"]+)":'
@@ -96,11 +96,11 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
         raise error_of("cannot load the scene", error) from error
     if not isinstance(scene, mi.Scene):
         raise DiffractionError(f"'{file}' is not a scene; its outermost element must be <scene>")
-    # "Diffraction[" is found inside twosided, blendbsdf and the like, too
+    # Found inside twosided, blendbsdf and the like, too
     surfaces = {
         number: shape
         for number, shape in enumerate(scene.shapes())
-        if "Diffraction[" in str(shape.bsdf())
+        if re.search(r"Diffraction(Dielectric)?\[", str(shape.bsdf()))
     }
     for number, shape in surfaces.items():
         check_attributes(shape, number)
@@ -109,7 +109,7 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
 
 
 def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
-    """Name the meshes on which a patch has no direction: a BSDF itself cannot see its mesh."""
+    """Warn of meshes on which a patch has no direction: a BSDF itself cannot see its mesh."""
     lacking = [
         name_of(shape, number)
         for number, shape in surfaces.items()
@@ -136,13 +136,13 @@ def shrink(sensor: Any) -> None:
 
 
 def preview_samples(sensor: Any, preview: bool) -> int:
-    """The scene's own samples per pixel; for a preview at most 16."""
-    own = int(sensor.sampler().sample_count())
-    return min(own, 16) if preview else own
+    """Return the scene's own samples per pixel; for a preview at most 16."""
+    samples = int(sensor.sampler().sample_count())
+    return min(samples, 16) if preview else samples
 
 
 def sensor_of(scene: Any, index: int) -> Any:
-    """One of the scene's sensors.
+    """Return a sensor of the scene.
 
     Raises a DiffractionError if there is none with that index.
     """
@@ -157,7 +157,7 @@ def sensor_of(scene: Any, index: int) -> Any:
 
 
 def plain_text(error: BaseException) -> str:
-    """The text of one of Mitsuba's exceptions as one line: where in the scene, and what is wrong.
+    """Return the text of Mitsuba's exception as one line: where in the scene, and what is wrong.
 
     The places in Mitsuba's own sources, the tracebacks of Python plugins and repeated
     "while loading" are left out.
@@ -183,45 +183,45 @@ def plain_text(error: BaseException) -> str:
     return text
 
 
-def error_of(what: str, error: BaseException) -> BaseException:
-    """What to raise for one of Mitsuba's exceptions.
+def error_of(failed: str, error: BaseException) -> BaseException:
+    """Return the error to raise for Mitsuba's exception.
 
     Mitsuba makes a RuntimeError of whatever a Python plugin raises: Ctrl-C, an exit and lack of
-    memory are themselves again, anything else is a DiffractionError that begins with `what`.
+    memory are themselves again, anything else is a DiffractionError that begins with `failed`.
     """
-    found = _NO_ERROR.search(_words(error))
-    if found is None:
-        return DiffractionError(f"{what}: {plain_text(error)}")
-    if found[1] == "SystemExit":
-        return SystemExit(int(found[2] or 1))
-    return KeyboardInterrupt() if found[1] == "KeyboardInterrupt" else MemoryError()
+    original = _NO_ERROR.search(_words(error))
+    if original is None:
+        return DiffractionError(f"{failed}: {plain_text(error)}")
+    if original[1] == "SystemExit":
+        return SystemExit(int(original[2] or 1))
+    return KeyboardInterrupt() if original[1] == "KeyboardInterrupt" else MemoryError()
 
 
 def _words(error: BaseException) -> str:
-    """Its text; a text that is no UTF-8, as it quotes a damaged scene, reaches us as bytes."""
+    """Return the text of an exception; damaged scenes are quoted as bytes that are not UTF-8."""
     if isinstance(error, UnicodeDecodeError):
         return error.object.decode("utf-8", "replace")
     return str(error)
 
 
-def _no_ply(found: re.Match[str]) -> str:
-    """A mesh of another format where a PLY is expected, with what to do about it."""
-    file = PurePath(found["file"])
+def _no_ply(match: re.Match[str]) -> str:
+    """Say what to do about a mesh of another format where a PLY is expected."""
+    file = PurePath(match["file"])
     todo = f"run 'mitsuba-diffraction tangents {file} -o mesh.ply' first, and use mesh.ply"
-    if not found["why"].startswith("invalid PLY"):
+    if not match["why"].startswith("invalid PLY"):
         return f"'{file}' has polygons, of which Mitsuba reads only triangles: {todo}"
     if file.suffix.lower() in (".ply", ""):
-        return f"'{file}' is no undamaged PLY: {found['why']}; export the mesh again"
+        return f"'{file}' is no undamaged PLY: {match['why']}; export the mesh again"
     if file.suffix.lower() not in (".obj", ".serialized"):
         todo = "convert it to PLY or OBJ"
     return f"'{file}' is no PLY mesh, which the scene expects: {todo}"
 
 
-def _unused(found: re.Match[str]) -> str:
-    """Parameters that are given and that nothing in the scene reads."""
-    names = re.findall(r"\$(\w+)=", found["list"])
+def _unused(match: re.Match[str]) -> str:
+    """Name parameters that are given and that nothing in the scene reads."""
+    names = re.findall(r"\$(\w+)=", match["list"])
     if not names:
-        return found[0]
+        return match[0]
     return (
         f"nothing in the scene uses {', '.join('$' + name for name in names)}, although it "
         f"declares it: write ${names[0]} where its value is to go, or leave "

@@ -18,22 +18,22 @@ from ..files import refuse_pipe
 _REFERENCE = re.compile(r"\$(\w+)")
 # Mitsuba stops at 15 includes within each other.
 _DEEPEST = 15
-# Of a path, in characters: longer texts name no file, and asking would be an error.
+# Longest path in characters: longer texts name no file, and asking would be an error.
 _LONGEST = 1024
 
 Numbers = tuple[float, ...]
 
 
-def check_parameters(scene: Path, given: Mapping[str, str]) -> None:
+def check_parameters(scene: Path, values: Mapping[str, str]) -> None:
     """Refuse parameters given on the command line that the scene, an XML file, does not have.
 
     Raises a DiffractionError if one is unknown; the text names those of the scene and its includes,
     with defaults.
     """
-    known = parameters_of(scene, given)
+    known = parameters_of(scene, values)
     if known is None:
         return  # Mitsuba says what is wrong with the file
-    for name in given:
+    for name in values:
         if name in known:
             continue
         if not known:
@@ -49,47 +49,47 @@ def check_parameters(scene: Path, given: Mapping[str, str]) -> None:
 
 
 def parameters_of(
-    scene: Path, given: Mapping[str, str] | None = None
+    scene: Path, values: Mapping[str, str] | None = None
 ) -> dict[str, str | None] | None:
     """Names of a scene's parameters and their defaults, includes and all.
 
     A default is `None` where the scene uses a parameter without giving one, and so is the result as
     a whole if a file is missing or no XML.
 
-    given : values that are set, which may occur in the names of included files.
+    values : those that are set, which may occur in the names of included files.
     """
-    found: dict[str, str | None] = {}
-    return found if _collect(scene, dict(given or {}), found, 0) else None
+    defaults: dict[str, str | None] = {}
+    return defaults if _collect(scene, dict(values or {}), defaults, 0) else None
 
 
-def refuse_pipes(scene: Path, given: Mapping[str, str]) -> None:
+def refuse_pipes(scene: Path, values: Mapping[str, str]) -> None:
     """Raise a DiffractionError if the scene names a pipe or a device, for which Mitsuba waits."""
-    _walk(scene, given, with_sources=False)
+    _walk(scene, values, with_sources=False)
 
 
-def files_of(scene: Path, given: Mapping[str, str] | None = None) -> list[Path]:
+def files_of(scene: Path, values: Mapping[str, str] | None = None) -> list[Path]:
     """List the scene, its includes, and every file named by one of them or by a recipe they name.
 
     Raises a DiffractionError if one is a pipe or a device, or a recipe is wrong.
     """
-    return _walk(scene, given, with_sources=True)
+    return _walk(scene, values, with_sources=True)
 
 
-def _walk(scene: Path, given: Mapping[str, str] | None, with_sources: bool) -> list[Path]:
+def _walk(scene: Path, values: Mapping[str, str] | None, with_sources: bool) -> list[Path]:
     """List the files that a scene names, with those that recipes among them name if asked."""
     from ..heights.read import is_recipe
     from ..heights.recipes import Recipe
 
-    values = {name: value or "" for name, value in (parameters_of(scene, given) or {}).items()}
-    values |= given or {}
-    found: dict[Path, None] = {}
+    defaults = parameters_of(scene, values) or {}
+    known = {name: value or "" for name, value in defaults.items()} | dict(values or {})
+    files: dict[Path, None] = {}
     waiting = [scene]
     while waiting:
         file = waiting.pop()
         refuse_pipe(file)
-        if file in found or not os.path.isfile(file):  # Path.is_file() raises for long names
+        if file in files or not os.path.isfile(file):  # Path.is_file() raises for long names
             continue
-        found[file] = None
+        files[file] = None
         if with_sources and is_recipe(file):
             waiting += Recipe.load(file).sources
         if file.suffix.lower() != ".xml":
@@ -97,14 +97,14 @@ def _walk(scene: Path, given: Mapping[str, str] | None, with_sources: bool) -> l
         with contextlib.suppress(ElementTree.ParseError, ValueError):
             for element in ElementTree.parse(file).getroot().iter():
                 for text in element.attrib.values():
-                    named = _with_values(text, values, {})
+                    named = _with_values(text, known, {})
                     if named and len(named) < _LONGEST and "\0" not in named:
                         waiting.append(scene.parent / named)
-    return list(found)
+    return list(files)
 
 
 def _collect(
-    file: Path, given: Mapping[str, str], found: dict[str, str | None], depth: int
+    file: Path, values: Mapping[str, str], defaults: dict[str, str | None], depth: int
 ) -> bool:
     """Add the parameters of one file to `found`; whether it and its includes could be read."""
     if depth > _DEEPEST or not file.is_file():
@@ -116,24 +116,24 @@ def _collect(
     for element in root.iter():
         if element.tag == "default":
             name = element.get("name", "")
-            if found.get(name) is None:  # the first default counts, as in Mitsuba
-                found[name] = element.get("value", "")
+            if defaults.get(name) is None:  # the first default counts, as in Mitsuba
+                defaults[name] = element.get("value", "")
             continue
         for value in element.attrib.values():
             for name in _REFERENCE.findall(value):
-                found.setdefault(name, None)
+                defaults.setdefault(name, None)
         if element.tag == "include":
-            included = file.parent / _with_values(element.get("filename", ""), given, found)
-            if not _collect(included, given, found, depth + 1):
+            included = file.parent / _with_values(element.get("filename", ""), values, defaults)
+            if not _collect(included, values, defaults, depth + 1):
                 return False
     return True
 
 
-def _with_values(text: str, given: Mapping[str, str], defaults: Mapping[str, str | None]) -> str:
+def _with_values(text: str, values: Mapping[str, str], defaults: Mapping[str, str | None]) -> str:
     """The text with parameters replaced by their values, as far as they have one."""
 
     def value(match: re.Match[str]) -> str:
-        return given.get(match[1]) or defaults.get(match[1]) or match[0]
+        return values.get(match[1]) or defaults.get(match[1]) or match[0]
 
     return _REFERENCE.sub(value, text)
 
@@ -180,14 +180,14 @@ def numbers_in(text: str) -> Numbers | None:
 
 def values_of_frames(
     scene: Path,
-    given: Mapping[str, str],
+    fixed: Mapping[str, str],
     count: int,
     changes: Sequence[Change],
     turns: Sequence[str],
 ) -> list[dict[str, str]]:
     """Parameters of the scene for each of `count` frames.
 
-    given : parameters that stay.
+    fixed : parameters that stay.
     changes : from the first frame to the last, both ends included.
     turns : names of angles in degrees that turn once around, beginning where the scene has them;
         the last frame is one step before the first, so that a film of them closes.
@@ -197,7 +197,7 @@ def values_of_frames(
     """
     around = []
     for name in turns:
-        start = given.get(name) or (parameters_of(scene, given) or {}).get(name, "0")
+        start = fixed.get(name) or (parameters_of(scene, fixed) or {}).get(name, "0")
         begin = numbers_in(start or "")
         if begin is None or len(begin) != 1:
             raise DiffractionError(
@@ -207,8 +207,8 @@ def values_of_frames(
         around.append(Change(name, begin, (begin[0] + 360.0,)))
     frames = []
     for n in range(count):
-        values = dict(given)
-        values |= {one.name: one.at(n / max(1, count - 1)) for one in changes}
-        values |= {one.name: one.at(n / count) for one in around}
+        values = dict(fixed)
+        values |= {change.name: change.at(n / max(1, count - 1)) for change in changes}
+        values |= {change.name: change.at(n / count) for change in around}
         frames.append(values)
     return frames

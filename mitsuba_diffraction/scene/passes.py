@@ -38,7 +38,7 @@ _SAMPLES = {"llvm": 2**21, "cuda": 2**24}
 
 
 def colours_of(bitmap: Any) -> Any | None:
-    """The part of a film's bitmap that a screen can show; `None` if there is none.
+    """Return the part of a film's bitmap that a screen can show; None if there is none.
 
     Beside colours a film may hold further channels (normals, depth, ...), and a spectral film
     holds only bands.
@@ -60,7 +60,7 @@ def write_exr(bitmap: Any, path: Path, metadata: Mapping[str, str | int]) -> Non
 def write_png(
     colours: Any, path: Path, exposure: float = 0.0, metadata: Mapping[str, str] | None = None
 ) -> None:
-    """Write 8 bits per channel: times 2^exposure, sRGB transfer, what is beyond [0, 1] clipped.
+    """Write 8 bits per channel: values times 2^exposure, sRGB transfer, clipped to [0, 1].
 
     colours : what `colours_of` returns; its alpha is premultiplied, that of the PNG is not.
     exposure : stops.
@@ -87,7 +87,7 @@ def write_png(
 
 
 def count_bad(bitmap: Any) -> int:
-    """How many pixels hold a NaN or an infinity."""
+    """Count the pixels that hold a NaN or an infinity."""
     return int((~np.isfinite(np.array(bitmap))).any(axis=-1).sum())
 
 
@@ -95,7 +95,7 @@ def _write(bitmap: Any, path: Path) -> None:
     with atomic_path(path) as temporary:
         try:
             bitmap.write(str(temporary))
-        except RuntimeError as error:  # what Mitsuba makes of a full disk
+        except RuntimeError as error:  # Mitsuba's exception for a full disk
             reason = one_line(str(error)).rpartition(": ")[2]
             raise DiffractionError(
                 f"cannot write '{path}': {reason}; nothing was left behind"
@@ -104,9 +104,9 @@ def _write(bitmap: Any, path: Path) -> None:
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a rendering: a `mi.Bitmap`, its samples per pixel, whether Ctrl-C ended it.
+    """Picture of a rendering (a `mi.Bitmap`), its samples per pixel, and whether Ctrl-C ended it.
 
-    Without samples there is no bitmap.
+    Without samples the bitmap is None.
     """
 
     bitmap: Any
@@ -115,7 +115,7 @@ class Result:
 
 
 class Stop:
-    """Inside, Ctrl-C only sets `asked`; Ctrl-C again gives up as usual."""
+    """Inside, Ctrl-C only sets `asked`; a second Ctrl-C raises KeyboardInterrupt."""
 
     def __init__(self) -> None:
         self.asked = False
@@ -138,7 +138,7 @@ class Stop:
 
 
 def samples_per_pass(spp: int, pixels: int, variant: str) -> int:
-    """How many of `spp` samples per pixel to take at once.
+    """Return how many of `spp` samples per pixel to take at once.
 
     Passes of one size share one kernel, so a divisor of `spp` is taken if one is large enough.
     """
@@ -153,14 +153,14 @@ def samples_per_pass(spp: int, pixels: int, variant: str) -> int:
 
 @dataclass(frozen=True)
 class Pass:
-    """One pass: the seed of its random numbers, and its samples per pixel."""
+    """A pass: the seed of its random numbers, and its samples per pixel."""
 
     seed: int
     spp: int
 
 
 def passes_of(sensor: Any, spp: int, seed: int, variant: str) -> list[Pass]:
-    """The passes that take `spp` samples per pixel, or the few more that a sampler rounds up to.
+    """List the passes that take `spp` samples per pixel, or a few more for stratified samplers.
 
     Parameters as in `render_passes`.
     """
@@ -176,12 +176,12 @@ def passes_of(sensor: Any, spp: int, seed: int, variant: str) -> list[Pass]:
 
 
 def groups_of(passes: Sequence[Pass]) -> list[Sequence[Pass]]:
-    """Passes that are added up on their own first: the same in one process and in many."""
+    """Group passes that are added up on their own first: alike in one process and in many."""
     return [passes[n : n + GROUP] for n in range(0, len(passes), GROUP)]
 
 
 def render_pass(scene: Any, sensor: Any, one: Pass) -> NDArray[np.float64]:
-    """The film's raw storage after one pass: filter-weighted sums beside the sums of the weights.
+    """Return the film's raw storage after a pass: weighted sums beside the sums of the weights.
 
     Raises a DiffractionError if Mitsuba refuses or fails to render.
     """
@@ -195,7 +195,7 @@ def render_pass(scene: Any, sensor: Any, one: Pass) -> NDArray[np.float64]:
 
 
 def developed(scene: Any, sensor: Any, total: NDArray[np.float64], spp: int) -> Any:
-    """The picture, a `mi.Bitmap`, of the sum of passes with `spp` samples per pixel in all."""
+    """Return the picture, a `mi.Bitmap`, of a sum of passes with `spp` samples per pixel in all."""
     import mitsuba as mi
 
     integrator, film = integrator_of(scene), sensor.film()
@@ -209,7 +209,7 @@ def developed(scene: Any, sensor: Any, total: NDArray[np.float64], spp: int) -> 
 
 
 def integrator_of(scene: Any) -> Any:
-    """The scene's integrator.
+    """Return the scene's integrator.
 
     Raises a DiffractionError if there is none.
     """
@@ -220,7 +220,7 @@ def integrator_of(scene: Any) -> Any:
 
 
 def _splats(integrator: Any) -> bool:
-    """Light tracing splats finished estimates without weights: an average needs them."""
+    """Whether the integrator splats estimates without weights, so that an average needs them."""
     import mitsuba as mi
 
     return isinstance(integrator, mi.AdjointIntegrator)

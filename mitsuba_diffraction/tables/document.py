@@ -1,6 +1,6 @@
-"""A table as plain data: all but its coefficients, for files and the cache; checked when read.
+"""A table as plain data, without its coefficients, for files and the cache; checked when read.
 
-Whatever `described` lets pass can be looked up anywhere without reading outside the table: every
+Whatever `parse_document` accepts can be looked up anywhere without reading outside the table: each
 field has its type, size and range, and agrees with the others.
 """
 
@@ -43,9 +43,9 @@ _BLOCK = 1 << 22  # coefficients at a time
 
 
 def document_of(table: DiffractionTable) -> dict[str, Any]:
-    """Everything but the coefficients; what a table need not have is left out where it has not."""
+    """Return all fields of a table but the coefficients; absent ones are left out."""
     return {
-        **table.settings.given(),
+        **table.settings.as_json(),
         "scale": table.scale,
         "spacing": table.spacing,
         "error": dict(table.error),
@@ -59,7 +59,7 @@ def document_of(table: DiffractionTable) -> dict[str, Any]:
 
 
 def _ratios_of(ratios: SlopeRatios) -> dict[str, Any]:
-    """All of it as numbers but the values, which are half floats in base 64."""
+    """Return slope ratios as numbers, and their values as half floats in base 64."""
     halves = np.ascontiguousarray(ratios.values).view(np.float32).astype("<f2")
     return {
         "cell": ratios.cell,
@@ -72,19 +72,19 @@ def _ratios_of(ratios: SlopeRatios) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """JSON for what a table holds besides plain Python: NumPy's numbers, read-only mappings."""
+    """Convert NumPy's numbers and read-only mappings for JSON."""
     return dict(value) if isinstance(value, Mapping) else value.tolist()
 
 
 def _given(record: Expansion | Grid) -> dict[str, Any]:
-    """Its fields, without those that are None."""
+    """Return the fields of a record that are not None."""
     fields = dataclasses.asdict(record)
     return {name: value for name, value in fields.items() if value is not None}
 
 
 @dataclasses.dataclass(frozen=True)
-class Described:
-    """A table without its coefficients.
+class TableDescription:
+    """Table without its coefficients.
 
     Attributes
     ----------
@@ -95,13 +95,13 @@ class Described:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the coefficients."""
+        """Shape of the coefficients."""
         expansion, grid = self.fields["expansion"], self.fields["grid"]
         components = _COMPONENTS[expansion.kind]
         return expansion.intervals, *grid.shape, components, expansion.terms
 
     def table(self, coefficients: NDArray[Any]) -> DiffractionTable:
-        """The table with its coefficients.
+        """Return the table with its coefficients.
 
         Raises
         ------
@@ -112,8 +112,8 @@ class Described:
         return DiffractionTable(coefficients=coefficients, **self.fields)
 
 
-def described(document: Any) -> Described:
-    """What `document_of` made, checked field by field and against each other.
+def parse_document(document: Any) -> TableDescription:
+    """Read the result of `document_of`, checked field by field and against each other.
 
     Raises
     ------
@@ -150,14 +150,16 @@ def described(document: Any) -> Described:
     with np.errstate(over="ignore"):
         largest = np.abs(table.order_0_at(kappa)).max()
     _require(largest <= _LARGEST_POWER, f"order_0 of a size of {largest:.3g}")
-    size = 4 * math.prod(Described({"expansion": expansion, "grid": grid}).shape)
+    size = 4 * math.prod(TableDescription({"expansion": expansion, "grid": grid}).shape)
     _require(size <= MAX_BYTES, f"{size:.3g} bytes of coefficients")
     values = {field.name: getattr(table, field.name) for field in dataclasses.fields(table)}
-    return Described({name: value for name, value in values.items() if name != "coefficients"})
+    return TableDescription(
+        {name: value for name, value in values.items() if name != "coefficients"}
+    )
 
 
 def _check_agreement(table: DiffractionTable) -> None:
-    """What follows from other fields is what follows from them."""
+    """Refuse fields that contradict others from which they follow."""
     grid, expansion, settings = table.grid, table.expansion, table.settings
     _require(grid.coherent == settings.coherent, "coherent beside coherence")
     _require(expansion.kind == "amplitude" or not grid.coherent, "coherence of powers")
@@ -204,7 +206,7 @@ def _expansion(fields: Mapping[str, Any]) -> Expansion:
 
 
 def _resolved(expansion: Expansion) -> Expansion:
-    """The series, if it can follow the phases of such heights; a few terms are one radian each."""
+    """Return the series if it can follow the phases of its heights; few terms are a radian each."""
     terms = expansion.series_terms
     _require(expansion.intervals * terms <= _MOST_SERIES, f"{expansion.intervals}×{terms} terms")
     phase = expansion.half_range * expansion.length

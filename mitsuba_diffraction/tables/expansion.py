@@ -85,11 +85,11 @@ class Expansion:
         return np.clip(index, 0, self.intervals - 1)
 
     def order_0_offset(self, interval: ArrayLike) -> NDArray[np.float64]:
-        """How much of δ_j0 is added to the series: 1 where it was taken out, else 0."""
+        """Return the part of δ_j0 that is added to the series: 1 where it was taken out, else 0."""
         return np.where(self._factored(interval), 1.0, 0.0)
 
     def weights(self, kappa: ArrayLike) -> NDArray[np.float64]:
-        """What each coefficient of a bin is multiplied with, shape κ.shape + (terms,)."""
+        """Return the factor of each coefficient of a bin, shape κ.shape + (terms,)."""
         series = self.series_weights(kappa)
         if self.functions is None:
             return series
@@ -99,7 +99,7 @@ class Expansion:
         return weights
 
     def series_weights(self, kappa: ArrayLike) -> NDArray[np.float64]:
-        """The same for order 0: shape κ.shape + (series_terms,)."""
+        """Return the factor of each coefficient of order 0, shape κ.shape + (series_terms,)."""
         kappa = np.asarray(kappa, float)
         if self.basis == "taylor":
             n = np.arange(1, self.terms + 1)

@@ -24,11 +24,11 @@ from ..atomic import atomic_path
 from ..errors import DiffractionError, one_line, quoted
 from ..files import readable_file
 from ..streams import without_chatter
-from .document import Described, described, document_of, plain
+from .document import TableDescription, document_of, parse_document, plain
 from .expansion import Expansion
 from .table import FORMAT_VERSION, DiffractionTable
 
-#: What every EXR begins with.
+#: First bytes of every EXR.
 EXR_BEGINS = b"\x76\x2f\x31\x01"
 #: The attribute with everything but the coefficients. One string: OpenEXR keeps numbers as floats.
 ATTRIBUTE = "mitsuba_diffraction"
@@ -67,7 +67,7 @@ def save_table(table: DiffractionTable, path: str | os.PathLike[str]) -> None:
     with atomic_path(path) as temporary:
         try:
             OpenEXR.File(header, channels).write(str(temporary))
-        except RuntimeError as error:  # what OpenEXR makes of a full disk
+        except RuntimeError as error:  # OpenEXR's exception for a full disk
             raise OSError(None, f"OpenEXR: {one_line(str(error))}") from error
 
 
@@ -94,12 +94,12 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
             f"{FORMAT_VERSION}; build it again with 'mitsuba-diffraction precompute'"
         )
     try:
-        found = described(document)
-        _check_headers(headers, found, os.path.getsize(path))
-        planes = _planes(_read(path, lambda file: file.channels()), found)
+        description = parse_document(document)
+        _check_headers(headers, description, os.path.getsize(path))
+        planes = _planes(_read(path, lambda file: file.channels()), description)
         if headers[0].get(CHECKSUM) != _checksum(str(text), planes):
             raise ValueError("its checksum is that of another one")
-        return found.table(_coefficients(planes, found))
+        return description.table(_coefficients(planes, description))
     except (DiffractionError, ValueError, MemoryError) as error:
         raise DiffractionError(
             f"'{path}' is a damaged table ({one_line(str(error))[:200]}); build it again with "
@@ -108,7 +108,7 @@ def load_table(path: str | os.PathLike[str]) -> DiffractionTable:
 
 
 def is_table(path: str | os.PathLike[str]) -> bool:
-    """Whether a file is a table, of whatever version; False if it cannot be read."""
+    """Whether a file is a table, of any version; False if it cannot be read."""
     try:
         with readable_file(path).open("rb") as stream:
             if stream.read(len(EXR_BEGINS)) != EXR_BEGINS:
@@ -119,7 +119,7 @@ def is_table(path: str | os.PathLike[str]) -> bool:
 
 
 def read_document(path: str | os.PathLike[str]) -> dict[str, Any] | None:
-    """The JSON attribute of a table's file, or None if the file is an EXR image without one.
+    """Return the JSON attribute of a table's file; None for an EXR image without one.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def _parsed(text: Any, path: str | os.PathLike[str]) -> dict[str, Any] | None:
     return document if isinstance(document, dict) else None
 
 
-def _check_headers(headers: list[dict[str, Any]], expected: Described, size: int) -> None:
+def _check_headers(headers: list[dict[str, Any]], expected: TableDescription, size: int) -> None:
     """Refuse a file that is not one image as described, before its pixels are read."""
     if len(headers) != 1:
         raise ValueError(f"{len(headers)} parts, expected one")
@@ -160,8 +160,10 @@ def _check_headers(headers: list[dict[str, Any]], expected: Described, size: int
         raise ValueError(f"{size} bytes that claim to hold {claimed:.2g}")
 
 
-def _planes(channels: Mapping[str, Any], expected: Described) -> dict[str, NDArray[np.floating]]:
-    """The pixels of each channel, in the order of `_channels`."""
+def _planes(
+    channels: Mapping[str, Any], expected: TableDescription
+) -> dict[str, NDArray[np.floating]]:
+    """Return the pixels of each channel, in the order of `_channels`."""
     expansion = expected.fields["expansion"]
     planes = {name: channels[name].pixels for name, _ in _channels(expansion)}
     kinds = {plane.dtype for plane in planes.values()}
@@ -171,9 +173,9 @@ def _planes(channels: Mapping[str, Any], expected: Described) -> dict[str, NDArr
 
 
 def _coefficients(
-    planes: Mapping[str, NDArray[np.floating]], expected: Described
+    planes: Mapping[str, NDArray[np.floating]], expected: TableDescription
 ) -> NDArray[np.floating]:
-    """Coefficients (intervals, ny, nx, components, terms), in the precision of the file."""
+    """Return coefficients (intervals, ny, nx, components, terms), in the precision of the file."""
     names = list(_channels(expected.fields["expansion"]))
     result = np.empty(expected.shape, planes[names[0][0]].dtype)
     for name, index in names:
@@ -189,7 +191,7 @@ def _checksum(text: str, planes: Mapping[str, NDArray[np.floating]]) -> str:
 
 
 def _channels(expansion: Expansion) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    """Channel names, and the index of each in the coefficients."""
+    """Yield channel names, and the index of each in the coefficients."""
     for interval in range(expansion.intervals):
         for component, prefix in enumerate(_PREFIXES[expansion.kind]):
             for term in range(expansion.terms):
@@ -199,20 +201,20 @@ def _channels(expansion: Expansion) -> Iterator[tuple[str, tuple[Any, ...]]]:
 
 
 def _headers(path: str | os.PathLike[str]) -> list[dict[str, Any]]:
-    """Headers of all parts of an EXR file; a table has one."""
+    """Read the headers of all parts of an EXR file; a table has one."""
     return _read(
         path, lambda file: [file.header(n) for n in range(len(file.parts))], header_only=True
     )
 
 
 def _read(
-    path: str | os.PathLike[str], what: Callable[[OpenEXR.File], Any], header_only: bool = False
+    path: str | os.PathLike[str], read: Callable[[OpenEXR.File], Any], header_only: bool = False
 ) -> Any:
-    """Part of an EXR file."""
+    """Read a part of an EXR file."""
     readable_file(path)
     try:
         with without_chatter():
-            return what(OpenEXR.File(str(path), separate_channels=True, header_only=header_only))
+            return read(OpenEXR.File(str(path), separate_channels=True, header_only=header_only))
     except (RuntimeError, ValueError, OSError, LookupError, TypeError, MemoryError) as error:
         raise DiffractionError(
             f"cannot read '{path}' as EXR: it is empty, cut short or no EXR file; "

@@ -57,7 +57,7 @@ class Grid:
         return (interval * rows + row) * columns + column
 
     def tapped(self) -> list[range]:
-        """Of every row of taps, the columns that a look-up reads."""
+        """Columns that a look-up reads, of every row of taps."""
         columns, rows = self.taps
         return [range(trim, columns - trim) for trim in self.trims or (0,) * rows]
 
@@ -68,7 +68,7 @@ class Grid:
 
     @property
     def exponents(self) -> tuple[float, float]:
-        """Of exp(−exponent·Δ²), the weight of a bin Δ bins away."""
+        """Exponents of exp(−exponent·Δ²), the weight of a bin Δ bins away, along x and y."""
         half = 0.5 if self.coherent else 1.0
         return half * self.steps[0] ** 2, half * self.steps[1] ** 2
 
@@ -94,12 +94,12 @@ class Record:
 
     @classmethod
     def aligned(cls, components: int, terms: int) -> Record:
-        """As processors gather them at best: 1, 2, or a multiple of 4 terms, of 8 from 17 on."""
+        """Fill up as processors gather best: 1, 2, or a multiple of 4 terms, of 8 from 17 on."""
         return cls.of(components, terms, 1 if terms <= 2 else 4 if terms <= 16 else 8)
 
     @property
     def numbers(self) -> int:
-        """In all."""
+        """Number of numbers in the record."""
         return self.components * self.stored
 
     def split(self, numbers: Sequence[Any]) -> list[Sequence[Any]]:
@@ -121,5 +121,5 @@ def cells_of(expansion: Expansion, phase: float) -> int:
 
 
 def functions_at(expansion: Expansion, kappa: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What terms are multiplied with, κ.shape + (terms,), without the factor of κ̂ or κ̂²."""
+    """Return the factors of the terms, κ.shape + (terms,), without that of κ̂ or κ̂²."""
     return np.asarray(expansion.weights(kappa) / expansion.fading(kappa)[..., None])

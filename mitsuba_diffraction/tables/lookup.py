@@ -47,12 +47,12 @@ def window_sum(
     DiffractionError
         For a place in a table that holds no amplitudes of `patch`.
     """
-    given = [qx, qy, kappa]
+    coordinates = [qx, qy, kappa]
     if place is not None:
         if not table.grid.coherent:
             raise DiffractionError("a window can only be moved in a table with coherence='patch'")
-        given += [np.asarray(place, float)[..., axis] for axis in (0, 1)]
-    qx, *rest = np.broadcast_arrays(*(np.asarray(a, float) for a in given))
+        coordinates += [np.asarray(place, float)[..., axis] for axis in (0, 1)]
+    qx, *rest = np.broadcast_arrays(*(np.asarray(a, float) for a in coordinates))
     flat = [np.ravel(a) for a in (qx, *rest)]
     result = np.empty(flat[0].size)
     for start in range(0, result.size, _CHUNK):

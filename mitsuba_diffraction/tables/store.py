@@ -1,8 +1,8 @@
-"""The one cache: whatever is made once, in files that are found by what it is made of.
+"""Cache of tables and all that is computed from them, in files found by what they are made of.
 
-A file is one line with what it is, its key and the SHA-256 of the rest; then JSON and arrays as
-they lie in memory. What is damaged, or stands under another's name, is made again. Tables and their
-colours are kept by what is below; what conserves energy by `tables.energy.store`.
+A file is one line with its kind, its key and the SHA-256 of the rest; then JSON and arrays as they
+lie in memory. A damaged file, or one under another's name, is rebuilt. This module stores tables
+and their colours, `tables.energy.store` the scales that conserve energy.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ..heights.validity import TEXTS_VERSION
 from ..settings import TableSettings
 from .colour.build import PolarGrid
 from .colour.table import COLOUR_VERSION, ColourTable
-from .document import described, document_of, plain
+from .document import document_of, parse_document, plain
 from .expansion import Expansion
 from .table import FORMAT_VERSION, DiffractionTable
 
@@ -40,8 +40,6 @@ VARIABLE = "MITSUBA_DIFFRACTION_CACHE"
 MAX_BYTES = 4 << 30
 
 SUFFIX = ".cache"
-#: Also of files that earlier versions kept.
-_PATTERNS = (f"*{SUFFIX}", "*.exr", "*.npz", "albedo-*.npy")
 _MAGIC = "mitsuba_diffraction cache"
 #: Bytes that the first line is filled up to, and the second, a number; arrays begin at multiples of
 #: the last.
@@ -52,20 +50,20 @@ _making: dict[tuple[str, str], threading.Lock] = {}
 
 
 def cache_folder() -> Path | None:
-    """$MITSUBA_DIFFRACTION_CACHE, or the user's cache folder; None for a user without a home."""
-    own = os.environ.get(VARIABLE)
-    if own:
-        return Path(own)
+    """Return $MITSUBA_DIFFRACTION_CACHE, or the user's cache folder; None without a home."""
+    chosen = os.environ.get(VARIABLE)
+    if chosen:
+        return Path(chosen)
     try:
         folder = platformdirs.user_cache_path("mitsuba_diffraction", appauthor=False)
     except RuntimeError:
         return None
-    return folder if folder.is_absolute() else None  # "~" as earlier versions leave it
+    return folder if folder.is_absolute() else None  # not "~", without a home
 
 
 @dataclass(frozen=True)
 class Record:
-    """What a file holds.
+    """Content of a file.
 
     Attributes
     ----------
@@ -78,7 +76,7 @@ class Record:
 
 
 def key_of(*parts: Any) -> str:
-    """A key: the SHA-256 of what something is made of, as JSON."""
+    """Return a key: the SHA-256 of its parts as JSON."""
     return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
 
 
@@ -90,7 +88,7 @@ def kept(
     pack: Callable[[T], Record],
     unpack: Callable[[Record], T],
 ) -> T:
-    """What is kept under a key, in memory or on disk; or made now, and kept.
+    """Return the value under a key, from memory or from disk; otherwise make and store it.
 
     Of several threads and processes that want one thing at a time, one makes it and the others
     wait. A cache that cannot be written is no reason to fail: the thing is then made every time.
@@ -103,13 +101,13 @@ def kept(
     make : makes it.
     pack, unpack : to a record, and back; unpack raises ValueError for what does not fit.
     """
-    found = memory.get(key)
-    if found is None:
+    value = memory.get(key)
+    if value is None:
         with _making.setdefault((kind, key), threading.Lock()):
-            found = memory.get(key)
-            if found is None:
-                found = memory[key] = _from_disk(kind, key, make, pack, unpack)
-    return found
+            value = memory.get(key)
+            if value is None:
+                value = memory[key] = _from_disk(kind, key, make, pack, unpack)
+    return value
 
 
 def _from_disk(
@@ -123,19 +121,19 @@ def _from_disk(
     if folder is None:
         return make()
     path, title = folder / f"{kind}-{key[:32]}{SUFFIX}", f"{_MAGIC} {kind} {key}"
-    found = _found(path, title, unpack)
-    if found is None:
+    value = _found(path, title, unpack)
+    if value is None:
         with _locked(path):
-            found = _found(path, title, unpack)  # made by whoever was waited for
-            if found is None:
-                found = make()
-                _keep(path, title, pack(found))
-    return found
+            value = _found(path, title, unpack)  # made by whoever was waited for
+            if value is None:
+                value = make()
+                _keep(path, title, pack(value))
+    return value
 
 
 @contextlib.contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Alone among all processes with this file; where there are no locks, not alone."""
+    """Hold the lock of a file among all processes; where there are no locks, do nothing."""
     lock = path.with_suffix(".lock")
     with contextlib.ExitStack() as release:
         with contextlib.suppress(OSError):
@@ -152,11 +150,11 @@ def _locked(path: Path) -> Iterator[None]:
 
 
 def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:
-    """What a file holds; None if there is none, and with a warning if it is damaged."""
+    """Read the value in a file; None if it is missing, or damaged, with a warning."""
     try:
-        found = unpack(read_record(path, title))
+        value = unpack(read_record(path, title))
         os.utime(path)  # recently used ones are kept longest
-        return found
+        return value
     except OSError:
         return None
     except (ValueError, LookupError, TypeError, MemoryError, RecursionError) as error:
@@ -179,17 +177,17 @@ def read_record(path: Path, title: str) -> Record:
     if not path.is_file():
         raise FileNotFoundError
     content = np.fromfile(path, np.uint8)
-    if content[:_HEAD].tobytes() != _head(title, [content[_HEAD:]]):
+    if content[:_HEAD].tobytes() != _head(title, [content[_HEAD:].data]):
         raise ValueError("its checksum or its key is another's")
     length = int(content[_HEAD : 2 * _HEAD].tobytes())
     place = 2 * _HEAD + _aligned(length)
-    described = json.loads(content[2 * _HEAD : 2 * _HEAD + length].tobytes())
+    header = json.loads(content[2 * _HEAD : 2 * _HEAD + length].tobytes())
     arrays = []
-    for kind, shape in described["arrays"]:
+    for kind, shape in header["arrays"]:
         size = math.prod(shape) * np.dtype(kind).itemsize
         arrays.append(content[place : place + size].view(kind).reshape(shape))
         place += _aligned(size)
-    return Record(described["document"], arrays)
+    return Record(header["document"], arrays)
 
 
 def _keep(path: Path, title: str, record: Record) -> None:
@@ -209,35 +207,35 @@ def write_record(path: Path, title: str, record: Record) -> None:
         If it cannot be written.
     """
     arrays = [np.ascontiguousarray(array) for array in record.arrays]
-    described = [[array.dtype.str, array.shape] for array in arrays]
-    text = json.dumps({"document": record.document, "arrays": described}).encode()
-    texts = [np.frombuffer(t, np.uint8) for t in (str(len(text)).encode().ljust(_HEAD), text)]
-    blocks = [*texts, *(array.reshape(-1).view(np.uint8) for array in arrays)]
-    padded = [np.pad(block, (0, _aligned(block.size) - block.size)) for block in blocks]
+    shapes = [[array.dtype.str, array.shape] for array in arrays]
+    text = json.dumps({"document": record.document, "arrays": shapes}).encode()
+    contents: list[bytes | memoryview] = [text]
+    contents += [array.reshape(-1).view(np.uint8).data for array in arrays]
+    blocks: list[bytes | memoryview] = [str(len(text)).encode().ljust(_HEAD)]
+    for block in contents:
+        blocks += [block, bytes(_aligned(len(block)) - len(block))]
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
-        file.write(_head(title, padded))
-        for block in padded:
-            file.write(block.data)
+        file.write(_head(title, blocks))
+        file.writelines(blocks)
 
 
-def _head(title: str, blocks: Sequence[NDArray[np.uint8]]) -> bytes:
-    """The first line, filled up."""
+def _head(title: str, blocks: Sequence[bytes | memoryview]) -> bytes:
+    """Return the first line, filled up to `_HEAD` bytes."""
     content = hashlib.sha256()
     for block in blocks:
-        content.update(block.data)
+        content.update(block)
     return f"{title} {content.hexdigest()}".encode().ljust(_HEAD - 1) + b"\n"
 
 
 def _aligned(size: int) -> int:
-    """The least multiple of `_ALIGNMENT` that is not below a size."""
+    """Return the least multiple of `_ALIGNMENT` that is not below a size."""
     return -(-size // _ALIGNMENT) * _ALIGNMENT
 
 
 def _prune(folder: Path) -> None:
     """Remove the files unused for longest until the folder is small enough."""
     remove_abandoned(folder, r"\w+-\w+", SUFFIX)
-    found = {path for pattern in _PATTERNS for path in folder.glob(pattern)}
-    newest = sorted(found, key=lambda path: path.stat().st_mtime, reverse=True)
+    newest = sorted(folder.glob(f"*{SUFFIX}"), key=lambda path: path.stat().st_mtime, reverse=True)
     total = 0
     for n, path in enumerate(newest):
         total += path.stat().st_size
@@ -253,14 +251,14 @@ _COLOUR_NUMBERS = ("scale", "radius_end", "sigma")
 
 
 def table_key(digest: str, settings: TableSettings) -> str:
-    """Name of the table of heights with this digest, built with these settings."""
+    """Return the key of the table of heights with this digest, built with these settings."""
     return key_of(FORMAT_VERSION, TEXTS_VERSION, digest, asdict(settings))
 
 
 def cached_table(
     digest: str, settings: TableSettings, build: Callable[[], DiffractionTable]
 ) -> DiffractionTable:
-    """The table for heights with this digest, from memory, from disk, or built and kept."""
+    """Return the table of heights with this digest, from memory, from disk, or built and stored."""
     key = table_key(digest, settings)
     return kept("table", key, _tables, build, _table_record, _table_of)
 
@@ -271,15 +269,15 @@ def _table_record(table: DiffractionTable) -> Record:
 
 
 def _table_of(record: Record) -> DiffractionTable:
-    found = described(record.document)
+    description = parse_document(record.document)
     (coefficients,) = record.arrays
-    if coefficients.shape != found.shape:
-        raise ValueError(f"coefficients of another shape than {found.shape}")
-    return found.table(coefficients)
+    if coefficients.shape != description.shape:
+        raise ValueError(f"coefficients of another shape than {description.shape}")
+    return description.table(coefficients)
 
 
 def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:
-    """`DiffractionTable.load`, once for all that use the same file at the same time."""
+    """Load a table file once for all that use it at the same time."""
     try:
         status = os.stat(path)
     except OSError:
@@ -292,14 +290,14 @@ def loaded_table(path: str | os.PathLike[str]) -> DiffractionTable:
 
 
 def cached_colours(table: DiffractionTable) -> ColourTable:
-    """The colours of a table, from memory, from disk, or summed and kept."""
+    """Return the colours of a table, from memory, from disk, or summed and stored."""
     key = key_of(COLOUR_VERSION, table.digest())
     memory = _colours.setdefault(table, {})
     return kept("colours", key, memory, lambda: ColourTable.build(table), colour_record, colours_of)
 
 
 def colour_record(colours: ColourTable) -> Record:
-    """What a file keeps of colours."""
+    """Return the record of colours for the cache."""
     document = {
         "grid": asdict(colours.grid),
         "expansion": asdict(colours.expansion),
@@ -309,7 +307,7 @@ def colour_record(colours: ColourTable) -> Record:
 
 
 def colours_of(record: Record) -> ColourTable:
-    """What was made into such a record."""
+    """Return the colours of such a record."""
     document = record.document
     grid = document["grid"]
     coefficients, order_0 = record.arrays

@@ -73,7 +73,7 @@ def taps_for(steps: tuple[float, float], error: float, coherent: bool) -> tuple[
 def trims_for(
     steps: tuple[float, float], taps: tuple[int, int], error: float, coherent: bool
 ) -> tuple[int, ...]:
-    """How many taps at both ends of each row can be left out besides: the corners matter least.
+    """Return how many taps at both ends of each row can be left out: the corners matter least.
 
     Parameters
     ----------

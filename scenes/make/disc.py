@@ -24,9 +24,9 @@ def disc(inner: float, outer: float, sectors: int = 240) -> TriangleMesh:
     DiffractionError
         If the radii or the number are out of their ranges.
     """
-    given = {"outer": outer, "inner": inner, "sectors": sectors}
-    check_limits(given, {"outer": (1e-3, 1e4), "sectors": (12, 10000)}, "disc")
-    check_limits(given, {"inner": (0.0, 0.999 * outer)}, "disc")
+    parameters = {"outer": outer, "inner": inner, "sectors": sectors}
+    check_limits(parameters, {"outer": (1e-3, 1e4), "sectors": (12, 10000)}, "disc")
+    check_limits(parameters, {"inner": (0.0, 0.999 * outer)}, "disc")
     angle = np.linspace(0, 2 * np.pi, sectors + 1)
     around = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
     positions = np.concatenate([inner * around, outer * around])

@@ -24,8 +24,8 @@ def knot(along: int = 160, around: int = 18) -> tuple[Floats, Floats, NDArray[np
     DiffractionError
         If a number is out of its range.
     """
-    given = {"along": along, "around": around}
-    check_limits(given, {"along": (24, 10000), "around": (3, 1000)}, "knot")
+    parameters = {"along": along, "around": around}
+    check_limits(parameters, {"along": (24, 10000), "around": (3, 1000)}, "knot")
     t = 2 * np.pi * np.arange(along) / along
     curve = np.stack(
         [np.sin(t) + 2 * np.sin(2 * t), np.sin(3 * t) * 1.2, np.cos(t) - 2 * np.cos(2 * t)], axis=1

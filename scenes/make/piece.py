@@ -54,13 +54,13 @@ def piece(
     near = np.abs(u - centre) <= columns * scales.pitch / 2
     near &= np.abs(v - 0.5) <= rows * scales.row_pitch / 2
     faces = mesh.faces[near[mesh.faces].all(axis=1)]
-    kept, renumbered = np.unique(faces, return_inverse=True)
+    used, renumbered = np.unique(faces, return_inverse=True)
     top = skin.points(np.array([centre]), np.array([0.5]))
     return replace(
         mesh,
-        positions=mesh.positions[kept] - top,
-        normals=mesh.normals[kept],
-        uv=mesh.uv[kept] - [centre, 0.0],
+        positions=mesh.positions[used] - top,
+        normals=mesh.normals[used],
+        uv=mesh.uv[used] - [centre, 0.0],
         faces=renumbered.reshape(-1, 3),
-        orientation=None if mesh.orientation is None else mesh.orientation[kept],
+        orientation=None if mesh.orientation is None else mesh.orientation[used],
     )

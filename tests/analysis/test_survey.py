@@ -27,7 +27,7 @@ from mitsuba_diffraction.analysis.survey import (
 from mitsuba_diffraction.cli import main
 from mitsuba_diffraction.optics.colour import response
 
-pytestmark = pytest.mark.usefixtures("coarse")
+pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
 
 PERIOD, PIXEL = 1.6, 0.1
 SMALL = {"coherence_width": 6.0, "tolerance": 0.05}

@@ -22,6 +22,8 @@ from mitsuba_diffraction.analysis.tradeoff.measuring import Measured, Setting, r
 from mitsuba_diffraction.analysis.tradeoff.report import Budget, recommended
 from tests.support.directions import rough_patch
 
+pytestmark = pytest.mark.thorough
+
 PATCH = rough_patch((48, 48), (0.1, 0.1), 0.25)
 WIDTH = 4.5
 

@@ -115,3 +115,22 @@ def test_loading_a_scene_whose_name_is_no_utf_8_is_refused(here):
     file.write_text(SCENE.format(""))
     with pytest.raises(DiffractionError, match="UTF-8"):
         load_scene(file, {})
+
+
+MISSPELT = """<shape type="sphere"><bsdf type="twosided">
+  <bsdf type="diffraction"><float name="int_iorr" value="1.5"/></bsdf>
+</bsdf></shape>"""
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["render {} -m scalar_rgb", "render {} -m llvm_ad_rgb", "plan {}", "compare {}",
+     "export-viewer {} a.html"],
+)  # fmt: skip
+def test_a_misspelt_parameter_of_a_scene_is_one_line(run, here, command):
+    Path("a.xml").write_text(SCENE.format(MISSPELT))
+    line = run(*command.format("a.xml").split()).failed_in_one_line()
+    assert "'a.xml', line" in line
+    assert "'int_iorr'; did you mean int_ior?" in line
+    assert "Traceback" not in line
+    assert "instantiate" not in line

@@ -24,8 +24,8 @@ distributed = pytest.importorskip("distributed")
 from mitsuba_diffraction import DiffractionError, cluster  # noqa: E402
 from mitsuba_diffraction.cluster import frames as frames_module  # noqa: E402
 from mitsuba_diffraction.cluster import workers as workers_module  # noqa: E402
-from mitsuba_diffraction.cluster.frames import Film, Kept, Wanted  # noqa: E402
-from mitsuba_diffraction.cluster.tasks import Lacking, run_task  # noqa: E402
+from mitsuba_diffraction.cluster.frames import Film, FrameRequest, Kept  # noqa: E402
+from mitsuba_diffraction.cluster.tasks import MissingFiles, run_task  # noqa: E402
 from mitsuba_diffraction.scene import passes  # noqa: E402
 from mitsuba_diffraction.scene.load import load_scene, set_variant  # noqa: E402
 from tests.support import ROOT  # noqa: E402
@@ -117,7 +117,7 @@ def test_a_client_that_was_stopped_goes_on(client, scene, expected, tmp_path):
         rendered(client, scene, keep=keep, progress=interrupt)
     there = len(list(keep.iterdir()))
     assert 4 <= there < 12
-    again = film(client, scene, [Wanted({}, SPP, 3)], keep)
+    again = film(client, scene, [FrameRequest({}, SPP, 3)], keep)
     (result,) = again.render(passes.Stop(), lambda *_: None)
     assert again.report.kept == there
     assert again.report.tasks == 12 - there
@@ -181,7 +181,7 @@ def test_a_scheduler_that_is_killed_and_started_again_changes_nothing(
             start_all()
 
     with cluster.connect(scheduler=address, patience=300) as mine:
-        job = film(mine, scene, [Wanted({}, SPP, 3)], tmp_path / "passes")
+        job = film(mine, scene, [FrameRequest({}, SPP, 3)], tmp_path / "passes")
         (result,) = job.render(passes.Stop(), disturb)
     np.testing.assert_array_equal(np.array(result.bitmap), expected)
     assert len(killed) >= 4
@@ -192,10 +192,10 @@ def test_a_scheduler_that_is_killed_and_started_again_changes_nothing(
 
 def test_files_that_a_worker_lacks_come_by_content(client, scene, expected, monkeypatch):
     def without_files(task, contents=None):
-        return run_task(task) if contents else Lacking((task.files.files[0][1],))
+        return run_task(task) if contents else MissingFiles((task.files.files[0][1],))
 
     monkeypatch.setattr(frames_module, "run_task", without_files)
-    job = film(client, scene, [Wanted({}, SPP, 3)], scene.parent / "passes")
+    job = film(client, scene, [FrameRequest({}, SPP, 3)], scene.parent / "passes")
     (result,) = job.render(passes.Stop(), lambda *_: None)
     np.testing.assert_array_equal(np.array(result.bitmap), expected)
     assert job.report.tasks == job.report.retries == 12
@@ -209,7 +209,7 @@ def test_a_copy_of_a_scene_is_the_scene(scene, expected, monkeypatch, tmp_path):
     assert len(contents) == 2
     scene.rename(tmp_path / "elsewhere.xml")
     (tmp_path / "part.xml").unlink()
-    assert run_task(task) == Lacking(tuple(sorted(contents)))
+    assert run_task(task) == MissingFiles(tuple(sorted(contents)))
     found = run_task(task, contents)
     assert found.raw.shape[:2] == expected.shape[:2]
 
@@ -233,11 +233,11 @@ class _Recorder:
 
     @classmethod
     def first_task(cls, scene):
-        return film(cls(), scene, [Wanted({}, SPP, 3)], scene.parent)._frames[0][0]
+        return film(cls(), scene, [FrameRequest({}, SPP, 3)], scene.parent)._frames[0][0]
 
 
 def test_an_error_names_frame_pass_and_worker(client, scene, tmp_path):
-    frames = [Wanted({}, 2, 0), Wanted({"format": "nonsense"}, 2, 1)]
+    frames = [FrameRequest({}, 2, 0), FrameRequest({"format": "nonsense"}, 2, 1)]
     job = film(client, scene, frames, tmp_path / "passes")
     with pytest.raises(DiffractionError, match=r"^frame 1, pass 0, worker tcp://\S+: cannot load"):
         list(job.render(passes.Stop(), lambda *_: None))
@@ -302,7 +302,7 @@ def test_workers_with_too_little_memory_are_named(scene, tmp_path):
     lines = []
     small = _Recorder(memory_limit=1e8)
     set_variant(VARIANT)
-    job = Film(small, scene, [Wanted({}, SPP, 3)], VARIANT, keep=tmp_path, warn=lines.append)
+    job = Film(small, scene, [FrameRequest({}, SPP, 3)], VARIANT, keep=tmp_path, warn=lines.append)
     assert job.needed > 5e8
     (line,) = lines
     assert re.search(r"worker one may use 0\.1 GB, .* estimated to need 0\.5 GB", line)
@@ -311,7 +311,9 @@ def test_workers_with_too_little_memory_are_named(scene, tmp_path):
 def test_processors_that_were_mixed_are_named(scene, tmp_path):
     lines = []
     set_variant(VARIANT)
-    job = Film(_Recorder(), scene, [Wanted({}, SPP, 3)], VARIANT, keep=tmp_path, warn=lines.append)
+    job = Film(
+        _Recorder(), scene, [FrameRequest({}, SPP, 3)], VARIANT, keep=tmp_path, warn=lines.append
+    )
     first = run_task(job._frames[0][0])
     for n, task in enumerate(job._frames[0]):
         Kept(tmp_path).write(task, replace(first, where=f"processor {n % 2}, 1 threads"))
@@ -365,7 +367,7 @@ def test_damaged_sums_are_rendered_again(scene, tmp_path, damage):
 
 
 def test_sums_under_the_name_of_others_are_rendered_again(scene, tmp_path):
-    first, second = film(_Recorder(), scene, [Wanted({}, SPP, 3)], tmp_path)._frames[0][:2]
+    first, second = film(_Recorder(), scene, [FrameRequest({}, SPP, 3)], tmp_path)._frames[0][:2]
     kept = Kept(tmp_path / "passes", lambda _: None)
     kept.write(first, run_task(first))
     (file,) = (tmp_path / "passes").iterdir()
@@ -441,6 +443,6 @@ def test_the_command_renders_frames_on_a_cluster(client, scene, run, monkeypatch
 
 def test_asked_to_stop_it_gives_nothing(client, scene, tmp_path):
     stop = passes.Stop()
-    job = film(client, scene, [Wanted({}, SPP, 3)], tmp_path / "passes")
+    job = film(client, scene, [FrameRequest({}, SPP, 3)], tmp_path / "passes")
     stop.asked = True
     assert list(job.render(stop, lambda *_: None)) == []

@@ -18,7 +18,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.heights.recipes import Recipe
 from mitsuba_diffraction.scene.load import load_scene
 from mitsuba_diffraction.scene.orientation.files import load_mesh
-from mitsuba_diffraction.tables.document import described
+from mitsuba_diffraction.tables.document import parse_document
 from mitsuba_diffraction.tables.exr import read_document
 from tests.support.directions import rough_patch
 from tests.support.instruments import nanoscope
@@ -126,7 +126,7 @@ def check_document(rng: np.random.Generator) -> None:
     document = json.loads(documents()[name])
     _mutate(rng, document)
     try:
-        found = described(document)
+        found = parse_document(document)
         # as many numbers as it declares, which `exr` compares with the file's size
         if int(np.prod(found.shape)) > _MOST_NUMBERS:
             return

@@ -8,7 +8,7 @@ import pytest
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.optics import fresnel
-from mitsuba_diffraction.tables.energy.conservation import DirectionalTable
+from mitsuba_diffraction.tables.energy.grid import DirectionalTable
 from mitsuba_diffraction.tables.energy.store import Energy
 from tests.support.directions import polar
 from tests.support.gentle import load, pairs

@@ -153,10 +153,10 @@ def test_variants_evaluate_what_they_sample(name):
         ({"coat_ior": 0.9}, "coat_ior=0.9"),
         ({"coat_ior": float("nan")}, "coat_ior=nan"),
         ({"coat_ior": 1.2, "ext_ior": 1.33}, "below the index of the medium above"),
-        ({"coat_ior": 1.5, "material": "none"}, "needs a refractive index beneath it"),
+        ({"coat_ior": 1.5, "material": "none"}, "material='none'"),
         (
             {"coat_ior": 1.5, "layering": "thesis", "nested": {"type": "diffuse"}},
-            "layering='thesis' knows no coat",
+            "layering='thesis' cannot be combined with coat_ior",
         ),
     ],
 )

@@ -31,8 +31,8 @@ KINDS = {
     "nested": {**GLASS, "nested": grey(0.5)},
     "film": {"material": "Cu", "film_ior": 1.77, "film_thickness": 300.0},
     "coat": {"material": "Al", "coat_ior": 1.58},
-    "transmission": {**GLASS, "transmission": True},
-    "thin": {**GLASS, "transmission": True, "thin": True},
+    "transmission": {**GLASS, "plugin": "diffraction_dielectric"},
+    "thin": {**GLASS, "plugin": "diffraction_dielectric", "thin": True},
     "surface": {"coherence": "surface", "uv_scale": 10.0},
     "varying": {"height_scale": {"type": "checkerboard"}, "height_scale_max": 1.0},
 }

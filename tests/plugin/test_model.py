@@ -149,7 +149,7 @@ def test_the_default_model_is_that_of_the_material(some_variant, parameters, mod
     ("parameters", "line"),
     [
         ({"model": "smallslope"}, "choose one of small_slope, kirchhoff"),
-        ({"model": "small_slope", "material": "none"}, "needs a refractive index"),
+        ({"model": "small_slope", "material": "none"}, "material='none'"),
         ({"eta": 0.0, "k": 3.0}, "eta=0"),
         ({"eta": -1.0, "k": 3.0}, "eta=-1"),
         ({"eta": 1.0, "k": -3.0}, "k=-3"),

@@ -156,7 +156,10 @@ def test_a_flat_patch_s_specular_light_is_mitsuba_s(polarised, ours, theirs, mod
 def test_through_a_flat_dielectric_specular_light_is_mitsuba_s(polarised, mode, theta):
     flat, n = md.HeightField(np.zeros((40, 40)), 0.08), {"int_ior": 1.5, "ext_ior": 1.0}
     mode = getattr(mi.TransportMode, mode)
-    smooth, bsdf = mi.load_dict({"type": "dielectric", **n}), load(flat, transmission=True, **n)
+    smooth, bsdf = (
+        mi.load_dict({"type": "dielectric", **n}),
+        load(flat, plugin="diffraction_dielectric", **n),
+    )
     wi, scalar = as_single(polar(theta, 70.0))[None], not dr.is_jit_v(mi.Float)
     si = interaction(wi[0], LAM) if scalar else interaction(wi, LAM[None])
     for component in (0, 1):
@@ -171,11 +174,11 @@ def test_through_a_flat_dielectric_specular_light_is_mitsuba_s(polarised, mode, 
         assert found / found[:, :1, :1] == pytest.approx(expected / expected[:, :1, :1], abs=2e-4)
 
 
-@pytest.mark.parametrize("sides", [{"transmission": True}, {"thin": True}])
+@pytest.mark.parametrize("sides", [{}, {"thin": True}])
 def test_light_that_goes_through_reversed_has_the_transposed_matrix(polarised, sides):
     wi, wo = pairs()
     wo = as_single(wo * [1, 1, -1])
-    bsdf = load(int_ior=1.5, ext_ior=1.0, **sides)
+    bsdf = load(plugin="diffraction_dielectric", int_ior=1.5, ext_ior=1.0, **sides)
     there = matrices(bsdf, wi, wo) / -wo[:, None, 2, None, None]
     back = matrices(bsdf, wo, wi) / wi[:, None, 2, None, None]
     back = back / (1.0 if "thin" in sides else 2.25)  # radiance in the dielectric
@@ -186,13 +189,13 @@ def test_light_that_goes_through_reversed_has_the_transposed_matrix(polarised, s
     assert found == pytest.approx(expected, rel=1e-4, abs=1e-5 * np.abs(there).max())
 
 
-@pytest.mark.parametrize("sides", [{"transmission": True}, {"thin": True}])
+@pytest.mark.parametrize("sides", [{}, {"thin": True}])
 def test_the_first_entry_of_light_on_all_sides_is_that_of_unpolarised_variants(polarised, sides):
     wi, wo = pairs()
     turned = [1, 1, -1]
     cases = [(wi, wo * turned), (wi * turned, wo), (wi * turned, wo * turned), (wi, wo)]
     cases = [(as_single(a), as_single(b)) for a, b in cases]
-    given = {"int_ior": 1.5, "ext_ior": 1.0, **sides}
+    given = {"plugin": "diffraction_dielectric", "int_ior": 1.5, "ext_ior": 1.0, **sides}
     found = [matrices(load(**given), *case)[..., 0, 0] for case in cases]
     mi.set_variant(mi.variant().removesuffix("_polarized"))
     bsdf, lam = load(**given), np.tile(LAM, (len(wi), 1))

@@ -14,7 +14,7 @@ from tests.support.directions import Array
 from tests.support.gentle import PATCH, WIDTH, pairs
 from tests.support.lanes import interaction, spectra, vectors
 
-pytestmark = pytest.mark.usefixtures("mono")
+pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("mono")]
 
 HOSTILE = [float("nan"), float("inf"), -1.0, 0.0, 0.5, 3.0, 1e30]
 WHITE = {"type": "diffuse", "reflectance": 0.5}
@@ -48,8 +48,8 @@ KINDS = {
     "filmed metal": surface(
         eta=0.9, k=6.0, film_ior=1.8, film_thickness=200.0, film_k=0.01, model="kirchhoff"
     ),
-    "transmission": surface(transmission=True),
-    "thin": surface(thin=True),
+    "transmission": surface(plugin="diffraction_dielectric"),
+    "thin": surface(plugin="diffraction_dielectric", thin=True),
     "mix": mixed(),
 }
 

@@ -23,6 +23,8 @@ from scenes.make.snake import Snake, build
 from scenes.make.spine import coil
 from tests.support import ROOT
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture(scope="module", params=["keeled", "smooth", "hose"])
 def snake(request: pytest.FixtureRequest) -> Snake:

@@ -7,38 +7,28 @@ is seconds of work for each table, material and film, and a fraction of that her
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
 from pathlib import Path
 
-from mitsuba_diffraction import DiffractionTable
-from mitsuba_diffraction.tables.energy import conservation, sides, sums, transport
-from mitsuba_diffraction.tables.energy import store as kept
-from mitsuba_diffraction.tables.energy.grid import DirectionGrid
+from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
+
+#: Energy conserved for who does not ask how well.
+COARSE = EnergySettings(
+    polar=24,
+    azimuthal=24,
+    wavelengths=3,
+    side_polar=40,
+    side_wavelengths=3,
+    few_parts=1,
+    rings=16,
+    steps=36,
+    sweeps=6,
+    passes=2,
+)
 
 
-def coarse_energy(set_value: Callable[[object, str, object], object] = setattr) -> None:
-    """From now on, or for as long as a monkeypatch's `setattr` lasts."""
-    set_value(conservation, "WAVELENGTHS", 3)
-    set_value(sides, "SHEET", DirectionGrid(24, 24))
-    set_value(sides, "DENSE", DirectionGrid(24, 24))
-    set_value(sides, "FINER", DirectionGrid(24, 24))
-    set_value(sides, "WAVELENGTHS", (2, 3))
-    set_value(sums, "SWEEPS", 8)
-    set_value(transport, "RINGS", 16)
-    set_value(transport, "STEPS", 36)
-    # others have what tables and the cache keep in full
-    set_value(conservation, "_orders", _orders)
-    for name in ("_SETTINGS", "_SIDES"):
-        set_value(kept, name, ("coarse", *getattr(kept, name)))
-
-
-def _orders(table: DiffractionTable, height_scale: float) -> transport.Orders:
-    """As `conservation` keeps them, apart from its own."""
-    last = table.__dict__.setdefault("_coarse_orders", {})
-    if height_scale not in last:
-        last.clear()
-        last[height_scale] = transport.Orders(table, height_scale)
-    return last[height_scale]
+def coarse_energy() -> EnergySettings:
+    """Conserve energy coarsely in this process from now on; return the settings before."""
+    return use_energy_settings(COARSE)
 
 
 def vectors_of(lanes: int) -> int:

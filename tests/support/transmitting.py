@@ -15,12 +15,12 @@ from tests.support.lanes import interaction
 from tests.support.layered import load
 
 INDICES = {"int_ior": 1.5, "ext_ior": 1.0}
-SIDES = {"dielectric": {"transmission": True}, "sheet": {"thin": True}}
+SIDES: dict[str, dict[str, Any]] = {"dielectric": {}, "sheet": {"thin": True}}
 BELOW = np.array([1, 1, -1])
 
 
 def both(**parameters: Any) -> Any:
-    return load(**INDICES, **parameters)
+    return load(plugin="diffraction_dielectric", **INDICES, **parameters)
 
 
 class OneSide:
@@ -61,6 +61,6 @@ def sampled(
     assert np.all(np.array(found.sampled_component) == passed)
     down = theta < 90.0
     assert np.all((np.array(found.wo.z)[valid & passed] < 0.0) == down)
-    eta = 1.0 if "thin" in str(bsdf) else 1.5 if down else 1 / 1.5
+    eta = 1.0 if "thin = true" in str(bsdf) else 1.5 if down else 1 / 1.5
     assert np.array(found.eta)[passed][0] == pytest.approx(eta)
     return weights, ~passed

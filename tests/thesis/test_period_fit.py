@@ -34,7 +34,7 @@ def blazed() -> HeightField:
 
 @pytest.fixture(scope="module")
 def of_blazed(blazed):
-    return methods.make_all(("default", "flss", "nmm", "pq", "pq-sinc"), blazed)
+    return methods.make_all(("spectral", "flss", "nmm", "pq", "pq-sinc"), blazed)
 
 
 def response_of(method, beam=None, angles=ANGLES, wavelengths=WAVELENGTHS) -> Response:
@@ -43,7 +43,7 @@ def response_of(method, beam=None, angles=ANGLES, wavelengths=WAVELENGTHS) -> Re
     )
 
 
-@pytest.mark.parametrize("name", ["default", "flss", "nmm", "pq", "pq-sinc"])
+@pytest.mark.parametrize("name", ["spectral", "flss", "nmm", "pq", "pq-sinc"])
 def test_the_blazed_grating_follows_the_grating_equation(of_blazed, name):
     ridge = ridge_of(response_of(of_blazed[name]))
     expected = Beam().grating_angles(WAVELENGTHS, 2.5, 1)
@@ -96,19 +96,19 @@ def test_outliers_do_not_move_the_fit():
 
 def test_windows_of_a_grating_agree_and_those_of_a_scale_do_not(blazed):
     beam, few = Beam(), WAVELENGTHS[::3]
-    table = methods.make("default", blazed, coherence="patch").table
+    table = methods.make("spectral", blazed, coherence="patch").table
     exact = window_fits(table, beam, few, ANGLES, count=4)
     assert exact.spread < 1e-5
     assert exact.mean == pytest.approx(2.5, rel=1e-3)
     scale = gratings.elaphe_like(32.0, 512)
-    table = methods.make("default", scale, coherence="patch", coherence_width=12.0).table
+    table = methods.make("spectral", scale, coherence="patch", coherence_width=12.0).table
     found = window_fits(table, beam, few, ANGLES[::2], count=6)
     assert found.spread > 0.01
     assert 0.9 < found.mean < 1.3  # fingers some 1 µm apart
 
 
 def test_the_thesis_procedure_finds_the_blazed_period(of_blazed, blazed):
-    table = methods.make("default", blazed, coherence="patch").table
+    table = methods.make("spectral", blazed, coherence="patch").table
     fit = thesis_fit(table, Beam(), WAVELENGTHS, ANGLES)
     assert fit.period == pytest.approx(2.5, rel=1e-3)  # they report 2500 nm
 
@@ -116,10 +116,10 @@ def test_the_thesis_procedure_finds_the_blazed_period(of_blazed, blazed):
 def test_a_measured_scale_has_the_period_of_its_fingers(shared_afm):
     patch = HeightField.load(shared_afm / "elaphe-65um.png", pixel_size=65 / 1332, max_height=0.375)
     angles = np.linspace(-75.0, 20.0, 951)
-    method = methods.make("default", patch)
+    method = methods.make("spectral", patch)
     fit = fit_period(ridge_of(response_of(method, angles=angles)))
     assert 1.0 < fit.period < 1.3
-    table = methods.make("default", patch, coherence="patch").table
+    table = methods.make("spectral", patch, coherence="patch").table
     found = window_fits(table, Beam(), WAVELENGTHS[::4], angles, count=8)
     assert 1.0 < found.mean < 1.3
     assert 0.02 < found.spread < 0.1
@@ -146,7 +146,7 @@ def test_a_bent_scale_has_the_period_of_its_fingers_across_them_only():
     heights = gratings.xenopeltis_like(32.0, 512).heights + bending
     bent = HeightField(heights, 0.0625)
     held = [grating.period for grating in dominant_periods(bent)]
-    method = methods.make("default", bent, tolerance=1e-2)
+    method = methods.make("spectral", bent, tolerance=1e-2)
     response = response_of(method)
     fit = fit_period(ridge_of(response, period=find_period(response, held)))
     assert fit.period == pytest.approx(0.6, rel=0.05)  # 0.6 µm, stretched to fit the patch
@@ -156,7 +156,7 @@ def test_a_bent_scale_has_the_period_of_its_fingers_across_them_only():
 
 def test_a_rough_patch_has_no_period_though_one_order_of_its_tile_is_brightest():
     rough = rough_patch((256, 256), (0.1, 0.1), 0.1, seed=4)
-    response = response_of(methods.make("default", rough, tolerance=1e-2))
+    response = response_of(methods.make("spectral", rough, tolerance=1e-2))
     assert fit_period(ridge_of(response)).residual < 0.01  # on a perfect line
     assert find_period(response, [grating.period for grating in dominant_periods(rough)]) is None
 
@@ -171,7 +171,7 @@ def test_the_second_order_is_told_from_the_first(of_blazed):
 
 def test_a_mirror_has_no_orders_to_fit():
     flat = HeightField(np.zeros((16, 16)), 0.5, name="flat")
-    method = methods.make("default", flat)
+    method = methods.make("spectral", flat)
     with pytest.raises(DiffractionError, match=r"0 of 21 wavelengths have a maximum.*too few"):
         fit_period(ridge_of(response_of(method)))
 
@@ -190,8 +190,8 @@ def test_beams_out_of_range_are_refused(call, text):
 
 def test_axes_that_make_no_plot_are_refused(of_blazed):
     with pytest.raises(DiffractionError, match="too few; widen"):
-        response_of(of_blazed["default"], wavelengths=np.array([500.0]))
+        response_of(of_blazed["spectral"], wavelengths=np.array([500.0]))
     with pytest.raises(DiffractionError, match="above -90 and below 90"):
-        response_of(of_blazed["default"], angles=np.linspace(-95.0, 0.0, 20))
+        response_of(of_blazed["spectral"], angles=np.linspace(-95.0, 0.0, 20))
     with pytest.raises(DiffractionError, match="order=0"):
-        ridge_of(response_of(of_blazed["default"], angles=ANGLES[::10]), 0)
+        ridge_of(response_of(of_blazed["spectral"], angles=ANGLES[::10]), 0)

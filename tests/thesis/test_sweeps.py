@@ -53,11 +53,11 @@ def test_wider_windows_make_sharper_lobes(grating):
 
 
 def test_methods_are_compared_with_flss(grating):
-    names = ("default", "flss", "nmm", "rainbow")
+    names = ("spectral", "flss", "nmm", "rainbow")
     result = sweep("method", grating, Light(20.0), values=names, **SETTINGS)
     by_name = {step.value: step for step in result.steps}
     # tables of tolerance 1e-3 both
-    assert by_name["default"].difference.delta_e < 0.1
+    assert by_name["spectral"].difference.delta_e < 0.1
     assert by_name["nmm"].difference.delta_e > 1.0
     assert by_name["nmm"].difference.blueness > 1.05  # the purple shift
     lobes = sweep(

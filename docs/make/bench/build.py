@@ -41,7 +41,7 @@ class Case:
     arguments: dict[str, Any] = field(default_factory=dict)
 
     def goals(self, seconds: float, gigabytes: float) -> list[Goal]:
-        """Those of the defaults."""
+        """Goals for time and memory of a table with default settings."""
         if self.arguments or self.side not in _GOALS:
             return []
         most_seconds, most_gigabytes = _GOALS[self.side]
@@ -52,7 +52,7 @@ class Case:
 
 
 def cases(plan: Plan) -> Iterator[Case]:
-    """What is built."""
+    """Yield the tables that are built."""
     for side in (plan.pixels, *plan.more_pixels):
         yield Case(f"{side}² pixels, the defaults", side)
     if plan.other_tables:
@@ -101,7 +101,7 @@ def _heights(side: int, folder: Path) -> Path:
 
 
 def _child(*arguments: str) -> str:
-    """What the child process prints; it finds the package where this one did."""
+    """Run a child process that finds the package where this one did; return its output."""
     paths = os.pathsep.join(path for path in sys.path if path)
     result = subprocess.run(
         [sys.executable, "-m", f"{__package__}.build", *arguments],

@@ -1,4 +1,4 @@
-"""What `eval` is compared with: other BSDFs and settings, the thesis' look-up, bare gathers.
+"""Contenders that `eval` is compared with: other BSDFs and settings, the thesis' look-up, gathers.
 
 No warning tells how far the model holds for the patch: here it is there to be looked up.
 """
@@ -32,7 +32,7 @@ DEFAULT = "diffraction, the defaults"
 DEFAULT_AL = "diffraction, Al"
 KIRCHHOFF = "diffraction, kirchhoff"
 KIRCHHOFF_AL = "diffraction, Al, kirchhoff"
-FIRST_ORDER = "diffraction, first order"
+SECOND_ORDER = "diffraction, second_order=true"
 COARSE = "diffraction, tolerance 1e-2"
 ONE_WINDOW = "diffraction, patch"
 ON_SURFACE = "diffraction, surface"
@@ -55,7 +55,7 @@ class Tables:
         return quiet_bsdf(self.paths[name], **parameters)
 
     def load(self, name: str) -> DiffractionTable:
-        """One of the tables."""
+        """Load the table of this name."""
         return DiffractionTable.load(self.paths[name])
 
 
@@ -109,7 +109,7 @@ def bsdf_factories(tables: Tables) -> dict[str, Callable[[], Any]]:
         KIRCHHOFF: ours("default", model="kirchhoff"),
         DEFAULT_AL: ours("default", material="Al"),
         KIRCHHOFF_AL: ours("default", material="Al", model="kirchhoff"),
-        FIRST_ORDER: ours("default", second_order=False),
+        SECOND_ORDER: ours("default", second_order=True),
         COARSE: ours("1e-2"),
         ONE_WINDOW: ours("patch"),
         ON_SURFACE: ours("patch", coherence="surface", uv_scale=1e4),

@@ -47,7 +47,7 @@ QUICK = Plan(
 
 @dataclass(frozen=True)
 class Goal:
-    """What a row is to reach, in words, and whether it does."""
+    """Goal of a row, in words, and whether the row meets it."""
 
     text: str
     met: bool
@@ -58,7 +58,7 @@ class Goal:
 
 @dataclass(frozen=True)
 class Row:
-    """One thing measured."""
+    """Measurements of one contender or case."""
 
     name: str  # what it is
     values: dict[str, float | None]  # by column; None where a column does not apply
@@ -94,7 +94,7 @@ class Section:
             yield "  ".join([f"  {cells[0]:<{widths[0]}}", *numbers, goals]).rstrip()
 
     def plain(self) -> dict[str, Any]:
-        """The same for JSON, single measurements included."""
+        """Return the section as plain data for JSON, single measurements included."""
         rows = [
             {
                 "name": row.name,
@@ -116,11 +116,11 @@ def _number(value: float | None) -> str:
 
 
 def read_run(path: Path) -> dict[str, Any]:
-    """What `bench --json` wrote."""
+    """Read the measurements of an earlier run."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        if isinstance(found["sections"], list) and isinstance(found["machine"], dict):
-            return dict(found)
+        document = json.loads(path.read_text(encoding="utf-8"))
+        if isinstance(document["sections"], list) and isinstance(document["machine"], dict):
+            return dict(document)
     except OSError as error:
         raise DiffractionError(f"cannot read '{path}': {error.strerror}") from error
     except (ValueError, KeyError, TypeError):

@@ -110,8 +110,8 @@ def pixels_of(scene: Any, shape: Any) -> Any:
     """Which pixels see the shape at their centre, (height, width) of bool."""
     width, height = scene.sensors()[0].film().crop_size()
     _, ray = rays(scene, 1)
-    found = scene.ray_intersect_preliminary(ray)
-    seen = found.is_valid() & (found.shape == mi.ShapePtr(shape))
+    hit = scene.ray_intersect_preliminary(ray)
+    seen = hit.is_valid() & (hit.shape == mi.ShapePtr(shape))
     return np.array(seen, bool).reshape(height, width)
 
 
@@ -167,23 +167,23 @@ def _window_map(rows: int = 128) -> np.ndarray[Any, np.dtype[np.float32]]:
 
 def measure_noise(plan: Plan, tables: Tables, progress: Progress) -> Section:
     """Relative standard deviation of one sample's estimate of the directional albedo."""
-    ours = tables.bsdf("default", material="none", energy_conserving=False)
+    orders = tables.bsdf("default", material="none", energy_conserving=False)
     cosine = draws_by_cosine(tables.bsdf("default", material="none", energy_conserving=False))
     columns = ("least", "median", "most", "largest weight", "by the cosine")
     rows = []
     for n, (theta, goal) in enumerate(_GOALS.items()):
         progress(n, len(_GOALS), "noise")
-        found = [
-            _deviation(ours, theta, phi, wavelength, plan.lanes)
+        samples = [
+            _deviation(orders, theta, phi, wavelength, plan.lanes)
             for phi in _AZIMUTHS
             for wavelength in _WAVELENGTHS
         ]
-        deviations = [deviation for deviation, _ in found]
+        deviations = [deviation for deviation, _ in samples]
         values = (
             min(deviations),
             float(np.median(deviations)),
             max(deviations),
-            max(weight for _, weight in found),
+            max(weight for _, weight in samples),
             _deviation(cosine, theta, 0.0, 550.0, plan.lanes)[0],
         )
         rows.append(
@@ -218,12 +218,12 @@ def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progr
     rows = []
     for n, (name, make) in enumerate(cases.items()):
         progress(n, len(cases), name)
-        ours, cosine = make(bsdf()), make(draws_by_cosine(bsdf()))
-        pixels = pixels_of(ours, ours.shapes()[0])
-        variance, seconds = _variance_and_time(ours, pixels, plan)
+        orders, cosine = make(bsdf()), make(draws_by_cosine(bsdf()))
+        pixels = pixels_of(orders, orders.shapes()[0])
+        variance, seconds = _variance_and_time(orders, pixels, plan)
         cosine_variance, cosine_seconds = _variance_and_time(cosine, pixels, plan)
         ratio = cosine_variance * cosine_seconds / (variance * seconds)
-        brightest = _brightest(ours, pixels, plan)
+        brightest = _brightest(orders, pixels, plan)
         values = (ratio, cosine_variance / variance, cosine_seconds / seconds, brightest)
         goals = [Goal("at least 100×", ratio >= 100.0)]
         if name.startswith("snake"):
@@ -239,7 +239,7 @@ def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progr
 
 
 def draws_by_cosine(bsdf: Any) -> Any:
-    """The same plugin, whose directions are drawn from the cosine lobe instead of the orders."""
+    """Have the plugin draw directions from the cosine lobe instead of the orders."""
 
     def draw(si: Any, sample1: Any, sample2: Any, active: Any) -> Any:
         even = mi.warp.square_to_uniform_hemisphere(sample2)
@@ -310,11 +310,11 @@ def _luminance(picture: Any) -> Any:
 def measure_snake(plan: Plan, tables: Tables, scenes: Path, progress: Progress) -> Section:
     """Time to render the snake's scene as it is, and with `roughconductor` for its skin."""
     size = {"resx": str(2 * plan.resolution), "resy": str(5 * plan.resolution // 4)}
-    made = {name: snake_scene(scenes, tables, **size) for name in (_SKIN, _ROUGH)}
+    scene_of = {name: snake_scene(scenes, tables, **size) for name in (_SKIN, _ROUGH)}
     rough = mi.load_dict({"type": "twosided", "b": {"type": "roughconductor", "material": "Al"}})
-    skin_of(made[_ROUGH]).set_bsdf(rough)
-    covered = pixels_of(made[_SKIN], skin_of(made[_SKIN])).mean()
-    calls = {name: partial(render_seconds, scene, plan) for name, scene in made.items()}
+    skin_of(scene_of[_ROUGH]).set_bsdf(rough)
+    covered = pixels_of(scene_of[_SKIN], skin_of(scene_of[_SKIN])).mean()
+    calls = {name: partial(render_seconds, scene, plan) for name, scene in scene_of.items()}
     rounds = max(3, plan.rounds // 2)
     seconds = rounds_of(calls, rounds, lambda done, total: progress(done, total, "snake"))
     rows = []

@@ -58,22 +58,22 @@ def simulate(workers: int, tasks: int, costs: Costs, ahead: int = 3, seed: int =
     free = [0.0] * workers
     heapq.heapify(free)
     done: list[float] = []
-    given = 0
+    submitted = 0
 
     def give(now: float) -> None:
-        nonlocal scheduler, given
+        nonlocal scheduler, submitted
         scheduler = max(scheduler, now) + costs.scheduler
         start = max(heapq.heappop(free), scheduler)
         end = start + max(0.1 * costs.work, rng.normal(costs.work, costs.spread))
         heapq.heappush(free, end)
         heapq.heappush(done, end)
-        given += 1
+        submitted += 1
 
-    while given < min(tasks, ahead * workers):
+    while submitted < min(tasks, ahead * workers):
         give(0.0)
     while done:
         client = max(client, heapq.heappop(done)) + max(costs.client, costs.transfer)
-        if given < tasks:
+        if submitted < tasks:
             give(client)
     return client
 
@@ -102,14 +102,14 @@ def client_seconds(count: int = 20) -> float:
     raw = rng.random((640, PIXELS // 640, CHANNELS)).astype(np.float32).astype(np.float64)
     total = np.zeros_like(raw)
     with tempfile.TemporaryDirectory() as folder:
-        kept = Kept(Path(folder) / "passes")
+        store = Kept(Path(folder) / "passes")
         start = time.perf_counter()
         for _ in range(count):
-            kept.write(task, Sums(raw, "", "", 0.0, 0))
-            found = kept.read(task)
-            assert found is not None
-            total += found.raw
-            kept.forget(task)
+            store.write(task, Sums(raw, "", "", 0.0, 0))
+            stored = store.read(task)
+            assert stored is not None
+            total += stored.raw
+            store.forget(task)
         return (time.perf_counter() - start) / count
 
 
@@ -150,8 +150,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     def work() -> None:
         film_seconds(args.scene, 1)  # makes the table, and caches it
         alone = film_seconds(args.scene, FRAMES)[1]["seconds"]
-        both, found = film_seconds(args.scene, FRAMES, ["--workers", "2", "--threads", "1"])
-        report = found["workers"]
+        two_workers, workers_report = film_seconds(
+            args.scene, FRAMES, ["--workers", "2", "--threads", "1"]
+        )
+        report = workers_report["workers"]
         seconds = report["seconds"]
         scheduler, client = scheduler_seconds(), client_seconds()
         transfer = PIXELS * CHANNELS * 8 / 1.25e8
@@ -159,7 +161,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         film = (
             f"A film of {FRAMES} frames takes {alone:.0f} s in one process with two threads. Two "
             f"workers with one thread each take {seconds:.0f} s, {seconds / alone:.2f} times as "
-            f"long, and {both - seconds:.0f} s to start; "
+            f"long, and {two_workers - seconds:.0f} s to start; "
             f"{report['overhead_per_task_s']:.2g} s a task are not work."
         )
         times = (

@@ -38,9 +38,9 @@ from mitsuba_diffraction.thesis.period_fit import (
 from mitsuba_diffraction.thesis.period_fit.plot import draw
 
 from . import pages
-from .pages import SHOWN, add_measured, exit_code, measured_patch
+from .pages import add_measured, exit_code, measured_patch
 
-METHODS = ("default", "flss", "nmm", "pq", "pq-sinc")
+METHODS = ("spectral", "flss", "nmm", "pq", "pq-sinc")
 
 _DPI = 85
 _STEP = 5.0  # nm
@@ -64,7 +64,7 @@ class Periods:
 
     name: str  # of the patch
     by_method: dict[str, Evaluated]  # the methods' responses and fits
-    given: float | None  # period that it is made with
+    nominal: float | None  # period that it is made with
     windows: tuple[float, float, float, float]  # mean, spread, smallest, largest of single windows
     count: int  # number of those windows
     thesis: float  # period that the procedure of the thesis finds; NaN if none
@@ -80,7 +80,7 @@ def exact_gratings() -> list[tuple[HeightField, float | None]]:
 
 def evaluate_patch(
     patch: HeightField,
-    given: float | None,
+    nominal: float | None,
     *,
     wavelengths: Array,
     angles: Array,
@@ -90,23 +90,23 @@ def evaluate_patch(
 ) -> Periods:
     """Evaluate every method, and single windows, under a beam at 75°."""
     beam = Beam()
-    made = make_all(methods, patch, coherence_width=coherence_width)
+    by_name = make_all(methods, patch, coherence_width=coherence_width)
     results = {}
-    for name, method in made.items():
+    for name, method in by_name.items():
         response = measure(method.brdf, beam, wavelengths, angles, sigma=method.sigma, label=name)
         ridge = ridge_of(response)
         results[name] = Evaluated(response, ridge, fit_period(ridge))
-    single = make("default", patch, coherence="patch", coherence_width=coherence_width)
+    single = make("spectral", patch, coherence="patch", coherence_width=coherence_width)
     assert isinstance(single, FullSpectrum)
     few = wavelengths[:: max(1, wavelengths.size // 20)]
-    found = window_fits(single.table, beam, few, angles, count=windows)
+    fits = window_fits(single.table, beam, few, angles, count=windows)
     try:
         thesis = thesis_fit(single.table, beam, wavelengths, angles).period
     except DiffractionError:
         thesis = float("nan")
     return Periods(
-        patch.name, results, given,
-        (found.mean, found.spread, float(found.periods.min()), float(found.periods.max())),
+        patch.name, results, nominal,
+        (fits.mean, fits.spread, float(fits.periods.min()), float(fits.periods.max())),
         windows, thesis,
     )  # fmt: skip
 
@@ -123,7 +123,7 @@ def evaluation_figure(patches: Sequence[Periods]) -> Figure:
         largest = max(float(e.response.values.max()) for e in patch.by_method.values())
         for column, name in enumerate(names):
             axes, result = grid[row][column], patch.by_method[name]
-            period = patch.given or result.fit.period
+            period = patch.nominal or result.fit.period
             shown = draw(axes, result.response, result.ridge, period, largest=largest)
             axes.set_title(f"{patch.name}, {name}", fontsize=9)
             axes.tick_params(labelsize=8)
@@ -141,13 +141,13 @@ def evaluation_figure(patches: Sequence[Periods]) -> Figure:
 def period_table(patches: Sequence[Periods]) -> str:
     """Fitted periods, in nm, as a Markdown table."""
     names = list(patches[0].by_method)
-    header = ("patch", "nominal", *(SHOWN.get(name, name) for name in names))
+    header = ("patch", "nominal", *names)
     rows = []
     for patch in patches:
-        made = "" if patch.given is None else f"{1e3 * patch.given:.4g}"
+        nominal = "" if patch.nominal is None else f"{1e3 * patch.nominal:.4g}"
         fits = (patch.by_method[name].fit for name in names)
         cells = [f"{1e3 * fit.period:.5g} ({_short(fit.residual)}°)" for fit in fits]
-        rows.append((patch.name, made, *cells))
+        rows.append((patch.name, nominal, *cells))
     return pages.table(header, rows)
 
 
@@ -156,15 +156,15 @@ def difference_table(patches: Sequence[Periods]) -> str:
     names = list(patches[0].by_method)
     rows = []
     for patch in patches:
-        if patch.given is None:
+        if patch.nominal is None:
             continue
         cells = []
         for name in names:
             response, ridge = patch.by_method[name].response, patch.by_method[name].ridge
-            expected = response.beam.grating_angles(response.wavelengths, patch.given, 1)
+            expected = response.beam.grating_angles(response.wavelengths, patch.nominal, 1)
             cells.append(f"{_short(float(np.nanmax(np.abs(ridge.angles - expected))))}°")
-        rows.append((patch.name, f"{1e3 * patch.given:.4g}", *cells))
-    return pages.table(("patch", "period, nm", *(SHOWN.get(name, name) for name in names)), rows)
+        rows.append((patch.name, f"{1e3 * patch.nominal:.4g}", *cells))
+    return pages.table(("patch", "period, nm", *names), rows)
 
 
 def window_table(patches: Sequence[Periods]) -> str:
@@ -172,7 +172,7 @@ def window_table(patches: Sequence[Periods]) -> str:
     rows = []
     for patch in patches:
         mean, spread, least, most = (1e3 * value for value in patch.windows)
-        ensemble = 1e3 * patch.by_method["default"].fit.period
+        ensemble = 1e3 * patch.by_method["spectral"].fit.period
         spread_text = f"± {spread:.2g}" if spread >= 0.01 else "± 0"
         thesis = "" if np.isnan(patch.thesis) else f"{1e3 * patch.thesis:.5g}"
         ends = f"{least:.5g} – {most:.5g}"
@@ -210,11 +210,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         wavelengths = np.arange(380.0, 780.5, 40.0 if args.small else _STEP)
         angles = np.linspace(-75.0, 30.0, round(105.0 / args.angle_step) + 1)
         results = []
-        for patch, given in patches:
+        for patch, nominal in patches:
             print(f"evaluating {patch.name}", flush=True)
             results.append(
                 evaluate_patch(
-                    patch, given, wavelengths=wavelengths, angles=angles, windows=args.windows
+                    patch, nominal, wavelengths=wavelengths, angles=angles, windows=args.windows
                 )
             )
         pages.update(

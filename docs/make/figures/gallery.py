@@ -115,8 +115,8 @@ PICTURES = (
     ),
     _scene(
         "film", "A diffraction film before lamps",
-        "A thin sheet with shallow waves on one side (`thin`): each lamp stands between its "
-        "spectra.",
+        "A thin sheet with shallow waves on one side (`diffraction_dielectric`): each lamp stands "
+        "between its spectra.",
     ),
     _scene(
         "spectrometer", "A grating spectrometer",

@@ -23,8 +23,6 @@ from mitsuba_diffraction.heights.field import HeightField
 
 Made = TypeVar("Made")
 
-#: Names of methods on the command line, where they differ from those of the library.
-SHOWN = {"default": "spectral"}
 # JPEG's default blurs single sparkling pixels; at 90 they stay, in a quarter of a PNG's size.
 _QUALITIES = (90, 86, 82, 78, 74, 70, 64, 58)
 

@@ -1,4 +1,4 @@
-"""Page of the plugin's parameters, from the plugin's docstring.
+"""The reference of the plugins' parameters, made of the plugins' own docstrings.
 
 python -m docs.make.figures.parameters -o docs/parameters.md
 """
@@ -10,7 +10,7 @@ import ast
 import re
 import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,8 +20,12 @@ from mitsuba_diffraction.errors import DiffractionError
 from . import pages
 from .pages import exit_code
 
-#: Read, not imported: that would take a variant of Mitsuba.
-PLUGIN = Path(__file__).resolve().parents[3] / "mitsuba_diffraction/plugin/bsdf.py"
+_FOLDER = Path(__file__).resolve().parents[3] / "mitsuba_diffraction/plugin"
+#: Modules of the plugins; read, not imported, which would need a variant of Mitsuba.
+PLUGINS = {
+    "diffraction": _FOLDER / "bsdf.py",
+    "diffraction_dielectric": _FOLDER / "transmission/bsdf.py",
+}
 
 _GROUP = re.compile(r"^(\w[\w ]*)\n-{3,}\n", re.M)
 _ENTRY = re.compile(
@@ -42,9 +46,9 @@ class Parameter:
     text: str
 
 
-def docstring() -> str:
-    """Docstring of the plugin."""
-    return ast.get_docstring(ast.parse(PLUGIN.read_text(encoding="utf-8"))) or ""
+def docstring(plugin: str) -> str:
+    """Return the docstring of a plugin."""
+    return ast.get_docstring(ast.parse(PLUGINS[plugin].read_text(encoding="utf-8"))) or ""
 
 
 def groups(text: str) -> dict[str, list[Parameter]]:
@@ -54,15 +58,15 @@ def groups(text: str) -> dict[str, list[Parameter]]:
 
 
 def _entries(body: str) -> list[Parameter]:
-    found = []
+    entries = []
     for entry in re.split(r"\n(?=\S)", body.strip()):
         head, _, rest = entry.partition("\n")
         match = _ENTRY.match(head)
         if match is None or not rest.strip():
             raise DiffractionError(
-                f"'{PLUGIN}': expected 'name : type [default]' and text below it, got '{head}'"
+                f"expected 'name : type [default]' and text below it, got '{head}'"
             )
-        found.append(
+        entries.append(
             Parameter(
                 tuple(match["names"].split(", ")),
                 match["type"],
@@ -71,31 +75,39 @@ def _entries(body: str) -> list[Parameter]:
                 " ".join(rest.split()),
             )
         )
-    return found
+    return entries
 
 
-def page(text: str) -> str:
-    """Return the page in Markdown, from the plugin's docstring."""
-    model, _, example = text.partition(_MODEL)[2].partition(_EXAMPLE)
-    xml, _, python = textwrap.dedent(example).strip().partition("\n\n")
+def page() -> str:
+    """Return the reference of both plugins in Markdown."""
+    reflecting, transmitting = (docstring(plugin) for plugin in PLUGINS)
+    introduction = _GROUP.split(transmitting)[0].partition("\n\n")[2]
     sections = [
         "# Parameters of `diffraction`",
-        "Made by `make parameters` of the text at the top of "
-        "[bsdf.py](../mitsuba_diffraction/plugin/bsdf.py). ∂: differentiable, a parameter of "
-        "`mi.traverse`. Lengths are in µm, wavelengths in nm. In an image file the top row is the "
-        "largest y.",
-    ]
-    for heading, entries in groups(text).items():
-        sections += [f"## {heading}", pages.table(_HEADER, [_row(entry) for entry in entries])]
-    sections += [
-        "## The model",
-        _prose(f"The model is {model}"),
-        "[theory.md](theory.md) has all of it, symbol by symbol.",
-        "## An example",
-        f"```xml\n{xml}\n```",
-        f"```python\n{python}\n```",
+        "Made by `make parameters` of the texts at the top of the plugins' modules. ∂: "
+        "differentiable, a parameter of `mi.traverse`. Lengths are in µm, wavelengths in nm. In an "
+        "image file the top row is the largest y. Surfaces that light goes through have the plugin "
+        "[`diffraction_dielectric`](#parameters-of-diffraction_dielectric).",
+        *_parts(reflecting),
+        "[theory.md](theory.md) has all of the model, symbol by symbol.",
+        "# Parameters of `diffraction_dielectric`",
+        _prose(introduction),
+        *_parts(transmitting),
     ]
     return "\n\n".join(sections) + "\n"
+
+
+def _parts(text: str) -> Iterator[str]:
+    """Tables of parameters, model and example of a plugin's docstring."""
+    for heading, entries in groups(text).items():
+        yield f"## {heading}"
+        yield pages.table(_HEADER, [_row(entry) for entry in entries])
+    model, _, example = text.partition(_MODEL)[2].partition(_EXAMPLE)
+    xml, _, python = textwrap.dedent(example).strip().partition("\n\n")
+    yield "## The model"
+    yield _prose(f"The model is {model}")
+    yield f"```xml\n{xml}\n```"
+    yield f"```python\n{python}\n```"
 
 
 _HEADER = ("parameter", "type", "default", "meaning")
@@ -127,7 +139,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     def work() -> None:
         with atomic_path(args.output) as temporary:
-            temporary.write_text(page(docstring()), encoding="utf-8")
+            temporary.write_text(page(), encoding="utf-8")
 
     return exit_code("parameters", work)
 

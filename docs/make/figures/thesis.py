@@ -38,11 +38,11 @@ from mitsuba_diffraction.thesis.sweeps import (
 )
 
 from . import pages
-from .pages import SHOWN, add_measured, exit_code, measured_patch
+from .pages import add_measured, exit_code, measured_patch
 
 #: What each method leaves out.
 APPROXIMATES = {
-    "default": "only its tolerance: short series in κ, summed 5 nm apart",
+    "spectral": "only its tolerance: short series in κ, summed 5 nm apart",
     "flss": "the spectrum by samples 5 nm apart; Taylor series, which shallow surfaces allow",
     "nmm": "the spectrum by the wavelengths that one period sends to the eye, all of one weight; "
     "white around the mirror direction",
@@ -87,14 +87,14 @@ def measure(
 def _steps(
     patch: HeightField, resolution: int, samples: int, step: float, width: float
 ) -> dict[str, Step]:
-    made = dict(make_all(NAMES, patch, coherence="patch", step=step, coherence_width=width))
+    by_name = dict(make_all(NAMES, patch, coherence="patch", step=step, coherence_width=width))
     fine = make("flss", patch, step=_FINE, coherence_width=width)
-    plain = made["nmm"]
+    plain = by_name["nmm"]
     assert isinstance(plain, OrdersOnly)
-    made["nmm, lobes"] = OrdersOnly(plain.full, plain.periods, weights="lobe")
+    by_name["nmm, lobes"] = OrdersOnly(plain.full, plain.periods, weights="lobe")
     reference = method_map(fine, _LIGHT, step=_FINE, resolution=resolution, samples=samples)
     result = {}
-    for name, method in made.items():
+    for name, method in by_name.items():
         timed = timed_map(method, _LIGHT, step=step, resolution=resolution, samples=samples)
         result[name] = compare(name, name, reference, timed)
     return result
@@ -107,7 +107,7 @@ def table(measured: Measured) -> str:
         grating, scale = measured.grating[name], measured.scale[name]
         cost = scale.seconds / measured.scale["flss"].seconds
         rows.append(
-            (f"`{SHOWN.get(name, name)}`" if name in NAMES else name, text, f"{cost:.2g}",
+            (f"`{name}`" if name in NAMES else name, text, f"{cost:.2g}",
              f"{grating.difference.delta_e:.2g} (× {grating.difference.blueness:.2f})",
              f"{scale.difference.delta_e:.2g}")
         )  # fmt: skip
@@ -137,7 +137,7 @@ def numbers(result: Sweep) -> str:
         elif math.isfinite(step.difference.delta_e):
             cells = [f"{step.difference.delta_e:.2g}", f"{step.difference.delta_e_95:.2g}"]
         time = [f"{step.seconds / result.steps[0].seconds:.2g}"] if timed else []
-        rows.append((SHOWN.get(step.label, step.label), *cells, *time))
+        rows.append((step.label, *cells, *time))
     header = ("value", "mean ΔE", "95th percentile")
     return pages.table((*header, "time (first = 1)") if timed else header, rows)
 
@@ -169,7 +169,7 @@ def write_sweeps(args: argparse.Namespace, patch: HeightField | None) -> None:
         best = next((s for s in result.steps if s.label == result.reference), None)
         sheet = contact_sheet(
             [step.map for step in result.steps],
-            [SHOWN.get(step.label, step.label) for step in result.steps],
+            [step.label for step in result.steps],
             title=f"{patch.name}: {kind}",
             exposure=None if best is None else best.map.exposure(),
         )

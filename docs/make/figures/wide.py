@@ -46,8 +46,8 @@ class Run:
 
 def field(file: Path, pixels: int) -> None:
     """Write the scan."""
-    made = gratings.elaphe_like(EXTENT, MADE, seed=5, bending=0.0)
-    heights = made.heights.astype(np.float32)
+    whole = gratings.elaphe_like(EXTENT, MADE, seed=5, bending=0.0)
+    heights = whole.heights.astype(np.float32)
     if pixels != MADE:
         heights = zoom(heights, pixels / MADE, order=3, mode="grid-wrap", grid_mode=True)
     np.save(file, heights)
@@ -85,8 +85,8 @@ def agreement(
         distance = np.hypot(qx, qy)
         inside = distance * whole.sigma <= NEAR
         part = inside if name == "glossy" else ~inside & (distance <= kappa)
-        found, exact = (t.window_sum(qx[part], qy[part], kappa) for t in (windowed, whole))
-        result[name] = float(np.abs(found - exact).sum() / exact.sum()), error[name]
+        windows, exact = (t.window_sum(qx[part], qy[part], kappa) for t in (windowed, whole))
+        result[name] = float(np.abs(windows - exact).sum() / exact.sum()), error[name]
     return result
 
 

@@ -5,8 +5,9 @@ index of the search are files of the site.
 
 Contents
 --------
-hooks      functions that MkDocs calls
-links      links between pages, and files of the repository that pages link to
-formulas   LaTeX to MathML
-reference  page of the public names
+hooks         functions that MkDocs calls
+links         links between pages, and files of the repository that pages link to
+formulas      LaTeX to MathML
+reference     page of the public names
+descriptions  parameters and attributes on that page
 """

@@ -28,7 +28,7 @@ def rewritten(text: str, source: str) -> str:
     ----------
     source : path of the page in the repository. Links to folders become plain text.
     """
-    own = _in_site(source)
+    in_site = _in_site(source)
 
     def replace(match: re.Match[str]) -> str:
         mark, label, target = match.groups()
@@ -38,7 +38,7 @@ def rewritten(text: str, source: str) -> str:
         place = posixpath.normpath(posixpath.join(posixpath.dirname(source), path))
         if not PurePosixPath(place).suffix and place not in ("LICENSE", "Makefile"):
             return label
-        relative = posixpath.relpath(_in_site(place), posixpath.dirname(own) or ".")
+        relative = posixpath.relpath(_in_site(place), posixpath.dirname(in_site) or ".")
         return f"{mark}[{label}]({relative}{'#' if anchor else ''}{anchor})"
 
     parts = _FENCE.split(text)

@@ -18,7 +18,7 @@ crossed          rigorous solver in two dimensions: coupled waves in layers
 patch_solutions  solutions in two dimensions
 coated           solutions of gratings under a coat
 filmed           solutions of gratings under a film
-passed           orders that go through a dielectric, and R + T of the recipes
+transmitted      transmitted orders of gratings, and R + T of surfaces
 model            order efficiencies by the package
 compare          deviations of the package from solutions of gratings
 models           deviations of Kirchhoff, small slope and their blend
@@ -26,7 +26,7 @@ goals            goals of the default, and deviations beside them
 limits           slopes at which the package warns
 cells            deviations in two dimensions
 second_order     exact second order of small slope
-factored         second order as the factor that tables hold
+second_order_factor  second order as the factor that tables hold
 closed_forms     ideal gratings
 roughness        random surfaces of known mean diffraction
 statistics       checks with random surfaces, and windows at random places

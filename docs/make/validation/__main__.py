@@ -97,11 +97,11 @@ def _solve(args: argparse.Namespace) -> int:
     path = args.output / file_name(args.material, args.solver)
     check_writable(path)
     with Bar(args, unit=" scans") as bar:
-        found = solve_material(args.material, args.solver, processes=args.jobs, progress=bar)
-    save(found, path)
+        solutions = solve_material(args.material, args.solver, processes=args.jobs, progress=bar)
+    save(solutions, path)
     print(
-        f"wrote {os.fspath(path)}: {len(found.rows)} orders; the last refinement changed them by "
-        f"{found.change.max():.1g} at most"
+        f"wrote {os.fspath(path)}: {len(solutions.rows)} orders; the last refinement changed "
+        f"them by {solutions.change.max():.1g} at most"
     )
     return 0
 
@@ -133,8 +133,8 @@ def _coated(args: argparse.Namespace) -> int:
     for series in SERIES:
         check_writable(args.output / coated_file(series))
     with Bar(args, unit=" gratings") as bar:
-        found = solve_coated(args.output, bar)
-    for series, rows in found.items():
+        by_series = solve_coated(args.output, bar)
+    for series, rows in by_series.items():
         print(f"wrote {os.fspath(args.output / coated_file(series))}: {len(rows)} orders")
     return 0
 

@@ -29,7 +29,7 @@ class Agreement:
 
 def agreement() -> list[Agreement]:
     """Compare the solvers for each material, profile and polarisation that both can solve."""
-    found = []
+    agreements = []
     for material in ("aluminium", "keratin"):
         first, second = shipped(material), shipped(material, "coupled_wave")
         partner = _partners(first, second)
@@ -41,7 +41,7 @@ def agreement() -> list[Agreement]:
                     continue
                 values = rows[polarisation][keep].astype(float)
                 difference = np.abs(values - first.rows[polarisation][partner[keep]])
-                found.append(
+                agreements.append(
                     Agreement(
                         f"{material}, {profile}, {polarisation.upper()}",
                         int(keep.sum()),
@@ -51,7 +51,7 @@ def agreement() -> list[Agreement]:
                         float(rows[f"{polarisation}_change"][keep].max()),
                     )
                 )
-    return found
+    return agreements
 
 
 def _partners(first: Solutions, second: Solutions) -> NDArray[np.intp]:

@@ -53,23 +53,27 @@ class PatchAgreement:
 def agreements() -> list[PatchAgreement]:
     """Rayleigh's expansion beside coupled waves, on keratin."""
     second = {solution.case: solution for solution in solved("keratin", "coupled_wave")[0]}
-    found = []
+    compared = []
     for first in solved("keratin")[0]:
         if first.case not in second:
             continue
         field, other = cell(first.case.surface), second[first.case]
         powers, others = (
-            dict(zip(_numbers(one), one.efficiency(field), strict=True)) for one in (first, other)
+            dict(zip(_numbers(solved_by), solved_by.efficiency(field), strict=True))
+            for solved_by in (first, other)
         )
         coloured = [number for number in powers if number != (0, 0)]
         truth = sum(powers[number] for number in coloured)
         deviation = sum(abs(powers[number] - others[number]) for number in coloured) / truth
         changes = (
-            float(one.rows["change"][[number != (0, 0) for number in _numbers(one)]].sum() / truth)
-            for one in (first, other)
+            float(
+                solved_by.rows["change"][[number != (0, 0) for number in _numbers(solved_by)]].sum()
+                / truth
+            )
+            for solved_by in (first, other)
         )
-        found.append(PatchAgreement(first.case, float(deviation), *changes))
-    return found
+        compared.append(PatchAgreement(first.case, float(deviation), *changes))
+    return compared
 
 
 def _numbers(solution: Solved) -> list[tuple[int, int]]:
@@ -84,17 +88,17 @@ def _compare(solution: Solved) -> PatchComparison:
     keep = coloured & (wo[:, 2] >= np.cos(np.radians(GRAZING)))
     truth = solution.efficiency(field)[keep]
     light, sigma = (field, index, wi, wo, case.wavelength), max(field.extent)  # lobes are separate
-    found = {
+    powers = {
         model: efficiencies(*light, model, sigma=sigma, ratios=ratios_of(case.surface))
         for model in _MODELS
     }
-    found = {model: power[keep] for model, power in found.items()}
-    by_model = {model: _deviation(power, truth) for model, power in found.items()}
+    powers = {model: power[keep] for model, power in powers.items()}
+    by_model = {model: _deviation(power, truth) for model, power in powers.items()}
     exact = np.sum(np.abs(solution.rows["jones"]) ** 2, axis=1) * (wo[:, 2] / wi[2])[:, None]
     polarised = {}
     for model in _POLARISED:
         jones = jones_of(*light, model)
-        power = found[model][:, None] * shares(jones)[keep]
+        power = powers[model][:, None] * shares(jones)[keep]
         s, p = (_deviation(power[:, n], exact[keep, n]) for n in range(2))
         polarised[model] = (s, p)
     return PatchComparison(

@@ -69,18 +69,18 @@ def solve_coated(folder: Path, progress: Progress | None = None) -> dict[str, ND
         If gratinglab is not installed, or a file cannot be written.
     """
     tell = progress or silent
-    found = {series: np.empty(0, ROW) for series in SERIES}
+    by_series = {series: np.empty(0, ROW) for series in SERIES}
     for n, grating in enumerate(GRATINGS):
         tell(n, len(GRATINGS), f"solving {grating} under a coat")
         for theta in ANGLES:
             for wavelength in FEW_WAVELENGTHS:
                 rows = solve_one(grating, theta, wavelength)
                 for series in SERIES:
-                    found[series] = np.concatenate([found[series], rows[series]])
+                    by_series[series] = np.concatenate([by_series[series], rows[series]])
         for series in SERIES:
-            save_rows(found[series], _about(series), folder / coated_file(series))
+            save_rows(by_series[series], _about(series), folder / coated_file(series))
     tell(len(GRATINGS), len(GRATINGS), "done")
-    return found
+    return by_series
 
 
 def solve_one(grating: Grating, theta: float, wavelength: float) -> dict[str, NDArray[np.void]]:
@@ -195,7 +195,7 @@ def _once(grating: Grating, theta: float, wavelength: float) -> Real:
     light = in_plane(sine / COAT), in_plane(sines / COAT), wavelength / COAT
     index = index_of(MATERIAL, wavelength / COAT)
     inside = efficiencies(field, index, *light, "small_slope", sigma=lobe_sigma(grating))
-    both = inside[:, None] * shares(jones_of(field, index, *light, "small_slope"))
+    by_light = inside[:, None] * shares(jones_of(field, index, *light, "small_slope"))
     through = np.stack(
         [
             (1 - np.abs(there) ** 2) * (1 - np.abs(back) ** 2)
@@ -207,22 +207,22 @@ def _once(grating: Grating, theta: float, wavelength: float) -> Real:
         ],
         axis=1,
     )
-    return np.asarray((both * through).mean(axis=1))
+    return np.asarray((by_light * through).mean(axis=1))
 
 
 def _matrices(
     grating: Grating, theta: float, wavelength: float, inside: NDArray[np.int64], *, fine: bool
 ) -> Real:
     """E of both polarisations, (2, inner, inner): from the column's order to the row's."""
-    found = np.zeros((2, len(inside), len(inside)))
+    matrices = np.zeros((2, len(inside), len(inside)))
     for column, order in enumerate(inside):
         # going down in order m is light from −sin of it
         sine = (np.sin(np.radians(theta)) - order * wavelength / 1000 / grating.period) / COAT
         for relative, powers in _reflected(grating, float(sine), wavelength / COAT, fine=fine):
             row = np.flatnonzero(inside == order + relative)
             if len(row):
-                found[:, row[0], column] = powers
-    return found
+                matrices[:, row[0], column] = powers
+    return matrices
 
 
 def _reflected(
@@ -231,11 +231,13 @@ def _reflected(
     """Orders and their efficiencies (2,), TE and TM, of light inside the coat."""
     if grating.profile == "sinusoidal":
         wi = in_plane(sine)
-        found = rayleigh.solve(
+        reflected = rayleigh.solve(
             grating.heights(256), index_of(MATERIAL, wavelength), wavelength, wi, _HARMONICS[fine]
         )
-        power = np.abs(np.diagonal(found.jones, axis1=1, axis2=2)) ** 2
-        for order, share, cosine in zip(found.order[:, 0], power, found.wo[:, 2], strict=True):
+        power = np.abs(np.diagonal(reflected.jones, axis1=1, axis2=2)) ** 2
+        for order, share, cosine in zip(
+            reflected.order[:, 0], power, reflected.wo[:, 2], strict=True
+        ):
             yield int(order), share * cosine / wi[2]
         return
     scan = Scan(grating, MATERIAL, float(np.degrees(np.arcsin(sine))), (wavelength,))

@@ -104,16 +104,16 @@ def compare(
     """
     trusted = (solutions or shipped(material)).trusted()
     rows = trusted.rows
-    found, lights = np.full(len(rows), np.nan), np.full((len(rows), 2), np.nan)
+    unpolarised, lights = np.full(len(rows), np.nan), np.full((len(rows), 2), np.nan)
     for grating, theta, wavelength, members in scans_of(rows):
         orders, _ = order_sines(grating.period, wavelength, theta)
         efficiencies = order_efficiencies(grating, material, theta, wavelength, model, coat)
         place = np.searchsorted(orders, rows["order"][members])
-        found[members] = efficiencies[place]
+        unpolarised[members] = efficiencies[place]
         if coat is None:
             share = order_shares(grating, material, theta, wavelength, model)
             lights[members] = (efficiencies[:, None] * share)[place]
-    return Comparison(material, trusted, found, lights)
+    return Comparison(material, trusted, unpolarised, lights)
 
 
 def scans_of(

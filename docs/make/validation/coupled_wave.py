@@ -144,11 +144,11 @@ _KINDS = {
 def _quiet() -> Iterator[None]:
     """The library reports every layer on stderr, past Python's own stream."""
     sys.stderr.flush()
-    kept = os.dup(2)
+    stderr = os.dup(2)
     try:
         with open(os.devnull, "wb") as nowhere:
             os.dup2(nowhere.fileno(), 2)
         yield
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
+        os.dup2(stderr, 2)
+        os.close(stderr)

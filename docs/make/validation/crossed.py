@@ -145,8 +145,8 @@ def _amplitudes(
     omega, count = cell.omega.real, cell.nG
     kx, ky = np.real(cell.kx), np.real(cell.ky)
     up = np.sqrt(np.maximum(omega**2 - kx**2 - ky**2, 0)) / omega
-    kept = up > HORIZON
-    wo = np.stack([kx / omega, -ky / omega, up], axis=1)[kept]
+    propagating = up > HORIZON
+    wo = np.stack([kx / omega, -ky / omega, up], axis=1)[propagating]
     s_in, s_out = boundary.polarisation_axes(wi, wo)
     p_out = np.cross(wo, s_out)
     layers = len(cell.thickness_list)
@@ -161,16 +161,16 @@ def _amplitudes(
         incident[[zeroth, count + zeroth]] = magnetic[:2]
         outgoing = -(reflection @ incident) / omega / cell.q_list[0]
         # grcwa has (−Ey, Ex), and its y points the other way
-        y, x = (half[kept] for half in np.split(cell.kp_list[0] @ outgoing, 2))
+        y, x = (half[propagating] for half in np.split(cell.kp_list[0] @ outgoing, 2))
         z = -(wo[:, 0] * x + wo[:, 1] * y) / wo[:, 2]
-        found = np.stack([x, y, z], axis=1)
-        fields.append([np.sum(found * s_out, axis=1), np.sum(found * p_out, axis=1)])
+        out = np.stack([x, y, z], axis=1)
+        fields.append([np.sum(out * s_out, axis=1), np.sum(out * p_out, axis=1)])
     jones = np.moveaxis(np.array(fields), 2, 0).swapaxes(1, 2)
     # from the zeroth order's axes to those that `boundary` has for each pair of directions
     turned = jones @ boundary.turn(basis, s_in, -wi)
     # the solver's phases are those at the highest point
     phase = np.exp(-1j * omega * (wi[2] + wo[:, 2]) * top)
-    return Orders(orders[kept] * [1, -1], wo, phase[:, None, None] * turned)
+    return Orders(orders[propagating] * [1, -1], wo, phase[:, None, None] * turned)
 
 
 def _eigenmodes(

@@ -84,8 +84,10 @@ def name() -> str:
 def solve(grating: Grating, stack: Stack, theta: float, wavelength: float, harmonics: int) -> Real:
     """Efficiencies of the orders of `cases.order_sines`, (2, orders): TE and TM."""
     orders, _ = order_sines(grating.period, wavelength, theta)
-    found, above = _amplitudes(grating, stack, np.sin(np.radians(theta)), wavelength, harmonics)
-    power = np.abs(found) ** 2 * above.real / above[harmonics].real
+    amplitudes, above = _amplitudes(
+        grating, stack, np.sin(np.radians(theta)), wavelength, harmonics
+    )
+    power = np.abs(amplitudes) ** 2 * above.real / above[harmonics].real
     return np.asarray(power[:, orders + harmonics])
 
 
@@ -101,7 +103,7 @@ def _amplitudes(
     heights = heights - heights.mean()
     depth = 2 * np.pi * stack.thickness / wavelength
     through = np.exp(1j * within * depth)
-    found = []
+    amplitudes = []
     for eta in ((1.0, 1.0, 1.0), epsilons):
         outer, into, rising, falling, under = (
             _projected(heights, alpha, beta, eta[medium])
@@ -114,8 +116,8 @@ def _amplitudes(
         came = np.zeros(2 * len(outer), complex)
         came[: len(outer)] = -into[:, harmonics]
         scale = np.abs(matrix).max(axis=0)
-        found.append((np.linalg.solve(matrix / scale, came) / scale)[: len(m)])
-    return np.asarray(found), above
+        amplitudes.append((np.linalg.solve(matrix / scale, came) / scale)[: len(m)])
+    return np.asarray(amplitudes), above
 
 
 def _projected(heights: Real, alpha: Real, beta: Complex, eta: complex) -> Complex:
@@ -159,19 +161,19 @@ def shipped_film(stack: Stack) -> Solutions:
 
 def deviations(stack: Stack, model: str) -> Real:
     """Σ|η − η_rigorous| / Σ η_rigorous of colours, (gratings, angles); orders within `GRAZING`."""
-    kept = shipped_film(stack)
-    found = np.zeros((2, len(GRATINGS), len(ANGLES)))
+    solutions = shipped_film(stack)
+    sums = np.zeros((2, len(GRATINGS), len(ANGLES)))
     for grating, theta, wavelength in _cases():
         orders, sines = order_sines(grating.period, wavelength, theta)
-        exact = kept.where(
+        exact = solutions.where(
             period=grating.period, depth=grating.depth, theta=theta, wavelength=wavelength
         ).mean
         counted = _counted(orders, sines)
         off = np.abs(model_of(grating, stack, theta, wavelength, model) - exact)
         place = GRATINGS.index(grating), ANGLES.index(theta)
-        found[(0, *place)] += off[counted].sum()
-        found[(1, *place)] += exact[counted].sum()
-    return np.asarray(found[0] / found[1])
+        sums[(0, *place)] += off[counted].sum()
+        sums[(1, *place)] += exact[counted].sum()
+    return np.asarray(sums[0] / sums[1])
 
 
 @dataclass(frozen=True)
@@ -212,9 +214,9 @@ def _of_mean(grating: Grating, stack: Stack, theta: float, wavelength: float) ->
     film = Filmed(stack.index[wavelength], stack.film, k * stack.thickness * 1e-3)
     _, sines = order_sines(grating.period, wavelength, theta)
     cosines = np.sqrt(1.0 - np.append(sines, np.sin(np.radians(theta))) ** 2)
-    roughness = ScaleRoughness.of(field.heights, field.pixel_size)
-    found = mean_gain(cosines, film, roughness, k)
-    return np.asarray(found[:-1] * found[-1])
+    roughness = ScaleRoughness.from_heights(field.heights, field.pixel_size)
+    gains = mean_gain(cosines, film, roughness, k)
+    return np.asarray(gains[:-1] * gains[-1])
 
 
 class Beyond(NamedTuple):

@@ -68,13 +68,13 @@ def solve(scan: Scan, boundary_points: int) -> Efficiencies:
         problem = _problem(scan.grating, coating)
         for polarisation in ("te", "tm"):
             light = Illumination.classical(scan.theta, polarisation.upper())
-            found = integral.solve(problem, light, scan.wavelengths, **options)
+            efficiencies = integral.solve(problem, light, scan.wavelengths, **options)
             for n, wavelength in enumerate(scan.wavelengths):
                 orders, _ = order_sines(scan.grating.period, wavelength, scan.theta)
-                columns = np.searchsorted(found.orders, orders)
-                result.orders[polarisation].append(found.efficiency[n, columns])
-                absorbed = 0.0 if found.absorption is None else found.absorption[n]
-                result.balance[polarisation][n] = found.efficiency[n].sum() + absorbed - 1.0
+                columns = np.searchsorted(efficiencies.orders, orders)
+                result.orders[polarisation].append(efficiencies.efficiency[n, columns])
+                absorbed = 0.0 if efficiencies.absorption is None else efficiencies.absorption[n]
+                result.balance[polarisation][n] = efficiencies.efficiency[n].sum() + absorbed - 1.0
     return result
 
 

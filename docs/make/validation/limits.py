@@ -28,23 +28,23 @@ def rms_slope(grating: Grating) -> float:
 
 def worst_deviations(comparisons: Sequence[Comparison]) -> list[tuple[Grating, float, float]]:
     """Each material's sinusoids with slope and largest deviation of colours, gentlest first."""
-    found = []
+    deviations = []
     for comparison in comparisons:
         sinusoids = gratings_of(comparison, "sinusoidal")
         angles = [theta for theta in angles_of(comparison) if 0 <= theta <= STEEPEST_LIGHT]
         table = table_of(
             comparison, sinusoids, angles, lambda part: part.deviation(colours=True)
         ).max(axis=1)
-        found += [
+        deviations += [
             (grating, rms_slope(grating), float(worst))
             for grating, worst in zip(sinusoids, table, strict=True)
         ]
-    return sorted(found, key=lambda item: item[1])
+    return sorted(deviations, key=lambda item: item[1])
 
 
 def slope_limit(comparisons: Sequence[Comparison], error: float) -> float:
     """Largest RMS slope up to which no sinusoid deviates by more than `error`; 0 if all do."""
     worst = worst_deviations(comparisons)
     # slopes of one depth/period are equal to rounding
-    first = min((slope for _, slope, found in worst if found > error), default=float("inf"))
+    first = min((slope for _, slope, deviation in worst if deviation > error), default=float("inf"))
     return max((slope for _, slope, _ in worst if slope < first - 1e-6), default=0.0)

@@ -94,12 +94,12 @@ def solve_patches(
         If the solver is not here, or the file cannot be written.
     """
     tell = progress or silent
-    cases, made = patch_cases(material), about(material, solver)
+    cases, description = patch_cases(material), about(material, solver)
     rows = np.empty(0, PATCH_ROW)
     for n, case in enumerate(cases):
         tell(n, len(cases), f"solving {case.surface.name}")
         rows = np.concatenate([rows, solve_case(case, solver)])
-        save_rows(rows, made, path)
+        save_rows(rows, description, path)
     tell(len(cases), len(cases), "done")
     return rows
 
@@ -142,8 +142,8 @@ def solved(material: str, solver: str = "rayleigh") -> tuple[list[Solved], Mappi
     """Stored solutions, case by case, and the description of their solver."""
     data = resources.files(__package__) / "data"
     with resources.as_file(data / patch_file(material, solver)) as path:
-        rows, made = load_rows(path, PATCH_ROW)
-    return list(_cases_of(rows, material)), made
+        rows, description = load_rows(path, PATCH_ROW)
+    return list(_cases_of(rows, material)), description
 
 
 def patch_file(material: str, solver: str) -> str:

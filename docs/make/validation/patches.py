@@ -239,12 +239,12 @@ def _source(surface: Surface) -> HeightField:
 def _smoothed(heights: NDArray[np.float64], side: float) -> NDArray[np.float64]:
     """Low frequencies at `PIXELS` samples a side, weighed by the Gaussian `_SMOOTHING`."""
     count = len(heights)
-    kept = min(count, PIXELS) // 2 - 1  # harmonics either way, without Nyquist's
-    few = np.arange(-kept, kept + 1)
+    harmonics = min(count, PIXELS) // 2 - 1  # harmonics either way, without Nyquist's
+    few = np.arange(-harmonics, harmonics + 1)
     weight = np.exp(-0.5 * (2 * np.pi * few / side * _SMOOTHING) ** 2)
     spectrum = np.zeros((PIXELS, PIXELS), complex)
-    found = np.fft.fft2(heights)[np.ix_(few, few)] * np.outer(weight, weight)
-    spectrum[np.ix_(few, few)] = found * (PIXELS / count) ** 2
+    low = np.fft.fft2(heights)[np.ix_(few, few)] * np.outer(weight, weight)
+    spectrum[np.ix_(few, few)] = low * (PIXELS / count) ** 2
     return np.fft.ifft2(spectrum).real
 
 

@@ -66,9 +66,11 @@ def solve(
     tests = axes(down, index)
     reflected = waves.coupling(tests, down, axes(waves.above, 1.0), waves.above)
     incident = waves.coupling(tests, down, axes(into, 1.0), into)
-    found = _solved(reflected, -incident)
+    amplitudes = _solved(reflected, -incident)
     out, mean = waves.above, waves.k * float(field.heights.mean())
-    return _orders(waves, wi, found, mean, out, np.where(out[:, 2].imag == 0, out[:, 2].real, 0.0))
+    return _orders(
+        waves, wi, amplitudes, mean, out, np.where(out[:, 2].imag == 0, out[:, 2].real, 0.0)
+    )
 
 
 def through(
@@ -94,9 +96,9 @@ def through(
         for column, e in enumerate(axes(waves.incident, 1.0)[:, 0]):
             flux = np.cross(e, np.cross(up[zeroth], test)) - np.cross(test, np.cross(into, e))
             right[row * len(up) + zeroth, column] = flux[2]
-    found = _solved(matrix, right)
+    amplitudes = _solved(matrix, right)
     mean = waves.k * float(field.heights.mean())
-    return _orders(waves, wi, found, mean, down / index, waves.below[:, 2].real)
+    return _orders(waves, wi, amplitudes, mean, down / index, waves.below[:, 2].real)
 
 
 def transmitted(
@@ -158,21 +160,21 @@ def _fluxes(tests: Complex, to: Complex, fields: Complex, waves: Complex) -> Com
     tests, fields : (2, ..., 3) their s and p fields; to, waves : (..., 3); all of them broadcast.
     """
     total = waves + to
-    found = [
+    fluxes = [
         np.sum(
             total * (np.cross(e, np.cross(to, e_test)) - np.cross(e_test, np.cross(waves, e))), -1
         )
         for e_test in tests
         for e in fields
     ]
-    return np.stack(found, axis=-1).reshape(*found[0].shape, 2, 2)
+    return np.stack(fluxes, axis=-1).reshape(*fluxes[0].shape, 2, 2)
 
 
 def _solved(matrix: Complex, right: Complex) -> Complex:
     """The solution, rows scaled first: those of evanescent waves are far smaller."""
     scale = 1.0 / np.abs(matrix).max(axis=1, keepdims=True)
-    found = np.linalg.solve(matrix * scale, right * scale)
-    return np.asarray(found)
+    scaled = np.linalg.solve(matrix * scale, right * scale)
+    return np.asarray(scaled)
 
 
 class _Spectra:
@@ -194,7 +196,7 @@ class _Spectra:
         place = difference[..., 1] % ny, difference[..., 0] % nx
         inside = (np.abs(difference[..., 0]) < nx / 2) & (np.abs(difference[..., 1]) < ny / 2)
         same = (difference == 0).all(axis=2)
-        found = np.where(same, 1.0 / np.where(same, gamma, 1.0), 0.0)
+        terms = np.where(same, 1.0 / np.where(same, gamma, 1.0), 0.0)
         power, factor = np.ones_like(self._heights), np.ones_like(gamma)
         n, bound = 0, 1.0
         while n <= reach or bound > _PRECISION:
@@ -203,25 +205,25 @@ class _Spectra:
             # exp(+iQ·r): the inverse transform
             spectrum = np.fft.ifft2(power)
             factor = factor * (1j / n) if n == 1 else factor * (1j * gamma / n)
-            found = found + factor * np.where(inside, spectrum[place], 0.0)
+            terms = terms + factor * np.where(inside, spectrum[place], 0.0)
             bound *= reach / n
-        return found
+        return terms
 
 
 def _orders(
-    waves: Waves, wi: Real, found: Complex, mean: float, out: Complex, travels: Real
+    waves: Waves, wi: Real, amplitudes: Complex, mean: float, out: Complex, travels: Real
 ) -> Orders:
     """Return the propagating orders of the amplitudes (2n, 2), by `boundary.polarisation_axes`.
 
     mean : of the heights, which the amplitudes' phases are from; out : (n, 3) unit vectors;
     travels : (n,) their cosines, 0 of those that fade.
     """
-    kept = travels > HORIZON
-    wo = out[kept].real
-    both = np.moveaxis(found.reshape(2, len(out), 2), 1, 0)[kept]
-    s_solved = axes(out[kept], 1.0)[0].real
+    propagating = travels > HORIZON
+    wo = out[propagating].real
+    pairs = np.moveaxis(amplitudes.reshape(2, len(out), 2), 1, 0)[propagating]
+    s_solved = axes(out[propagating], 1.0)[0].real
     basis = axes(waves.incident, 1.0)[0].real[0]
     s_in, s_out = boundary.polarisation_axes(wi, wo)
-    turned = boundary.turn(s_out, s_solved, wo) @ both @ boundary.turn(basis, s_in, -wi)
-    phase = np.exp(-1j * mean * (wi[2] + travels[kept] * np.sign(wo[:, 2])))
-    return Orders(waves.orders[kept], wo, phase[:, None, None] * turned)
+    turned = boundary.turn(s_out, s_solved, wo) @ pairs @ boundary.turn(basis, s_in, -wi)
+    phase = np.exp(-1j * mean * (wi[2] + travels[propagating] * np.sign(wo[:, 2])))
+    return Orders(waves.orders[propagating], wo, phase[:, None, None] * turned)

@@ -64,7 +64,7 @@ def amplitudes(
     heights = (field.heights - field.heights.mean()) * waves.k
     into, out = waves.orders, orders[:, None] - waves.orders
     before, after = at(heights, into), at(heights, out)
-    found = {name: np.empty_like(first) for name in MODELS}
+    by_model = {name: np.empty_like(first) for name in MODELS}
     for n, kappa in enumerate(wi[2] + wo[:, 2]):
         screen = 2 * wi[2] / kappa * np.exp(-1j * kappa * heights)
         amplitude, moment = (at(part, orders[n]) for part in (screen, heights * screen))
@@ -72,10 +72,10 @@ def amplitudes(
         pairs = after[n] * at(screen, into) + before * at(screen, out[n])
         mean, whole = (np.tensordot(part, second[n], axes=1) for part in (variances, pairs))
         mean += 2 * kappa * np.mean(heights**2) * first[n]
-        found["first"][n] = amplitude * first[n]
-        found["mean"][n] = amplitude * (first[n] + 0.25 * kappa * mean)
-        found["second"][n] = (amplitude + 0.5j * kappa * moment) * first[n] + 0.25j * whole
-    return found
+        by_model["first"][n] = amplitude * first[n]
+        by_model["mean"][n] = amplitude * (first[n] + 0.25 * kappa * mean)
+        by_model["second"][n] = (amplitude + 0.5j * kappa * moment) * first[n] + 0.25j * whole
+    return by_model
 
 
 def coefficients(
@@ -107,14 +107,14 @@ class Case:
 
 def cases_of_cells(material: str, kinds: Sequence[str] = KINDS) -> Iterator[Case]:
     """Compare the stored solutions of cells of these kinds."""
-    for one in solved(material)[0]:
-        surface = one.case.surface
+    for solution in solved(material)[0]:
+        surface = solution.case.surface
         if surface.kind in kinds:
-            field, index = cell(surface), patch_index(material, one.case.wavelength)
-            orders = np.stack([one.rows["mx"], one.rows["my"]], axis=1).astype(np.int64)
-            light = field, index, one.case.wavelength, one.wi, one.wo(field), orders
+            field, index = cell(surface), patch_index(material, solution.case.wavelength)
+            orders = np.stack([solution.rows["mx"], solution.rows["my"]], axis=1).astype(np.int64)
+            light = field, index, solution.case.wavelength, solution.wi, solution.wo(field), orders
             group = f"{material}, {GROUPS[surface.kind]}, slope {surface.slope:.2g}"
-            yield _case(group, light, one.efficiency(field))
+            yield _case(group, light, solution.efficiency(field))
 
 
 def cases_of_gratings(material: str) -> Iterator[Case]:
@@ -137,8 +137,8 @@ def _case(
 ) -> Case:
     wi, wo, orders = light[3:]
     powers = {
-        name: 0.5 * np.sum(np.abs(found) ** 2, axis=(1, 2)) * wo[:, 2] / wi[2]
-        for name, found in amplitudes(*light).items()
+        name: 0.5 * np.sum(np.abs(amplitude) ** 2, axis=(1, 2)) * wo[:, 2] / wi[2]
+        for name, amplitude in amplitudes(*light).items()
     }
     return scored(group, powers, truth, wo, orders)
 

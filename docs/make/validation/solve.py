@@ -69,8 +69,8 @@ def solve_material(
     # Children start anew: what they inherit of BLAS's threads could not be changed
     with _one_thread_each(), multiprocessing.get_context("spawn").Pool(processes) as pool:
         results = pool.imap(functools.partial(solve_scan, solver=solver), wanted)
-        for n, found in enumerate(results):
-            rows.append(found)
+        for n, result in enumerate(results):
+            rows.append(result)
             if progress:
                 progress(n + 1, len(wanted), f"solving {material}")
     about = {
@@ -93,17 +93,17 @@ def solve_scan(
     """
     method = SOLVERS[solver]
     levels = list(resolutions or method.resolutions(scan))
-    found = _solve_twice(scan, method, levels[0], levels[1])
+    rows_of_scan = _solve_twice(scan, method, levels[0], levels[1])
     for coarse, fine in itertools.pairwise(levels[1:]):
-        open_ones = np.unique(found.rows["wavelength"][~found.converged])
+        open_ones = np.unique(rows_of_scan.rows["wavelength"][~rows_of_scan.converged])
         if not len(open_ones):
             break
         part = replace(scan, wavelengths=tuple(float(w) for w in open_ones))
         better = _solve_twice(part, method, coarse, fine)
-        rows = found.rows.copy()
+        rows = rows_of_scan.rows.copy()
         rows[np.isin(rows["wavelength"], open_ones)] = better.rows
-        found = Solutions(rows, {})
-    return found.rows
+        rows_of_scan = Solutions(rows, {})
+    return rows_of_scan.rows
 
 
 def _solve_twice(scan: Scan, method: ModuleType, first: Any, final: Any) -> Solutions:

@@ -2,7 +2,8 @@
 
 Contents
 --------
-sides     value, density and samples of light on both sides
-crossing  pairs of directions that are not both above the surface, and their Jones matrices
-energy    scales of directions by which reflected and transmitted light add up to 1
+bsdf        `DiffractionDielectric`, the plugin; its docstring describes its parameters
+parameters  read from Mitsuba's Properties, checked
+crossing    pairs of directions that are not both above the surface, and their Jones matrices
+energy      scales of directions by which reflected and transmitted light add up to 1
 """

@@ -113,9 +113,9 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
         If the BSDF does not diffract or has features that the shaders lack, a method is unknown, or
         a method does not support the table.
     """
-    from ...plugin.bsdf import Diffraction  # which only a variant has
+    from ...plugin.surface import DiffractingSurface  # which only a variant has
 
-    if not isinstance(bsdf, Diffraction):
+    if not isinstance(bsdf, DiffractingSurface):
         raise DiffractionError(
             f"bsdf={type(bsdf).__name__} does not diffract: give one of type 'diffraction', for "
             "instance mi.load_dict(md.bsdf_dict(...))"

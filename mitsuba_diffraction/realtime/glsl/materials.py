@@ -13,6 +13,7 @@ from ...errors import DiffractionError
 from ...optics.colour import RGB_WAVELENGTHS
 from ...optics.geometry import wavenumber
 from ...plugin.parameter_changes import children
+from ...tables.energy.grid import FINE
 from ...tables.table import DiffractionTable
 from .maps import Map, Spectrum, axis_map, colour_map, evaluated, raw_picture
 from .packing import (
@@ -222,13 +223,10 @@ def conservation_at(bsdf: Any, scales: Sequence[float]) -> Packed:
     """Pack energy conservation and the base's light of a BSDF at height scales."""
     ratios = [bsdf.reflected_ratio(scale) for scale in scales]
     beneath = pack_beneath([ratio for ratio in ratios if ratio is not None])
-    energy_scales = [bsdf.energy_scale(scale) for scale in scales]
-    existing = [energy for energy in energy_scales if energy is not None]
-    if not existing:
+    energy = [bsdf.energy_scale(scale) for scale in scales]
+    if all(scale is None for scale in energy):
         return beneath
-    ones = np.ones_like(existing[0][0])
-    values = [ones if energy is None else energy[0] for energy in energy_scales]
-    return beneath | pack_energy(values, existing[0][1])
+    return beneath | pack_energy([FINE.ones if scale is None else scale for scale in energy])
 
 
 def pack_surface(material: Material) -> Packed:

@@ -17,11 +17,9 @@ from ...optics.second_order import LIMIT, NODES, coefficient_table
 from ...optics.slope_ratios import SlopeRatios
 from ...tables.colour.build import VISIBLE
 from ...tables.colour.table import ColourTable
-from ...tables.energy.conservation import FINE, DirectionalTable
-from ...tables.energy.gain import GRAZING
-from ...tables.energy.grid import SHARE
-from ...tables.energy.powers import order_0_power, power_series
+from ...tables.energy.grid import FINE, SHARE, DirectionalTable
 from ...tables.layout import Record, cells_of, functions_at
+from ...tables.powers import order_0_power, power_series
 from ...tables.table import DiffractionTable
 from .texels import Packed, Texture, as_half, listed, paired, texels
 
@@ -129,26 +127,20 @@ def area_factor(sigma: float) -> float:
     return 4.0 * math.pi * sigma**2
 
 
-def pack_energy(scales: Sequence[NDArray[np.float32]], fades: bool) -> Packed:
+def pack_energy(scales: Sequence[NDArray[np.float32]]) -> Packed:
     """Pack the scales that conserve energy, one page per height scale; empty without scales.
 
     scales : s on a grid of directions, (polar + 1, azimuthal) each (`Diffraction.energy_scale`).
-    fades : whether Kirchhoff's model is attenuated towards grazing directions, too.
     """
     if not scales:
         return Packed()
     values = np.stack(list(scales))
-    definitions = {
-        "ENERGY_CONSERVING": "",
-        # 1e-6 is below every cosine: no attenuation
-        "ENERGY_GRAZING": repr(GRAZING if fades else 1e-6),
-    }
     right = np.roll(values, -1, axis=2)
     corners = [values[:, :-1], right[:, :-1], values[:, 1:], right[:, 1:]]
     return Packed(
         (listed("energy", np.stack(corners, axis=-1).reshape(-1, 4)),),
         {"energy_page": 0.0},
-        definitions | _grid(len(values)),
+        {"ENERGY_CONSERVING": ""} | _grid(len(values)),
     )
 
 

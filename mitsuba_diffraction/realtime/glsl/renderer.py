@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import warn
-from ...tables.energy.conservation import FINE
+from ...tables.energy.grid import FINE
 from .camera import Camera
 from .context import (
     Bindings,
@@ -283,7 +283,7 @@ class Renderer:
         for surface, own in zip(self.scene.surfaces, self.bindings, strict=True):
             if {"energy", "beneath"}.isdisjoint(own.textures):
                 continue
-            ones = pack_energy([np.ones((FINE.polar + 1, FINE.azimuthal), np.float32)], False)
+            ones = pack_energy([FINE.ones])
             packed = ones | conservation_at(surface.material.bsdf, [scale])
             for texture in packed.textures:
                 if texture.name in own.textures:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...optics.geometry import wavenumber
 from ...progress import Progress
 from ...tables.colour.table import colour_difference, power_colour_difference
-from ...tables.energy.powers import power_series
+from ...tables.powers import power_series
 from ...tables.store import cached_colours
 from ...tables.table import DiffractionTable
 from ..glsl.packing import pack_colours, pack_powers

@@ -32,10 +32,10 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Complexes = NDArray[np.complex128]
 
-#: What a field may follow.
+#: Guides that a field may follow.
 GUIDES = ("smooth", "x", "y", "z", "body")
 _ITERATIONS = 60
-_SHIFT = 1e-6  # of the eigenvalues' scale: the Laplacian of a flat sheet is singular
+_SHIFT = 1e-6  # share of the eigenvalues' scale: the Laplacian of a flat sheet is singular
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class Surface:
             rotation = self.transport(j, i)
             turn += np.angle(field[j] * np.conj(rotation * field[i]))
             holonomy *= rotation
-        # what is carried once around comes back turned by the curvature within
+        # a direction carried once around comes back turned by the curvature within
         return np.round((turn + np.angle(holonomy)) / (2 * np.pi)).astype(np.int64)
 
     def gradient(self, values: Floats) -> Floats:

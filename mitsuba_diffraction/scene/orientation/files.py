@@ -8,6 +8,7 @@ import re
 import struct
 import tempfile
 from pathlib import Path
+from typing import NamedTuple
 
 import mitsuba as mi
 import numpy as np
@@ -22,7 +23,7 @@ from .trimesh import TriangleMesh
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# what Mitsuba throws, text that is not UTF-8, and sizes beyond the memory
+# Mitsuba's exceptions, text that is not UTF-8, and sizes beyond the memory
 _UNREAD = (RuntimeError, ValueError, MemoryError)
 
 KINDS = {".ply": "ply", ".obj": "obj", ".serialized": "serialized"}
@@ -34,8 +35,24 @@ _CODES = {
 }  # fmt: skip
 
 
-def load_mesh(path: str | os.PathLike[str]) -> tuple[Floats, Floats | None, Floats | None, Ints]:
-    """Positions (n, 3), normals (n, 3) or None, texture coordinates (n, 2) or None, faces (m, 3).
+class MeshArrays(NamedTuple):
+    """Arrays of a triangle mesh.
+
+    Attributes
+    ----------
+    positions, normals : (n, 3); normals may be absent.
+    uv : (n, 2) texture coordinates, or None.
+    faces : (m, 3) indices of vertices.
+    """
+
+    positions: Floats
+    normals: Floats | None
+    uv: Floats | None
+    faces: Ints
+
+
+def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
+    """Read a mesh file.
 
     Reads what Mitsuba reads, .ply, .obj, .serialized, and PLY files of polygons.
 
@@ -68,11 +85,11 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[Floats, Floats | None, Floa
 
     normals = array("vertex_normals", 3) if mesh.has_vertex_normals() else None
     uv = array("vertex_texcoords", 2) if mesh.has_vertex_texcoords() else None
-    return array("vertex_positions", 3), normals, uv, faces
+    return MeshArrays(array("vertex_positions", 3), normals, uv, faces)
 
 
 def _vertices_and_faces(file: Path, kind: str) -> tuple[int, Ints]:
-    """How many vertices, and the faces (m, 3), of a mesh that is not kept.
+    """Return the number of vertices and the faces (m, 3) of a mesh that is not kept.
 
     Whoever keeps an error keeps what its traceback has seen, and Dr.Jit compiles kernels for all
     meshes alive: one without faces would break every later rendering of the process.
@@ -84,7 +101,7 @@ def _vertices_and_faces(file: Path, kind: str) -> tuple[int, Ints]:
 
 
 def has_own_normals(path: str | os.PathLike[str]) -> bool:
-    """Whether the file of a mesh itself holds vertex normals; else Mitsuba makes smooth ones."""
+    """Whether the file of a mesh holds vertex normals; otherwise Mitsuba makes smooth ones."""
     file = Path(path)
     content = read_bytes(file)
     if file.suffix.lower() == ".ply":
@@ -113,7 +130,7 @@ def _read(file: Path, kind: str, face_normals: bool) -> mi.Mesh:
 
 
 def load_orientation(path: str | os.PathLike[str]) -> Floats | None:
-    """The attribute vertex_orientation of a mesh that `load_mesh` reads, (n, 2), or None."""
+    """Read the attribute vertex_orientation of a mesh file, (n, 2); None without one."""
     file = readable_file(path)
     mesh = _load(file, KINDS[file.suffix.lower()], face_normals=False)
     if not mesh.has_attribute(ORIENTATION):
@@ -136,14 +153,14 @@ def write_ply(
         If the file cannot be written.
     """
     _need_variant()
-    made = mi.Mesh(
+    written = mi.Mesh(
         "mesh", len(mesh.positions), len(mesh.faces),
         has_vertex_normals=True, has_vertex_texcoords=with_uv,
     )  # fmt: skip
     if mesh.orientation is not None:
         turn = np.pad(mesh.orientation, [(0, 0), (0, 1)])
-        made.add_attribute(ORIENTATION, 3, turn.ravel())
-    values = mi.traverse(made)
+        written.add_attribute(ORIENTATION, 3, turn.ravel())
+    values = mi.traverse(written)
     values["vertex_positions"] = mesh.positions.ravel()
     values["vertex_normals"] = mesh.normals.ravel()
     if with_uv:
@@ -152,8 +169,8 @@ def write_ply(
     values.update()
     with atomic_path(path) as temporary:
         try:
-            made.write_ply(str(temporary))
-        except RuntimeError as error:  # what Mitsuba makes of a full disk
+            written.write_ply(str(temporary))
+        except RuntimeError as error:  # Mitsuba's exception for a full disk
             raise DiffractionError(f"cannot write '{path}': {one_line(str(error))}") from error
         # Mitsuba writes no comments: they follow the line that names the format
         lines = Path(temporary).read_bytes().split(b"\n", 2)
@@ -167,13 +184,13 @@ def _need_variant() -> None:
 
 
 def triangulated_ply(data: bytes) -> bytes | None:
-    """A PLY file whose polygons are cut into fans of triangles, as Mitsuba cuts those of OBJ.
+    """Cut the polygons of a PLY file into fans of triangles, as Mitsuba cuts those of OBJ.
 
     Faces must come after vertices; the result has nothing else. None where the file is no such PLY.
     """
     try:
         return _triangulated(data)
-    # what a damaged header or body makes of its numbers and names
+    # numbers and names of a damaged header or body
     except (struct.error, ValueError, LookupError, OverflowError, MemoryError):
         return None
 
@@ -207,7 +224,7 @@ def _triangulated(data: bytes) -> bytes | None:
 def _read_ascii(
     body: bytes, vertex: list[str], face: list[str], _: str
 ) -> tuple[bytes, list[list[int]]]:
-    """The vertices' part of the file, and the corners of each face."""
+    """Return the vertices' part of the file, and the corners of each face."""
     count, faces = (int(e[0].split()[2]) for e in (vertex, face))
     lines = body.splitlines(keepends=True)
     if not face[1].startswith("property list"):
@@ -224,7 +241,7 @@ def _read_ascii(
 def _read_binary(
     body: bytes, vertex: list[str], face: list[str], order: str
 ) -> tuple[bytes, list[list[int]]]:
-    """The vertices' part of the file, and the corners of each face."""
+    """Return the vertices' part of the file, and the corners of each face."""
     count, faces = (int(e[0].split()[2]) for e in (vertex, face))
     # lists at vertices are none of these codes: KeyError
     row = order + "".join(_CODES[line.split()[1]] for line in vertex[1:])

@@ -1,4 +1,4 @@
-"""Does a mesh have the tangents that a measured patch needs?
+"""Tangents of a mesh, judged by whether a measured patch can follow them.
 
 A patch is laid along dp/du, which Mitsuba takes from the texture coordinates of each triangle, and
 turned from there by the mesh attribute vertex_orientation, where the mesh has it. So a mesh needs
@@ -33,11 +33,11 @@ BREAK = 60.0
 # longer than this many of its own edges, or than this share of the mesh, is a line.
 _EDGES, _SHARE = 4.0, 0.2
 
-MOST_TURNING = 0.05  # of the surface, on which the direction may turn too fast
-LONG = 0.05  # of the mesh's size: breaks that are longer in all are seen
+MOST_TURNING = 0.05  # share of the surface on which the direction may turn too fast
+LONG = 0.05  # share of the mesh's size: longer breaks, all together, are visible
 TURN = 30.0  # degrees between neighbours from which on a seam shows
 
-FLAT = 1e-3  # of the typical ratio of texture area to surface area: as good as none
+FLAT = 1e-3  # share of the typical ratio of texture area to surface area: taken for none
 
 
 def _turning(orientation: Floats) -> Bools:
@@ -106,7 +106,7 @@ def _shares(corners: Floats, crossed: Bools, middles: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class TangentReport:
-    """What `check_tangents` found; shares are of the surface area, 0 to 1."""
+    """Findings of `check_tangents`; shares are of the surface area, 0 to 1."""
 
     triangles: int  # number of triangles with an area
     # has_uv, has_normals, has_orientation: whether the mesh carries them
@@ -120,7 +120,7 @@ class TangentReport:
     stretch: float  # median ratio of |dp/du| to |dp/dv| (1: no direction is stretched)
     # length of the lines along which the direction breaks, in the unit of the positions
     broken: float
-    size: float  # of the mesh, its longest side along an axis
+    size: float  # longest side of the mesh along an axis
     has_orientation: bool = False
 
     @property
@@ -146,7 +146,7 @@ class TangentReport:
         )
 
     def problems(self) -> list[str]:
-        """One line for each thing that speaks against this mesh, with what to do."""
+        """Reasons against this mesh, a line each, with what to do."""
         if not self.has_uv:
             return [
                 "no texture coordinates, so the patch has no direction: give the mesh one with "
@@ -273,7 +273,7 @@ def check_tangents(
 
 
 def carried(vectors: Floats, before: Floats, after: Floats) -> Floats:
-    """Vectors (n, 3) turned by the smallest rotation of one unit normal to another (Rodrigues)."""
+    """Turn vectors (n, 3) by the smallest rotation of one unit normal to another (Rodrigues)."""
     axis = np.cross(before, after)
     cosine = (before * after).sum(axis=1, keepdims=True)
     along = (axis * vectors).sum(axis=1, keepdims=True) / np.maximum(1 + cosine, 1e-3)
@@ -283,7 +283,7 @@ def carried(vectors: Floats, before: Floats, after: Floats) -> Floats:
 def _jumps(
     welded: Ints, normals: Floats, tangent: Floats, turn: Floats, good: NDArray[np.bool_]
 ) -> tuple[NDArray[np.bool_], Ints]:
-    """Across which edges the direction jumps, the fold of the surface apart.
+    """Find edges across which the direction jumps, apart from the fold of the surface.
 
     Parameters
     ----------
@@ -325,7 +325,7 @@ def _jumps(
 
 
 def _laid(tangent: Floats, normal: Floats, turn: Floats) -> Floats:
-    """Unit tangents (n, 3) turned by (cosine, sine) (n, 2) counter-clockwise around normals."""
+    """Turn unit tangents (n, 3) by (cosine, sine) (n, 2), counter-clockwise around normals."""
     unit = _unit(turn)
     return unit[:, :1] * tangent + unit[:, 1:] * np.cross(normal, tangent)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,7 +69,7 @@ def vertex_normals(positions: Floats, faces: Ints) -> Floats:
 
 
 def join(meshes: list[TriangleMesh]) -> TriangleMesh:
-    """One mesh out of several, without welding; an orientation is kept where all have one."""
+    """Join meshes into one, without welding; an orientation is kept where all have one."""
     starts = np.cumsum([0] + [len(mesh.positions) for mesh in meshes])
     turns = [mesh.orientation for mesh in meshes if mesh.orientation is not None]
     return TriangleMesh(
@@ -80,8 +81,22 @@ def join(meshes: list[TriangleMesh]) -> TriangleMesh:
     )
 
 
-def texture_tangents(sides: Floats, uv_sides: Floats) -> tuple[Floats, Floats, Floats]:
-    """dp/du and dp/dv of triangles, (m, 3) each, and the signed areas of their (u, v), (m,).
+class TextureTangents(NamedTuple):
+    """Tangents of triangles by their texture coordinates.
+
+    Attributes
+    ----------
+    dp_du, dp_dv : (m, 3).
+    area : (m,) signed areas in (u, v).
+    """
+
+    dp_du: Floats
+    dp_dv: Floats
+    area: Floats
+
+
+def texture_tangents(sides: Floats, uv_sides: Floats) -> TextureTangents:
+    """Return the tangents of triangles from two sides of each, in space and in (u, v).
 
     Solves sides = uv_sides · (dp/du, dp/dv); where (u, v) span no area the result is zero.
     """
@@ -90,7 +105,7 @@ def texture_tangents(sides: Floats, uv_sides: Floats) -> tuple[Floats, Floats, F
     safe = np.where(determinant == 0, np.inf, determinant)[:, None]
     dp_du = (dv1[:, None] * sides[:, 0] - dv0[:, None] * sides[:, 1]) / safe
     dp_dv = (du0[:, None] * sides[:, 1] - du1[:, None] * sides[:, 0]) / safe
-    return dp_du, dp_dv, determinant / 2
+    return TextureTangents(dp_du, dp_dv, determinant / 2)
 
 
 def oriented_mesh(

@@ -1,4 +1,4 @@
-"""What a scene asks of its diffraction tables: paths through it, and the tables that suffice.
+"""Smaller tables for one scene: paths through it, look-ups on them, and limits that suffice.
 
 Contents
 --------

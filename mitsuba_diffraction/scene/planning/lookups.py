@@ -94,7 +94,7 @@ def quantiles(
 
 
 def lobes_in_a_pixel(turn: float, sigma: float) -> float:
-    """How many lobes of the window one pixel sees at once, at 550 nm, because the surface bends.
+    """Return how many lobes of the window a pixel sees at once, at 550 nm, on a bent surface.
 
     Where ωi turns by δ in the surface's frame, so does ωo: (u, v) moves by up to 2δ, and a lobe is
     1/(kσ) wide.
@@ -105,15 +105,15 @@ def lobes_in_a_pixel(turn: float, sigma: float) -> float:
     return float((2.0 * turn * float(wavenumber(550.0)) * sigma) ** 2)
 
 
-def wavelengths_needed(asked: Lookups, share: float = 1e-3) -> dict[str, Any]:
+def wavelengths_needed(lookups: Lookups, share: float = 1e-3) -> dict[str, Any]:
     """The band that all but a share of the diffracted light lies in, half of it on either side.
 
     Returns range_nm, and lost_colour: ΔE2000 between the mean colours of all light and of the band
     alone.
     """
-    low, high = quantiles(asked.wavelength, asked.light, [0.5 * share, 1.0 - 0.5 * share])
-    inside = (asked.wavelength >= low) & (asked.wavelength <= high)
-    colours = [linear_srgb(asked.xyz[mine].sum(axis=0)) for mine in (slice(None), inside)]
+    low, high = quantiles(lookups.wavelength, lookups.light, [0.5 * share, 1.0 - 0.5 * share])
+    inside = (lookups.wavelength >= low) & (lookups.wavelength <= high)
+    colours = [linear_srgb(lookups.xyz[part].sum(axis=0)) for part in (slice(None), inside)]
     largest = max(float(np.abs(colours[0]).max()), 1e-30)
     lost = delta_e(colours[0][None] / largest, colours[1][None] / largest, exposure=1.0)
     return {"range_nm": [low, high], "lost_colour": float(lost[0])}

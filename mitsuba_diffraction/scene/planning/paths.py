@@ -29,7 +29,7 @@ MOST_BOUNCES = 12
 BRIGHTEST = 99.0
 
 
-#: One look-up: of which BSDF among the session's, u, v, w = ωi + ωo in the patch's frame with w
+#: A look-up: index of the BSDF among the session's, u, v, w = ωi + ωo in the patch's frame with w
 #: times height_scale, wavelength in nm, and the X, Y and Z that it adds to the picture, the light
 #: of all paths being 1.
 LOOKUP = np.dtype(
@@ -40,7 +40,7 @@ LOOKUP = np.dtype(
 
 @dataclass(frozen=True)
 class TracedPaths:
-    """What diffracting surfaces are asked, weighted with the light of the picture."""
+    """Look-ups of diffracting surfaces, weighted with the light of the picture."""
 
     lookups: NDArray[np.void]  # (n,) of type `LOOKUP`
     # (bsdfs,) light of all paths that meet each BSDF, nested BSDFs' included; the light of all
@@ -112,7 +112,7 @@ def trace(scene: Any, sensor: Any, session: Session, paths: int, seed: int = 0) 
 
 @dataclass(frozen=True)
 class _Vertex:
-    """One bounce: light straight from emitters, and what was asked for it and for the next ray."""
+    """A bounce: light straight from emitters, and the look-ups for it and for the next ray."""
 
     direct: NDArray[np.float64]  # (paths, wavelengths), as it reaches the camera
     lit: list[Any]
@@ -157,8 +157,8 @@ def _follow(
         there = mi.DirectionSample3f(scene, si, before)
         by_emitter = scene.pdf_emitter_direction(before, there, active & ~delta)
         share = dr.select(delta, 1.0, _heuristic(density, by_emitter))
-        found = throughput * emitter.eval(si, active) * share
-        emitted.append(_lanes(dr.select(active, found, 0.0), paths))
+        radiance = throughput * emitter.eval(si, active) * share
+        emitted.append(_lanes(dr.select(active, radiance, 0.0), paths))
         active &= si.is_valid()
         if number == 0:
             turns = np.stack([_lane(si.wi.x, paths), _lane(si.wi.y, paths)], axis=1)
@@ -228,13 +228,13 @@ def _lanes(spectrum: Any, count: int) -> NDArray[np.float64]:
 
 def _bounces(integrator: Any) -> int:
     """Rays of a path: what the integrator's description says, at most MOST_BOUNCES."""
-    found = re.search(r"max_depth = (-?\d+)", str(integrator))
-    depth = int(found[1]) if found else -1
+    match = re.search(r"max_depth = (-?\d+)", str(integrator))
+    depth = int(match[1]) if match else -1
     return MOST_BOUNCES if depth < 0 else min(max(depth, 1), MOST_BOUNCES)
 
 
 def _response(sensor: Any, wavelengths: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What light of each wavelength adds to X, Y and Z; all alike to a film of spectral bands."""
+    """Shares of each wavelength in X, Y and Z; all equal for a film of spectral bands."""
     if "SpecFilm" in str(sensor.film()):
         return np.full((*wavelengths.shape, 3), 1.0 / 3.0)
     return response(wavelengths, "E")
@@ -249,7 +249,7 @@ def _turns(incident: NDArray[np.float64], first: _Vertex, count: int) -> NDArray
     turned = np.hypot(*(incident[0::2] - incident[1::2]).T)
     return np.array(
         [
-            float(np.median(turned[mine])) if (mine := same & (owner[0::2] == n)).any() else np.nan
+            float(np.median(turned[pair])) if (pair := same & (owner[0::2] == n)).any() else np.nan
             for n in range(count)
         ]
     )

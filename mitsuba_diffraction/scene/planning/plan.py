@@ -11,8 +11,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import mitsuba as mi
-
 from ...errors import DiffractionError
 from ...heights.recipes import Recipe
 from ...optics.second_order_change import applies
@@ -99,14 +97,6 @@ def _check(session: Session) -> None:
         raise DiffractionError(
             "the scene has no BSDF 'diffraction'; there is nothing to plan, render it as it is"
         )
-    passed = {
-        name for name, bsdf in session.bsdfs if mi.has_flag(bsdf.flags(), mi.BSDFFlags.Transmission)
-    }
-    if passed:
-        raise DiffractionError(
-            f"light goes through {', '.join(sorted(passed))}, which plans do not record; render "
-            "the scene without a plan"
-        )
     if not session.tables:
         raise DiffractionError(
             f"the tables of {_names(session)} come from files and stay as they are; give the scene "
@@ -121,13 +111,11 @@ def _names(session: Session) -> str:
 def _recorded(key: str, session: Session, traced: TracedPaths) -> RecordedTable:
     table = session.tables[key]
     bsdfs = [n for n, (_, bsdf) in enumerate(session.bsdfs) if bsdf.table is table]
-    found = traced.of(bsdfs)
+    rows = traced.of(bsdfs)
     lookups = None
-    if len(found):
+    if len(rows):
         total = float(min(traced.total[bsdfs].sum(), 1.0))
-        lookups = Lookups(
-            found["u"], found["v"], found["w"], found["wavelength"], found["xyz"], total
-        )
+        lookups = Lookups(rows["u"], rows["v"], rows["w"], rows["wavelength"], rows["xyz"], total)
     turns = [float(traced.lobe_turn[n]) for n in bsdfs if traced.lobe_turn[n] >= 0.0]
     return RecordedTable(
         request=session.requests[key],
@@ -237,10 +225,10 @@ def load_by_recipes(load: Load, files: Sequence[Path]) -> Any:
 def _limited(request: TableRequest, recipe: Recipe) -> TableSettings:
     settings = TableSettings(**recipe.table)
     for name in RECIPE_SETTINGS:
-        theirs, ours = getattr(settings, name), getattr(request.settings, name)
-        if name not in CHOSEN and theirs != ours:
+        planned, asked = getattr(settings, name), getattr(request.settings, name)
+        if name not in CHOSEN and planned != asked:
             raise DiffractionError(
-                f"{name}={theirs} of '{recipe.path}' is {ours} in the scene; plan this scene"
+                f"{name}={planned} of '{recipe.path}' is {asked} in the scene; plan this scene"
             )
     if request.height_scale > settings.height_scale_max:
         raise DiffractionError(

@@ -1,4 +1,4 @@
-"""Reports of a plan as nested plain data: what each table is asked for, and what limits save."""
+"""Reports of a plan as nested plain data: look-ups in each table, and memory that limits save."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .plan import PlannedTable
 
 
 def describe(planned: PlannedTable) -> dict[str, Any]:
-    """What a table is asked for, the limits that it needs, and the memory that they save."""
+    """Report the look-ups in a table, the limits that suffice, and the memory that they save."""
     recorded, lookups = planned.recorded, planned.recorded.lookups
     table = recorded.table
     result: dict[str, Any] = {

@@ -146,7 +146,7 @@ _ATTEMPTS = 8
 
 @dataclass(frozen=True)
 class _Wanted:
-    """What is asked for, and what follows from it at once."""
+    """Patches and settings of a table, and the limits that follow from them."""
 
     patches: Sequence[HeightField]
     settings: TableSettings
@@ -163,7 +163,7 @@ class _Wanted:
 
     @property
     def steps(self) -> tuple[float, float]:
-        """The same in units of 1/σ."""
+        """Spacing of the bins in units of 1/σ."""
         sigma = sigma_of(self.settings.coherence_width)
         return (sigma * self.spacing[0], sigma * self.spacing[1])
 
@@ -186,7 +186,7 @@ class _Wanted:
 
 @dataclass(frozen=True)
 class _Setting:
-    """What is tried: a series, the bins that a look-up reads, and what it leaves out of them."""
+    """Parameters of an attempt: a series, the taps of a look-up, and the corners it leaves out."""
 
     expansion: Expansion
     functions: int | None
@@ -263,7 +263,7 @@ def build_with(
 
 
 def _built(wanted: _Wanted, tell: Progress) -> DiffractionTable:
-    """The first attempt that meets the tolerance."""
+    """Try settings until one meets the tolerance."""
     patches, tolerance = wanted.patches, wanted.settings.tolerance
     setting = _first(wanted)
     for _ in range(_ATTEMPTS):
@@ -276,11 +276,11 @@ def _built(wanted: _Wanted, tell: Progress) -> DiffractionTable:
         if attempt.error(setting.trims) <= tolerance:
             return _table(wanted, setting, attempt)
         setting = _next(wanted, setting, attempt)
-        found = attempt.error()
+        error = attempt.error()
         del attempt  # before the next one takes as much memory
     expansion, functions = setting.expansion, setting.functions
     raise build_error(
-        f"the error is still {found:.2g} with {expansion.intervals}×{functions or expansion.terms} "
+        f"the error is still {error:.2g} with {expansion.intervals}×{functions or expansion.terms} "
         f"terms and {setting.taps[0]}×{setting.taps[1]} taps; raise tolerance={tolerance:g}"
     )
 
@@ -311,7 +311,10 @@ def _first(wanted: _Wanted) -> _Setting:
 
 
 def _next(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> _Setting:
-    """What to try after an attempt that leaves too much; an error where the user forbids it."""
+    """Return the next setting after an attempt with too large an error.
+
+    Raises a DiffractionError where the user's own settings leave none to try.
+    """
     tolerance, terms = wanted.settings.tolerance, wanted.settings.terms
     if attempt.taps_error() > TAPS_SHARE * tolerance:
         if wanted.settings.taps is not None:
@@ -332,7 +335,7 @@ def _next(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> _Setting:
 
 
 def _table(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> DiffractionTable:
-    """What an attempt made, with all that a table knows of itself."""
+    """Make the table of an attempt, with its error, roughness and source."""
     patches, settings = wanted.patches, wanted.settings
     limit = None if wanted.frequency_limit == (wanted.q_limit,) * 2 else wanted.frequency_limit
     settings = replace(settings, frequency_limit=limit)
@@ -366,7 +369,7 @@ def _grid(wanted: _Wanted, taps: tuple[int, int]) -> Grid:
 
 
 def _more(taps: int) -> int:
-    """By one where few are read; by a sixth under a window far narrower than the patch."""
+    """Return one tap more, or a sixth more where many are read."""
     return taps + max(1, taps // 6)
 
 

@@ -1,4 +1,4 @@
-"""What cannot be built: patches that do not fit, series that fail, tables too large."""
+"""Checks that refuse tables that cannot be built: unfit patches, failing series, large sizes."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def check_patches(patches: Sequence[HeightField], settings: TableSettings) -> No
         return
     taylor = settings.basis == "taylor"
     if settings.coherent or taylor:
-        given = "basis='taylor'" if taylor else f"coherence='{settings.coherence}'"
+        setting = "basis='taylor'" if taylor else f"coherence='{settings.coherence}'"
         raise build_error(
-            f"{len(patches)} patches have their powers averaged, which {given} cannot; use "
+            f"{len(patches)} patches have their powers averaged, which {setting} cannot; use "
             "coherence='ensemble' and basis='svd', or one patch"
         )
     for patch in patches[1:]:

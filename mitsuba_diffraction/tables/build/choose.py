@@ -1,4 +1,4 @@
-"""How many terms and intervals a tolerance takes, before anything large is computed."""
+"""Choice of terms and intervals for a tolerance, before anything large is computed."""
 
 from __future__ import annotations
 
@@ -112,9 +112,9 @@ def _fewest_intervals(
         bad = good // 2
     else:
         bad, good = guess, 2 * guess
-        while (found := error(make(good))) > budget:
+        while (smallest := error(make(good))) > budget:
             if good >= MAX_INTERVALS:
-                raise too_many_intervals(make(good), terms, found)
+                raise too_many_intervals(make(good), terms, smallest)
             bad, good = good, 2 * good
     while good - bad > max(1, good // 16):
         middle = (good + bad) // 2
@@ -126,7 +126,7 @@ def _fewest_intervals(
 
 
 def too_many_intervals(expansion: Expansion, terms: int, error: float) -> DiffractionError:
-    """What to say of a series that has been cut into as many intervals as make sense."""
+    """Error about a series that needs more intervals than make sense."""
     return build_error(
         f"{expansion.intervals} intervals of κ with {terms} terms each still leave an "
         f"error of {error:.2g} for heights of {2 * expansion.half_range:.3g} µm; give more terms "
@@ -258,8 +258,9 @@ class _Trial:
         )
         back = np.linalg.solve(expansion.fit(interval).T, series)  # functions at the nodes
         flat = back @ (projection.T @ flat)
-        found = flat.reshape(*values.shape, len(parts))
-        result = found[..., 0] if len(parts) == 1 else found[..., 0] + 1j * found[..., 1]
+        parts_back = flat.reshape(*values.shape, len(parts))
+        real = parts_back[..., 0]
+        result = real if len(parts) == 1 else real + 1j * parts_back[..., 1]
         result[:, *self._centre] = centre
         return np.asarray(result)
 

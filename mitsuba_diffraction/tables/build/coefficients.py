@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +22,28 @@ from .spectrum import NEAR, Spectrum
 ValuesAt = Callable[[int, NDArray[np.float32]], Iterable[Sequence[float]]]
 
 
+class Coefficients(NamedTuple):
+    """Series coefficients of a table.
+
+    Attributes
+    ----------
+    bins : (intervals, ny, nx, components, terms) of every bin, 0 for order 0.
+    order_0 : (intervals, components, series_terms).
+    expansion : of the bins, with its functions.
+    """
+
+    bins: NDArray[np.float32]
+    order_0: NDArray[np.float64]
+    expansion: Expansion
+
+
 def series_of(
     values_at: ValuesAt,
     shape: tuple[int, int, int],
     expansion: Expansion,
     functions: int | None,
     near: NDArray[np.int64],
-) -> tuple[NDArray[np.float32], NDArray[np.float64], Expansion]:
+) -> Coefficients:
     """Series coefficients (intervals, ny, nx, components, terms) of whatever has values at nodes.
 
     Parameters
@@ -44,29 +59,29 @@ def series_of(
     order_0 = np.empty((expansion.intervals, shape[2], expansion.terms))
     values = np.empty((expansion.terms, *shape), np.float32)
     flat = values.reshape(expansion.terms, -1)
-    found = []
+    all_series = []
     for interval in range(expansion.intervals):
         at_nodes = list(values_at(interval, values))
         fit = expansion.fit(interval)
         order_0[interval] = np.transpose(at_nodes) @ fit
         if functions is not None:
             fit, series = principal_functions(flat, expansion, interval, functions, near)
-            found.append(series)
+            all_series.append(series)
         np.matmul(flat.T, fit.astype(np.float32), out=result[interval].reshape(-1, terms))
     if functions is not None:
-        expansion = replace(expansion, basis="svd", terms=terms, functions=np.array(found))
-    return result, order_0, expansion
+        expansion = replace(expansion, basis="svd", terms=terms, functions=np.array(all_series))
+    return Coefficients(result, order_0, expansion)
 
 
 def coefficients_of(
     spectra: Spectra, grid: Grid, expansion: Expansion, functions: int | None
-) -> tuple[NDArray[np.float32], NDArray[np.float64], Expansion]:
+) -> Coefficients:
     """Series coefficients of every bin, (intervals, ny, nx, components, terms), and of order 0.
 
     functions : see `series_of`.
     """
     if expansion.basis == "taylor":
-        return *_taylor(spectra, grid, expansion), expansion
+        return Coefficients(*_taylor(spectra, grid, expansion), expansion)
     components = 1 if expansion.kind == "power" else 2
     of_kind = _powers_at if expansion.kind == "power" else _amplitudes_at
     values_at = partial(of_kind, spectra, grid, expansion)

@@ -1,4 +1,4 @@
-"""What a table remembers of the heights it was built from, and what to warn of."""
+"""Description of the heights in a table: statistics, digest, roughness and warnings."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def roughness_of(patches: Sequence[HeightField], q_max: float) -> RoughnessTable
     each = []
     for patch in patches:
         if patch.heights.size <= LARGE:
-            each.append(ScaleRoughness.of(patch.heights, patch.pixel_size))
+            each.append(ScaleRoughness.from_heights(patch.heights, patch.pixel_size))
         else:
             each.append(ScaleRoughness.mean(_parts(Windows([patch], math.inf)).roughness()))
     return ScaleRoughness.mean(each).table(q_max)
@@ -83,10 +83,10 @@ def roughness_of(patches: Sequence[HeightField], q_max: float) -> RoughnessTable
 def sections(
     patches: Sequence[HeightField],
 ) -> Iterator[tuple[HeightField, NDArray[np.float64]]]:
-    """Patches, or some windows on wide scans, that represent them; and how screens fade there."""
+    """Yield patches, or some windows of wide scans that represent them, with their tapers."""
     if isinstance(patches, Windows):
         parts = _parts(patches)
-        yield from ((one, parts.taper) for one in parts.some())
+        yield from ((window, parts.taper) for window in parts.some())
         return
     for patch in patches:
         if patch.heights.size <= LARGE:
@@ -96,7 +96,7 @@ def sections(
 
 
 def _parts(windows: Windows) -> Windows:
-    """Windows of at most so many points, whose transforms take ten times their memory."""
+    """Windows small enough for transforms, which take ten times their memory."""
     if max(windows.shape) <= _PART:
         return windows
     return Windows(windows.scans, _PART * min(windows.scans[0].pixel_size))

@@ -1,4 +1,4 @@
-"""How far a table is from the exact DFT: the one error measure of the project.
+"""Error of a table against the exact DFT: the error measure of the whole project.
 
 At every bin that light can reach, moved by up to half a bin (fixed seed), the table's ⟨|P|²⟩ is
 compared with the exact one, over κ between the nodes of the series and at its ends:
@@ -153,7 +153,7 @@ class ErrorMeter:
             yield amplitude
 
     def _tap(self, table: NDArray[Any]) -> NDArray[Any]:
-        """What a look-up's taps add up to, without order 0."""
+        """Sum over a look-up's taps, without order 0."""
         total: Any = 0.0
         for matrices in self._tapped:
             total = total + apply_window(matrices, table)

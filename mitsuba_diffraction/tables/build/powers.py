@@ -38,7 +38,7 @@ class Power:
 
     @classmethod
     def of(cls, spectrum: Spectrum, kappa: float) -> Power:
-        """That of one patch, in the precision of its spectrum."""
+        """Power of one patch, in the precision of its spectrum."""
         amplitude = spectrum.of_phase(kappa, minus_one=True)  # so that bin 0 is a_0 − 1
         middle = spectrum.last[1], spectrum.last[0]
         less = complex(amplitude[middle])
@@ -55,7 +55,7 @@ class Power:
         self.order_0 += other.order_0
 
     def over(self, count: int) -> Power:
-        """The mean of so many, whose sum this is."""
+        """Divide a sum of so many powers by their number."""
         if count > 1:
             self.bins /= count
         return Power(self.bins, self.change / count, self.order_0 / count)
@@ -81,13 +81,13 @@ class Spectra:
         self.tick, self._patches = tick, patches
         self._of = last, double
         self._batches = patches.batches() if isinstance(patches, Windows) else []
-        kept = [patches[0]] if self._batches else patches
-        self._kept = [Spectrum(patch, last, double) for patch in kept]
+        whole = [patches[0]] if self._batches else patches
+        self._spectra = [Spectrum(patch, last, double) for patch in whole]
 
     @property
     def first(self) -> Spectrum:
-        """That of the only patch, or one of the shape and precision of all."""
-        return self._kept[0]
+        """Spectrum of the only patch, or of one that stands for the shape and precision of all."""
+        return self._spectra[0]
 
     @property
     def count(self) -> int:
@@ -98,9 +98,9 @@ class Spectra:
         """The mean over all patches, at one κ after the other."""
         if not self._batches:
             for kappa in kappas:
-                (total,) = _sums(self._kept, [kappa])
+                (total,) = _sums(self._spectra, [kappa])
                 self.tick()
-                yield total.over(len(self._kept))
+                yield total.over(len(self._spectra))
             return
         ny, nx = self.first.shape
         size = max(1, _GROUP // (8 * ny * nx))
@@ -111,8 +111,8 @@ class Spectra:
         assert isinstance(self._patches, Windows)
         tasks = (_Task(batch, *self._of, kappas) for batch in self._batches)
         total: list[Power] = []
-        for found in self._patches.run(_Task.sums, tasks):
-            _add(total, found)
+        for powers in self._patches.run(_Task.sums, tasks):
+            _add(total, powers)
             for _ in kappas:
                 self.tick()
         for power in total:
@@ -129,8 +129,9 @@ class _Task:
     kappas: tuple[float, ...]
 
     def sums(self) -> list[Power]:
-        own = (self.windows.spectrum(n, self.last, self.double) for n in range(len(self.windows)))
-        return _sums(own, self.kappas)
+        numbers = range(len(self.windows))
+        spectra = (self.windows.spectrum(n, self.last, self.double) for n in numbers)
+        return _sums(spectra, self.kappas)
 
 
 def _sums(spectra: Iterable[Spectrum], kappas: Sequence[float]) -> list[Power]:

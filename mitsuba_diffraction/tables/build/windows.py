@@ -121,9 +121,9 @@ class Windows(Sequence[HeightField]):
 
     def _check(self, axes: Sequence[Sequence[_Axis]]) -> None:
         first = self.scans[0]
-        for scan, own in zip(self.scans[1:], axes[1:], strict=True):
+        for scan, scan_axes in zip(self.scans[1:], axes[1:], strict=True):
             alike = np.allclose(scan.pixel_size, first.pixel_size, rtol=1e-6, atol=0.0)
-            if not alike or [a.length for a in own] != [a.length for a in axes[0]]:
+            if not alike or [a.length for a in scan_axes] != [a.length for a in axes[0]]:
                 raise build_error(
                     f"'{scan.name}' and '{first.name}' have no windows of one size: their pixels "
                     "differ, or one is narrower than a window; build a table of each"
@@ -157,18 +157,18 @@ class Windows(Sequence[HeightField]):
         """All windows, some neighbours at a time; the same whoever does their work."""
         ny, nx = self.shape
         most = 1 + max(0, int((_BATCH / ny - nx) / (0.5 * nx)))
-        found = []
+        batches = []
         for _, row in groupby(self._places, key=lambda place: (id(place[0]), place[1])):
             places = list(row)
             for start in range(0, len(places), most):
                 batch = Windows.__new__(Windows)
-                own = {"scans": [places[0][0]], "_places": places[start : start + most]}
-                vars(batch).update(vars(self), **own)
-                found.append(batch)
-        return found
+                part = {"scans": [places[0][0]], "_places": places[start : start + most]}
+                vars(batch).update(vars(self), **part)
+                batches.append(batch)
+        return batches
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is sent to workers of a batch: the part of its scan that it lies in."""
+        """State of a batch for workers: of its scan, only the part that it covers."""
         (scan,) = self.scans
         corners = np.array([(top, left) for _, top, left in self._places])
         (top, left), (bottom, right) = corners.min(axis=0), corners.max(axis=0) + self.shape
@@ -181,7 +181,7 @@ class Windows(Sequence[HeightField]):
         return Spectrum(self[n], last, double, self.tapers)
 
     def standard_error(self, coherence_width: float) -> dict[str, float]:
-        """That of the mean over windows, relative, as the windows scatter.
+        """Relative standard error of the mean over windows, from their scatter.
 
         Of what look-ups find at 550 nm, normal incidence and reflection: Σ error / Σ mean over
         directions, near order 0 and in all others, as a table's own error is summed.
@@ -206,21 +206,21 @@ class Windows(Sequence[HeightField]):
         }
 
     def roughness(self) -> list[ScaleRoughness]:
-        """Of some of the windows, their heights tapered as the screens are."""
+        """Roughness of some of the windows, their heights tapered like the screens."""
         return [
-            ScaleRoughness.of((one.heights - one.heights.mean()) * self.taper, one.pixel_size)
-            for one in self.some()
+            ScaleRoughness.from_heights((w.heights - w.heights.mean()) * self.taper, w.pixel_size)
+            for w in self.some()
         ]
 
     @property
     def taper(self) -> Reals:
-        """How screens fade, along both axes: (ny or 1, nx or 1)."""
+        """Factor by which screens fade towards the edges: (ny or 1, nx or 1)."""
         return np.outer(*(np.ones(1) if t is None else t for t in self.tapers))
 
     def some(self) -> Iterator[HeightField]:
         """Some of the windows, evenly spread."""
-        found = np.unique(np.linspace(0, len(self) - 1, _ROUGHNESS_OF).round().astype(int))
-        return (self[int(n)] for n in found)
+        numbers = np.unique(np.linspace(0, len(self) - 1, _ROUGHNESS_OF).round().astype(int))
+        return (self[int(n)] for n in numbers)
 
     @property
     def _pixels(self) -> tuple[float, float]:
@@ -273,8 +273,8 @@ def windows_of(
         )
     if min(width / d for d in scans[0].pixel_size) < 4:
         return scans  # pixels so coarse that something else is wrong
-    found = Windows(scans, width, run)
-    return scans if len(found) == len(scans) else found
+    windows = Windows(scans, width, run)
+    return scans if len(windows) == len(scans) else windows
 
 
 def shape_of(patches: Sequence[HeightField]) -> tuple[int, int]:

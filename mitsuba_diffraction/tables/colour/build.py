@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from scipy import ndimage, sparse
 
 from ...optics.colour import linear_srgb, response
-from ..energy.powers import order_0_power, power_expansion, powers_of
 from ..expansion import Expansion
+from ..powers import order_0_power, power_expansion, powers_of
 from ..table import DiffractionTable
 from ..window import taps_at
 
@@ -74,16 +74,16 @@ class PolarGrid:
 
     @property
     def rings(self) -> int:
-        """How many."""
+        """Number of rings."""
         return len(self.counts)
 
     @property
     def bins(self) -> int:
-        """How many in all, the repeated ones included."""
+        """Number of bins, the repeated ones included."""
         return sum(self.counts) + self.rings
 
     def radius(self, ring: int) -> float:
-        """Of this ring, |(u, v)|."""
+        """Radius |(u, v)| of a ring."""
         return self.smallest * math.exp(self.step * ring)
 
     def start(self, ring: int) -> int:
@@ -174,21 +174,21 @@ class OtherOrders:
         frequency = first * np.exp(grid.step / per_ring * np.arange(count))
         size = max(1, _BLOCK // (count * max(16, source.width)))
         for start in range(0, len(azimuths), size):
-            mine = azimuths[start : start + size]
-            found = source.at(frequency, 2 * np.pi / grid.counts[band.start] * mine)
+            block = azimuths[start : start + size]
+            sums = source.at(frequency, 2 * np.pi / grid.counts[band.start] * block)
             for n, ring in enumerate(band):
-                result = np.zeros((len(mine), expansion.intervals, 3, expansion.terms), np.float32)
+                result = np.zeros((len(block), expansion.intervals, 3, expansion.terms), np.float32)
                 for part in parts:
                     lower, upper = part.wavelengths.start, part.wavelengths.stop
-                    term = found[:, part.source, n * per_ring + lower : n * per_ring + upper]
-                    added = term.reshape(len(mine), -1) @ part.matrix
-                    result[:, part.targets] += added.reshape(len(mine), -1, 3, expansion.terms)
-                yield ring, mine, result
+                    term = sums[:, part.source, n * per_ring + lower : n * per_ring + upper]
+                    added = term.reshape(len(block), -1) @ part.matrix
+                    result[:, part.targets] += added.reshape(len(block), -1, 3, expansion.terms)
+                yield ring, block, result
 
 
 @dataclass(frozen=True)
 class _Part:
-    """What one interval of κ adds to the intervals of z, through a run of wavelengths.
+    """Contribution of one interval of κ to the intervals of z, through a run of wavelengths.
 
     Attributes
     ----------
@@ -210,15 +210,15 @@ def _parts(
     wavelengths: NDArray[np.float64],
     weights: NDArray[np.float64],
 ) -> list[_Part]:
-    """How the series in κ at all wavelengths (n,) in µm make the series in z."""
+    """Return how the series in κ at all wavelengths (n,) in µm make the series in z."""
     scaled = weights / wavelengths[:, None] ** 2
     nodes = np.array([target.nodes(n) for n in range(target.intervals)])
     fits = np.array([target.fit(n) for n in range(target.intervals)])
     kappa = np.minimum(2 * np.pi / wavelengths[:, None, None] * nodes, source.kappa_max)
     home = source.interval(kappa)
     parts = []
-    for mine in np.unique(home):
-        inside = home == mine
+    for interval in np.unique(home):
+        inside = home == interval
         run, targets = _run(inside.any(axis=(1, 2))), _run(inside.any(axis=(0, 2)))
         inside, at = inside[run, targets], kappa[run, targets]
         matrix = np.einsum(
@@ -229,12 +229,12 @@ def _parts(
             optimize=True,
         )
         flat = matrix.reshape((run.stop - run.start) * source.terms, -1)
-        parts.append(_Part(int(mine), targets, run, np.ascontiguousarray(flat, np.float32)))
+        parts.append(_Part(int(interval), targets, run, np.ascontiguousarray(flat, np.float32)))
     return parts
 
 
 def _run(used: NDArray[np.bool_]) -> slice:
-    """From the first to the last that is True."""
+    """Slice from the first to the last that is True."""
     indices = np.flatnonzero(used)
     return slice(int(indices[0]), int(indices[-1]) + 1)
 
@@ -278,12 +278,12 @@ class _Source:
         table = self._table
         qx = np.outer(np.cos(azimuth), frequency).ravel()
         qy = np.outer(np.sin(azimuth), frequency).ravel()
-        found = self._taps(qx, qy) @ self._bins
+        sums = self._taps(qx, qy) @ self._bins
         if table.grid.coherent:
-            found = self._coherent(found, qx, qy)
-        found *= np.float32(1.0 / self._scale)
+            sums = self._coherent(sums, qx, qy)
+        sums *= np.float32(1.0 / self._scale)
         shape = (len(azimuth), len(frequency), self.expansion.intervals, self.expansion.terms)
-        return np.ascontiguousarray(found.reshape(shape).transpose(0, 2, 1, 3))
+        return np.ascontiguousarray(sums.reshape(shape).transpose(0, 2, 1, 3))
 
     def _taps(self, qx: NDArray[np.float64], qy: NDArray[np.float64]) -> sparse.csr_array:
         """Weights from bins to points, a sparse (points, ny·nx) matrix."""
@@ -314,25 +314,25 @@ class _Source:
         return index, weights.astype(np.float32)
 
     def _coherent(
-        self, found: NDArray[np.float32], qx: NDArray[np.float64], qy: NDArray[np.float64]
+        self, amplitudes: NDArray[np.float32], qx: NDArray[np.float64], qy: NDArray[np.float64]
     ) -> NDArray[np.float32]:
         """The power's series of a sum of amplitudes, less the power of order 0 alone."""
         table = self._table
         old, new = table.expansion, self.expansion
-        parts = found.reshape(len(found), old.intervals, 2, old.terms)
+        parts = amplitudes.reshape(len(amplitudes), old.intervals, 2, old.terms)
         x, y = qx / table.spacing[0], qy / table.spacing[1]
         lobe = np.exp(-table.grid.exponents[0] * x * x - table.grid.exponents[1] * y * y)
-        result = np.empty((len(found), new.intervals, new.terms), np.float32)
+        result = np.empty((len(amplitudes), new.intervals, new.terms), np.float32)
         for interval in range(new.intervals):
-            values = np.empty((len(found), new.terms), np.float32)
+            values = np.empty((len(amplitudes), new.terms), np.float32)
             for n, kappa in enumerate(new.nodes(interval)):
-                mine, weights = int(old.interval(kappa)), old.weights(kappa).astype(np.float32)
-                amplitude = parts[:, mine] @ weights * np.float32(1.0 / table.scale)
+                source, weights = int(old.interval(kappa)), old.weights(kappa).astype(np.float32)
+                amplitude = parts[:, source] @ weights * np.float32(1.0 / table.scale)
                 centre = table.order_0_at(kappa)
                 # |o + c|² − |c|² = |o|² + 2 Re(o c*), c the part of order 0
                 values[:, n] = (amplitude**2).sum(axis=1) + 2.0 * lobe * (amplitude @ centre)
             result[:, interval] = values @ new.fit(interval).astype(np.float32)
-        return result.reshape(len(found), -1) * np.float32(self._scale)
+        return result.reshape(len(amplitudes), -1) * np.float32(self._scale)
 
 
 def _flat(coefficients: NDArray[np.floating]) -> NDArray[np.float32]:

@@ -24,8 +24,8 @@ from numpy.typing import ArrayLike, NDArray
 from ...errors import warn
 from ...optics.colour import delta_e, linear_srgb, response
 from ..build.coefficients import half_scale
-from ..energy.powers import kind_of
 from ..expansion import Expansion
+from ..powers import kind_of
 from ..table import DiffractionTable
 from .build import VISIBLE, OtherOrders, PolarGrid, lobe_of, order_0_colour
 
@@ -82,9 +82,9 @@ class ColourTable:
         values = np.zeros((expansion.intervals, grid.bins, PACKET), np.float32)
         for band in grid.bands():
             everywhere = np.arange(grid.counts[band.start])
-            for ring, azimuths, found in orders.blocks(grid, band, everywhere, expansion):
+            for ring, azimuths, block in orders.blocks(grid, band, everywhere, expansion):
                 bins = grid.start(ring) + azimuths
-                flat = found.reshape(len(bins), expansion.intervals, -1)
+                flat = block.reshape(len(bins), expansion.intervals, -1)
                 values[:, bins, : 3 * TERMS] = flat.transpose(1, 0, 2)
         for ring in range(grid.rings):
             start = grid.start(ring)
@@ -128,8 +128,8 @@ class ColourTable:
         for ring, share in _pair(lowest):
             position = turn * np.array(grid.counts)[ring]
             for azimuth, of_azimuth in _pair(position):
-                found = self.coefficients[interval, starts[ring] + azimuth]
-                packet += (share * of_azimuth)[:, None] * found
+                node = self.coefficients[interval, starts[ring] + azimuth]
+                packet += (share * of_azimuth)[:, None] * node
         series = packet[:, : 3 * TERMS].reshape(-1, 3, TERMS) / self.scale
         result = np.einsum("nct,nt->nc", series, self.expansion.weights(z))
         radii, zs = self.order_0.shape[:2]
@@ -169,7 +169,7 @@ def _order_0(
 def _expansion(
     table: DiffractionTable, orders: OtherOrders, grid: PolarGrid, z_max: float
 ) -> Expansion:
-    """As few intervals of z as meet the tolerance, tried on a few azimuths of a few rings."""
+    """Return the fewest intervals of z that meet the tolerance on a few azimuths of a few rings."""
     bands = [band for band in grid.bands() if 0.1 < grid.radius(band.start) < 1.0]
 
     def expand(terms: int, intervals: int) -> tuple[Expansion, NDArray[np.float64]]:
@@ -179,15 +179,18 @@ def _expansion(
         for band in bands:
             azimuths = np.linspace(0, grid.counts[band.start], 33)[:-1].astype(np.int64)
             rings = range(band.start, min(band.start + 4, band.stop))
-            blocks += [found for *_, found in orders.blocks(grid, rings, azimuths, expansion)]
+            blocks += [block for *_, block in orders.blocks(grid, rings, azimuths, expansion)]
         return expansion, np.concatenate(blocks).astype(float)
 
     z = z_max * (np.arange(200) + 0.5) / 200
 
     def evaluate(series: tuple[Expansion, NDArray[np.float64]]) -> NDArray[np.float64]:
-        expansion, found = series
+        expansion, coefficients = series
         return np.einsum(
-            "azct,zt->azc", found[:, expansion.interval(z)], expansion.weights(z), optimize=True
+            "azct,zt->azc",
+            coefficients[:, expansion.interval(z)],
+            expansion.weights(z),
+            optimize=True,
         )
 
     phase = z_max * 2 * math.pi / 0.44 * table.expansion.half_range
@@ -237,8 +240,8 @@ def power_colour_difference(
     lam = np.arange(*VISIBLE, _STEP)[:, None]
     weights = linear_srgb(response(lam[:, 0])) / lam**2
     k = 2e3 * np.pi / lam
-    exact, found = (t.window_sum(k * u, k * v, k * z).T @ weights for t in (table, other))
-    return _loss(exact, found, factor)
+    exact, colours = (t.window_sum(k * u, k * v, k * z).T @ weights for t in (table, other))
+    return _loss(exact, colours, factor)
 
 
 def _pairs(count: int) -> tuple[NDArray[np.float64], ...]:
@@ -261,5 +264,5 @@ def _pairs(count: int) -> tuple[NDArray[np.float64], ...]:
 def _loss(
     exact: NDArray[np.float64], other: NDArray[np.float64], factor: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    found = delta_e(exact * factor[:, None], other * factor[:, None])
-    return found[np.isfinite(found)]
+    difference = delta_e(exact * factor[:, None], other * factor[:, None])
+    return difference[np.isfinite(difference)]

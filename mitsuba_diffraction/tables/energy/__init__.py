@@ -1,20 +1,14 @@
-"""How much light a table's surface reflects, and what conserves energy.
+"""How much light a table's surface reflects and transmits, and the scales that conserve energy.
 
 Contents
 --------
-gain           what becomes of one order's light, by model and material
-transport      the albedo of one wavelength, as a linear map of weights of directions
+settings       resolution and limits, all of them part of the cache's key
+grid           the grid of directions, and functions on it
+gain           factor of |a_j|² in the albedo, by model and material
+transport      sums over the orders for directions of incidence
+scaling        the scale of a symmetric kernel with given sums
 conservation   the scale by which no more is reflected than comes in
-fit            a scale fitted where albedos are looked at, at its nodes and amid them
-grating        orders on one line, and a grid with its nodes where they come up
-chains         a grating's light between few directions, and what reciprocity leaves of it
-grid           the grid of directions
-powers         powers of the orders as series in κ
-links          what becomes of one order's light between the sides of a dielectric
-sums           R + T as a linear map of weights, and the scales that bring it near 1
-sheet          the same of a sheet that is a grating, chain by chain
-between        R + T amid the nodes of a scale: what is too much there, and what lacks
-sides          R + T of a dielectric, and the scale and the spread light that make it 1
-film           what a thin film makes of the second order's mean
-store          what conserves energy, in the cache
+transmission   the scale of order 0 by which reflected and transmitted light add up to 1
+film           the mean of the second order under a film
+store          all of it in the cache
 """

@@ -1,18 +1,18 @@
-"""A grid of directions, and bilinear interpolation on it (NumPy only)."""
+"""A grid of directions, and linear interpolation on it (NumPy only)."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 Real = NDArray[np.float64]
+Array = NDArray[np.float32]
 
-#: The grid ends at this polar angle; what is beyond is as there.
+#: The grid ends at this polar angle, rad; values beyond are those at its end.
 LAST_ANGLE = math.radians(89.5)
 #: x = (1 − √(1 − 2θ/π)) / SHARE runs from 0 to 1 over the grid: denser towards grazing angles.
 SHARE = 1.0 - math.sqrt(1.0 - LAST_ANGLE / (0.5 * math.pi))
@@ -20,7 +20,7 @@ SHARE = 1.0 - math.sqrt(1.0 - LAST_ANGLE / (0.5 * math.pi))
 
 @dataclass(frozen=True)
 class DirectionGrid:
-    """`polar` + 1 polar angles, from 0 to `LAST_ANGLE`, and `azimuthal` azimuths from 0.
+    """Grid of `polar` + 1 polar angles, from 0 to `LAST_ANGLE`, and `azimuthal` azimuths from 0.
 
     Values on it have the shape (polar + 1, azimuthal).
     """
@@ -31,88 +31,122 @@ class DirectionGrid:
     @property
     def theta(self) -> Real:
         """Polar angles, rad, (polar + 1,)."""
-        position = np.arange(self.polar + 1) / self.polar
-        return np.asarray(0.5 * math.pi * (1.0 - (1.0 - SHARE * position) ** 2))
+        return self.angles(np.arange(self.polar + 1))
 
     @property
     def phi(self) -> Real:
         """Azimuths, rad, (azimuthal,)."""
         return np.asarray(np.arange(self.azimuthal) * (2.0 * math.pi / self.azimuthal), np.float64)
 
+    @property
+    def ones(self) -> Array:
+        """Weights of 1."""
+        return np.ones((self.polar + 1, self.azimuthal), np.float32)
+
+    @property
+    def half(self) -> DirectionGrid:
+        """Grid of half as many cells, for what is smooth."""
+        return DirectionGrid(min(self.polar // 2, 24), min(self.azimuthal // 2, 30))
+
+    def angles(self, row: ArrayLike) -> Real:
+        """Polar angles (rad) at rows 0 … polar."""
+        position = np.asarray(row, float) / self.polar
+        return np.asarray(0.5 * math.pi * (1.0 - (1.0 - SHARE * position) ** 2))
+
     def row(self, theta: ArrayLike) -> Real:
-        """Position 0 … polar of a polar angle (rad)."""
+        """Row 0 … polar of polar angles (rad)."""
         remaining = np.maximum(1.0 - np.asarray(theta, float) / (0.5 * math.pi), 0.0)
         return np.clip((1.0 - np.sqrt(remaining)) * (self.polar / SHARE), 0.0, self.polar)
 
-    def interpolation(self, theta: ArrayLike, phi: ArrayLike) -> Interpolation:
-        """From values on the grid to directions (rad), of any one shape."""
+    def middles(self, parts: int) -> tuple[Real, Real]:
+        """Middles of the parts of all cells: polar angles and azimuths, rad."""
+        theta = self.angles((np.arange(self.polar * parts) + 0.5) / parts)
+        count = self.azimuthal * parts
+        return theta, np.asarray((np.arange(count) + 0.5) * (2.0 * math.pi / count))
+
+    def interpolation(self, theta: ArrayLike, phi: ArrayLike) -> LinearMap:
+        """Bilinear interpolation to directions (rad), of any one shape."""
         row, column = np.broadcast_arrays(
             self.row(theta), np.mod(phi, 2.0 * math.pi) * (self.azimuthal / (2.0 * math.pi))
         )
         i = np.minimum(row.astype(np.int32), self.polar - 1)
         j = column.astype(np.int32)
         s, t = (row - i).astype(np.float32), (column - j).astype(np.float32)
-        j %= self.azimuthal
-        index = i * self.azimuthal + j
+        left = i * self.azimuthal + j % self.azimuthal
         right = i * self.azimuthal + (j + 1) % self.azimuthal
-        nodes = (self.polar + 1) * self.azimuthal
-        return Interpolation(index, right, self.azimuthal, nodes, s, t)
-
-
-@dataclass(frozen=True)
-class Interpolation:
-    """Bilinear, from values on `nodes` of the grid: four are read for each direction."""
-
-    left: NDArray[np.int32]
-    right: NDArray[np.int32]
-    stride: int
-    nodes: int
-    s: NDArray[np.float32]
-    t: NDArray[np.float32]
-
-    def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Values at the directions."""
-        return np.asarray((self._matrix @ values.ravel()).reshape(self.left.shape))
-
-    def spread(self, values: NDArray[np.floating]) -> Real:
-        """The transposed: values at the directions, by their shares in the nodes (nodes,)."""
-        return np.asarray(self._matrix.T @ values.ravel(), np.float64)
-
-    def largest(self, values: NDArray[np.floating]) -> Real:
-        """The largest of the values, at least 1, that each node (nodes,) has a share in."""
-        found = np.ones(self.nodes)
-        much = np.flatnonzero(values.ravel() > 1.0)
-        shared = self._matrix[much]
-        at = shared.data > 1e-3
-        of = np.repeat(values.ravel()[much], 4)
-        np.maximum.at(found, shared.indices[at], of[at])
-        return found
-
-    def summed(self, shares: NDArray[np.float32]) -> Summed:
-        """Sums over the last axis of the directions, by shares (…, m)."""
-        data = self._matrix.data * np.repeat(shares.ravel(), 4)
-        starts = np.arange(0, len(data) + 1, 4 * shares.shape[-1], dtype=np.int32)
-        shape = len(starts) - 1, self.nodes
-        matrix = sparse.csr_array((data, self._matrix.indices, starts), shape=shape)
-        return Summed(matrix, shares.shape[:-1])
-
-    @cached_property
-    def _matrix(self) -> sparse.csr_array:
-        """(directions, nodes)."""
-        columns = [at + step for step in (0, self.stride) for at in (self.left, self.right)]
-        shares = [s * t for s in (1.0 - self.s, self.s) for t in (1.0 - self.t, self.t)]
+        columns = [at + step for step in (0, self.azimuthal) for at in (left, right)]
+        shares = [u * v for u in (1.0 - s, s) for v in (1.0 - t, t)]
         indices, data = (np.stack(part, axis=-1).ravel() for part in (columns, shares))
-        starts = np.arange(0, len(data) + 1, 4, dtype=np.int32)
-        return sparse.csr_array((data, indices, starts), shape=(self.left.size, self.nodes))
+        return LinearMap.of(data, indices, 4, row.shape, self)
 
 
 @dataclass(frozen=True)
-class Summed:
-    """A linear map from values on a grid: `matrix` (sums, nodes), of sums of a shape."""
+class LinearMap:
+    """Map from values on a grid to values of another shape: `matrix` (values, nodes)."""
 
     matrix: sparse.csr_array
     shape: tuple[int, ...]
 
-    def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The sums."""
+    @classmethod
+    def of(
+        cls,
+        data: Array,
+        indices: NDArray[np.int32],
+        each: int,
+        shape: tuple[int, ...],
+        grid: DirectionGrid,
+    ) -> LinearMap:
+        """Build a map whose values are made of equally many nodes of a grid each."""
+        starts = np.arange(0, len(data) + 1, each, dtype=np.int32)
+        nodes = (grid.polar + 1) * grid.azimuthal
+        return cls(sparse.csr_array((data, indices, starts), shape=(len(starts) - 1, nodes)), shape)
+
+    def __call__(self, values: NDArray[np.floating]) -> Array:
         return np.asarray((self.matrix @ values.ravel()).reshape(self.shape))
+
+    def summed(self, shares: Array, grid: DirectionGrid) -> LinearMap:
+        """Return the map to sums over the last axis, by shares (…, m)."""
+        data, each = self.matrix.data * np.repeat(shares.ravel(), 4), 4 * shares.shape[-1]
+        return LinearMap.of(data, self.matrix.indices, each, shares.shape[:-1], grid)
+
+
+@dataclass(frozen=True)
+class DirectionalTable:
+    """Function of wavelength and direction.
+
+    Attributes
+    ----------
+    wavelengths : (n,) nm, evenly in their logarithm.
+    values : (n, polar + 1, azimuthal) on a `DirectionGrid`.
+    """
+
+    wavelengths: Real
+    values: Array
+
+    @property
+    def grid(self) -> DirectionGrid:
+        """Directions of the values."""
+        return DirectionGrid(self.values.shape[1] - 1, self.values.shape[2])
+
+    def at(self, theta: ArrayLike, phi: ArrayLike, wavelength: float) -> Array:
+        """Interpolate at angles (rad) of any one shape and a wavelength (nm)."""
+        return self.grid.interpolation(theta, phi)(self.page(wavelength))
+
+    def on(self, grid: DirectionGrid) -> DirectionalTable:
+        """Interpolate to another grid of directions."""
+        to_grid = self.grid.interpolation(grid.theta[:, None], grid.phi)
+        return DirectionalTable(self.wavelengths, np.stack([to_grid(page) for page in self.values]))
+
+    def page(self, wavelength: float) -> Array:
+        """Values at one wavelength (nm)."""
+        place = np.interp(
+            np.log(wavelength), np.log(self.wavelengths), np.arange(len(self.wavelengths))
+        )
+        low = int(min(place, len(self.wavelengths) - 2)) if len(self.wavelengths) > 1 else 0
+        high = min(low + 1, len(self.wavelengths) - 1)
+        share = np.float32(place - low)
+        return np.asarray(self.values[low] * (1 - share) + self.values[high] * share, np.float32)
+
+
+#: Grid that renderers without wavelengths look scales up on.
+FINE = DirectionGrid(40, 60)

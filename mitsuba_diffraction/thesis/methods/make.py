@@ -22,7 +22,7 @@ from ...tables.window import taps_for
 from .method import FullSpectrum, Gain, Method, trapezoid_rule
 from .periodic import OrdersOnly, Rainbow, Repeated, check_period, estimate_periods, required_period
 
-NAMES = ("default", "flss", "nmm", "pq", "pq-sinc", "rainbow")
+NAMES = ("spectral", "flss", "nmm", "pq", "pq-sinc", "rainbow")
 
 #: Function that builds a table of a patch, like `DiffractionTable.build`.
 Build = Callable[..., DiffractionTable]
@@ -63,7 +63,7 @@ def make_all(
     coherence_width : 4σ of the Gaussian amplitude window, µm; for `pq`, the width that is filled
         with copies of the patch.
     coherence : "patch", one window on the patch's centre, or "ensemble", the mean power of all
-        positions. By default "ensemble" for `default`, and "patch", as in the thesis, for `flss`
+        positions. By default "ensemble" for `spectral`, and "patch", as in the thesis, for `flss`
         and `nmm`. `pq` always adds amplitudes; `rainbow` has no window.
     tolerance : tolerance of the tables.
     terms, taps : terms of the Taylor series and taps of the window of `flss`, `nmm` and `pq`; by
@@ -98,7 +98,7 @@ def make_all(
     def table(**changes: Any) -> DiffractionTable:
         return (build or DiffractionTable.build)(heights, **(common | changes))
 
-    def default(name: str) -> FullSpectrum:
+    def spectral(name: str) -> FullSpectrum:
         powers = table(coherence=coherence or "ensemble")
         return FullSpectrum(name, powers, wavelength_range, step)
 
@@ -124,7 +124,7 @@ def make_all(
         )  # fmt: skip
 
     makers: dict[str, Callable[[str], Method]] = {
-        "default": default,
+        "spectral": spectral,
         "flss": flss,
         "nmm": nmm,
         "pq": pq,

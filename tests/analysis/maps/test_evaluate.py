@@ -15,7 +15,10 @@ from tests.support.directions import rough_patch
 from tests.support.mapped import GRATING, centres, mirror, plugin
 
 # Patches here are small and tiled, and the flat ones coarse: the warnings are right, but known.
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
+pytestmark = [
+    pytest.mark.thorough,
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+]
 
 
 @pytest.mark.usefixtures("variant")

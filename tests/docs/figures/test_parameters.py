@@ -12,8 +12,14 @@ import mitsuba_diffraction as md
 from docs.make.figures import parameters
 from mitsuba_diffraction.errors import DiffractionError
 
-ENTRIES = [e for entries in parameters.groups(parameters.docstring()).values() for e in entries]
-BY_NAME = {name: entry for entry in ENTRIES for name in entry.names}
+
+def entries(plugin):
+    """Entries of a plugin's docstring by the names of their parameters."""
+    found = parameters.groups(parameters.docstring(plugin))
+    return {name: e for entries in found.values() for e in entries for name in e.names}
+
+
+BY_NAME = entries("diffraction")
 
 
 @pytest.fixture
@@ -22,14 +28,19 @@ def patch():
 
 
 def test_every_parameter_is_described_once(some_variant):
-    from mitsuba_diffraction.plugin.parameters import NAMES
+    from mitsuba_diffraction.plugin.surface_parameters import NAMES
 
-    names = [name for entry in ENTRIES for name in entry.names]
-    assert sorted(names) == sorted([*NAMES, "(nested)"])
+    shared = set(NAMES["diffraction"]) & set(NAMES["diffraction_dielectric"])
+    assert set(BY_NAME) == {*NAMES["diffraction"], "(nested)"}
+    transmitting = set(entries("diffraction_dielectric"))
+    # Parameters of heights and table are described once
+    assert set(NAMES["diffraction_dielectric"]) - shared <= transmitting
+    assert transmitting <= set(NAMES["diffraction_dielectric"])
 
 
 def test_the_defaults_are_those_of_the_code(some_variant, patch):
     from mitsuba_diffraction.plugin import parameters as code
+    from mitsuba_diffraction.plugin.sources import from_cache
     from mitsuba_diffraction.tables.table import DiffractionTable
 
     def default(name):
@@ -45,13 +56,14 @@ def test_the_defaults_are_those_of_the_code(some_variant, patch):
     given = md.bsdf_dict(patch, coherence_width=4, tolerance=0.1)
     for name in ("data", "coherence_width", "tolerance"):
         properties[name] = given[name]
-    read = code.read_parameters(properties)
-    assert float(default("height_scale")) == read.height_scale
-    assert float(default("wavelength")) == read.wavelength
-    assert default("energy_conserving") == str(read.energy_conserving).lower()
+    read = code.read_parameters(properties, from_cache)
+    surface = read.surface
+    assert float(default("height_scale")) == surface.height_scale
+    assert float(default("wavelength")) == surface.wavelength
+    assert default("energy_conserving") == str(surface.energy_conserving).lower()
     assert default("shadowing") == ("vcavity" if read.vcavity else "none")
     assert default("layering") == str(read.layering)
-    assert float(default("orientation")) == read.orientation.degrees[0]
+    assert float(default("orientation")) == surface.orientation.degrees[0]
     interior, exterior = (float(index) for index in default("int_ior").split(","))
     # single precision
     assert read.reflectance.eta[0] == pytest.approx(interior / exterior, rel=1e-6)
@@ -82,7 +94,7 @@ def test_what_is_marked_differentiable_is(some_variant, patch):
         md.bsdf_dict(patch, coherence_width=4, tolerance=0.1, energy_conserving=False) | named
     )
     found = {key.split(".")[0] for key, _ in mi.traverse(bsdf)}
-    marked = {name for entry in ENTRIES if entry.differentiable for name in entry.names}
+    marked = {name for name, entry in BY_NAME.items() if entry.differentiable}
     # of indices that are given as such the parameter is the ratio, under another name
     assert found - {"film_eta"} == marked - {"(nested)"}
 

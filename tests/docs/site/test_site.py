@@ -25,7 +25,7 @@ def test_the_site_is_built_without_warnings(tmp_path):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     reference = (tmp_path / "api.html").read_text(encoding="utf-8")
-    assert 'id="mitsuba_diffraction.heights.field.HeightField"' in reference
+    assert 'id="mitsuba_diffraction.heights.field.HeightField.rms_slope"' in reference
     for page in tmp_path.rglob("*.html"):
         html = page.read_text(encoding="utf-8")
         assert not re.search(r'(?:src|href)="https?://[^"]+\.(?:js|css|woff2?)"', html), page

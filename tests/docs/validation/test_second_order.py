@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from docs.make.validation import rayleigh
-from docs.make.validation.factored import MODELS as FACTORED
-from docs.make.validation.factored import factored_cases
 from docs.make.validation.patch_solutions import solved
 from docs.make.validation.patches import cell
 from docs.make.validation.second_order import MODELS, amplitudes, cases_of_cells, coefficients
+from docs.make.validation.second_order_factor import MODELS as FACTOR
+from docs.make.validation.second_order_factor import compare_cells
 from mitsuba_diffraction import HeightField
 from mitsuba_diffraction.optics import boundary
 
@@ -93,9 +93,9 @@ def test_most_of_it_changes_sign_where_hills_are_made_pits():
 
 
 def test_as_a_factor_it_takes_most_of_the_error_on_a_cd():
-    cases = list(factored_cases(["cd_pits"], FACTORED[:2]))
+    cases = list(compare_cells(["cd_pits"], FACTOR[:2]))
     for slope, first, left in ((0.2, 0.3, 0.08), (0.06, 0.07, 0.02)):
         same = [c for c in cases if c.group.endswith(f"slope {slope:g}, from 60°")]
         assert len(same) == 2
-        assert np.mean([c.deviation[FACTORED[0]] for c in same]) > first
-        assert np.mean([c.deviation[FACTORED[1]] for c in same]) < left
+        assert np.mean([c.deviation[FACTOR[0]] for c in same]) > first
+        assert np.mean([c.deviation[FACTOR[1]] for c in same]) < left

@@ -13,7 +13,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics.fresnel import reflectance
-from mitsuba_diffraction.tables.energy import sides
+from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from tests.support.chi_square import DISPERSED, ROUGH, SMALL, Case, chi_square
 from tests.support.directions import as_single, rough_patch
 from tests.support.lanes import evaluated, interaction, refusal, spectra, vectors
@@ -52,7 +52,7 @@ def test_values_are_the_reference_s_in_both_directions(some_variant, kind, model
 def test_above_it_reflects_what_it_does_alone_and_below_as_from_within(some_variant, kind):
     wi, wo, lam = pairs(60)
     found = evaluated(both(**SIDES[kind]), wi, wo, lam)
-    alone = evaluated(both(second_order=False), wi, wo, lam)
+    alone = evaluated(load(second_order=False, **INDICES), wi, wo, lam)
     if kind == "dielectric":
         assert found == pytest.approx(alone, rel=1e-4, abs=1e-6 * alone.max())
     else:  # and what the flat side sends back
@@ -110,22 +110,20 @@ def test_of_gentle_surfaces_both_sides_add_up_to_all_light(some_variant, kind):
 
 @pytest.mark.parametrize(
     ("kind", "theta", "lengths", "width"),
-    # chains of directions are solved of the last, whose lobes are narrow
     [
         ("dielectric", 60.0, (2.5, 0.08), 20.0),
         ("sheet", 70.0, (2.5, 0.08), 20.0),
         ("sheet", 75.0, (1.1, 0.06), 40.0),
     ],
 )
-def test_conserved_both_sides_add_up_to_all_light(
-    some_variant, kind, theta, lengths, width, monkeypatch
-):
-    monkeypatch.setattr(sides, "WAVELENGTHS", (3, 3))  # one of them near 550 nm
+def test_conserved_both_sides_add_up_to_all_light(some_variant, kind, theta, lengths, width):
     period, depth = lengths
     size = {"periods": math.ceil(width / period), "pixels_per_period": math.ceil(period / 0.0895)}
     grating = md.gratings.sinusoidal(period, depth, **size)
     common = {"field": grating, "coherence_width": width, **SIDES[kind]}
+    before = use_energy_settings(EnergySettings(side_wavelengths=3))  # one of them near 550 nm
     raw, conserved = (sampled(both(energy_conserving=e, **common), theta)[0] for e in (False, True))
+    use_energy_settings(before)
     error = 3 * raw.std() / np.sqrt(len(raw))
     # first order gains light, and a sheet loses what is beyond its critical angle
     assert raw.mean() > 1.0 + error if kind == "dielectric" else raw.mean() < 0.99 - error
@@ -195,19 +193,33 @@ def test_derivatives_are_those_of_differences(some_variant, kind, name, at, step
 
 
 @pytest.mark.parametrize(
-    ("parameters", "line"),
+    ("parameters", "named"),
     [
-        ({"transmission": True, "material": "Al"}, "which the material 'conductor[Al]' does not"),
-        ({"thin": True, "material": "none"}, "thin=true lets light through"),
-        ({"transmission": True, "int_ior": 1.0, "ext_ior": 1.5}, "turn the surface round"),
-        ({"thin": True, "transmission": False}, "leave transmission=false out"),
-        ({"thin": True, "pigment": {"type": "diffuse"}}, "a nested BSDF exclude each other"),
-        ({"transmission": True, "coat_ior": 1.4}, "coat_ior exclude each other"),
-        ({"transmission": True, "coat_ior": 1.5}, "coat_ior exclude each other"),
-        ({"thin": True, "film_ior": 1.4, "film_thickness": 100.0}, "film_ior exclude each other"),
-        ({"thin": True, "shadowing": "vcavity"}, "shadowing=vcavity exclude each other"),
-        ({"thin": 1.0}, "thin=1.0 must be true or false"),
+        ({"material": "Al"}, ["material", "'diffraction'"]),
+        ({"int_ior": 1.0, "ext_ior": 1.5}, ["eta=0.666667", "1.01", "int_ior", "ext_ior"]),
+        ({"int_ior": 1.005, "ext_ior": 1.0}, ["eta=1.005", "1.01", "int_ior", "ext_ior"]),
+        ({"pigment": {"type": "diffuse"}}, ["nested", "diffraction_dielectric"]),
+        ({"coat_ior": 1.4}, ["coat_ior", "'diffraction'"]),
+        ({"film_ior": 1.4, "film_thickness": 100.0}, ["film_", "'diffraction'"]),
+        ({"shadowing": "vcavity"}, ["shadowing", "'diffraction'"]),
+        ({"second_order": True}, ["second_order", "'diffraction'"]),
+        ({"coherence": "surface"}, ["coherence='surface'", "diffraction_dielectric"]),
+        ({"thin": 1.0}, ["thin=1.0", "true or false"]),
+        ({"transmission": True}, ["transmission", "diffraction_dielectric"]),
     ],
 )
-def test_what_cannot_be_is_one_line(some_variant, parameters, line):
-    assert line in refusal(lambda: load(**parameters))
+def test_what_a_dielectric_does_not_support_is_named_in_one_line(some_variant, parameters, named):
+    line = refusal(lambda: load(plugin="diffraction_dielectric", **parameters))
+    assert all(name in line for name in named), line
+
+
+@pytest.mark.parametrize("parameters", [{"transmission": True}, {"thin": True}])
+def test_a_reflecting_surface_names_the_plugin_that_lets_light_through(some_variant, parameters):
+    line = refusal(lambda: load(**parameters))
+    assert "'diffraction_dielectric'" in line
+    assert next(iter(parameters)) in line
+
+
+def test_a_dictionary_names_an_unknown_plugin():
+    with pytest.raises(md.DiffractionError, match="plugin='glass' is unknown"):
+        md.bsdf_dict(PATCH, plugin="glass")

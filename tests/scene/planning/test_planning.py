@@ -24,7 +24,10 @@ from mitsuba_diffraction.scene.planning.plan import (
 from tests.support.directions import polar, rough_patch
 
 # Of coarse pixels: small tables. The plugin warns of that, and this is not about that.
-pytestmark = pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning")
+pytestmark = [
+    pytest.mark.thorough,
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.errors.DiffractionWarning"),
+]
 
 PATCH = rough_patch((64, 64), (0.3, 0.3), 0.2, correlation=0.2)
 #: |ωi + ωo| in the plane is 0.42: below Nyquist's frequency at all wavelengths.
@@ -246,16 +249,12 @@ def test_scenes_without_anything_to_plan_are_refused(tmp_path):
     table = {"type": "diffraction", "table": str(file), "energy_conserving": False}
     for bsdf, expected in (
         ({"type": "diffuse"}, "has no BSDF 'diffraction'"),
+        ({**table, "type": "diffraction_dielectric"}, "has no BSDF 'diffraction'"),
         (table, "come from files and stay as they are"),
     ):
         parts = {"type": "scene", "ball": {"type": "sphere", "bsdf": bsdf}}
         with pytest.raises(DiffractionError, match=expected):
             record(lambda parts=parts: mi.load_dict(parts), sensor, 100)
-
-
-def test_a_sheet_that_lets_light_through_is_refused():
-    with pytest.raises(DiffractionError, match="light goes through foil, which plans do not"):
-        record(lambda: plate(thin=True), sensor, 100)
 
 
 def test_a_scene_in_the_dark_is_refused():

@@ -14,7 +14,7 @@ from mitsuba_diffraction.settings import TableSettings
 from mitsuba_diffraction.tables.build.describe import roughness_of
 from mitsuba_diffraction.tables.build.slope_ratios import slope_ratios
 from mitsuba_diffraction.tables.build.windows import windows_of
-from mitsuba_diffraction.tables.document import described, document_of, plain
+from mitsuba_diffraction.tables.document import document_of, parse_document, plain
 from tests.support.directions import rough_patch
 
 #: Of few orders, and of many; not square.
@@ -37,7 +37,7 @@ def of_table(patches, settings: TableSettings) -> SlopeRatios:
 
 def exact(field: HeightField, order: tuple[int, int], kappa: float) -> np.ndarray:
     """r_l, r_t of an order (x, y), by plane transforms."""
-    slopes = Slopes.of(field.heights, field.pixel_size)
+    slopes = Slopes.from_heights(field.heights, field.pixel_size)
     screen = np.exp(-1j * kappa * field.heights)
     a, *products = (np.fft.fft2(f * screen)[order[::-1]] for f in (1.0, *slopes.products))
     q = 2 * np.pi * np.array(order) / field.extent
@@ -62,7 +62,7 @@ def test_cells_of_many_orders_are_their_mean_by_power():
     kappa, place = found.kappa[1], np.array([2, 1])
     q = place * found.cell
     step = 2 * np.pi / np.array(MANY.extent)
-    slopes = Slopes.of(MANY.heights, MANY.pixel_size)
+    slopes = Slopes.from_heights(MANY.heights, MANY.pixel_size)
     screen = np.exp(-1j * kappa * MANY.heights)
     spectra = [np.fft.fft2(f * screen) for f in (1.0, *slopes.products)]
     total, power = np.zeros(2, complex), 0.0
@@ -164,10 +164,10 @@ def test_of_a_damaged_file_it_is_refused(name, value):
     table = DiffractionTable.build(FEW, second_order=True, coherence_width=6.0, tolerance=0.01)
     document = document_of(table)
     assert table.summary()["second_order"]["applied"] is True
-    described(json.loads(json.dumps(document, default=plain)))
+    parse_document(json.loads(json.dumps(document, default=plain)))
     document["slope_ratios"][name] = value
     with pytest.raises(ValueError, match=r".+"):
-        described(json.loads(json.dumps(document, default=plain)))
+        parse_document(json.loads(json.dumps(document, default=plain)))
 
 
 def test_other_words_than_true_and_false_are_refused():

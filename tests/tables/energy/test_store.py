@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.tables.energy import store
-from mitsuba_diffraction.tables.energy.conservation import Conservation, DirectionalTable
+from mitsuba_diffraction.tables.energy.conservation import Conservation, Surface
+from mitsuba_diffraction.tables.energy.grid import DirectionalTable
+from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from mitsuba_diffraction.tables.energy.store import Energy
 from mitsuba_diffraction.tables.store import VARIABLE
 
@@ -18,13 +19,14 @@ def computed(monkeypatch, tmp_path):
     monkeypatch.setenv(VARIABLE, str(tmp_path))
     made: list[tuple[float, complex]] = []
 
-    def instead(table, height_scale, model, index, wavelength_range) -> Conservation:
-        made.append((height_scale, complex(index(np.array([500.0]))[0])))
+    def instead(surface: Surface, wavelength_range: tuple[float, float]) -> Conservation:
+        height_scale = surface.orders.height_scale
+        made.append((height_scale, complex(surface.index(np.array([500.0]))[0])))
         values = np.full((2, 3, 4), 1.0 + height_scale, np.float32)
         found = DirectionalTable(np.array([400.0, 700.0]), values)
         return Conservation(found, found if height_scale > 0.5 else None)
 
-    monkeypatch.setattr(store, "conservation", instead)
+    monkeypatch.setattr(Surface, "conservation", instead)
     return made
 
 
@@ -69,3 +71,14 @@ def test_another_material_is_computed_anew(computed):
     for index in (1.5, 1.5000001, 1.6, 1.5 + 0.1j):  # the second is the first to rounding
         energy(index).at(1.0)
     assert [index for _, index in computed] == [1.5, 1.6, 1.5 + 0.1j]
+
+
+def test_other_settings_are_another_record(computed):
+    energy().at(1.0)
+    before = use_energy_settings(EnergySettings(target=0.9))
+    try:
+        energy().at(1.0)
+    finally:
+        use_energy_settings(before)
+    energy().at(1.0)
+    assert len(computed) == 2

@@ -27,5 +27,5 @@ def grating() -> HeightField:
 def of_rough(rough):
     """Methods of `rough`, which share what they tabulate."""
     return methods.make_all(
-        ("default", "flss", "pq", "pq-sinc"), rough, coherence_width=WIDTH, repeats=(3, 2)
+        ("spectral", "flss", "pq", "pq-sinc"), rough, coherence_width=WIDTH, repeats=(3, 2)
     )

@@ -17,7 +17,7 @@ from tests.support.directions import lit_pairs, polar, uniform_directions
 from tests.support.thesis import WIDTH
 
 
-@pytest.mark.parametrize(("name", "coherence"), [("default", "ensemble"), ("flss", "patch")])
+@pytest.mark.parametrize(("name", "coherence"), [("spectral", "ensemble"), ("flss", "patch")])
 def test_one_wavelength_is_the_reference(rough, of_rough, name, coherence):
     wi, wo, wavelength, _ = lit_pairs(rough, sigma_of(WIDTH), 160, seed=3)
     keep = wavelength >= 380.0

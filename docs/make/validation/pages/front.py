@@ -129,7 +129,7 @@ def _cells(measured: Measurements) -> list[list[object]]:
         if not oblique:
             continue
         columns = [
-            _mean_and_worst(np.array([one[model] for one in oblique]))
+            _mean_and_worst(np.array([by_model[model] for by_model in oblique]))
             for model in ("kirchhoff", "first_order", "small_slope")
         ]
         if material == "aluminium":
@@ -177,9 +177,11 @@ is 0. On aluminium {len(against.better)} of {len(against.every)} are better than
 
 
 def _layers(measured: Measurements) -> str:
-    gentle = [one for one in measured.coats if one.grating.profile == "sinusoidal"]
-    coat = (max(getattr(one, name) for one in gentle) for name in ("single", "bounced"))
-    film = max(float(one.default.max()) for one in measured.films)
+    gentle = [
+        deviation for deviation in measured.coats if deviation.grating.profile == "sinusoidal"
+    ]
+    coat = (max(getattr(deviation, name) for deviation in gentle) for name in ("single", "bounced"))
+    film = max(float(deviation.default.max()) for deviation in measured.films)
     passage, bounced = map(percent, coat)
     rows = [
         ["coat on sinusoids of aluminium, light diffracted once", passage],

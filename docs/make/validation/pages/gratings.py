@@ -193,5 +193,5 @@ def _side_by_side(
     first: Comparison, second: Comparison, grating: Grating, angles: Sequence[float]
 ) -> list[str]:
     """Deviations of colours by both comparisons, a cell for each angle."""
-    both = (table_of(part, [grating], angles, models.of_colours)[0] for part in (first, second))
-    return [" / ".join(map(percent, pair)) for pair in zip(*both, strict=True)]
+    columns = (table_of(part, [grating], angles, models.of_colours)[0] for part in (first, second))
+    return [" / ".join(map(percent, pair)) for pair in zip(*columns, strict=True)]

@@ -19,8 +19,12 @@ def write(measured: Measurements) -> str:
 
 def _coat(measured: Measurements) -> str:
     rows = [
-        [str(one.grating), angle(one.theta), *map(percent, (one.single, one.share, one.bounced))]
-        for one in measured.coats
+        [
+            str(deviation.grating),
+            angle(deviation.theta),
+            *map(percent, (deviation.single, deviation.share, deviation.bounced)),
+        ]
+        for deviation in measured.coats
     ]
     header = ["grating", "incidence", "one passage", "share of the bounces", "with bounces"]
     return f"""## Under a coat
@@ -66,7 +70,7 @@ A film that follows the heights, beside Rayleigh's expansion at both of its face
 {table(["film", "`film_ior` + i `film_k`", "`film_thickness`"], sizes)}
 
 Deviation of colours as Kirchhoff / small slope of first order / the default, which has the
-[mean of the second order](../theory.md) as well:
+[mean of the second order](../theory/layers.md#the-mean-of-the-second-order) as well:
 
 {table(["film", "sinusoid", *map(angle, ANGLES)], rows)}
 

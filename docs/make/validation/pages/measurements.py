@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from .. import cells, coated, filmed, models, statistics
+from .. import cells, coated, filmed, models, statistics, transmitted
 from ..cases import FEW_WAVELENGTHS, Grating
 from ..compare import Comparison, compare
 from ..goals import Sides
@@ -70,6 +70,23 @@ class Measurements:
         """Deviations of gratings under each film."""
         stacks = filmed.STACKS[:1] if self.quick else filmed.STACKS
         return [filmed.compare_models(stack) for stack in stacks]
+
+    @cached_property
+    def transmitted(self) -> list[transmitted.Deviations]:
+        """Deviations of transmitted orders of gratings."""
+        return transmitted.deviations(transmitted.GRATINGS[: 1 if self.quick else None])
+
+    @cached_property
+    def sums_of_surfaces(self) -> list[transmitted.Sums]:
+        """R + T of surfaces with a narrow coherence window."""
+        names = list(transmitted.SURFACES)
+        return list(transmitted.sums_of_surfaces(names[:1] if self.quick else names))
+
+    @cached_property
+    def sums_of_recipes(self) -> list[transmitted.Sums]:
+        """R + T of recipes with their own coherence widths."""
+        recipes = [p for p in transmitted.PRECOMPUTE if not self.quick or p.stem == "cd"]
+        return list(transmitted.sums_of_recipes(recipes))
 
     @cached_property
     def statistics(self) -> statistics.Statistics:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .. import factored, goals, models
+from .. import goals, models, second_order_factor
 from ..model import DEFAULT
 from ..second_order import DEEPEST, MODELS, Case, cases_of_cells, cases_of_gratings
 from .markdown import angle, percent, table
@@ -54,9 +54,9 @@ no table of powers holds. On vertical walls the sums depend on where they are tr
 
 def _factor(measured: Measurements) -> str:
     kinds = measured.kinds if not measured.quick else ("elaphe_like",)
-    cases = list(factored.factored_cases(kinds))
-    lit = factored.MODELS[0], factored.MODELS[2]
-    header = ["surface", "cases", *factored.MODELS, *(f"light, {name}" for name in lit)]
+    cases = list(second_order_factor.compare_cells(kinds))
+    lit = second_order_factor.MODELS[0], second_order_factor.MODELS[2]
+    header = ["surface", "cases", *second_order_factor.MODELS, *(f"light, {name}" for name in lit)]
     return f"""## The factor of `second_order=true`
 
 The factor has two coefficients of directions and index, and two ratios of spectra of the heights.
@@ -64,7 +64,7 @@ The ratios of gratings are those of each order. The ratios of cuts are those of 
 them, 20 to 65 µm wide, in cells of many orders, as in tables of scans; *own orders* uses each order
 of the cut itself. Deviation of colours on keratin, mean and worst of the cases, blend included.
 
-{table(header, _rows(cases, factored.MODELS, lit))}
+{table(header, _rows(cases, second_order_factor.MODELS, lit))}
 
 On a CD in oblique light the factor removes most of the error, because all its pits are alike. On
 scales it removes a quarter with each order's own ratios and a tenth with those of the patch: the

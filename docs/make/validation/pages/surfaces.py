@@ -82,7 +82,10 @@ def _nearer(cells: Sequence[PatchComparison]) -> str:
     oblique = [c.polarised for c in cells if c.case.material == "keratin" and c.case.theta == 60.0]
     sentences = []
     for n, light in enumerate("sp"):
-        gains = [100.0 * (one["first_order"][n] - one["small_slope"][n]) for one in oblique]
+        gains = [
+            100.0 * (polarised["first_order"][n] - polarised["small_slope"][n])
+            for polarised in oblique
+        ]
         better, best, worst = sum(gain > 0.0 for gain in gains), max(gains), -min(gains)
         sentences.append(
             f"{light} light is closer in {better} of {len(gains)} directions, by at most "

@@ -200,14 +200,6 @@ float energy_scale(vec2 tangential, float cosine)
     return ON_PAGES(energy_on_page, cell);
 }
 
-// (min/max)² of two clamped cosines: see tables/energy/gain.py.
-float energy_fade(float cos_i, float cos_o)
-{
-    float one = min(cos_i, ENERGY_GRAZING), other = min(cos_o, ENERGY_GRAZING);
-    float ratio = min(one, other) / max(one, other);
-    return ratio * ratio;
-}
-
 #endif
 
 // ---------------------------------------------------------------- display

@@ -27,7 +27,7 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
 #endif
 #ifdef ENERGY_CONSERVING
     outside *= energy_scale(in_patch(wi, rotation), wi.z)
-             * energy_scale(in_patch(wo, rotation), wo.z) * energy_fade(wi.z, wo.z);
+             * energy_scale(in_patch(wo, rotation), wo.z);
 #endif
 #ifdef VCAVITY
     outside *= groove_shadow(wi.z, wo.z, one_plus_dot);

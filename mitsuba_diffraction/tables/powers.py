@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..expansion import Expansion
-from ..table import DiffractionTable
+from .expansion import Expansion
+from .table import DiffractionTable
 
 
 def kind_of(table: DiffractionTable) -> str:

@@ -16,7 +16,7 @@ from .second_order import GROUPS, Case, scored
 MODELS = ("`second_order=false`", "own orders", "`second_order=true`")
 
 
-def factored_cases(kinds: Sequence[str] = KINDS, models: Sequence[str] = MODELS) -> Iterator[Case]:
+def compare_cells(kinds: Sequence[str] = KINDS, models: Sequence[str] = MODELS) -> Iterator[Case]:
     """Compare the stored solutions of keratin cells, all together and by angle of incidence.
 
     Parameters

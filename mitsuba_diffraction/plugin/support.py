@@ -1,0 +1,96 @@
+"""Features of the model that go together, declared by each choice that a scene makes.
+
+A choice is a material, a layer, a model, a coherence or a plugin. What a scene asks for is checked
+against the declarations of all its choices, and settings that are automatic follow them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from ..errors import DiffractionError
+
+
+@dataclass(frozen=True)
+class Support:
+    """Features that one choice can be combined with.
+
+    Attributes
+    ----------
+    choice : name of the choice, for messages.
+    small_slope : the boundary model of that name.
+    second_order : the second order of small slope.
+    energy : scales that conserve energy, which need the albedo of the structure.
+    coat, film : layers over the structure.
+    nested : a BSDF beneath the structure.
+    thesis : the layering of the thesis of 2014.
+    placed : windows that sit where the light falls, `coherence="surface"`.
+    shadowing : V-shaped grooves.
+    shaders : the realtime renderer.
+    """
+
+    choice: str
+    small_slope: bool = True
+    second_order: bool = True
+    energy: bool = True
+    coat: bool = True
+    film: bool = True
+    nested: bool = True
+    thesis: bool = True
+    placed: bool = True
+    shadowing: bool = True
+    shaders: bool = True
+
+
+MIRROR = Support(
+    "material='none', a mirror without a refractive index",
+    small_slope=False, second_order=False, coat=False, film=False, nested=False,
+)  # fmt: skip
+CONDUCTOR = Support("a conductor, which lets no light through", second_order=False, nested=False)
+RARER = Support("an int_ior below the index of the medium above", second_order=False)
+KIRCHHOFF = Support("model='kirchhoff'", second_order=False)
+COAT = Support("coat_ior", energy=False, film=False, thesis=False)
+FILM = Support(
+    "a thin film (film_ior)", second_order=False, coat=False, thesis=False, shaders=False
+)
+ABSORBING = Support("film_k, which absorbs the light for what lies beneath", nested=False)
+THESIS = Support("layering='thesis'", second_order=False)
+PATCH = Support("coherence='patch'", second_order=False)
+PLACED = Support("coherence='surface'", second_order=False, shaders=False)
+COLOURS = Support("an RGB variant, whose light has no wavelengths to tell speckle by", placed=False)
+VARYING = Support("a height_scale that varies", shaders=False)
+TRANSMISSION = Support(
+    "the plugin diffraction_dielectric, through which light goes",
+    second_order=False, coat=False, film=False, nested=False, thesis=False, placed=False,
+    shadowing=False, shaders=False,
+)  # fmt: skip
+
+
+def check_combination(asked: Mapping[str, str], choices: Sequence[Support]) -> None:
+    """Refuse a feature that one of a scene's choices does not support.
+
+    Parameters
+    ----------
+    asked : what the scene asks for, as messages call it, by the name of the feature.
+    choices : declarations of all choices of the scene.
+
+    Raises
+    ------
+    DiffractionError
+        With the feature and the choice.
+    """
+    for feature, phrase in asked.items():
+        for support in choices:
+            if not getattr(support, feature):
+                raise DiffractionError(refusal(phrase, support))
+
+
+def refusal(phrase: str, support: Support) -> str:
+    """Return the message on a feature that a choice does not support."""
+    return f"{phrase} cannot be combined with {support.choice}; leave one of them out"
+
+
+def supported(feature: str, choices: Sequence[Support]) -> bool:
+    """Whether all choices support a feature."""
+    return all(getattr(support, feature) for support in choices)

@@ -1,0 +1,217 @@
+"""A surface that diffracts: the part that the plugins share, whichever way the light leaves."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
+from typing import Any, NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+
+from .boundary import Boundary
+from .directions import Pair
+from .fresnel import Reflectance, tinted
+from .layers import CoatedPair, UnderCoat, UnderFilm
+from .parameter_changes import Bounded, Changeable, arrays_within, marks, take_changes
+from .power import power_model
+from .surface_parameters import SurfaceParameters
+from .textures import LEAST_SCALE, VaryingHeightScale
+from .types import Callback, Colour, Context, Float, Interaction, Mask, Properties, Spectrum
+
+#: Component of a context that asks for all of them.
+ALL_COMPONENTS = 0xFFFFFFFF
+
+
+class ScaleRange(NamedTuple):
+    """Height scales that energy is conserved for.
+
+    largest : of the surface; lowest : where they vary, else None.
+    differentiable : whether derivatives with respect to the height scale are wanted.
+    """
+
+    largest: float
+    differentiable: bool
+    lowest: float | None
+
+
+class DiffractingSurface(mi.BSDF):
+    """Table, height scale, orientation and power of a surface; the lobe that they make.
+
+    Attributes
+    ----------
+    table : the diffraction table.
+    heights : function that reads the heights that the table is made of.
+    window_positions : positions of windows, or None where the table averages over them.
+    fresnel : reflectance of the flat surface, with its layers.
+    orientation : angle from the first tangent to the patch's x axis.
+    height_scale : mi.Float; the largest, where it varies.
+    power : `power.PowerModel` of the variant.
+    wavelength : nm, of mono variants.
+    parameters : everything that `traverse` exposes.
+    mix : the mix that the surface is part of, as a weak reference, or None.
+    """
+
+    def __init__(
+        self,
+        props: Properties,
+        surface: SurfaceParameters,
+        fresnel: Reflectance | UnderCoat | UnderFilm,
+    ) -> None:
+        super().__init__(props)
+        self.table, self.heights = surface.table, surface.heights
+        self.window_positions, self.wavelength = surface.window_positions, surface.wavelength
+        self.fresnel, self.orientation = fresnel, surface.orientation
+        self.power = power_model(self.table, self.wavelength, self.window_positions)
+        # Heights are in a medium of this optical index
+        self._set_height_scale(surface.height_scale, surface.optical)
+        self.parameters: list[Changeable] = [
+            *self._scale_changeable,
+            *self.orientation.changeable,
+            *fresnel.changeable,
+        ]
+        self.mix: weakref.ref[Any] | None = None
+        # 4π²σ⁴/A of eq. 3 and 4, with the window's area A = πσ²
+        self.area_factor = 4.0 * dr.pi * self.table.sigma**2
+
+    def _set_height_scale(self, factor: float | VaryingHeightScale, optical: float) -> None:
+        """Keep a bounded number; or factors that vary, of which `height_scale` is the largest."""
+        if isinstance(factor, VaryingHeightScale):
+            self._scale: VaryingHeightScale | Bounded = factor
+            self._varying: VaryingHeightScale | None = factor
+            self._scale_changeable: tuple[Changeable, ...] = factor.changeable
+            self.height_scale: Float = mi.Float(factor.high)
+            return
+        most = self.table.height_scale_max / optical
+        bounded = Bounded("height_scale", factor, LEAST_SCALE, most, partial(_scale_refusal, most))
+        self._scale, self._varying, self.height_scale = bounded, None, bounded.value
+        self._scale_changeable = (bounded,)
+
+    # ------------------------------------------------------------------ the model
+
+    def geometry(self, pair: Pair) -> Float:
+        """Return 4π²σ⁴ / (A w² cosθi), the part of eq. 4 that is neither power nor N'."""
+        w = pair.cos_i + pair.cos_o
+        factor = self.area_factor * dr.rcp(dr.square(w) * pair.cos_i)
+        if isinstance(pair, CoatedPair):  # directions are those within the coat
+            factor *= pair.outer.cos_o * dr.rcp(pair.cos_o)
+        return factor
+
+    def lobe(
+        self,
+        ctx: Context,
+        si: Interaction,
+        pair: Pair,
+        boundary: Boundary,
+        power: Colour,
+        active: Mask,
+    ) -> Spectrum:
+        """Return f cosθo of a boundary.
+
+        power : `geometry` times ⟨|P|²⟩ / (4π²σ⁴ λ²), per channel.
+        """
+        wavenumbers, scale = self.power.wavenumbers(si), self.scale_at(si, active)
+        factor = boundary.factor(pair, scale, wavenumbers, si, active, ctx.mode)
+        return dr.select(active, tinted(mi.Spectrum(power) * factor, boundary.material), 0.0)
+
+    def face(
+        self, ctx: Context, si: Interaction, pair: Pair, mirror: Boundary, active: Mask
+    ) -> Spectrum:
+        """Return f cosθo of a flat face: the lobe of a flat patch."""
+        power = self.geometry(pair) * self.power.flat(pair, si)
+        return self.lobe(ctx, si, pair, mirror, power, active)
+
+    def scale_at(self, si: Interaction, active: Mask) -> Float:
+        """Return the factor on the heights at points of the surface."""
+        return self._varying.at(si, active) if self._varying else self.height_scale
+
+    # ------------------------------------------------------------------ changes of parameters
+
+    def traverse(self, callback: Callback) -> None:
+        """Expose the parameters that may change without another table."""
+        self._scale.traverse(callback)
+        self.orientation.traverse(callback)
+        self.fresnel.traverse(callback)
+
+    def parameters_changed(self, keys: list[str]) -> None:
+        """Take all changes, or none of them.
+
+        Raises
+        ------
+        DiffractionError
+            If a parameter is out of bounds, as a height_scale that the table does not serve. All
+            parameters then have their last values.
+        """
+        mix = self.mix and self.mix()
+        take_changes(self, mix.together if mix else [self])
+
+    def refusals(self) -> Iterator[str | None]:
+        """See `Changing.refusals`."""
+        if self._varying is not None:
+            yield self._varying.refusal()
+
+    def derive(self) -> None:
+        """See `Changing.derive`."""
+        raise NotImplementedError
+
+    def optical_refusal(self, index: Float, name: str, parameter: str) -> str | None:
+        """Reason why heights times the index that they are in are beyond the table, or None.
+
+        name, parameter : of the index, as it changes and as it is loaded.
+        """
+        optical = float(dr.slice(dr.max(dr.detach(self.height_scale * index))))
+        if optical <= self.table.height_scale_max * (1.0 + 1e-6):
+            return None
+        return (
+            f"height_scale times {name} is {optical:g}, beyond the table's "
+            f"{self.table.height_scale_max:g}; load the plugin anew with that {parameter}"
+        )
+
+    def scale_range(self) -> ScaleRange:
+        """Return the height scales that energy is to be conserved for."""
+        largest = dr.slice(dr.max(dr.detach(self.height_scale)))
+        lowest = self._varying.range()[0] if self._varying else None
+        return ScaleRange(largest, dr.grad_enabled(self.height_scale), lowest)
+
+    def freeze(self, holders: Iterable[Any], *constants: object) -> None:
+        """Tell `dr.freeze` all arrays, and constants for which kernels are others.
+
+        holders : objects that hold arrays.
+        """
+        held = arrays_within(self.power, self.orientation, self.fresnel, self._varying, *holders)
+        self._for_freezing = held + marks(
+            self.table, str(self.window_positions), str(self._varying), *constants
+        )
+
+    # ------------------------------------------------------------------ for people
+
+    def described(self, plugin: str, model: str, conserving: bool, more: Mapping[str, Any]) -> str:
+        """Return all parameters as `to_string` shows them.
+
+        model, conserving : of the plugin; more : its other parameters.
+        """
+        placed = {}
+        if self.window_positions is not None:
+            placed["coherence"] = f"surface, {self.window_positions}"  # see textures.PLACED
+        shown = {
+            "table": self.table,
+            "coherence_width": f"{self.table.coherence_width:g} µm",
+            **placed,
+            "tolerance": f"{self.table.tolerance:g}",
+            "surface": self.fresnel,
+            "model": model,
+            "height_scale": self._varying or f"{dr.slice(self.height_scale):g}",
+            "energy_conserving": "true" if conserving else "false",
+            "orientation": self.orientation,
+            **more,
+        }
+        lines = "".join(f"  {name} = {value},\n" for name, value in shown.items())
+        return f"{plugin}[\n{lines}]"
+
+
+def _scale_refusal(most: float, height_scale: float) -> str:
+    return (
+        f"height_scale={height_scale:g} is outside what the table serves, above 0 and up to "
+        f"{most:g}; load the plugin anew with that height_scale"
+    )

@@ -1,0 +1,426 @@
+"""The Mitsuba BSDF plugin `diffraction_dielectric`: reflects light, and lets the rest through.
+
+A surface between two dielectrics, or a thin sheet with one structured side, that light meets from
+either side. It has the parameters of `diffraction` for the heights, the table (without
+`coherence=surface`), `orientation`, `height_scale` and `wavelength`, and those below. It has no
+coat, film, nested BSDF, shadowing or second order.
+
+The dielectric
+--------------
+int_ior, ext_ior : float or string [1.5, 1.000277]
+    Indices of the media below and above the surface; of a sheet, and of both sides of it. Normals
+    point to the side of ext_ior. The ratio, at least 1.01, is the differentiable parameter `eta`.
+thin : boolean [false]
+    Light goes through a sheet, whose lower side is flat; both sides have ext_ior. Light that the
+    lower side sends back is summed as between two mirrors. Light beyond the sheet's critical angle
+    is lost, unless energy_conserving puts it into order 0.
+model : string [small_slope]
+    `small_slope` or `kirchhoff`, as of `diffraction`.
+energy_conserving : boolean [true]
+    Makes R + T 1, since a dielectric loses no light: order 0 is multiplied by c(ωi) c(ωo), c on the
+    directions of both sides. It takes a few seconds the first time and is kept in the cache, in
+    steps of 0.01 of eta. `false` is the model as it is, for checks.
+
+The model is that of `diffraction` where light is reflected; light that goes through has orders of
+κ = k (n cosθt − cosθi). Component 0 is the reflection, component 1 the transmission. Orders that
+change the tangential part by more than 2/λ are left out.
+
+From below, a dielectric reflects like a surface of index 1/n in light of λ/n, and a thin sheet like
+such a surface under a coat of index n, its flat side. Light from above that the flat side sends
+back passes the structure twice, at independent positions: to first order in κ² that is one passage
+of κ = √(κi² + κo²), exact for order 0 of a Gaussian surface, with the power that two mirrors leave
+it. The formulas are those of `optics.through`.
+
+XML and the same in Python:
+
+    <bsdf type="diffraction_dielectric">
+        <string name="heightfield" value="film.toml"/>
+        <boolean name="thin" value="true"/>
+    </bsdf>
+
+    bsdf = mi.load_dict(
+        {"type": "diffraction_dielectric", "heightfield": "film.toml", "thin": True}
+    )
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import drjit as dr
+import mitsuba as mi
+
+from ..boundary import Boundary, Jones, Kirchhoff, SmallSlope, mueller
+from ..directions import Pair, TablePoint, from_patch
+from ..fresnel import Inside, squared
+from ..layers import CoatedPair, transmittances
+from ..parameter_changes import check_parameters
+from ..sampling import EVEN, direction_of, with_even_share
+from ..sources import TableProvider, from_cache
+from ..support import TRANSMISSION
+from ..surface import DiffractingSurface
+from ..types import (
+    Colour,
+    Context,
+    Float,
+    Interaction,
+    Mask,
+    Properties,
+    Rotation,
+    Sample,
+    Spectrum,
+    Vector2f,
+    Vector3f,
+)
+from .crossing import (
+    Crossing,
+    Sides,
+    Turned,
+    crossing_axes,
+    first_order,
+    order_0,
+    out_of_sheet,
+    tangent_plane,
+)
+from .energy import SidesModel
+from .parameters import read_parameters
+
+_LEAST_SHARE = 0.1
+
+
+class Asked(NamedTuple):
+    """Components that a context asks for."""
+
+    reflection: bool
+    transmission: bool
+
+
+class DiffractionDielectric(DiffractingSurface):
+    """Reflection and transmission of a dielectric that diffracts, or of a thin sheet.
+
+    Attributes
+    ----------
+    material : the dielectric.
+    boundary, inner_boundary : models of light that is reflected above and below the surface.
+    thin : whether the side below is beyond the flat side of a sheet.
+    balance : scales by which both sides add up to 1, or None.
+    """
+
+    only_traced = TRANSMISSION.choice
+
+    def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
+        read = read_parameters(props, provider)
+        super().__init__(props, read.surface, read.material)
+        self.material, self.thin, self.boundary = read.material, read.thin, read.boundary
+        inside = Inside(self.material, self.thin)
+        self.inner_boundary: Boundary = (
+            self.boundary.of(inside) if isinstance(self.boundary, SmallSlope) else Kirchhoff(inside)
+        )
+        self.mirror = Kirchhoff(self.material)
+        self.balance = None
+        if read.surface.energy_conserving:
+            self.balance = SidesModel(
+                self.table, self.material, str(self.boundary), self.thin, self.wavelength
+            )
+        sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide | mi.BSDFFlags.Anisotropic
+        transmitted = mi.BSDFFlags.GlossyTransmission | sides
+        if not self.thin:
+            transmitted = transmitted | mi.BSDFFlags.NonSymmetric
+        self.m_components = [mi.BSDFFlags.GlossyReflection | sides, transmitted]
+        self.m_flags = mi.BSDFFlags.GlossyReflection | sides | transmitted
+        check_parameters([self])
+        self.derive()
+
+    # ------------------------------------------------------------------ Mitsuba's interface
+
+    def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
+        """Return f |cosθo| per wavelength, as the context's mode of transport has it."""
+        return self.eval_pdf(ctx, si, wo, active)[0]
+
+    def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
+        """Return the density of `sample` per solid angle."""
+        return self.eval_pdf(ctx, si, wo, active)[1]
+
+    def eval_pdf(
+        self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
+    ) -> tuple[Spectrum, Float]:
+        """Return `eval` and `pdf` at once."""
+        cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
+        asked = _asked(ctx)
+        share = self._reflected_share(cos_i, asked)
+        rotation = self.orientation.rotation(si, active)
+        value, density = mi.Spectrum(0.0), mi.Float(0.0)
+        # c(ωi) c(ωo), by which order 0 makes up for what R + T lacks or exceeds
+        change = None
+        if self.balance is not None and self.balance.takes:
+            k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
+            change = self.balance.product((si.wi, wo), rotation, k, scale)
+        if asked.reflection:
+            for reflected, sign in ((self._above, 1.0), (self._below, -1.0)):
+                lit = active & (sign * cos_i > 0.0) & (cos_i * cos_o > 0.0)
+                side, orders = reflected(ctx, si, wo, rotation, lit, change)
+                value = dr.select(lit, side, value)
+                density = dr.select(lit, share * with_even_share(orders), density)
+        if asked.transmission:
+            lit = active & (cos_i * cos_o < 0.0)
+            crossing = Crossing(si, wo, rotation, lit, self.material.eta, self.thin)
+            passed = self._transmitted(ctx, si, crossing, change) * dr.abs(cos_o)
+            value = dr.select(lit, passed, value)
+            out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
+            orders = self.power.density(crossing, self.scale_at(si, active), si) * dr.square(out)
+            density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
+        return value, density
+
+    def sample(
+        self,
+        ctx: Context,
+        si: Interaction,
+        sample1: Float,
+        sample2: Vector2f,
+        active: Mask = True,
+    ) -> tuple[Sample, Spectrum]:
+        """Draw a side by the flat reflectance, then a direction by the orders."""
+        cos_i = mi.Frame3f.cos_theta(si.wi)
+        active = mi.Mask(active) & (cos_i != 0.0)
+        share = self._reflected_share(cos_i, _asked(ctx))
+        reflected = sample1 < share
+        sample1 = dr.select(
+            reflected, sample1 / dr.maximum(share, 1e-6), (sample1 - share) / (1.0 - share + 1e-6)
+        )
+        down, n = cos_i > 0.0, dr.detach(self.material.eta)
+        sides = Sides.of(n, self.thin, down)
+        inner = mi.Float(1.0) if self.thin else n
+        into = dr.select(reflected, dr.select(down, 1.0, inner), sides.into)
+        out = dr.select(reflected, into, sides.out)
+        sign = dr.select(reflected & down, 1.0, -1.0)
+        cosine = dr.abs(cos_i)
+        drawn = self.power.draw(
+            dr.select(reflected, cosine, sides.cosine(cosine, n, down, self.thin)),
+            dr.detach(self.scale_at(si, active) * dr.select(reflected & (cos_i < 0.0), n, 1.0)),
+            dr.maximum((sample1 - EVEN) * (1.0 / (1.0 - EVEN)), 0.0),
+            sample2,
+            si,
+        )
+        rotation = self.orientation.rotation(si, active)
+        total = sign * from_patch(drawn, rotation) - into * mi.Vector2f(si.wi.x, si.wi.y)
+        wo = dr.select(
+            sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), direction_of(total / out)
+        )
+        active &= wo.z > 0.0
+        wo.z = dr.select(reflected == down, wo.z, -wo.z)
+        value, density = self.eval_pdf(ctx, si, wo, active)
+        active &= density > 0.0
+        result = dr.zeros(mi.BSDFSample3f)
+        result.wo = wo
+        result.pdf = dr.select(active, density, 0.0)
+        result.eta = dr.select(reflected, 1.0, out / into)
+        kinds = mi.BSDFFlags.GlossyReflection, mi.BSDFFlags.GlossyTransmission
+        result.sampled_type = dr.select(reflected, mi.UInt32(+kinds[0]), mi.UInt32(+kinds[1]))
+        result.sampled_component = dr.select(reflected, mi.UInt32(0), mi.UInt32(1))
+        return result, dr.select(active, value / dr.select(active, density, 1.0), 0.0)
+
+    def eval_diffuse_reflectance(self, si: Interaction, active: Mask = True) -> Spectrum:
+        """Return the reflectance of the flat surface at normal incidence, for denoisers."""
+        reflectance = mi.Spectrum(self.material.reflectance(mi.Float(1.0), si, active))
+        return dr.select(active, dr.clip(reflectance, 0.0, 1.0), 0.0)
+
+    # ------------------------------------------------------------------ reflection
+
+    def _above(
+        self,
+        ctx: Context,
+        si: Interaction,
+        wo: Vector3f,
+        rotation: Rotation,
+        lit: Mask,
+        change: Colour | None,
+    ) -> tuple[Spectrum, Float]:
+        """Return f cosθo and density of light that stays above the surface."""
+        scale, pair = self.scale_at(si, lit), Pair(si, wo, rotation, lit)
+        power = self.geometry(pair) * self._power(si, pair, scale, change)
+        value = self.lobe(ctx, si, pair, self.boundary, power, lit)
+        if self.thin:
+            value += self._returned(si, pair, scale, change)
+        return value, self.power.density(pair, scale, si)
+
+    def _below(
+        self,
+        ctx: Context,
+        si: Interaction,
+        wo: Vector3f,
+        rotation: Rotation,
+        lit: Mask,
+        change: Colour | None,
+    ) -> tuple[Spectrum, Float]:
+        """Return f cosθo and density of light that stays below the surface, or below a sheet."""
+        n, scale = self.material.eta, self.scale_at(si, lit)
+        if self.thin:
+            outer = Turned(si, wo, rotation, lit, mi.Float(1.0))
+            pair = CoatedPair(outer, n)
+            power = self.geometry(pair) * self._power(si, pair, scale, change)
+            value = self.lobe(ctx, si, pair, self.inner_boundary, power, lit)
+            face = self.face(ctx, si, outer, self.mirror, lit)
+            value += face if change is None else mi.Spectrum(change) * face
+            return value, self.power.density(outer, scale * n, si)
+        inner = Turned(si, wo, rotation, lit, n)
+        power = self.geometry(inner) * self._power(si, inner.place, scale, change)
+        # a new mask, for the caller's stays as it is: tables do not reach farther
+        lit = lit & inner.reached
+        value = self.lobe(ctx, si, inner, self.inner_boundary, power, lit) * dr.square(n)
+        return value, self.power.density(inner, scale * n, si) * dr.square(n)
+
+    def _returned(
+        self, si: Interaction, pair: Pair, scale: Float, change: Colour | None
+    ) -> Spectrum:
+        """f cosθo of light that the flat side of a sheet sends back through the structure."""
+        n = self.material.eta
+        ends, returned = [], []
+        for cosine in (pair.cos_i, pair.cos_o):
+            ends.append(dr.sqrt(dr.fma(cosine, cosine, n * n - 1.0)) - cosine)
+            passed = transmittances(cosine, n)
+            # T² R / (1 − R²) of each polarisation
+            returned.append(0.5 * sum(t * (1.0 - t) * dr.rcp(2.0 - t) for t in passed))
+        point = TablePoint(pair.uv, dr.sqrt(dr.fma(ends[0], ends[0], dr.square(ends[1]))))
+        power = self._power(si, point, scale, change)
+        factor = self.area_factor * dr.safe_sqrt(returned[0] * returned[1]) * pair.cos_o
+        return mi.depolarizer(power * factor)
+
+    def _power(
+        self, si: Interaction, point: Pair | TablePoint, scale: Float, change: Colour | None
+    ) -> Colour:
+        """Return ⟨|P|²⟩ / (4π²σ⁴ λ²) per channel, with order 0 multiplied by `change`."""
+        power = self.power.power(point, scale, si)
+        if change is None:
+            return power
+        # Speckle may be dark where the ensemble's order 0 is not
+        return power + (change - 1.0) * dr.minimum(self.power.zeroth(point, scale, si), power)
+
+    # ------------------------------------------------------------------ transmission
+
+    def _transmitted(
+        self,
+        ctx: Context,
+        si: Interaction,
+        crossing: Crossing,
+        change: Colour | None,
+    ) -> Spectrum:
+        """Return f of light that goes through, as the mode of transport has it.
+
+        Order 0 has what the flat surface transmits, and is finite where w → 0, as all others are.
+        """
+        point, scale = crossing.place, self.scale_at(si, crossing.active)
+        power, zeroth = self.power.power(point, scale, si), self.power.zeroth(point, scale, si)
+        zeroth = dr.minimum(zeroth, power)  # speckle may be dark
+        axes = crossing_axes(-crossing.above, crossing.inside)
+        per_w = crossing.n * dr.rcp(dr.square(point.w) * crossing.q0 * -crossing.inside.z)
+        others = self._factor(ctx, si, crossing, axes, self._matrices(si, crossing, axes))
+        flat = self._factor(ctx, si, crossing, axes, [order_0(crossing, axes, self.thin)])
+        value = mi.Spectrum((power - zeroth) * per_w) * others
+        value += mi.Spectrum(zeroth if change is None else zeroth * change) * flat
+        outside = mi.Float(self.area_factor)
+        if not self.thin:
+            # Radiance over n² is transmitted; light along ωi or ωo
+            down = mi.Frame3f.cos_theta(si.wi) > 0.0
+            scales = mi.Float(1.0), dr.square(crossing.n)
+            if ctx.mode == mi.TransportMode.Importance:
+                scales = scales[::-1]
+            outside *= dr.select(down, *scales)
+        return dr.select(crossing.active, value * outside, 0.0)
+
+    def _matrices(
+        self,
+        si: Interaction,
+        crossing: Crossing,
+        axes: tuple[Vector3f, Vector3f],
+    ) -> list[Jones]:
+        """Return 2 cosθi cosθt J of light from above, of each channel or of all."""
+        tangent = tangent_plane(crossing, axes)
+        if not isinstance(self.boundary, SmallSlope):
+            return [out_of_sheet(tangent, crossing)] if self.thin else [tangent]
+        first = first_order(crossing, axes, self.thin)
+        shares = self.boundary.shares(
+            crossing.place,
+            self.scale_at(si, crossing.active),
+            self.power.wavenumbers(si),
+            [crossing.n],
+        )
+        blended = [
+            tuple(b + (k - b) * share for k, b in zip(tangent, first, strict=True))
+            for share in shares
+        ]
+        return [out_of_sheet(jones, crossing) for jones in blended] if self.thin else blended
+
+    def _factor(
+        self,
+        ctx: Context,
+        si: Interaction,
+        crossing: Crossing,
+        axes: tuple[Vector3f, Vector3f],
+        matrices: list[Jones],
+    ) -> Spectrum:
+        """Return ½ Σ|J|², or Mueller matrices, for each channel."""
+        if not mi.is_polarized:
+            powers = [0.5 * sum(map(squared, jones)) for jones in matrices]
+            return mi.UnpolarizedSpectrum(powers if len(powers) > 1 else powers[0])
+        # light that goes up is that which goes down, reversed: with other s, so other signs
+        importance = ctx.mode == mi.TransportMode.Importance
+        falls = (mi.Frame3f.cos_theta(si.wi) > 0.0) == mi.Mask(importance)
+        ends = -crossing.above, crossing.below
+        light = tuple(
+            dr.select(falls, *both) for both in ((ends[0], -ends[1]), (ends[1], -ends[0]))
+        )
+        about = tuple(
+            dr.select(falls, *both) for both in ((axes[0], -axes[1]), (axes[1], -axes[0]))
+        )
+        turned_round = [
+            (ss, dr.select(falls, sp, -ps), dr.select(falls, ps, -sp), pp)
+            for ss, sp, ps, pp in matrices
+        ]
+        return mueller(turned_round, light, about)
+
+    def _reflected_share(self, cos_i: Float, asked: Asked) -> Float:
+        """Share of the samples that stay on their side."""
+        if not (asked.reflection and asked.transmission):
+            return mi.Float(1.0 if asked.reflection else 0.0)
+        cosine = dr.abs(cos_i) if self.thin else cos_i
+        flat = dr.detach(mi.fresnel(cosine, self.material.eta)[0])
+        if self.thin:
+            flat = 2.0 * flat * dr.rcp(1.0 + flat)
+        return dr.clip(flat, _LEAST_SHARE, 1.0 - _LEAST_SHARE)
+
+    # ------------------------------------------------------------------ changes of parameters
+
+    def refusals(self) -> Iterator[str | None]:
+        """See `Changing.refusals`."""
+        yield from super().refusals()
+        yield self.optical_refusal(self.material.eta, "eta", "int_ior")
+
+    def derive(self) -> None:
+        """Compute what depends on the parameters: the index, and scales of both sides."""
+        self.material.derive()
+        if self.balance is not None:
+            self.balance.update(*self.scale_range())
+        self.freeze(
+            (self.balance, self.boundary, self.inner_boundary, self.mirror),
+            self.thin,
+            str(self.boundary),
+            0 if self.balance is None else self.balance.takes,
+        )
+
+    def to_string(self) -> str:
+        """Describe all parameters, for people."""
+        more = {"thin": "true" if self.thin else "false"}
+        return self.described(
+            "DiffractionDielectric", str(self.boundary), self.balance is not None, more
+        )
+
+
+def _asked(ctx: Context) -> Asked:
+    return Asked(
+        ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0),
+        ctx.is_enabled(mi.BSDFFlags.GlossyTransmission, 1),
+    )
+
+
+mi.register_bsdf("diffraction_dielectric", DiffractionDielectric)

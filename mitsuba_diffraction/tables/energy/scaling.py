@@ -1,0 +1,70 @@
+"""Scaling a symmetric kernel to given sums, by a scale on a grid of directions (NumPy only)."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .grid import Array, Real
+from .settings import EnergySettings
+
+Floats = NDArray[np.floating[Any]]
+
+#: Least sum that is scaled.
+_LEAST = np.float32(1e-6)
+
+
+def scaled(
+    transport: Callable[[Any], Floats], aim: Floats, largest: Real | float, sweeps: int
+) -> Array:
+    """Return s such that s Ms is `aim`, by the iteration of Sinkhorn and Knopp (1967).
+
+    transport : M, a symmetric kernel's sums for weights on a grid.
+    largest : upper limit of s.
+    """
+    s = np.ones_like(aim, np.float32)
+    # series of few terms may sum to less than 0 where next to nothing is reflected
+    aim = np.maximum(aim, _LEAST)
+    for _ in range(sweeps):
+        s = s * np.sqrt(aim / np.maximum(s * transport(s), _LEAST))
+        s = np.minimum(s, largest).astype(np.float32)
+    return s
+
+
+def lowered(
+    scale: Array, excess: Sequence[Callable[[Array], Array]], settings: EnergySettings
+) -> Array:
+    """Return a scale (n, …, polar + 1, azimuthal) lowered until nothing is in excess between nodes.
+
+    excess : between each two wavelengths, or of the only one: from a scale's page to the factors,
+        1 or more, by which an albedo in each cell (…, polar, azimuthal) is too large.
+    """
+    for turn in range(settings.passes):
+        pages = [0.5 * (scale[n] + scale[min(n + 1, len(scale) - 1)]) for n in range(len(excess))]
+        cells = parallel(lambda each: each[0](each[1]), list(zip(excess, pages, strict=True)))
+        between = np.stack([_largest_around(cell) for cell in cells])
+        if len(scale) > 1:
+            ends = between[:1], np.maximum(between[1:], between[:-1]), between[-1:]
+            between = np.concatenate(ends)
+        last = turn == settings.passes - 1
+        scale = (scale / (between if last else np.sqrt(between))).astype(np.float32)
+    return scale
+
+
+def _largest_around(cells: Array) -> Array:
+    """From cells (…, polar, azimuthal) to vertices, each the largest of the cells around it."""
+    first = np.broadcast_to(cells[..., :1, :].max(axis=-1, keepdims=True), cells[..., :1, :].shape)
+    around = np.maximum(cells[..., 1:, :], cells[..., :-1, :])
+    rows = np.concatenate([first, around, cells[..., -1:, :]], axis=-2)  # all meet at the normal
+    return np.asarray(np.maximum(rows, np.roll(rows, 1, axis=-1)))
+
+
+def parallel(function: Callable[[Any], Any], arguments: Iterable[Any]) -> list[Any]:
+    """Return results for all arguments, by as many threads as there are processors."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(function, arguments))

@@ -1,0 +1,72 @@
+"""Resolution and limits of what conserves energy: one record, all of it part of the cache's key."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+#: Raised whenever the computation changes.
+VERSION = 15
+
+
+@dataclass(frozen=True)
+class EnergySettings:
+    """How finely energy is conserved, and how far scales may go.
+
+    Attributes
+    ----------
+    polar, azimuthal : cells of the grid that scales are tabulated on.
+    side_polar, side_wavelengths : of the scale of both sides of a dielectric, whose light bends
+        quickly towards the critical angle.
+    wavelengths, film_wavelengths : of a scale; under a film, whose fringes albedos follow, more. In
+        variants of one wavelength there is one.
+    coarse_polar, coarse_azimuthal, coarse_wavelengths : of the albedo of the model as it is, which
+        tells whether a scale is needed.
+    parts, few_parts : a cell is looked at in the middles of so many parts either way; on surfaces
+        of at most `few_orders` strong orders, whose albedos have kinks, in more.
+    rings, steps : directions of the quadrature over weak orders: rings, and azimuths on the widest.
+    sweeps : of Sinkhorn and Knopp's iteration.
+    threshold : an albedo that is nowhere above needs no scale.
+    target : albedos above are scaled to this; what is left to 1 is for what lies between nodes.
+    ceiling : most that is left between nodes.
+    largest : of a scale; of all light at most 1 from 80° on, since part of a lobe is below the
+        horizon there, and what is above reaches across directions of very different scales.
+    close : R + T that differs from 1 by less needs no scale.
+    passes : how often scales are lowered where an albedo between nodes is above the ceiling.
+    """
+
+    polar: int = 40
+    azimuthal: int = 60
+    side_polar: int = 80
+    side_wavelengths: int = 8
+    wavelengths: int = 16
+    film_wavelengths: int = 16
+    coarse_polar: int = 20
+    coarse_azimuthal: int = 30
+    coarse_wavelengths: int = 4
+    parts: int = 1
+    few_parts: int = 3
+    few_orders: int = 32
+    rings: int = 36
+    steps: int = 80
+    sweeps: int = 12
+    threshold: float = 0.99
+    target: float = 0.992
+    ceiling: float = 1.001
+    largest: float = 1.5
+    close: float = 5e-4
+    passes: int = 4
+
+
+_settings = EnergySettings()
+
+
+def energy_settings() -> EnergySettings:
+    """Return the settings by which this process conserves energy."""
+    return _settings
+
+
+def use_energy_settings(settings: EnergySettings) -> EnergySettings:
+    """Conserve energy by other settings in this process from now on; return the previous ones."""
+    global _settings
+    previous, _settings = _settings, settings
+    return previous

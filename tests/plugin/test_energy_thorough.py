@@ -1,0 +1,183 @@
+"""Energy conservation: white furnaces, reciprocity, and what stays raw."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction.optics.geometry import wavenumber
+from tests.support.directions import polar
+from tests.support.furnace import (
+    DIELECTRIC,
+    SURFACES,
+    assert_at_most_white,
+    bsdf,
+    furnace,
+    furnace_in,
+    random_directions,
+    white_pair,
+)
+from tests.support.lanes import lanes
+
+# the surfaces are steep on purpose
+pytestmark = [
+    pytest.mark.thorough,
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+    pytest.mark.usefixtures("variant"),
+]
+
+#: Every surface with random numbers of its own.
+SEEDED = [(name, seed) for seed, name in enumerate(SURFACES)]
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_white_furnace_of_the_diffraction_alone(name):
+    assert_at_most_white(bsdf(name))
+
+
+@pytest.mark.parametrize(("name", "seed"), SEEDED)
+def test_white_furnace_of_one_wavelength(name, seed):
+    """Mono variants make the scale at the one wavelength they have; gratings of a real metal."""
+    mi.set_variant("llvm_ad_mono")
+    rng = np.random.default_rng(seed)
+    material = "none" if name == "rough" else "Al"
+    parameters = {"material": material, "wavelength": float(rng.uniform(400.0, 700.0))}
+    directions = random_directions(rng, 80.0)
+    mean, error = furnace_in(bsdf(name, **parameters), directions, seed)
+    raw, _ = furnace_in(bsdf(name, energy_conserving=False, **parameters), directions, seed)
+    assert raw.max() > 1.02  # or there would be nothing to take
+    assert np.all(mean <= 1.0 + 4.0 * error + 1e-3)
+    # what may be kept is, but for the tenth that is steepest between an order and the next
+    short = np.minimum(raw, 1.0) - mean > 0.03 + 4.0 * error
+    assert short.mean() < 0.1
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_white_furnace_in_colours(name):
+    """RGB variants have one scale for each channel, the mean over its wavelengths."""
+    mi.set_variant("llvm_ad_rgb")
+    directions = random_directions(np.random.default_rng(3), 80.0)
+    mean, error = furnace_in(bsdf(name), directions, 3)
+    # what is a mean over wavelengths is not each wavelength's
+    assert np.all(mean <= 1.0 + 4.0 * error + 5e-3)
+    assert np.median(mean) > 0.9
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_white_furnace_over_a_white_base(name):
+    assert_at_most_white(white_pair(name))
+
+
+@pytest.mark.parametrize("base", [False, True])
+@pytest.mark.parametrize(("name", "seed"), SEEDED)
+def test_white_furnace_at_random_directions(name, base, seed):
+    surface = white_pair(name, orientation=10.0 * seed) if base else bsdf(name)
+    assert_at_most_white(surface, seed)
+
+
+@pytest.mark.parametrize("base", [False, True])
+@pytest.mark.parametrize("name", ["sinusoid", "rough"])
+def test_white_furnace_in_its_own_shade(name, base):
+    load = white_pair if base else bsdf
+    assert_at_most_white(load(name, shadowing="vcavity"))
+
+
+def test_reciprocity_of_a_surface_and_its_base():
+    assert_reciprocal(white_pair("rough", orientation=20.0), 1)
+
+
+def test_the_raw_model_gains_energy():
+    # the sinusoid at 75°, λ such that an order leaves at the horizon: well above white
+    surface = bsdf("sinusoid", energy_conserving=False)
+    assert furnace(surface, [75.0] * 8, [0.0])[0].max() > 1.2
+
+
+def test_white_furnace_of_the_measured_patch(shared_afm):
+    patch = md.HeightField.load(
+        shared_afm / "elaphe-65um.png", pixel_size=65 / 1332, max_height=0.375
+    )
+    assert_at_most_white(mi.load_dict(md.bsdf_dict(patch, material="none")))
+
+
+@pytest.mark.parametrize("shadowing", ["none", "vcavity"])
+@pytest.mark.parametrize(("name", "seed"), SEEDED)
+def test_reciprocity(name, shadowing, seed):
+    assert_reciprocal(bsdf(name, shadowing=shadowing, orientation=20.0), seed)
+
+
+def assert_reciprocal(surface, seed: int) -> None:
+    n = 4096
+    rng = np.random.default_rng(seed)
+    z, azimuth = rng.uniform(0.01, 1.0, (2, n)), rng.uniform(0.0, 2.0 * np.pi, (2, n))
+    sine = np.sqrt(1.0 - z**2)
+    wi, wo = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), z], axis=1)
+    si = dr.zeros(mi.SurfaceInteraction3f, n)
+    si.wavelengths = mi.Spectrum(400.0, 500.0, 600.0, 700.0)
+    values = []
+    for one, other in ((wi, wo), (wo, wi)):
+        si.wi = mi.Vector3f(one.astype(np.float32))
+        value = surface.eval(mi.BSDFContext(), si, mi.Vector3f(other.astype(np.float32)))
+        values.append(np.array(value) / other[2])
+    # single precision; differences of up to 1e-4 of the largest come from cancelling in ωi + ωo
+    assert values[0] == pytest.approx(values[1], rel=1e-3, abs=1e-4 * values[0].max())
+
+
+def test_only_the_values_change_not_the_samples():
+    conserving, raw = bsdf("sinusoid"), bsdf("sinusoid", energy_conserving=False)
+    si = dr.zeros(mi.SurfaceInteraction3f, 1000)
+    si.wi = mi.Vector3f(polar(60.0, 10.0))
+    si.wavelengths = mi.Spectrum(400.0, 500.0, 600.0, 700.0)
+    rng = mi.PCG32(1000)
+    numbers = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+    context = mi.BSDFContext()
+    one, other = (b.sample(context, si, *numbers)[0] for b in (conserving, raw))
+    assert np.array_equal(np.array(one.wo), np.array(other.wo))
+    assert np.array_equal(np.array(one.pdf), np.array(other.pdf))
+    values = (np.array(b.eval(context, si, one.wo)) for b in (conserving, raw))
+    assert next(values).mean() < next(values).mean()
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_a_white_base_gets_what_the_model_does_not_reflect(name):
+    """White Lambertian beneath: a + T ∫T cosθ/π dω, with T = 1 − a of the furnace itself."""
+    alone, pair = bsdf(name, **DIELECTRIC), white_pair(name)
+    directions = np.array([polar(theta, 37.0) for theta in (0.0, 50.0, 75.0)])
+    reflected, error = furnace_in(alone, directions, 0)
+    total, other_error = furnace_in(pair, directions, 0)
+    rng = np.random.default_rng(1)
+    cosine, azimuth = np.sqrt(rng.uniform(0.0, 1.0, 400)), rng.uniform(0.0, 2 * np.pi, 400)
+    sine = np.sqrt(1.0 - cosine**2)
+    hemisphere = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], axis=1)
+    mean = 1.0 - furnace_in(alone, hemisphere, 0)[0].mean()
+    expected = reflected + (1.0 - reflected) * mean
+    # four standard errors, and 5e-3 for the 400 directions, four wavelengths each, of the mean
+    assert np.all(np.abs(total - expected) < 4.0 * (error + other_error) + 5e-3)
+    assert total.max() < 1.0
+
+
+def test_the_bound_follows_height_scale():
+    surface = bsdf("sinusoid")
+    parameters = mi.traverse(surface)
+    parameters["height_scale"] = 1.3
+    parameters.update()
+    assert_at_most_white(surface)
+
+
+def test_kernels_twin_agrees_with_numpy():
+    surface = bsdf("sinusoid")
+    model = surface._energy
+    found = model._energy.at(1.0).scale
+    rng = np.random.default_rng(0)
+    z, azimuth = rng.uniform(0.02, 1.0, 500), rng.uniform(-np.pi, np.pi, 500)
+    sine = np.sqrt(1.0 - z**2)
+    x, y, cosine = (lanes(c) for c in (sine * np.cos(azimuth), sine * np.sin(azimuth), z))
+    for wavelength in (360.0, 512.0, 830.0):
+        k = mi.Float(float(wavenumber(wavelength)))
+        ours = model._scale.at(mi.Vector2f(x, y), cosine, [k], mi.Float(1.0))[0]
+        # single precision in acos, amplified where the scale is steep
+        assert np.array(ours) == pytest.approx(
+            found.at(np.arccos(z), azimuth, wavelength), rel=2e-3
+        )

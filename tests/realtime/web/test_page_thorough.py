@@ -1,0 +1,188 @@
+"""The page in a browser without a window: what the reader does there, and what it may lack."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.realtime.web import Viewer
+from mitsuba_diffraction.realtime.web.export import MAX_BYTES, Page, make_page
+from tests.support.pictures import picture
+
+pytestmark = pytest.mark.thorough
+
+
+def test_colours_move_with_the_light_and_come_back(page_file: Path, tab: Any) -> None:
+    opened = tab((400, 300))
+    assert opened.open(page_file) == "ready"
+
+    def chromaticities() -> NDArray[np.float64]:
+        image = picture(opened)[..., :3].astype(float)
+        return image / np.maximum(image.sum(axis=-1, keepdims=True), 1e-6)
+
+    first = chromaticities()
+    opened.page.keyboard.down("Shift")
+    opened.page.mouse.move(60, 200)
+    opened.page.mouse.down()
+    opened.page.mouse.move(110, 180, steps=4)
+    opened.page.mouse.up()
+    opened.page.keyboard.up("Shift")
+    moved = chromaticities()
+    # the camera stands still, so the ground keeps its colours; those of the roll run
+    changed = np.abs(moved - first).max(axis=-1)
+    assert (changed > 0.1).sum() > 100
+    assert np.median(changed) < 0.02
+    opened.page.keyboard.press("r")
+    np.testing.assert_allclose(chromaticities(), first, atol=1e-3)
+    assert opened.said == []
+
+
+def test_the_mouse_turns_moves_and_zooms(page_file: Path, tab: Any) -> None:
+    opened = tab((400, 300))
+    assert opened.open(page_file) == "ready"
+    mouse, keyboard = opened.page.mouse, opened.page.keyboard
+
+    def camera() -> dict[str, Any]:
+        return dict(
+            opened.page.evaluate("({eye: viewer.camera.eye, target: viewer.camera.target})")
+        )
+
+    def dragged(key: str | None = None) -> dict[str, Any]:
+        if key:
+            keyboard.down(key)
+        mouse.move(60, 150)
+        mouse.down()
+        mouse.move(90, 160)
+        mouse.up()
+        if key:
+            keyboard.up(key)
+        return camera()
+
+    start = camera()
+    distance = np.linalg.norm(np.subtract(start["eye"], start["target"]))
+    turned = dragged()
+    assert np.allclose(turned["target"], start["target"])
+    assert not np.allclose(turned["eye"], start["eye"], atol=0.1)
+    far = np.linalg.norm(np.subtract(turned["eye"], turned["target"]))
+    np.testing.assert_allclose(far, distance, rtol=1e-6)
+    panned = dragged("Control")
+    assert not np.allclose(panned["target"], start["target"], atol=0.1)
+    mouse.wheel(0, -100)
+    opened.page.wait_for_function(f"viewer.camera.distance < {0.95 * distance}")
+    assert opened.said == []
+
+
+def test_sliders_change_the_picture(page_file: Path, tab: Any) -> None:
+    opened = tab()
+    assert opened.open(page_file) == "ready"
+    before = picture(opened)[..., :3]
+    opened.page.evaluate(
+        "element('heights').value = -1, element('heights').dispatchEvent(new Event('input'))"
+    )
+    lower = picture(opened)[..., :3]
+    # half the height: about a quarter of the light in the orders
+    assert np.abs(lower - before).sum() > 0.02 * before.sum()
+    shown = "element('canvas').toDataURL()"
+    dim = opened.page.evaluate(shown)
+    opened.page.evaluate(
+        "element('exposure').value = 1, element('exposure').dispatchEvent(new Event('input'))"
+    )
+    assert opened.page.evaluate(shown) != dim
+    assert opened.page.inner_text("#exposure_value") == "+1.0 EV"
+
+
+@pytest.mark.parametrize(
+    ("script", "words"),
+    [
+        ("HTMLCanvasElement.prototype.getContext = () => null", "has no WebGL 2"),
+        ("WebGL2RenderingContext.prototype.getExtension = () => null", "EXT_color_buffer_float"),
+        ("delete window.DecompressionStream", "cannot unpack"),
+        (
+            """const all = WebGL2RenderingContext.prototype.getParameter;
+            WebGL2RenderingContext.prototype.getParameter = function (name) {
+                return name === this.MAX_TEXTURE_SIZE ? 64 : all.call(this, name);
+            }""",
+            "this device supports 64",
+        ),
+    ],
+)
+def test_browsers_that_lack_something_are_told_so(
+    page_file: Path, tab: Any, script: str, words: str
+) -> None:
+    opened = tab(script=script)
+    assert opened.open(page_file) == "failed"
+    assert words in opened.page.inner_text("#message")
+    assert opened.said == []
+
+
+def test_maps_in_single_precision_need_linear_filtering(
+    page: Page, tab: Any, tmp_path: Path
+) -> None:
+    # as if half floats could not hold the ground's map
+    text = page.text.replace('"kind": "picture"', '"kind": "single"')
+    path = tmp_path / "single.html"
+    path.write_text(text, encoding="utf-8")
+    lacking = """const all = WebGL2RenderingContext.prototype.getExtension;
+        WebGL2RenderingContext.prototype.getExtension = function (name) {
+            return name === "OES_texture_float_linear" ? null : all.call(this, name);
+        }"""
+    opened = tab(script=lacking)
+    assert opened.open(path) == "failed"
+    assert "linear filtering of float textures" in opened.page.inner_text("#message")
+
+
+def test_a_notebook_shows_the_same_page(
+    scene: Any, page: Page, tab: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mitsuba_diffraction.realtime.web.export.make_page", lambda *_, **__: page)
+    path = tmp_path / "cell.html"
+    path.write_text(f"<!DOCTYPE html>{Viewer(scene, height=200)._repr_html_()}", encoding="utf-8")
+    opened = tab((400, 300))
+    opened.page.goto(path.as_uri())
+    (frame,) = opened.page.main_frame.child_frames
+    assert opened.state(frame) == "ready"
+    assert frame.evaluate("viewer.drawing.height") == 200
+    assert opened.said == []
+
+
+def test_the_page_is_small_and_says_what_rounding_costs(page: Page) -> None:
+    assert len(page.text.encode()) < MAX_BYTES
+    assert list(page.loss) == ["lut", "spectral"]
+    for mean, most in page.loss.values():
+        assert 0.0 < mean < 0.15  # nobody sees a tenth
+        assert mean < most
+    assert page.left_out == {}
+
+
+def test_only_what_diffracts_light_twice_carries_what_that_takes(page: Page) -> None:
+    text = page.text.partition('id="header" type="application/json">')[2].partition("</script>")[0]
+    surfaces = json.loads(text)["surfaces"]
+    assert len(surfaces) == 2
+    for surface in surfaces:
+        names = {texture["name"] for texture in surface["parts"]["textures"]}
+        carried = {"slope_ratios", "second_coefficients"} & names
+        assert len(carried) == (2 if "height_scale" in surface else 0)
+
+
+def test_what_does_not_fit_is_left_out_from_the_last_on(
+    scene: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from mitsuba_diffraction.realtime.web import export as packing
+
+    # the pages of the triangles alone take 0.35 MB
+    monkeypatch.setattr(packing, "_HEADER", MAX_BYTES - 1000)
+    monkeypatch.setattr(packing, "OCTAVES", (0.0,))
+    with pytest.raises(DiffractionError, match=r"is too large for a page \(spectral: .*; lut: "):
+        make_page(scene)
+
+
+@pytest.mark.parametrize("methods", [["flss"], [], ["lut", "lut"]])
+def test_unknown_methods_are_refused_with_the_choices(scene: Any, methods: list[str]) -> None:
+    with pytest.raises(DiffractionError, match="choose from lut, spectral"):
+        make_page(scene, methods=methods)

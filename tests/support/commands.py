@@ -1,0 +1,102 @@
+"""Commands that pages show, run on small patches and pictures."""
+
+from __future__ import annotations
+
+import gc
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction.cli import main
+from scenes.make.__main__ import main as make_mesh
+from tests.support.clone import small_clone
+from tests.support.instruments import nanoscope
+from tests.support.pages import blocks, spans, typed
+
+NOT_RUN = {"view", "tradeoff", "compare", "plan", "--plan"}
+# as small as commands may be asked to be; the last option of a name counts
+SMALL = {
+    "render": ["-s", "2", "-m", "scalar_spectral"],
+    "brdf-map": ["--resolution", "24", "--step", "50", "--samples", "1"],
+    "evaluate": ["--step", "50", "--angle-step", "2", "--windows", "2", "--coherence-width", "10"],
+    "sweep": ["--coherence-width", "10", "--resolution", "12", "--step", "100", "--no-compiled"],
+    "export-viewer": ["--method", "spectral"],
+    "export-shader": ["--coherence-width", "4", "--tolerance", "0.05"],
+    "survey": ["--coherence-width", "4", "--tolerance", "0.05", "--resolution", "16"],
+}
+
+
+def commands(page: str) -> list[list[str]]:
+    """Words of a page's commands that are run here: those of blocks, then those of sentences."""
+    lines = [words for text in blocks(page, "sh") for words in typed(text)]
+    lines += [words for span in spans(page) for words in typed(span) if len(words) > 2]
+    # FILE and TABLE stand for what the reader has
+    lines = [words for words in lines if not any(w.isalpha() and w.isupper() for w in words)]
+    return [
+        words
+        for words in lines
+        if (Path(words[0]).name == "mitsuba-diffraction" and NOT_RUN.isdisjoint(words))
+        or (words[1:3] == ["-m", "scenes.make"] and len(words) > 4)
+    ]
+
+
+def run(words: list[str]) -> None:
+    """Run a command, smaller than it stands there."""
+    gc.collect()  # as in a process of its own, without the BSDFs of the command before
+    if words[1] == "-m":
+        assert make_mesh(words[3:]) == 0
+        return
+    _, command, *rest = words
+    rest = [word.replace("$PWD", str(Path.cwd())) for word in rest]
+    rest = [*without_size(rest), *SMALL.get(command, [])]
+    if "--workers" in rest:  # tests/cluster starts processes
+        at = rest.index("--workers")
+        del rest[at : at + 2]
+    if command == "render" and "--frames" in rest:
+        rest += ["--frames", "2"]
+    assert main([command, *rest]) == 0, words
+    if "-o" in rest:
+        output = Path(rest[rest.index("-o") + 1])
+        assert output.stat().st_size > 0
+        if command == "render" and output.suffix != ".webp":
+            with Image.open(output.with_suffix(".png")) as picture:
+                # shown as it is: neither black nor burnt out; lamps in the dark are few pixels
+                grey = np.asarray(picture.convert("L"))
+                assert np.percentile(grey, 95) > 20
+                assert np.median(grey) < 235
+
+
+def without_size(rest: list[str]) -> list[str]:
+    """Arguments without -D resx=... and -D resy=..., larger than scenes are here."""
+    sized = {i for i, word in enumerate(rest) if word.startswith(("resx=", "resy="))}
+    return [word for i, word in enumerate(rest) if not {i, i + 1} & sized]
+
+
+def small_tree(folder: Path) -> Path:
+    """What a clone's folder holds, and the files that commands name, small."""
+    small_clone(folder)
+    (folder / "out").mkdir()
+    field = md.gratings.sinusoidal(period=1.6, depth=0.05, periods=4, rows=32)
+    heights = np.tile(field.heights[:1], (32, 1))
+    np.save(folder / "grating.npy", heights)
+    grey = np.round((heights - heights.min()) / np.ptp(heights) * 255).astype(np.uint8)
+    for name in ("scale.png", "elaphe.png", "a.png", "b.png"):
+        Image.fromarray(grey).save(folder / name)
+    # 32 lines of 64 samples, 8 by 4 µm, 3.9 nm high
+    wave = 512 * np.sin(2 * np.pi * np.arange(64) / 16)
+    counts = np.tile(np.int16(np.round(wave)), (32, 1))
+    (folder / "scan.spm").write_bytes(nanoscope(counts, scan_size="8 4 ~m"))
+    assert make_mesh(["knot", "-o", str(folder / "mesh.ply")]) == 0
+    return folder
+
+
+def run_page(page: str, tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run a page's commands in a folder of `small_tree`."""
+    # of height scales that a page may be asked for, two
+    monkeypatch.setattr("mitsuba_diffraction.realtime.web.export.OCTAVES", (-1.0, 0.0))
+    monkeypatch.chdir(tree)
+    for words in commands(page):
+        run(words)

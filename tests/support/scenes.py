@@ -1,0 +1,30 @@
+"""The scenes of the project, rendered small."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from tests.support import ROOT
+
+SCENES = ROOT / "scenes"
+SMALL = {"spp": "4", "resx": "48", "resy": "40"}
+
+
+def rendered(name: str, **parameters: str) -> np.ndarray:
+    """The picture of a scene, of 48 × 40 pixels unless told otherwise."""
+    import mitsuba as mi
+
+    scene = mi.load_file(str(SCENES / f"{name}.xml"), **(SMALL | parameters))
+    return np.array(mi.render(scene, seed=1))
+
+
+def gentle_patch(folder: Path) -> dict[str, str]:
+    """Parameters of any scene: a grating whose table and bound take a second."""
+    from mitsuba_diffraction.heights import gratings
+
+    field = gratings.sinusoidal(period=1.6, depth=0.05, periods=4, rows=4)
+    file = folder / "gentle.npy"
+    np.save(file, field.heights)
+    return {"patch": str(file), "pixel_size": str(field.pixel_size[0]), "coherence_width": "10"}

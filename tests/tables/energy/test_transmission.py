@@ -1,0 +1,101 @@
+"""R + T of dielectrics and sheets: sums over the orders, and the scale that makes it 1."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionTable, HeightField, gratings
+from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
+from mitsuba_diffraction.tables.energy.transmission import Medium, Sides
+from tests.support.directions import rough_patch
+
+#: Between nodes of angles and azimuths; at the critical angle from within lobes are half reflected.
+THETA, PHI = np.radians([1.0, 31.0, 59.0, 74.0]), np.radians([11.0, 184.0])
+KINDS = {"interface": False, "sheet": True}
+
+
+@pytest.fixture(autouse=True)
+def few_wavelengths():
+    """One pair of wavelengths, at which the sums are taken: nothing lies between."""
+    before = use_energy_settings(EnergySettings(side_wavelengths=2, azimuthal=16))
+    yield
+    use_energy_settings(before)
+
+
+def flat() -> HeightField:
+    return HeightField(np.zeros((8, 8)), 8.0)
+
+
+def shallow() -> HeightField:
+    """5 nm of noise."""
+    return rough_patch((200, 200), (0.1, 0.1), 0.005, 1.0)
+
+
+def gentle() -> HeightField:
+    return gratings.sinusoidal(2.5, 0.08, periods=8, pixels_per_period=28)
+
+
+def sums(field, index, width, thin, model="small_slope"):
+    """R + T raw and conserved, (2 wavelengths, 2 sides, angles, azimuths)."""
+    table = DiffractionTable.build(field, coherence_width=width, height_scale_max=index)
+    sides = Sides(table, 1.0, Medium(index, model, thin))
+    scale = sides.scale((450.0, 650.0))
+    pairs = [sides.sums(scale, THETA, PHI, wavelength) for wavelength in (450.0, 650.0)]
+    return (np.stack(part) for part in zip(*pairs, strict=True))
+
+
+@pytest.mark.parametrize("thin", KINDS.values(), ids=KINDS)
+@pytest.mark.parametrize("index", [1.01, 1.2, 2.4])
+def test_a_flat_surface_sends_on_all_light_whatever_its_index(index, thin):
+    raw, kept = sums(flat(), index, 65.0, thin)
+    assert np.abs(raw - 1.0).max() < 5e-3  # a lobe of half a degree is spread at 74°
+    assert np.abs(kept - 1.0).max() < 1e-3
+
+
+@pytest.mark.parametrize("thin", KINDS.values(), ids=KINDS)
+@pytest.mark.parametrize("index", [1.01, 1.5])
+def test_a_narrow_window_makes_no_light(index, thin):
+    """Order 0 has what the flat surface transmits: 1/w², as large as one likes, is not in it."""
+    raw, kept = sums(flat(), index, 4.0, thin)
+    assert raw.max() < 1.002
+    # lobes are 6° wide: from 59° on part of them is below the horizon, or beyond the critical angle
+    assert kept.max() < 1.005
+    assert np.abs(kept[:, :, :2] - 1.0).max() < 2e-2
+
+
+@pytest.mark.parametrize("thin", KINDS.values(), ids=KINDS)
+@pytest.mark.parametrize("model", ["small_slope", "kirchhoff"])
+def test_a_shallow_surface_sends_on_all_light(model, thin):
+    _, kept = sums(shallow(), 1.2, 20.0, thin, model)
+    assert np.abs(kept - 1.0).max() < 1e-2  # lobes of 6° at 74°
+    assert np.abs(kept[:, :, :2] - 1.0).max() < 1e-3
+
+
+def test_a_gentle_sheet_sends_on_nearly_all_light():
+    raw, kept = sums(gentle(), 1.5, 20.0, True)
+    assert raw.min() < 0.95  # what is beyond its critical angle is lost
+    assert kept.min() > 0.95
+    assert kept.max() < 1.002
+
+
+def test_the_gain_grows_with_the_square_of_the_heights():
+    def total(depth: float) -> float:
+        field = gratings.sinusoidal(2.5, depth, periods=4, pixels_per_period=28)
+        table = DiffractionTable.build(field, coherence_width=20.0, height_scale_max=1.5)
+        sides = Sides(table, 1.0, Medium(1.5, "small_slope", False))
+        return float(sides.sums(None, np.radians([40.0]), np.zeros(1), 550.0)[0][0, 0, 0])
+
+    level, *gains = (total(depth) for depth in (1e-3, 0.02, 0.04))
+    assert gains[0] - level > 1e-4
+    assert gains[1] - level == pytest.approx(4 * (gains[0] - level), rel=0.1)
+
+
+def test_heights_that_are_scaled_are_as_others():
+    medium = Medium(1.5, "small_slope", True)
+    totals = []
+    for depth, scale in ((0.03, 1.4), (0.042, 1.0)):
+        field = gratings.sinusoidal(2.5, depth, periods=4, pixels_per_period=28)
+        table = DiffractionTable.build(field, coherence_width=20.0, height_scale_max=2.2)
+        totals.append(Sides(table, scale, medium).sums(None, THETA, PHI, 550.0)[0])
+    assert totals[0] == pytest.approx(totals[1], abs=1e-4)
