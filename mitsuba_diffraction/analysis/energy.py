@@ -9,9 +9,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tables.energy.conservation import Index, albedos
+from ..tables.energy.conservation import Index, Surface
 from ..tables.energy.store import Energy, SidesEnergy
 from ..tables.energy.transmission import Medium, Sides
+from ..tables.energy.transport import Orders
 from ..tables.table import DiffractionTable
 
 #: Polar angles (degrees) and wavelengths (nm) looked at, at `AZIMUTHS` azimuths each.
@@ -51,10 +52,8 @@ def _aluminium(wavelengths: NDArray[np.float64]) -> NDArray[np.complex128]:
 def _of_material(table: DiffractionTable, model: str, index: Index) -> dict[str, Any]:
     found = Energy(table, model, index, table.wavelength_range).at(1.0)
     theta, phi = np.radians(ANGLES), _azimuths()
-    pairs = [
-        albedos(table, 1.0, model, index, found.scale, theta, phi, wavelength)
-        for wavelength in WAVELENGTHS
-    ]
+    surface = Surface(Orders(table), model, index)
+    pairs = [surface.albedos(found.scale, theta, phi, wavelength) for wavelength in WAVELENGTHS]
     raw, kept = (np.stack(part).astype(float) for part in zip(*pairs, strict=True))
     taken = 1.0 - kept / raw
     gains = raw > 1.0

@@ -123,12 +123,12 @@ second_order : string or boolean [auto]
 energy_conserving : boolean [true]
     Where the model reflects more than it gets, multiplies it by s(ωi) s(ωo), a scale of directions
     found for this table, model, material and each wavelength, so that no more is reflected than
-    comes in: reciprocal. Kirchhoff's model fades within 5° of the horizon as well. Dielectrics gain
-    nothing and are as they are; blazed metal gratings lose some of the light of directions that
-    gain nothing, too (docs/energy.md has figures). `false` is the model as it is, for checks. The
-    scale takes a second or more the first time, and is kept in the cache. It follows height_scale,
-    interpolated between a few: an optimisation waits where it enters such an interval for the first
-    time. For its derivative, enable that of height_scale before parameters.update().
+    comes in: reciprocal. Dielectrics gain nothing and are as they are; metal gratings lose some
+    per cent of the light of directions that gain nothing, too (docs/energy.md has figures). `false`
+    is the model as it is, for checks. The scale takes seconds the first time, and is cached. It
+    follows height_scale, interpolated between a few: an optimisation waits where it enters such an
+    interval for the first time. For its derivative, enable that of height_scale before
+    parameters.update().
 shadowing : string [none]
     `vcavity`: the surface shadows itself like long V-shaped grooves (Torrance and Sparrow 1967);
     `none`.
@@ -511,15 +511,14 @@ class Diffraction(DiffractingSurface):
         """Whether the BSDF is scaled so that it never reflects more than it receives."""
         return self._energy is not None and self._energy.conserving
 
-    def energy_scale(self, height_scale: float) -> tuple[NDArray[np.float32], bool] | None:
-        """Return s of the mean wavelength, for shaders, and whether Kirchhoff's model fades.
+    def energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
+        """Return s of the mean wavelength, for shaders; None where all s are 1.
 
-        s : (polar + 1, azimuthal) on `tables.energy.grid.FINE`; None where all s are 1.
+        (polar + 1, azimuthal) on `tables.energy.grid.FINE`.
         """
         if self._energy is None or not self._energy.conserving:
             return None
-        scale = self._energy.brightness(height_scale)
-        return None if scale is None else (scale, self._energy.fades)
+        return self._energy.brightness(height_scale)
 
     def reflected_ratio(self, height_scale: float) -> DirectionalTable | None:
         """Return albedo over flat reflectance, by which light goes on to a nested BSDF."""

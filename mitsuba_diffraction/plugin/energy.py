@@ -20,9 +20,9 @@ from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS, response
 from ..optics.mean_second_order import limited
 from ..tables.energy.conservation import Conservation
-from ..tables.energy.gain import GRAZING, fades
 from ..tables.energy.grid import FINE, DirectionalTable
-from ..tables.energy.store import Energy, mean_exponents
+from ..tables.energy.store import Energy
+from ..tables.film import mean_exponents
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, SmallSlope
 from .direction_lookup import DirectionLookup, between, scales_of
@@ -51,7 +51,7 @@ MUCH = 0.05
 
 
 class EnergyModel:
-    """Of one BSDF, at the height scale and the material last given.
+    """Scales of directions and albedo of a BSDF, at the height scale and material last set.
 
     Parameters
     ----------
@@ -72,7 +72,6 @@ class EnergyModel:
         )
         model = str(boundary)
         self._energy = Energy(table, model, self._indices, (low, high))
-        self._fades = fades(model)
         self._warned = False
         self._filmed = isinstance(self._material, UnderFilm) and isinstance(boundary, SmallSlope)
         self._scale, self._mean = DirectionLookup(), DirectionLookup()
@@ -143,24 +142,18 @@ class EnergyModel:
         return np.average(scale.values, axis=0, weights=weights).astype(np.float32)
 
     def ratio(self, height_scale: float) -> DirectionalTable:
-        """What `reflected` looks up, for who draws without Dr.Jit."""
+        """Return the table that `reflected` looks up, for shaders."""
         nodes = self._energy.nodes(height_scale)
         ratios = [self._ratio(self._energy.at(node).albedo) for node in nodes]
         return between(ratios, nodes, height_scale)
 
     @property
-    def fades(self) -> bool:
-        """Whether the factor has `tables.energy.gain.fade`."""
-        return self._fades
-
-    @property
     def takes(self) -> int:
-        """By what the BSDF is multiplied: 0 where it is by nothing."""
+        """Number that tells which factors the BSDF is multiplied by; 0 for none."""
         return self._scale.present + 2 * self._mean.present
 
     def factor(self, pair: Pair, wavenumbers: list[Float], height_scale: Float) -> Colour:
-        """s(ωi) s(ωo), per channel; of a film g(ωi) g(ωo) as well (`optics.mean_second_order`), of
-        Kirchhoff's model `tables.energy.gain.fade`.
+        """s(ωi) s(ωo), per channel; of a film g(ωi) g(ωo) as well (`optics.mean_second_order`).
 
         height_scale : the one given to `update`; needed where derivatives with respect to it are,
             and where it varies.
@@ -174,9 +167,6 @@ class EnergyModel:
                     strict=True,
                 )
                 found *= mi.UnpolarizedSpectrum([one * other for one, other in both])
-        if self._fades:
-            one, other = dr.minimum(pair.cos_i, GRAZING), dr.minimum(pair.cos_o, GRAZING)
-            found *= dr.square(dr.minimum(one, other) * dr.rcp(dr.maximum(one, other)))
         return found
 
     def reflected(

@@ -236,7 +236,7 @@ class DiffractionDielectric(DiffractingSurface):
         lit: Mask,
         change: Colour | None,
     ) -> tuple[Spectrum, Float]:
-        """f cosθo and density of light that stays above the surface."""
+        """Return f cosθo and density of light that stays above the surface."""
         scale, pair = self.scale_at(si, lit), Pair(si, wo, rotation, lit)
         power = self.geometry(pair) * self._power(si, pair, scale, change)
         value = self.lobe(ctx, si, pair, self.boundary, power, lit)
@@ -253,7 +253,7 @@ class DiffractionDielectric(DiffractingSurface):
         lit: Mask,
         change: Colour | None,
     ) -> tuple[Spectrum, Float]:
-        """f cosθo and density of light that stays below the surface, or below a sheet."""
+        """Return f cosθo and density of light that stays below the surface, or below a sheet."""
         n, scale = self.material.eta, self.scale_at(si, lit)
         if self.thin:
             outer = Turned(si, wo, rotation, lit, mi.Float(1.0))
@@ -289,7 +289,7 @@ class DiffractionDielectric(DiffractingSurface):
     def _power(
         self, si: Interaction, point: Pair | TablePoint, scale: Float, change: Colour | None
     ) -> Colour:
-        """⟨|P|²⟩ / (4π²σ⁴ λ²) per channel, with order 0 multiplied by `change`."""
+        """Return ⟨|P|²⟩ / (4π²σ⁴ λ²) per channel, with order 0 multiplied by `change`."""
         power = self.power.power(point, scale, si)
         if change is None:
             return power
@@ -305,7 +305,7 @@ class DiffractionDielectric(DiffractingSurface):
         crossing: Crossing,
         change: Colour | None,
     ) -> Spectrum:
-        """BSDF of light that goes through, as the mode of transport has it.
+        """Return f of light that goes through, as the mode of transport has it.
 
         Order 0 has what the flat surface transmits, and is finite where w → 0, as all others are.
         """
@@ -334,7 +334,7 @@ class DiffractionDielectric(DiffractingSurface):
         crossing: Crossing,
         axes: tuple[Vector3f, Vector3f],
     ) -> list[Jones]:
-        """2 cosθi cosθt times the Jones matrices of light from above, of each channel or of all."""
+        """Return 2 cosθi cosθt J of light from above, of each channel or of all."""
         tangent = tangent_plane(crossing, axes)
         if not isinstance(self.boundary, SmallSlope):
             return [out_of_sheet(tangent, crossing)] if self.thin else [tangent]
@@ -359,7 +359,7 @@ class DiffractionDielectric(DiffractingSurface):
         axes: tuple[Vector3f, Vector3f],
         matrices: list[Jones],
     ) -> Spectrum:
-        """½ Σ|J|², or Mueller matrices, for each channel."""
+        """Return ½ Σ|J|², or Mueller matrices, for each channel."""
         if not mi.is_polarized:
             powers = [0.5 * sum(map(squared, jones)) for jones in matrices]
             return mi.UnpolarizedSpectrum(powers if len(powers) > 1 else powers[0])

@@ -24,11 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...optics.fresnel import Filmed
-from ..table import DiffractionTable
-from .gain import fades
+from .gain import Boundary
 from .grid import Array, DirectionalTable, DirectionGrid, Real
 from .scaling import lowered, parallel, scaled
-from .settings import EnergySettings
 from .transport import Orders, Transport
 
 #: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.
@@ -37,138 +35,84 @@ Index = Callable[[Real], "NDArray[np.complex128] | Filmed | None"]
 
 @dataclass(frozen=True)
 class Conservation:
-    """What a surface reflects, and what is taken of it.
-
-    Attributes
-    ----------
-    albedo : of the model as it is.
-    scale : s, or None where the albedo is at most 1; what Kirchhoff's is scaled from is attenuated
-        towards the horizon (`gain.fade`).
-    """
+    """Albedo of the model as it is, and the scale s; None where the albedo is at most 1."""
 
     albedo: DirectionalTable
     scale: DirectionalTable | None
 
 
-def conservation(
-    table: DiffractionTable,
-    height_scale: float,
-    model: str,
-    index: Index,
-    wavelength_range: tuple[float, float],
-) -> Conservation:
-    """Conserve the energy of a table at one height scale: seconds where energy is gained.
+@dataclass(frozen=True)
+class Surface:
+    """Orders of a table at one height scale, made of a material.
 
-    Parameters
+    Attributes
     ----------
+    orders : of the table.
     model : "kirchhoff" or "small_slope".
     index : of the material over that of the medium above it.
-    wavelength_range : nm; both ends may be one.
     """
-    maps = _Maps(Orders(table, height_scale), model, index)
-    settings = maps.orders.settings
-    coarse = DirectionGrid(settings.coarse_polar, settings.coarse_azimuthal)
-    albedo = maps.albedo(coarse, wavelengths_of(wavelength_range, settings.coarse_wavelengths))
-    if albedo.values.max() <= settings.threshold:
-        return Conservation(albedo, None)
-    filmed = isinstance(index(albedo.wavelengths), Filmed)
-    count = settings.film_wavelengths if filmed else settings.wavelengths
-    return Conservation(albedo, maps.scale(wavelengths_of(wavelength_range, count)))
-
-
-def wavelengths_of(wavelength_range: tuple[float, float], count: int) -> Real:
-    """Wavelengths (nm) evenly in their logarithm, or the only one."""
-    low, high = wavelength_range
-    return np.geomspace(low, high, count if high > low else 1)
-
-
-def between(wavelengths: Real) -> Real:
-    """Wavelengths amid each two, or the only one."""
-    return np.sqrt(wavelengths[1:] * wavelengths[:-1]) if len(wavelengths) > 1 else wavelengths
-
-
-def albedos(
-    table: DiffractionTable,
-    height_scale: float,
-    model: str,
-    index: Index,
-    scale: DirectionalTable | None,
-    theta: Real,
-    phi: Real,
-    wavelength: float,
-) -> tuple[Array, Array]:
-    """Return the albedo as it is and scaled, (t, p) each, at angles (rad) and one wavelength (nm).
-
-    Exact sums at these directions, not the grid's: what a furnace finds. Arguments as in
-    `conservation`, which gave the scale.
-    """
-    maps, at = _Maps(Orders(table, height_scale), model, index), np.array([wavelength])
-    grid = _grid(maps.orders.settings) if scale is None else scale.grid
-    raw = maps.at(at, theta, phi, grid)[0](grid.ones)
-    if scale is None:
-        return raw, raw
-    transport = maps.at(at, theta, phi, grid, faded=maps.fades)[0]
-    return raw, scale.at(theta[:, None], phi, wavelength) * transport(scale.page(wavelength))
-
-
-def _grid(settings: EnergySettings) -> DirectionGrid:
-    return DirectionGrid(settings.polar, settings.azimuthal)
-
-
-@dataclass(frozen=True)
-class _Maps:
-    """Maps from weights of directions to albedos."""
 
     orders: Orders
     model: str
     index: Index
 
-    @property
-    def fades(self) -> bool:
-        return fades(self.model)
+    def conservation(self, wavelength_range: tuple[float, float]) -> Conservation:
+        """Conserve energy over a range of wavelengths (nm), whose ends may be one: seconds."""
+        settings = self.orders.settings
+        coarse = DirectionGrid(settings.coarse_polar, settings.coarse_azimuthal)
+        wavelengths = wavelengths_of(wavelength_range, settings.coarse_wavelengths)
+        transports = self.transports(wavelengths, coarse.theta, coarse.phi, coarse)
+        values = np.stack([transport(coarse.ones) for transport in transports])
+        albedo = DirectionalTable(wavelengths, values)
+        if values.max() <= settings.threshold:
+            return Conservation(albedo, None)
+        filmed = isinstance(self.index(wavelengths), Filmed)
+        count = settings.film_wavelengths if filmed else settings.wavelengths
+        return Conservation(albedo, self._scale(wavelengths_of(wavelength_range, count)))
 
-    def at(
-        self,
-        wavelengths: Real,
-        theta: Real,
-        phi: Real,
-        grid: DirectionGrid,
-        *,
-        faded: bool = False,
+    def albedos(
+        self, scale: DirectionalTable | None, theta: Real, phi: Real, wavelength: float
+    ) -> tuple[Array, Array]:
+        """Return the albedo as it is and scaled, (t, p) each, at angles (rad).
+
+        Exact sums at these directions and a wavelength (nm), as a furnace finds them.
+        """
+        grid = self._grid if scale is None else scale.grid
+        transport = self.transports(np.array([wavelength]), theta, phi, grid)[0]
+        raw = transport(grid.ones)
+        if scale is None:
+            return raw, raw
+        return raw, scale.at(theta[:, None], phi, wavelength) * transport(scale.page(wavelength))
+
+    def transports(
+        self, wavelengths: Real, theta: Real, phi: Real, grid: DirectionGrid
     ) -> list[Transport]:
-        """Maps at several wavelengths (nm), for directions, from weights on a grid."""
+        """Maps from weights on a grid to albedos at directions, for several wavelengths (nm)."""
         indices = self.index(wavelengths)
 
         def at_wavelength(n: int) -> Transport:
-            index = None if indices is None else indices[n]
-            gain = self.orders.gain(float(wavelengths[n]), self.model, index)
-            return self.orders.transport(theta, phi, gain, grid, faded=faded)
+            surface = Boundary(None if indices is None else indices[n], self.model)
+            gain = self.orders.gain(float(wavelengths[n]), surface)
+            return self.orders.transport(theta, phi, gain, grid)
 
         return parallel(at_wavelength, range(len(wavelengths)))
 
-    def albedo(self, grid: DirectionGrid, wavelengths: Real) -> DirectionalTable:
-        """Albedo of the model as it is, on a grid of directions."""
-        transports = self.at(wavelengths, grid.theta, grid.phi, grid)
-        values = np.stack([transport(grid.ones) for transport in transports])
-        return DirectionalTable(wavelengths, values)
+    @property
+    def _grid(self) -> DirectionGrid:
+        return DirectionGrid(self.orders.settings.polar, self.orders.settings.azimuthal)
 
-    def scale(self, wavelengths: Real) -> DirectionalTable:
-        """Find s."""
-        settings = self.orders.settings
-        grid = _grid(settings)
+    def _scale(self, wavelengths: Real) -> DirectionalTable:
+        """Find s at its nodes, and lower it for what lies between."""
+        settings, grid = self.orders.settings, self._grid
+        # part of a lobe is below the horizon there, and would ask for any s
         largest = np.interp(np.degrees(grid.theta), (70.0, 80.0), (settings.largest, 1.0))
 
-        def at_nodes(each: tuple[Transport, Transport]) -> Array:
-            raw, transport = each
-            aim = np.minimum(raw(grid.ones), np.float32(settings.target))
+        def at_nodes(transport: Transport) -> Array:
+            aim = np.minimum(transport(grid.ones), np.float32(settings.target))
             return scaled(transport, aim, largest[:, None], settings.sweeps)
 
-        raw = self.at(wavelengths, grid.theta, grid.phi, grid)
-        faded = raw
-        if self.fades:
-            faded = self.at(wavelengths, grid.theta, grid.phi, grid, faded=True)
-        scale = np.stack(parallel(at_nodes, zip(raw, faded, strict=True)))
-        del raw, faded
+        transports = self.transports(wavelengths, grid.theta, grid.phi, grid)
+        scale = np.stack(parallel(at_nodes, transports))
         few = len(self.orders.mixture.frequency) <= settings.few_orders
         parts = settings.few_parts if few else settings.parts
         theta, phi = grid.middles(parts)
@@ -182,7 +126,17 @@ class _Maps:
 
             return of_page
 
-        transports = self.at(between(wavelengths), theta, phi, grid, faded=self.fades)
-        return DirectionalTable(
-            wavelengths, lowered(scale, list(map(excess, transports)), settings)
-        )
+        transports = self.transports(between(wavelengths), theta, phi, grid)
+        scale = lowered(scale, [excess(transport) for transport in transports], settings)
+        return DirectionalTable(wavelengths, scale)
+
+
+def wavelengths_of(wavelength_range: tuple[float, float], count: int) -> Real:
+    """Wavelengths (nm) evenly in their logarithm, or the only one."""
+    low, high = wavelength_range
+    return np.geomspace(low, high, count if high > low else 1)
+
+
+def between(wavelengths: Real) -> Real:
+    """Wavelengths amid each two, or the only one."""
+    return np.sqrt(wavelengths[1:] * wavelengths[:-1]) if len(wavelengths) > 1 else wavelengths

@@ -43,6 +43,11 @@ class DirectionGrid:
         """Weights of 1."""
         return np.ones((self.polar + 1, self.azimuthal), np.float32)
 
+    @property
+    def half(self) -> DirectionGrid:
+        """Grid of half as many cells, for what is smooth."""
+        return DirectionGrid(min(self.polar // 2, 24), min(self.azimuthal // 2, 30))
+
     def angles(self, row: ArrayLike) -> Real:
         """Polar angles (rad) at rows 0 … polar."""
         position = np.asarray(row, float) / self.polar

@@ -236,7 +236,7 @@ def test_one_body_compiles_on_the_desktop_and_in_a_browser(
         scale = np.ones((FINE.polar + 1, FINE.azimuthal), np.float32)
         parts = ("COLOUR_MAPPED", "AXIS_MAPPED", "PIGMENTED", "VCAVITY", "THESIS", "COHERENT")
         definitions |= dict.fromkeys(parts, "") | {"SURFACE_KIND": "2"}
-        definitions |= pack_energy([scale, scale], True).definitions
+        definitions |= pack_energy([scale, scale]).definitions
         ratio = DirectionalTable(np.array([550.0]), scale[None])
         definitions |= pack_beneath([ratio, ratio]).definitions
         definitions |= pack_roughness(table.roughness).definitions

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.tables.energy import store
-from mitsuba_diffraction.tables.energy.conservation import Conservation
+from mitsuba_diffraction.tables.energy.conservation import Conservation, Surface
 from mitsuba_diffraction.tables.energy.grid import DirectionalTable
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from mitsuba_diffraction.tables.energy.store import Energy
@@ -20,13 +19,14 @@ def computed(monkeypatch, tmp_path):
     monkeypatch.setenv(VARIABLE, str(tmp_path))
     made: list[tuple[float, complex]] = []
 
-    def instead(table, height_scale, model, index, wavelength_range) -> Conservation:
-        made.append((height_scale, complex(index(np.array([500.0]))[0])))
+    def instead(surface: Surface, wavelength_range: tuple[float, float]) -> Conservation:
+        height_scale = surface.orders.height_scale
+        made.append((height_scale, complex(surface.index(np.array([500.0]))[0])))
         values = np.full((2, 3, 4), 1.0 + height_scale, np.float32)
         found = DirectionalTable(np.array([400.0, 700.0]), values)
         return Conservation(found, found if height_scale > 0.5 else None)
 
-    monkeypatch.setattr(store, "conservation", instead)
+    monkeypatch.setattr(Surface, "conservation", instead)
     return made
 
 

@@ -7,13 +7,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ...optics import mean_second_order
-from ...optics.blend import RoughnessTable
-from ...optics.fresnel import Filmed
-from ...optics.geometry import wavenumber
-from .conservation import Index
-from .grid import FINE, DirectionalTable, DirectionGrid
-from .scaling import parallel
+from ..optics import mean_second_order
+from ..optics.blend import RoughnessTable
+from ..optics.fresnel import Filmed
+from ..optics.geometry import wavenumber
+from .energy.conservation import Index
+from .energy.grid import FINE, DirectionalTable, DirectionGrid
+from .energy.scaling import parallel
+from .energy.store import PROBES, cached, rounded
+from .table import DiffractionTable
 
 #: Phase of a fringe, rad, from one wavelength to the next, and most wavelengths: within a twentieth
 #: of the most there is up to a path 2 n d of 3 µm, and three times that at 12 µm. Under thin films
@@ -25,9 +27,9 @@ _FEWEST = 8
 def exponents(
     roughness: RoughnessTable, index: Index, wavelength_range: tuple[float, float]
 ) -> DirectionalTable:
-    """ln g of `optics.mean_second_order`, of the angle alone; a second or two of a thick film.
+    """Tabulate ln g of `optics.mean_second_order`, of the angle alone: a second or two.
 
-    Arguments as in `conservation`.
+    Arguments as of `tables.energy.store.Energy`.
     """
     low, high = wavelength_range
     film = index(np.array([low]))
@@ -40,9 +42,21 @@ def exponents(
     grid = DirectionGrid(FINE.polar, 1)
     cosine = np.cos(grid.theta)
 
-    def one(n: int) -> NDArray[np.float64]:
+    def at_wavelength(n: int) -> NDArray[np.float64]:
         k = float(wavenumber(wavelengths[n]))
         return mean_second_order.exponents(cosine, films[n], roughness, k)
 
-    values = np.stack(parallel(one, list(range(len(wavelengths)))))
+    values = np.stack(parallel(at_wavelength, list(range(len(wavelengths)))))
     return DirectionalTable(wavelengths, values[:, :, None].astype(np.float32))
+
+
+def mean_exponents(
+    table: DiffractionTable, index: Index, wavelength_range: tuple[float, float]
+) -> DirectionalTable:
+    """Return `exponents` of a table, from memory, from disk, or computed."""
+
+    def make() -> list[DirectionalTable]:
+        return [exponents(table.roughness, index, wavelength_range)]
+
+    probes = rounded(index(np.geomspace(*wavelength_range, PROBES)))
+    return cached("film", table, [STEP, MOST, probes, *wavelength_range], make)[0]
