@@ -227,9 +227,9 @@ from .types import (
 
 
 class Diffraction(DiffractingSurface):
-    """Reflection by a surface that diffracts; its symbols are those of `reference.model`.
+    """Reflection by a surface that diffracts, in the symbols and equations of `reference.model`.
 
-    f cosθo = 4πσ² ⟨|P|²⟩ N' / (λ² w² cosθi),   N' = ½ Σ |2 cosθi cosθo J|²
+    f cosθo = N' ⟨|P|²⟩ / (λ² A w² cosθi),   N' = (2 cosθi cosθo)² N,   is eq. 4 times cosθo.
     """
 
     def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
@@ -263,10 +263,14 @@ class Diffraction(DiffractingSurface):
         above, nested = self._lobes(ctx)
         value = mi.Spectrum(0.0)
         if above:
+            # Eq. 1: (u, v, w) = ωi + ωo
             pair = self._pair(si, wo, active)
+            # Eq. 2 and 3: ⟨|P|²⟩ at q = k (u, v) and κ = k w, for each wavelength
             power = self.power.power(pair, self.scale_at(si, active), si)
+            # Eq. 4 to 10: times N' of the material and the rest
             value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
         if nested is not None:
+            # T(ωi) T(ωo) f of the BSDF beneath
             beneath = mi.Spectrum(self._beneath(si, wo, active))
             value += beneath * self.nested.eval(nested, si, wo, active)
         return dr.select(active, value, 0.0)
