@@ -374,7 +374,7 @@ def test_lobes_and_lights_share_what_surrounds_a_scene(
             "sensor": {
                 "type": "perspective", "fov": 50,
                 "to_world": T().look_at([0, -2.4, 2.4], [0, 0.5, 0.2], [0, 0, 1]),
-                "film": {"type": "hdrfilm", "width": 96, "height": 72},
+                "film": {"type": "hdrfilm", "width": 64, "height": 48},
             },
             "lamp": {
                 "type": "disk", "to_world": lamp,
