@@ -12,6 +12,7 @@ document           all but the coefficients as plain data, checked when read
 layout             where a table's numbers lie: for NumPy, the plugin and the shaders
 energy             the directional albedo and its bound
 sampling           densities to draw directions from
+order_mixture      orders for integrals: strong ones, and a density of all others
 colour             the sum over daylight's spectrum
 store              the cache of all of these
 """
