@@ -92,8 +92,9 @@ class DiffractionMix(mi.BSDF):
             if weight is not None
         ]
         check_parameters([self])
-        for one in self.together[1:]:
-            one.mix = weakref.ref(self)  # not a cycle, which would keep both
+        for surface in self._held:
+            if hasattr(surface, "mix"):
+                surface.mix = weakref.ref(self)  # a cycle would keep both
         self.derive()
 
     # ------------------------------------------------------------------ Mitsuba's interface

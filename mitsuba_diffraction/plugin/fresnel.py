@@ -245,8 +245,8 @@ class Conductor:
         objects = children(_load("conductor", material=material))
         if mi.is_monochromatic:
             objects = {name: _at(material, name, wavelength) for name in ("eta", "k")}
-        parts = [ObjectValues(name, objects[name], INDEX_PARTS[name]) for name in INDEX_PARTS]
-        conductor = cls(*parts, material)
+        eta, k = (ObjectValues(name, objects[name], INDEX_PARTS[name]) for name in INDEX_PARTS)
+        conductor = cls(eta, k, material)
         if mi.is_rgb:
             index = _tabulated(material, "eta", _VISIBLE) + 1j * _tabulated(material, "k", _VISIBLE)
             conductor._spectrum = index, conductor._channels()

@@ -4,7 +4,7 @@ Contents
 --------
 ideal    gratings with closed-form diffraction
 scales   look-alikes of snake scales
-fingers  fingers of a scale, in irregular columns
+fingers  positions and shape of a scale's fingers
 noise    periodic random fields
 discs    tracks of CDs and DVDs
 """

@@ -38,9 +38,7 @@ XML and the same in Python:
         <boolean name="thin" value="true"/>
     </bsdf>
 
-    bsdf = mi.load_dict(
-        {"type": "diffraction_dielectric", "heightfield": "film.toml", "thin": True}
-    )
+    mi.load_dict({"type": "diffraction_dielectric", "heightfield": "film.toml", "thin": True})
 """
 
 from __future__ import annotations
