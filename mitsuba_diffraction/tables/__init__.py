@@ -5,8 +5,6 @@ Contents
 DiffractionTable   a table: `build`, `load`, `save`, `brdf` (in `table`)
 build              from heights to a table of a given tolerance
 expansion          series in κ: which functions, with which weights
-powers             powers of the orders, also of tables of amplitudes
-height_scales      height scales at which functions of them are tabulated
 window             the coherence window, cut to a few taps
 lookup             the NumPy twin of the renderer's look-up
 exr                tables as EXR files
@@ -18,7 +16,6 @@ film               the mean of the second order under a film
 energy             the directional albedo, and the scales that conserve energy
 sampling           densities to draw directions from
 order_mixture      orders for integrals: strong ones, and a density of all others
-film               the mean of the second order under a film
 colour             the sum over daylight's spectrum
 store              the cache of all of these
 """
