@@ -56,7 +56,6 @@ from ..layers import CoatedPair, transmittances
 from ..parameter_changes import check_parameters
 from ..sampling import EVEN, direction_of, with_even_share
 from ..sources import TableProvider, from_cache
-from ..support import TRANSMISSION
 from ..surface import DiffractingSurface
 from ..types import (
     Colour,
@@ -105,7 +104,8 @@ class DiffractionDielectric(DiffractingSurface):
     balance : scales by which both sides add up to 1, or None.
     """
 
-    only_traced = TRANSMISSION.choice
+    #: Feature that shaders do not support.
+    only_traced = "light that goes through"
 
     def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
         read = read_parameters(props, provider)
