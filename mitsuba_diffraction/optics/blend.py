@@ -54,7 +54,7 @@ class ScaleRoughness:
     variance: Real
 
     @classmethod
-    def of(cls, heights: ArrayLike, pixel_size: tuple[float, float]) -> ScaleRoughness:
+    def from_heights(cls, heights: ArrayLike, pixel_size: tuple[float, float]) -> ScaleRoughness:
         """Return the roughness of heights (ny, nx) in µm; pixel_size is (dx, dy) in µm."""
         surface = np.asarray(heights, np.float64)
         ny, nx = surface.shape

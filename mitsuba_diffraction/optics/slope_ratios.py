@@ -60,7 +60,7 @@ class Slopes:
     gate: float
 
     @classmethod
-    def of(
+    def from_heights(
         cls, heights: ArrayLike, pixel_size: tuple[float, float], weight: Real | float = 1.0
     ) -> Slopes:
         """Return the products for heights (ny, nx) in µm.
@@ -158,21 +158,23 @@ class CellGrid:
     summed: Real
 
     @classmethod
-    def of(
+    def for_patches(
         cls,
         extent: tuple[float, float],
         rms_height: float,
         q_limit: float,
-        reach: tuple[float, float],
-        kappa_max: float,
+        reach: tuple[float, float] | None = None,
+        kappa_max: float | None = None,
     ) -> CellGrid:
         """Choose the grid for patches of this extent and RMS height, both in µm.
 
         q_limit : largest q that light of the shortest wavelength probes, rad/µm.
-        kappa_max : largest κ that is looked up, rad/µm.
+        reach : largest q along x and y that is looked up, rad/µm; None for `q_limit`.
+        kappa_max : largest κ that is looked up, rad/µm; None for `q_limit`.
         """
+        reach = reach or (q_limit, q_limit)
         first = q_limit * FIRST
-        last = max(2.0 * first, kappa_max)
+        last = max(2.0 * first, kappa_max or q_limit)
         spacing = [2.0 * np.pi / length for length in extent]
         orders = [step >= 0.5 * CELL * q_limit for step in spacing]
         cell = [
@@ -224,7 +226,7 @@ class CellSums:
     gate: float
 
     @classmethod
-    def of(cls, patches: Iterable[tuple[HeightField, Real]], grid: CellGrid) -> CellSums:
+    def of_patches(cls, patches: Iterable[tuple[HeightField, Real]], grid: CellGrid) -> CellSums:
         """Add up patches, each with the taper of its screens; four transforms a patch and κ."""
         (middle_x, middle_y), nodes = grid.middle, grid.summed
         sums = np.zeros((len(nodes), 3, 2 * middle_y + 1, 2 * middle_x + 1), np.complex64)
@@ -233,9 +235,9 @@ class CellSums:
         fine = np.zeros((len(nodes), fine_y, fine_x), np.float32)
         gates = []
         for patch, taper in patches:
-            slopes = Slopes.of(patch.heights, patch.pixel_size, taper**2)
+            slopes = Slopes.from_heights(patch.heights, patch.pixel_size, taper**2)
             gates.append(slopes.gate)
-            factors, orders = slopes.products.astype(np.float32), _Orders.of(patch, grid.reach)
+            factors, orders = slopes.products.astype(np.float32), _Orders.within(patch, grid.reach)
             del slopes  # as large as the transforms' working memory
             x, y = (
                 _tents(q / w, m) for q, w, m in zip(orders.q, grid.cell, grid.middle, strict=True)
@@ -286,7 +288,7 @@ class _Orders:
     inside: Floats
 
     @classmethod
-    def of(cls, patch: HeightField, reach: Sequence[float]) -> _Orders:
+    def within(cls, patch: HeightField, reach: Sequence[float]) -> _Orders:
         every = [
             2.0 * np.pi * np.fft.fftfreq(n, d)
             for n, d in zip(patch.shape[::-1], patch.pixel_size, strict=True)

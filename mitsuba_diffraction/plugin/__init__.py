@@ -1,4 +1,4 @@
-"""What the BSDF plugin is made of (Dr.Jit).
+"""The BSDF plugins and their parts (Dr.Jit).
 
 Contents
 --------

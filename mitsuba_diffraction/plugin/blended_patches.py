@@ -67,12 +67,12 @@ _POINTS = 32
 #: The component of a context that asks for all of them.
 _ALL = 0xFFFFFFFF
 
-#: Values and densities of one of the surfaces, in a context of its own, where the mask is true.
+#: Function that asks a surface, in a context for it, for values and densities where a mask is true.
 Ask = Callable[[BSDF, Context, Mask], Sequence[Any]]
 
 
 class DiffractionMix(mi.BSDF):
-    """Several BSDFs, by weights that vary over the surface."""
+    """Several BSDFs, blended by weights that vary over the surface."""
 
     #: To who draws without Mitsuba, as `Diffraction.only_traced`.
     only_traced = "a mix of surfaces"
@@ -92,26 +92,27 @@ class DiffractionMix(mi.BSDF):
             if weight is not None
         ]
         check_parameters([self])
-        for one in self.together[1:]:
-            one.mix = weakref.ref(self)  # not a cycle, which would keep both
+        for surface in self._held:
+            if hasattr(surface, "mix"):
+                surface.mix = weakref.ref(self)  # a cycle would keep both
         self.derive()
 
     # ------------------------------------------------------------------ Mitsuba's interface
 
     def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
-        """f·cosθo per wavelength."""
+        """Return f cosθo per wavelength."""
         weights = [self._weights_at(si, _wide(active, si, wo.z))]
         return self._sum(ctx, weights, lambda one, own, on: [one.eval(own, si, wo, on)], "v")[0]
 
     def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
-        """Density of `sample` per solid angle."""
+        """Return the density of `sample` per solid angle."""
         shares = [self._shares(ctx, self._weights_at(si, _wide(active, si, wo.z)))]
         return self._sum(ctx, shares, lambda one, own, on: [one.pdf(own, si, wo, on)], "d")[0]
 
     def eval_pdf(
         self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
     ) -> tuple[Spectrum, Float]:
-        """`eval` and `pdf` at once."""
+        """Return `eval` and `pdf` at once."""
         weights = self._weights_at(si, _wide(active, si, wo.z))
         both = [weights, self._shares(ctx, weights)]
         value, density = self._sum(
@@ -127,7 +128,7 @@ class DiffractionMix(mi.BSDF):
         sample2: Vector2f,
         active: Mask = True,
     ) -> tuple[Sample, Spectrum]:
-        """A direction drawn from one of the surfaces, and f·cosθo of all over their density.
+        """Draw a direction from a surface; return it with f cosθo of all over their density.
 
         Lobes of one direction are that surface's alone.
         """
@@ -137,16 +138,16 @@ class DiffractionMix(mi.BSDF):
         chosen, weight, share = mi.UInt32(_ALL), mi.Float(0.0), mi.Float(0.0)
         lower = mi.Float(0.0)
         for n, one, own, first in self._asked(ctx):
-            mine = (shares[n] > 0.0) & (sample1 >= lower) & (sample1 < lower + shares[n])
-            left = (sample1 - lower) * dr.rcp(dr.select(mine, shares[n], 1.0))
+            here = (shares[n] > 0.0) & (sample1 >= lower) & (sample1 < lower + shares[n])
+            left = (sample1 - lower) * dr.rcp(dr.select(here, shares[n], 1.0))
             lower = lower + shares[n]
             draw = functools.partial(_drawn, one, own, si, left, sample2)
-            drawn, of_drawn = _where(mine, draw, (result, value))
-            result, value = dr.select(mine, drawn, result), dr.select(mine, of_drawn, value)
-            result.sampled_component += dr.select(mine, mi.UInt32(first), 0)
-            chosen = dr.select(mine, mi.UInt32(n), chosen)
-            weight = dr.select(mine, weights[n], weight)
-            share = dr.select(mine, shares[n], share)
+            drawn, of_drawn = _where(here, draw, (result, value))
+            result, value = dr.select(here, drawn, result), dr.select(here, of_drawn, value)
+            result.sampled_component += dr.select(here, mi.UInt32(first), 0)
+            chosen = dr.select(here, mi.UInt32(n), chosen)
+            weight = dr.select(here, weights[n], weight)
+            share = dr.select(here, shares[n], share)
         smooth = ~mi.has_flag(result.sampled_type, mi.BSDFFlags.Delta) & (result.pdf > 0.0)
         others, density = self._sum(
             ctx,
@@ -161,7 +162,7 @@ class DiffractionMix(mi.BSDF):
         return result, dr.select(lit, total * dr.rcp(dr.select(lit, result.pdf, 1.0)), 0.0)
 
     def eval_diffuse_reflectance(self, si: Interaction, active: Mask = True) -> Spectrum:
-        """What a denoiser takes for the surface's colour."""
+        """Return the weighted reflectances of the surfaces, for denoisers."""
         weights = [self._weights_at(si, _wide(active, si))]
         ask: Ask = lambda one, own, on: [one.eval_diffuse_reflectance(si, on)]  # noqa: E731
         return self._sum(mi.BSDFContext(), weights, ask, "v")[0]
@@ -182,7 +183,7 @@ class DiffractionMix(mi.BSDF):
 
     @property
     def together(self) -> list[Changing]:
-        """This BSDF, and all in it that are refused with it."""
+        """This BSDF and the surfaces in it, whose changes are refused together."""
         return [self, *(one for one in self._held if hasattr(one, "mix"))]
 
     def refusals(self) -> Iterator[str | None]:
@@ -197,7 +198,7 @@ class DiffractionMix(mi.BSDF):
         self._for_freezing = arrays_within(list(self.weights.values()))
 
     def to_string(self) -> str:
-        """All parameters, for people."""
+        """Describe all parameters, for people."""
         lines = [f"  {name} = {one},\n" for name, one in self.bsdfs.items()]
         lines += [f"  {_PREFIX}{name} = {_text(one)},\n" for name, one in self.weights.items()]
         return f"DiffractionMix[\n{''.join(lines)}]"
@@ -205,30 +206,30 @@ class DiffractionMix(mi.BSDF):
     # ------------------------------------------------------------------ the weights
 
     def _weights_at(self, si: Interaction, active: Mask) -> list[Float]:
-        """Of each surface, of sum 1; 0 where it is not active or they are all 0."""
-        given = [_weight_at(weight, si, active) for weight in self.weights.values()]
-        rest = dr.maximum(1.0 - sum(one for one in given if one is not None), 0.0)
-        found = [rest if one is None else one for one in given]
-        total: Float = sum(found, mi.Float(0.0))
+        """Return the surfaces' weights, of sum 1; 0 where inactive or where all are 0."""
+        explicit = [_weight_at(weight, si, active) for weight in self.weights.values()]
+        rest = dr.maximum(1.0 - sum(one for one in explicit if one is not None), 0.0)
+        weights = [rest if one is None else one for one in explicit]
+        total: Float = sum(weights, mi.Float(0.0))
         some = mi.Mask(active) & (total > 0.0)
         scale = dr.select(some, dr.rcp(dr.select(some, total, 1.0)), 0.0)
-        return [one * scale for one in found]
+        return [one * scale for one in weights]
 
     def _shares(self, ctx: Context, weights: list[Float]) -> list[Float]:
-        """Of the samples: the weights, or all where a component of one surface is asked for."""
+        """Return shares of the samples: the weights; for a component of one surface, all."""
         if ctx.component == _ALL:
             return weights
         return [dr.select(one > 0.0, mi.Float(1.0), 0.0) for one in weights]
 
     def _asked(self, ctx: Context) -> Iterator[tuple[int, BSDF, Context, int]]:
-        """Number, surface, context of its own, and its first component."""
+        """Yield number, surface, context for that surface, and its first component."""
         first = 0
         for n, one in enumerate(self._held):
             if ctx.component == _ALL:
                 yield n, one, ctx, first
             elif first <= ctx.component < first + one.component_count():
-                own = mi.BSDFContext(ctx.mode, ctx.type_mask, ctx.component - first)
-                yield n, one, own, 0
+                context = mi.BSDFContext(ctx.mode, ctx.type_mask, ctx.component - first)
+                yield n, one, context, 0
             first += one.component_count()
 
     def _sum(
@@ -239,15 +240,15 @@ class DiffractionMix(mi.BSDF):
         kinds: str,
         where: Callable[[int], Mask] = lambda n: True,
     ) -> list[Any]:
-        """Σ over surfaces of their shares times what they are asked, "v"alues and "d"ensities."""
+        """Sum the surfaces' answers, "v"alues and "d"ensities, times their shares."""
         nothing = [mi.Spectrum(0.0) if kind == "v" else mi.Float(0.0) for kind in kinds]
         totals = list(nothing)
         for n, one, own, _ in self._asked(ctx):
             on = mi.Mask((shares[0][n] > 0.0) & where(n))
-            found = _where(on, functools.partial(ask, one, own), nothing)
+            answers = _where(on, functools.partial(ask, one, own), nothing)
             totals = [
                 total + dr.select(on, part * share[n], 0.0)
-                for total, part, share in zip(totals, found, shares, strict=True)
+                for total, part, share in zip(totals, answers, shares, strict=True)
             ]
         return totals
 
@@ -263,7 +264,7 @@ class DiffractionMix(mi.BSDF):
 
 
 def _wide(active: Mask, si: Interaction, *arrays: Float) -> Mask:
-    """The mask, as wide as what is computed where it is true: Dr.Jit ends the process otherwise."""
+    """Return a mask as wide as the arrays of its branch; otherwise Dr.Jit ends the process."""
     for one in (si.wi.z, *arrays):
         active = mi.Mask(active) & dr.isfinite(one)
     return active
@@ -276,7 +277,7 @@ def _drawn(
 
 
 def _where(on: Mask, ask: Callable[[Mask], Sequence[Any]], otherwise: Sequence[Any]) -> Any:
-    """What is asked where it is on; kernels skip it where none of their lanes are."""
+    """Return the answers where the mask is true; kernels skip a branch that no lane takes."""
     if not dr.is_jit_v(mi.Float):
         return ask(on) if on else otherwise
     # copies: Dr.Jit makes what comes out of both branches of what the one returned
@@ -288,7 +289,7 @@ def _where(on: Mask, ask: Callable[[Mask], Sequence[Any]], otherwise: Sequence[A
 def _weights(
     props: Properties, names: list[str], objects: dict[str, Any]
 ) -> dict[str, Bounded | Texture | None]:
-    """By surface; None for what the others leave.
+    """Return the weight of each surface; None for the surface that gets the rest.
 
     Raises
     ------
@@ -297,7 +298,7 @@ def _weights(
     """
     if len(names) < 2:
         raise DiffractionError(f"diffraction_mix takes two nested BSDFs or more, got {len(names)}")
-    given = [name for name in props.keys() if name.startswith(_PREFIX)]  # noqa: SIM118
+    weighted = [name for name in props.keys() if name.startswith(_PREFIX)]  # noqa: SIM118
     known = [_PREFIX + name for name in names]
     for name in props.keys():  # noqa: SIM118 - Properties is no mapping
         if name not in (*known, *names, "id"):
@@ -305,8 +306,8 @@ def _weights(
                 f"unknown parameter '{name}' of diffraction_mix; its surfaces are "
                 f"{', '.join(names)}, and their weights {', '.join(known)}"
             )
-    if len(given) < len(names) - 1:
-        missing = ", ".join(name for name in known if name not in given)
+    if len(weighted) < len(names) - 1:
+        missing = ", ".join(name for name in known if name not in weighted)
         raise DiffractionError(f"give weights for all surfaces but one; there is no {missing}")
     return {name: _weight(props, _PREFIX + name, objects) for name in names}
 
@@ -359,7 +360,7 @@ def _text(weight: Bounded | Texture | None) -> str:
 
 
 def _square() -> Iterator[Interaction]:
-    """Hits at points of the unit square of UV coordinates; one by one in scalar variants."""
+    """Yield hits at points of the unit square of UV coordinates, singly in scalar variants."""
     places = (np.indices((_POINTS, _POINTS)).reshape(2, -1).astype(np.float32) + 0.5) / _POINTS
     for part in [places] if dr.is_jit_v(mi.Float) else places.T.tolist():
         si = dr.zeros(mi.SurfaceInteraction3f)

@@ -1,4 +1,4 @@
-"""What the material makes of the light, by model: the factor of the diffracted power (Dr.Jit).
+"""Boundary models: the material's factor on the diffracted power (Dr.Jit).
 
 The twin of `optics.boundary` and `optics.blend`, which give the formulas and their sources. With
 J = (1−s) K + s B of small slope (s = 0 is Kirchhoff) and J' = 2 cosθi cosθo J,
@@ -62,7 +62,7 @@ class Kirchhoff:
         active: Mask,
         mode: mi.TransportMode,
     ) -> Spectrum:
-        """N' of a pair, or its Mueller matrix, for each channel.
+        """Return N' of a pair, or its Mueller matrix, for each channel.
 
         wavenumbers : of the channels, rad/µm.
         mode : whether light comes along ωo (radiance) or along ωi (importance).
@@ -94,7 +94,7 @@ class SmallSlope:
         self._nodes = upload(mi.Float, np.stack([nodes[:-1], nodes[1:]], axis=1))
 
     def of(self, material: Inside) -> SmallSlope:
-        """That of another material with the same heights."""
+        """Return the model of another material on the same heights."""
         other = copy.copy(self)
         other.material = material
         return other
@@ -131,7 +131,7 @@ class SmallSlope:
         wavenumbers: list[Float],
         indices: list[Index],
     ) -> list[Float]:
-        """Kirchhoff's share for each channel, 1 − s with s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3).
+        """Return Kirchhoff's share 1 − s for each channel, eq. 9.
 
         Not s: near the horizon K is so large beside B that the last digit of 1 − s counts.
         """
@@ -173,7 +173,7 @@ def _one_minus_exp(x: Float) -> Float:
 
 
 def _of_the_normal(index: Index) -> Float:
-    """R of normal incidence."""
+    """Return R₀ of eq. 9, the reflectance at normal incidence."""
     if isinstance(index, Filmed):
         return squared(amplitudes(mi.Float(1.0), mi.Float(0.0), index)[0])
     return squared((index - 1.0) / (index + 1.0))
@@ -237,16 +237,16 @@ class _Path:
         turn0 = dr.fma(x, first.y, -y * first.x)
         turn = dr.fma(y, second.x, -x * second.y)
         length0, length = (dr.fma(t, t, z * z) for t in (turn0, turn))
-        found = (length0 > LEVEL) & (length > LEVEL)
-        inverse = dr.rsqrt(dr.select(found, length0, 1.0)) * dr.rsqrt(dr.select(found, length, 1.0))
+        apart = (length0 > LEVEL) & (length > LEVEL)
+        inverse = dr.rsqrt(dr.select(apart, length0, 1.0)) * dr.rsqrt(dr.select(apart, length, 1.0))
         # Where both directions are one, any facet's axis does: s0
-        self._cc = dr.select(found, turn * turn0 * inverse, self._dot)
-        self._cs = dr.select(found, turn * z * inverse, 0.0)
-        self._sc = dr.select(found, -z * turn0 * inverse, self._cross)
-        self._ss = dr.select(found, -z * z * inverse, 0.0)
+        self._cc = dr.select(apart, turn * turn0 * inverse, self._dot)
+        self._cs = dr.select(apart, turn * z * inverse, 0.0)
+        self._sc = dr.select(apart, -z * turn0 * inverse, self._cross)
+        self._ss = dr.select(apart, -z * z * inverse, 0.0)
 
     def kirchhoff(self, index: Index) -> Jones:
-        """2 cosθi cosθo K (`optics.boundary.kirchhoff`)."""
+        """Return 2 cosθi cosθo K, eq. 7 (`optics.boundary.kirchhoff`)."""
         if isinstance(index, Filmed):
             index = index.tilted(0.5 * self._w * dr.rcp(dr.maximum(self._cos_half, 1e-4)))
         square = dr.fma(-self._cos_half, self._cos_half, 1.0)
@@ -259,10 +259,10 @@ class _Path:
         )
 
     def small_slope(self, index: Index) -> Jones:
-        """2 cosθi cosθo B (`optics.boundary.small_slope`)."""
+        """Return 2 cosθi cosθo B, eq. 8 (`optics.boundary.small_slope`)."""
         ends = faces(self._q0, self._square0, index), faces(self._q, self._square, index)
-        found = [self._of_face(*both) for both in zip(*ends, strict=True)]
-        return tuple(sum(x[1:], x[0]) for x in zip(*found, strict=True))
+        parts = [self._of_face(*both) for both in zip(*ends, strict=True)]
+        return tuple(sum(x[1:], x[0]) for x in zip(*parts, strict=True))
 
     def _of_face(self, came: Face, there: Face) -> Jones:
         contrast = came.contrast * self._scale
@@ -280,7 +280,7 @@ class _Path:
         indices: list[Index],
         material: Reflectance | Inside | UnderFilm,
     ) -> Spectrum:
-        """What Jones matrices and indices make of light, for each channel; one may stand for all.
+        """Return N', or a Mueller matrix, from Jones matrices of each channel or of all.
 
         ½ Σ|J|², or in polarised variants the Mueller matrix between Mitsuba's bases; through the
         faces of a coat, where there is one.
@@ -295,7 +295,7 @@ class _Path:
         return mi.UnpolarizedSpectrum(powers if len(powers) > 1 else powers[0])
 
     def _transmitted(self, jones: Jones, index: Index) -> Jones:
-        """√(T T G) J of the coat's face, light coming and going (`optics.coat`)."""
+        """Return √(T T G) J, through the coat's face on both ways (`optics.coat`)."""
         structure = (
             self._mirrored(self._q0, self._square0, index),
             self._mirrored(self._q, self._square, index),
@@ -311,7 +311,7 @@ class _Path:
         return tuple(entry * factor for entry, factor in zip(jones, factors, strict=True))
 
     def _mirrored(self, cosine: Float, square: Float, index: Index) -> tuple[Float, Float]:
-        """|r_s|² and |r_p|² of the flat structure."""
+        """Return |r_s|² and |r_p|² of the flat structure."""
         r_s, r_p = amplitudes(cosine, square, index)
         return squared(r_s), squared(r_p)
 
@@ -334,12 +334,12 @@ class _Path:
 
 
 def turn(to: Vector3f, start: Vector3f, direction: Vector3f) -> tuple[Float, Float]:
-    """(cos, sin) from components along (start, d×start) to those along (to, d×to)."""
+    """Return (cos, sin) of the turn from axes (start, d×start) to axes (to, d×to)."""
     return dr.dot(to, start), dr.dot(to, dr.cross(direction, start))
 
 
 def turned(jones: Jones, out: tuple[Float, Float], into: tuple[Float, Float]) -> Jones:
-    """[[c, s], [−s, c]] of `out`, times the matrix, times that of `into`."""
+    """Return the product of the turn `out`, the Jones matrix and the turn `into`."""
     ss, sp, ps, pp = jones
     (c, s), (c0, s0) = out, into
     ss, sp, ps, pp = ss * c + ps * s, sp * c + pp * s, ps * c - ss * s, pp * c - sp * s
@@ -349,7 +349,7 @@ def turned(jones: Jones, out: tuple[Float, Float], into: tuple[Float, Float]) ->
 def mueller(
     matrices: list[Jones], light: tuple[Vector3f, Vector3f], axes: tuple[Vector3f, Vector3f]
 ) -> Spectrum:
-    """Mueller matrices between Mitsuba's bases of light along two directions, for each channel.
+    """Return Mueller matrices between Mitsuba's bases of light along two directions, per channel.
 
     axes : s of both, which the Jones matrices are about.
     """
@@ -362,7 +362,7 @@ def mueller(
 
 
 def _mueller(jones: Jones) -> list[Float]:
-    """The sixteen entries, row by row (`optics.boundary.mueller`)."""
+    """Return the sixteen entries, row by row (`optics.boundary.mueller`)."""
     ss, sp, ps, pp = jones
     a, b, c, d = (0.5 * squared(x) for x in jones)
     rows, columns = (_product(ss, sp), _product(ps, pp)), (_product(ss, ps), _product(sp, pp))

@@ -7,102 +7,104 @@ plugin `diffraction_dielectric`.
 The surface
 -----------
 heightfield : string
-    Heights: image (PNG, BMP, TIFF, EXR), array (NPY), text, instrument file, recipe (TOML); a table
-    works too.
+    File of heights: image (PNG, BMP, TIFF, EXR), array (NPY), text, instrument file or recipe
+    (TOML). A table is accepted, too.
 table : string
-    A table made by `mitsuba-diffraction precompute` instead.
+    Instead: a table made by `mitsuba-diffraction precompute`.
 data : mi.TensorXf
-    Heights in µm instead, shape (ny, nx); dictionaries only. `md.bsdf_dict` fills it in with a
-    whole HeightField, which needs no pixel_size.
+    Instead: heights in µm, shape (ny, nx), in dictionaries only. `md.bsdf_dict` passes a whole
+    HeightField, which needs no pixel_size.
 pixel_size : float or string [from the file]
     Distance between heights in µm: one number, "dx, dy", or "auto".
 max_height : float or string [from the file]
-    Height of white in an integer image, µm, or "auto"; other heights are scaled to span it.
+    Height of white in an integer image, µm, or "auto". Other heights are scaled to this range.
 height_unit : string [from the file]
-    Unit of the numbers in the file, `nm` for instance, where it states none or a wrong one.
+    Unit of the numbers in the file, for example `nm`, if the file states none or a wrong one.
 channel : string or integer [the heights]
-    Which channel of an instrument file: its name or index; of an EXR image, its name.
+    Channel of an instrument file, by name or index; of an EXR image, by name.
 crop : float or string [none]
-    Crop to a central region (µm): one number for a square, or "width, height".
+    Size of the central region to keep, µm: one number for a square, or "width, height".
 fill : string [none]
-    How points without data are filled: `none` (they are refused), `nearest` (the nearest height)
-    or `harmonic` (a membrane spanned over the gap).
+    Treatment of points without data: `none` refuses them, `nearest` copies the nearest height,
+    `harmonic` spans a membrane over the gap.
 level : string [none]
-    `plane` subtracts the best plane, `lines` aligns the scan lines by their medians first; `none`.
+    `plane` subtracts the best plane; `lines` aligns the scan lines by their medians first; `none`.
 clip : float [none]
-    Cuts heights off beyond so many robust standard deviations: dust. At least 1.
+    Number of robust standard deviations, at least 1, beyond which heights are clipped, as of dust.
 periodic : string [none]
-    How opposite edges are made to meet, since the patch tiles the surface: `smooth` (its periodic
-    component, Moisan 2011) or `taper` (heights fade towards the edges); `none`. The
-    treatments are applied in the order crop, fill, level, clip, periodic.
+    Treatment of opposite edges, which meet where the patch is tiled: `smooth` keeps the periodic
+    component (Moisan 2011), `taper` attenuates heights towards the edges; `none`. Treatments are
+    applied in the order crop, fill, level, clip, periodic.
 orientation : float or texture ∂ [0]
-    Degrees that the patch's x axis is turned by from the first tangent, up to 36000; or a texture
-    (raw, in a float format such as EXR) or mesh attribute of three channels, the first two of
-    which are (cos, sin) of that angle. Tangents follow UV coordinates: on a mesh without them they
-    are arbitrary, and turn from triangle to triangle. A BSDF cannot see that; `info MESH` and
-    `render` warn.
+    Angle in degrees from the first tangent to the patch's x axis, up to 36000. Or a texture (raw,
+    in a float format such as EXR) or mesh attribute of three channels, the first two of which are
+    (cos, sin) of the angle. Tangents follow UV coordinates. On a mesh without UV coordinates they
+    are arbitrary and turn from triangle to triangle, of which `info MESH` and `render` warn.
 height_scale : float or texture ∂ [1]
-    Multiplies the heights, up to 1.5 × max(1, value given); or, worn and fresh places: a raw bitmap
-    or another texture or mesh attribute of one channel.
+    Factor on the heights, up to 1.5 × max(1, the value loaded). Or a raw bitmap, another texture or
+    a mesh attribute of one channel, for worn and fresh places.
 height_scale_max : float [of a bitmap]
-    The largest factor of such a texture, which all but bitmaps need; larger ones are taken for it.
+    Largest factor of such a texture, above which factors are clipped. Required unless the texture
+    is a bitmap.
 
 The table
 ---------
 coherence_width : float or string [65]
-    4σ of the Gaussian amplitude window, µm: the width over which light is coherent. `auto`, as
-    without it: that of the table or the recipe, else 65.
+    4σ of the Gaussian amplitude window, µm: the width over which light is coherent. `auto` is the
+    width of the table or the recipe, else 65.
 coherence : string [ensemble]
-    `ensemble`: what a pixel sees that covers many coherence areas; `patch`: one window's speckle,
-    the same everywhere; `surface`: that of the window centred where the light falls, the grain seen
-    from close up, which averages to `ensemble` from afar. It needs UV coordinates and one of the
-    next two, and a spectral or mono variant. Directions and energy are those of `ensemble`.
+    `ensemble`: the mean over many windows, as seen by a pixel that covers many coherence areas.
+    `patch`: the speckle of a single window, the same everywhere. `surface`: the speckle of the
+    window centred where the light falls, the grain seen from close up, whose mean is `ensemble`.
+    `surface` requires UV coordinates, uv_scale or world_scale, and a spectral or mono variant;
+    sampling and energy are those of `ensemble`.
 uv_scale : float or string [none]
-    µm a unit of the UV coordinates: one number, or "u, v".
+    µm per unit of the UV coordinates: one number, or "u, v".
 world_scale : float [none]
-    Or µm a unit of length of the scene, 1000 for mm: positions are then as far apart as UV
-    coordinates are on the surface, which must be alike all over it.
+    Instead: µm per unit of length of the scene, 1000 for mm. Distances on the surface follow from
+    the UV coordinates, whose scale must be the same all over it.
 tiling : string [periodic]
-    How the patch covers the surface: `periodic`, side by side; `random`, shifted at random and
-    blended such that mean and contrast stay, so that it does not show again and again (Heitz and
-    Neyret 2018; for rough surfaces: the lines of a grating would be broken).
+    Cover of the surface by patches: `periodic`, side by side; or `random`, shifted at random and
+    blended with the same mean and contrast, which hides the repetition (Heitz and Neyret 2018). Use
+    `random` for rough surfaces only: it breaks the lines of a grating.
 basis : string [auto]
-    `svd` (also as `auto`), `chebyshev` or `taylor`: the series in κ.
+    Basis of the series in κ: `svd` (also `auto`), `chebyshev` or `taylor`.
 tolerance : float [0.001]
-    Relative error of ⟨|P|²⟩, met or refused.
+    Largest relative error of ⟨|P|²⟩. A table that cannot meet it is refused.
 terms : integer [from tolerance]
     Length of the series.
 windows : float or string [none]
-    Width, in µm, of the overlapping windows that a scan much wider than coherence_width is cut
-    into, each levelled, whose powers are averaged (Welch 1967); `auto` is twice coherence_width.
+    Width, µm, of overlapping windows that a scan much wider than coherence_width is cut into. Each
+    is levelled, and their powers are averaged (Welch 1967). `auto` is twice coherence_width.
 
 The material
 ------------
 material : string
-    A conductor by name, as in `roughconductor`; `none` reflects everything.
+    Name of a conductor, as in `roughconductor`; or `none`, which reflects all light.
 eta, k : spectra ∂
-    The same by its complex refractive index.
+    Instead: the conductor's complex refractive index.
 int_ior, ext_ior : float or string [1.5, 1.000277]
-    A dielectric, which the surface is unless it is a conductor (1.5: shed snake skin).
-    Their ratio is the differentiable parameter `eta`; under a coat that of int_ior and coat_ior.
+    Indices of a dielectric and of the medium above it, the default material (1.5: shed snake skin).
+    Their ratio is the differentiable parameter `eta`; under a coat, int_ior over coat_ior.
 coat_ior : float or string [none]
-    A flat clear layer over the structure, too thick to interfere: 1.58 is the polycarbonate of a
-    CD. Light is refracted into it and out again, and its own face is a mirror of the same
-    coherence width. Light that the face sends back is summed as between two mirrors; what leaves
-    the structure beyond the critical angle is lost (docs/validation.md has figures), so coats never
-    gain, and energy_conserving has nothing to do. Over that of the medium above it is the
-    differentiable parameter `coat_eta`.
+    Index of a flat clear layer over the structure, too thick to interfere, as the polycarbonate of
+    a CD (1.58). Light is refracted into the layer and out again; its own face is a mirror of the
+    same coherence width. Light that the face sends back is summed as between two mirrors. Light
+    that leaves the structure beyond the critical angle is lost (docs/validation.md), so that a
+    coated surface never gains energy and is not scaled. The index over that of the medium above is
+    the differentiable parameter `coat_eta`.
 film_ior : float or string [none]
-    A thin film that follows the heights and interferes: oxide on a metal (1.77 is alumina), wax on
-    a scale. Its lower face is the structure, its upper one the same heights, film_thickness above.
-    Over that of the medium above it is the differentiable parameter `film_eta`. It excludes a coat.
-    Small slope has the mean of the second order under a film, which thick films on metals need: a
-    second or two at loading, kept in the cache, in steps of 5 nm and of 0.01 of the indices.
+    Index of a thin film that follows the heights and interferes, as an oxide on a metal (1.77:
+    alumina) or wax on a scale. The upper face has the heights of the structure, film_thickness
+    above it. The index over that of the medium above is the differentiable parameter `film_eta`.
+    Excludes a coat. Model `small_slope` includes the mean of the second order under a film. It
+    costs a second or two at loading, is cached, and follows the film in steps of 5 nm and 0.01.
 film_thickness : float ∂ [none]
-    The film's thickness along the vertical, nm; at most the length over which light is coherent,
-    2 n d = 12 µm. RGB variants sum its colours over wavelengths, apart from those of the orders.
+    Thickness of the film along the vertical, nm. 2 n d is at most the length over which light is
+    coherent, 12 µm. RGB variants sum the film's colours over wavelengths, apart from the orders.
 film_k : float ∂ [0]
-    The film's absorption, the k of n + ik over that of the medium above it; not over a nested BSDF.
+    Absorption of the film: k of its index n + ik, over the index of the medium above. Excludes a
+    nested BSDF.
 model : string [small_slope]
     `small_slope`: first-order small-slope approximation (Voronovich 1985), blended with Kirchhoff's
     where the surface is rough at the scale of an order; polarised variants have its Mueller
@@ -121,50 +123,46 @@ second_order : string or boolean [auto]
     light for what lies beneath are the same without it. Coefficients follow the index in steps of
     0.01.
 energy_conserving : boolean [true]
-    Where the model reflects more than it gets, multiplies it by s(ωi) s(ωo), a scale of directions
-    found for this table, model, material and each wavelength, so that no more is reflected than
-    comes in: reciprocal. Dielectrics gain nothing and are as they are; metal gratings lose some
-    per cent of the light of directions that gain nothing, too (docs/energy.md has figures). `false`
-    is the model as it is, for checks. The scale takes seconds the first time, and is cached. It
-    follows height_scale, interpolated between a few: an optimisation waits where it enters such an
-    interval for the first time. For its derivative, enable that of height_scale before
+    Scales the BSDF by s(ωi) s(ωo) so that no direction reflects more than it receives; reciprocal.
+    The scale belongs to the table, model, material and wavelength. Dielectrics are unaffected;
+    gratings of metal lose some per cent of the light in directions without gain, too
+    (docs/energy.md). `false` keeps the model as it is, for checks. The scale costs seconds the
+    first time and is cached. It is interpolated over height_scale: an optimisation waits when it
+    enters a new interval. For its derivative, enable that of height_scale before
     parameters.update().
 shadowing : string [none]
-    `vcavity`: the surface shadows itself like long V-shaped grooves (Torrance and Sparrow 1967);
-    `none`.
+    `vcavity`: shadowing of long V-shaped grooves (Torrance and Sparrow 1967); `none`.
 
 The light beneath
 -----------------
 (nested) : BSDF ∂
-    What lies beneath a dielectric and receives the light that is not reflected, e.g. pigment:
-    any BSDF that only reflects, mirrors included. Its components follow the diffraction's, which
-    is number 0.
+    BSDF beneath a dielectric, for example pigment, which receives the light that is not reflected.
+    Any BSDF that only reflects, mirrors included. Component 0 is the diffraction; those of the
+    nested BSDF follow.
 layering : string [transmission]
-    How the nested BSDF shares the light. `transmission`: it gets and returns T(ωi) T(ωo), with
-    T = 1 − a, a the diffracting surface's own albedo (under a coat, the reflectance of both flat
-    faces, bounces included). `thesis`: (1 − w) f_diffraction + (1 − F + w) f_nested, F at the half
-    vector, as in the thesis of 2014 that the method comes from; for comparisons with its pictures
-    only, since it gains energy.
+    Share of the light for the nested BSDF. `transmission`: T(ωi) T(ωo) with T = 1 − a and a the
+    albedo of the diffracting surface; under a coat, the reflectance of both flat faces. `thesis`:
+    (1 − w) f_diffraction + (1 − F + w) f_nested with F at the half vector, as in the thesis of 2014
+    that the method comes from. It gains energy and is for comparisons with the thesis only.
 diffuse_weight : float [0]
-    That w.
+    Weight w of layering `thesis`.
 
 Variants
 --------
 wavelength : float [550]
-    nm, in mono variants; the others have their own.
+    Wavelength of mono variants, nm.
 
-The model is that of diffraction orders under a Gaussian coherence window (Stam 1999), looked up in
-a table of the patch, times what the material makes of them:
+The model is the power of diffraction orders under a Gaussian coherence window (Stam 1999), looked
+up in a table of the patch, times a factor of the material:
 
     f = 4 cosθi cosθo N / (λ² A w²) · ⟨|P|²⟩
 
 N is the mean power of a Jones matrix for unpolarised light; by Kirchhoff (Beckmann and Spizzichino
 1963) it is R (1 + ωi·ωo)² / (2 cosθi cosθo)².
 
-Denoisers that ask for an albedo get the reflectance at normal incidence, that of what lies beneath
-included.
+Denoisers that ask for an albedo get the reflectance at normal incidence, nested BSDF included.
 
-Several such surfaces in one, by weights: the BSDF `diffraction_mix` (docs/own-scene.md).
+The BSDF `diffraction_mix` blends several such surfaces by weights (docs/own-scene.md).
 
 XML and the same in Python:
 
@@ -227,9 +225,9 @@ from .types import (
 
 
 class Diffraction(DiffractingSurface):
-    """Reflection by a surface that diffracts; its symbols are those of `reference.model`.
+    """Reflection by a surface that diffracts, in the symbols and equations of `reference.model`.
 
-    f cosθo = 4πσ² ⟨|P|²⟩ N' / (λ² w² cosθi),   N' = ½ Σ |2 cosθi cosθo J|²
+    f cosθo = N' ⟨|P|²⟩ / (λ² A w² cosθi),   N' = (2 cosθi cosθo)² N,   is eq. 4 times cosθo.
     """
 
     def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
@@ -263,10 +261,14 @@ class Diffraction(DiffractingSurface):
         above, nested = self._lobes(ctx)
         value = mi.Spectrum(0.0)
         if above:
+            # Eq. 1: (u, v, w) = ωi + ωo
             pair = self._pair(si, wo, active)
+            # Eq. 2 and 3: ⟨|P|²⟩ at q = k (u, v) and κ = k w, for each wavelength
             power = self.power.power(pair, self.scale_at(si, active), si)
+            # Eq. 4 to 10: times N' of the material and the rest
             value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
         if nested is not None:
+            # T(ωi) T(ωo) f of the BSDF beneath
             beneath = mi.Spectrum(self._beneath(si, wo, active))
             value += beneath * self.nested.eval(nested, si, wo, active)
         return dr.select(active, value, 0.0)

@@ -15,7 +15,7 @@ PLUGINS = ("diffraction", "diffraction_dielectric")
 
 
 class HeightData(mi.Object):
-    """A height field that a dictionary of Mitsuba's can hold, with all that it knows of itself."""
+    """Height field in an object that a dictionary of Mitsuba's can hold."""
 
     def __init__(self, field: HeightField) -> None:
         super().__init__()
@@ -48,12 +48,12 @@ def bsdf_dict(
         raise DiffractionError(
             f"bsdf_dict: plugin={quoted(plugin)} is unknown; choose one of {', '.join(PLUGINS)}"
         )
-    given = {name: value for name, value in parameters.items() if value is not None}
+    arguments = {name: value for name, value in parameters.items() if value is not None}
     if isinstance(field, str | os.PathLike):
-        return {"type": plugin, "heightfield": os.fspath(field), **given}
+        return {"type": plugin, "heightfield": os.fspath(field), **arguments}
     if not isinstance(field, HeightField):
         raise DiffractionError(
             f"bsdf_dict: expected a HeightField or the path of a file, got {quoted(field)}; make "
             "one of an array with HeightField(heights, pixel_size)"
         )
-    return {"type": plugin, "data": HeightData(field), **given}
+    return {"type": plugin, "data": HeightData(field), **arguments}

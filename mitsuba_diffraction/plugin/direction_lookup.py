@@ -141,6 +141,6 @@ def _pages(table: DirectionalTable) -> Array:
 
 
 def _sensitivities(wavelengths: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How much each wavelength counts in red, green and blue, (3, n)."""
+    """Weights of the wavelengths in red, green and blue, (3, n)."""
     weights = np.maximum(linear_srgb(response(wavelengths)).T, 0.0) * wavelengths
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))

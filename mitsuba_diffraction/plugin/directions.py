@@ -1,4 +1,4 @@
-"""What the model asks of a pair of directions, in the patch's frame; grooves (Dr.Jit)."""
+"""Pairs of directions in the patch's frame, and the shadowing of grooves (Dr.Jit)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SMALLEST = float(np.finfo(np.float32).tiny)
 
 
 class Pair:
-    """ωi and ωo, both on the surface's front; where they are not active, harmless ones.
+    """Directions ωi and ωo in front of the surface; inactive lanes have harmless ones.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class TablePoint:
 
 
 def in_patch(direction: Vector2f | Vector3f, rotation: Rotation) -> Vector2f:
-    """A vector's tangential part, turned from the shading frame to the patch's."""
+    """Return a vector's tangential part, turned from the shading frame to the patch's."""
     cos, sin = rotation
     return mi.Vector2f(
         dr.fma(cos, direction.x, sin * direction.y),
@@ -87,13 +87,15 @@ def in_patch(direction: Vector2f | Vector3f, rotation: Rotation) -> Vector2f:
 
 
 def from_patch(q: Vector2f, rotation: Rotation) -> Vector2f:
-    """The inverse of `in_patch`."""
+    """Turn a tangential part from the patch's frame to the shading frame."""
     cos, sin = rotation
     return mi.Vector2f(dr.fma(cos, q.x, -sin * q.y), dr.fma(cos, q.y, sin * q.x))
 
 
 def vcavity(cos_i: Float, cos_o: Float, one_plus_dot: Float) -> Float:
-    """min(1, 2(n·h)(n·ωi)/(ωo·h), 2(n·h)(n·ωo)/(ωo·h)): long V-shaped grooves, edges level.
+    """Return the shadowing of long V-shaped grooves with level edges.
+
+    It is min(1, 2(n·h)(n·ωi)/(ωo·h), 2(n·h)(n·ωo)/(ωo·h)).
 
     Torrance and Sparrow 1967 (the form is Blinn's, 1977; Stam 1999, appendix, uses it for
     diffraction). With ωi + ωo = |ωi + ωo| h and |ωi + ωo|² = 2(1 + ωi·ωo) =: 2·one_plus_dot,

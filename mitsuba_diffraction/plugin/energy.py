@@ -51,7 +51,7 @@ MUCH = 0.05
 
 
 class EnergyModel:
-    """Of one BSDF, at the height scale and the material last given.
+    """Scales of directions and albedo of a BSDF, at the height scale and material last set.
 
     Parameters
     ----------
@@ -142,14 +142,14 @@ class EnergyModel:
         return np.average(scale.values, axis=0, weights=weights).astype(np.float32)
 
     def ratio(self, height_scale: float) -> DirectionalTable:
-        """What `reflected` looks up, for who draws without Dr.Jit."""
+        """Return the table that `reflected` looks up, for shaders."""
         nodes = self._energy.nodes(height_scale)
         ratios = [self._ratio(self._energy.at(node).albedo) for node in nodes]
         return between(ratios, nodes, height_scale)
 
     @property
     def takes(self) -> int:
-        """By what the BSDF is multiplied: 0 where it is by nothing."""
+        """Number that tells which factors the BSDF is multiplied by; 0 for none."""
         return self._scale.present + 2 * self._mean.present
 
     def factor(self, pair: Pair, wavenumbers: list[Float], height_scale: Float) -> Colour:

@@ -1,4 +1,4 @@
-"""Interfaces (Dr.Jit), the twin of `optics.fresnel`: what the material reflects, and its fields.
+"""Reflectance and fields of interfaces (Dr.Jit), the twin of `optics.fresnel`.
 
 Power reflectance of a dielectric, a conductor or a perfect mirror; fields at a flat interface, or
 at both of a film.
@@ -33,7 +33,7 @@ class Filmed:
     depth: Float
 
     def tilted(self, cosine: Float) -> Filmed:
-        """That on a facet whose normal has this cosine to the vertical."""
+        """Return the film's index on a facet whose normal has this cosine to the vertical."""
         return Filmed(self.index, self.film, self.depth * cosine)
 
 
@@ -52,7 +52,7 @@ class Face(NamedTuple):
 
 
 def faces(q: Float, square: Float, index: Index) -> list[Face]:
-    """Fields at the interface, or at both, for light of this cosine and squared sine."""
+    """Return fields at the interface, or at both of a film, for a cosine and a squared sine."""
     if not isinstance(index, Filmed):
         epsilon = index * index
         inside = root(epsilon - square)
@@ -76,7 +76,7 @@ def faces(q: Float, square: Float, index: Index) -> list[Face]:
 
 
 def amplitudes(cosine: Float, square: Float, index: Index) -> tuple[Number, Number]:
-    """r_s and r_p for the cosine and the squared sine of the angle of incidence."""
+    """Return r_s and r_p for the cosine and the squared sine of the angle of incidence."""
     if not isinstance(index, Filmed):
         epsilon = index * index
         inside = root(epsilon - square)
@@ -84,13 +84,13 @@ def amplitudes(cosine: Float, square: Float, index: Index) -> tuple[Number, Numb
             (epsilon * cosine - inside) * dr.rcp(epsilon * cosine + inside)
         )
     _, film, within, once, back_s, back_p = _film(square, index)
-    found = []
+    pairs = []
     for q, back in ((mi.Complex2f(cosine, 0.0), back_s), (film * cosine, back_p)):
         there = back * once * once
-        found.append(
+        pairs.append(
             (q - within + (q + within) * there) * dr.rcp(q + within + (q - within) * there)
         )
-    return found[0], found[1]
+    return pairs[0], pairs[1]
 
 
 def _film(square: Float, index: Filmed) -> tuple[Number, ...]:
@@ -106,12 +106,12 @@ def _film(square: Float, index: Filmed) -> tuple[Number, ...]:
 
 
 def squared(x: Number) -> Float:
-    """|x|²."""
+    """Return |x|²."""
     return dr.fma(x.real, x.real, dr.square(x.imag)) if dr.is_complex_v(x) else dr.square(x)
 
 
 def root(square: Number) -> Number:
-    """The root whose wave decays, or else travels, away from the surface."""
+    """Return the root whose wave decays, or else travels, away from the surface."""
     if not dr.is_complex_v(square):
         return dr.safe_sqrt(square)
     # The larger part from a sum, the other from the product: neither cancels
@@ -190,7 +190,7 @@ class Dielectric:
         return [mi.Complex2f(self.eta, 0.0) if self.reflects_all else self.eta]
 
     def derive(self) -> None:
-        """Find out whether there is total reflection, for which kernels differ."""
+        """Determine whether there is total reflection, for which kernels differ."""
         self.reflects_all = bool(dr.slice(dr.detach(self.eta)) < 1.0)
 
     def __str__(self) -> str:
@@ -206,7 +206,7 @@ def _ratio_refusal(name: str, least: float, ratio: float) -> str:
 
 
 class Inside:
-    """A dielectric seen from within, over the medium above it; `Dielectric` of the reciprocal."""
+    """Dielectric seen from within: the medium above it, over the dielectric."""
 
     reflects_all = True
 
@@ -238,19 +238,19 @@ class Conductor:
 
     @classmethod
     def of_material(cls, material: str, wavelength: float) -> Conductor:
-        """Mitsuba's tabulated conductors, by the names that `roughconductor` takes.
+        """Return one of Mitsuba's tabulated conductors, by the names that `roughconductor` accepts.
 
         wavelength : nm, where mono variants take the index; Mitsuba's is a mean over the spectrum.
         """
         objects = children(_load("conductor", material=material))
         if mi.is_monochromatic:
             objects = {name: _at(material, name, wavelength) for name in ("eta", "k")}
-        parts = [ObjectValues(name, objects[name], INDEX_PARTS[name]) for name in INDEX_PARTS]
-        made = cls(*parts, material)
+        eta, k = (ObjectValues(name, objects[name], INDEX_PARTS[name]) for name in INDEX_PARTS)
+        conductor = cls(eta, k, material)
         if mi.is_rgb:
             index = _tabulated(material, "eta", _VISIBLE) + 1j * _tabulated(material, "k", _VISIBLE)
-            made._spectrum = index, made._channels()
-        return made
+            conductor._spectrum = index, conductor._channels()
+        return conductor
 
     def reflectance(self, cos_theta: Float, si: Interaction, active: Mask) -> Colour:
         """R for the cosine of the angle to the half vector, at si.wavelengths."""
@@ -293,7 +293,7 @@ Reflectance = Perfect | Dielectric | Conductor
 
 
 def tinted(value: Spectrum, material: object) -> Spectrum:
-    """Light of a metal, multiplied by its channels' reflectances, as its spectrum would have it."""
+    """Correct a metal's colour in RGB variants to the colour of its spectrum."""
     tint: list[Colour] | None = getattr(material, "tint", None)
     if tint is None:
         return value
@@ -308,22 +308,22 @@ def tinted(value: Spectrum, material: object) -> Spectrum:
 
 
 def _load(plugin: str, **parameters: float | str) -> BSDF:
-    """One of Mitsuba's own BSDFs, which know the names of materials."""
+    """Load one of Mitsuba's own BSDFs, which know the names of materials."""
     try:
         return mi.load_dict({"type": plugin, **parameters})
     except Exception as error:  # Mitsuba throws RuntimeError, over several lines
-        given = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
+        arguments = ", ".join(f"{name}={value!r}" for name, value in parameters.items())
         reason = " ".join(str(error).split())
         if plugin == "conductor":
             raise DiffractionError(_unknown_conductor(str(parameters["material"]))) from error
         raise DiffractionError(
-            f"{given} is no material that Mitsuba knows ({reason[:200]}); give a number, a name "
-            "from Mitsuba's table of materials, or eta and k"
+            f"{arguments} is no material that Mitsuba knows ({reason[:200]}); give a number, a "
+            "name from Mitsuba's table of materials, or eta and k"
         ) from error
 
 
 def _unknown_conductor(material: str) -> str:
-    """That there is no such conductor, and which there are."""
+    """Return the message on an unknown conductor, with the names of known ones."""
     names = _conductors()
     close = difflib.get_close_matches(material.lower(), [name.lower() for name in names], 3, 0.6)
     listed = [name for name in names if name.lower() in close] or names
@@ -335,11 +335,11 @@ def _unknown_conductor(material: str) -> str:
 
 
 def _conductors() -> list[str]:
-    """Names of the tabulated conductors, without those that are another's in Palik's table."""
+    """Return names of tabulated conductors, without second entries from Palik's table."""
     folder = Path(str(mi.file_resolver().resolve("data/ior")))
-    found = {file.name.removesuffix(".eta.spd") for file in folder.glob("*.eta.spd")}
+    names = {file.name.removesuffix(".eta.spd") for file in folder.glob("*.eta.spd")}
     return sorted(
-        (name for name in found if name.removesuffix("_palik") not in found - {name}),
+        (name for name in names if name.removesuffix("_palik") not in names - {name}),
         key=str.lower,
     )
 

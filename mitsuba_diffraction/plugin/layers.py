@@ -1,4 +1,4 @@
-"""What lies over the structure, and what beneath it gets (Dr.Jit).
+"""Layers over the structure, and the light for a BSDF beneath it (Dr.Jit).
 
 A flat clear coat, the twin of `optics.coat`; a thin film that is coherent with the material, see
 `optics.fresnel.Filmed`; and how much light reaches a nested BSDF.
@@ -23,7 +23,7 @@ from .types import Callback, Colour, Float, Interaction, Mask, Number, Vector3f
 
 
 class CoatedPair(Pair):
-    """A pair as it is in a coat.
+    """Pair of the directions within a coat.
 
     `uv` and `w` are optical, those of k in vacuum: `w` is n times the sum of the cosines. All else
     is that of the refracted directions.
@@ -49,7 +49,7 @@ class CoatedPair(Pair):
 
 
 class UnderCoat:
-    """A material under a coat, as far as flat faces go: what light is not transmitted by both."""
+    """Reflectance of the flat faces of a coat and of the material beneath it."""
 
     def __init__(self, material: Dielectric | Conductor, coat: Dielectric) -> None:
         self.material, self.coat = material, coat
@@ -80,7 +80,7 @@ class UnderCoat:
 
 
 def transmittances(cosine: Float, n: Float) -> tuple[Float, Float]:
-    """T_s and T_p of the face for light at this angle outside; the same both ways."""
+    """Return T_s and T_p of a face for the cosine of the angle outside; equal both ways."""
     inside = dr.safe_sqrt(dr.fma(cosine, cosine, n * n - 1.0))
     outside = 4.0 * cosine * inside
     below = dr.fma(n * n, cosine, inside)
@@ -88,7 +88,7 @@ def transmittances(cosine: Float, n: Float) -> tuple[Float, Float]:
 
 
 def bounced(face: tuple[Float, Float], structure: tuple[Float, Float]) -> Float:
-    """G of the light that comes and goes, from R of the face and ρ of the structure for both."""
+    """Return G of light that bounces, from R of the face and ρ of the structure for both ways."""
     # At Brewster's angle R is 0 to rounding
     ends = [dr.safe_sqrt(r * rho) for r, rho in zip(face, structure, strict=True)]
     left = dr.fma(-ends[0], ends[1], 1.0)
@@ -112,7 +112,7 @@ _ENDS, _PER_FRINGE, _LEAST_NODES = (390.0, 710.0), 4, 6
 
 @dataclass(frozen=True)
 class Channels:
-    """How RGB variants sum a film's colours: channels are `weights` (3, n) times those at nodes.
+    """Weights (3, n) by which RGB variants sum a film's colours at n wavelengths.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class Channels:
 
     @classmethod
     def of(cls, path: float) -> Channels:
-        """For fringes of a path there and back (nm): a cubic spline under the sensitivities."""
+        """Return weights for fringes of a path there and back (nm), by a cubic spline."""
         first, last = (1.0 / end for end in _ENDS)
         count = _LEAST_NODES + math.ceil(_PER_FRINGE * path * (first - last))
         nodes = np.linspace(last, first, count)
@@ -133,7 +133,7 @@ class Channels:
         return cls((1.0 / nodes).tolist(), (rows / rows.sum(axis=1, keepdims=True)).tolist())
 
     def sums(self, values: list[Float]) -> list[Float]:
-        """The channels' of values at the nodes; none below 0, as of a colour beyond the gamut."""
+        """Return the channels of values at the nodes; colours beyond the gamut are clipped at 0."""
         return [
             dr.maximum(sum(w * v for w, v in zip(row, values, strict=True)), 0.0)
             for row in self.weights
@@ -141,7 +141,7 @@ class Channels:
 
 
 class UnderFilm:
-    """A material under a film; wherever a material is asked for its reflectance or its indices.
+    """Material under a film, with the interface of a material.
 
     Parameters
     ----------
@@ -181,28 +181,28 @@ class UnderFilm:
         return mi.UnpolarizedSpectrum(self.summed(powers))
 
     def indices(self, si: Interaction, active: Mask) -> list[Filmed]:
-        """Of each channel, or in RGB variants of each of the wavelengths that are summed."""
-        found = [_complex(n) for n in self.material.indices(si, active)]
+        """Return the filmed index of each channel; in RGB variants, of each wavelength summed."""
+        indices = [_complex(n) for n in self.material.indices(si, active)]
         waves = self._wavelengths(si)
         if self.channels is not None:
-            found = _between(found, self.channels.wavelengths)
-        elif len(found) == 1:
-            found *= len(waves)
+            indices = _between(indices, self.channels.wavelengths)
+        elif len(indices) == 1:
+            indices *= len(waves)
         film, depth = mi.Complex2f(self.film.eta, self.k), self.thickness * (2.0 * dr.pi)
-        return [Filmed(n, film, depth * dr.rcp(w)) for n, w in zip(found, waves, strict=True)]
+        return [Filmed(n, film, depth * dr.rcp(w)) for n, w in zip(indices, waves, strict=True)]
 
     def summed(self, values: list[Float]) -> list[Float]:
         """The channels' values of those of `indices`."""
         return values if self.channels is None else self.channels.sums(values)
 
     def wavenumbers(self, given: list[Float]) -> list[Float]:
-        """rad/µm of `indices`; given : of the channels."""
+        """Return wavenumbers of `indices`, rad/µm, from those of the channels."""
         if self.channels is None:
             return given
         return [mi.Float(k) for k in wavenumber(self.channels.wavelengths).tolist()]
 
     def traverse(self, callback: Callback) -> None:
-        """Expose what the material has, and the film's `film_eta`, `film_k`, `film_thickness`."""
+        """Expose the material's index, and `film_eta`, `film_k` and `film_thickness`."""
         for one in (self.material, self.film, self._k, self._thickness):
             one.traverse(callback)
 
@@ -264,7 +264,7 @@ def _complex(index: Number) -> Number:
 
 
 def _between(found: list[Number], wavelengths: list[float]) -> list[Number]:
-    """An index by red, green and blue at other wavelengths: linear, level beyond the ends."""
+    """Interpolate an index from red, green and blue to other wavelengths, constant outside."""
     if len(found) == 1:
         return found * len(wavelengths)
     shares = [np.interp(wavelengths, RGB_WAVELENGTHS[::-1], row) for row in np.eye(3)]
@@ -273,7 +273,7 @@ def _between(found: list[Number], wavelengths: list[float]) -> list[Number]:
 
 
 def plain(number: Float) -> float:
-    """A number of all lanes."""
+    """Return the number that all lanes share."""
     return float(dr.slice(dr.detach(number)))
 
 

@@ -62,7 +62,7 @@ def find_llvm() -> list[Library]:
 
 
 def named_library() -> Library | None:
-    """What the environment variable names; a bare file name is the loader's to find."""
+    """Library that the environment variable names; the loader finds a bare file name."""
     value = os.environ.get(VARIABLE)
     if not value:
         return None

@@ -24,7 +24,7 @@ ROUGH = 65.0
 
 
 def material_of(props: Properties, coat: Dielectric | None) -> Reflectance:
-    """The structure: a conductor, a perfect mirror, or a dielectric, in air or under a coat."""
+    """Read the structure's material: conductor, perfect mirror or dielectric, in air or a coat."""
     conductor = [n for n in ("material", "eta", "k") if n in props]
     dielectric = [n for n in ("int_ior", "ext_ior") if n in props]
     if conductor and dielectric:
@@ -51,7 +51,7 @@ def material_of(props: Properties, coat: Dielectric | None) -> Reflectance:
 
 
 def coat_of(props: Properties) -> Dielectric | None:
-    """The clear layer over the structure, or None."""
+    """Read the clear layer over the structure, or return None."""
     if "coat_ior" not in props:
         return None
     medium = read_index(props, "ext_ior", _above(props))
@@ -67,16 +67,16 @@ def coat_of(props: Properties) -> Dielectric | None:
 def film_of(
     props: Properties, material: Reflectance, wavelength: float, shortest: float
 ) -> Reflectance | UnderFilm:
-    """The material, under a film if there is one.
+    """Read the film; return the material under it, or the bare material.
 
     wavelength : nm, of mono variants; shortest : the least that the table serves.
     """
-    given = [name for name in ("film_ior", "film_k", "film_thickness") if name in props]
-    if not given:
+    parameters = [name for name in ("film_ior", "film_k", "film_thickness") if name in props]
+    if not parameters:
         return material
-    if not {"film_ior", "film_thickness"} <= set(given):
+    if not {"film_ior", "film_thickness"} <= set(parameters):
         raise DiffractionError(
-            f"{given[0]} alone is no film; give both film_ior and film_thickness (nm)"
+            f"{parameters[0]} alone is no film; give both film_ior and film_thickness (nm)"
         )
     if isinstance(material, Perfect):
         raise DiffractionError("film_ior needs a material with a refractive index beneath it")
@@ -91,7 +91,7 @@ def film_of(
 
 
 def warn_of_film(material: Reflectance | UnderFilm, table: DiffractionTable, scale: float) -> None:
-    """Say that a film's fringes are finer than the model can follow on heights times a scale."""
+    """Warn of a film whose fringes are finer than the model can follow on these heights."""
     if not isinstance(material, UnderFilm) or not isinstance(material.material, Conductor):
         return
     index, thickness = material.numbers()
@@ -105,7 +105,7 @@ def warn_of_film(material: Reflectance | UnderFilm, table: DiffractionTable, sca
 
 
 def _above(props: Properties) -> float:
-    """Index of the medium above: air; conductors have theirs given relative to it."""
+    """Return the default index of the medium above; conductors' indices are relative to it."""
     return 1.0 if any(name in props for name in ("material", "eta", "k")) else AIR
 
 

@@ -17,7 +17,7 @@ PACKET = 16
 
 
 def upload(kind: Kind, values: NDArray[np.generic]) -> Buffer:
-    """A Dr.Jit array in memory of Dr.Jit's own, which starts at a cache line.
+    """Upload an array into memory of Dr.Jit's own, which starts at a cache line.
 
     On the CPU an array made from NumPy's may go on using NumPy's memory: aligned by chance, and
     mistaken for other arrays when a function recorded by `dr.freeze` runs again. Scalar variants

@@ -27,7 +27,7 @@ _VALUES = ("value", "values", "data")
 
 
 class Changeable(Protocol):
-    """A parameter that `mi.traverse` exposes, as `ParameterChanges` sees it."""
+    """A parameter that `mi.traverse` exposes."""
 
     def refusal(self) -> str | None:
         """Reason why the value that was set is not allowed, or None."""
@@ -122,7 +122,7 @@ class ObjectValues:
 
 
 class Changing(Protocol):
-    """A BSDF whose parameters change, as `take_changes` sees it.
+    """A BSDF whose parameters change.
 
     Attributes
     ----------
@@ -186,7 +186,7 @@ def _copy(value: Any) -> Any:
 
 
 def _numbers(value: Any) -> NDArray[np.float64]:
-    """All numbers of a value; none of transformations and the like."""
+    """Return all numbers of a value; none of transformations and the like."""
     if dr.is_array_v(value):
         return np.array(dr.detach(value), float).ravel()
     return np.array([value] if isinstance(value, int | float) else [], float)

@@ -12,7 +12,7 @@ from .types import BSDF, Properties
 
 
 def choice(props: Properties, name: str, choices: tuple[str, ...]) -> str:
-    """One of some words; the first is the default."""
+    """Read a word out of several; the first is the default."""
     value = props.get(name, choices[0])
     if value not in choices:
         raise DiffractionError(f"{name}={value!r} is unknown; choose one of {', '.join(choices)}")
@@ -20,7 +20,7 @@ def choice(props: Properties, name: str, choices: tuple[str, ...]) -> str:
 
 
 def flag(props: Properties, name: str, default: bool) -> bool:
-    """True or false."""
+    """Read a boolean."""
     value = props.get(name, default)
     if not isinstance(value, bool):
         raise DiffractionError(f"{name}={value!r} must be true or false")
@@ -28,7 +28,7 @@ def flag(props: Properties, name: str, default: bool) -> bool:
 
 
 def number(props: Properties, name: str, default: float) -> float:
-    """A finite number."""
+    """Read a finite number."""
     if name not in props:
         return default
     value = props.get(name)
@@ -42,7 +42,7 @@ def number(props: Properties, name: str, default: float) -> float:
 
 
 def kind_of(element: BSDF) -> str:
-    """What an element of a scene is: `SmoothDielectric`, say."""
+    """Return the class of an element of a scene, for example `SmoothDielectric`."""
     return str(element.class_name())
 
 
@@ -60,9 +60,9 @@ def name_of(element: Any, number: int | None = None) -> str:
     element : of Mitsuba's, with `id()`.
     number : of a shape, its place in `scene.shapes()`, counted from 0.
     """
-    own = own_id(element.id())
-    if own:
-        return own
+    scene_id = own_id(element.id())
+    if scene_id:
+        return scene_id
     file = _FILE.match(str(element))
     if file:
         kind = f"the mesh {Path(file[1]).name}"
@@ -72,7 +72,7 @@ def name_of(element: Any, number: int | None = None) -> str:
 
 
 def own_id(given: str) -> str:
-    """An id as the scene gives it, empty where it was made up."""
+    """Return the id that the scene gives, empty if Mitsuba made it up."""
     return "" if given.startswith(_UNNAMED) else given
 
 

@@ -29,7 +29,7 @@ from .types import Buffer, Colour, Float, Index, Interaction, Vector2f
 
 
 class PolarCoordinates:
-    """Where (u, v) lies between the rings and azimuths of a colour table."""
+    """Position of (u, v) between the rings and azimuths of a colour table."""
 
     def __init__(self, table: ColourTable) -> None:
         grid = table.grid
@@ -72,7 +72,7 @@ class ColourLookup:
         return mi.Color3f(*others) + self.zeroth(uv, z)
 
     def zeroth(self, uv: Vector2f, z: Float) -> Colour:
-        """That of order 0."""
+        """Return the RGB of order 0."""
         radius = dr.sqrt(dr.maximum(dr.squared_norm(uv), 1e-14))
         return mi.Color3f(*self._zeroth_order(radius, z))
 
@@ -133,14 +133,14 @@ class RGBPower:
         self._lookup = ColourLookup(table)
         self._coordinates = self._lookup.coordinates
         self._z_max = table.z_max
-        found = colour_proposals(table)
-        self._rings, self._bins = found.rings.shape[1], table.grid.bins
+        proposals = colour_proposals(table)
+        self._rings, self._bins = proposals.rings.shape[1], table.grid.bins
         self._most = max(table.grid.counts)
-        self._ring_sums = upload(mi.Float, found.rings)
-        self._azimuth_sums = upload(mi.Float, found.azimuths)
-        self._occupied = upload(mi.Float, found.occupied.astype("float32"))
-        self._zs = len(found.order_0)
-        self._order_0 = upload(mi.Float, found.order_0)
+        self._ring_sums = upload(mi.Float, proposals.rings)
+        self._azimuth_sums = upload(mi.Float, proposals.azimuths)
+        self._occupied = upload(mi.Float, proposals.occupied.astype("float32"))
+        self._zs = len(proposals.order_0)
+        self._order_0 = upload(mi.Float, proposals.order_0)
         self._wavenumbers = [mi.Float(k) for k in wavenumber(RGB_WAVELENGTHS).tolist()]
         # 1/(2·variance) of the lobes in (u, v)
         self._sharpness = [(2.0 * math.pi * table.sigma / lam) ** 2 for lam in LOBES]

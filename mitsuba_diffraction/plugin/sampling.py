@@ -43,7 +43,7 @@ _samplers: weakref.WeakKeyDictionary[DiffractionTable, dict[str, OrderSampler]] 
 
 
 class Strategy(NamedTuple):
-    """How frequencies are drawn towards one direction.
+    """Parameters of drawing frequencies for one direction of incidence.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""From what a scene names (an image, a recipe, a table, an array) to a table, built only once."""
+"""Tables of the sources that a scene names: images, recipes, tables, arrays; each built once."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def table_of_file(
     height_scale: float,
     provider: TableProvider,
 ) -> DiffractionTable:
-    """The table that a file is or makes: a table, a recipe, or a height field of any format.
+    """Return the table of a file: a table, a recipe, or a height field of any format.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def table_of_file(
 
 
 def heights_of_file(path: Path, must_be_table: bool, options: LoadOptions) -> HeightField:
-    """The heights that a scene names; the first of a recipe's several.
+    """Return the heights that a scene names; the first of a recipe's several.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def heights_of_file(path: Path, must_be_table: bool, options: LoadOptions) -> He
 
 
 def heights_of_tensor(data: Any, options: LoadOptions) -> HeightField:
-    """Heights (ny, nx) in µm, given as an array, or as what `bsdf_dict` makes of a HeightField.
+    """Return heights (ny, nx) in µm from an array, or from `bsdf_dict`'s HeightField.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def heights_of_tensor(data: Any, options: LoadOptions) -> HeightField:
 def table_of_heights(
     heights: HeightField, asked: Mapping[str, Any], height_scale: float, provider: TableProvider
 ) -> DiffractionTable:
-    """The table of a height field."""
+    """Return the table of a height field."""
     digest = heights.digest() + (" cut out" if heights.cut_out else "")  # warned of otherwise
     return provider(_request(digest, lambda: [heights], asked, height_scale, None))
 
@@ -200,7 +200,7 @@ def _file_digest(path: Path, options: LoadOptions) -> str:
 
 
 def _recipe_digest(recipe: Recipe, options: LoadOptions) -> str:
-    """Changes when the recipe's heights may: its own text, its sources, or the generators."""
+    """Return a digest of the recipe's text, its sources and the generators."""
     files = [readable_file(source) for source in recipe.sources]
     if recipe.generator is not None:
         files += sorted(Path(gratings.__file__).parent.glob("*.py"))

@@ -1,4 +1,4 @@
-"""What varies over a surface: height scale and orientation, from textures and mesh attributes.
+"""Height scale and orientation that vary over a surface: textures and mesh attributes.
 
 A BSDF cannot see whether the shape has the attributes that it reads: `check_attributes` does.
 """
@@ -29,7 +29,7 @@ _READ = re.compile(r'MeshAttribute\[\s*name = "([^"]+)"')
 
 
 def check_attributes(shape: Any, number: int | None = None) -> None:
-    """Refuse a shape whose BSDF reads what it lacks: a mesh attribute, or where on it one is.
+    """Refuse a shape that lacks a mesh attribute or the UV coordinates that its BSDF reads.
 
     Mitsuba's kernels would go on with zeros, which turn no patch and colour nothing, and with UV
     coordinates of each triangle.
@@ -63,12 +63,12 @@ def check_attributes(shape: Any, number: int | None = None) -> None:
 
 
 def is_bitmap(texture: Texture) -> bool:
-    """Whether it is a picture, whose numbers can be looked at."""
+    """Whether a texture is a bitmap, whose values can be read."""
     return str(texture).startswith("BitmapTexture[")
 
 
 def is_attribute(texture: Texture) -> bool:
-    """Whether it is a mesh attribute, which has values on that mesh only."""
+    """Whether a texture is a mesh attribute, which has values on that mesh only."""
     return str(texture).startswith("MeshAttribute[")
 
 
@@ -115,23 +115,23 @@ class VaryingHeightScale:
         require_raw(texture, "height_scale", "factors")
         self.high = self.range()[1] if most is None else most
         if not 0.0 < self.high <= 1e3:  # also refuses NaN
-            given = "its largest factor" if most is None else "height_scale_max"
+            described = "its largest factor" if most is None else "height_scale_max"
             raise DiffractionError(
-                f"height_scale: {given}, {self.high:g}, must be above 0 and at most 1000"
+                f"height_scale: {described}, {self.high:g}, must be above 0 and at most 1000"
             )
         if refused := self.refusal():
             raise DiffractionError(refused)
         self.changeable = (ObjectValues("height_scale", texture),)
 
     def range(self) -> tuple[float, float]:
-        """The least and the largest factor there are, as far as is known."""
+        """Return the smallest and the largest factor, as far as known."""
         if not self._is_bitmap:
             return 0.0, self.high
         values = np.array(mi.traverse(self.texture)["data"], float)
         return float(values.min()), float(values.max())
 
     def at(self, si: Interaction, active: Mask) -> Float:
-        """The factor at points of the surface."""
+        """Return the factor at points of the surface."""
         return index_between(self.texture.eval_1(si, active), LEAST_SCALE, self.high)
 
     def refusal(self) -> str | None:
@@ -157,7 +157,7 @@ MOST_DEGREES = 36_000.0
 
 
 class ConstantOrientation:
-    """The same angle everywhere, degrees from the first tangent to the patch's x axis."""
+    """A constant angle, degrees from the first tangent to the patch's x axis."""
 
     def __init__(self, degrees: float) -> None:
         self._angle = Bounded("orientation", degrees, -MOST_DEGREES, MOST_DEGREES, _refusal)
@@ -206,7 +206,7 @@ class OrientationTexture:
 
 
 def _check(texture: Texture) -> None:
-    """Refuse a texture whose values are not the directions that somebody saved.
+    """Refuse a texture whose values are not the directions that were saved.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What the plugin's arguments are, one name a role: Mitsuba's own types differ by variant.
+"""Names for the types of arguments; Mitsuba's own types differ by variant.
 
 In JIT variants every number stands for one in each lane of a kernel; in scalar variants it is a
 plain number.

@@ -1,4 +1,4 @@
-"""Where on the patch the coherence window sits at a point of the surface: `coherence="surface"`.
+"""Positions of the coherence window on the patch, for `coherence="surface"`.
 
 A window centred on x turns the amplitude of order j by exp(−i q_j·x). x is the point's position on
 the surface, from its UV coordinates, in the patch's axes. The patch tiles the plane; at random, it
@@ -33,7 +33,7 @@ _MOST_CORNERS = 2.0**22
 
 @dataclass(frozen=True)
 class Window:
-    """One of the windows at a point, by what it turns orders by, from the patch's centre.
+    """A window at a point of the surface, by the phases that it gives to orders.
 
     Attributes
     ----------
@@ -48,14 +48,14 @@ class Window:
 
     @classmethod
     def of(cls, turn: Vector2f, weight: Float) -> Window:
-        """Of a turn of any size."""
+        """Make the window of a turn of any size."""
         turn = turn - dr.round(turn)
         x, y = (dr.sincos(2.0 * dr.pi * part)[::-1] for part in turn)
         return cls(turn, (x, y), weight)
 
 
 class WindowPositions:
-    """From points of the surface to windows on a patch.
+    """Windows on a patch for points of the surface.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class WindowPositions:
         dr.make_opaque(self._scale, self._patches)
 
     def at(self, si: Interaction, rotation: Rotation) -> list[Window]:
-        """The windows at points of the surface, one or three."""
+        """Return the windows at points of the surface, one or three."""
         position = self._position(si)
         if not self._random:
             return [self._window(position, rotation, mi.Vector2f(0.0), mi.Float(1.0))]
@@ -90,7 +90,7 @@ class WindowPositions:
         return windows
 
     def _position(self, si: Interaction) -> Vector2f:
-        """Along the shading frame's tangents, µm; v may run either way."""
+        """Return the position along the shading frame's tangents, µm; v may run either way."""
         uv, s, t = si.uv, si.sh_frame.s, si.sh_frame.t
         if self._in_world:
             along = si.dp_du * uv.x + si.dp_dv * uv.y
@@ -100,7 +100,7 @@ class WindowPositions:
     def _window(
         self, position: Vector2f, rotation: Rotation, shift: Vector2f, weight: Float
     ) -> Window:
-        """Position and shift in µm of the surface and in patches."""
+        """Return the window at a position (µm), shifted by so many patches."""
         return Window.of(in_patch(position, rotation) * self._patches + shift - 0.5, weight)
 
     def __str__(self) -> str:
@@ -108,7 +108,7 @@ class WindowPositions:
 
 
 def _triangle(position: Vector2f) -> tuple[list[Vector2f], list[Float]]:
-    """Corners, in whole numbers along two sides, of the triangle of side 1 around; coordinates."""
+    """Return the corners of the triangle of side 1 around a position, and its coordinates."""
     y = position.y * (2.0 / math.sqrt(3.0))
     skewed = mi.Vector2f(dr.fma(-0.5, y, position.x), y)
     base = dr.floor(skewed)
@@ -122,7 +122,7 @@ def _triangle(position: Vector2f) -> tuple[list[Vector2f], list[Float]]:
 
 
 def _unskewed(corner: Vector2f) -> Vector2f:
-    """Where a corner is, in sides of a triangle."""
+    """Return the position of a corner, in sides of a triangle."""
     return mi.Vector2f(dr.fma(0.5, corner.y, corner.x), corner.y * (0.5 * math.sqrt(3.0)))
 
 

@@ -31,7 +31,7 @@ def _mean_gain(
     field: HeightField, cosines: tuple[Real, Real], wavelength: Real, film: Filmed
 ) -> Real:
     """g(ωi) g(ωo) of `optics.mean_second_order`, (n,)."""
-    roughness = ScaleRoughness.of(field.heights, field.pixel_size)
+    roughness = ScaleRoughness.from_heights(field.heights, field.pixel_size)
     gain = np.ones(len(wavelength))
     rows = np.stack(np.broadcast_arrays(wavelength, *film.parts), axis=1)
     for row in np.unique(rows, axis=0):

@@ -18,9 +18,10 @@ the medium above it. Lengths are in µm. The equations have the numbers of docs/
 (2) are orders of the phase screen exp(iκh); (3) is the power under a Gaussian window exp(−r²/2σ²),
 averaged over its positions (Stam 1999, eq. 7–12). K is Kirchhoff's tangent plane: Fresnel's r_s and
 r_p at the half vector, T the turn between the axes of the surface and the facet's. B is first-order
-small slope (Rice 1951; Voronovich 1985), (10) its second order (Voronovich 1994). Rows and columns
-of J are s and p, outgoing and incoming. Indices and results are arrays (n,) as `Light`'s are.
-coat.py, film.py and transmission.py wrap this.
+small slope (Rice 1951; Voronovich 1985), (10) its second order (Voronovich 1994): c_l, c_t depend
+on directions and index, r = a* D/|a|² on the spectra D of squared slopes along and across q_j. Rows
+and columns of J are s and p, outgoing and incoming. Indices and results are arrays (n,) as in
+`Light`. coat.py, film.py and transmission.py wrap this.
 """
 
 from __future__ import annotations
@@ -80,7 +81,7 @@ def ensemble_power(
 ) -> Real:
     """⟨|P|²⟩ of (3) in µm⁴; second : index and share s for the factors of (10), else F_j = 1."""
     k, power = 2e3 * np.pi / light.wavelength, np.zeros(len(light.wavelength))
-    slopes = None if second is None else Slopes.of(field.heights, field.pixel_size)
+    slopes = None if second is None else Slopes.from_heights(field.heights, field.pixel_size)
     for n, (wi, wo) in enumerate(zip(light.wi, light.wo, strict=True)):
         # (1): the frequency q and the phase per height κ
         u, v, w = wi + wo
@@ -162,7 +163,7 @@ def share(field: HeightField, light: Light, index: Index) -> Real:
     total, k = light.wi + light.wo, 2e3 * np.pi / light.wavelength
     q = k * np.hypot(total[:, 0], total[:, 1])
     # σ_q² = Σ_q' |h_q'|² (1 − exp(−(4q'/q)⁴)) exp(−(q'/2q)⁴), h_q' the heights' spectrum
-    variance = ScaleRoughness.of(field.heights, field.pixel_size).at(q)
+    variance = ScaleRoughness.from_heights(field.heights, field.pixel_size).at(q)
     roughness = np.square(k * total[:, 2]) * variance  # (κσ_q)²
     return np.exp(-roughness * (0.5 * reflectance(1.0, index) + roughness / 3))
 

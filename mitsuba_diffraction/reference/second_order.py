@@ -57,7 +57,7 @@ def resolved(
 def measured_change(field: HeightField) -> float:
     """Relative change of the colours of these heights, as a table of them measures it."""
     q_limit = 2.0 * float(wavenumber(SHORTEST))
-    grid = CellGrid.of(field.extent, field.rms_height, q_limit, (q_limit, q_limit), q_limit)
-    sums = CellSums.of([(field, np.ones((1, 1)))], grid)
-    roughness = ScaleRoughness.of(field.heights, field.pixel_size)
+    grid = CellGrid.for_patches(field.extent, field.rms_height, q_limit)
+    sums = CellSums.of_patches([(field, np.ones((1, 1)))], grid)
+    roughness = ScaleRoughness.from_heights(field.heights, field.pixel_size)
     return colour_change(sums, sums.ratios(), roughness, (SHORTEST, LONGEST))

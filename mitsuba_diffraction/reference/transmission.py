@@ -53,7 +53,7 @@ def btdf(
         inside = refracted(below * [1, 1, -1], eta) * [1, 1, -1]
     k, total = wavenumber(lam), above + eta * inside
     kappa, sigma = -k * total[:, 2], sigma_of(width)
-    roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
+    roughness = blend.ScaleRoughness.from_heights(field.heights, field.pixel_size)
     jones = through.kirchhoff(above, inside, eta)
     if model == "small_slope":
         s = blend.weight(kappa, roughness.at(k * np.hypot(*total[:, :2].T)), eta)[:, None, None]

@@ -10,8 +10,12 @@ lookup             the NumPy twin of the renderer's look-up
 exr                tables as EXR files
 document           all but the coefficients as plain data, checked when read
 layout             where a table's numbers lie: for NumPy, the plugin and the shaders
-energy             the directional albedo and its bound
+powers             powers of the orders as series in κ, whatever the table stores
+height_scales      height scales at which functions of it are tabulated
+film               the mean of the second order under a film
+energy             the directional albedo, and the scales that conserve energy
 sampling           densities to draw directions from
+order_mixture      orders for integrals: strong ones, and a density of all others
 colour             the sum over daylight's spectrum
 store              the cache of all of these
 """

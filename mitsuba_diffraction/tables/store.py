@@ -177,7 +177,7 @@ def read_record(path: Path, title: str) -> Record:
     if not path.is_file():
         raise FileNotFoundError
     content = np.fromfile(path, np.uint8)
-    if content[:_HEAD].tobytes() != _head(title, [content[_HEAD:]]):
+    if content[:_HEAD].tobytes() != _head(title, [content[_HEAD:].data]):
         raise ValueError("its checksum or its key is another's")
     length = int(content[_HEAD : 2 * _HEAD].tobytes())
     place = 2 * _HEAD + _aligned(length)
@@ -209,20 +209,21 @@ def write_record(path: Path, title: str, record: Record) -> None:
     arrays = [np.ascontiguousarray(array) for array in record.arrays]
     shapes = [[array.dtype.str, array.shape] for array in arrays]
     text = json.dumps({"document": record.document, "arrays": shapes}).encode()
-    texts = [np.frombuffer(t, np.uint8) for t in (str(len(text)).encode().ljust(_HEAD), text)]
-    blocks = [*texts, *(array.reshape(-1).view(np.uint8) for array in arrays)]
-    padded = [np.pad(block, (0, _aligned(block.size) - block.size)) for block in blocks]
+    contents: list[bytes | memoryview] = [text]
+    contents += [array.reshape(-1).view(np.uint8).data for array in arrays]
+    blocks: list[bytes | memoryview] = [str(len(text)).encode().ljust(_HEAD)]
+    for block in contents:
+        blocks += [block, bytes(_aligned(len(block)) - len(block))]
     with atomic_path(path) as temporary, open(temporary, "wb") as file:
-        file.write(_head(title, padded))
-        for block in padded:
-            file.write(block.data)
+        file.write(_head(title, blocks))
+        file.writelines(blocks)
 
 
-def _head(title: str, blocks: Sequence[NDArray[np.uint8]]) -> bytes:
+def _head(title: str, blocks: Sequence[bytes | memoryview]) -> bytes:
     """Return the first line, filled up to `_HEAD` bytes."""
     content = hashlib.sha256()
     for block in blocks:
-        content.update(block.data)
+        content.update(block)
     return f"{title} {content.hexdigest()}".encode().ljust(_HEAD - 1) + b"\n"
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from mitsuba_diffraction.streams import own_program
-from tests.fuzz import cached, command_lines, damage, surfaces
+from tests.fuzz import cached, command_lines, damage, light, surfaces, updates
 
 KINDS: dict[str, Callable[[np.random.Generator], None]] = {
     "tables": damage.check_table,
@@ -29,13 +29,18 @@ KINDS: dict[str, Callable[[np.random.Generator], None]] = {
     "surfaces": surfaces.check,
     "cache": cached.check,
     "scenes": damage.check_scene,
+    "light": light.check,
+    "updates": updates.check,
 }
 #: A kind's place decides its random numbers: new ones go to the end.
-_STREAMS = ("commands", "heights", "surfaces", "tables", "texts", "documents", "cache", "scenes")
+_STREAMS = (
+    "commands", "heights", "surfaces", "tables", "texts", "documents", "cache", "scenes", "light",
+    "updates",
+)  # fmt: skip
 #: Share of the time that each kind gets.
 _SHARES = {
     "tables": 0.1, "documents": 0.1, "heights": 0.1, "texts": 0.05, "cache": 0.1, "scenes": 0.05,
-    "commands": 0.25, "surfaces": 0.25,
+    "commands": 0.15, "surfaces": 0.15, "light": 0.15, "updates": 0.05,
 }  # fmt: skip
 #: Seconds of the processor, and by the clock of a busy machine, that a case may take; most take
 #: less than one, and some where kernels are compiled on a slow machine.

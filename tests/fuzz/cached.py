@@ -50,7 +50,7 @@ def _conservation() -> list[DirectionalTable]:
 KINDS = {
     "table": Kind(_table, store._table_record, store._table_of),
     "colours": Kind(_colours, store.colour_record, store.colours_of),
-    "energy": Kind(_conservation, energy._record, energy._tables),
+    "energy": Kind(_conservation, energy.record, energy.tables),
 }
 
 

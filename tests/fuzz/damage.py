@@ -66,7 +66,7 @@ def originals() -> dict[str, bytes]:
         for name, more in {
             "ensemble.exr": {}, "patch.exr": {"coherence": "patch"},
             "chebyshev.exr": {"basis": "chebyshev", "tolerance": 1e-4},
-            "taylor.exr": {"basis": "taylor"},
+            "taylor.exr": {"basis": "taylor"}, "limited.exr": {"frequency_limit": [9.0, 7.0]},
         }.items():  # fmt: skip
             md.DiffractionTable.build(field, coherence_width=2.0, **more).save(at / name)
         for suffix in ("png", "tiff", "bmp"):

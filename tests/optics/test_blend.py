@@ -14,7 +14,7 @@ PATCH = rough_patch((40, 56), (0.11, 0.09), 0.3)
 
 
 def roughness() -> ScaleRoughness:
-    return ScaleRoughness.of(PATCH.heights, PATCH.pixel_size)
+    return ScaleRoughness.from_heights(PATCH.heights, PATCH.pixel_size)
 
 
 def test_all_components_together_are_the_variance_of_the_heights():
@@ -35,7 +35,7 @@ def test_it_is_the_sum_over_all_components():
 
 
 def test_ripples_of_an_order_count_and_long_waves_and_fine_roughness_do_not():
-    ripples = ScaleRoughness.of(gratings.sinusoidal(1.0, 0.05).heights, (1 / 32, 1 / 32))
+    ripples = ScaleRoughness.from_heights(gratings.sinusoidal(1.0, 0.05).heights, (1 / 32, 1 / 32))
     line = ripples.frequency[np.argmax(ripples.variance)]
     whole = ripples.variance.max()
     assert ripples.at(line) == pytest.approx(0.94 * whole, rel=2e-3)  # exp(−1/16)
@@ -55,14 +55,14 @@ def test_a_table_of_nodes_interpolates_to_it():
 
 
 def test_the_mean_of_several_is_that_of_their_variances():
-    other = ScaleRoughness.of(2 * PATCH.heights, PATCH.pixel_size)
+    other = ScaleRoughness.from_heights(2 * PATCH.heights, PATCH.pixel_size)
     q = np.geomspace(0.1, 30.0, 20)
     mean = ScaleRoughness.mean([roughness(), other])
     assert mean.at(q) == pytest.approx(2.5 * roughness().at(q), rel=1e-12)
 
 
 def test_several_patches_have_the_mean_of_their_roughness():
-    other = ScaleRoughness.of(2 * PATCH.heights[:, ::-1], PATCH.pixel_size)
+    other = ScaleRoughness.from_heights(2 * PATCH.heights[:, ::-1], PATCH.pixel_size)
     q = np.geomspace(0.1, 35, 20)
     both = ScaleRoughness.mean([roughness(), other])
     assert both.at(q) == pytest.approx(2.5 * roughness().at(q), rel=1e-9)
@@ -70,7 +70,7 @@ def test_several_patches_have_the_mean_of_their_roughness():
 
 
 def test_a_flat_surface_has_no_roughness_at_any_scale():
-    flat = ScaleRoughness.of(np.full((4, 6), 0.3), (0.1, 0.1))
+    flat = ScaleRoughness.from_heights(np.full((4, 6), 0.3), (0.1, 0.1))
     assert np.all(flat.at([0.0, 1.0, 30.0]) < 1e-30)
     table = flat.table(35.0)
     assert np.isfinite(table.first)

@@ -25,7 +25,7 @@ def test_films_that_are_none_change_nothing(none):
 
 
 def test_a_flat_surface_has_none():
-    flat = ScaleRoughness.of(np.zeros((16, 16)), (0.1, 0.1))
+    flat = ScaleRoughness.from_heights(np.zeros((16, 16)), (0.1, 0.1))
     assert np.all(mean_gain(COSINES, LACQUER, flat, WAVENUMBER) == 1.0)
 
 

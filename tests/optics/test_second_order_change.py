@@ -20,9 +20,9 @@ Q_LIMIT = 2.0 * float(wavenumber(VISIBLE[0]))
 
 
 def measured(field) -> float:
-    grid = CellGrid.of(field.extent, field.rms_height, Q_LIMIT, (Q_LIMIT, Q_LIMIT), Q_LIMIT)
-    sums = CellSums.of([(field, np.ones((1, 1)))], grid)
-    roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
+    grid = CellGrid.for_patches(field.extent, field.rms_height, Q_LIMIT)
+    sums = CellSums.of_patches([(field, np.ones((1, 1)))], grid)
+    roughness = blend.ScaleRoughness.from_heights(field.heights, field.pixel_size)
     return colour_change(sums, sums.ratios(), roughness, VISIBLE)
 
 
@@ -33,8 +33,8 @@ def order_by_order(field) -> float:
         2 * np.pi * np.fft.fftfreq(n, d) for n, d in zip((nx, ny), field.pixel_size, strict=True)
     )
     q = np.stack(np.meshgrid(qx, qy), axis=-1).reshape(-1, 2)
-    slopes = Slopes.of(field.heights, field.pixel_size)
-    roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
+    slopes = Slopes.from_heights(field.heights, field.pixel_size)
+    roughness = blend.ScaleRoughness.from_heights(field.heights, field.pixel_size)
     changed = total = 0.0
     for wave in wavenumber([454.0, 548.0, 642.0]):
         for azimuth in 360.0 * (np.arange(8) + 0.25) / 8:
@@ -85,8 +85,8 @@ def test_a_flat_surface_has_no_change():
 
 def test_true_and_false_apply_whatever_the_change():
     field = gratings.sinusoidal(2.5, 0.1, periods=1, pixels_per_period=16, rows=2)
-    grid = CellGrid.of(field.extent, field.rms_height, Q_LIMIT, (Q_LIMIT, Q_LIMIT), Q_LIMIT)
-    ratios = CellSums.of([(field, np.ones((1, 1)))], grid).ratios()
+    grid = CellGrid.for_patches(field.extent, field.rms_height, Q_LIMIT)
+    ratios = CellSums.of_patches([(field, np.ones((1, 1)))], grid).ratios()
     for change, auto in ((0.049, False), (0.05, True)):
         changed = dataclasses.replace(ratios, change=change)
         assert [applies(asked, changed) for asked in ("auto", True, False)] == [auto, True, False]

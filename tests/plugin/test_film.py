@@ -47,7 +47,7 @@ def means(kind: str, table: md.DiffractionTable, wi: Array, wo: Array, lam: Arra
     """g(ωi) g(ωo) of the table of angles and wavelengths over the exact, (n, 4)."""
     given = FILMED[kind][1]
     index, (film, thickness) = given["eta"] + 1j * given.get("k", 0.0), given["film"]
-    heights = ScaleRoughness.of(PATCH.heights, PATCH.pixel_size)
+    heights = ScaleRoughness.from_heights(PATCH.heights, PATCH.pixel_size)
 
     def filmed(lam: Array) -> Filmed:
         parts = (index + 0.0j, film + 0.0j, 2.0 * np.pi * thickness / lam)

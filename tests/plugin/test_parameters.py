@@ -337,6 +337,23 @@ def test_a_table_for_fewer_wavelengths_than_mitsuba_s_is_refused(some_variant, t
     assert "starts at 450 nm, but Mitsuba renders from 360 nm on" in text
 
 
+@pytest.mark.parametrize("nm", [300.0, 549.45, 1064.0])
+def test_a_table_of_a_laser_s_wavelength_serves_mono_variants_alone(tmp_path, nm):
+    file = tmp_path / "laser.exr"
+    md.DiffractionTable.build(PATCH, wavelength_range=(nm, nm + 1.1), **SMALL).save(file)
+    try:
+        mi.set_variant("llvm_ad_mono")
+        bsdf = loads(table=str(file), wavelength=nm + 0.5, int_ior=1.5)()
+        assert np.all(evaluated(bsdf, polar(10), [polar(25, phi) for phi in (0, 60)], nm) > 0)
+        assert f"outside the table's {nm:g} to" in refusal(
+            loads(table=str(file), wavelength=nm - 1, int_ior=1.5)
+        )
+    finally:
+        mi.set_variant("llvm_ad_spectral")
+    if nm > 360.0:
+        assert "360" in refusal(loads(table=str(file)))
+
+
 def test_two_nested_bsdfs_are_one_too_many(some_variant):
     text = refusal(lambda: load(a={"type": "diffuse"}, b={"type": "diffuse"}))
     assert text.startswith("2 nested BSDFs (a, b); at most one can lie beneath")

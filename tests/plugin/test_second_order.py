@@ -84,7 +84,7 @@ def test_the_factor_is_that_of_its_numpy_twin(variant, scale):
     bsdf, plain = load(height_scale=scale), load(height_scale=scale, second_order=False)
     wave = wavenumber(lam)
     q, kappa = wave[:, None] * (wi + wo)[:, :2], wave * (wi + wo)[:, 2] * scale
-    roughness = blend.ScaleRoughness.of(scale * PATCH.heights, PATCH.pixel_size)
+    roughness = blend.ScaleRoughness.from_heights(scale * PATCH.heights, PATCH.pixel_size)
     share = blend.weight(kappa / scale, roughness.at(np.hypot(*q.T)), 1.56)
     ratios = scale**2 * bsdf.table.slope_ratios.at(q, kappa)
     factor = second_order.factor(second_order.interpolated(1.56, wi, wo), ratios, share)

@@ -26,7 +26,7 @@ def test_matrices_are_those_of_the_tables(index):
     assert model.small_slope(LIGHT, index) == pytest.approx(boundary.small_slope(WI, WO, index))
     s = model.share(FIELD, LIGHT, index)
     total = wavenumber(LIGHT.wavelength)[:, None] * (WI + WO)
-    variance = blend.ScaleRoughness.of(FIELD.heights, FIELD.pixel_size).at(
+    variance = blend.ScaleRoughness.from_heights(FIELD.heights, FIELD.pixel_size).at(
         np.hypot(*total[:, :2].T)
     )
     assert s == pytest.approx(blend.weight(total[:, 2], variance, index))
@@ -36,7 +36,7 @@ def test_matrices_are_those_of_the_tables(index):
 
 def test_factors_are_those_of_the_plugin_s_twin():
     screen, c = np.exp(9j * FIELD.heights), np.array([0.9 - 0.2j, -0.1 + 2.4j])
-    slopes = Slopes.of(FIELD.heights, FIELD.pixel_size)
+    slopes = Slopes.from_heights(FIELD.heights, FIELD.pixel_size)
     orders = model.orders_near((3.0, -2.0), 0.45, screen, FIELD.pixel_size)
     found = model.second_order_factors(orders, screen, slopes, c, 0.8)
     spectra = orders.waves_y @ (slopes.products * screen) @ orders.waves_x.T / screen.size

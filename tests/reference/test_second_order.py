@@ -117,7 +117,7 @@ def test_in_oblique_light_most_of_the_brute_force_sums_is_found(sign):
 def test_the_factors_are_those_of_explicit_sums_over_pixels():
     field, kappa, sigma, s = rough_patch((13, 15), (0.13, 0.15), 0.3), 9.0, 0.45, 0.8
     c = np.array([0.3 - 0.2j, -0.1 + 0.4j])
-    slopes = Slopes.of(field.heights, field.pixel_size)
+    slopes = Slopes.from_heights(field.heights, field.pixel_size)
     screen = np.exp(1j * kappa * field.heights)
     orders = model.orders_near((3.0, -2.0), sigma, screen, field.pixel_size)
     found = model.second_order_factors(orders, screen, slopes, c, s)

@@ -25,7 +25,7 @@ def oxide(thickness, lam):
 def test_tables_have_it(thickness):
     """From the roughness of a table, between its nodes: of g, 1.3 % per direction up to 80°."""
     patch = rough_patch((40, 44), (0.09, 0.09), 0.14, 0.8)
-    exact = ScaleRoughness.of(patch.heights, patch.pixel_size)
+    exact = ScaleRoughness.from_heights(patch.heights, patch.pixel_size)
     table = exponents(exact.table(4e3 * np.pi / RANGE[0]), lambda lam: oxide(thickness, lam), RANGE)
     theta = np.radians([5.0, 30.0, 55.0, 80.0])
     for lam in (437.0, 561.0, 643.0):
@@ -40,6 +40,6 @@ def test_tables_have_it(thickness):
 
 def test_one_wavelength_is_one_page():
     patch = rough_patch((40, 44), (0.09, 0.09), 0.14, 0.8)
-    roughness = ScaleRoughness.of(patch.heights, patch.pixel_size).table(50.0)
+    roughness = ScaleRoughness.from_heights(patch.heights, patch.pixel_size).table(50.0)
     table = exponents(roughness, lambda lam: oxide(250.0, lam), (550.0, 550.0))
     assert table.values.shape[0] == 1

@@ -214,7 +214,7 @@ def _of_mean(grating: Grating, stack: Stack, theta: float, wavelength: float) ->
     film = Filmed(stack.index[wavelength], stack.film, k * stack.thickness * 1e-3)
     _, sines = order_sines(grating.period, wavelength, theta)
     cosines = np.sqrt(1.0 - np.append(sines, np.sin(np.radians(theta))) ** 2)
-    roughness = ScaleRoughness.of(field.heights, field.pixel_size)
+    roughness = ScaleRoughness.from_heights(field.heights, field.pixel_size)
     gains = mean_gain(cosines, film, roughness, k)
     return np.asarray(gains[:-1] * gains[-1])
 

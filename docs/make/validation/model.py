@@ -139,7 +139,7 @@ def share_of(
 ) -> NDArray[np.float64]:
     """s of small slope in the default, (n,); arguments as `efficiencies`."""
     k, total = float(wavenumber(wavelength)), wi + wo
-    roughness = blend.ScaleRoughness.of(field.heights, field.pixel_size)
+    roughness = blend.ScaleRoughness.from_heights(field.heights, field.pixel_size)
     variance = roughness.at(k * np.hypot(total[:, 0], total[:, 1]))
     return np.asarray(blend.weight(k * total[:, 2], variance, index))
 
@@ -164,8 +164,8 @@ def second_order(
 def slope_ratios(patch: HeightField) -> SlopeRatios:
     """Return the slope ratios of a patch that tiles the plane."""
     q_limit = 2.0 * float(wavenumber(SHORTEST))
-    grid = CellGrid.of(patch.extent, patch.rms_height, q_limit, (q_limit, q_limit), q_limit)
-    return CellSums.of([(patch, np.ones((1, 1)))], grid).ratios()
+    grid = CellGrid.for_patches(patch.extent, patch.rms_height, q_limit)
+    return CellSums.of_patches([(patch, np.ones((1, 1)))], grid).ratios()
 
 
 @cache

@@ -2,9 +2,11 @@
 
 Contents
 --------
-ideal   gratings with closed-form diffraction
-scales  look-alikes of snake scales
-discs   tracks of CDs and DVDs
+ideal    gratings with closed-form diffraction
+scales   look-alikes of snake scales
+fingers  positions and shape of a scale's fingers
+noise    periodic random fields
+discs    tracks of CDs and DVDs
 """
 
 from __future__ import annotations

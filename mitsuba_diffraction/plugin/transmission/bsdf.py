@@ -38,9 +38,7 @@ XML and the same in Python:
         <boolean name="thin" value="true"/>
     </bsdf>
 
-    bsdf = mi.load_dict(
-        {"type": "diffraction_dielectric", "heightfield": "film.toml", "thin": True}
-    )
+    mi.load_dict({"type": "diffraction_dielectric", "heightfield": "film.toml", "thin": True})
 """
 
 from __future__ import annotations
@@ -58,7 +56,6 @@ from ..layers import CoatedPair, transmittances
 from ..parameter_changes import check_parameters
 from ..sampling import EVEN, direction_of, with_even_share
 from ..sources import TableProvider, from_cache
-from ..support import TRANSMISSION
 from ..surface import DiffractingSurface
 from ..types import (
     Colour,
@@ -107,7 +104,8 @@ class DiffractionDielectric(DiffractingSurface):
     balance : scales by which both sides add up to 1, or None.
     """
 
-    only_traced = TRANSMISSION.choice
+    #: Feature that shaders do not support.
+    only_traced = "light that goes through"
 
     def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
         read = read_parameters(props, provider)
@@ -236,7 +234,7 @@ class DiffractionDielectric(DiffractingSurface):
         lit: Mask,
         change: Colour | None,
     ) -> tuple[Spectrum, Float]:
-        """f cosθo and density of light that stays above the surface."""
+        """Return f cosθo and density of light that stays above the surface."""
         scale, pair = self.scale_at(si, lit), Pair(si, wo, rotation, lit)
         power = self.geometry(pair) * self._power(si, pair, scale, change)
         value = self.lobe(ctx, si, pair, self.boundary, power, lit)
@@ -253,7 +251,7 @@ class DiffractionDielectric(DiffractingSurface):
         lit: Mask,
         change: Colour | None,
     ) -> tuple[Spectrum, Float]:
-        """f cosθo and density of light that stays below the surface, or below a sheet."""
+        """Return f cosθo and density of light that stays below the surface, or below a sheet."""
         n, scale = self.material.eta, self.scale_at(si, lit)
         if self.thin:
             outer = Turned(si, wo, rotation, lit, mi.Float(1.0))
@@ -289,7 +287,7 @@ class DiffractionDielectric(DiffractingSurface):
     def _power(
         self, si: Interaction, point: Pair | TablePoint, scale: Float, change: Colour | None
     ) -> Colour:
-        """⟨|P|²⟩ / (4π²σ⁴ λ²) per channel, with order 0 multiplied by `change`."""
+        """Return ⟨|P|²⟩ / (4π²σ⁴ λ²) per channel, with order 0 multiplied by `change`."""
         power = self.power.power(point, scale, si)
         if change is None:
             return power
@@ -305,7 +303,7 @@ class DiffractionDielectric(DiffractingSurface):
         crossing: Crossing,
         change: Colour | None,
     ) -> Spectrum:
-        """BSDF of light that goes through, as the mode of transport has it.
+        """Return f of light that goes through, as the mode of transport has it.
 
         Order 0 has what the flat surface transmits, and is finite where w → 0, as all others are.
         """
@@ -334,7 +332,7 @@ class DiffractionDielectric(DiffractingSurface):
         crossing: Crossing,
         axes: tuple[Vector3f, Vector3f],
     ) -> list[Jones]:
-        """2 cosθi cosθt times the Jones matrices of light from above, of each channel or of all."""
+        """Return 2 cosθi cosθt J of light from above, of each channel or of all."""
         tangent = tangent_plane(crossing, axes)
         if not isinstance(self.boundary, SmallSlope):
             return [out_of_sheet(tangent, crossing)] if self.thin else [tangent]
@@ -359,7 +357,7 @@ class DiffractionDielectric(DiffractingSurface):
         axes: tuple[Vector3f, Vector3f],
         matrices: list[Jones],
     ) -> Spectrum:
-        """½ Σ|J|², or Mueller matrices, for each channel."""
+        """Return ½ Σ|J|², or Mueller matrices, for each channel."""
         if not mi.is_polarized:
             powers = [0.5 * sum(map(squared, jones)) for jones in matrices]
             return mi.UnpolarizedSpectrum(powers if len(powers) > 1 else powers[0])

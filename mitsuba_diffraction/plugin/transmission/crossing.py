@@ -24,7 +24,7 @@ _FARTHEST = 2.0 - 1e-5
 
 
 class Turned(Pair):
-    """Two directions below the surface, as those above one whose heights point down.
+    """Two directions below the surface, turned over: as if above a surface of negative heights.
 
     n : optical index of the medium that both are in.
     """
@@ -40,17 +40,17 @@ class Turned(Pair):
 
     @property
     def place(self) -> TablePoint:
-        """Of the look-up; see `reached`."""
+        """Return the point of tables to look up; see `reached`."""
         return TablePoint(dr.select(self.reached, self.uv, 0.0), self.w)
 
     @property
     def reached(self) -> Mask:
-        """Whether tables reach so far."""
+        """Whether tables hold these frequencies."""
         return dr.squared_norm(self.uv) < _FARTHEST**2
 
 
 class Crossing:
-    """One direction above and one below the surface, in any order.
+    """A pair of directions, one above and the other below the surface, in any order.
 
     Attributes
     ----------
@@ -98,7 +98,7 @@ class Sides:
 
     @classmethod
     def of(cls, n: Float, thin: bool, down: Mask) -> Sides:
-        """Of light that goes through, downwards where `down`."""
+        """Return the indices of light that goes through, downwards where `down`."""
         one = mi.Float(1.0)
         return cls(one, one) if thin else cls(dr.select(down, one, n), dr.select(down, n, one))
 
@@ -115,20 +115,20 @@ class Sides:
 
 
 def _inside(below: Vector3f, n: Float) -> Vector3f:
-    """A direction below a sheet as it is within."""
+    """Return a direction below a sheet, refracted into the sheet."""
     x, y = below.x / n, below.y / n
     return mi.Vector3f(x, y, -dr.sqrt(1.0 - dr.fma(x, x, y * y)))
 
 
 def crossing_axes(came: Vector3f, left: Vector3f) -> tuple[Vector3f, Vector3f]:
-    """s of light along two directions; each other's along the normal (`optics.boundary`)."""
-    found = []
+    """Return the axes s of light along two directions (`optics.boundary`)."""
+    axes = []
     for direction in (came, left):
         square = dr.square(direction.x) + dr.square(direction.y)
         slanted = square > LEVEL
         inverse = dr.rsqrt(dr.select(slanted, square, 1.0))
-        found.append((slanted, mi.Vector3f(-direction.y * inverse, direction.x * inverse, 0.0)))
-    (is_came, s_came), (is_left, s_left) = found
+        axes.append((slanted, mi.Vector3f(-direction.y * inverse, direction.x * inverse, 0.0)))
+    (is_came, s_came), (is_left, s_left) = axes
     s_came = dr.select(is_came, s_came, dr.select(is_left, s_left, mi.Vector3f(0.0, 1.0, 0.0)))
     return s_came, dr.select(is_left, s_left, s_came)
 
@@ -167,7 +167,7 @@ def _outer_cosine(crossing: Crossing, thin: bool) -> Float:
 
 
 def first_order(crossing: Crossing, axes: tuple[Vector3f, Vector3f], thin: bool) -> Jones:
-    """2 cosθi cosθt B (`optics.through.small_slope`)."""
+    """Return 2 cosθi cosθt B (`optics.through.small_slope`)."""
     n, above, inside = crossing.n, crossing.above, crossing.inside
     squares = [dr.square(d.x) + dr.square(d.y) for d in (above, inside)]
     epsilon = n * n
@@ -190,7 +190,7 @@ def first_order(crossing: Crossing, axes: tuple[Vector3f, Vector3f], thin: bool)
 
 
 def tangent_plane(crossing: Crossing, axes: tuple[Vector3f, Vector3f]) -> Jones:
-    """2 cosθi cosθt K (`optics.through.kirchhoff`)."""
+    """Return 2 cosθi cosθt K (`optics.through.kirchhoff`)."""
     n, above, inside = crossing.n, crossing.above, crossing.inside
     total = -(above + n * inside)
     length = dr.norm(total)
@@ -202,7 +202,7 @@ def tangent_plane(crossing: Crossing, axes: tuple[Vector3f, Vector3f]) -> Jones:
     t_s, t_p = scale * dr.rcp(cos_in + n * cos_out), scale * dr.rcp(n * cos_in + cos_out)
     axis = dr.cross(inside, above)
     square = dr.squared_norm(axis)
-    found = square > LEVEL
-    axis = dr.select(found, axis * dr.rsqrt(dr.select(found, square, 1.0)), axes[0])
+    slanted = square > LEVEL
+    axis = dr.select(slanted, axis * dr.rsqrt(dr.select(slanted, square, 1.0)), axes[0])
     zero = mi.Float(0.0)
     return turned((t_s, zero, zero, t_p), turn(axes[1], axis, inside), turn(axis, axes[0], -above))

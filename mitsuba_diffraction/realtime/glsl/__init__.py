@@ -1,25 +1,25 @@
-"""The realtime port in GLSL: shaders, what they read, and a renderer (extra `gl`).
+"""Realtime rendering in GLSL: shaders, their textures and uniforms, and a renderer (extra `gl`).
 
 Contents
 --------
-Renderer     draws a scene of Mitsuba by shaders, without a window (in `renderer`)
-export_shader  writes a surface's shader for other programs (in `export`)
-scene        a scene as the shaders know it: triangles and their tangents, and the next three
-materials    BSDFs, and what plain ones mirror
-maps         their textures
-lights       directions, points, spots, a smooth sky
-emitters     all emitters as a sequence of lights
-shadows      shadow maps, and what casts shadows
-surroundings  what lobes meet: environments, flat lights, what stands in the way; the lobes
-progressive  frames with one light each, or what lobes meet, accumulated
-camera       sensors; the camera and the light, moved by hand
-packing      tables as textures
-texels       textures, uniforms and definitions that a shader reads; numbers packed in texels
-methods      a method's tables and programs; the methods of the thesis as textures
-source       the shaders' text, also without what a surface lacks, under names of its own
-context      OpenGL without a window: programs, textures, pictures to draw into
-timing       how long fragments take
-viewer       a window on a scene with its panel (extra `view`)
+Renderer       draw a Mitsuba scene by shaders, without a window (in `renderer`)
+export_shader  write the shader of a surface for other programs (in `export`)
+scene          scenes as triangles with tangents, materials, lights and a camera
+materials      BSDFs, and the gloss of plain ones
+maps           textures of materials
+lights         directions, points, spots, and a smooth sky
+emitters       all emitters of a scene as a sequence of lights
+shadows        shadow maps, and the triangles that cast shadows
+surroundings   environments, flat lights and obstacles, which lobes look up; densities of lobes
+progressive    accumulation of frames, each with one light or with looked-up surroundings
+camera         sensors as cameras; moving the camera and the light by hand
+packing        tables as textures
+texels         textures, uniforms and definitions that a shader reads; packing of numbers
+methods        tables and programs of each method, also of the thesis' methods
+source         text of the shaders; removal of unused code, and prefixed names
+context        OpenGL without a window: programs, textures, framebuffers
+timing         time per fragment
+viewer         a window on a scene with a panel (extra `view`)
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Mitsuba's sensors as cameras of OpenGL, and moving a camera and a light by hand."""
+"""Cameras of OpenGL from Mitsuba's sensors; moving a camera and a light by hand."""
 
 from __future__ import annotations
 
@@ -14,46 +14,45 @@ from .lights import Light
 
 Array = NDArray[np.float64]
 
-_UPRIGHT = 0.05  # least cosine between the camera's and the scene's up
+_UPRIGHT = 0.05  # least cosine between the up directions of camera and scene
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera."""
+    """Perspective camera, a pinhole or a thin lens."""
 
     to_world: Array  # (4, 4); the camera looks along its z axis, y is up and x to the left
-    fov: float  # across the picture, degrees
+    fov: float  # angle of view across the picture, degrees
     size: tuple[int, int]  # width and height, pixels
-    offset: tuple[float, float] = (0.0, 0.0)  # of the principal point, in widths and heights
-    # lens, focus: radius of a thin lens, and how far away it is sharp
-    lens: float = 0.0
-    focus: float = 1.0
+    offset: tuple[float, float] = (0.0, 0.0)  # principal point's offset, in widths and heights
+    lens: float = 0.0  # radius of the lens
+    focus: float = 1.0  # distance of the plane in focus
 
     @property
     def eye(self) -> Array:
-        """Where it stands."""
+        """Position of the camera (3,)."""
         return self.to_world[:3, 3]
 
     def moved(self, to_world: Array) -> Camera:
-        """The same camera elsewhere."""
+        """Return this camera with another transform."""
         return replace(self, to_world=to_world)
 
     def resized(self, width: int, height: int) -> Camera:
-        """The same camera with a picture of another size."""
+        """Return this camera with a picture of another size."""
         return replace(self, size=(width, height))
 
     def sampled(self, pixel: Array, lens: Array) -> Camera:
-        """The same camera through one place of each pixel and of the lens.
+        """Return the pinhole camera through one point of each pixel and of the lens.
 
-        pixel : (2,) from the middle, −1/2 to 1/2 pixels.
-        lens : (2,) 0 to 1, even over the lens.
+        pixel : (2,) offset from the middle of the pixel, −1/2 to 1/2.
+        lens : (2,) 0 to 1, mapped evenly to the lens.
         """
         width, height = self.size
         radius, turn = self.lens * np.sqrt(lens[0]), 2.0 * np.pi * lens[1]
         beside = radius * np.array([np.cos(turn), np.sin(turn)])
         moved = self.to_world.copy()
         moved[:3, 3] += moved[:3, :2] @ beside
-        # what is in focus stays where it is
+        # points in focus do not move in the picture
         shift = beside / (2.0 * self.focus * np.tan(np.radians(0.5 * self.fov)))
         offset = (
             self.offset[0] + pixel[0] / width - shift[0],
@@ -62,9 +61,10 @@ class Camera:
         return replace(self, to_world=moved, offset=offset)
 
     def view_projection(self, low: Array, high: Array) -> Array:
-        """From world space to OpenGL's clip space, for a scene between two corners.
+        """Return the matrix from world to OpenGL's clip space, for a scene between two corners.
 
-        Column vectors; near and far planes lie around the scene, which keeps depths apart.
+        The matrix is for column vectors. Near and far planes lie close around the scene, for
+        precise depths.
         """
         to_camera = np.linalg.inv(self.to_world)
         depths = box_corners(low, high) @ to_camera[2, :3] + to_camera[2, 3]
@@ -86,21 +86,21 @@ class Camera:
 
 
 def box_corners(low: Array, high: Array) -> Array:
-    """(8, 3) of a box between two of them."""
+    """Return the corners (8, 3) of a box from the lowest and highest one."""
     return np.array([[(low, high)[n >> i & 1][i] for i in range(3)] for n in range(8)])
 
 
 def read_camera(sensor: Any) -> tuple[Camera, list[str]]:
-    """A sensor's camera, and what of it is not shown.
+    """Return the camera of a sensor, and names of its unsupported features.
 
-    Raises a DiffractionError if it is no perspective camera.
+    Raises a DiffractionError if the sensor is not a perspective camera.
     """
     import mitsuba as mi
 
     kind, parameters = sensor.class_name(), mi.traverse(sensor)
     if kind not in ("PerspectiveCamera", "ThinLensCamera"):
         raise DiffractionError(
-            f"the sensor is a {kind}; the realtime renderer has perspective cameras only: "
+            f"the sensor is a {kind}; the realtime renderer supports perspective cameras only: "
             "give the scene a <sensor type='perspective'>"
         )
     omissions = list[str]()
@@ -109,6 +109,7 @@ def read_camera(sensor: Any) -> tuple[Camera, list[str]]:
         omissions.append("the film's crop")
 
     def number(name: str) -> float:
+        """Return a parameter of the sensor, or 0 if it does not exist."""
         return float(np.array(parameters[name]).ravel()[0]) if name in parameters else 0.0
 
     camera = Camera(
@@ -124,15 +125,15 @@ def read_camera(sensor: Any) -> tuple[Camera, list[str]]:
 
 @dataclass(frozen=True)
 class Orbit:
-    """A camera around a point."""
+    """Camera that turns around a point."""
 
-    to_world: Array  # of the camera, which looks along z, with x to the left and y up
-    target: Array  # (3,) what it turns around, straight ahead
-    up: Array  # (3,) of the scene
+    to_world: Array  # (4, 4); the camera looks along z, with x to the left and y up
+    target: Array  # (3,) centre of the orbit, straight ahead
+    up: Array  # (3,) up direction of the scene
 
     @classmethod
-    def of(cls, camera: Camera, middle: Array) -> Orbit:
-        """Start at a camera; what it turns around is as far away as `middle`."""
+    def start(cls, camera: Camera, middle: Array) -> Orbit:
+        """Start at a camera, with the centre straight ahead at the distance of `middle`."""
         forward, eye = camera.to_world[:3, 2], camera.eye
         distance = max(float((middle - eye) @ forward), 1e-3 * float(np.linalg.norm(middle - eye)))
         above = camera.to_world[:3, 1]
@@ -143,11 +144,11 @@ class Orbit:
 
     @property
     def distance(self) -> float:
-        """From the camera to the point."""
+        """Distance of the camera from the centre."""
         return float(np.linalg.norm(self.target - self.to_world[:3, 3]))
 
     def turned(self, right: float, up: float) -> Orbit:
-        """Around the point by these angles (rad); never over the top."""
+        """Turn around the centre by these angles (rad), but never over the top."""
         side = -self.to_world[:3, 0]
         rotation = rotation_about(self.up, -right) @ rotation_about(side, -up)
         moved = self._rotated(rotation)
@@ -156,19 +157,20 @@ class Orbit:
         return replace(self, to_world=moved)
 
     def panned(self, right: float, up: float) -> Orbit:
-        """Sideways, in multiples of the distance."""
+        """Move sideways, in multiples of the distance."""
         step = self.distance * (up * self.to_world[:3, 1] - right * self.to_world[:3, 0])
         moved = self.to_world.copy()
         moved[:3, 3] += step
         return replace(self, to_world=moved, target=self.target + step)
 
     def zoomed(self, factor: float) -> Orbit:
-        """To `factor` times the distance."""
+        """Move to `factor` times the distance."""
         moved = self.to_world.copy()
         moved[:3, 3] = self.target + factor * (moved[:3, 3] - self.target)
         return replace(self, to_world=moved)
 
     def _rotated(self, rotation: Array) -> Array:
+        """Return the camera's transform after a rotation about the centre."""
         moved = self.to_world.copy()
         moved[:3, :3] = rotation @ moved[:3, :3]
         moved[:3, 3] = self.target + rotation @ (moved[:3, 3] - self.target)
@@ -176,7 +178,7 @@ class Orbit:
 
 
 def dragged(light: Light, orbit: Orbit, right: float, up: float) -> Light:
-    """A light turned around the point that the camera looks at, as seen from it (rad)."""
+    """Turn a light around the orbit's centre by angles in rad, as seen from the camera."""
     rotation = rotation_about(orbit.to_world[:3, 1], right)
     rotation = rotation_about(-orbit.to_world[:3, 0], -up) @ rotation
     centre = orbit.target * light.place[3]
@@ -185,5 +187,5 @@ def dragged(light: Light, orbit: Orbit, right: float, up: float) -> Light:
 
 
 def rotation_about(axis: Array, angle: float) -> Array:
-    """Rotation matrix (3, 3) about a unit vector, counter-clockwise."""
+    """Return the rotation matrix (3, 3) about a unit vector, counter-clockwise."""
     return np.asarray(Rotation.from_rotvec(angle * axis).as_matrix())

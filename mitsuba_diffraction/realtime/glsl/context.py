@@ -1,4 +1,4 @@
-"""An OpenGL context without a window, programs and textures in it, and clear words if it fails."""
+"""OpenGL without a window: contexts, programs, textures, framebuffers, and errors of drivers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...errors import DiffractionError
 from .source import fragment_parts, plain_source, vertex_source
 from .texels import PAGE, Packed, Texture, Uniform
 
-#: OpenGL 3.3.
+#: Required version of OpenGL, 3.3.
 REQUIRED = 330
 
 _SOFTWARE = re.compile("llvmpipe|softpipe|swr|SwiftShader", re.IGNORECASE)
@@ -28,7 +28,7 @@ _KINDS = {
 
 
 def headless_context() -> Any:
-    """A moderngl context through EGL: a graphics card, or Mesa's software rasteriser.
+    """Create a moderngl context through EGL, on a graphics card or Mesa's software rasteriser.
 
     Raises a DiffractionError if moderngl, EGL or a driver is missing, or the driver is older than
     OpenGL 3.3.
@@ -50,7 +50,7 @@ def headless_context() -> Any:
 
 
 def require_moderngl() -> Any:
-    """The module moderngl.
+    """Import moderngl.
 
     Raises a DiffractionError if it is not installed.
     """
@@ -64,7 +64,7 @@ def require_moderngl() -> Any:
 
 
 def check_version(context: Any) -> None:
-    """Raise a DiffractionError for a driver older than OpenGL 3.3, or with too small textures."""
+    """Refuse a driver older than OpenGL 3.3, or with too small textures."""
     if context.version_code < REQUIRED:
         raise DiffractionError(
             f"the driver {context.info['GL_RENDERER']} has OpenGL "
@@ -75,16 +75,17 @@ def check_version(context: Any) -> None:
     largest = context.info["GL_MAX_TEXTURE_SIZE"]
     if largest < PAGE:
         raise DiffractionError(
-            f"the driver {context.info['GL_RENDERER']} has textures of {largest} texels at most, "
-            f"but the shaders need {PAGE}; use Mesa's software rasteriser: LIBGL_ALWAYS_SOFTWARE=1"
+            f"the driver {context.info['GL_RENDERER']} supports textures of {largest} texels at "
+            f"most, but the shaders need {PAGE}; use Mesa's software rasteriser: "
+            "LIBGL_ALWAYS_SOFTWARE=1"
         )
 
 
 def clock_of(driver: str) -> Callable[[], float]:
-    """Seconds, for differences: what to time a driver's pictures with.
+    """Return the clock to time a driver's pictures with, in seconds.
 
-    Of a rasteriser in software this is the processor's time, shared evenly by its cores: other
-    programs do not count, as they would not on a graphics card.
+    The clock of a software rasteriser is the process time divided by the number of cores: like on a
+    graphics card, other programs do not count.
     """
     if not _SOFTWARE.search(driver):
         return time.perf_counter
@@ -100,9 +101,9 @@ def compile_program(
     vertex: str = "surface.vert",
     main: str = "surface.frag",
 ) -> Any:
-    """A method's program.
+    """Compile the program of a method.
 
-    Raises a DiffractionError if the driver refuses it: the file, the line and the driver's words.
+    Raises a DiffractionError with file, line and the driver's message if it does not compile.
     """
     moderngl = require_moderngl()
     stage = vertex_source(name=vertex)
@@ -126,9 +127,9 @@ def compile_plain(
     shared: Sequence[str] = (),
     definitions: Mapping[str, str] | None = None,
 ) -> Any:
-    """A program of two files that know neither surfaces nor tables.
+    """Compile a program of two files that depend on neither surfaces nor tables.
 
-    shared, definitions : of the fragment stage, as of `source.plain_source`.
+    shared, definitions : parameters of `source.plain_source` for the fragment stage.
     """
     return context.program(
         vertex_shader=plain_source(vertex),
@@ -137,27 +138,27 @@ def compile_plain(
 
 
 def compiler_words(log: str, parts: Sequence[tuple[str, str]]) -> str:
-    """A compiler's log as one line: the file and line of the first error, and the words about it.
+    """Shorten a compiler's log to one line: file, line and message of the first error.
 
     parts : names and texts of the source, joined in this order.
     """
     # Mesa: "0:15(3): error: …", NVIDIA: "0(15) : error C1503: …", ANGLE: "ERROR: 0:15: …"
     for line in log.splitlines():
-        found = re.search(r"\d+:(\d+)\(\d+\): error:|\d+\((\d+)\) : error|ERROR: \d+:(\d+):", line)
-        if not found:
+        match = re.search(r"\d+:(\d+)\(\d+\): error:|\d+\((\d+)\) : error|ERROR: \d+:(\d+):", line)
+        if not match:
             continue
-        row = next(int(n) for n in found.groups() if n is not None)
+        row = next(int(n) for n in match.groups() if n is not None)
         for name, text in parts:
             if row <= text.count("\n"):
-                return f"{name}, line {row}: {' '.join(line[found.end() :].split())}"
+                return f"{name}, line {row}: {' '.join(line[match.end() :].split())}"
             row -= text.count("\n")
     return " ".join(log.split())[:400]
 
 
 def upload(context: Any, texture: Texture) -> Any:
-    """A texture in the graphics card's memory.
+    """Upload a texture to the graphics card.
 
-    Raises a DiffractionError if it is larger than the driver takes.
+    Raises a DiffractionError if it is larger than the driver supports.
     """
     moderngl = require_moderngl()
     rows, columns, channels = texture.data.shape
@@ -165,22 +166,21 @@ def upload(context: Any, texture: Texture) -> Any:
     if max(rows, columns) > largest:
         raise DiffractionError(
             f"texture {texture.name} of {columns} × {rows} texels is too large for "
-            f"{context.info['GL_RENDERER']}, which takes {largest}"
+            f"{context.info['GL_RENDERER']}, which supports {largest}"
         )
     data = np.ascontiguousarray(texture.data)
     kind = _KINDS[data.dtype]
-    made = context.texture((columns, rows), channels, data.data, alignment=1, dtype=kind)
-    made.filter = (moderngl.LINEAR, moderngl.LINEAR) if texture.smooth else (
-        moderngl.NEAREST, moderngl.NEAREST
-    )  # fmt: skip
-    made.repeat_x = made.repeat_y = texture.smooth
-    return made
+    uploaded = context.texture((columns, rows), channels, data.data, alignment=1, dtype=kind)
+    filtering = moderngl.LINEAR if texture.smooth else moderngl.NEAREST
+    uploaded.filter = (filtering, filtering)
+    uploaded.repeat_x = uploaded.repeat_y = texture.smooth
+    return uploaded
 
 
 class Target:
-    """A picture in single precision, with depth.
+    """Framebuffer in single precision, with depth.
 
-    Raises a DiffractionError if the driver has no textures so large.
+    Raises a DiffractionError if it is larger than the driver's textures.
     """
 
     def __init__(self, context: Any, width: int, height: int) -> None:
@@ -188,7 +188,7 @@ class Target:
         if max(width, height) > largest:
             raise DiffractionError(
                 f"a picture of {width} × {height} samples is too large for the driver, which "
-                f"takes {largest}; lower the supersampling or the size"
+                f"supports {largest}; lower the supersampling or the size"
             )
         self.colour = context.texture((width, height), 4, dtype="f4")
         self.depth = context.depth_renderbuffer((width, height))
@@ -200,7 +200,7 @@ class Target:
 
 
 class Bindings:
-    """The textures and uniforms of some parts, uploaded once, for any program that reads them."""
+    """Uploaded textures and uniforms, for any program that reads them."""
 
     def __init__(self, context: Any, parts: Packed) -> None:
         self.uniforms = dict(parts.uniforms)
@@ -208,7 +208,7 @@ class Bindings:
         self.textures = {texture.name: upload(context, texture) for texture in parts.textures}
 
     def use(self, program: Any, first_unit: int = 0) -> int:
-        """Set them in a program; returns the next free texture unit."""
+        """Bind textures and uniforms in a program, and return the next free texture unit."""
         set_uniforms(program, self.uniforms)
         for name, texture in self.textures.items():
             if (sampler := program.get(name, None)) is not None:
@@ -223,12 +223,12 @@ class Bindings:
 
 
 def set_uniforms(program: Any, uniforms: Mapping[str, Uniform]) -> None:
-    """Set those that the program reads: compilers remove the others, and cut arrays short."""
+    """Set the uniforms that the program reads: compilers remove others, and shorten arrays."""
     for name, value in uniforms.items():
-        found = program.get(name, None)  # a program's `in` looks through all names
-        if found is None:
+        uniform = program.get(name, None)  # faster than `in`, which searches all names
+        if uniform is None:
             continue
         if isinstance(value, np.ndarray):
-            found.write(np.ascontiguousarray(value[: found.array_length], np.float32))
+            uniform.write(np.ascontiguousarray(value[: uniform.array_length], np.float32))
         else:
-            found.value = value
+            uniform.value = value

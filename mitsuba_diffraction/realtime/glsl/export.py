@@ -1,4 +1,4 @@
-"""A surface's diffraction for other programs: GLSL, its textures and constants, an example."""
+"""Export of a surface's shader to other programs: GLSL, textures, constants and an example."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .packing import pack_colours, pack_powers, pack_responses
 from .source import global_names, pruned, renamed, resolved, shader_file
 from .texels import PAGE, Packed, Texture, plain
 
-#: Methods that other programs can have, and the functions that they become.
+#: Methods that can be exported, and the names of their functions.
 EXPORTED = {"lut": "diffraction", "spectral": "diffraction_spectral"}
 
 _PREFIX = "md_"
@@ -38,7 +38,8 @@ _HEAD = """// Diffraction of a measured surface, made by mitsuba_diffraction {ve
 //
 //   vec3 diffraction_transmission(vec3 wi, vec3 wo)
 //
-// is the share of light that reaches a matt base beneath and comes back: multiply its radiance.
+// is the share of light that passes the surface twice, to a diffuse base and back: multiply the
+// base's radiance by it.
 // Uniforms: constants.json. GLSL ES 3.00 (precision highp float, int and sampler2D) or GLSL 3.30.
 """
 _ENTRY = """
@@ -60,15 +61,15 @@ vec3 diffraction_transmission(vec3 wi, vec3 wo)
 
 @dataclass(frozen=True)
 class Shader:
-    """A shader for other programs.
+    """Shader of a surface for other programs.
 
     Attributes
     ----------
-    code : GLSL.
-    uniforms : values, by name.
-    textures : whose names are those of the samplers.
-    functions : of `code`, by method.
-    surface : in a few words.
+    code : source in GLSL.
+    uniforms : values of the uniforms, by name.
+    textures : textures, named like their samplers.
+    functions : names of the functions in `code`, by method.
+    surface : description of the surface in a few words.
     """
 
     code: str
@@ -78,7 +79,7 @@ class Shader:
     surface: str
 
     def constants(self) -> dict[str, Any]:
-        """What a program must know beside the code, as JSON."""
+        """Return functions, uniforms and textures for a program, as JSON types."""
         return {
             "generator": f"mitsuba_diffraction {version('mitsuba_diffraction')}",
             "surface": self.surface,
@@ -98,31 +99,31 @@ class Shader:
 
 
 def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
-    """The shader of a surface.
+    """Build the shader of a surface.
 
     Parameters
     ----------
-    bsdf : of the plugin `diffraction`, as `mi.load_dict` makes it; what lies beneath it and its
+    bsdf : BSDF of the plugin `diffraction`, from `mi.load_dict`; the base beneath it and its
         orientation are left to the program that draws.
-    methods : of `EXPORTED`, each at most once.
+    methods : methods of `EXPORTED`, each at most once.
 
     Raises
     ------
     DiffractionError
-        If the BSDF does not diffract, or has what shaders do not know; if a method is unknown, or
-        the table does not suit it.
+        If the BSDF does not diffract or has features that the shaders lack, a method is unknown, or
+        a method does not support the table.
     """
     from ...plugin.surface import DiffractingSurface  # which only a variant has
 
     if not isinstance(bsdf, DiffractingSurface):
         raise DiffractionError(
-            f"bsdf={type(bsdf).__name__} does not diffract: give one of type 'diffraction', as "
-            "mi.load_dict(md.bsdf_dict(...)) makes it"
+            f"bsdf={type(bsdf).__name__} does not diffract: give one of type 'diffraction', for "
+            "instance mi.load_dict(md.bsdf_dict(...))"
         )
     if lacking := bsdf.only_traced:
         raise DiffractionError(
-            f"the surface has {lacking}, which shaders do not know: export it without, or render "
-            "it with Mitsuba"
+            f"the surface has {lacking}, which the shaders do not support: export it without, or "
+            "render it with Mitsuba"
         )
     if not methods or len(set(methods)) < len(methods) or not set(methods) <= set(EXPORTED):
         raise DiffractionError(
@@ -136,7 +137,7 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
     )
     common |= Packed(definitions={"SURFACE_KIND": "0", "FLOAT_TEXTURES": "", **common.definitions})
     tables = {method: _tables(method, bsdf) for method in methods}
-    # of all methods the same, and read by what they share
+    # equal for all methods, and read by shared functions
     common |= Packed(uniforms={"area_factor": tables[methods[0]].uniforms["area_factor"]})
     return _joined(common, tables, _words(bsdf))
 
@@ -146,19 +147,19 @@ def export_shader(
 ) -> Shader:
     """Write the shader of a surface into a folder, with an example; see `make_shader`.
 
-    The folder is made if it is missing; files of the same names in it are replaced.
+    The folder is created if it does not exist; existing files are replaced.
 
     Raises
     ------
     DiffractionError
-        As of `make_shader`, or if the folder cannot be written.
+        As in `make_shader`, or if the folder cannot be written.
     """
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise DiffractionError(
-            f"cannot write into '{folder}': {error.strerror}; name a folder that can be made"
+            f"cannot write into '{folder}': {error.strerror}; choose another folder"
         ) from error
     shader = make_shader(bsdf, methods)
     for texture in shader.textures:
@@ -176,6 +177,7 @@ def export_shader(
 
 
 def _tables(method: str, bsdf: Any) -> Packed:
+    """Pack the table of a BSDF for a method."""
     if method == "lut":
         return pack_colours(cached_colours(bsdf.table), floats=True)
     daylight = (np.array([360.0, 830.0]), np.ones(2))
@@ -183,49 +185,50 @@ def _tables(method: str, bsdf: Any) -> Packed:
 
 
 def _joined(common: Packed, tables: dict[str, Packed], surface: str) -> Shader:
-    """Shared text with that of each method, all under names of their own."""
+    """Join the shared source with that of each method, under prefixed names."""
     definitions = dict(common.definitions)
     for packed in tables.values():
         definitions |= packed.definitions
     constants = [f"#define {name} {value}\n" for name, value in definitions.items() if value]
-    twice = ["second_order.glsl"] if "SECOND_ORDER" in definitions else []
-    files = ["library.glsl", "boundary.glsl", "layers.glsl", *twice, "pair.glsl"]
+    second_order = ["second_order.glsl"] if "SECOND_ORDER" in definitions else []
+    files = ["library.glsl", "boundary.glsl", "layers.glsl", *second_order, "pair.glsl"]
     shared = "".join(constants) + resolved("\n".join(map(shader_file, files)), definitions)
     names = global_names(shared)
     code = [renamed(shared, [(_PREFIX, names)])]
-    found = _declared(common, _PREFIX, names)
+    declared = _declared(common, _PREFIX, names)
     for method, packed in tables.items():
         prefix = f"{_PREFIX}{method[:4]}_"
         text = shader_file(f"{method}.glsl") + "\n" + shader_file("diffraction.glsl")
         text = resolved(text, {**common.definitions, **packed.definitions})
-        own = global_names(text)
-        text = renamed(text, [(_PREFIX, names), (prefix, own)])
+        method_names = global_names(text)
+        text = renamed(text, [(_PREFIX, names), (prefix, method_names)])
         code.append(text + _ENTRY.format(name=EXPORTED[method], prefix=prefix))
-        found |= _declared(packed, prefix, own) | _declared(packed, _PREFIX, names)
+        declared |= _declared(packed, prefix, method_names) | _declared(packed, _PREFIX, names)
     functions = {method: EXPORTED[method] for method in tables}
     head = _HEAD.format(
         version=version("mitsuba_diffraction"), surface=surface,
         functions="\n//   ".join(f"vec3 {name}(vec3 wi, vec3 wo)" for name in functions.values()),
     )  # fmt: skip
     text = f"{head}\n" + pruned("".join(code) + _BENEATH, _PREFIX)
-    return Shader(text, dict(found.uniforms), found.textures, functions, surface)
+    return Shader(text, dict(declared.uniforms), declared.textures, functions, surface)
 
 
 def _declared(packed: Packed, prefix: str, names: set[str]) -> Packed:
-    """What of a part a text with these global names declares, under its names there."""
-    known = [t for t in packed.textures if t.name in names]
+    """Return the textures and uniforms among global `names`, under prefixed names."""
+    samplers = [t for t in packed.textures if t.name in names]
     uniforms = {prefix + n: plain(value) for n, value in packed.uniforms.items() if n in names}
-    textures = tuple(Texture(prefix + t.name, _four(t.data), t.smooth) for t in known)
+    textures = tuple(Texture(prefix + t.name, _four(t.data), t.smooth) for t in samplers)
     return Packed(textures, uniforms)
 
 
 def _four(data: Any) -> Any:
-    """Four channels, of which some loaders know no fewer."""
+    """Pad a texture to four channels, which some loaders require."""
     missing = 4 - data.shape[2]
     return np.pad(data, [(0, 0), (0, 0), (0, missing)]) if missing else data
 
 
 def _words(bsdf: Any) -> str:
+    """Describe a surface: material, coherence width, height scale."""
     table = bsdf.table
     return (
         f"{bsdf.fresnel}, coherence width {table.coherence_width:g} µm, "
@@ -234,7 +237,7 @@ def _words(bsdf: Any) -> str:
 
 
 def _save(texture: Texture, path: Path) -> None:
-    """As EXR, whose first line is a picture's top: the last row of the texture."""
+    """Write a texture as EXR; the first line of the file is the texture's last row."""
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     channels = {"RGBA": np.ascontiguousarray(texture.data[::-1])}
     OpenEXR.File(header, channels).write(str(path))
@@ -242,4 +245,5 @@ def _save(texture: Texture, path: Path) -> None:
 
 @functools.cache
 def _example(name: str) -> str:
+    """Read a file of the example."""
     return resources.files(__package__).joinpath("three", name).read_text(encoding="utf-8")

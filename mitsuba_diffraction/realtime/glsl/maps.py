@@ -1,4 +1,4 @@
-"""Mitsuba's textures as a shader knows them: values, pictures, attributes of meshes."""
+"""Mitsuba's textures as values, pictures and mesh attributes for shaders."""
 
 from __future__ import annotations
 
@@ -19,55 +19,56 @@ Array = NDArray[np.float64]
 #: Wavelengths (n,) in nm, and values (n,).
 Spectrum = tuple[Array, Array]
 
-_CHEQUERS = 512  # texels along either side of two by two
+_CHEQUERS = 512  # texels a side of a picture of 2 × 2 chequers
 _LAM = np.linspace(380.0, 740.0, 36)  # nm
-_SOME = 256  # texels whose spectra are known
+_SOME = 256  # texels whose spectra are stored
 
 
 @dataclass(frozen=True)
 class Map:
-    """A value over a surface: the same everywhere, at every vertex, or a picture."""
+    """Value over a surface: a constant, a picture, or an attribute of the mesh."""
 
-    value: Array  # (channels,), where it is the same
-    # (rows, columns, channels), row 0 at v = 0, and `to_uv` (3, 3) that leads into it
+    value: Array  # (channels,), the constant
+    # (rows, columns, channels), row 0 at v = 0
     picture: NDArray[np.floating] | None = None
-    to_uv: Array = field(default_factory=lambda: np.eye(3))
+    to_uv: Array = field(default_factory=lambda: np.eye(3))  # from texture coordinates to it
     attribute: str | None = None  # name of a mesh attribute
-    clamped: bool = False  # whether the picture's edges go on beyond it, which else repeats
-    spectra: NDArray[np.floating] | None = None  # of some texels of a colour, over `_LAM`, (n, 36)
-    # theirs under the light that the picture is for, (n, 3)
+    clamped: bool = False  # whether the picture is clamped at its edges; else it repeats
+    spectra: NDArray[np.floating] | None = None  # reflectances of some texels over `_LAM`, (n, 36)
+    # colours of these texels under the light of the picture, (n, 3)
     colours: NDArray[np.floating] | None = None
 
     def under(self, wavelengths: Array, spectrum: Array) -> Array:
-        """Colours as rows times this matrix (3, 3) are those under another light.
+        """Return the matrix (3, 3) from colours, as rows, to colours under another light.
 
-        The best for the texels that are known: three numbers do not say all of a spectrum.
+        The matrix is a least-squares fit to the texels with stored spectra, since three numbers do
+        not determine a spectrum.
         """
         if self.spectra is None or self.colours is None or spectrum.ndim > 1:
             return np.eye(3)
-        apart = self.spectra @ _weights((wavelengths, spectrum)) - self.colours
-        return np.eye(3) + self._fit @ apart
+        change = self.spectra @ _weights((wavelengths, spectrum)) - self.colours
+        return np.eye(3) + self._fit @ change
 
     @cached_property
     def _fit(self) -> Array:
-        """From numbers (n, k) at the texels that are known to the least squares' matrix (3, k)."""
+        """Matrix from values (n, k) at texels with spectra to the least-squares fit (3, k)."""
         assert self.colours is not None
         return np.asarray(np.linalg.pinv(self.colours.astype(float), rcond=1e-3))
 
 
 def raw_picture(bsdf: Any, name: str, channels: int, scale: float, shift: float = 0.0) -> Map:
-    """The numbers of a wrapper's raw texture, of one or three channels, scaled and shifted."""
+    """Return the values of a wrapper's raw texture of one or three channels, scaled and shifted."""
     texture = children(bsdf)[name]
     width, height = (int(n) for n in texture.resolution())
     uv, to_uv = _centres(texture, width, height)
     si = _interaction(uv)
     value = texture.eval_1(si) if channels == 1 else texture.eval_3(si)
-    found = np.array(value, np.float32).reshape(channels, height, width)
-    return Map(np.zeros(channels), scale * found.transpose(1, 2, 0) + shift, to_uv)
+    pixels = np.array(value, np.float32).reshape(channels, height, width)
+    return Map(np.zeros(channels), scale * pixels.transpose(1, 2, 0) + shift, to_uv)
 
 
 def colour_map(texture: Any, light: Spectrum) -> Map:
-    """A texture of reflectances in linear sRGB, right when multiplied with the light's colour."""
+    """Return a texture of reflectances in linear sRGB, to be multiplied with the light's colour."""
     attribute = _attribute(texture)
     if attribute is not None:
         return Map(np.ones(3), attribute=attribute)
@@ -75,35 +76,36 @@ def colour_map(texture: Any, light: Spectrum) -> Map:
 
     width, height = (int(n) for n in texture.resolution())
     if texture.class_name() == "Checkerboard":
-        width = height = _CHEQUERS  # filtered only as far as a texel reaches
+        width = height = _CHEQUERS  # fine, since filtering blurs edges by a texel
     elif width * height <= 1:
         width = height = 1
     uv, to_uv = _centres(texture, width, height)
-    found = _lit(texture, uv, light) if mi.is_spectral else evaluated(texture, uv, np.zeros(3))
+    colours = _lit(texture, uv, light) if mi.is_spectral else evaluated(texture, uv, np.zeros(3))
     if width * height == 1:
-        whole = Map(found[0].astype(float))
+        result = Map(colours[0].astype(float))
     else:
         clamped = _clamps(lambda uv: evaluated(texture, uv, np.full(4, 550.0)), to_uv)
-        whole = Map(np.ones(3), found.reshape(height, width, 3), to_uv, clamped=clamped)
+        result = Map(np.ones(3), colours.reshape(height, width, 3), to_uv, clamped=clamped)
     if not mi.is_spectral:
-        return whole
+        return result
     some = slice(None, None, max(len(uv) // _SOME, 1))
-    return replace(whole, spectra=evaluated(texture, uv[some], _LAM), colours=found[some])
+    return replace(result, spectra=evaluated(texture, uv[some], _LAM), colours=colours[some])
 
 
 @cache
 def _daylight_weights() -> Array:
+    """Return linear sRGB under daylight of each wavelength of `_LAM`, (36, 3)."""
     return np.asarray(linear_srgb(response(_LAM)))
 
 
 def _weights(light: Spectrum) -> Array:
-    """From reflectances over `_LAM` to their colours under a light, (36, 3)."""
+    """Return the matrix (36, 3) from reflectances over `_LAM` to colours under a light."""
     weights = _daylight_weights() * np.interp(_LAM, *light)[:, None]
     return np.asarray(weights / weights.sum(axis=0))
 
 
 def _lit(texture: Any, uv: Array, light: Spectrum) -> NDArray[np.float32]:
-    """A texture's values (points, 3) under a light, over the light's own, in linear sRGB."""
+    """Return the colours (points, 3) of a texture under a light, relative to the light's colour."""
     weights, total = _weights(light).astype(np.float32), np.zeros((len(uv), 3), np.float32)
     for start in range(0, len(_LAM), 4):
         four = slice(start, start + 4)
@@ -112,7 +114,7 @@ def _lit(texture: Any, uv: Array, light: Spectrum) -> NDArray[np.float32]:
 
 
 def axis_map(orientation: Any) -> Map:
-    """Where the patch's x axis points."""
+    """Return the direction of the patch's x axis, (cos, sin) in the tangent frame."""
     if not hasattr(orientation, "texture"):
         angle = np.radians(float(np.array(orientation.degrees).ravel()[0]))
         return Map(np.array([np.cos(angle), np.sin(angle)]))
@@ -124,6 +126,7 @@ def axis_map(orientation: Any) -> Map:
     uv, to_uv = _centres(texture, width, height)
 
     def turned(uv: Array) -> Array:
+        """Evaluate the texture of directions."""
         return np.array(texture.eval_3(_interaction(uv)), np.float64).T
 
     value = turned(uv).reshape(height, width, 3)[..., :2]
@@ -131,28 +134,30 @@ def axis_map(orientation: Any) -> Map:
 
 
 def _clamps(look_up: Callable[[Array], NDArray[np.floating]], to_uv: Array) -> bool:
-    """Whether a texture is beyond its edge more like the edge than like the other side."""
+    """Return whether a texture is clamped: outside, it is closer to its edge than repeated."""
     along = np.linspace(0.02, 0.98, 16)
     back = np.linalg.inv(to_uv)
 
     def values(across: float) -> NDArray[np.floating]:
-        both = [np.stack([np.full(16, across), along]), np.stack([along, np.full(16, across)])]
-        places = np.concatenate([np.concatenate(both, axis=1), np.ones((1, 32))])
-        return look_up((back @ places)[:2].T)
+        """Evaluate the texture along lines at u = `across` and v = `across`."""
+        lines = [np.stack([np.full(16, across), along]), np.stack([along, np.full(16, across)])]
+        points = np.concatenate([np.concatenate(lines, axis=1), np.ones((1, 32))])
+        return look_up((back @ points)[:2].T)
 
     beyond = values(-0.3)
     return bool(np.abs(beyond - values(1e-4)).sum() < np.abs(beyond - values(0.7)).sum())
 
 
 def _attribute(texture: Any) -> str | None:
+    """Return the name of the mesh attribute that a texture reads, or None."""
     if texture.class_name() != "MeshAttribute":
         return None
-    found = re.search(r'name = "?(\w+)', str(texture))
-    return found[1] if found else None
+    match = re.search(r'name = "?(\w+)', str(texture))
+    return match[1] if match else None
 
 
 def _centres(texture: Any, width: int, height: int) -> tuple[Array, Array]:
-    """(u, v) of all texels' middles, and the transform that the texture puts before its picture."""
+    """Return (u, v) of the centres of all texels, and the texture's transform of coordinates."""
     import mitsuba as mi
 
     parameters = mi.traverse(texture)
@@ -165,6 +170,7 @@ def _centres(texture: Any, width: int, height: int) -> tuple[Array, Array]:
 
 
 def _interaction(uv: Array) -> Any:
+    """Return surface interactions at texture coordinates (n, 2)."""
     import drjit as dr
     import mitsuba as mi
 
@@ -174,16 +180,16 @@ def _interaction(uv: Array) -> Any:
 
 
 def evaluated(texture: Any, uv: Array, wavelengths: Array) -> NDArray[np.float32]:
-    """A texture's values (points, wavelengths), or its three colours."""
+    """Evaluate a texture: (points, wavelengths), or (points, 3) in RGB variants."""
     import mitsuba as mi
 
     si = _interaction(uv)
-    found = []
+    parts = []
     step = 4 if mi.is_spectral else len(wavelengths)
     for start in range(0, len(wavelengths), step):
         if mi.is_spectral:
             si.wavelengths = mi.Spectrum(*(float(w) for w in wavelengths[start : start + 4]))
         value = np.array(texture.eval(si), np.float32)
         value = value.reshape(value.shape[0], -1)
-        found.append(np.broadcast_to(value, (value.shape[0], len(uv))))
-    return np.concatenate(found).T
+        parts.append(np.broadcast_to(value, (value.shape[0], len(uv))))
+    return np.concatenate(parts).T

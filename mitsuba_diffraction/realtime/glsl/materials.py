@@ -1,10 +1,10 @@
-"""Mitsuba's BSDFs as a shader knows them."""
+"""Mitsuba's BSDFs as materials for shaders."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,45 +25,45 @@ from .packing import (
 )
 from .texels import Packed, Texture, Uniform, as_half
 
-_COSINES = 64
+_COSINES = 64  # nodes of transmittances
 _KINDS = ("RoughPlastic", "SmoothPlastic", "RoughConductor", "SmoothConductor", "Principled")
-#: Parts of the principled BSDF that are not drawn.
+#: Unsupported parameters of the principled BSDF.
 _LEFT_OUT = ("spec_trans", "anisotropic", "sheen", "flatness", "clearcoat", "spec_tint")
 
 Array = NDArray[np.float64]
 
-#: BSDFs around another one, by class, and what they change that is not shown.
+#: Classes of BSDFs around another one, and the feature that is not supported, if any.
 _WRAPPERS = {"TwoSidedBRDF": "", "BumpMap": "", "NormalMap": "", "MaskBSDF": "mask"}
-_OTHER_GREY = 0.5
+_OTHER_GREY = 0.5  # reflectance of unsupported BSDFs
 
 
 @dataclass(frozen=True)
 class Gloss:
-    """A face that mirrors."""
+    """Specular reflection of a BSDF that does not diffract."""
 
-    bsdf: Any  # of Mitsuba
+    bsdf: Any  # BSDF of Mitsuba
     alpha: float  # roughness; 0 of a smooth face
-    ggx: bool  # whether facets are distributed as GGX, else as Beckmann
-    # (n,) what it lets through at cosines even from 0 to 1, None of a metal and the principled
-    # BSDF: the base has the BRDF ρ/π times those of both directions
+    ggx: bool  # distribution of facets: GGX, or else Beckmann
+    # (n,) transmittance at cosines even from 0 to 1, None of a metal and the principled BSDF. The
+    # base has the BRDF ρ/π times the transmittances of both directions.
     through: NDArray[np.float64] | None
-    omissions: tuple[str, ...] = ()  # what of it is not drawn, in a few words each
+    omissions: tuple[str, ...] = ()  # unsupported features, in a few words each
 
     @classmethod
-    def of(cls, bsdf: Any) -> Gloss | None:
-        """That of a BSDF, or None for a kind that is not known here."""
+    def read(cls, bsdf: Any) -> Gloss | None:
+        """Read the gloss of a BSDF, or return None for an unsupported kind."""
         import mitsuba as mi
 
         if bsdf.class_name() not in _KINDS:
             return None
         if bsdf.class_name() == "Principled":
             left_out = (name.replace("_", " ") for name in _LEFT_OUT if _mean(bsdf, name) > 0.0)
-            alpha = max(_mean(bsdf, "roughness") ** 2, 1e-3)  # as Mitsuba has it
+            alpha = max(_mean(bsdf, "roughness") ** 2, 1e-3)  # Mitsuba's formula
             return cls(bsdf, alpha, True, None, tuple(f"the {part}" for part in left_out))
         parameters = mi.traverse(bsdf)
         alpha = next((parameters[n] for n in ("alpha", "alpha.value") if n in parameters), 0.0)
         if bsdf.class_name().startswith("Rough") and not np.any(alpha):
-            return None  # another one along each axis, or a picture
+            return None  # anisotropic, or a texture
         metal = bsdf.class_name().endswith("Conductor")
         through = None if metal else _through(bsdf)
         rough = float(np.array(alpha).ravel()[0])
@@ -71,41 +71,38 @@ class Gloss:
 
     @property
     def pigment(self) -> Any:
-        """The texture of the diffuse base, None of a metal."""
-        found = children(self.bsdf)
-        return found.get("diffuse_reflectance", found.get("base_color"))
+        """Texture of the diffuse base, None of a metal."""
+        textures = children(self.bsdf)
+        return textures.get("diffuse_reflectance", textures.get("base_color"))
 
-    def packed(self, spectra: Any) -> Packed:
-        """For shaders/gloss.glsl.
-
-        spectra : turns two textures into wavelengths and their values over them.
-        """
+    def packed(self) -> Packed:
+        """Pack the gloss for shaders/gloss.glsl."""
         import mitsuba as mi
 
         definitions = {"GLOSS": ""} | ({"GGX": ""} if self.ggx else {})
         if self.alpha == 0.0:
             definitions["MIRROR"] = ""
-        found = Packed((), {"gloss_alpha": self.alpha}, definitions)
+        packed = Packed((), {"gloss_alpha": self.alpha}, definitions)
         if self.bsdf.class_name() == "Principled":
-            return found | _principled(self.bsdf)
+            return packed | _principled(self.bsdf)
         parts = children(self.bsdf)
         if self.through is None:
-            return found | pack_conductor(*spectra(parts["eta"], parts["k"]))
+            return packed | pack_conductor(*_index_spectra(parts["eta"], parts["k"]))
         eta = float(np.array(mi.traverse(self.bsdf)["eta"]).ravel()[0])
         rows = np.repeat(self.through.reshape(1, -1, 1), 4, axis=2).astype(np.float32)
         face = Packed(
             (Texture("through", rows),), {"eta": eta}, {"SURFACE_KIND": "1", "THROUGH": ""}
         )
-        return found | face
+        return packed | face
 
 
 def _mean(bsdf: Any, name: str) -> float:
-    """Of one of its textures."""
+    """Return the mean of a BSDF's texture."""
     return float(np.array(children(bsdf)[name].mean()).ravel()[0])
 
 
 def _principled(bsdf: Any) -> Packed:
-    """Of the principled BSDF what is not its roughness alone."""
+    """Pack index, metallic and roughness of the principled BSDF."""
     import mitsuba as mi
 
     parameters = mi.traverse(bsdf)
@@ -113,7 +110,7 @@ def _principled(bsdf: Any) -> Packed:
         eta = float(np.array(parameters["eta"]).ravel()[0])
     else:
         specular = float(np.array(parameters["specular"]).ravel()[0])
-        eta = 2.0 / (1.0 - np.sqrt(0.08 * specular)) - 1.0  # as Mitsuba has it
+        eta = 2.0 / (1.0 - np.sqrt(0.08 * specular)) - 1.0  # Mitsuba's formula
     return Packed(
         (),
         {"eta": eta, "metallic": _mean(bsdf, "metallic"), "roughness": _mean(bsdf, "roughness")},
@@ -122,7 +119,7 @@ def _principled(bsdf: Any) -> Packed:
 
 
 def _through(bsdf: Any) -> NDArray[np.float64]:
-    """From the diffuse part of Mitsuba's own values."""
+    """Return the transmittance of the face from Mitsuba's values of the diffuse part."""
     import drjit as dr
     import mitsuba as mi
 
@@ -138,41 +135,41 @@ def _through(bsdf: Any) -> NDArray[np.float64]:
     value = np.array(bsdf.eval(context, si, mi.Vector3f(0.0, 0.0, 1.0)), np.float64)[0]
     base = np.array(children(bsdf)["diffuse_reflectance"].eval(si), np.float64)
     base = np.broadcast_to(base.reshape(base.shape[0], -1), (base.shape[0], _COSINES))[0]
-    both = np.divide(np.pi * value, base, out=np.zeros(_COSINES), where=base > 0.0)
-    return np.asarray(both / np.sqrt(max(float(both[-1]), 1e-12)))
+    twice = np.divide(np.pi * value, base, out=np.zeros(_COSINES), where=base > 0.0)
+    return np.asarray(twice / np.sqrt(max(float(twice[-1]), 1e-12)))
 
 
 @dataclass(frozen=True)
 class Material:
-    """How one shape reflects."""
+    """Material of one shape."""
 
     pigment: Map  # diffuse reflectance, linear sRGB
     two_sided: bool = False  # whether the back reflects like the front
     bsdf: Any = None  # the diffraction BSDF, or None
     # (cos, sin) from the tangent to the patch's x axis
     axis: Map = field(default_factory=lambda: Map(np.array([1.0, 0.0])))
-    gloss: Gloss | None = None  # what a BSDF that does not diffract mirrors, or None
+    gloss: Gloss | None = None  # specular reflection of a BSDF that does not diffract
     bumps: Map | None = None  # heights (rows, columns, 1) in the scene's unit, or None
     normals: Map | None = None  # (rows, columns, 3) in the shading frame, or None
 
     @property
     def black(self) -> bool:
-        """Whether it reflects nothing."""
-        own = self.bsdf is None and self.gloss is None
-        plain = self.pigment.picture is None and self.pigment.attribute is None
-        return own and plain and not self.pigment.value.any()
+        """Whether the material reflects no light."""
+        diffuse = self.bsdf is None and self.gloss is None
+        constant = self.pigment.picture is None and self.pigment.attribute is None
+        return diffuse and constant and not self.pigment.value.any()
 
     @property
     def table(self) -> DiffractionTable:
-        """The diffraction table."""
+        """Table of the diffraction BSDF."""
         table: DiffractionTable = self.bsdf.table
         return table
 
 
 def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Material:
-    """The material of a shape; what cannot be shown is added to `omissions`.
+    """Read the material of a shape, and append its unsupported features to `omissions`.
 
-    light : wavelengths and a spectrum relative to D65, under which pigments get their colours.
+    light : wavelengths and spectrum relative to D65, under which pigments get their colours.
     """
     import mitsuba as mi
 
@@ -193,15 +190,18 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
             omissions.append(f"the back of {name}, another material")
         bsdf = inner[0]
     if only := getattr(bsdf, "only_traced", None):
-        raise DiffractionError(f"{only} of {name} is for the path tracer alone")
+        raise DiffractionError(
+            f"{name} has {only}, which the shaders do not support; leave it out, or render the "
+            "scene with Mitsuba"
+        )
     if isinstance(bsdf, Diffraction):
         pigment = Map(np.zeros(3))
         if bsdf.nested is not None:
-            pigment = _diffuse(bsdf.nested, omissions, f"what lies beneath {name}", light)
+            pigment = _diffuse(bsdf.nested, omissions, f"the base beneath {name}", light)
         return Material(
             pigment, two_sided, bsdf, axis_map(bsdf.orientation), bumps=bumps, normals=normals
         )
-    gloss = Gloss.of(bsdf)
+    gloss = Gloss.read(bsdf)
     if gloss is None:
         return Material(
             _diffuse(bsdf, omissions, name, light), two_sided, bumps=bumps, normals=normals
@@ -212,7 +212,7 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
 
 
 def pack_conservation(material: Material, factors: Sequence[float] = (1.0,)) -> Packed:
-    """What conserves its energy, and goes beneath, at its height scale times these factors."""
+    """Pack energy conservation and the base's light, at the height scale times each factor."""
     if material.bsdf is None:
         return Packed()
     scales = [height_scale(material) * factor for factor in factors]
@@ -220,7 +220,7 @@ def pack_conservation(material: Material, factors: Sequence[float] = (1.0,)) -> 
 
 
 def conservation_at(bsdf: Any, scales: Sequence[float]) -> Packed:
-    """The same, of a diffraction BSDF at height scales."""
+    """Pack energy conservation and the base's light of a BSDF at height scales."""
     ratios = [bsdf.reflected_ratio(scale) for scale in scales]
     beneath = pack_beneath([ratio for ratio in ratios if ratio is not None])
     energy = [bsdf.energy_scale(scale) for scale in scales]
@@ -230,7 +230,7 @@ def conservation_at(bsdf: Any, scales: Sequence[float]) -> Packed:
 
 
 def pack_surface(material: Material) -> Packed:
-    """A material, all but its tables and what conserves its energy."""
+    """Pack a material without its tables and energy conservation."""
     uniforms: dict[str, Uniform] = {
         "two_sided": material.two_sided,
         "colour_uv": tuple(material.pigment.to_uv.T.ravel().tolist()),
@@ -238,11 +238,11 @@ def pack_surface(material: Material) -> Packed:
     }
     definitions: dict[str, str] = {}
     textures = []
-    for name, found in (("colour", material.pigment), ("axis", material.axis)):
-        if found.picture is not None:
-            textures.append(Texture(f"{name}_map", as_half(_four(found.picture)), smooth=True))
+    for name, value in (("colour", material.pigment), ("axis", material.axis)):
+        if value.picture is not None:
+            textures.append(Texture(f"{name}_map", as_half(_four(value.picture)), smooth=True))
             definitions[f"{name.upper()}_MAPPED"] = ""
-            if found.clamped:
+            if value.clamped:
                 definitions[f"{name.upper()}_CLAMPED"] = ""
     packed = Packed(tuple(textures), uniforms, definitions)
     bsdf, gloss = material.bsdf, material.gloss
@@ -253,7 +253,7 @@ def pack_surface(material: Material) -> Packed:
     if pigmented:
         definitions["PIGMENTED"] = ""
     if gloss is not None:
-        return packed | gloss.packed(_spectra)
+        return packed | gloss.packed()
     if bsdf is None:
         return packed
     definitions["DIFFRACTING"] = ""
@@ -279,14 +279,14 @@ def pack_surface(material: Material) -> Packed:
 
 
 def pack_emission(radiance: Array | None) -> Packed:
-    """What a surface emits, (3,) linear sRGB; None of most."""
+    """Pack the radiance that a surface emits, (3,) linear sRGB, if any."""
     if radiance is None:
         return Packed()
     return Packed((), {"emission": tuple(radiance.tolist())}, {"EMITTING": ""})
 
 
 def pack_relief(material: Material) -> Packed:
-    """Its bumps and normals."""
+    """Pack the bump map and the normal map of a material."""
     packed = Packed()
     for name, relief in (("bump", material.bumps), ("normal", material.normals)):
         if relief is None or relief.picture is None:
@@ -303,59 +303,70 @@ def pack_relief(material: Material) -> Packed:
 
 
 def height_scale(material: Material) -> float:
-    """The factor on the heights."""
+    """Return the height scale of a material that diffracts."""
     return _number(material.bsdf.height_scale)
 
 
 def coat_index(material: Material) -> float:
-    """Of the layer over the structure, over that outside; 1 without one."""
+    """Return the index of the coat over that of the medium above; 1 without a coat."""
     return 1.0 if material.bsdf.coat is None else _number(material.bsdf.coat.eta)
 
 
 def _number(value: Any) -> float:
+    """Convert a Dr.Jit value of one element to a float."""
     return float(np.array(value).ravel()[0])
 
 
 def _reflectance(surface: Any) -> Packed:
+    """Pack the Fresnel reflectance of a dielectric or conductor."""
     kind = type(surface).__name__
     if kind == "Dielectric":
         ratio = _number(surface.eta)
-        if ratio < 1.0:  # total reflection has phases, as a conductor's
+        if ratio < 1.0:  # total reflection has phases like a conductor
             return pack_conductor(np.array([360.0, 830.0]), np.full(2, ratio), np.zeros(2))
         return Packed(uniforms={"eta": ratio}, definitions={"SURFACE_KIND": "1"})
     if kind == "Conductor":
-        lam, eta, k = _spectra(surface.eta, surface.k)
+        lam, eta, k = _index_spectra(surface.eta, surface.k)
         medium = 1.0 if surface.medium is None else _number(surface.medium.eta)
         return pack_conductor(lam, eta / medium, k / medium)
     return Packed()
 
 
-def _spectra(eta: Any, k: Any) -> tuple[Array, Array, Array]:
-    """Wavelengths, and two textures over them; three colours count as three wavelengths."""
+class IndexSpectra(NamedTuple):
+    """Complex index of refraction η + ik over wavelengths, (n,) each."""
+
+    wavelengths: Array  # nm
+    eta: Array
+    k: Array
+
+
+def _index_spectra(eta: Any, k: Any) -> IndexSpectra:
+    """Evaluate the textures of an index; RGB values become three wavelengths."""
     import mitsuba as mi
 
-    # else of sRGB's primaries, of which textures give the reddest first
+    # in RGB variants the wavelengths of sRGB's primaries, which textures list from red to blue
     lam = np.linspace(360.0, 830.0, 96) if mi.is_spectral else np.array([464.0, 549.0, 611.0])
     order = slice(None, None, 1 if mi.is_spectral else -1)
     uv = np.full((1, 2), 0.5)
-    return lam, *(evaluated(t, uv, lam)[0][order].astype(float) for t in (eta, k))
+    return IndexSpectra(lam, *(evaluated(t, uv, lam)[0][order].astype(float) for t in (eta, k)))
 
 
-def _is_bsdf(thing: Any) -> bool:
+def _is_bsdf(child: Any) -> bool:
+    """Return whether a child of a BSDF is a BSDF."""
     import mitsuba as mi
 
-    return isinstance(thing, mi.BSDF)
+    return isinstance(child, mi.BSDF)
 
 
 def diffracts(bsdf: Any) -> bool:
-    """Whether a BSDF diffracts, or the first one that it is wrapped around."""
+    """Return whether a BSDF, or the first BSDF inside its wrappers, diffracts."""
     while bsdf.class_name() in _WRAPPERS:
         bsdf = next(b for b in children(bsdf).values() if _is_bsdf(b))
     return hasattr(bsdf, "only_traced")
 
 
 def _diffuse(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Map:
-    """Reflectance of a diffuse BSDF; another is shown by its diffuse part, or as grey."""
+    """Return the reflectance of a diffuse BSDF; other kinds become their diffuse part, or grey."""
     textures = children(bsdf)
     if bsdf.class_name() == "SmoothDiffuse":
         return colour_map(textures["reflectance"], light)
@@ -369,6 +380,6 @@ def _diffuse(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Map
 
 
 def _four(picture: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Four channels: graphics cards pad three to four anyway."""
+    """Pad a picture to four channels, which graphics cards store anyway."""
     missing = 4 - picture.shape[2]
     return np.pad(picture, [(0, 0), (0, 0), (0, missing)]).astype(np.float32)

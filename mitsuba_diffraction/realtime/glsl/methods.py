@@ -1,4 +1,4 @@
-"""What a method needs to draw a scene: its tables as textures, and a program for each surface."""
+"""Tables of each method as textures, and its program for each surface of a scene."""
 
 from __future__ import annotations
 
@@ -23,41 +23,42 @@ from .scene import VERTEX, RealtimeScene
 from .source import METHODS, THESIS_METHODS
 from .texels import Packed, Uniform, as_half, listed, texels
 
-#: As in the thesis: terms of the series, bins read along each axis, and nm.
+#: Values of the thesis: terms of the series, bins read along each axis, wavelength step in nm.
 TERMS, TAPS, STEP = 37, 3, 5.0
-#: What 37 terms and 3 × 3 bins reach on snakes' scales; the thesis asks for none.
+#: Error of 37 terms and 3 × 3 bins on snakes' scales; the thesis has no tolerance.
 TOLERANCE = 0.02
 
 
 def thesis_method(name: str, heights: HeightField, table: DiffractionTable) -> Method:
-    """A method of the thesis for a patch, with the thesis' own settings.
+    """Build a method of the thesis for a patch, with the thesis' settings.
 
-    table : the package's own of that patch, for its window and how positions are averaged.
+    table : table of the patch, whose coherence width and coherence the method uses.
 
-    Raises a DiffractionError if the series is too short for the patch, or it has no period and the
-    method needs one.
+    Raises a DiffractionError if the series is too short for the patch, or the method needs a period
+    and the patch has none.
     """
     if name not in THESIS_METHODS:
-        raise DiffractionError(f"method='{name}' is none of {', '.join(THESIS_METHODS)}")
+        raise DiffractionError(
+            f"method='{name}' is unknown; choose one of {', '.join(THESIS_METHODS)}"
+        )
     settings = {} if name == "pq" else {"taps": TAPS}  # pq reads two bins along each axis
     return make(
         name, heights, coherence_width=table.coherence_width, coherence=table.coherence,
-        terms=TERMS, tolerance=TOLERANCE, step=STEP, build=_kept, **settings,
+        terms=TERMS, tolerance=TOLERANCE, step=STEP, build=_cached_build, **settings,
     )  # fmt: skip
 
 
-def _kept(heights: HeightField, **arguments: Any) -> DiffractionTable:
-    """`DiffractionTable.build`, once for a patch and its arguments."""
+def _cached_build(heights: HeightField, **arguments: Any) -> DiffractionTable:
+    """Build a table like `DiffractionTable.build`, or read it from the cache."""
     progress = arguments.pop("progress", None)
     settings = TableSettings(**arguments)
     return cached_table(heights.digest(), settings, lambda: build_with(heights, settings, progress))
 
 
 def pack_method(method: Method) -> Packed:
-    """A method's Taylor table and settings.
+    """Pack the Taylor table and settings of a method.
 
-    Raises a DiffractionError if there is no shader for the method, or its table is no Taylor
-    series.
+    Raises a DiffractionError if no shader implements the method, or its table has no Taylor series.
     """
     if isinstance(method, OrdersOnly):
         periods = tuple(0.0 if period is None else period for period in method.periods)
@@ -82,7 +83,7 @@ def pack_method(method: Method) -> Packed:
     definitions |= {"TAPS_X": str(taps[0]), "TAPS_Y": str(taps[1])}
     if table.grid.coherent:
         definitions["COHERENT"] = ""
-    # real and imaginary part of a term side by side, two terms a texel
+    # real and imaginary part of a term are adjacent; a texel has two terms
     series = np.moveaxis(table.coefficients[0], 2, 3)
     series = series.reshape(-1, 2 * terms)
     zero = table.order_0[0].T.reshape(1, -1).astype(np.float32)
@@ -109,7 +110,7 @@ def pack_method(method: Method) -> Packed:
 
 
 class Part(NamedTuple):
-    """One surface's program, its vertices in it, and its tables."""
+    """Program of one surface, with its vertex array and tables."""
 
     program: Any
     array: Any
@@ -119,9 +120,9 @@ class Part(NamedTuple):
 class Prepared:
     """Programs and tables of one method for all surfaces of a scene.
 
-    surfaces : what each surface's shader reads but for the method's tables.
+    surfaces : bindings of each surface, without the method's tables.
 
-    Raises a DiffractionError if there is no such method, or a table does not suit it.
+    Raises a DiffractionError if the method is unknown, or does not support a table.
     """
 
     def __init__(
@@ -139,42 +140,41 @@ class Prepared:
             key = id(surface.material.table)
             if key not in packed:
                 packed[key] = method_tables(method, surface.material)
-        bound = {key: Bindings(context, found) for key, found in packed.items()}
+        bound = {key: Bindings(context, tables) for key, tables in packed.items()}
         first = next(iter(bound.values()))
-        # each surface's; what does not diffract is drawn by any of the programs
+        # one for each surface; any table serves a surface that does not diffract
         self.tables = [
             first if s.material.bsdf is None else bound[id(s.material.table)]
             for s in scene.surfaces
         ]
-        self.nbytes = sum(p.nbytes for p in packed.values())  # of the method's own textures
+        self.nbytes = sum(p.nbytes for p in packed.values())  # size of the method's textures
         self._programs: dict[tuple[tuple[str, str], ...], Any] = {}
         self._parts: dict[object, list[Part]] = {}
 
     def parts(
         self, light: Mapping[str, str], extras: Sequence[Mapping[str, str]] = ()
     ) -> list[Part]:
-        """One part a surface.
+        """Return the part of each surface under the definitions of a light; parts are cached.
 
-        extras : more definitions of each surface.
+        extras : further definitions of each surface.
 
-        Raises a DiffractionError if the driver refuses a program.
+        Raises a DiffractionError if a program does not compile.
         """
-        more = list(extras) or [{}] * len(self._surfaces)
-        key = tuple(tuple(sorted({**light, **one}.items())) for one in more)
+        further = list(extras) or [{}] * len(self._surfaces)
+        key = tuple(tuple(sorted({**light, **extra}.items())) for extra in further)
         if key not in self._parts:
-            made = []
-            for own, tables, buffer, extra in zip(
-                self._surfaces, self.tables, self._buffers, more, strict=True
+            parts = []
+            for surface, tables, buffer, extra in zip(
+                self._surfaces, self.tables, self._buffers, further, strict=True
             ):
-                of_light = {**tables.definitions, **light, **extra}
-                program = self.program({**own.definitions, **of_light})
-                array = vertex_array(self._context, program, buffer)
-                made.append(Part(program, array, tables))
-            self._parts[key] = made
+                definitions = {**surface.definitions, **tables.definitions, **light, **extra}
+                program = self.program(definitions)
+                parts.append(Part(program, vertex_array(self._context, program, buffer), tables))
+            self._parts[key] = parts
         return self._parts[key]
 
     def program(self, definitions: Mapping[str, str]) -> Any:
-        """The method's program with these definitions, compiled once."""
+        """Return the method's program with these definitions; programs are cached."""
         key = tuple(sorted(definitions.items()))
         if key not in self._programs:
             self._programs[key] = compile_program(self._context, self._method, definitions)
@@ -189,9 +189,9 @@ class Prepared:
 
 
 def method_tables(method: str, material: Material) -> Packed:
-    """What a method reads of a material's table.
+    """Pack a material's table for a method.
 
-    Raises a DiffractionError if there is no such method, or the table does not suit it.
+    Raises a DiffractionError if the method is unknown, or does not support the table.
     """
     if method == "lut":
         return pack_colours(cached_colours(material.table))
@@ -204,18 +204,19 @@ def method_tables(method: str, material: Material) -> Packed:
 
 
 def window(tables: Bindings, coherence_width: float) -> dict[str, Uniform]:
-    """Uniforms of another coherence window."""
+    """Return the uniforms of another coherence width in µm."""
     sigma = sigma_of(coherence_width)
     factor = area_factor(sigma)
-    exponents, own = tables.uniforms.get("exponents"), tables.uniforms["area_factor"]
-    found: dict[str, Uniform] = {"sigma": sigma, "area_factor": factor}
-    if isinstance(exponents, tuple) and isinstance(own, float):
-        found["exponents"] = tuple(float(e) * factor / own for e in exponents)  # both ∝ σ²
-    return found
+    exponents, table_factor = tables.uniforms.get("exponents"), tables.uniforms["area_factor"]
+    uniforms: dict[str, Uniform] = {"sigma": sigma, "area_factor": factor}
+    if isinstance(exponents, tuple) and isinstance(table_factor, float):
+        # exponents are proportional to σ², too
+        uniforms["exponents"] = tuple(float(e) * factor / table_factor for e in exponents)
+    return uniforms
 
 
 def vertex_array(context: Any, program: Any, buffer: Any) -> Any:
-    """Those attributes of the vertices that the program reads."""
-    used: Sequence[tuple[str, int]] = [(name, size) for name, size in VERTEX if name in program]
+    """Return the vertex array of the attributes that a program reads."""
+    names = [name for name, _ in VERTEX if name in program]
     layout = " ".join(f"{n}f" if name in program else f"{4 * n}x" for name, n in VERTEX)
-    return context.vertex_array(program, [(buffer, layout, *(name for name, _ in used))])
+    return context.vertex_array(program, [(buffer, layout, *names)])

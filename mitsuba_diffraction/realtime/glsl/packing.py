@@ -1,4 +1,4 @@
-"""Tables as textures, for the methods `lut` and `spectral` (NumPy only)."""
+"""Packing of tables as textures for the methods `lut` and `spectral` (NumPy only)."""
 
 from __future__ import annotations
 
@@ -26,26 +26,30 @@ from .texels import Packed, Texture, as_half, listed, paired, texels
 #: First and last wavenumber of the loops over wavelengths, rad/µm.
 WAVENUMBERS = (2e3 * math.pi / VISIBLE[1], 2e3 * math.pi / VISIBLE[0])
 
-#: Phase of a cell of κ within which functions are straight: off by its square over 8, 1e-4.
+#: Phase over a cell of κ, within which functions are interpolated linearly; the error is its square
+#: over 8, 1e-4.
 _CELL = 0.03
 
 _LAM = np.arange(360.0, 830.5, 1.0)  # nm
-_RESPONSES = 2048  # over k: 0.4 nm apart
-_ANGLES, _WAVELENGTHS = 129, 64  # of a conductor's reflectance
+_RESPONSES = 2048  # nodes over k, about 0.4 nm apart
+_ANGLES, _WAVELENGTHS = 129, 64  # nodes of a conductor's reflectance
 
 
 def pack_colours(table: ColourTable, *, floats: bool = False) -> Packed:
-    """A colour table, for `lut`; all of floats under `FLOAT_TEXTURES`, for other programs."""
+    """Pack a colour table for `lut`.
+
+    floats : whether all textures are float (`FLOAT_TEXTURES`), for other programs.
+    """
     grid = table.grid
     starts = np.array([grid.start(n) for n in range(grid.rings)])
-    counts = np.array(grid.counts)  # below 2¹⁶: the table would be too large before
+    counts = np.array(grid.counts)  # always below 2¹⁶: larger tables exceed the textures
     pairs = np.stack([starts[:-1], counts[:-1] | counts[1:] << 16], axis=1).astype(np.uint32)
     radii, zs = table.order_0.shape[:2]
     if floats:
         bins = np.stack([starts[:-1], counts[:-1], counts[1:], counts[1:]], axis=1)
         listings = (
             listed("colours", table.coefficients.reshape(-1, 4)),
-            listed("rings", bins.astype(np.float32)),  # whole up to 2²⁴
+            listed("rings", bins.astype(np.float32)),  # floats are exact up to 2²⁴
             listed("glossy", texels(table.order_0[..., :3].reshape(-1, 3)).astype(np.float32)),
         )
     else:
@@ -73,16 +77,16 @@ def pack_colours(table: ColourTable, *, floats: bool = False) -> Packed:
 
 
 def _with_next(values: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Of order 0 (radii, zs, 3): each colour, that of the next z, and two zeros, (n, 8)."""
+    """Put each colour of order 0 (radii, zs, 3) beside that of the next z, padded: (n, 8)."""
     following = np.concatenate([values[:, 1:], values[:, -1:]], axis=1)
-    both = np.concatenate([values, following, np.zeros((*values.shape[:2], 2))], axis=-1)
-    return np.asarray(both.reshape(-1, 8))
+    pairs = np.concatenate([values, following, np.zeros((*values.shape[:2], 2))], axis=-1)
+    return np.asarray(pairs.reshape(-1, 8))
 
 
 def pack_powers(table: DiffractionTable) -> Packed:
-    """A table of powers, for `spectral`; one of amplitudes is turned into one.
+    """Pack a table's powers for `spectral`; amplitudes are converted to powers.
 
-    Raises a DiffractionError for a coherent sum (`coherence="patch"`), whose orders interfere.
+    Raises a DiffractionError for a coherent table (`coherence="patch"`), whose orders interfere.
     """
     if table.grid.coherent:
         raise DiffractionError(
@@ -119,12 +123,12 @@ def pack_powers(table: DiffractionTable) -> Packed:
 
 
 def area_factor(sigma: float) -> float:
-    """4π²σ⁴ over the window's area πσ², µm²."""
+    """Return 4π²σ⁴ over the window's area πσ², µm²."""
     return 4.0 * math.pi * sigma**2
 
 
 def pack_energy(scales: Sequence[NDArray[np.float32]]) -> Packed:
-    """What conserves energy, at one or several height scales; nothing if there are none.
+    """Pack the scales that conserve energy, one page per height scale; empty without scales.
 
     scales : s on a grid of directions, (polar + 1, azimuthal) each (`Diffraction.energy_scale`).
     """
@@ -141,7 +145,7 @@ def pack_energy(scales: Sequence[NDArray[np.float32]]) -> Packed:
 
 
 def pack_beneath(ratios: Sequence[DirectionalTable]) -> Packed:
-    """What light is left for what lies beneath, at one or several height scales.
+    """Pack the light that reaches the base beneath, one page per height scale.
 
     ratios : albedo over the flat interface's reflectance (`Diffraction.reflected_ratio`).
     """
@@ -155,22 +159,23 @@ def pack_beneath(ratios: Sequence[DirectionalTable]) -> Packed:
 
 
 def _daylight_mean(table: DirectionalTable) -> NDArray[np.float64]:
-    """In linear sRGB under daylight, on `FINE`: exact of what is straight between wavelengths."""
+    """Average over daylight's spectrum: linear sRGB on `FINE`, linear between the wavelengths."""
     place = np.interp(
         np.log(_LAM), np.log(table.wavelengths), np.arange(len(table.wavelengths), dtype=float)
     )
     shares = np.maximum(1.0 - np.abs(place - np.arange(len(table.wavelengths))[:, None]), 0.0)
-    pages = [table.at(FINE.theta[:, None], FINE.phi, at) for at in table.wavelengths]
+    pages = [table.at(FINE.theta[:, None], FINE.phi, nm) for nm in table.wavelengths]
     return np.tensordot(np.stack(pages, axis=-1), shares @ _daylight_weights(), 1)
 
 
 def _daylight_weights() -> NDArray[np.float64]:
-    """From values over `_LAM` to linear sRGB under daylight, (n, 3)."""
+    """Return the matrix (n, 3) from values over `_LAM` to linear sRGB under daylight."""
     weights = linear_srgb(response(_LAM))
     return np.asarray(weights / weights.sum(axis=0))
 
 
 def _grid(pages: int) -> dict[str, str]:
+    """Return the definitions of a grid of directions with one page per height scale."""
     return {
         "GRID_PAGES": str(pages),
         "GRID_POLAR": str(FINE.polar),
@@ -180,11 +185,10 @@ def _grid(pages: int) -> dict[str, str]:
 
 
 def pack_responses(lights: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Packed:
-    """What each light's wavelengths add to linear sRGB, for `spectral`.
+    """Pack the contribution of each light's wavelengths to linear sRGB, for `spectral`.
 
-    lights : of each, wavelengths (n,) in nm and its spectrum relative to D65 of luminance 1 there,
-        (n,) or, from a renderer that knows three colours only, (n, 3). Without lights there is
-        one that is dark.
+    lights : wavelengths (n,) in nm of each light, and its spectrum relative to D65 of luminance 1,
+        (n,), or (n, 3) in RGB variants. An empty list is packed as one dark light.
     """
     lights = lights or [(np.array([360.0, 830.0]), np.zeros(2))]
     k = np.linspace(*WAVENUMBERS, _RESPONSES)
@@ -194,14 +198,14 @@ def pack_responses(lights: Sequence[tuple[NDArray[np.float64], NDArray[np.float6
     rows = np.zeros((len(lights), _RESPONSES, 4), np.float32)
     for row, (wavelengths, spectrum) in zip(rows, lights, strict=True):
         values = np.stack([np.interp(lam, wavelengths, s) for s in np.atleast_2d(spectrum.T)], 1)
-        row[1:-1, :3] = (daylight * values)[1:-1]  # nothing is seen beyond
+        row[1:-1, :3] = (daylight * values)[1:-1]  # the ends are 0: invisible wavelengths
     return Packed((Texture("responses", rows),), {"wavenumbers": WAVENUMBERS})
 
 
 def daylight_colour(
     wavelengths: NDArray[np.float64], spectrum: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Linear sRGB (3,) of a spectrum relative to D65, as in `pack_responses`."""
+    """Return linear sRGB (3,) of a spectrum relative to D65, as in `pack_responses`."""
     values = np.stack([np.interp(_LAM, wavelengths, s) for s in np.atleast_2d(spectrum.T)], 1)
     return np.asarray((linear_srgb(response(_LAM)) * values).sum(axis=0))
 
@@ -209,7 +213,7 @@ def daylight_colour(
 def pack_conductor(
     wavelengths: NDArray[np.float64], eta: NDArray[np.float64], k: NDArray[np.float64]
 ) -> Packed:
-    """A conductor's reflectance over angle and wavelength, and in linear sRGB under daylight.
+    """Pack a conductor's reflectance by angle and wavelength, and in linear sRGB under daylight.
 
     wavelengths : (n,) nm.
     eta, k : (n,), the complex index of refraction η + ik.
@@ -218,17 +222,18 @@ def pack_conductor(
     waves = np.linspace(*WAVENUMBERS, _WAVELENGTHS)
     lam = 2e3 * np.pi / waves
 
-    def over(at: NDArray[np.float64]) -> NDArray[np.float64]:
-        index = np.interp(at, wavelengths, eta) + 1j * np.interp(at, wavelengths, k)
+    def reflectances(nm: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the reflectance (n, angles) at wavelengths (n,)."""
+        index = np.interp(nm, wavelengths, eta) + 1j * np.interp(nm, wavelengths, k)
         return reflectance(cosines, index[:, None])
 
     rows = np.zeros((_WAVELENGTHS + 1, _ANGLES, 4), np.float32)
-    rows[:-1, :, 0] = over(lam)
+    rows[:-1, :, 0] = reflectances(lam)
     rows[:-1, :, 1] = np.interp(lam, wavelengths, eta)[:, None]
     rows[:-1, :, 2] = np.interp(lam, wavelengths, k)[:, None]
-    found = over(_LAM)
-    rows[-1, :, :3] = found.T @ _daylight_weights()
-    tint = metal_tint(_LAM, found[:, -1], rows[-1, -1, :3])
+    fine = reflectances(_LAM)
+    rows[-1, :, :3] = fine.T @ _daylight_weights()
+    tint = metal_tint(_LAM, fine[:, -1], rows[-1, -1, :3])
     return Packed(
         (Texture("reflectances", rows),),
         {
@@ -242,7 +247,7 @@ def pack_conductor(
 
 
 def pack_roughness(roughness: RoughnessTable) -> Packed:
-    """What small slope is blended by with Kirchhoff."""
+    """Pack the roughness that determines the blend of small slope with Kirchhoff."""
     nodes = roughness.nodes.astype(np.float32)
     pairs = np.zeros((len(nodes) - 1, 4), np.float32)
     pairs[:, 0], pairs[:, 1] = nodes[:-1], nodes[1:]
@@ -258,9 +263,9 @@ def pack_roughness(roughness: RoughnessTable) -> Packed:
 
 
 def pack_second_order(index: float, ratios: SlopeRatios) -> Packed:
-    """What light diffracted twice makes of orders, `optics.second_order`.
+    """Pack the second order's coefficients and slope ratios (`optics.second_order`).
 
-    index : of a dielectric, over that of the medium above it.
+    index : index of a dielectric over that of the medium above it.
     """
     first, last = ratios.kappa
     count, _, rows, columns = ratios.values.shape
@@ -284,6 +289,6 @@ def pack_second_order(index: float, ratios: SlopeRatios) -> Packed:
 
 
 def _paged(name: str, values: NDArray[np.complexfloating]) -> Texture:
-    """Two complex numbers at nodes (pages, rows, columns, 2), page below page."""
+    """Pack two complex numbers at nodes (pages, rows, columns, 2), pages one below another."""
     floats = np.stack([values.real, values.imag], axis=-1).astype(np.float16)
     return Texture(name, floats.reshape(-1, values.shape[2], 4), smooth=True)

@@ -1,10 +1,9 @@
-"""Direct light of all emitters with soft shadows, one light without extent after the other.
+"""Direct light of all emitters with soft shadows, accumulated over frames.
 
-Frames are of two kinds in turn. One draws a light with its shadows: see `emitters` for what is
-drawn and why its mean is right, `shadows` for the shadows. The other looks up what each pixel's
-lobes meet (`surroundings`), and shows what is behind the scene and what emits light. The balance
-heuristic shares the light between them. Pixels and the lens are sampled at another place in every
-frame, so their edges become smooth as the light does.
+Two kinds of frames alternate. The first draws one light with its shadows (`emitters`, `shadows`).
+The second looks up the surroundings along each pixel's lobes (`surroundings`), and draws the
+background and shapes that emit light. The balance heuristic weights the two. Every frame samples
+another point of each pixel and of the lens, so that edges become smooth with the light.
 """
 
 from __future__ import annotations
@@ -32,17 +31,17 @@ from .texels import Packed, Uniform
 
 Array = NDArray[np.float64]
 
-# two numbers each for the pixel, the lens, the shadow map and the lobes: multiples of the roots of
-# primes less their whole parts have nothing to do with each other (Richtmyer 1951); those of the
-# golden ratio, (1 + √5)/2, are the most even, and lobes need that most
+# steps of two numbers each for the pixel, the lens, the shadow map and the lobes: fractional parts
+# of multiples of square roots of primes are independent (Richtmyer 1951); those of the golden
+# ratio, (1 + √5)/2, are the most even, which matters most for lobes
 _STEPS = np.append(np.sqrt([2.0, 3.0, 7.0, 11.0, 13.0, 17.0]), [0.5 + 1.25**0.5, 19.0**0.5]) % 1.0
 
-#: Towards what the second kind of frame looks: all spectra are daylight's, the colours come later.
+#: Light of frames that look up the surroundings: spectra of daylight, to be multiplied by colours.
 _WHITE = Light("surroundings", np.array([0.0, 0.0, 1.0, 0.0]), np.array([360.0, 830.0]), np.ones(2))
 
 
 class Drawing(Protocol):
-    """What of `renderer.Renderer` is used here, which imports this."""
+    """Interface of `renderer.Renderer` in this module, which the renderer imports."""
 
     context: Any
     scene: RealtimeScene
@@ -50,22 +49,22 @@ class Drawing(Protocol):
     buffers: list[Any]
 
     def target(self, width: int, height: int) -> Target:
-        """A framebuffer of floats."""
+        """Return a framebuffer of floats."""
 
     @property
     def draw_lights(self) -> Callable[..., None]:
-        """Draw some lights, or what the surroundings send."""
+        """Function that draws lights or looked-up surroundings."""
 
 
 class Stage:
-    """What does not depend on the camera: emitters, surroundings, what casts shadows.
+    """Emitters, surroundings and shadow casters of a scene, independent of the camera.
 
-    Raises a DiffractionError if no emitter brings light, or the environment is not finite.
+    Raises a DiffractionError if no emitter lights the scene, or the environment is not finite.
     """
 
     def __init__(self, renderer: Drawing) -> None:
         self._context, self._scene = renderer.context, renderer.scene
-        self._owned: list[Any] = []
+        self._resources: list[Any] = []
         self.emitters = Emitters(renderer.mitsuba_scene, self._scene.middle)
         self._add_glowing(renderer.buffers)
         flats = flat_shapes(renderer.mitsuba_scene)
@@ -76,51 +75,53 @@ class Stage:
         self._around = around[0]
         self._background, self._triangle = None, None
         if self.emitters.environment is not None:
-            self._background = self._kept(
+            self._background = self._register(
                 compile_plain(
                     self._context, "whole.vert", "background.frag",
                     ("library.glsl", "surroundings.glsl"), self._around.definitions,
                 )
             )  # fmt: skip
-            self._triangle = self._kept(self._context.vertex_array(self._background, []))
-        self.extras = self._with_lobes(around)  # of each surface, what its shader reads of it
-        # whether there is anything to look up along lobes
+            self._triangle = self._register(self._context.vertex_array(self._background, []))
+        self.extras = self._with_lobes(around)  # bindings of each surface
+        # whether lobes can look up any light
         self.looks_up = self._scene.glows or self._background is not None
 
-    def _kept(self, thing: Any) -> Any:
-        self._owned.append(thing)
-        return thing
+    def _register(self, resource: Any) -> Any:
+        """Add a resource that `release` frees, and return it."""
+        self._resources.append(resource)
+        return resource
 
     def _bound(self, packed: Packed) -> Bindings:
-        bindings: Bindings = self._kept(Bindings(self._context, packed))
+        """Upload packed data."""
+        bindings: Bindings = self._register(Bindings(self._context, packed))
         return bindings
 
     def _add_glowing(self, buffers: list[Any]) -> None:
-        """What emits light: to be seen, and to stand in the way."""
+        """Add shapes that emit light, both as pictures and as shadow casters."""
         context, scene = self._context, self._scene
-        self._glow = self._kept(compile_plain(context, "surface.vert", "glow.frag"))
-        vertices = [self._kept(context.buffer(one.vertices.tobytes())) for one in scene.emitting]
-        self._glowing = [self._kept(vertex_array(context, self._glow, v)) for v in vertices]
-        self._radiances = [tuple(float(x) for x in one.radiance) for one in scene.emitting]
-        self.casters = self._kept(Casters(context, scene.surfaces, buffers, vertices))
+        self._glow = self._register(compile_plain(context, "surface.vert", "glow.frag"))
+        vertices = [self._register(context.buffer(g.vertices.tobytes())) for g in scene.emitting]
+        self._glowing = [self._register(vertex_array(context, self._glow, v)) for v in vertices]
+        self._radiances = [tuple(float(x) for x in glow.radiance) for glow in scene.emitting]
+        self.casters = self._register(Casters(context, scene.surfaces, buffers, vertices))
 
     def _with_lobes(self, around: list[Bindings]) -> list[Joined]:
-        """Of each surface, what surrounds it and where it sends light."""
+        """Return the bindings of each surface: the surroundings, and its lobes if it diffracts."""
         lobes: dict[int, Bindings] = {}
-        found = []
+        extras = []
         for surface in self._scene.surfaces:
-            own = []
+            parts = [*around]
             if surface.material.bsdf is not None:
                 table = surface.material.table
                 if id(table) not in lobes:
                     factor = height_scale(surface.material) * coat_index(surface.material)
                     lobes[id(table)] = self._bound(pack_lobes(cached_colours(table), factor))
-                own.append(lobes[id(table)])
-            found.append(Joined([*around, *own]))
-        return found
+                parts.append(lobes[id(table)])
+            extras.append(Joined(parts))
+        return extras
 
     def draw_behind(self, frame: Any, camera: Camera, bright: bool) -> None:
-        """The background and what emits light into a framebuffer; dark, it only covers."""
+        """Clear a framebuffer and draw background and emitters; unless `bright`, in black."""
         moderngl = require_moderngl()
         matrix = camera.view_projection(self._scene.low, self._scene.high)
         frame.use()
@@ -145,12 +146,12 @@ class Stage:
             array.render(moderngl.TRIANGLES)
 
     def release(self) -> None:
-        for thing in reversed(self._owned):
-            thing.release()
+        for resource in reversed(self._resources):
+            resource.release()
 
 
 def pack_surroundings(scene: RealtimeScene, emitters: Emitters, flats: Sequence[Any]) -> Packed:
-    """The environment, and shapes that directions meet exactly, for shaders/surroundings.glsl."""
+    """Pack the environment and flat shapes for shaders/surroundings.glsl."""
     extent = float(np.ptp([scene.low, scene.high]))
     packed = pack_flats(flats, emitters.share_of)
     packed |= Packed((), {"least_distance": 1e-6 * extent})
@@ -161,7 +162,7 @@ def pack_surroundings(scene: RealtimeScene, emitters: Emitters, flats: Sequence[
 
 
 def pack_solid(scene: RealtimeScene, flats: Sequence[Any]) -> Packed:
-    """All else that stands in a direction's way, for shaders/obstacles.glsl."""
+    """Pack all other shapes that obstruct directions, for shaders/obstacles.glsl."""
     exact = {shape.ptr for shape in flats}
     solid = [
         surface.vertices[:, :3].reshape(-1, 3, 3)
@@ -172,24 +173,24 @@ def pack_solid(scene: RealtimeScene, flats: Sequence[Any]) -> Packed:
 
 
 class Joined:
-    """Several bindings as one."""
+    """Several bindings, used as one."""
 
     def __init__(self, parts: list[Bindings]) -> None:
         self._parts = parts
         self.definitions = {k: v for part in parts for k, v in part.definitions.items()}
 
     def use(self, program: Any, first_unit: int = 0) -> int:
-        """As of `Bindings`."""
+        """Bind all parts in a program, and return the next free texture unit."""
         for part in self._parts:
             first_unit = part.use(program, first_unit)
         return first_unit
 
 
 class ProgressiveLight:
-    """A picture that gets better with every frame: made by `Renderer.progressive`.
+    """Picture that accumulates frames, created by `Renderer.progressive`.
 
-    lights : these alone, instead of the scene's emitters and what surrounds it.
-    shadow_size : texels along either side of a shadow map.
+    lights : lights to draw instead of the scene's emitters and surroundings.
+    shadow_size : texels a side of a shadow map.
     """
 
     def __init__(
@@ -198,14 +199,14 @@ class ProgressiveLight:
     ) -> None:  # fmt: skip
         self._renderer, self._method, self._camera = renderer, method, camera
         self._stage = stage
-        self._fixed = [replace(one, spectrum=len(lights) * one.spectrum) for one in lights]
+        self._fixed = [replace(light, spectrum=len(lights) * light.spectrum) for light in lights]
         self._looks_up = stage.looks_up and not lights
         self._surface: dict[str, float | None] = {}
         context = renderer.context
         self._map = ShadowMap(stage.casters, shadow_size)
         width, height = camera.size
         self._frame = renderer.target(width, height)
-        self._sums = [renderer.target(width, height) for _ in range(2)]  # of either kind of frame
+        self._sums = [renderer.target(width, height) for _ in range(2)]  # one per kind of frame
         self._counts = [0, 0]
         self._lights: Iterator[Light] = iter(())
         self.restart(camera)
@@ -216,21 +217,21 @@ class ProgressiveLight:
 
     @property
     def frames(self) -> int:
-        """How many are in the picture."""
+        """Number of frames in the picture."""
         return sum(self._counts)
 
     def restart(self, camera: Camera | None = None, **surface: float | None) -> None:
         """Start again, with another camera of the same size or other surfaces.
 
-        surface : height scale and coherence width as of `Renderer.draw`.
+        surface : `scale` and `coherence_width` of `Renderer.draw`.
         """
         if camera is not None:
             self._camera, self._surface = camera, surface
-            self._seen = self._stage.casters.seen(camera)
+            self._visible = self._stage.casters.visible(camera)
         for target in self._sums:
             target.frame.clear(0.0, 0.0, 0.0, 0.0)
         self._counts = [0, 0]
-        self._drawn: Counter[tuple[str, bool]] = Counter()  # frames of each
+        self._drawn: Counter[tuple[str, bool]] = Counter()  # number of frames of each emitter
         emitters = self._stage.emitters
         self._lights = itertools.cycle(self._fixed) if self._fixed else emitters.lights()
 
@@ -239,24 +240,24 @@ class ProgressiveLight:
         for _ in range(frames):
             kind = self.frames % 2 if self._looks_up else 0
             light = next(self._lights) if kind == 0 else _WHITE
-            # each emitter has all places in turn, a sky and its sun too: else glints come by chance
-            drawn = light.name, light.density != 0.0
-            self._drawn[drawn] += 1
-            places = (0.5 + self._drawn[drawn] * _STEPS) % 1.0
-            camera = self._camera.sampled(places[:2] - 0.5, places[2:4])
+            # one sequence per emitter, for a sky and its sun, too: random points would cause glints
+            emitter = light.name, light.density != 0.0
+            self._drawn[emitter] += 1
+            numbers = (0.5 + self._drawn[emitter] * _STEPS) % 1.0
+            camera = self._camera.sampled(numbers[:2] - 0.5, numbers[2:4])
             self._stage.draw_behind(self._frame.frame, camera, bright=kind == 1)
             if kind == 0:
-                self._light(light, camera, places[4:6])
+                self._light(light, camera, numbers[4:6])
             else:
-                self._look_up(camera, places[6:8])
+                self._look_up(camera, numbers[6:8])
             self._accumulate(self._sums[kind])
             self._counts[kind] += 1
 
-    def _light(self, light: Light, camera: Camera, beside: Array) -> None:
-        """One light with its shadows."""
-        if not len(self._seen.places):
+    def _light(self, light: Light, camera: Camera, shift: Array) -> None:
+        """Draw one light with its shadows."""
+        if not len(self._visible.places):
             return
-        uniforms, each = self._map.draw(light, self._seen, (float(beside[0]), float(beside[1])))
+        uniforms, each = self._map.draw(light, self._visible, (float(shift[0]), float(shift[1])))
         uniforms["light_density"] = light.density
         definitions = light_definitions(1, False) | {"SHADOWED": "", "PIGMENT_IN_LIGHT": ""}
         if self._looks_up:
@@ -267,7 +268,7 @@ class ProgressiveLight:
         )  # fmt: skip
 
     def _look_up(self, camera: Camera, numbers: Array) -> None:
-        """What each pixel's lobes meet."""
+        """Draw the surroundings that each pixel's lobes look up."""
         self._renderer.draw_lights(
             self._frame.frame, self._method, camera, [_WHITE],
             light_definitions(1, False) | {"LOOKED_UP": ""},
@@ -275,17 +276,18 @@ class ProgressiveLight:
         )  # fmt: skip
 
     def _extras(self, in_map: Sequence[dict[str, Uniform]] = ()) -> list[Extra]:
-        """Of each surface; in_map : what it is in the shadow map, if one was drawn."""
-        bodies: list[dict[str, Uniform]] = [{"solid": solid} for solid in self._seen.solid]
+        """Return the extras of each surface; in_map : their uniforms in the shadow map, if any."""
+        bodies: list[dict[str, Uniform]] = [{"solid": solid} for solid in self._visible.solid]
         texture = self._map.texture if in_map else None
         return [
-            Extra(extra, {**body, **own}, texture)
-            for extra, body, own in zip(
+            Extra(extra, {**body, **shadow}, texture)
+            for extra, body, shadow in zip(
                 self._stage.extras, bodies, in_map or [{}] * len(bodies), strict=True
             )
         ]
 
     def _accumulate(self, target: Target) -> None:
+        """Add the frame to a sum."""
         moderngl = require_moderngl()
         context: Any = self._renderer.context
         target.frame.use()
@@ -297,7 +299,7 @@ class ProgressiveLight:
         context.enable_only(moderngl.NOTHING)
 
     def show(self, frame: Any, exposure: float) -> None:
-        """The picture so far into a framebuffer of the same size, exposed, as sRGB."""
+        """Draw the picture so far into a framebuffer of the same size, exposed, as sRGB."""
         moderngl = require_moderngl()
         context: Any = self._renderer.context
         frame.use()
@@ -305,41 +307,40 @@ class ProgressiveLight:
         for unit, target in enumerate(self._sums):
             target.colour.use(unit)
         weights = tuple(1.0 / max(count, 1) for count in self._counts)
-        shown: dict[str, Uniform] = {
+        uniforms: dict[str, Uniform] = {
             "first": 0, "second": 1, "weights": weights, "exposure": exposure
         }  # fmt: skip
-        set_uniforms(self._mean, shown)
+        set_uniforms(self._mean, uniforms)
         self._whole.render(moderngl.TRIANGLES, vertices=3)
 
     @property
     def image(self) -> NDArray[np.float32]:
-        """The picture so far (height, width, 4): linear sRGB, and the share that is covered."""
+        """Picture so far (height, width, 4): linear sRGB, and the coverage of each pixel."""
         width, height = self._camera.size
         total = np.zeros((height, width, 4), np.float32)
         for target, count in zip(self._sums, self._counts, strict=True):
-            found = np.frombuffer(target.frame.read(components=4, dtype="f4"), np.float32)
-            mean = found.reshape(height, width, 4)[::-1] / np.float32(max(count, 1))
-            total += mean
+            pixels = np.frombuffer(target.frame.read(components=4, dtype="f4"), np.float32)
+            total += pixels.reshape(height, width, 4)[::-1] / np.float32(max(count, 1))
         total[..., 3] /= np.float32(max(sum(count > 0 for count in self._counts), 1))
         return total
 
     def release(self) -> None:
-        made = (self._triangle, self._add, self._whole, self._mean)
-        for thing in (*made, self._frame, *self._sums, self._map):
-            thing.release()
+        programs = (self._triangle, self._add, self._whole, self._mean)
+        for resource in (*programs, self._frame, *self._sums, self._map):
+            resource.release()
 
 
 class Extra:
-    """A surface's extras, what it is in this frame, and the light's shadow map, if there is one."""
+    """Bindings of a surface, its uniforms in one frame, and the light's shadow map, if any."""
 
-    def __init__(self, extra: Joined, own: dict[str, Uniform], shadow_map: Any) -> None:
-        self._extra, self._own, self._map = extra, own, shadow_map
+    def __init__(self, extra: Joined, uniforms: dict[str, Uniform], shadow_map: Any) -> None:
+        self._extra, self._uniforms, self._map = extra, uniforms, shadow_map
         self.definitions = extra.definitions
 
     def use(self, program: Any, first_unit: int = 0) -> int:
-        """As of `Bindings`."""
+        """Bind all in a program, and return the next free texture unit."""
         first_unit = self._extra.use(program, first_unit)
-        set_uniforms(program, self._own)
+        set_uniforms(program, self._uniforms)
         sampler = program.get("shadow_map", None)
         if self._map is not None and sampler is not None:
             self._map.use(first_unit)

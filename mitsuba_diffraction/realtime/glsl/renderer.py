@@ -1,4 +1,4 @@
-"""The realtime renderer: scenes of Mitsuba, drawn by shaders, without a window."""
+"""Realtime renderer of Mitsuba scenes by shaders, without a window."""
 
 from __future__ import annotations
 
@@ -41,24 +41,24 @@ Image = NDArray[np.float32]
 
 
 class Renderer:
-    """Draws a scene of Mitsuba with a method of the shaders.
+    """Renderer of one Mitsuba scene by shaders.
 
-    Meshes, rectangles, spheres, disks and cylinders; diffraction over a diffuse BSDF, diffuse ones,
-    plastic and metal, smooth or rough, and bumps. `render` and `draw` know directional and point
-    lights, and a smooth sky, without shadows; `progressive` all emitters, with shadows, and the
-    lens. There is no light between surfaces. All else is named in a warning, and in
-    `scene.omissions`.
+    Supported are meshes, rectangles, spheres, disks and cylinders; diffraction over a diffuse BSDF;
+    diffuse BSDFs, plastic and metal, smooth or rough; and bump maps. `render` and `draw` have
+    directional and point lights and a smooth sky, without shadows. `progressive` has all emitters,
+    shadows and the lens. Light between surfaces is left out. Unsupported parts of the scene are
+    listed in a warning, and in `scene.omissions`.
 
     Parameters
     ----------
-    scene : a `mi.Scene` of the variant that is set, or an XML file.
+    scene : a `mi.Scene` of the current variant, or an XML file.
     sensor : index of the camera.
     context : a moderngl context; by default one without a window, through EGL.
 
     Raises
     ------
     DiffractionError
-        If there is no OpenGL 3.3, nothing diffracts, or the camera has no perspective.
+        If OpenGL 3.3 is missing, nothing diffracts, or the camera is not a perspective one.
     """
 
     def __init__(self, scene: Any, *, sensor: int = 0, context: Any = None) -> None:
@@ -86,28 +86,29 @@ class Renderer:
         self._methods: dict[str, Prepared] = {}
         self._responses: Bindings | None = None
         self._stage: Stage | None = None
-        self._lit_by: list[NDArray[np.float64]] = []
+        self._spectra: list[NDArray[np.float64]] = []
 
     def _warn(self, omissions: Sequence[str]) -> None:
+        """Warn of unsupported parts of the scene."""
         if omissions:
             listed = "; ".join(dict.fromkeys(omissions))
             warn(f"the realtime picture does not show: {listed}")
 
     @property
     def driver(self) -> str:
-        """What draws."""
+        """Name of the OpenGL driver."""
         return str(self.context.info["GL_RENDERER"])
 
     def render(
         self, method: str = "lut", *, supersampling: int = 4, size: tuple[int, int] | None = None
     ) -> Image:
-        """A picture (height, width, 4): linear sRGB and the share of each pixel that is covered.
+        """Render a picture (height, width, 4): linear sRGB and the coverage of each pixel.
 
         Parameters
         ----------
         method : one of `source.METHODS`.
         supersampling : samples along either side of a pixel, averaged evenly.
-        size : width and height; the scene's by default.
+        size : width and height; by default those of the camera.
         """
         self._warn(self._of_light)
         self._of_light.clear()
@@ -123,9 +124,9 @@ class Renderer:
     def frame_time(
         self, method: str, *, size: tuple[int, int] | None = None, frames: int = 1
     ) -> float:
-        """Seconds a frame takes, the fastest of some, one sample a pixel; compiled beforehand.
+        """Return the seconds of the fastest of some frames with one sample per pixel.
 
-        By the clock of `context.clock_of`.
+        The program is compiled before. The clock is that of `context.clock_of`.
         """
         width, height = size or self.camera.size
         target = self.target(width, height)
@@ -142,7 +143,7 @@ class Renderer:
         return min(times)
 
     def texture_bytes(self, method: str) -> int:
-        """Memory of a method's own textures."""
+        """Return the size of a method's textures."""
         return self.prepared(method).nbytes
 
     def draw(
@@ -159,12 +160,13 @@ class Renderer:
 
         Parameters
         ----------
-        frame : of moderngl, with a depth buffer.
+        frame : framebuffer of moderngl with a depth buffer.
         method : one of `source.METHODS`.
-        camera : the scene's by default.
-        exposure : factor on the light, for display as sRGB; None leaves it linear.
-        scale : height scale of all patches, instead of their own; see `energy_for`.
-        coherence_width : µm, instead of their own; not for `lut` and `pq`, whose tables hold it.
+        camera : by default the scene's camera.
+        exposure : factor on the light, for display as sRGB; None leaves the picture linear.
+        scale : height scale of all patches instead of the scene's; see `energy_for`.
+        coherence_width : coherence width of all patches instead of the scene's, µm; not for `lut`
+            and `pq`, whose tables include it.
         """
         self.draw_lights(
             frame, method, camera or self.camera, self.lights,
@@ -184,20 +186,20 @@ class Renderer:
         lights: Sequence[Light] = (),
         shadow_size: int = SIZE,
     ) -> ProgressiveLight:
-        """A picture of all emitters' direct light, with shadows, that gets better by frames.
+        """Return a picture that accumulates frames of all direct light with shadows.
 
         Parameters
         ----------
         method : one of `source.METHODS`.
-        size : width and height; the camera's by default.
-        camera : the scene's by default.
-        lights : these alone, instead of all that the scene has.
-        shadow_size : texels along either side of a shadow map.
+        size : width and height; by default those of the camera.
+        camera : by default the scene's camera.
+        lights : lights to draw instead of the scene's emitters.
+        shadow_size : texels a side of a shadow map.
 
         Raises
         ------
         DiffractionError
-            If no emitter brings light, or as of `prepared`.
+            If no emitter lights the scene, or as of `prepared`.
         """
         camera = camera or self.camera
         resized = camera.resized(*(size or camera.size))
@@ -206,7 +208,7 @@ class Renderer:
         )
 
     def stage(self) -> Stage:
-        """What progressive light needs of the scene, made when it is first wanted."""
+        """Return the scene's emitters, surroundings and shadow casters, built at the first call."""
         if self._stage is None:
             self._stage = Stage(self)
         return self._stage
@@ -224,18 +226,19 @@ class Renderer:
         scale: float | None = None,
         coherence_width: float | None = None,
     ) -> None:
-        """Draw some lights, or what the surroundings send, into a framebuffer.
+        """Draw some lights, or looked-up surroundings, into a framebuffer.
 
         Parameters
         ----------
-        frame, method, camera, scale, coherence_width : as of `draw`.
-        lights : without extent.
-        definitions, uniforms : what of them the shaders know.
-        extras : what each surface's shader reads of them; without any the frame is cleared first.
+        frame, method, camera, scale, coherence_width : as in `draw`.
+        lights : lights without extent.
+        definitions, uniforms : definitions and uniforms of the light.
+        extras : further bindings of each surface; without them the frame is cleared first.
         """
         moderngl = require_moderngl()
-        own_definitions = [extra.definitions for extra in extras or ()]
-        parts = self.prepared(method).parts(definitions, own_definitions)
+        parts = self.prepared(method).parts(
+            definitions, [extra.definitions for extra in extras or ()]
+        )
         frame.use()
         if extras is None:
             frame.clear(0.0, 0.0, 0.0, 0.0)
@@ -256,18 +259,18 @@ class Renderer:
             "light_colour": colours,
             **uniforms,
         }
-        for n, (surface, own, part) in enumerate(
+        for n, (surface, bindings, part) in enumerate(
             zip(self.scene.surfaces, self.bindings, parts, strict=True)
         ):
             program = part.program
             set_uniforms(program, shared)
-            unit = part.tables.use(program, own.use(program))
+            unit = part.tables.use(program, bindings.use(program))
             if extras is not None:
                 unit = extras[n].use(program, unit)
             self.use_responses(program, unit, lights)
             if "pigment_in_light" in program:
-                turned = surface.material.pigment.under(lights[0].wavelengths, lights[0].spectrum)
-                set_uniforms(program, {"pigment_in_light": tuple(turned.ravel().tolist())})
+                matrix = surface.material.pigment.under(lights[0].wavelengths, lights[0].spectrum)
+                set_uniforms(program, {"pigment_in_light": tuple(matrix.ravel().tolist())})
             if surface.material.bsdf is not None:
                 factor = scale if scale is not None else height_scale(surface.material)
                 set_uniforms(program, {"height_scale": factor})
@@ -287,24 +290,22 @@ class Renderer:
                     own.textures[texture.name].write(texture.data.tobytes())
 
     def release(self) -> None:
-        """Free what lies in the graphics card's memory."""
+        """Free the graphics card's memory."""
         for prepared in self._methods.values():
             prepared.release()
-        for thing in (*self.bindings, *self.buffers):
-            thing.release()
-        for thing in (self._responses, self._stage):
-            if thing is not None:
-                thing.release()
+        for resource in (*self.bindings, *self.buffers, self._responses, self._stage):
+            if resource is not None:
+                resource.release()
         if self._own_context:
             self.context.release()
 
     def prepared(self, method: str) -> Prepared:
-        """A method's tables and programs, uploaded when it is first wanted.
+        """Return a method's tables and programs, uploaded at the first call.
 
         Raises
         ------
         DiffractionError
-            If there is no such method, or a table does not suit it.
+            If the method is unknown, or does not support a table.
         """
         if method not in self._methods:
             self._methods[method] = Prepared(
@@ -313,21 +314,21 @@ class Renderer:
         return self._methods[method]
 
     def use_responses(self, program: Any, unit: int, lights: Sequence[Light] | None = None) -> None:
-        """The lights' spectra, uploaded anew when other lights are set."""
+        """Bind the lights' spectra, and upload them if the lights have changed."""
         if "responses" not in program:
             return
         pairs = [(light.wavelengths, light.spectrum) for light in lights or self.lights]
         spectra = [spectrum for _, spectrum in pairs]
-        same = len(spectra) == len(self._lit_by) and all(
-            one is other for one, other in zip(spectra, self._lit_by, strict=True)
+        same = len(spectra) == len(self._spectra) and all(
+            new is old for new, old in zip(spectra, self._spectra, strict=True)
         )
         if self._responses is None or not same:
             if self._responses is not None:
                 self._responses.release()
             self._responses = Bindings(self.context, pack_responses(pairs))
-            self._lit_by = spectra
+            self._spectra = spectra
         self._responses.use(program, unit)
 
     def target(self, width: int, height: int) -> Target:
-        """A framebuffer to draw into, to be released."""
+        """Return a new framebuffer, which the caller releases."""
         return Target(self.context, width, height)

@@ -1,4 +1,4 @@
-"""A Mitsuba scene as the realtime renderer knows it."""
+"""Mitsuba scenes as triangles, materials, lights and a camera for the realtime renderer."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from .source import LIGHTS
 
 Array = NDArray[np.float64]
 
-_RINGS, _SEGMENTS = 192, 384  # of a sphere: 3e-5 of its radius away from it
+_RINGS, _SEGMENTS = 192, 384  # triangles of a sphere lie within 3e-5 of its radius
 
-#: What a vertex has: position, normal, tangent, texture coordinates, colour, axis.
+#: Attributes of a vertex and their number of components.
 VERTEX = (
     ("position", 3), ("normal", 3), ("tangent", 3), ("texcoord", 2), ("colour", 3), ("axis", 2)
 )  # fmt: skip
@@ -33,39 +33,38 @@ VERTEX = (
 
 @dataclass(frozen=True)
 class Triangles:
-    """Vertices in world space, three after another making a triangle."""
+    """Vertices in world space; three consecutive ones are a triangle."""
 
-    # positions, normals, tangents: (n, 3); tangents are ∂p/∂u, of any length
-    positions: Array
-    normals: Array
-    tangents: Array
+    positions: Array  # (n, 3)
+    normals: Array  # (n, 3)
+    tangents: Array  # (n, 3), ∂p/∂u, of any length
     texcoords: Array  # (n, 2)
-    # (n,) index of each in the mesh that it comes from, or None
+    # (n,) index of each vertex in its mesh, or None
     vertices: NDArray[np.int64] | None = None
 
 
 def triangles_of(shape: Any) -> Triangles | None:
-    """A shape's triangles, or None for a kind that cannot be shown."""
+    """Return the triangles of a shape, or None for an unsupported kind."""
     grid = _ANALYTIC.get(shape.class_name())
     if grid is not None:
         import mitsuba as mi
 
         to_world = np.array(mi.traverse(shape)["to_world"].matrix, np.float64).reshape(4, 4)
-        return _placed(_grid(*grid), to_world, *a_normal(shape))
-    return _of_mesh(shape) if shape.is_mesh() else None
+        return _transformed(_grid(*grid), to_world, *sample_normal(shape))
+    return _mesh_triangles(shape) if shape.is_mesh() else None
 
 
-def a_normal(shape: Any) -> tuple[Array, Array]:
-    """A place on a shape and its normal there, (3,) each: which way `flip_normals` has it."""
+def sample_normal(shape: Any) -> tuple[Array, Array]:
+    """Return a point of a shape and the normal at it, (3,) each, `flip_normals` included."""
     import mitsuba as mi
 
-    found = shape.sample_position(0.0, mi.Point2f(0.3, 0.4))
-    place, normal = (np.array(x, np.float64).reshape(3, -1)[:, 0] for x in (found.p, found.n))
+    sample = shape.sample_position(0.0, mi.Point2f(0.3, 0.4))
+    place, normal = (np.array(x, np.float64).reshape(3, -1)[:, 0] for x in (sample.p, sample.n))
     return place, normal
 
 
-def _placed(local: Triangles, to_world: Array, place: Array, normal: Array) -> Triangles:
-    """In the world, with normals on the side that this one at a place is on."""
+def _transformed(local: Triangles, to_world: Array, place: Array, normal: Array) -> Triangles:
+    """Transform triangles to world space, with normals on the same side as `normal` at `place`."""
     linear = to_world[:3, :3]
     positions = local.positions @ linear.T + to_world[:3, 3]
     normals = local.normals @ np.linalg.inv(linear)
@@ -79,10 +78,11 @@ def _placed(local: Triangles, to_world: Array, place: Array, normal: Array) -> T
     )
 
 
-def _of_mesh(shape: Any) -> Triangles:
-    """Mitsuba shades a triangle with one tangent, that of its texture coordinates."""
+def _mesh_triangles(shape: Any) -> Triangles:
+    """Return the triangles of a mesh, each with the tangent of its texture coordinates."""
 
     def buffer(values: Any, width: int) -> Array:
+        """Return the values of a vertex buffer at the corners of all triangles."""
         return np.array(values, np.float64).reshape(-1, width)[corners]
 
     corners = np.array(shape.faces_buffer(), np.int64).ravel()
@@ -93,7 +93,7 @@ def _of_mesh(shape: Any) -> Triangles:
     normals = np.repeat(flat, 3, axis=0)
     if shape.has_vertex_normals():
         normals = buffer(shape.vertex_normals_buffer(), 3)
-    tangents = across(flat)
+    tangents = default_tangents(flat)
     texcoords = np.zeros((len(corners), 2))
     if shape.has_vertex_texcoords():
         texcoords = buffer(shape.vertex_texcoords_buffer(), 2)
@@ -103,8 +103,8 @@ def _of_mesh(shape: Any) -> Triangles:
     return Triangles(positions, normals, np.repeat(tangents, 3, axis=0), texcoords, corners)
 
 
-def across(normals: Array) -> Array:
-    """Mitsuba's tangent where there are no texture coordinates (Duff et al. 2017)."""
+def default_tangents(normals: Array) -> Array:
+    """Return Mitsuba's tangents without texture coordinates, (n, 3) (Duff et al. 2017)."""
     x, y, z = normals.T
     sign = np.where(z < 0.0, -1.0, 1.0)
     a = -1.0 / (sign + z)
@@ -112,7 +112,7 @@ def across(normals: Array) -> Array:
 
 
 def _grid(rows: int, columns: int, point: Callable[[Array, Array], tuple[Array, ...]]) -> Triangles:
-    """Triangles of a parametrisation (u, v) ↦ position, normal, tangent."""
+    """Tessellate a parametrisation (u, v) ↦ position, normal, tangent."""
     s, t = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))
     position, normal, tangent = point(s.ravel(), t.ravel())
     index = grid_faces(np.arange(s.size).reshape(s.shape).T).ravel()
@@ -121,30 +121,34 @@ def _grid(rows: int, columns: int, point: Callable[[Array, Array], tuple[Array, 
 
 
 def _rectangle(u: Array, v: Array) -> tuple[Array, ...]:
+    """Return positions, normals and tangents of Mitsuba's rectangle."""
     p = np.stack([2.0 * u - 1.0, 2.0 * v - 1.0, 0.0 * u], axis=1)
     return p, np.tile([0.0, 0.0, 1.0], (len(u), 1)), np.tile([2.0, 0.0, 0.0], (len(u), 1))
 
 
 def _sphere(u: Array, v: Array) -> tuple[Array, ...]:
+    """Return positions, normals and tangents of Mitsuba's sphere."""
     phi, theta = 2 * np.pi * u, np.pi * v
     p = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], 1)
     return p, p, np.stack([-np.sin(phi), np.cos(phi), 0.0 * phi], axis=1)
 
 
 def _disk(u: Array, v: Array) -> tuple[Array, ...]:
+    """Return positions, normals and tangents of Mitsuba's disk."""
     phi = 2 * np.pi * v  # Mitsuba's u is the radius, v the azimuth
     radial = np.stack([np.cos(phi), np.sin(phi), 0.0 * phi], axis=1)
     return u[:, None] * radial, np.tile([0.0, 0.0, 1.0], (len(u), 1)), radial
 
 
 def _cylinder(u: Array, v: Array) -> tuple[Array, ...]:
+    """Return positions, normals and tangents of Mitsuba's cylinder."""
     phi = 2 * np.pi * u
     p = np.stack([np.cos(phi), np.sin(phi), v], axis=1)
     normal = np.stack([np.cos(phi), np.sin(phi), 0.0 * phi], axis=1)
     return p, normal, np.stack([-np.sin(phi), np.cos(phi), 0.0 * phi], axis=1)
 
 
-#: Rows, columns and parametrisation.
+#: Rows, columns and parametrisation of each analytic shape.
 _ANALYTIC = {
     "Rectangle": (1, 1, _rectangle),
     "Sphere": (_RINGS, _SEGMENTS, _sphere),
@@ -155,61 +159,60 @@ _ANALYTIC = {
 
 @dataclass(frozen=True)
 class Surface:
-    """One shape."""
+    """A shape that reflects light: triangles and material."""
 
-    name: str  # for people
-    # (n, 16) float32 as `VERTEX` says, three after another making a triangle
+    name: str  # name in messages
+    # (n, 16) attributes of `VERTEX`; three consecutive vertices are a triangle
     vertices: NDArray[np.float32]
-    material: Material  # how it reflects
-    shape: Any  # of Mitsuba
-    exact: bool  # whether all of its material is shown
-    radiance: Array | None = None  # (3,) linear sRGB that it emits as well, the mean; None of most
+    material: Material
+    shape: Any  # shape of Mitsuba
+    exact: bool  # whether all of its material is supported
+    radiance: Array | None = None  # (3,) linear sRGB, mean emitted radiance; None without light
 
 
 @dataclass(frozen=True)
 class Glow:
     """A shape that emits light and reflects none."""
 
-    vertices: NDArray[np.float32]  # as of a surface
-    radiance: Array  # (3,) linear sRGB, the mean
+    vertices: NDArray[np.float32]  # (n, 16) attributes of `VERTEX`
+    radiance: Array  # (3,) linear sRGB, mean emitted radiance
 
 
 @dataclass(frozen=True)
 class RealtimeScene:
-    """What is shown of a scene."""
+    """The supported parts of a scene, in world space."""
 
-    # surfaces, camera, lighting: in world space
     surfaces: tuple[Surface, ...]
     camera: Camera
     lighting: Lighting
-    # low, high: (3,) corners of a box around all surfaces
-    low: Array
-    high: Array
-    omissions: tuple[str, ...]  # what is not shown, or shown otherwise, in a few words each
+    low: Array  # (3,) lowest corner of a box around all surfaces
+    high: Array  # (3,) highest corner
+    omissions: tuple[str, ...]  # parts that are left out or simplified, in a few words each
     emitting: tuple[Glow, ...] = ()  # shapes that emit light and reflect none
-    of_light: tuple[str, ...] = ()  # of the omissions, what progressive light does show
+    of_light: tuple[str, ...] = ()  # omissions that progressive light does support
 
     @property
     def glows(self) -> bool:
-        """Whether anything in it emits light."""
+        """Whether any shape emits light."""
         return bool(self.emitting) or any(s.radiance is not None for s in self.surfaces)
 
     @property
     def diffracting(self) -> tuple[Surface, ...]:
-        """The surfaces that diffract."""
+        """Surfaces that diffract."""
         return tuple(s for s in self.surfaces if s.material.bsdf is not None)
 
     @property
     def middle(self) -> Array:
-        """(3,) of the box around what diffracts."""
+        """Middle (3,) of the box around all surfaces that diffract."""
         low, high = box_of([s.vertices[:, :3] for s in self.diffracting])
         return 0.5 * (low + high)
 
 
 def load(scene: Any) -> Any:
-    """A Mitsuba scene, of itself or of its file, in the variant that is set or llvm_ad_spectral.
+    """Return a Mitsuba scene or load its file, in the current variant or llvm_ad_spectral.
 
-    Raises a DiffractionError if it is neither, the file cannot be loaded, or as of `check_variant`.
+    Raises a DiffractionError if `scene` is neither, the file cannot be loaded, or the variant is
+    not supported.
     """
     import mitsuba as mi
 
@@ -218,7 +221,7 @@ def load(scene: Any) -> Any:
     if not isinstance(scene, str | os.PathLike):
         if mi.variant() is None or not isinstance(scene, mi.Scene):
             raise DiffractionError(
-                f"scene={type(scene).__name__} is no Mitsuba scene of the variant that is set "
+                f"scene={type(scene).__name__} is not a Mitsuba scene of the current variant "
                 f"({mi.variant()}); give mi.load_file(...) or mi.load_dict(...), or an XML file"
             )
         return scene
@@ -230,26 +233,28 @@ def load(scene: Any) -> Any:
 
 
 def check_variant(variant: str) -> None:
-    """Raise a DiffractionError for a variant that reads values one by one, or knows no colours."""
+    """Refuse a scalar or monochrome variant."""
     kind, _, colours = variant.partition("_")
     if kind == "scalar" or "mono" in colours:
         raise DiffractionError(
-            f"the shaders draw in colours, and read all of a scene's lights and textures at once, "
-            f"which {variant} does not: set llvm_ad_rgb or llvm_ad_spectral (--mode)"
+            f"variant {variant} does not support the shaders, which need colours and arrays of "
+            "values: set llvm_ad_rgb or llvm_ad_spectral (--mode)"
         )
 
 
 def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
-    """Read a Mitsuba scene.
+    """Read the supported parts of a Mitsuba scene.
 
-    Raises a DiffractionError if nothing in it diffracts, there is no perspective camera, or a mesh
-    lacks an attribute.
+    Raises a DiffractionError if no supported shape diffracts, the camera is not a perspective one,
+    or a mesh lacks an attribute.
     """
     sensors = scene.sensors()
     if not 0 <= sensor < len(sensors):
-        raise DiffractionError(f"sensor={sensor}: the scene has {len(sensors)} sensors")
+        raise DiffractionError(
+            f"sensor={sensor} must be from 0 to {len(sensors) - 1}, the scene's sensors"
+        )
     camera, omissions = read_camera(sensors[sensor])
-    shown = []
+    supported = []
     for number, shape in enumerate(scene.shapes()):
         name = name_of(shape, number)
         check_attributes(shape, number)
@@ -258,11 +263,11 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
             omissions.append(f"{name} ({shape.class_name()})")
             continue
         _check_texcoords(shape, name)
-        shown.append((name, shape, triangles))
-    middle = _middle([t for _, shape, t in shown if diffracts(shape.bsdf())])
+        supported.append((name, shape, triangles))
+    middle = _middle([t for _, shape, t in supported if diffracts(shape.bsdf())])
     lighting = read_lights(scene, middle, LIGHTS)
     surfaces, emitting = [], []
-    for name, shape, triangles in shown:
+    for name, shape, triangles in supported:
         before = len(omissions)
         material = read_material(shape.bsdf(), omissions, name, lighting.mean_spectrum)
         vertices = _vertices(triangles, material, shape)
@@ -282,39 +287,40 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
 
 
 def _check_texcoords(shape: Any, name: str) -> None:
-    """Raise a DiffractionError for a mesh that diffracts but has no tangents of its own."""
+    """Refuse a mesh that diffracts but has no texture coordinates for its tangents."""
     if shape.is_mesh() and diffracts(shape.bsdf()) and not shape.has_vertex_texcoords():
         raise DiffractionError(
-            f"{name}: the mesh has no texture coordinates, along which the patch's axes lie; "
-            "give it some (u along the patch's x axis), or use 'tangents' to make them"
+            f"{name}: the mesh has no texture coordinates, which define the patch's axes; add "
+            "them (u along the patch's x axis), or generate them with 'tangents'"
         )
 
 
 def _middle(triangles: list[Triangles]) -> Array:
-    """Middle (3,) of what diffracts."""
+    """Return the middle (3,) of all triangles that diffract."""
     if not triangles:
         raise DiffractionError(
-            "nothing in the scene diffracts that could be shown; give a mesh, rectangle, sphere, "
-            "disk or cylinder a <bsdf type='diffraction'>"
+            "no supported shape of the scene diffracts; give a mesh, rectangle, sphere, disk or "
+            "cylinder a <bsdf type='diffraction'>"
         )
     low, high = box_of([t.positions for t in triangles])
     return 0.5 * (low + high)
 
 
 def box_of(positions: Sequence[NDArray[np.floating]]) -> tuple[Array, Array]:
-    """The lowest and highest corner (3,) of a box around all positions (n, 3)."""
+    """Return the lowest and highest corner (3,) of a box around all positions (n, 3)."""
     low = np.min([p.min(axis=0) for p in positions], axis=0)
     high = np.max([p.max(axis=0) for p in positions], axis=0)
     return low.astype(float), high.astype(float)
 
 
 def _vertices(triangles: Triangles, material: Material, shape: Any) -> NDArray[np.float32]:
+    """Return the attributes of all vertices, (n, 16), in the order of `VERTEX`."""
     count = len(triangles.positions)
     normals, tangents = triangles.normals, triangles.tangents
-    # shaders divide by the length of what is left of it across the normal
-    left = np.cross(normals, tangents)
-    lost = np.sum(left**2, axis=1) <= 1e-12 * np.sum(tangents**2, axis=1)
-    tangents = np.where(lost[:, None], across(normals), tangents)
+    # tangents along the normal are replaced: shaders normalise the part across the normal
+    perpendicular = np.cross(normals, tangents)
+    parallel = np.sum(perpendicular**2, axis=1) <= 1e-12 * np.sum(tangents**2, axis=1)
+    tangents = np.where(parallel[:, None], default_tangents(normals), tangents)
     parts = [triangles.positions, normals, tangents, triangles.texcoords]
     parts += [
         _attribute(material.pigment, triangles, shape, 3),
@@ -326,7 +332,7 @@ def _vertices(triangles: Triangles, material: Material, shape: Any) -> NDArray[n
 
 
 def _attribute(value: Map, triangles: Triangles, shape: Any, channels: int) -> Array:
-    """A map's value at all vertices."""
+    """Return the value of a map at all vertices, (n, channels) or (channels,)."""
     if value.attribute is None or triangles.vertices is None:
         return value.value[:channels]
     import mitsuba as mi

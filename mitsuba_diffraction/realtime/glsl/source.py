@@ -1,6 +1,6 @@
-"""Shader sources: one body for desktop OpenGL 3.3 and for WebGL 2, with a preamble each.
+"""Shader sources: one body for desktop OpenGL 3.3 and WebGL 2, with a preamble for each.
 
-For other programs what a surface lacks is left out, and global names are out of their way.
+Sources for other programs omit the code of features that a surface lacks, and prefix global names.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ Dialect = Literal["desktop", "web"]
 
 #: Methods of the fragment stage.
 METHODS = ("lut", "spectral", "flss", "nmm", "pq")
-#: Those of the 2014 thesis; `thesis.methods` evaluates them in NumPy.
+#: Methods of the 2014 thesis; `thesis.methods` evaluates them in NumPy.
 THESIS_METHODS = METHODS[2:]
 
-#: Lights at once.
+#: Largest number of lights in one draw call.
 LIGHTS = 4
 
 _CONSTANTS = {
@@ -45,12 +45,12 @@ _GLOBAL = re.compile(rf"(?:uniform |const )?{_TYPES} (\w[^;={{(]*)")
 
 @functools.cache
 def shader_file(name: str) -> str:
-    """The text of one of the shaders' files."""
+    """Read a shader file."""
     return resources.files(__package__).joinpath("shaders", name).read_text(encoding="utf-8")
 
 
 def vertex_source(dialect: Dialect = "desktop", name: str = "surface.vert") -> str:
-    """The vertex stage, the same for all methods."""
+    """Return the source of the vertex stage, which all methods share."""
     return _PREAMBLES[dialect] + shader_file(name)
 
 
@@ -60,13 +60,13 @@ def fragment_source(
     dialect: Dialect = "desktop",
     main: str = "surface.frag",
 ) -> str:
-    """The fragment stage of a method.
+    """Return the source of a method's fragment stage.
 
-    definitions : what the surface and the tables ask for (`Packed.definitions`).
+    definitions : definitions of the surface, the tables and the light (`Packed.definitions`).
     dialect : "desktop" is GLSL 3.30 core, "web" GLSL ES 3.00.
-    main : the file with the main function.
+    main : file with the main function.
 
-    Raises a DiffractionError if there is no such method.
+    Raises a DiffractionError if the method is unknown.
     """
     return "".join(text for _, text in fragment_parts(method, definitions, dialect, main))
 
@@ -77,7 +77,7 @@ def fragment_parts(
     dialect: Dialect = "desktop",
     main: str = "surface.frag",
 ) -> list[tuple[str, str]]:
-    """The names and texts that `fragment_source` joins; parameters and errors as there."""
+    """Return names and texts of the parts of `fragment_source`; parameters and errors as there."""
     if method not in METHODS:
         raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
     constants = _CONSTANTS | dict(definitions)
@@ -109,9 +109,9 @@ def plain_source(
     definitions: Mapping[str, str] | None = None,
     dialect: Dialect = "desktop",
 ) -> str:
-    """A stage that knows neither surfaces nor tables.
+    """Return the source of a stage that depends on neither surfaces nor tables.
 
-    shared : files that it uses.
+    shared : files that it includes.
     """
     constants = _CONSTANTS | dict(definitions or {})
     lines = [f"#define {key} {value}\n" for key, value in constants.items()]
@@ -122,71 +122,73 @@ _COMPARISONS = {"==": operator.eq, "!=": operator.ne, ">": operator.gt, "<": ope
 
 
 def resolved(source: str, definitions: Mapping[str, str]) -> str:
-    """A source without its conditions: only lines that are compiled with these definitions.
+    """Evaluate a source's preprocessor conditions: keep only the lines that would be compiled.
 
-    Definitions in the source count as well, and stay.
+    Definitions in the source count, too, and stay in it.
     """
-    known, kept = dict(definitions), []
-    nest: list[tuple[bool, bool]] = []  # whether lines are kept, whether a branch has been
+    macros, kept = dict(definitions), []
+    nest: list[tuple[bool, bool]] = []  # whether a branch is active, whether one has been
     for line in source.splitlines():
         word, _, rest = line.strip().partition(" ")
         active = all(now for now, _ in nest)
         if word in ("#ifdef", "#ifndef", "#if"):
-            holds = active and _holds(word, rest, known)
+            holds = active and _holds(word, rest, macros)
             nest.append((holds, holds))
         elif word in ("#elif", "#else"):
-            _, taken = nest.pop()
+            _, done = nest.pop()
             outer = all(now for now, _ in nest)
-            holds = outer and not taken and (word == "#else" or _holds("#if", rest, known))
-            nest.append((holds, taken or holds))
+            holds = outer and not done and (word == "#else" or _holds("#if", rest, macros))
+            nest.append((holds, done or holds))
         elif word == "#endif":
             nest.pop()
         elif active:
             if word == "#define":
                 name, _, value = rest.partition(" ")
-                known[name.partition("(")[0]] = value
+                macros[name.partition("(")[0]] = value
             kept.append(line)
     return re.sub(r"\n{3,}", "\n\n", "\n".join(kept)).strip() + "\n"
 
 
-def _holds(word: str, rest: str, known: Mapping[str, str]) -> bool:
-    """Whether a condition holds: `A`, or terms `defined(A)` and comparisons joined by &&."""
+def _holds(word: str, rest: str, macros: Mapping[str, str]) -> bool:
+    """Evaluate a condition: `A`, or terms `defined(A)` and comparisons joined by &&."""
     if word != "#if":
-        return (rest.split()[0] in known) == (word == "#ifdef")
-    return all(_term(term.strip(), known) for term in rest.split("&&"))
+        return (rest.split()[0] in macros) == (word == "#ifdef")
+    return all(_term(term.strip(), macros) for term in rest.split("&&"))
 
 
-def _term(term: str, known: Mapping[str, str]) -> bool:
-    found = re.fullmatch(r"(!?)defined\((\w+)\)", term)
-    if found:
-        return (found[2] in known) != bool(found[1])
+def _term(term: str, macros: Mapping[str, str]) -> bool:
+    """Evaluate `defined(A)`, `!defined(A)` or a comparison of integers."""
+    match = re.fullmatch(r"(!?)defined\((\w+)\)", term)
+    if match:
+        return (match[2] in macros) != bool(match[1])
     left, sign, right = term.split()
-    a, b = _number(left, known), _number(right, known)
+    a, b = _number(left, macros), _number(right, macros)
     return bool(_COMPARISONS[sign](a, b))
 
 
-def _number(word: str, known: Mapping[str, str]) -> int:
-    while word in known:
-        word = known[word].split()[0]
+def _number(word: str, macros: Mapping[str, str]) -> int:
+    """Expand a word to an integer."""
+    while word in macros:
+        word = macros[word].split()[0]
     return int(word)
 
 
 def global_names(source: str) -> set[str]:
-    """Names that a resolved source declares outside functions, macros among them."""
-    found: set[str] = set()
+    """Return the names that a resolved source declares outside functions, including macros."""
+    names: set[str] = set()
     for line in source.splitlines():
         code = line.partition("//")[0]
         if code.startswith("#define "):
-            found.add(_NAME.findall(code)[1])
+            names.add(_NAME.findall(code)[1])
         elif match := _GLOBAL.match(code):
-            found |= {_NAME.findall(part)[0] for part in match[1].split(",") if _NAME.search(part)}
-    return found
+            names |= {_NAME.findall(part)[0] for part in match[1].split(",") if _NAME.search(part)}
+    return names
 
 
 def renamed(source: str, prefixes: Iterable[tuple[str, set[str]]]) -> str:
-    """A source whose names begin with a prefix, shorter: comments only where something is declared.
+    """Prefix names in a source, and remove comments except those of uniforms.
 
-    prefixes : each with the names that get it.
+    prefixes : pairs of a prefix and the names that get it.
     """
     new = {name: prefix + name for prefix, names in prefixes for name in names}
     lines = []
@@ -200,15 +202,16 @@ def renamed(source: str, prefixes: Iterable[tuple[str, set[str]]]) -> str:
 
 
 def pruned(source: str, prefix: str) -> str:
-    """A resolved source without functions, constants and macros of this prefix that none reads."""
+    """Remove unused functions, constants and macros with this prefix from a resolved source."""
     body = r"\(.*\)(?: {.*}|\n{\n(?s:.*?)^})| = .*;"
     of_type, macro = rf"(?:const )?{_TYPES} ({prefix}\w+)(?:{body})", rf"#define ({prefix}\w+) .*"
     pattern = re.compile(rf"(?m)^(?:{of_type}|{macro})\n+")
 
-    def kept(found: re.Match[str]) -> str:
-        name = found[1] or found[2]
-        return found[0] if len(re.findall(rf"\b{name}\b", source)) > 1 else ""
+    def if_used(match: re.Match[str]) -> str:
+        """Return the definition if its name occurs elsewhere, or else nothing."""
+        name = match[1] or match[2]
+        return match[0] if len(re.findall(rf"\b{name}\b", source)) > 1 else ""
 
-    while (shorter := pattern.sub(kept, source)) != source:
+    while (shorter := pattern.sub(if_used, source)) != source:
         source = shorter
     return source

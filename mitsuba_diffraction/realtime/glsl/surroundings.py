@@ -1,13 +1,13 @@
-"""What a scene is surrounded by, for light that is looked up along directions of a surface's lobes.
+"""Surroundings of a scene, which shaders look up along directions drawn from a surface's lobes.
 
-Narrow lobes hardly ever meet a light that was drawn without regard to them. So every other frame of
-`progressive` draws a direction from the surface's own lobe at each pixel, and looks up what comes
-from there: area lights that are flat, and the environment. The two kinds of frames share the light
-by the balance heuristic (Veach and Guibas 1995).
+Lights that are drawn independently of a surface rarely lie in a narrow lobe. So every other frame
+of `progressive` draws a direction from the surface's lobe at each pixel, and looks up the light
+from that direction: flat area lights, and the environment. The balance heuristic (Veach and Guibas
+1995) weights the two kinds of frames.
 
-What such a direction meets first is exact of rectangles and disks. All else that stands in the way
-is found on a grid of distances to the nearest surface: a ray may step as far as that is without
-missing one (Hart 1996, *Sphere tracing*).
+Rays intersect rectangles and disks exactly. Other obstacles are tested on a grid of distances to
+the nearest surface: a ray can step by that distance without missing one (Hart 1996, *Sphere
+tracing*).
 """
 
 from __future__ import annotations
@@ -27,36 +27,36 @@ from ...tables.colour.build import LARGEST_RADIUS
 from ...tables.colour.proposals import IMPORTANCE, brightness
 from ...tables.colour.table import ColourTable
 from .lights import emitted_radiance, radiance_along
-from .scene import a_normal
+from .scene import sample_normal
 from .shadows import frame_along
 from .texels import Packed, Texture, Uniform, as_half, listed
 
 Array = NDArray[np.float64]
 
-# lobes: cells over (u, v) in rings
+# lobes: cells over (u, v) in rings, and directions in a list
 _RINGS, _AZIMUTHS, _PLACES = 128, 1024, 1 << 16
-_INNERMOST = 0.5  # radius of the innermost cell, in standard deviations of a lobe in the green
+_INNERMOST = 0.5  # radius of the innermost cell, in standard deviations of a lobe in green light
 _GREEN = 2.0 * np.pi / 0.55  # rad/µm
-_ZS = np.array([1.1, 1.45, 1.8])  # of w, from slanted to nearly normal incidence
-_EVERYWHERE = 0.1  # share of what is drawn evenly
+_ZS = np.array([1.1, 1.45, 1.8])  # values of w, from oblique to nearly normal incidence
+_EVERYWHERE = 0.1  # share of directions that are drawn evenly
 
-# the grid of distances
-_CELLS = 1 << 22  # in all, about
-_MARGIN = 2  # cells around it
-_PER_CELL = 4.0  # steps of the distances
-_SPACING = 0.7  # cells between two places of a triangle, at most
-_AT_ONCE = 1 << 20  # places
+# grid of distances
+_CELLS = 1 << 22  # approximate number of cells
+_MARGIN = 2  # cells around the obstacles
+_PER_CELL = 4.0  # distance steps per cell
+_SPACING = 0.7  # largest distance between two points of a triangle, cells
+_AT_ONCE = 1 << 20  # points at a time
 
-_SKY = (128, 256)  # rows and columns of an environment that is no picture, and the fewest of one
-_LARGEST = (512, 1024)  # the most
-_SUN_RADIUS = np.radians(0.2679)  # as Mitsuba has it
-_AROUND_SUN = np.radians(0.6)  # within this, a sky's sun is left to the lights
-_FLATS = 12
-_PLASTIC = [0.8191725134, 0.6710436067, 0.5497004779]  # steps in three numbers (Roberts 2018)
+_SKY = (128, 256)  # rows and columns of an environment without a picture, and the fewest of one
+_LARGEST = (512, 1024)  # most rows and columns
+_SUN_RADIUS = np.radians(0.2679)  # Mitsuba's radius of the sun
+_AROUND_SUN = np.radians(0.6)  # radius around the sun that only drawn lights represent
+_FLATS = 12  # largest number of flat shapes
+_PLASTIC = [0.8191725134, 0.6710436067, 0.5497004779]  # sequence of three numbers (Roberts 2018)
 
 
 def pack_lobes(table: ColourTable, height_scale: float) -> Packed:
-    """What shaders/lobes.glsl reads.
+    """Pack directions of a surface's lobes and their densities, for shaders/lobes.glsl.
 
     height_scale : factor on the heights, the index of a coat included.
     """
@@ -80,7 +80,7 @@ def pack_lobes(table: ColourTable, height_scale: float) -> Packed:
 def _power(
     table: ColourTable, edges: NDArray[np.float64], height_scale: float
 ) -> NDArray[np.float64]:
-    """Brightness in the cells (rings, azimuths) between these radii."""
+    """Return the brightness in the cells (rings, azimuths) between radii `edges`."""
     zs = np.minimum(_ZS * height_scale, table.z_max)
     grid, bright = table.grid, brightness(table, zs) / len(zs)
     cells = np.zeros((_RINGS, _AZIMUTHS))
@@ -89,7 +89,7 @@ def _power(
         row = int(np.clip(np.searchsorted(edges, radius) - 1, 0, _RINGS - 1))
         start = grid.start(ring)
         area = radius**2 * grid.step * 2.0 * np.pi / count
-        parts = 2 * max(1, _AZIMUTHS // count)  # of a bin, which lies on both sides of its azimuth
+        parts = 2 * max(1, _AZIMUTHS // count)  # parts of a bin, half on either side of its azimuth
         spread = np.repeat(bright[start : start + count], parts) * (area / parts)
         turn = np.arange(len(spread)) * _AZIMUTHS // len(spread)
         cells[row] += np.bincount(turn, np.roll(spread, -parts // 2), _AZIMUTHS)
@@ -101,11 +101,11 @@ def _power(
 
 
 def _lobe_places(share: NDArray[np.float64], edges: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(u, v) as often in each cell as it is drawn, in the cells' order, (n, 2)."""
+    """Return points (u, v) (n, 2) in proportion to each cell's share, in the order of cells."""
     below = np.concatenate([[0.0], np.cumsum(share)])
-    wanted = (np.arange(_PLACES) + 0.5) / _PLACES * below[-1]
-    cell = np.minimum(np.searchsorted(below, wanted, side="right") - 1, share.size - 1)
-    inside = (wanted - below[cell]) / (below[cell + 1] - below[cell])
+    quantile = (np.arange(_PLACES) + 0.5) / _PLACES * below[-1]
+    cell = np.minimum(np.searchsorted(below, quantile, side="right") - 1, share.size - 1)
+    inside = (quantile - below[cell]) / (below[cell + 1] - below[cell])
     ring, azimuth = np.divmod(cell, _AZIMUTHS)
     across = np.arange(_PLACES) * 0.6180339887 % 1.0
     radius = np.sqrt(edges[ring] ** 2 + (edges[ring + 1] ** 2 - edges[ring] ** 2) * across)
@@ -114,9 +114,9 @@ def _lobe_places(share: NDArray[np.float64], edges: NDArray[np.float64]) -> NDAr
 
 
 def pack_obstacles(triangles: Array) -> Packed:
-    """What shaders/obstacles.glsl reads of triangles (n, 3, 3)."""
+    """Pack the grid of distances to triangles (n, 3, 3), for shaders/obstacles.glsl."""
     low, high = triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
-    # flat or thin, a scene gets some room
+    # flat or thin scenes get a minimum thickness
     room = np.maximum(high - low, max(float((high - low).max()), 1e-12) / 64.0)
     cell = float((room.prod() / _CELLS) ** (1.0 / 3.0))
     low = low - _MARGIN * cell
@@ -125,8 +125,8 @@ def pack_obstacles(triangles: Array) -> Packed:
     for places in _places((triangles - low) / cell):
         x, y, z = places.astype(np.int32).T
         empty[z, y, x] = False
-    apart = distance_transform_edt(empty)
-    steps = np.minimum(np.floor(_PER_CELL * apart), 255.0).astype(np.uint8)
+    distances = distance_transform_edt(empty)
+    steps = np.minimum(np.floor(_PER_CELL * distances), 255.0).astype(np.uint8)
     return Packed(
         (listed("obstacles", steps.reshape(-1, 1)),),
         {
@@ -139,15 +139,15 @@ def pack_obstacles(triangles: Array) -> Packed:
 
 
 def _places(triangles: Array) -> Iterator[Array]:
-    """Places (n, 3) all over triangles (n, 3, 3), in cells, some at a time."""
+    """Yield points (n, 3) all over triangles (n, 3, 3), in units of cells, some at a time."""
     sides = triangles - np.roll(triangles, 1, axis=1)
     longest = np.sqrt((sides**2).sum(axis=2).max(axis=1))
     parts = np.maximum(np.ceil(longest / _SPACING), 1.0).astype(int)
-    parts = 2 ** np.ceil(np.log2(parts)).astype(int)  # few kinds
+    parts = 2 ** np.ceil(np.log2(parts)).astype(int)  # powers of 2: few different subdivisions
     for count in np.unique(parts):
         i, j = np.meshgrid(np.arange(count + 1), np.arange(count + 1))
-        kept = i + j <= count
-        weights = np.stack([i[kept], j[kept], count - i[kept] - j[kept]], axis=1) / count
+        inner = i + j <= count
+        weights = np.stack([i[inner], j[inner], count - i[inner] - j[inner]], axis=1) / count
         chosen = triangles[parts == count]
         step = max(1, _AT_ONCE // len(weights))
         for start in range(0, len(chosen), step):
@@ -156,20 +156,20 @@ def _places(triangles: Array) -> Iterator[Array]:
 
 @dataclass(frozen=True)
 class Environment:
-    """Radiance from infinitely far away."""
+    """Radiance from infinitely far away, by direction."""
 
-    emitter: Any  # of Mitsuba
+    emitter: Any  # emitter of Mitsuba
     # (rows, columns, 3) linear sRGB without the sun's disc, rows over the angle from the z axis,
     # columns around it
     picture: NDArray[np.float32]
-    sun: Array  # (3,) the direction towards its middle, or zeros
-    sun_radiance: Array  # (3,) linear sRGB, the mean over the disc
+    sun: Array  # (3,) direction towards the middle of the sun, or zeros
+    sun_radiance: Array  # (3,) linear sRGB, mean over the sun's disc
 
     @classmethod
-    def of(cls, scene: Any) -> Environment | None:
-        """Of a Mitsuba scene, if it has one.
+    def read(cls, scene: Any) -> Environment | None:
+        """Read the environment of a Mitsuba scene, or return None without one.
 
-        Raises a DiffractionError if it is not finite.
+        Raises a DiffractionError if a radiance is not finite.
         """
         import mitsuba as mi
 
@@ -193,54 +193,54 @@ class Environment:
             picture = radiance_along(emitter, directions.reshape(-1, 3))
         if not (np.isfinite(picture).all() and np.isfinite(radiance).all()):
             raise DiffractionError(
-                f"{name_of(emitter)}: the environment has radiances that are not finite; "
-                "give a picture without them"
+                f"{name_of(emitter)}: the environment has infinite or NaN radiances; "
+                "use a picture without them"
             )
         picture = picture.reshape(rows, columns, 3)
         return cls(emitter, np.maximum(picture, 0.0).astype(np.float32), sun, radiance)
 
     def in_sun(self, directions: Array) -> NDArray[np.bool_]:
-        """Which of (n, 3) unit vectors lead to the sun."""
+        """Return which of (n, 3) unit vectors point to the sun, as a mask."""
         return np.asarray(directions @ self.sun > np.cos(_AROUND_SUN))
 
     @property
     def areas(self) -> Array:
-        """Solid angles of the picture's texels (rows, 1)."""
+        """Solid angles of the picture's texels, (rows, 1)."""
         edges = np.cos(np.linspace(0.0, np.pi, len(self.picture) + 1))
         return np.asarray(-np.diff(edges)[:, None] * 2.0 * np.pi / self.picture.shape[1])
 
-    def drawn(self, start: int, count: int) -> tuple[Array, Array]:
-        """Directions (count, 3) as dense as the picture is bright, and their densities (count,).
+    def draw(self, start: int, count: int) -> tuple[Array, Array]:
+        """Draw directions (count, 3) in proportion to the radiance, with densities (count,).
 
-        Stratified along a curve through all texels (Morton 1966), so that each part of the sky is
-        drawn as often as it is bright.
+        The samples are stratified along a curve through all texels (Morton 1966), so that they
+        follow the brightness of each part of the sky.
 
-        start : number of the first, in a sequence.
+        start : number of the first sample in a sequence.
         """
         rows, columns, _ = self.picture.shape
         row, column = np.indices((rows, columns)).reshape(2, -1)
-        # bits of both in turn: near in this order is near in the sky
+        # interleaved bits: neighbours in this order are neighbours in the sky
         bits = [(bit, 2 * bit) for bit in range(10)]
         curve = sum((row >> a & 1) << b | (column >> a & 1) << (b + 1) for a, b in bits)
         order = np.argsort(curve)
         below = np.cumsum((self.picture.sum(axis=2) * self.areas).ravel()[order])
         inside, across, down = ((0.5 + np.outer(np.arange(start, start + count), _PLASTIC)) % 1.0).T
         places = (np.arange(count) + inside) / count * below[-1]
-        kept = order[np.minimum(np.searchsorted(below, places), len(order) - 1)]
-        chances = np.diff(below, prepend=0.0)[np.argsort(order)][kept] / below[-1]
+        texel = order[np.minimum(np.searchsorted(below, places), len(order) - 1)]
+        probability = np.diff(below, prepend=0.0)[np.argsort(order)][texel] / below[-1]
         edges = np.cos(np.linspace(0.0, np.pi, rows + 1))
-        cosine = edges[row[kept]] + down * np.diff(edges)[row[kept]]
-        phi = 2.0 * np.pi * (column[kept] + across) / columns
-        return _directions(np.arccos(cosine), phi), chances / self.areas[row[kept], 0]
+        cosine = edges[row[texel]] + down * np.diff(edges)[row[texel]]
+        phi = 2.0 * np.pi * (column[texel] + across) / columns
+        return _directions(np.arccos(cosine), phi), probability / self.areas[row[texel], 0]
 
     def beside_sun(self, directions: Array) -> Array:
-        """Unit vectors (n, 3), those that lead to the sun turned aside: to the sky's own light."""
+        """Turn unit vectors (n, 3) that point to the sun aside, to the light of the sky alone."""
         return _beside(self.sun, directions)
 
     def packed(self, share: float) -> Packed:
-        """For shaders/surroundings.glsl.
+        """Pack the environment for shaders/surroundings.glsl.
 
-        share : of the lights that are drawn from it.
+        share : probability of lights drawn from the environment.
         """
         rows, columns, _ = self.picture.shape
         total = float((self.picture.sum(axis=2) * self.areas).sum())
@@ -258,20 +258,20 @@ class Environment:
 
 
 def is_flat(shape: Any) -> bool:
-    """Whether directions meet a shape exactly."""
+    """Return whether rays intersect a shape exactly: a rectangle or a disk."""
     return shape.class_name() in ("Rectangle", "Disk")
 
 
 def flat_shapes(scene: Any) -> list[Any]:
-    """Those of a scene, at most 12, lights first."""
-    found = [shape for shape in scene.shapes() if is_flat(shape)]
-    return sorted(found, key=lambda shape: not shape.is_emitter())[:_FLATS]
+    """Return the rectangles and disks of a scene, at most 12, emitters first."""
+    flats = [shape for shape in scene.shapes() if is_flat(shape)]
+    return sorted(flats, key=lambda shape: not shape.is_emitter())[:_FLATS]
 
 
 def pack_flats(shapes: Sequence[Any], share_of: Callable[[Any], float]) -> Packed:
-    """Rectangles and disks, for shaders/surroundings.glsl.
+    """Pack rectangles and disks for shaders/surroundings.glsl.
 
-    share_of : of an emitter, with what probability lights are drawn from it.
+    share_of : function that returns the probability of lights drawn from an emitter.
     """
     import mitsuba as mi
 
@@ -283,7 +283,7 @@ def pack_flats(shapes: Sequence[Any], share_of: Callable[[Any], float]) -> Packe
         to_world = np.array(mi.traverse(shape)["to_world"].matrix, np.float64).reshape(4, 4)
         to_local = np.linalg.inv(to_world)
         to_local[2] /= np.linalg.norm(to_local[2, :3])
-        if to_local[2, :3] @ a_normal(shape)[1] < 0.0:
+        if to_local[2, :3] @ sample_normal(shape)[1] < 0.0:
             to_local[2] *= -1.0
         rows[:3, number] = to_local[:3]
         if shape.is_emitter():
@@ -298,13 +298,13 @@ def pack_flats(shapes: Sequence[Any], share_of: Callable[[Any], float]) -> Packe
 
 
 def _directions(theta: Any, phi: Any) -> Array:
-    """Unit vectors (..., 3) by angles from the z axis and around it."""
+    """Return unit vectors (..., 3) from angles from the z axis and around it."""
     x, y = np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi)
     return np.stack(np.broadcast_arrays(x, y, np.cos(theta)), axis=-1)
 
 
 def _beside(sun: Array, directions: Array) -> Array:
-    """Directions (..., 3), those that lead to a sun, if there is one, turned aside."""
+    """Turn directions (..., 3) that point to the sun, if any, aside."""
     if not sun.any():
         return directions
     aside = sun + np.tan(1.5 * _AROUND_SUN) * frame_along(sun)[0]
@@ -313,8 +313,9 @@ def _beside(sun: Array, directions: Array) -> Array:
 
 
 def _disc(axis: Array, radius: float) -> Array:
-    """Unit vectors (64, 3) even over the disc of this angular radius around an axis."""
+    """Return unit vectors (64, 3), even over the disc of this angular radius around an axis."""
     number = np.arange(64) + 0.5
-    angle, r = 2.399963 * number, np.sqrt(number / 64) * np.tan(radius)  # a sunflower's
-    found = axis + np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1) @ frame_along(axis)[:2]
-    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+    angle, r = 2.399963 * number, np.sqrt(number / 64) * np.tan(radius)  # sunflower spiral
+    offsets = np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1) @ frame_along(axis)[:2]
+    directions = axis + offsets
+    return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))

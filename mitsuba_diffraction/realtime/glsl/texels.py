@@ -1,6 +1,6 @@
-"""What a shader reads: textures, uniforms and definitions, as plain NumPy.
+"""Textures, uniforms and definitions that shaders read, as plain NumPy.
 
-Nothing here knows of OpenGL: a desktop renderer and a page with WebGL upload the same.
+The module is independent of OpenGL: the desktop renderer and pages with WebGL share it.
 """
 
 from __future__ import annotations
@@ -14,42 +14,41 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError
 
-#: Texels in a row of a list: every OpenGL 3.3 and nearly every WebGL 2 has textures this wide.
+#: Texels per row of a list: every OpenGL 3.3 and nearly every WebGL 2 has textures this wide.
 PAGE = 1 << 12
 
-#: Half floats are used where they change a sum of coefficients by less than this share of it.
+#: Largest relative error of a sum of coefficients for which half floats are used.
 HALF_ERROR = 2e-4
-_LOOKED_AT = 1 << 20  # to know it
+_SAMPLED = 1 << 20  # numbers from which that error is estimated
 
-#: A number, a vector, or an array of vectors (n, components) of single precision.
+#: Value of a uniform: number, vector, or array of vectors (n, components) of single precision.
 Uniform = float | int | bool | tuple[float, ...] | tuple[int, ...] | NDArray[np.float32]
 
 
 @dataclass(frozen=True)
 class Texture:
-    """One texture."""
+    """Data of one texture."""
 
-    name: str  # of the sampler in the shader
+    name: str  # name of the sampler in the shader
     # (rows, columns, channels) float16, float32, uint8 or uint32 (read as whole numbers), one, two
     # or four channels
     data: NDArray[np.generic]
-    # whether it is a picture, filtered and repeated; else a list, read texel by texel
+    # True: a picture, filtered and repeated; False: a list, read texel by texel
     smooth: bool = False
 
     @property
     def nbytes(self) -> int:
-        """Size in the memory of the graphics card."""
+        """Size in the graphics card's memory."""
         return self.data.nbytes
 
 
 @dataclass(frozen=True)
 class Packed:
-    """What one part of a shader reads."""
+    """Textures, uniforms and definitions of one part of a shader."""
 
-    textures: tuple[Texture, ...] = ()  # by the names of their samplers
+    textures: tuple[Texture, ...] = ()
     uniforms: Mapping[str, Uniform] = field(default_factory=dict)  # by name
-    # constants that the compiler must know
-    definitions: Mapping[str, str] = field(default_factory=dict)
+    definitions: Mapping[str, str] = field(default_factory=dict)  # macros of the preprocessor
 
     @property
     def nbytes(self) -> int:
@@ -65,9 +64,9 @@ class Packed:
 
 
 def listed(name: str, entries: NDArray[np.generic]) -> Texture:
-    """Entries (n, channels) as a texture with rows of `PAGE` texels: what `entry` reads.
+    """Arrange entries (n, channels) in rows of `PAGE` texels, for the shaders' function `entry`.
 
-    Raises a DiffractionError if they are too many for a texture.
+    Raises a DiffractionError if a texture cannot hold them.
     """
     count, channels = entries.shape
     rows = -(-count // PAGE)
@@ -82,7 +81,7 @@ def listed(name: str, entries: NDArray[np.generic]) -> Texture:
 
 
 def texels(values: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Numbers (n, m) as texels of four, (n·⌈m/4⌉, 4), filled up with zeros."""
+    """Arrange numbers (n, m) as texels of four, (n·⌈m/4⌉, 4), padded with zeros."""
     numbers = values.shape[1]
     missing = -numbers % 4
     padded = np.pad(values, [(0, 0), (0, missing)]) if missing else values
@@ -90,17 +89,17 @@ def texels(values: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def half_error(values: NDArray[np.floating]) -> float:
-    """Σ|half(x) − x| / Σ|x|: what half floats cost, of a million numbers where there are more."""
-    some = values.ravel()
-    if some.size > _LOOKED_AT:
-        some = some[np.random.default_rng(0).integers(0, some.size, _LOOKED_AT)]
-    rounded = some.astype(np.float16).astype(some.dtype)
-    total = float(np.abs(some).sum(dtype=np.float64))
-    return float(np.abs(rounded - some).sum(dtype=np.float64)) / total if total > 0.0 else 0.0
+    """Return Σ|half(x) − x| / Σ|x|, the error of half floats, from at most a million numbers."""
+    sample = values.ravel()
+    if sample.size > _SAMPLED:
+        sample = sample[np.random.default_rng(0).integers(0, sample.size, _SAMPLED)]
+    rounded = sample.astype(np.float16).astype(sample.dtype)
+    total = float(np.abs(sample).sum(dtype=np.float64))
+    return float(np.abs(rounded - sample).sum(dtype=np.float64)) / total if total > 0.0 else 0.0
 
 
 def as_half(values: NDArray[np.floating]) -> NDArray[np.floating]:
-    """The values as half floats if that is exact enough, else in single precision."""
+    """Convert values to half floats if the error is small enough, else to single precision."""
     if values.dtype == np.float16:
         return values
     if np.abs(values).max(initial=0.0) < 6e4 and half_error(values) <= HALF_ERROR:
@@ -109,10 +108,10 @@ def as_half(values: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def shortened(values: NDArray[np.floating]) -> NDArray[np.float32]:
-    """The values rounded to 8 binary digits: what the upper half of a float32 holds.
+    """Round values to 8 binary digits, so that the upper half of a float32 holds them.
 
-    Half floats have 11 digits, but other exponents: drivers in software take as long to undo that
-    as to fetch the numbers, where these take a shift.
+    Half floats have 11 digits, but software drivers take as long to convert their exponents as to
+    fetch the numbers; these need only a shift.
     """
     bits = np.ascontiguousarray(values, np.float32).view(np.uint32)
     nearest = bits + (0x7FFF + (bits >> 16 & 1))  # ties to even
@@ -120,13 +119,13 @@ def shortened(values: NDArray[np.floating]) -> NDArray[np.float32]:
 
 
 def paired(values: NDArray[np.floating]) -> NDArray[np.uint32]:
-    """The upper halves of numbers (…, 2n), `shortened`, two in each word (…, n), low one first."""
+    """Pack the upper halves of `shortened` numbers (…, 2n) in words (…, n), low half first."""
     upper = shortened(values).view(np.uint32)
     return np.asarray(upper[..., ::2] >> 16 | upper[..., 1::2], np.uint32)
 
 
 def plain(value: Any) -> Any:
-    """A uniform for JSON; an array's numbers are one list."""
+    """Convert a uniform to JSON types; an array becomes one flat list."""
     if isinstance(value, np.ndarray):
         return value.ravel().tolist()
     if isinstance(value, tuple):

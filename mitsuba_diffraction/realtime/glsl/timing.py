@@ -1,4 +1,4 @@
-"""How long fragments take: whole ones, and a method's look-up alone."""
+"""Time per fragment of whole shaders, and of a method's look-up alone."""
 
 from __future__ import annotations
 
@@ -15,67 +15,68 @@ from .renderer import Renderer
 from .source import LIGHTS
 from .texels import Packed, Texture, Uniform
 
-#: Width and height of the pictures that are timed, the same for all methods.
+#: Width and height of the timed pictures.
 SIDE = 256
 
-_SHORTEST = 0.05  # s that a timing takes, by drawing several times
-_ROUNDS = 3  # of which the fastest counts
+_SHORTEST = 0.05  # least duration of a timing, s, by drawing several times
+_ROUNDS = 3  # rounds, of which the fastest counts
 _EYE = (-0.4, -1.0, 1.6)
 _LIGHT = (0.36, 0.48, 0.8, 0.0)
 
 
 def fragment_times(renderer: Renderer, methods: Sequence[str]) -> dict[str, dict[str, float]]:
-    """Seconds a fragment, by method, as "whole" and "look_up".
+    """Return the seconds per fragment of each method, as "whole" and "look_up".
 
-    Whole are lit fragments of a plane with the first diffracting surface's material, which fills
+    Whole fragments are those of a plane with the first diffracting surface's material, which fills
     the picture under one directional light: all of the fragment stage, with next to no geometry. A
-    look-up is the method's own function at as many places, without the surface's shading. All
-    methods take turns, and the fastest time of each counts: background load affects them alike.
-    The clock is that of `context.clock_of`.
+    look-up is only the method's function at as many points, without the surface's shading. Methods
+    alternate in rounds, and the fastest time of each counts, so that background load affects all
+    equally. The clock is that of `context.clock_of`.
     """
-    drawn = {
-        (method, kind): make(renderer, method)
+    timed = {
+        (method, kind): prepare(renderer, method)
         for method in methods
-        for kind, make in (("whole", _whole), ("look_up", _look_up))
+        for kind, prepare in (("whole", _whole), ("look_up", _look_up))
     }
-    found = {method: {"whole": np.inf, "look_up": np.inf} for method in methods}
+    seconds = {method: {"whole": np.inf, "look_up": np.inf} for method in methods}
     for _ in range(_ROUNDS):
-        for (method, kind), one in drawn.items():
-            found[method][kind] = min(found[method][kind], _seconds(renderer, one) / SIDE**2)
-    for one in drawn.values():
-        for thing in one.owned:
-            thing.release()
-    return found
+        for (method, kind), triangle in timed.items():
+            fragment = _seconds(renderer, triangle) / SIDE**2
+            seconds[method][kind] = min(seconds[method][kind], fragment)
+    for triangle in timed.values():
+        for resource in triangle.resources:
+            resource.release()
+    return seconds
 
 
 @dataclass
-class _Drawn:
-    """One triangle over the picture: its vertices, what sets its uniforms, and what it owns."""
+class _Triangle:
+    """Triangle that covers the picture: vertex array, setter of uniforms, resources to release."""
 
     array: Any
     bind: Callable[[], object]
-    owned: tuple[Any, ...]
-    warm: bool = False
+    resources: tuple[Any, ...]
+    compiled: bool = False
 
 
-def _seconds(renderer: Renderer, drawn: _Drawn) -> float:
-    """Of one picture; the first of the driver's pictures compiles."""
+def _seconds(renderer: Renderer, triangle: _Triangle) -> float:
+    """Return the seconds of one picture; a small picture before it compiles the program."""
     target = renderer.target(SIDE, SIDE)
     target.frame.use()
     renderer.context.enable_only(require_moderngl().NOTHING)  # no depth test
-    drawn.bind()
-    if not drawn.warm:
+    triangle.bind()
+    if not triangle.compiled:
         target.frame.viewport = (0, 0, 8, 8)
-        drawn.array.render(vertices=3)
+        triangle.array.render(vertices=3)
         renderer.context.finish()
         target.frame.viewport = (0, 0, SIDE, SIDE)
-        drawn.warm = True
+        triangle.compiled = True
     clock = clock_of(renderer.driver)
     times = 1
     while True:
         start = clock()
         for _ in range(times):
-            drawn.array.render(vertices=3)
+            triangle.array.render(vertices=3)
         renderer.context.finish()
         seconds = clock() - start
         if seconds >= _SHORTEST:
@@ -85,15 +86,16 @@ def _seconds(renderer: Renderer, drawn: _Drawn) -> float:
 
 
 def _first_diffracting(renderer: Renderer, method: str) -> tuple[Bindings, Bindings]:
-    """What the shader reads of the surface, and of the method's tables."""
+    """Return the bindings of the first diffracting surface, and of the method's tables."""
     surfaces = renderer.scene.surfaces
     number = next(n for n, s in enumerate(surfaces) if s.material.bsdf is not None)
     return renderer.bindings[number], renderer.prepared(method).tables[number]
 
 
-def _whole(renderer: Renderer, method: str) -> _Drawn:
-    own, tables = _first_diffracting(renderer, method)
-    definitions = {**own.definitions, **tables.definitions, **light_definitions(1, False)}
+def _whole(renderer: Renderer, method: str) -> _Triangle:
+    """Prepare a triangle with the whole fragment stage of a method."""
+    surface, tables = _first_diffracting(renderer, method)
+    definitions = {**surface.definitions, **tables.definitions, **light_definitions(1, False)}
     program = compile_program(renderer.context, method, definitions)
     corners = np.array([[-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]])
     vertices = np.zeros((3, 16), np.float32)
@@ -110,24 +112,25 @@ def _whole(renderer: Renderer, method: str) -> _Drawn:
 
     def bind() -> None:
         set_uniforms(program, uniforms)
-        renderer.use_responses(program, tables.use(program, own.use(program)))
+        renderer.use_responses(program, tables.use(program, surface.use(program)))
 
     array = vertex_array(renderer.context, program, buffer)
-    return _Drawn(array, bind, (array, program, buffer))
+    return _Triangle(array, bind, (array, program, buffer))
 
 
-def _look_up(renderer: Renderer, method: str) -> _Drawn:
+def _look_up(renderer: Renderer, method: str) -> _Triangle:
+    """Prepare a triangle with the look-up of a method alone."""
     tables = _first_diffracting(renderer, method)[1]
     program = compile_program(
         renderer.context, method, tables.definitions, vertex="whole.vert", main="probe.frag"
     )
     u, v = np.meshgrid(*2 * [np.linspace(-0.7, 0.7, SIDE)])
     places = np.stack([u, v, 1.8 - 0.5 * u, np.ones_like(u)], axis=-1).astype(np.float32)
-    given = Bindings(renderer.context, Packed((Texture("places", places),)))
+    points = Bindings(renderer.context, Packed((Texture("places", places),)))
 
     def bind() -> None:
         set_uniforms(program, {"light_colour": np.ones((LIGHTS, 3), np.float32)})
-        renderer.use_responses(program, given.use(program, tables.use(program)))
+        renderer.use_responses(program, points.use(program, tables.use(program)))
 
     array = renderer.context.vertex_array(program, [])
-    return _Drawn(array, bind, (array, program, given))
+    return _Triangle(array, bind, (array, program, points))

@@ -1,4 +1,4 @@
-"""A window on a scene of Mitsuba (extra `view`): orbit, pan, zoom, drag the light, compare."""
+"""Window on a Mitsuba scene (extra `view`): orbit, pan, zoom, drag the light, path-trace."""
 
 from __future__ import annotations
 
@@ -34,23 +34,24 @@ HELP = (
     "S: screenshot   P: path-trace this view   R: reset   Esc: close"
 )
 
-_TURN = 0.006  # rad per pixel
-_FRAMES = 30  # that the readout averages over
-_AT_ONCE, _ENOUGH = 4, 2048  # frames of progressive light at once, and when there is no more to see
+_TURN = 0.006  # rotation per pixel, rad
+_FRAMES = 30  # frames in the mean time that the panel shows
+_AT_ONCE, _ENOUGH = 4, 2048  # frames of progressive light per picture, and in all
 
 
 def _to_panel(event: str) -> Callable[..., None]:
-    """What hands an event on to the panel."""
+    """Return a handler that passes an event on to the panel."""
 
     def handle(self: Viewer, *values: Any) -> None:
-        if hasattr(self, "panel"):  # a window may be resized before it has one
+        """Pass the event on, if the panel exists."""
+        if hasattr(self, "panel"):  # a window may be resized before the panel is created
             getattr(self.panel, event)(*values)
 
     return handle
 
 
 class Viewer(moderngl_window.WindowConfig):
-    """The window. What it shows is set on a subclass: see `show`."""
+    """Window of the viewer; `show` sets the scene and options on a subclass."""
 
     gl_version = (3, 3)
     title = TITLE
@@ -63,7 +64,7 @@ class Viewer(moderngl_window.WindowConfig):
     method = "lut"
     stops = 0.0
     folder = Path()
-    frames = 0  # to close after; 0 is never
+    frames = 0  # number of frames to close after; 0: never
     spp = 64
 
     def __init__(self, **arguments: Any) -> None:
@@ -78,38 +79,40 @@ class Viewer(moderngl_window.WindowConfig):
         self.renderer: Renderer | None = None
         self.tracing: PathTracing | None = None
         self.light: ProgressiveLight | None = None
-        self.shadows = True  # all light and shadows, or few lights without them at once
+        self.shadows = True  # progressive light with shadows, or at once a few lights without
         self._shown: tuple[Any, ...] = ()
         self._loading: Iterator[str] | None = self._load()
 
     def _load(self) -> Iterator[str]:
-        """Everything slow, in steps between which the window can be closed."""
+        """Load in steps; the window can be closed between them."""
         yield "reading the scene ..."
         self.renderer = Renderer(self.mitsuba_scene, sensor=self.sensor, context=self.ctx)
         yield f"tables of method {self.method} ..."
         self.renderer.texture_bytes(self.method)
-        yield "lights and what they meet ..."
+        yield "lights, shadows and surroundings ..."
         self.renderer.stage()
         self._start()
 
     def _start(self) -> None:
+        """Set camera, surfaces and lights to those of the scene."""
         renderer = self._ready
         scene = renderer.scene
-        self.orbit = Orbit.of(scene.camera, 0.5 * (scene.low + scene.high))
+        self.orbit = Orbit.start(scene.camera, 0.5 * (scene.low + scene.high))
         first = scene.diffracting[0].material
         self.scale = float(np.array(first.bsdf.height_scale).ravel()[0])
         self.largest_scale = float(first.table.height_scale_max)
-        self.own_width = self.width = float(first.table.coherence_width)
+        self.table_width = self.width = float(first.table.coherence_width)
         renderer.lights = list(scene.lighting.lights)
         self._dragged = False
 
     @property
     def _ready(self) -> Renderer:
+        """Renderer, once it is loaded."""
         assert self.renderer is not None
         return self.renderer
 
     def on_render(self, now: float, since: float) -> None:
-        """Draw one frame, or do one step of loading."""
+        """Draw one frame, or load one step."""
         if self._loading is not None:
             try:
                 self._say(next(self._loading))
@@ -128,6 +131,7 @@ class Viewer(moderngl_window.WindowConfig):
             self.wnd.close()
 
     def _draw(self, frame: Any) -> None:
+        """Draw the scene into a framebuffer."""
         if self.shadows:
             self._light(frame.size).show(frame, 2.0**self.stops)
             return
@@ -135,17 +139,19 @@ class Viewer(moderngl_window.WindowConfig):
         self._ready.draw(frame, self.method, camera, exposure=2.0**self.stops, **self._surface)
 
     def _camera(self, size: tuple[int, int]) -> Camera:
+        """Return the orbit's camera with a picture of this size."""
         return self._ready.camera.moved(self.orbit.to_world).resized(*size)
 
     @property
     def _surface(self) -> dict[str, float | None]:
+        """Height scale and coherence width of the surfaces."""
         return {"scale": self.scale, "coherence_width": None if self._baked else self.width}
 
     def _light(self, size: tuple[int, int]) -> ProgressiveLight:
-        """The light so far, a few frames further; begun anew where anything has changed.
+        """Add a few frames of progressive light; restart it if anything has changed.
 
-        The first lights are those that look most like all of them, and always the same: what moves
-        is lit by them alone.
+        The sequence of lights begins with the most representative ones, so a moving picture, which
+        has only these, does not flicker.
         """
         renderer, camera = self._ready, self._camera(size)
         lights = tuple(renderer.lights) if self._dragged else ()
@@ -165,15 +171,16 @@ class Viewer(moderngl_window.WindowConfig):
 
     @property
     def _baked(self) -> bool:
-        """Whether the method's table holds the window itself."""
+        """Whether the method's table includes the coherence window."""
         return self.method in ("lut", "pq")
 
     @property
     def frame_ms(self) -> float:
-        """Mean of the last frames."""
+        """Mean time of the last frames, ms."""
         return 1e3 * float(np.mean(self.times)) if self.times else 0.0
 
     def _panel(self) -> None:
+        """Draw the panel and read its controls."""
         imgui.new_frame()
         imgui.set_next_window_pos((10, 10), imgui.Cond_.first_use_ever)
         imgui.begin(TITLE, flags=imgui.WindowFlags_.always_auto_resize)
@@ -186,8 +193,8 @@ class Viewer(moderngl_window.WindowConfig):
         if imgui.is_item_deactivated_after_edit():
             self._ready.energy_for(self.scale)
         if not self._baked:
-            widest = 4.0 * self.own_width
-            _, self.width = imgui.slider_float("coherence, µm", self.width, self.own_width, widest)
+            low = self.table_width
+            _, self.width = imgui.slider_float("coherence, µm", self.width, low, 4.0 * low)
         _, self.shadows = imgui.checkbox("all light, with shadows", self.shadows)
         imgui.text(HELP)
         imgui.text(self.message)
@@ -195,7 +202,7 @@ class Viewer(moderngl_window.WindowConfig):
         self._show_panel()
 
     def _say(self, text: str) -> None:
-        """The panel with one line alone, on an empty picture."""
+        """Show the panel with one line of text, on an empty picture."""
         self.wnd.fbo.clear(0.02, 0.02, 0.02)
         imgui.new_frame()
         imgui.begin(TITLE)
@@ -204,13 +211,13 @@ class Viewer(moderngl_window.WindowConfig):
         self._show_panel()
 
     def _show_panel(self) -> None:
-        """Draw what ImGui was told since its last new frame."""
+        """Render ImGui's current frame."""
         imgui.render()
         self.wnd.use()
         self.panel.render(imgui.get_draw_data())
 
     def choose(self, method: str) -> None:
-        """Draw with another method, if it suits the surface."""
+        """Draw with another method, if it supports the surfaces."""
         try:
             self._ready.texture_bytes(method)
         except DiffractionError as error:
@@ -222,20 +229,20 @@ class Viewer(moderngl_window.WindowConfig):
             self.message = "a method of the thesis: slow, for comparison"
 
     def screenshot(self) -> Path:
-        """Write what is seen, without the panel, as PNG; the next free name."""
+        """Write the view without the panel as PNG, under the next free name."""
         target = self._ready.target(*self.wnd.fbo.size)
         try:
             self._draw(target.frame)
-            found = np.frombuffer(target.frame.read(components=3, dtype="f4"), np.float32)
+            pixels = np.frombuffer(target.frame.read(components=3, dtype="f4"), np.float32)
         finally:
             target.release()
         width, height = self.wnd.fbo.size
-        path = write_screenshot(found.reshape(height, width, 3)[::-1], self.folder, "view")
+        path = write_screenshot(pixels.reshape(height, width, 3)[::-1], self.folder, "view")
         self.message = f"written: {path}"
         return path
 
     def start_tracing(self) -> None:
-        """Send this view to the path tracer, which works between frames."""
+        """Start path-tracing this view, one pass per frame."""
         renderer = self._ready
         width, height = self.wnd.fbo.size
         camera = self._camera((width, height))
@@ -243,14 +250,15 @@ class Viewer(moderngl_window.WindowConfig):
         self.message = "path tracing ..."
 
     def _trace(self) -> None:
+        """Render one pass of the path tracer; write the picture after the last one."""
         tracing = self.tracing
         assert tracing is not None
         tracing.advance()
         self.message = f"path tracing: {tracing.done} of {tracing.spp} samples"
         if tracing.finished:
             self.tracing = None
-            shown = encode_srgb(tracing.image * 2.0**self.stops)
-            path = write_screenshot(shown, self.folder, "view_path")
+            encoded = encode_srgb(tracing.image * 2.0**self.stops)
+            path = write_screenshot(encoded, self.folder, "view_path")
             self.message = f"written: {path} (direct light, {tracing.spp} samples)"
 
     on_mouse_position_event = _to_panel("mouse_position_event")
@@ -260,7 +268,7 @@ class Viewer(moderngl_window.WindowConfig):
     on_resize = _to_panel("resize")
 
     def on_mouse_drag_event(self, x: int, y: int, dx: int, dy: int) -> None:
-        """Turn, move, or drag the light."""
+        """Orbit, pan, or drag the light."""
         self.panel.mouse_drag_event(x, y, dx, dy)
         if self._loading is not None or imgui.get_io().want_capture_mouse:
             return
@@ -277,13 +285,13 @@ class Viewer(moderngl_window.WindowConfig):
             self.orbit = self.orbit.turned(_TURN * dx, _TURN * dy)
 
     def on_mouse_scroll_event(self, x_offset: float, y_offset: float) -> None:
-        """Nearer or farther."""
+        """Zoom."""
         self.panel.mouse_scroll_event(x_offset, y_offset)
         if self._loading is None and not imgui.get_io().want_capture_mouse:
             self.orbit = self.orbit.zoomed(0.9**y_offset)
 
     def on_key_event(self, key: Any, action: Any, modifiers: Any) -> None:
-        """S, P and R."""
+        """Take a screenshot (S), path-trace (P) or reset (R)."""
         self.panel.key_event(key, action, modifiers)
         keys = self.wnd.keys
         if self._loading is not None or action != keys.ACTION_PRESS:
@@ -299,7 +307,7 @@ class Viewer(moderngl_window.WindowConfig):
             self.message = str(error)  # a full disk need not close the window
 
     def on_close(self) -> None:
-        """Free the graphics card's memory, also of what was half loaded."""
+        """Free the graphics card's memory, even if the scene is only partly loaded."""
         self._loading = None
         if self.light is not None:
             self.light.release()
@@ -322,14 +330,14 @@ def show(
 ) -> tuple[int, float]:
     """Open a window on a scene and wait until it is closed.
 
-    sensor : index of the camera to start at.
-    method, stops : to start with; exposure in stops.
-    size : of the window, pixels.
-    folder : for screenshots.
-    frames : close after so many; 0 waits for the user.
+    sensor : index of the first camera.
+    method, stops : first method, and exposure in stops.
+    size : size of the window, pixels.
+    folder : folder of screenshots.
+    frames : number of frames after which to close; 0 waits for the user.
     window : kind of window, as moderngl-window names it; "headless" needs no display.
 
-    Returns frames drawn, and the mean of the last ones in ms.
+    Returns the number of frames, and the mean time of the last ones in ms.
 
     Raises a DiffractionError if no window can be opened, or as `Renderer`.
     """
@@ -347,9 +355,9 @@ def show(
 
 
 def open_viewer(kind: type[Viewer], arguments: list[str]) -> Viewer:
-    """A window of a kind of viewer, not shown yet.
+    """Create the window of a viewer, without showing it.
 
-    arguments : of moderngl-window's command line.
+    arguments : arguments of moderngl-window's command line.
 
     Raises a DiffractionError if no window can be opened, or as `Renderer`.
     """
@@ -357,7 +365,7 @@ def open_viewer(kind: type[Viewer], arguments: list[str]) -> Viewer:
         viewer: Viewer = moderngl_window.create_window_config_instance(kind, args=arguments)
     except DiffractionError:
         raise
-    except Exception as error:  # every kind of window has exceptions of its own
+    except Exception as error:  # exceptions differ by kind of window
         reason = " ".join(str(error).split()) or type(error).__name__
         raise DiffractionError(
             f"no window could be opened ({reason}); a display and OpenGL 3.3 are needed: over ssh "
@@ -366,17 +374,17 @@ def open_viewer(kind: type[Viewer], arguments: list[str]) -> Viewer:
     return viewer
 
 
-def write_screenshot(shown: NDArray[np.floating], folder: Path, stem: str) -> Path:
-    """Write a picture as `stem_000.png`, or the next number that is free.
+def write_screenshot(picture: NDArray[np.floating], folder: Path, stem: str) -> Path:
+    """Write a picture as `stem_000.png`, or under the next free number.
 
-    shown : (height, width, 3) sRGB, 0 to 1; what is beyond is cut.
+    picture : (height, width, 3) sRGB, clipped to 0 to 1.
 
-    Raises a DiffractionError if it cannot be written.
+    Raises a DiffractionError if the file cannot be written.
     """
     number = 0
     while (path := folder / f"{stem}_{number:03d}.png").exists():
         number += 1
-    eight_bits = (np.clip(shown, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    eight_bits = (np.clip(picture, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
     with atomic_path(path) as temporary:
         Image.fromarray(eight_bits).save(temporary)
     return path

@@ -38,7 +38,7 @@ _IN_FRAME = 1 << 15  # samples that progressive light draws at once; fewer are n
 
 
 class SameLights:
-    """One scene for both renderers, lit only by directions and points.
+    """A scene for both renderers, lit only by directions and points.
 
     Both renderers replace lights with an extent by points and directions: the sun of a sky by its
     direction. The rest of the sky is left out of both.

@@ -1,9 +1,9 @@
-"""Pages that show a scene in a browser, without a server.
+"""Self-contained pages that draw a scene in a browser, without a server.
 
 Contents
 --------
-export_viewer   writes a page
-Viewer          the same page in a cell of a notebook
+export_viewer   write a page
+Viewer          show a page in a cell of a notebook
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A scene as one self-contained page of HTML: in a file, or in a notebook."""
+"""Export of a scene as one self-contained page of HTML, to a file or a notebook."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ from .light import packed_light, packed_surroundings
 from .sections import Sections, packed_mesh, packed_parts, sections_of
 from .tables import WEB_METHODS, fitting_tables, strongest_orders
 
-#: Largest page, bytes.
+#: Largest size of a page, bytes.
 MAX_BYTES = 25_000_000
 
-#: What conserves energy is at height scales 2^n of the scene's own.
+#: Height scales of the tables for energy conservation, log2 of the factor on the scene's scale.
 OCTAVES = (-2.0, -1.5, -1.0, -0.5, 0.0, 0.5)
 
-_HEADER = 200_000  # bytes for shaders, script and style, generously
+_HEADER = 200_000  # upper bound of shaders, script and style, bytes
 
 _SCRIPTS = (
     "vectors.js", "data.js", "mesh.js", "camera.js", "light.js", "drawing.js", "shadow.js",
@@ -52,14 +52,14 @@ _SCRIPTS = (
 
 @dataclass(frozen=True)
 class Page:
-    """A page of HTML.
+    """Exported page of HTML.
 
     Attributes
     ----------
-    text : all of it.
-    loss : mean and 99th percentile of ΔE2000 that rounding the tables makes, by method.
-    left_out : methods that did not fit, each with the reason.
-    omissions : what of the scene is not shown.
+    text : source of the page.
+    loss : mean and 99th percentile of the ΔE2000 by rounding of the tables, by method.
+    left_out : methods that were left out, each with the reason.
+    omissions : parts of the scene that are left out or simplified.
     """
 
     text: str
@@ -76,21 +76,21 @@ def make_page(
     sensor: int = 0,
     progress: Progress = silent,
 ) -> Page:
-    """The page of a scene.
+    """Build the page of a scene.
 
     Parameters
     ----------
-    scene : a `mi.Scene` of the variant that is set, or an XML file.
-    title : by default the file's name.
-    methods : of `WEB_METHODS`; the first is shown first, and the last is left out first if the
-        page would have more than 25 MB.
+    scene : a `mi.Scene` of the current variant, or an XML file.
+    title : title of the page; by default the file's name.
+    methods : methods of `WEB_METHODS`; the page starts with the first, and leaves out the last
+        ones where it would have more than 25 MB.
     sensor : index of the camera.
-    progress : is told what is done.
+    progress : called as progress(done, total, text).
 
     Raises
     ------
     DiffractionError
-        If nothing in the scene diffracts, a method is unknown, or the scene does not fit.
+        If nothing in the scene diffracts, a method is unknown, or the page would be too large.
     """
     unknown = [method for method in methods if method not in WEB_METHODS]
     if unknown or not methods or len(set(methods)) < len(methods):
@@ -98,8 +98,8 @@ def make_page(
             f"methods={list(methods)!r}: choose from {', '.join(WEB_METHODS)}, each at most once"
         )
     if title is None:
-        named = isinstance(scene, str | os.PathLike)
-        title = Path(scene).stem if named else "Diffraction"
+        is_file = isinstance(scene, str | os.PathLike)
+        title = Path(scene).stem if is_file else "Diffraction"
     header, data = _packed(load(scene), sensor, title, methods, progress)
     text = _filled(header, data)
     if len(text.encode()) > MAX_BYTES:
@@ -111,7 +111,7 @@ def make_page(
 
 
 def export_viewer(scene: Any, path: str | os.PathLike[str], **options: Any) -> Page:
-    """Write the page of a scene; arguments as of `make_page`, errors too."""
+    """Write the page of a scene; options and errors as in `make_page`."""
     page = make_page(scene, **options)
     with atomic_path(path) as temporary:
         temporary.write_text(page.text, encoding="utf-8")
@@ -119,12 +119,12 @@ def export_viewer(scene: Any, path: str | os.PathLike[str], **options: Any) -> P
 
 
 class Viewer:
-    """The page of a scene in a cell of a notebook; arguments and errors as of `make_page`.
+    """Page of a scene in a cell of a notebook; options and errors as in `make_page`.
 
     Parameters
     ----------
-    scene : a `mi.Scene` of the variant that is set, or an XML file.
-    height : of the cell, pixels.
+    scene : a `mi.Scene` of the current variant, or an XML file.
+    height : height of the cell, pixels.
     """
 
     def __init__(self, scene: Any, *, height: int = 520, **options: Any) -> None:
@@ -140,7 +140,7 @@ class Viewer:
 
 
 def _filled(header: dict[str, Any], data: bytes) -> str:
-    """The page with everything in it."""
+    """Fill the template of the page."""
     parts: dict[str, Callable[[], str]] = {
         "style": lambda: _asset("style.css"),
         "script": lambda: "\n".join(_asset(name) for name in _SCRIPTS),
@@ -156,15 +156,16 @@ def _filled(header: dict[str, Any], data: bytes) -> str:
 
 @functools.cache
 def _asset(name: str) -> str:
+    """Read a file of the page."""
     return resources.files(__package__).joinpath("page", name).read_text(encoding="utf-8")
 
 
 def _packed(
     loaded: Any, sensor: int, title: str, methods: Sequence[str], progress: Progress
 ) -> tuple[dict[str, Any], bytes]:
-    """The page's header, as JSON, and all arrays and pictures, compressed.
+    """Return the page's header as JSON types, and all arrays and pictures, compressed.
 
-    Methods whose tables do not fit are left out, from the last on.
+    The last methods are left out if their tables exceed the size of the page.
     """
     scene = read_scene(loaded, sensor)
     emitters = Emitters(loaded, scene.middle) if loaded.emitters() else None
@@ -175,7 +176,7 @@ def _packed(
     for number, surface in enumerate(scene.surfaces):
         progress(number, len(scene.surfaces), f"packing {surface.name}")
         material = surface.material
-        # at all height scales that the slider offers
+        # energy conservation at all height scales of the slider
         common = pack_surface(material) | pack_relief(material) | pack_emission(surface.radiance)
         common |= pack_conservation(material, [2.0**n for n in OCTAVES])
         entry: dict[str, Any] = {
@@ -235,26 +236,27 @@ def _packed(
 def _fitted(
     methods: Sequence[str], tables: Sequence[DiffractionTable], room: int, progress: Progress
 ) -> tuple[list[str], Any, dict[str, str]]:
-    """Methods whose tables fit, the tables, and why the others are not there."""
+    """Return the methods whose tables fit, their tables, and why others are left out."""
     shown, left_out = list(methods), {}
     if "spectral" in shown and any(table.grid.coherent for table in tables):
         shown.remove("spectral")
-        left_out["spectral"] = "orders interfere with coherence='patch', which it cannot add up"
+        left_out["spectral"] = "it has no interference of orders, which coherence='patch' requires"
     while shown:
         packed = fitting_tables(shown, tables, room, progress)
         if not isinstance(packed, int):
             return shown, packed, left_out
         left_out[shown.pop()] = (
-            f"{(packed - room) / 1e6:.1f} MB too much for a page of {MAX_BYTES / 1e6:.0f} MB"
+            f"{(packed - room) / 1e6:.1f} MB too large for a page of {MAX_BYTES / 1e6:.0f} MB"
         )
     reasons = "; ".join(f"{method}: {reason}" for method, reason in left_out.items())
     raise DiffractionError(
-        f"the scene does not fit into a page ({reasons}); use fewer triangles, a smaller "
+        f"the scene is too large for a page ({reasons}); use fewer triangles, a smaller "
         "coherence_width, or a shallower surface"
     )
 
 
 def _worst(losses: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Return the largest mean and the largest 99th percentile of some tables."""
     return max(mean for mean, _ in losses), max(most for _, most in losses)
 
 
@@ -265,16 +267,16 @@ def _add_programs(
     packed: Any,
     around: dict[str, str],
 ) -> None:
-    """The shaders, each once, and which surface is drawn with which.
+    """Add all distinct shader sources, and the number of each surface's source.
 
-    The page puts what it knows of the light where LIGHTS_LIT is defined, and appends one of the
+    The page replaces the definition of LIGHTS_LIT by those of its light, and appends one of the
     main functions.
 
-    around : definitions of what surrounds the scene.
+    around : definitions of the surroundings.
     """
     sources: list[str] = []
     for entry, common in surfaces:
-        # what does not diffract is drawn by any of the programs
+        # any table serves a surface that does not diffract
         table = entry.setdefault("table", 0)
         entry["programs"] = {}
         for method in methods:
@@ -297,22 +299,22 @@ def _add_programs(
 
 
 def _source(method: str, definitions: dict[str, str]) -> str:
-    """All but the main function, with what looks up surroundings only where that is asked for."""
+    """Return a source without its main function; code of surroundings is conditional."""
     parts = dict(fragment_parts(method, definitions, "web")[:-1])
-    looked_up = fragment_parts(method, {**definitions, "LOOKED_UP": ""}, "web")[:-1]
-    more = "".join(text for name, text in looked_up if name not in parts)
-    within = f"#if defined(WEIGHTED) || defined(LOOKED_UP)\n{more}#endif\n"
-    return "".join((*parts.values(), within))
+    with_surroundings = fragment_parts(method, {**definitions, "LOOKED_UP": ""}, "web")[:-1]
+    further = "".join(text for name, text in with_surroundings if name not in parts)
+    conditional = f"#if defined(WEIGHTED) || defined(LOOKED_UP)\n{further}#endif\n"
+    return "".join((*parts.values(), conditional))
 
 
 def _omissions(scene: RealtimeScene, emitters: Emitters | None) -> list[str]:
-    """What the page does not show: of emitters only what the sequence of lights leaves out."""
-    found = [text for text in scene.omissions if text not in scene.lighting.omissions]
-    found += [] if emitters is None else emitters.omissions
-    return list(dict.fromkeys(found))
+    """Return the parts of the scene that the page leaves out, in a few words each."""
+    omissions = [text for text in scene.omissions if text not in scene.lighting.omissions]
+    omissions += [] if emitters is None else emitters.omissions
+    return list(dict.fromkeys(omissions))
 
 
 def _zenith(sky: NDArray[np.float64]) -> list[float]:
-    """The brightest of a sky: its own where it lights one half, the mean where it is all around."""
+    """Return the largest radiance of a sky: at the zenith of a half, the mean of a whole one."""
     slope = np.linalg.norm(sky[1:], axis=0)
     return [float(x) for x in np.maximum(sky[0] + slope, 0.0)]

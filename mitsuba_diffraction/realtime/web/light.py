@@ -1,6 +1,6 @@
-"""The light of a page: lights, a sequence that stands for all, and what surrounds the scene.
+"""Light of a page: lights, a sequence that represents all emitters, and the surroundings.
 
-An environment, shapes that emit light, and what lobes meet.
+The surroundings are an environment, shapes that emit light, and data to look them up along lobes.
 """
 
 from __future__ import annotations
@@ -26,38 +26,39 @@ from ..glsl.surroundings import flat_shapes, pack_lobes
 from ..glsl.texels import Packed, shortened
 from .sections import Sections, packed_array, packed_mesh, packed_parts, sections_of
 
-#: Lights of the sequence: their mean is the scene's light.
+#: Number of lights in the sequence; their mean is the scene's light.
 SAMPLES = 256
 
-_FIRST, _LAST, _STEP = 380.0, 780.0, 5.0  # nm, of the light of one wavelength
-_NEAR = float(np.cos(np.radians(3.0)))  # of a light without extent: what moves with it
+_FIRST, _LAST, _STEP = 380.0, 780.0, 5.0  # wavelengths of monochromatic light, nm
+_NEAR = float(np.cos(np.radians(3.0)))  # lights within this angle of a direction move with it
 
 
 def packed_light(
     scene: RealtimeScene, emitters: Emitters | None, sections: Sections
 ) -> dict[str, Any]:
-    """All that the page knows of light, as JSON.
+    """Return the page's data of light, as JSON types.
 
-    `own` are the lights without extent that show while something moves, `samples` the sequence, of
-    which each knows to which of `own` it belongs (−1: to none).
+    `own` are the scene's lights without extent, which light the picture while something moves.
+    `samples` is the sequence; each light has the number of the light in `own` that it moves with
+    (−1: none).
     """
     own = scene.lighting.lights
-    drawn = list(itertools.islice(emitters.lights(), SAMPLES)) if emitters else []
-    if len({id(light) for light in drawn}) < len(drawn) and _alike(drawn):
-        drawn = drawn[:1]
-    spectra = [np.asarray(light.spectrum, np.float32).ravel() for light in [*own, *drawn]]
+    sequence = list(itertools.islice(emitters.lights(), SAMPLES)) if emitters else []
+    if len({id(light) for light in sequence}) < len(sequence) and _equal(sequence):
+        sequence = sequence[:1]
+    spectra = [np.asarray(light.spectrum, np.float32).ravel() for light in [*own, *sequence]]
     values = np.stack(spectra) if spectra else None
     daylight = pack_responses([(np.array([360.0, 830.0]), np.ones(2))]).textures[0]
     return {
         "own": [_described(light, n) for n, light in enumerate(own)],
         "samples": [
             _described(light, len(own) + n) | {"of": _owner(light, own), "density": light.density}
-            for n, light in enumerate(drawn)
+            for n, light in enumerate(sequence)
         ],
         "sky": scene.lighting.sky.ravel().tolist(),
         "spectra": None if values is None else sections.add(packed_array(values)),
         "columns": 0 if values is None else values.shape[1],
-        "channels": 3 if spectra and [*own, *drawn][0].spectrum.ndim > 1 else 1,
+        "channels": 3 if spectra and [*own, *sequence][0].spectrum.ndim > 1 else 1,
         "daylight": sections.add(packed_array(daylight.data.reshape(-1, 4))),
         "wavenumbers": list(WAVENUMBERS),
         "monochrome": {"first": _FIRST, "step": _STEP, "colours": _monochrome().tolist()},
@@ -65,34 +66,35 @@ def packed_light(
 
 
 def _described(light: Light, spectrum: int) -> dict[str, Any]:
+    """Return a light as JSON types; `spectrum` is the number of its spectrum."""
     return {
         "name": light.name, "spectrum": spectrum, "cone": list(light.cone or (0.0, 0.0)),
         **{n: np.round(getattr(light, n), 7).tolist() for n in ("place", "colour", "axis")},
     }  # fmt: skip
 
 
-def _alike(lights: Sequence[Light]) -> bool:
-    """Whether all are the same light."""
+def _equal(lights: Sequence[Light]) -> bool:
+    """Return whether all lights are equal."""
     first = lights[0]
     return all(
-        np.array_equal(one.place, first.place) and np.array_equal(one.spectrum, first.spectrum)
-        for one in lights
+        np.array_equal(light.place, first.place) and np.array_equal(light.spectrum, first.spectrum)
+        for light in lights
     )
 
 
 def _owner(light: Light, own: Sequence[Light]) -> int:
-    """The light without extent that stands for this one, −1 where none does."""
+    """Return the number of the light in `own` with which a light moves, or −1."""
     for number, other in enumerate(own):
         if not other.name.endswith(light.name) or light.place[3] != other.place[3]:
             continue
-        a, b = (one.place[:3] / np.linalg.norm(one.place[:3]) for one in (light, other))
+        a, b = (x.place[:3] / np.linalg.norm(x.place[:3]) for x in (light, other))
         if light.place[3] or float(a @ b) > _NEAR:
             return number
     return -1
 
 
 def _monochrome() -> NDArray[np.float64]:
-    """Linear sRGB of each wavelength, as saturated as a display can, the brightest channel 1."""
+    """Return the most saturated displayable linear sRGB of each wavelength, largest channel 1."""
     lam = np.arange(_FIRST, _LAST + _STEP, _STEP)
     colours = np.maximum(linear_srgb(response(lam)), 0.0)
     return np.round(colours / colours.max(axis=1, keepdims=True), 4)
@@ -105,11 +107,11 @@ def packed_surroundings(
     materials: Sequence[Material],
     sections: Sections,
 ) -> tuple[dict[str, Any] | None, dict[str, str]]:
-    """All that the page knows of it, and what its shaders must know when they are compiled.
+    """Return the page's data of surroundings, as JSON types, and definitions for the shaders.
 
-    materials : one for each table, which lobes are drawn by.
+    materials : one material for each table, for directions of its lobes.
 
-    Returns JSON, None where there is neither; definitions.
+    The data is None for a scene without environment and without shapes that emit light.
     """
     environment = None if emitters is None else emitters.environment
     if emitters is None or not (scene.glows or environment):
@@ -124,11 +126,11 @@ def packed_surroundings(
         background = plain_source("background.frag", shared, packed.definitions, "web")
     return {
         "parts": packed_parts(packed | solid, sections),
-        "lobes": [packed_parts(one, sections) for one in lobes],
+        "lobes": [packed_parts(part, sections) for part in lobes],
         "emitting": [
-            {"mesh": sections_of(packed_mesh(one.vertices), sections.add),
-             "radiance": one.radiance.tolist()}
-            for one in scene.emitting
+            {"mesh": sections_of(packed_mesh(glow.vertices), sections.add),
+             "radiance": glow.radiance.tolist()}
+            for glow in scene.emitting
         ],
         "glow": plain_source("glow.frag", dialect="web"),
         "background": background,
@@ -137,12 +139,15 @@ def packed_surroundings(
 
 
 def _lobes(material: Material) -> Packed:
-    """In fewer digits: whatever they are, densities are those that directions are drawn with."""
+    """Pack directions of lobes and their densities in fewer digits.
+
+    Rounding adds no bias: shaders divide by the rounded densities.
+    """
     factor = height_scale(material) * coat_index(material)
     packed = pack_lobes(cached_colours(material.table), factor)
-    fewer: dict[str, Callable[[Any], Any]] = {
+    rounding: dict[str, Callable[[Any], Any]] = {
         "lobe_places": np.float16,
         "lobe_densities": shortened,
     }
-    textures = [replace(t, data=fewer[t.name](t.data)) for t in packed.textures]
+    textures = [replace(t, data=rounding[t.name](t.data)) for t in packed.textures]
     return replace(packed, textures=tuple(textures))

@@ -1,6 +1,7 @@
-"""Arrays, triangles and textures in little space, as the page's header names them.
+"""Compression of arrays, triangles and textures for the page.
 
-Byte planes, differences and zlib: `data.js` undoes them.
+Arrays are stored as byte planes, of differences where these are smaller, and compressed by zlib;
+`data.js` decodes them.
 """
 
 from __future__ import annotations
@@ -28,32 +29,32 @@ _NAMES = {
     np.dtype(np.float16): "Uint16Array",  # JavaScript has no half floats; WebGL takes their bits
 }
 
-_UNIT = 32767  # of directions
-_STEPS = 65535  # over a bounding box
-_NO_DIRECTION = -32768
+_UNIT = 32767  # integer that encodes a coordinate 1 of directions
+_STEPS = 65535  # integer that encodes the far side of a bounding box
+_NO_DIRECTION = -32768  # integer that encodes a direction of length 0
 
 
 @dataclass(frozen=True)
 class Section:
-    """One array or file in the page's data."""
+    """Array or file in the page's data."""
 
-    data: bytes  # bytes as they are stored
-    layout: dict[str, Any]  # what the page must know to undo it, as JSON
+    data: bytes  # stored bytes
+    layout: dict[str, Any]  # parameters to decode them, as JSON types
 
 
 def packed_array(values: NDArray[Any], *, differences: bool = False) -> Section:
-    """An array (rows, columns), compressed without loss.
+    """Compress an array (rows, columns) without loss.
 
-    All first bytes of a column lie together, then all second ones: alike bytes compress well.
+    All first bytes of a column are adjacent, then all second ones: similar bytes compress well.
 
-    values : of any type that JavaScript has an array of, or half floats.
-    differences : store whole numbers less those of the row before, where rows are alike.
+    values : values of a type that JavaScript has an array of, or half floats.
+    differences : whether to store differences from the row before, for integers in similar rows.
     """
     rows, columns = values.shape
     kind = _NAMES[values.dtype]
     size = values.dtype.itemsize
     if differences:
-        # whole numbers of fixed size wrap around, here and in the page
+        # integers of fixed size wrap around, here and in the page
         values = np.concatenate([values[:1], values[1:] - values[:-1]])
     contiguous = np.ascontiguousarray(values, values.dtype.newbyteorder("<"))
     planes = contiguous.view(np.uint8).reshape(rows, columns * size).T
@@ -63,12 +64,12 @@ def packed_array(values: NDArray[Any], *, differences: bool = False) -> Section:
 
 
 def packed_file(data: bytes) -> Section:
-    """A file of a format that browsers read, as it is."""
+    """Return a file of a format that browsers read as a section."""
     return Section(data, {"kind": "file"})
 
 
 def as_columns(data: Any, width: int) -> Any:
-    """A texture's numbers as rows of a given width; the last row is filled up with zeros."""
+    """Arrange a texture's numbers in rows of a given width; the last row is padded with zeros."""
     flat = data.reshape(-1)
     missing = -len(flat) % width
     if missing:
@@ -77,7 +78,7 @@ def as_columns(data: Any, width: int) -> Any:
 
 
 class Sections:
-    """The page's data, one section after another."""
+    """Data of the page, a sequence of sections."""
 
     def __init__(self) -> None:
         self._parts: list[Section] = []
@@ -89,11 +90,11 @@ class Sections:
 
     @property
     def nbytes(self) -> int:
-        """Bytes so far."""
+        """Number of bytes so far."""
         return sum(len(part.data) for part in self._parts)
 
     def joined(self) -> tuple[bytes, list[dict[str, Any]]]:
-        """All bytes, and where and how each section lies in them."""
+        """Return all bytes, and position and layout of each section."""
         layouts, start = [], 0
         for part in self._parts:
             layouts.append({**part.layout, "start": start, "length": len(part.data)})
@@ -103,19 +104,19 @@ class Sections:
 
 @dataclass(frozen=True)
 class Mesh:
-    """A surface's triangles."""
+    """Encoded triangles of a surface."""
 
-    # (vertices, n) sixteen-bit numbers of every vertex that differs from the others
+    # (vertices, n) sixteen-bit attributes of every distinct vertex
     columns: NDArray[np.uint16]
-    corners: NDArray[np.uint32]  # (3 · triangles, 1) indices into them
-    # (triangles, 2) where a triangle has one tangent, else they are in `columns`
+    corners: NDArray[np.uint32]  # (3 · triangles, 1) indices of vertices
+    # (triangles, 2) tangents, if each triangle has one; otherwise they are in `columns`
     tangents: NDArray[np.int16] | None
-    # of the columns, by attribute, as JSON; attributes with one value are there as it is
+    # columns of each attribute, as JSON types; a constant attribute has its value instead
     layout: dict[str, Any] = field(default_factory=dict)
 
 
 def packed_mesh(vertices: NDArray[np.float32]) -> Mesh:
-    """Vertices as `glsl.scene.VERTEX` says, three after another making a triangle."""
+    """Encode vertices (n, 16) with attributes of `glsl.scene.VERTEX`, three to a triangle."""
     parts: dict[str, NDArray[np.float32]] = {}
     start = 0
     for name, size in VERTEX:
@@ -148,7 +149,7 @@ def packed_mesh(vertices: NDArray[np.float32]) -> Mesh:
 
 
 def sections_of(mesh: Mesh, add: Any) -> dict[str, Any]:
-    """The mesh as the page's header names it; `add` takes sections and returns their numbers."""
+    """Return a mesh for the page's header; `add` stores a section and returns its number."""
     return {
         "columns": add(packed_array(mesh.columns, differences=True)),
         "corners": add(packed_array(mesh.corners, differences=True)),
@@ -160,25 +161,25 @@ def sections_of(mesh: Mesh, add: Any) -> dict[str, Any]:
 
 
 def octahedral(directions: NDArray[np.floating]) -> NDArray[np.int16]:
-    """Directions (n, 3) of any length as two numbers each (Cigolle et al. 2014), within 7e-5 rad.
+    """Encode directions (n, 3) of any length as two integers (Cigolle et al. 2014).
 
-    A vector of length 0 has no direction: both numbers are -32768.
+    The error is at most 7e-5 rad. Both integers of a vector of length 0 are -32768.
     """
     d = np.asarray(directions, np.float64)
     length = np.abs(d).sum(axis=1, keepdims=True)
-    known = length[:, 0] > 1e-20
+    nonzero = length[:, 0] > 1e-20
     d = d / np.where(length > 1e-20, length, 1.0)
     folded = (1.0 - np.abs(d[:, 1::-1])) * np.where(d[:, :2] < 0.0, -1.0, 1.0)
     plane = np.where(d[:, 2:] < 0.0, folded, d[:, :2])
     result = np.round(plane * _UNIT).astype(np.int16)
-    result[~known] = _NO_DIRECTION
+    result[~nonzero] = _NO_DIRECTION
     return result
 
 
 def _distinct(rows: NDArray[np.uint16]) -> tuple[NDArray[np.uint16], NDArray[np.uint32]]:
-    """Distinct rows in the order in which they come first, and the number of each row's own.
+    """Return distinct rows in the order of their first occurrence, and the index of each row.
 
-    That order keeps neighbours together, so that differences between them stay small.
+    The order keeps neighbours together, so that differences between them are small.
     """
     whole = np.ascontiguousarray(rows).view(np.dtype((np.void, rows.itemsize * rows.shape[1])))
     _, first, inverse = np.unique(whole.ravel(), return_index=True, return_inverse=True)
@@ -189,16 +190,18 @@ def _distinct(rows: NDArray[np.uint16]) -> tuple[NDArray[np.uint16], NDArray[np.
 
 
 def packed_parts(
-    packed: Packed, sections: Sections, done: Mapping[str, Section] | None = None
+    packed: Packed, sections: Sections, compressed: Mapping[str, Section] | None = None
 ) -> dict[str, Any]:
-    """Textures and uniforms as JSON; `done` are sections that are there already, by texture."""
+    """Return textures and uniforms as JSON types; `compressed` has sections of some textures."""
+    ready = compressed or {}
     return {
         "uniforms": {name: plain(value) for name, value in packed.uniforms.items()},
-        "textures": [_texture(t, sections, (done or {}).get(t.name)) for t in packed.textures],
+        "textures": [_texture(t, sections, ready.get(t.name)) for t in packed.textures],
     }
 
 
-def _texture(texture: Texture, sections: Sections, done: Section | None) -> dict[str, Any]:
+def _texture(texture: Texture, sections: Sections, section: Section | None) -> dict[str, Any]:
+    """Return a texture as JSON types, and store its data, if not yet compressed, as a section."""
     rows, columns, channels = texture.data.shape
     entry: dict[str, Any] = {
         "name": texture.name, "width": columns, "height": rows, "channels": channels,
@@ -212,14 +215,14 @@ def _texture(texture: Texture, sections: Sections, done: Section | None) -> dict
     entry["kind"] = {1: "bytes", 2: "half", 4: "single"}[data.dtype.itemsize]
     if data.dtype == np.uint32:
         entry["kind"] = "words"
-    if done is None:
-        done = packed_array(as_columns(data, channels), differences=entry["kind"] == "bytes")
-    entry["section"] = sections.add(done)
+    if section is None:
+        section = packed_array(as_columns(data, channels), differences=entry["kind"] == "bytes")
+    entry["section"] = sections.add(section)
     return entry
 
 
 def _png(data: NDArray[np.generic]) -> bytes:
-    """A picture of reflectances as eight bits of sRGB, as which nearly all of them began."""
+    """Encode a picture of reflectances in 8-bit sRGB, the format of nearly all source files."""
     from PIL import Image
 
     linear = np.asarray(data, np.float64)[..., :3]

@@ -1,4 +1,4 @@
-"""The tables of a page: as many digits of them as fit."""
+"""Tables of a page, rounded to as many digits as fit into its size."""
 
 from __future__ import annotations
 
@@ -18,40 +18,42 @@ from ..glsl.packing import pack_colours, pack_powers
 from ..glsl.texels import Packed, shortened
 from .sections import Section, as_columns, packed_array
 
-#: What a page can draw with.
+#: Methods that a page supports.
 WEB_METHODS = ("lut", "spectral")
 
-#: Binary digits that are tried, from the largest page to the smallest.
+#: Numbers of binary digits, from the largest page to the smallest.
 DIGITS = (9, 8, 7, 6)
 
-_ORDERS = 5  # that are named, at most
-_LARGE = 1 << 20  # entries of the textures that are rounded
+_ORDERS = 5  # largest number of orders that the page names
+_LARGE = 1 << 20  # least number of entries of rounded textures
 
 
 @dataclass(frozen=True)
 class WebTable:
-    """One table for one method."""
+    """Rounded table for one method."""
 
-    packed: Packed  # textures, uniforms and definitions for the shader, rounded
-    sections: dict[str, Section]  # of the textures, by name
-    # mean and 99th percentile of ΔE2000 against the table that was not rounded
-    loss: tuple[float, float]
+    packed: Packed  # textures, uniforms and definitions for the shader
+    sections: dict[str, Section]  # compressed textures, by name
+    loss: tuple[float, float]  # mean and 99th percentile of ΔE2000 from the exact table
 
     @property
     def nbytes(self) -> int:
-        """Bytes of its sections."""
+        """Number of bytes of the sections."""
         return sum(len(section.data) for section in self.sections.values())
 
 
 def web_table(method: str, table: DiffractionTable, digits: int) -> WebTable:
-    """A table with fewer binary digits, for one of `WEB_METHODS`; not `spectral` where coherent."""
+    """Round a table to fewer binary digits for one of `WEB_METHODS`.
+
+    `spectral` does not support coherent tables.
+    """
     if method == "lut":
         colours = cached_colours(table)
-        # halves that the shader can read
+        # rounded twice, so that the upper halves of floats, which the shader reads, are exact
         coefficients = shortened(rounded(colours.coefficients, digits)).astype(np.float16)
         fewer = replace(colours, coefficients=coefficients, order_0=shortened(colours.order_0))
         packed, loss = pack_colours(fewer), colour_difference(colours, fewer)
-        width = fewer.coefficients.shape[-1] // 2  # two numbers a word
+        width = fewer.coefficients.shape[-1] // 2  # a word has two numbers
     else:
         series, order_0, scale, expansion = power_series(table)
         powers = replace(
@@ -71,10 +73,10 @@ def web_table(method: str, table: DiffractionTable, digits: int) -> WebTable:
 
 
 def rounded(values: NDArray[np.floating], bits: int) -> NDArray[np.float16]:
-    """Each row (…, n) rounded to multiples of 2^-bits of its largest number's power of two.
+    """Round each row (…, n) to multiples of 2^-bits of its largest number's power of two.
 
-    A row is one series: what is added up has one absolute error. As half floats the results end in
-    zeros, which compress.
+    A row is one series, whose terms are added up, so they get one absolute error. The half floats
+    end in zeros, which compress well.
     """
     exact = values.astype(np.float32)
     largest = np.abs(exact).max(axis=-1, keepdims=True)
@@ -85,29 +87,29 @@ def rounded(values: NDArray[np.floating], bits: int) -> NDArray[np.float16]:
 def fitting_tables(
     methods: Sequence[str], tables: Sequence[DiffractionTable], room: int, progress: Progress
 ) -> dict[tuple[str, int], WebTable] | int:
-    """Tables for all methods with as many digits as fit into a number of bytes.
+    """Round tables for all methods to as many digits as fit into `room` bytes.
 
-    Returns those by method and number of the table; or, if nothing fits, the least bytes it takes.
+    Returns the tables by method and number, or the number of bytes that is needed if none fit.
     """
-    least = 0
+    needed = 0
     for digits in DIGITS:
-        found: dict[tuple[str, int], WebTable] = {}
+        rounded_tables: dict[tuple[str, int], WebTable] = {}
         for method in methods:
             for number, table in enumerate(tables):
-                done = len(found)
+                done = len(rounded_tables)
                 progress(done, len(methods) * len(tables), f"{method}, {digits} digits")
-                found[method, number] = web_table(method, table, digits)
-        least = sum(one.nbytes for one in found.values())
-        if least <= room:
-            return found
-    return least
+                rounded_tables[method, number] = web_table(method, table, digits)
+        needed = sum(web.nbytes for web in rounded_tables.values())
+        if needed <= room:
+            return rounded_tables
+    return needed
 
 
 def strongest_orders(table: DiffractionTable) -> list[list[float]]:
-    """The few brightest orders in green light along the normal, each apart from the others.
+    """Return the brightest separate orders in green light along the normal.
 
-    Returns q_x and q_y of each, rad/µm, and its share of the light; of a pair ±q one. None of a
-    table whose orders interfere.
+    Each entry has q_x and q_y in rad/µm, and the share of the light; a pair ±q has one entry. The
+    list of a coherent table is empty.
     """
     if table.grid.coherent:
         return []
@@ -118,13 +120,15 @@ def strongest_orders(table: DiffractionTable) -> list[list[float]]:
     last = np.array(table.grid.last)
     y, x = np.divmod(np.argsort(powers, axis=None)[::-1], powers.shape[1])
     q = (np.stack([x, y], axis=1) - last) * table.spacing
-    shares, apart = np.sort(powers, axis=None)[::-1], 2.0 / table.sigma
-    found: list[list[float]] = []
-    for at, share in zip(q, shares, strict=True):
-        if len(found) == _ORDERS or share <= 1e-5:
+    shares, separation = np.sort(powers, axis=None)[::-1], 2.0 / table.sigma
+    orders: list[list[float]] = []
+    for position, share in zip(q, shares, strict=True):
+        if len(orders) == _ORDERS or share <= 1e-5:
             break
-        taken = np.array([one[:2] for one in found] or [[0.0, 0.0]])
-        near = np.minimum(*(np.linalg.norm(taken - sign * at, axis=1) for sign in (1.0, -1.0)))
-        if min(near.min(), np.linalg.norm(at)) > apart:
-            found.append([float(at[0]), float(at[1]), float(share)])
-    return found
+        others = np.array([order[:2] for order in orders] or [[0.0, 0.0]])
+        distances = np.minimum(
+            *(np.linalg.norm(others - sign * position, axis=1) for sign in (1.0, -1.0))
+        )
+        if min(distances.min(), np.linalg.norm(position)) > separation:
+            orders.append([float(position[0]), float(position[1]), float(share)])
+    return orders

@@ -74,7 +74,7 @@ def roughness_of(patches: Sequence[HeightField], q_max: float) -> RoughnessTable
     each = []
     for patch in patches:
         if patch.heights.size <= LARGE:
-            each.append(ScaleRoughness.of(patch.heights, patch.pixel_size))
+            each.append(ScaleRoughness.from_heights(patch.heights, patch.pixel_size))
         else:
             each.append(ScaleRoughness.mean(_parts(Windows([patch], math.inf)).roughness()))
     return ScaleRoughness.mean(each).table(q_max)

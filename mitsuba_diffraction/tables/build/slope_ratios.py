@@ -23,14 +23,14 @@ def slope_ratios(
     """
     q_limit = q_limit_of(settings.wavelength_range)
     x, y = settings.frequency_limit or (q_limit, q_limit)
-    grid = CellGrid.of(
+    grid = CellGrid.for_patches(
         next(sections(patches))[0].extent,
         max(patch.rms_height for patch in patches),
         q_limit,
         (min(x, q_limit), min(y, q_limit)),
         q_limit * settings.height_scale_max,
     )
-    sums = CellSums.of(sections(patches), grid)
+    sums = CellSums.of_patches(sections(patches), grid)
     ratios = sums.ratios()
     change = colour_change(sums, ratios, roughness, settings.wavelength_range)
     return replace(ratios, change=change)

@@ -208,7 +208,7 @@ class Windows(Sequence[HeightField]):
     def roughness(self) -> list[ScaleRoughness]:
         """Roughness of some of the windows, their heights tapered like the screens."""
         return [
-            ScaleRoughness.of((w.heights - w.heights.mean()) * self.taper, w.pixel_size)
+            ScaleRoughness.from_heights((w.heights - w.heights.mean()) * self.taper, w.pixel_size)
             for w in self.some()
         ]
 

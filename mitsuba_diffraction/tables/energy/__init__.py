@@ -9,6 +9,5 @@ transport      sums over the orders for directions of incidence
 scaling        the scale of a symmetric kernel with given sums
 conservation   the scale by which no more is reflected than comes in
 transmission   the scale of order 0 by which reflected and transmitted light add up to 1
-film           the mean of the second order under a film
 store          all of it in the cache
 """

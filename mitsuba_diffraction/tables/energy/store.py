@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...optics import mean_second_order
 from ...optics.fresnel import Filmed
 from ..height_scales import HeightScales
-from ..sampling import MOST_STRONG, STRONG
+from ..order_mixture import MOST_STRONG, STRONG
 from ..store import Record, kept, key_of
 from ..table import DiffractionTable
 from .conservation import Conservation, Index, Surface

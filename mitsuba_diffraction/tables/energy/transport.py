@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from scipy.special import i0e
 
 from ...optics.geometry import wavenumber
+from ..order_mixture import order_mixture
 from ..powers import order_0_power
-from ..sampling import order_mixture
 from ..table import DiffractionTable
 from .gain import LEAST_COSINE, Boundary, Gain
 from .grid import Array, DirectionGrid, LinearMap, Real

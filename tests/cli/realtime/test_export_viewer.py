@@ -112,5 +112,5 @@ def test_a_scene_without_diffraction_is_refused(
     out = tmp_path / "dull.html"
     assert main(["export-viewer", str(file), str(out)]) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert "nothing in the scene diffracts" in line
+    assert "diffracts" in line
     assert not out.exists()

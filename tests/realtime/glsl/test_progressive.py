@@ -374,7 +374,7 @@ def test_lobes_and_lights_share_what_surrounds_a_scene(
             "sensor": {
                 "type": "perspective", "fov": 50,
                 "to_world": T().look_at([0, -2.4, 2.4], [0, 0.5, 0.2], [0, 0, 1]),
-                "film": {"type": "hdrfilm", "width": 96, "height": 72},
+                "film": {"type": "hdrfilm", "width": 64, "height": 48},
             },
             "lamp": {
                 "type": "disk", "to_world": lamp,
@@ -476,7 +476,7 @@ def test_an_environment_that_is_not_finite_is_refused(some_variant: str) -> None
     picture = np.ones((8, 16, 3), np.float32)
     picture[2, 3] = np.inf
     scene = {"type": "scene", "sky": {"type": "envmap", "id": "sky", "bitmap": mi.Bitmap(picture)}}
-    with pytest.raises(DiffractionError, match="not finite"):
+    with pytest.raises(DiffractionError, match="infinite or NaN"):
         Emitters(mi.load_dict(scene), np.zeros(3))
 
 
@@ -484,5 +484,5 @@ def test_a_scene_whose_emitters_are_dark_is_refused(some_variant: str) -> None:
     dark = {"type": "point", "intensity": {"type": "uniform", "value": 0.0}}
     for parts in ({}, {"dark": dark}):
         scene = mi.load_dict({"type": "scene", **parts})
-        with pytest.raises(DiffractionError, match="no emitter of the scene brings light"):
+        with pytest.raises(DiffractionError, match="no emitter of the scene lights"):
             Emitters(scene, np.zeros(3))

@@ -17,7 +17,7 @@ def solid_of(**shape: Any) -> Solid:
     found = triangles_of(mi.load_dict(shape))
     triangles, normals = (x.reshape(-1, 3, 3) for x in (found.positions, found.normals))
     around = np.array([[-9.0, -9.0, 0.0], [9.0, 9.0, 6.0]])
-    return Solid.of(triangles, normals, np.concatenate([around, triangles.reshape(-1, 3)]))
+    return Solid.analyse(triangles, normals, np.concatenate([around, triangles.reshape(-1, 3)]))
 
 
 def light(*place: float) -> Light:
@@ -52,7 +52,7 @@ def test_what_is_more_bent_needs_more_bias(some_variant: str) -> None:
     assert 0.0 < flat < smooth < 0.1
     triangle = np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])
     bent = np.array([[[0.0, 0.0, 1.0], [0.3, 0.0, 1.0], [0.0, 0.0, 1.0]]])
-    assert Solid.of(triangle, bent, triangle[0]).bias > 0.5
+    assert Solid.analyse(triangle, bent, triangle[0]).bias > 0.5
 
 
 def test_an_outline_reaches_as_far_as_what_it_is_of() -> None:

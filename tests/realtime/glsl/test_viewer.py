@@ -24,7 +24,7 @@ def camera() -> Camera:
 
 
 def test_turning_keeps_the_distance_and_looks_at_the_point(some_variant: str) -> None:
-    orbit = Orbit.of(camera(), np.zeros(3))
+    orbit = Orbit.start(camera(), np.zeros(3))
     for right, up in ((0.3, 0.0), (0.0, 0.2), (-1.0, -0.4)):
         turned = orbit.turned(right, up)
         assert turned.distance == pytest.approx(orbit.distance)
@@ -37,14 +37,14 @@ def test_turning_keeps_the_distance_and_looks_at_the_point(some_variant: str) ->
 
 
 def test_turning_never_goes_over_the_top(some_variant: str) -> None:
-    orbit = Orbit.of(camera(), np.zeros(3))
+    orbit = Orbit.start(camera(), np.zeros(3))
     for _ in range(100):
         orbit = orbit.turned(0.0, 0.1)
         assert orbit.to_world[2, 1] > 0.0
 
 
 def test_moving_and_zooming_keep_the_direction(some_variant: str) -> None:
-    orbit = Orbit.of(camera(), np.zeros(3))
+    orbit = Orbit.start(camera(), np.zeros(3))
     assert orbit.zoomed(0.5).distance == pytest.approx(0.5 * orbit.distance)
     moved = orbit.panned(0.1, 0.2)
     np.testing.assert_array_equal(moved.to_world[:3, :3], orbit.to_world[:3, :3])
@@ -53,7 +53,7 @@ def test_moving_and_zooming_keep_the_direction(some_variant: str) -> None:
 
 
 def test_a_dragged_light_keeps_its_distance(some_variant: str) -> None:
-    orbit = Orbit.of(camera(), np.array([0.0, 0.0, 0.0]))
+    orbit = Orbit.start(camera(), np.array([0.0, 0.0, 0.0]))
     spectrum = (np.array([360.0, 830.0]), np.ones(2))
     sun = dragged(Light("sun", np.array([0.0, 0.6, 0.8, 0.0]), *spectrum), orbit, 0.4, 0.1)
     assert np.linalg.norm(sun.place[:3]) == pytest.approx(1.0)

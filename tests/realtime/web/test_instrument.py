@@ -287,7 +287,7 @@ def test_a_page_without_its_data_says_so(
     path.write_text(text, encoding="utf-8")
     opened = tab()
     assert opened.open(path) == "failed"
-    assert "not complete" in opened.page.inner_text("#message")
+    assert "incomplete" in opened.page.inner_text("#message")
     assert opened.said == []
 
 

@@ -108,7 +108,7 @@ def test_sliders_change_the_picture(page_file: Path, tab: Any) -> None:
             WebGL2RenderingContext.prototype.getParameter = function (name) {
                 return name === this.MAX_TEXTURE_SIZE ? 64 : all.call(this, name);
             }""",
-            "this device has 64",
+            "this device supports 64",
         ),
     ],
 )
@@ -178,7 +178,7 @@ def test_what_does_not_fit_is_left_out_from_the_last_on(
     # the pages of the triangles alone take 0.35 MB
     monkeypatch.setattr(packing, "_HEADER", MAX_BYTES - 1000)
     monkeypatch.setattr(packing, "OCTAVES", (0.0,))
-    with pytest.raises(DiffractionError, match=r"does not fit into a page \(spectral: .*; lut: "):
+    with pytest.raises(DiffractionError, match=r"is too large for a page \(spectral: .*; lut: "):
         make_page(scene)
 
 

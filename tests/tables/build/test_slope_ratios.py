@@ -37,7 +37,7 @@ def of_table(patches, settings: TableSettings) -> SlopeRatios:
 
 def exact(field: HeightField, order: tuple[int, int], kappa: float) -> np.ndarray:
     """r_l, r_t of an order (x, y), by plane transforms."""
-    slopes = Slopes.of(field.heights, field.pixel_size)
+    slopes = Slopes.from_heights(field.heights, field.pixel_size)
     screen = np.exp(-1j * kappa * field.heights)
     a, *products = (np.fft.fft2(f * screen)[order[::-1]] for f in (1.0, *slopes.products))
     q = 2 * np.pi * np.array(order) / field.extent
@@ -62,7 +62,7 @@ def test_cells_of_many_orders_are_their_mean_by_power():
     kappa, place = found.kappa[1], np.array([2, 1])
     q = place * found.cell
     step = 2 * np.pi / np.array(MANY.extent)
-    slopes = Slopes.of(MANY.heights, MANY.pixel_size)
+    slopes = Slopes.from_heights(MANY.heights, MANY.pixel_size)
     screen = np.exp(-1j * kappa * MANY.heights)
     spectra = [np.fft.fft2(f * screen) for f in (1.0, *slopes.products)]
     total, power = np.zeros(2, complex), 0.0

@@ -49,9 +49,9 @@ statistics. `make validation` computes every number on it.
 - Vertical walls are less accurate at any depth, most of all on metals and in oblique light.
 - The default, `model="small_slope"`, is better than `model="kirchhoff"`, most of all in oblique
   light and in polarised light.
-- `second_order=true` corrects dielectric discs in oblique light, and scales by a tenth of their
-  error. By default a table takes it in where it changes its colours by at least 5 %; `info` prints
-  that figure.
+- `second_order=true` removes most of the error of dielectric discs in oblique light, and a tenth of
+  that of scales. By default a table applies it if its colours change by 5 % or more, as those of
+  discs do and those of scales do not ([theory.md](theory.md#the-second-order)).
 
 ## Deviation by surface
 

@@ -1,11 +1,11 @@
-// What lies behind the scene: the environment along a pixel's ray.
+// Background: the environment along a pixel's ray.
 
-uniform mat4 from_clip;           // the view's, inverted
+uniform mat4 from_clip;           // from clip space to the scene
 uniform vec3 eye;
 uniform vec2 picture_size;
-uniform vec3 horizon;             // upwards, if skies that are dark below go on there; else zero
+uniform vec3 horizon;             // up direction, if half skies are mirrored below; else zero
 
-const float HAZE = 0.03;          // sine of the lowest height that is shown of such a sky
+const float HAZE = 0.03;          // sine of the lowest elevation of a mirrored half sky
 
 out vec4 fragment;
 

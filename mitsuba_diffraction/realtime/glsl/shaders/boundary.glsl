@@ -1,9 +1,9 @@
-// What the material makes of the light: N' / (1 + ωi·ωo)², the twin of plugin/boundary.py and
-// plugin/layers.py. Kirchhoff's is the reflectance at the half vector.
+// Boundary factor of the material, N' / (1 + ωi·ωo)², like plugin/boundary.py and plugin/layers.py.
+// Kirchhoff's factor is the reflectance at the half vector.
 
 #ifdef COATED
 
-uniform float coat;               // index of the layer over the structure, over that outside
+uniform float coat;               // index of the coat over that of the medium above
 
 vec3 refracted(vec3 w)
 {
@@ -11,7 +11,7 @@ vec3 refracted(vec3 w)
     return vec3(tangential, sqrt(max(1.0 - dot(tangential, tangential), 1e-12)));
 }
 
-// T_s and T_p of the layer's face.
+// Transmittances T_s and T_p of the coat's face.
 vec2 transmittances(float cosine)
 {
     float inside = sqrt(max(cosine * cosine + coat * coat - 1.0, 0.0));
@@ -19,12 +19,12 @@ vec2 transmittances(float cosine)
     return vec2(1.0, coat * coat) * 4.0 * cosine * inside / (below * below);
 }
 
-// What the face reflects, over what `outside` has for the structure.
+// Reflection by the face, relative to the factor `outside` of the structure.
 float face_reflected;
 
 float face_reflectance(float cosine) { return 1.0 - 0.5 * dot(transmittances(cosine), vec2(1.0)); }
 
-// 1 − T T / (1 − R R) of both faces.
+// Reflectance of a flat coated interface: 1 − T T / (1 − R R) of both faces.
 vec3 flat_reflectance(float cosine)
 {
     float inside = sqrt(max(cosine * cosine + coat * coat - 1.0, 0.0)) / coat;
@@ -49,7 +49,7 @@ float boundary_at(float cos_half, float k, float r, float z) { return reflectanc
 
 #else
 
-// A dielectric's matrices are real.
+// Matrices of a dielectric are real.
 #if SURFACE_KIND == DIELECTRIC
 #define NUMBER float
 
@@ -65,7 +65,7 @@ vec2 times(vec2 a, vec2 b) { return vec2(a.x * b.x - a.y * b.y, a.x * b.y + a.y 
 vec2 inverse_of(vec2 a) { return vec2(a.x, -a.y) / dot(a, a); }
 vec2 plus(vec2 a, float b) { return vec2(a.x + b, a.y); }
 
-// The root whose wave decays, or else travels, away from the surface.
+// Square root whose wave decays, or else propagates, away from the surface.
 vec2 root(vec2 a)
 {
     float larger = sqrt(0.5 * (length(a) + abs(a.x)));
@@ -75,16 +75,16 @@ vec2 root(vec2 a)
 
 #endif
 
-// Of the pair: cosines and squared sines, products of the turns to the facet's axis and back, ...
-vec2 pair_cosines, pair_squares;
-vec4 pair_turns;
+// Values of the pair, set by `begin_pair`.
+vec2 pair_cosines, pair_squares;  // cosines and squared sines
+vec4 pair_turns;                  // products of the rotations to the facet's axis and back
 float pair_dot, pair_cross, pair_sines, pair_half, pair_one_plus_dot;
-vec2 pair_there, pair_back;       // ... T_s and T_p of a coat
-vec4 pair_through;                // ... and what it makes of each entry
+vec2 pair_there, pair_back;       // T_s and T_p of a coat
+vec4 pair_through;                // factor of the coat on each entry of the matrices
 
 const float NORMAL = 1e-20;       // squared sine
 
-// |r_s|² and |r_p|² of the flat structure; inside: the cosine in it times its index.
+// |r_s|² and |r_p|² of the flat structure; inside: cosine inside times the index.
 vec2 mirrored(NUMBER epsilon, NUMBER inside, float cosine)
 {
     NUMBER raised = epsilon * cosine;
@@ -93,7 +93,7 @@ vec2 mirrored(NUMBER epsilon, NUMBER inside, float cosine)
     return vec2(dot(r_s, r_s), dot(r_p, r_p));
 }
 
-// √(T T G): through the coat's face and back, and what it sends to the structure again.
+// √(T T G): transmittances of the coat's face, and reflections between coat and structure.
 vec4 through_coat(vec2 structure0, vec2 structure)
 {
     vec2 face0 = max(1.0 - pair_there, 0.0), face = max(1.0 - pair_back, 0.0);
@@ -151,8 +151,8 @@ float mean_power(NUMBER tangent[4], NUMBER gentle[4], float s)
 
 #ifdef SMALL_SLOPE
 
-uniform sampler2D roughness;      // σ_q² at a node in log2 q and at the next
-uniform float first_octave;       // of the first node
+uniform sampler2D roughness;      // σ_q² at a node in log2 q and at the next one
+uniform float first_octave;       // log2 q of the first node
 uniform float last_node;
 
 // s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3)
@@ -175,7 +175,7 @@ float gentle_share(NUMBER index, float k, float r, float z) { return 0.0; }
 
 #if SURFACE_KIND == DIELECTRIC
 
-float pair_tangent[4], pair_gentle[4];  // at all wavelengths
+float pair_tangent[4], pair_gentle[4];  // equal at all wavelengths
 
 void of_material() { matrices(eta, pair_tangent, pair_gentle); }
 
@@ -214,7 +214,8 @@ float boundary_at(float cos_half, float k, float r, float z)
     return of_index(index, gentle_share(index, k, r, z));
 }
 
-// A channel's reflectance is that of daylight, what is beside it that at the channel's mean.
+// Boundary factor of each channel: the reflectance under daylight, times the ratio of the blended to
+// Kirchhoff's factor at the channel's mean wavelength.
 vec3 boundary(float cos_half, float r, float z)
 {
     vec3 found;
@@ -233,7 +234,7 @@ vec3 boundary(float cos_half, float r, float z)
 
 #endif
 
-// What all wavelengths share, of directions above the structure.
+// Prepare the values of a pair of directions above the structure that all wavelengths share.
 // there, back: transmittances of a coat.
 void begin_pair(vec3 wi, vec3 wo, vec2 there, vec2 back)
 {

@@ -1,4 +1,4 @@
-// f·cosθ of the diffraction times the light's irradiance; what a method adds is `diffracted`.
+// f·cosθ of the diffraction times the light's irradiance; each method defines `diffracted`.
 
 vec3 diffraction(vec3 wi, vec3 wo, vec2 rotation, int light)
 {

@@ -1,7 +1,7 @@
-// What plain materials mirror: microfacets (Walter et al. 2007), or a smooth face; the twin of
+// Specular reflection of plain materials: microfacets (Walter et al. 2007), or a smooth face. See
 // materials.py.
 
-uniform float gloss_alpha;        // roughness
+uniform float gloss_alpha;        // roughness α
 
 float microfacets(float cosine)
 {
@@ -15,7 +15,7 @@ float microfacets(float cosine)
 #endif
 }
 
-// What of the facets is seen along a direction (Smith 1967).
+// Share of the facets that is visible along a direction (Smith 1967).
 float unshadowed(float cosine)
 {
     float squared = max(cosine * cosine, 1e-8);
@@ -29,9 +29,9 @@ float unshadowed(float cosine)
 }
 
 #ifdef PRINCIPLED
-vec3 base_colour;                 // of the fragment
+vec3 base_colour;                 // base colour of the fragment
 
-// A dielectric's facets, and a metal's by Schlick (Burley 2012).
+// Reflectance of facets: a dielectric, and a metal by Schlick's formula (Burley 2012).
 vec3 facet_reflectance(float cosine)
 {
     vec3 metal = mix(base_colour, vec3(1.0), fifth_power(1.0 - cosine));
@@ -41,11 +41,11 @@ vec3 facet_reflectance(float cosine)
 vec3 facet_reflectance(float cosine) { return reflectance(cosine); }
 #endif
 
-// f·cosθ, wi towards the eye.
+// f·cosθ; wi points to the eye.
 vec3 gloss(vec3 wi, vec3 wo)
 {
 #ifdef MIRROR
-    return reflectance(wi.z);  // along the one direction that is mirrored
+    return reflectance(wi.z);  // along the mirror direction
 #else
     vec3 h = normalize(wi + wo);
     return facet_reflectance(dot(wi, h)) * (microfacets(h.z) * unshadowed(wi.z) * unshadowed(wo.z)

@@ -1,4 +1,4 @@
-// A shape that emits light, along its normal's side.
+// Shape that emits light, on the side of its normal.
 
 in vec3 v_position;
 in vec3 v_normal;

@@ -1,8 +1,8 @@
-// A surface's own constants, the patch's frame, and what is left for what lies beneath.
+// Constants of a surface, the patch's frame, and the light that reaches the base beneath.
 
 uniform float area_factor;        // 4πσ², that is 4π²σ⁴ over the window's area πσ²
 uniform float height_scale;
-uniform float diffuse_weight;     // of layering `thesis`
+uniform float diffuse_weight;     // weight of the base with layering `thesis`
 
 vec2 in_patch(vec3 direction, vec2 rotation)
 {
@@ -10,11 +10,11 @@ vec2 in_patch(vec3 direction, vec2 rotation)
                 rotation.x * direction.y - rotation.y * direction.x);
 }
 
-const float LOWEST = 1e-6;  // cosine of what is seen or lit, so that all is finite
+const float LOWEST = 1e-6;  // least cosine of a direction, which keeps results finite
 
 #ifdef DIFFRACTING
 
-// What the surface reflects of a direction's light, at most all.
+// Albedo of the surface for one direction, at most 1.
 vec3 albedo(vec3 w, vec2 rotation)
 {
     vec3 found = flat_reflectance(w.z);
@@ -28,7 +28,7 @@ vec3 albedo(vec3 w, vec2 rotation)
 
 #ifdef THROUGH
 
-uniform sampler2D through;        // what a plain material's face lets through, over cosθ
+uniform sampler2D through;        // transmittance of a plain material's face, over cosθ
 
 float passed(float cosine)
 {
@@ -42,12 +42,12 @@ float passed(float cosine)
 
 #ifdef PRINCIPLED
 
-uniform float metallic;           // share of a metal
+uniform float metallic;           // share of the metal
 uniform float roughness;
 
 float fifth_power(float x) { return x * x * x * x * x; }
 
-// The base of the principled BSDF over a diffuse one, with what rough ones throw back (Burley 2012).
+// Base of the principled BSDF relative to a diffuse one, with retro-reflection (Burley 2012).
 float burley(vec3 wi, vec3 wo)
 {
     float there = fifth_power(1.0 - wo.z), back = fifth_power(1.0 - wi.z);
@@ -58,7 +58,7 @@ float burley(vec3 wi, vec3 wo)
 
 #endif
 
-// Share of the light that reaches what lies beneath and comes back.
+// Share of the light that passes the surface twice, to the base and back.
 vec3 transmission(vec3 wi, vec3 wo, vec2 rotation)
 {
 #if defined(THROUGH)

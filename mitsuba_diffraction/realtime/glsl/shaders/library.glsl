@@ -1,8 +1,8 @@
-// What all methods share: reading lists, the surface's reflectance, shadowing, energy, display.
+// Functions that all methods share: lists, reflectance, shadowing, energy conservation, display.
 
 const float PI = 3.14159265358979;
 
-// Number i of a list, which lies in rows of PAGE = 2^PAGE_BITS texels.
+// Entry i of a list, which is stored in rows of PAGE = 2^PAGE_BITS texels.
 vec4 entry(sampler2D list, int i)
 {
     return texelFetch(list, ivec2(i & (PAGE - 1), i >> PAGE_BITS), 0);
@@ -15,7 +15,7 @@ uvec4 entry(usampler2D list, int i)
     return texelFetch(list, ivec2(i & (PAGE - 1), i >> PAGE_BITS), 0);
 }
 
-// Two numbers of single precision, of which a word holds the upper halves.
+// Two floats whose upper halves a word stores.
 vec2 upper_halves(uint word)
 {
     return uintBitsToFloat(uvec2(word << 16, word & 0xffff0000u));
@@ -47,49 +47,49 @@ vec3 elevations(vec3 cosines)
 #ifdef LIGHTS
 uniform vec3 light_colour[LIGHTS];  // irradiance, or intensity of a point light, linear sRGB
 #else
-const vec3 light_colour[1] = vec3[1](vec3(1.0));  // whoever calls multiplies by the light's own
+const vec3 light_colour[1] = vec3[1](vec3(1.0));  // the caller multiplies by the light's colour
 #endif
 
 // ---------------------------------------------------------------- reflectance
 
-// Kinds and parts that a surface lacks are left out by the preprocessor: software rasterisers go
-// through both sides of a branch, whatever a uniform says, and through a loop's body once. What all
-// fragments run is free of branches: Mesa's rasteriser then takes 40 % less time.
+// The preprocessor removes the code of features that a surface lacks: software rasterisers execute
+// both sides of a branch on a uniform, and a loop's body at least once. Code that all fragments run
+// has no branches, which saves Mesa's rasteriser 40 % of the time.
 #define PERFECT 0
 #define DIELECTRIC 1
 #define CONDUCTOR 2
 
-uniform vec2 wavenumbers;        // ends of what the eye sees, rad/µm
-uniform vec3 channel_wavenumbers;  // of the mean wavelengths of red, green and blue
+uniform vec2 wavenumbers;        // ends of the visible range, rad/µm
+uniform vec3 channel_wavenumbers;  // at the mean wavelengths of red, green and blue, rad/µm
 
 #if SURFACE_KIND == DIELECTRIC
 
-uniform float eta;               // inside over outside
+uniform float eta;               // index inside over index outside
 
 // Unpolarised power reflectance of an interface between dielectrics (Fresnel).
 float fresnel(float cos_i)
 {
-    // no branch: rasterisers in software pay for each one; cos_t = 0 is total reflection
+    // without a branch for total reflection, where cos_t = 0
     float cos_t = sqrt(max(1.0 - (1.0 - cos_i * cos_i) / (eta * eta), 0.0));
     vec2 a = vec2(cos_i, eta * cos_i);
     vec2 b = vec2(eta * cos_t, cos_t);
     vec2 below = a + b;
-    vec2 crossed = (a - b) * below.yx;  // over one denominator
+    vec2 crossed = (a - b) * below.yx;  // numerators over a common denominator
     return 0.5 * dot(crossed, crossed) / (below.x * below.x * below.y * below.y);
 }
 
 // R in linear sRGB, under daylight.
 vec3 reflectance(float cos_i) { return vec3(fresnel(cos_i)); }
-vec3 tinted(vec3 colour) { return colour; }  // R is nearly the same within a channel
+vec3 tinted(vec3 colour) { return colour; }  // R is nearly constant within a channel
 
-// R at one wavenumber: the product of what is the same at all, and the rest.
+// R at one wavenumber: the product of a factor for all wavenumbers and one for this wavenumber.
 float reflectance_at_all(float cos_i) { return fresnel(cos_i); }
 float reflectance_at(float cos_i, float k) { return 1.0; }
 
 #elif SURFACE_KIND == CONDUCTOR
 
-uniform sampler2D reflectances;  // columns over cosθ, rows over k, colours in the last; beside
-                                 // them the index n + ik of a row
+uniform sampler2D reflectances;  // columns over cosθ, rows over k, the last row in linear sRGB; the
+                                 // other channels have the index n + ik of the row
 uniform vec3 channel_eta;        // the index at the mean wavelengths of red, green and blue
 uniform vec3 channel_k;
 uniform vec3 tint_0, tint_1, tint_2;  // columns of optics/colour.py's metal_tint
@@ -141,9 +141,9 @@ float groove_shadow(float cos_i, float cos_o, float one_plus_dot)
 
 #ifdef GRID_POLAR
 
-uniform float energy_page;   // between pages, which are for different height scales
+uniform float energy_page;   // fractional number of the page; each page is for one height scale
 
-// Row and column on a grid of directions (tables/energy/grid.py), given the tangential part.
+// Fractional row and column on the grid of directions (tables/energy/grid.py).
 vec2 on_grid(vec2 tangential, float cosine)
 {
     float remaining = max(elevations(vec3(cosine)).x, 0.0);
@@ -163,7 +163,7 @@ int lower_page() { return int(clamp(floor(energy_page), 0.0, float(GRID_PAGES - 
 
 #ifdef BENEATH
 
-uniform sampler2D beneath;   // rows of all pages; columns go all around
+uniform sampler2D beneath;   // rows of all pages; columns over the azimuth, periodic
 
 vec3 beneath_on_page(int page, vec2 cell)
 {
@@ -171,7 +171,7 @@ vec3 beneath_on_page(int page, vec2 cell)
     return texture(beneath, (vec2(cell.y, row) + 0.5) / vec2(textureSize(beneath, 0))).rgb;
 }
 
-// Albedo over the flat interface's reflectance, of a direction's tangential part in the patch's frame.
+// Albedo over the flat interface's reflectance; the tangential part is in the patch's frame.
 vec3 reflected_ratio(vec2 tangential, float cosine)
 {
     vec2 cell = on_grid(tangential, cosine);
@@ -193,7 +193,7 @@ float energy_on_page(int page, vec2 cell)
     return mix(along.x, along.y, t.x);
 }
 
-// s of a direction, given its tangential part in the patch's frame.
+// Energy scale s of a direction; the tangential part is in the patch's frame.
 float energy_scale(vec2 tangential, float cosine)
 {
     vec2 cell = on_grid(tangential, cosine);
@@ -204,7 +204,7 @@ float energy_scale(vec2 tangential, float cosine)
 
 // ---------------------------------------------------------------- display
 
-// What a display is sent (IEC 61966-2-1), clipped.
+// Encode linear sRGB for a display (IEC 61966-2-1), clipped.
 vec3 encode_srgb(vec3 linear)
 {
     vec3 c = clamp(linear, 0.0, 1.0);

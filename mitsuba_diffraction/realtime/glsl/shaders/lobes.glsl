@@ -1,11 +1,11 @@
-// Directions that are drawn from what a surface mirrors or diffracts, and with which density.
+// Directions drawn from a surface's specular or diffraction lobes, and their probability densities.
 
 #if defined(DIFFRACTING)
 
-uniform sampler2D lobe_places;     // (u, v), as dense as they are bright
-uniform sampler2D lobe_densities;  // per area of (u, v): azimuths × rings
+uniform sampler2D lobe_places;     // points (u, v), as dense as the lobes are bright
+uniform sampler2D lobe_densities;  // density per area of (u, v): azimuths × rings
 uniform float lobe_smallest;       // radius of the innermost cell
-uniform float lobe_step;           // of the others in ln r
+uniform float lobe_step;           // width of the other cells in ln r
 
 float lobe_density(vec3 wi, vec3 wo, vec2 rotation)
 {

@@ -1,19 +1,19 @@
-// `lut`: the colours of daylight, summed over all wavelengths beforehand; the twin of
-// plugin/rgb.py. Rings even in ln r with azimuths of their own, a series of five terms in z.
+// `lut`: colours under daylight, summed over all wavelengths in advance, like plugin/rgb.py. Bins
+// lie on rings even in ln r, each with its number of azimuths; a bin is a series of five terms in z.
 
-#ifdef FLOAT_TEXTURES            // the same in textures that every loader knows
-uniform sampler2D colours;      // four texels a bin
-uniform sampler2D rings;        // first bin of a ring, its azimuths, those of the next one
+#ifdef FLOAT_TEXTURES            // float textures, which every loader supports
+uniform sampler2D colours;      // four texels per bin
+uniform sampler2D rings;        // first bin of a ring, its azimuths, azimuths of the next ring
 uniform sampler2D glossy;       // order 0, radii × zs
 #else
-uniform usampler2D colours;     // two texels a bin: term t of channel c is number 5c + t
-uniform usampler2D rings;       // first bin of a ring; its azimuths, and of the next one
+uniform usampler2D colours;     // two texels per bin: term t of channel c is number 5c + t
+uniform usampler2D rings;       // first bin of a ring; azimuths of the ring and the next one
 uniform usampler2D glossy;      // order 0, radii × zs: colours of this z and the next
 #endif
-uniform int bins;               // of one interval of z
+uniform int bins;               // number of bins in one interval of z
 uniform int last_ring;
 uniform float smallest_radius;
-uniform float ring_step;        // in ln r
+uniform float ring_step;        // step in ln r
 uniform float interval_length;
 uniform int intervals;
 uniform float inverse_scale;
@@ -94,7 +94,7 @@ vec3 other_orders(vec2 uv, float squared_radius, float z)
     return sum * (fade * inverse_scale);
 }
 
-// Of an entry and the next z.
+// Interpolate order 0 between an entry and that of the next z.
 vec3 glossy_between(int index, float t)
 {
 #ifdef FLOAT_TEXTURES
@@ -106,7 +106,7 @@ vec3 glossy_between(int index, float t)
 #endif
 }
 
-// The glossy reflection, bright within a degree or so.
+// Order 0, whose lobe is about a degree wide.
 vec3 order_0(float radius, float z)
 {
     vec2 last = vec2(glossy_size) - 1.0;

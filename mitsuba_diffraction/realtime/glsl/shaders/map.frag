@@ -1,8 +1,8 @@
-// The BRDF for one light direction over all view directions, seen from above, for a display.
+// BRDF for one light direction over all view directions, seen from above, for a display.
 
 uniform vec3 light_direction;  // in the patch's axes
 uniform float exposure;
-uniform float side;            // pixels
+uniform float side;            // size of the map, pixels
 
 out vec4 fragment;
 

@@ -1,8 +1,8 @@
-// Sums of two kinds of frames as one picture, with the transfer curve of sRGB.
+// Picture of two kinds of frames from their sums, with the transfer curve of sRGB.
 
 uniform sampler2D first;
 uniform sampler2D second;
-uniform vec2 weights;        // one over the number of frames of either kind
+uniform vec2 weights;        // 1 over the number of frames of each kind
 uniform float exposure;      // factor
 
 out vec4 fragment;

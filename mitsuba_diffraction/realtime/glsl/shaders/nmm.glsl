@@ -1,9 +1,9 @@
-// `nmm`: the thesis' n_min–n_max method, only wavelengths whose orders reach the view
+// `nmm`: the thesis' n_min–n_max method, which sums only wavelengths whose orders reach the view
 // direction, each with the step of the full sum (thesis/methods/periodic.py).
 
-uniform vec2 periods;           // along x and y, µm; 0 where there is none
-uniform float specular_reach;   // of hypot(u, v), within which the colour is white
-uniform float white_wavelength; // µm, how bright that white is
+uniform vec2 periods;           // periods along x and y, µm; 0 where none exists
+uniform float specular_reach;   // largest hypot(u, v) of the white mirror direction
+uniform float white_wavelength; // wavelength that sets the brightness of white, µm
 
 vec3 reached(float frequency, float period, vec2 uv, float z, float cos_half, int light)
 {

@@ -1,14 +1,14 @@
-// Whether the scene stands in the way of a ray; see surroundings.py.
+// Whether the scene obstructs a ray; see surroundings.py.
 
 #ifdef OBSTACLES
-uniform sampler2D obstacles;      // distances from the nearest surface over OBSTACLES cells
+uniform sampler2D obstacles;      // distance of the nearest surface, in units of OBSTACLES cells
 uniform vec3 obstacles_low;
 uniform float obstacles_cell;
 uniform ivec3 obstacles_size;
 
 bool hidden(vec3 position, vec3 normal, vec3 direction, float farthest)
 {
-    // beyond the cells that the surface itself lies in
+    // start beyond the cells of the surface at `position`
     vec3 place = (position - obstacles_low) / obstacles_cell + 1.75 * normal;
     float gone = 0.0;
     farthest /= obstacles_cell;
@@ -19,7 +19,7 @@ bool hidden(vec3 position, vec3 normal, vec3 direction, float farthest)
         int number = (cell.z * obstacles_size.y + cell.y) * obstacles_size.x + cell.x;
         float apart = OBSTACLES * entry(obstacles, number).r;
         if (apart == 0.0) return true;
-        gone += max(apart - 1.0, 0.5);  // ray and surface may lie half a diagonal off the middles
+        gone += max(apart - 1.0, 0.5);  // less 1: distances are those between cells' middles
     }
     return false;
 }

@@ -1,5 +1,5 @@
-// A pair of directions in the tangent frame, wi towards the eye: where its diffraction is looked up
-// (u, v, z = w·height_scale, cosine at the half vector), and what that is multiplied by.
+// Prepare a pair of directions in the tangent frame, wi towards the eye. `place` gets the arguments
+// of the look-up (u, v, z = w·height_scale, cosine at the half vector); returns the factor on it.
 float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
 {
     vec3 sum = wi + wo;
@@ -19,7 +19,7 @@ float begin_diffraction(vec3 wi, vec3 wo, vec2 rotation, out vec4 place)
     one_plus_dot = 0.5 * dot(sum, sum);
     ratio = one_plus_dot / sum.z;
     outside = area_factor * ratio * ratio / wi.z * leaving / wo.z;
-    sum.z *= coat;  // κ grows by the index
+    sum.z *= coat;  // κ is larger by the index of the coat
 #endif
     begin_pair(wi, wo, there, back);
 #ifdef SECOND_ORDER

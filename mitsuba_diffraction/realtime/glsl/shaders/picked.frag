@@ -1,4 +1,4 @@
-// What the page's cursor points at: directions of eye and light in the patch's axes.
+// Point under the page's cursor: directions of eye and light in the patch's axes.
 
 in vec3 v_position;
 in vec3 v_normal;

@@ -1,4 +1,4 @@
-// Where in the scene a pixel's surface lies; with a depth buffer alone, a shadow map.
+// Position of a pixel's surface in the scene; with only a depth buffer, a shadow map.
 
 in vec3 v_position;
 

@@ -1,5 +1,5 @@
-// `pq`: the thesis' repeated patch (thesis/methods/periodic.py, linear interpolation); REPEATED makes
-// the window of taylor.glsl that of whole copies.
+// `pq`: the thesis' repeated patch (thesis/methods/periodic.py, linear interpolation). With REPEATED,
+// the window of taylor.glsl is that of whole copies.
 
 vec3 diffracted(vec2 uv, float z, float cos_half, int light)
 {

@@ -1,4 +1,4 @@
-// A method's own function at given places, one a fragment: for checks and timings.
+// Evaluate a method's function at one set of arguments per fragment, for tests and timings.
 
 #ifdef PAIRED
 uniform sampler2D directions;  // ωi in the first row, ωo in the second

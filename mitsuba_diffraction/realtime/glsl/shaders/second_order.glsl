@@ -1,11 +1,12 @@
-// What light that is diffracted twice makes of orders: the twin of plugin/second_order.py.
+// Second order: the factor of light that is diffracted twice on the power of an order, like
+// plugin/second_order.py.
 
-uniform sampler2D second_coefficients;  // c: a page for each θi, of θo over the azimuth between
-uniform sampler2D slope_ratios;   // r: a page for each κ, of q_y over q_x
-uniform vec3 ratio_size;          // nodes of q_x, q_y and κ ...
-uniform vec3 ratio_steps;         // ... per rad/µm
-uniform vec3 ratio_zero;          // ... and which is where they are 0
-uniform vec2 ratio_orders;        // 1 where a node is one order, along x and y
+uniform sampler2D second_coefficients;  // c: one page per θi, rows over θo, columns over azimuth
+uniform sampler2D slope_ratios;   // r: one page per κ, rows over q_y, columns over q_x
+uniform vec3 ratio_size;          // numbers of nodes of q_x, q_y and κ
+uniform vec3 ratio_steps;         // nodes per rad/µm
+uniform vec3 ratio_zero;          // nodes of q_x = 0, q_y = 0 and κ = 0
+uniform vec2 ratio_orders;        // 1 along axes where every node is one order
 
 #if SURFACE_KIND == DIELECTRIC
 #define OWN_INDEX eta
@@ -15,14 +16,14 @@ uniform vec2 ratio_orders;        // 1 where a node is one order, along x and y
 
 vec4 pair_coefficients;
 
-// Of pages below each other; size and place are in nodes.
+// Interpolate between pages that lie one below another; size and place are in nodes.
 vec4 on_pages(sampler2D pages, vec3 size, vec3 place)
 {
     place = clamp(place, vec3(0.0), size - 1.0);
     vec2 texel = 1.0 / vec2(size.x, size.y * size.z);
     vec2 at = (place.xy + 0.5) * texel;
     float page = size.y * texel.y;
-#ifdef GLANCE  // the nearest page alone
+#ifdef GLANCE  // only the nearest page
     return textureLod(pages, at + vec2(0.0, floor(place.z + 0.5) * page), 0.0);
 #else
     float lower = min(floor(place.z), size.z - 2.0);
@@ -32,11 +33,11 @@ vec4 on_pages(sampler2D pages, vec3 size, vec3 place)
 #endif
 }
 
-// Of the pair that `begin_pair` was told.
+// Look up the coefficients of the pair that `begin_pair` has prepared.
 void begin_second_order()
 {
     vec3 cosines = vec3(pair_dot, pair_cosines.yx);
-    vec3 angles = 1.0 - sign(cosines) * elevations(abs(cosines));  // over π/2
+    vec3 angles = 1.0 - sign(cosines) * elevations(abs(cosines));  // angles over π/2
     vec3 place = angles * vec3(0.5, 1.0, 1.0) * (COEFFICIENT_NODES - 1.0);
     pair_coefficients = on_pages(second_coefficients, vec3(COEFFICIENT_NODES), place);
 }

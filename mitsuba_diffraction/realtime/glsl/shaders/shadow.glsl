@@ -1,13 +1,13 @@
-// One light and the shadows that it casts: what it emits towards a place, and whether it gets there.
+// A light with shadows: the light emitted towards a point, and whether it reaches the point.
 
-uniform vec3 light_axis;          // of a light that shines along it; zero otherwise
-uniform vec2 light_cone;          // cutoff (rad) and 1/(cutoff − beam) of a spot; zero of a plane
+uniform vec3 light_axis;          // axis of a spot or normal of an area light; otherwise zero
+uniform vec2 light_cone;          // cutoff (rad) and 1/(cutoff − beam) of a spot; otherwise zero
 
 uniform sampler2D shadow_map;     // depth from the light
 uniform mat4 shadow_matrix;       // from the scene to the map's clip space
-uniform mat4 shadow_planes;       // the same for planes: its inverse, transposed
-uniform float shadow_bias;        // in the map's depth; of a perspective at the distance 1
-uniform float shadow_steepest;    // largest change of depth within a texel, likewise
+uniform mat4 shadow_planes;       // inverse transpose of that matrix, for planes
+uniform float shadow_bias;        // bias in the map's depth; in perspective at the distance 1
+uniform float shadow_steepest;    // largest change of depth within a texel; in perspective at 1
 
 float emitted(vec3 towards_light)
 {
@@ -17,8 +17,8 @@ float emitted(vec3 towards_light)
     return clamp((light_cone.x - acos(cosine)) * light_cone.y, 0.0, 1.0);
 }
 
-// A texel holds the depth in its middle. So that a surface does not shade itself there, its own
-// depth is taken in the texel's middle, too: on the plane of its triangle, which has this normal.
+// A texel stores the depth in its middle. The surface's depth is computed in the texel's middle,
+// too, on the plane of its triangle with this normal, so that a surface does not shade itself.
 float reached(vec3 position, vec3 normal)
 {
     vec4 clip = shadow_matrix * vec4(position, 1.0);
@@ -31,7 +31,7 @@ float reached(vec3 position, vec3 normal)
     vec4 plane = shadow_planes * vec4(normal, -dot(normal, position));
     float depth = abs(plane.z) < 1e-20 ? place.z
         : -(plane.x * middle.x + plane.y * middle.y + plane.w) / plane.z;
-    // edge-on a plane is steeper than any texel can tell
+    // limit the slope of planes that are seen edge-on
     depth = clamp(depth, place.z - shadow_steepest / clip.w, place.z + shadow_steepest / clip.w);
     float seen = 2.0 * texelFetch(shadow_map, ivec2(texel), 0).r - 1.0;
     return seen < depth - shadow_bias / clip.w ? 0.0 : 1.0;

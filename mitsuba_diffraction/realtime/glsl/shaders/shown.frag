@@ -1,6 +1,6 @@
-// A page's picture: samples so far, averaged, before a background, with the transfer curve of sRGB.
+// Picture of a page: mean of the samples over a background, with the transfer curve of sRGB.
 
-uniform sampler2D samples;   // sums of linear sRGB and of what is covered
+uniform sampler2D samples;   // sums of linear sRGB and of coverage
 uniform float sample_count;
 uniform vec3 background;     // linear sRGB, exposed
 uniform float exposure;      // factor

@@ -1,41 +1,41 @@
-// `spectral`: a loop over wavelengths through the table of powers, lit by the light's own spectrum.
+// `spectral`: a loop over wavelengths in the table of powers, with the light's spectrum.
 //
-// Light along (u, v) probes the orders q on the ray k (u, v). With F(k) the light's response times
-// an order's power at κ = k z, what is wanted is ∫ Σ_j exp(−σ²|k (u, v) − q_j|²) F_j(k) dk.
-// Far from the specular direction lobes are narrow in k, and the loop steps from order to order along
-// the ray: ∫ = exp(−σ² q⊥²) √π/(σr) · mean of F_j over the lobe, q⊥ the order's distance from the ray,
-// and two points at one standard deviation give that mean to third order; the orders across the ray
-// at one step share their mean wavelength. Close to the specular direction lobes are wide, and the
+// The orders of a direction pair (u, v) lie near the ray k (u, v). With F(k) the light's response
+// times an order's power at κ = k z, the result is ∫ Σ_j exp(−σ²|k (u, v) − q_j|²) F_j(k) dk.
+// Far from the mirror direction lobes are narrow in k, and the loop steps from order to order along
+// the ray: ∫ = exp(−σ² q⊥²) √π/(σr) · mean of F_j over the lobe, with q⊥ the order's distance from
+// the ray. Two points at one standard deviation yield that mean to third order. Orders across the
+// ray at one step share their mean wavelength. Near the mirror direction lobes are wide, and the
 // loop steps in k.
 
-#define SKIPS_UNLIT  // loops end early where no fragment is lit
+#define SKIPS_UNLIT  // skip unlit fragments, so that loops can end early
 
-uniform sampler2D orders;        // TEXELS texels an order: terms of its series in κ
-uniform sampler2D functions;     // what each term is multiplied with over κ, and |a₀|²: TEXELS + 1
-                                 // texels at each end of `cells` cells an interval
+uniform sampler2D orders;        // TEXELS texels per order: terms of its series in κ
+uniform sampler2D functions;     // factors of all terms over κ, and |a₀|²: TEXELS + 1 texels at
+                                 // each end of `cells` cells per interval
 uniform sampler2D responses;     // linear sRGB / 2π over k, one row per light
 uniform ivec2 last_order;        // orders run from −last to last
-uniform vec2 spacing;            // of orders, rad/µm
+uniform vec2 spacing;            // spacing of orders, rad/µm
 uniform float sigma;
 uniform float interval_length;
 uniform int intervals;
 uniform int cells;
 uniform float inverse_scale;
 
-const float REACH = 2.6;         // of the window, in 1/σ: erfc(2.6) = 2e-4 is left out
-const float WIDEST_LOBE = 0.35;  // rad/µm, 17 nm in the green
-const float LARGEST_STEP = 0.25; // rad/µm, for the eye's curves
+const float REACH = 2.6;         // half width of a lobe in 1/σ: erfc(2.6) = 2e-4 is left out
+const float WIDEST_LOBE = 0.35;  // widest lobe for steps from order to order, rad/µm: 17 nm at 550
+const float LARGEST_STEP = 0.25; // largest step in k, rad/µm, which resolves colour matching
 
 int interval_of(float kappa)
 {
     return int(clamp(floor(kappa / interval_length), 0.0, float(intervals - 1)));
 }
 
-// Weights of the terms, and the power of order 0.
+// Compute the weights of the terms, and return the power of order 0.
 float series(float kappa, int interval, out vec4 weights[TEXELS])
 {
     float offset = clamp(kappa / interval_length - float(interval), 0.0, 1.0);
-    float fading = interval == 0 ? offset * offset : 1.0;  // powers fade as κ²
+    float fading = interval == 0 ? offset * offset : 1.0;  // powers are proportional to κ² near 0
     float place = offset * float(cells);
     int cell = min(int(place), cells - 1);
     float t = place - float(cell);
@@ -66,14 +66,14 @@ vec3 from_order_to_order(vec2 uv, float r, float z, float cos_half, int light)
 {
     vec2 rate = uv / spacing;  // orders per rad/µm along either axis
     bool steep = abs(rate.y) > abs(rate.x);
-    // along the axis that is crossed faster, and across
+    // x: the axis whose orders the ray crosses faster; y: the other axis
     vec2 rates = steep ? rate.yx : rate;
     vec2 steps = steep ? spacing.yx : spacing;
     vec2 direction = (steep ? uv.yx : uv) / r;
     ivec2 last = steep ? last_order.yx : last_order;
 
-    float reach = REACH / (sigma * steps.y * abs(direction.x));      // orders, across
-    float shift = direction.y * steps.y / r;                         // of k per order across
+    float reach = REACH / (sigma * steps.y * abs(direction.x));      // orders across the ray
+    float shift = direction.y * steps.y / r;                         // change of k per order across
     float margin = reach * abs(shift);
     vec2 ends = rates.x * vec2(wavenumbers.x - margin, wavenumbers.y + margin);
     int first = max(int(ceil(min(ends.x, ends.y))), -last.x);
@@ -82,7 +82,7 @@ vec3 from_order_to_order(vec2 uv, float r, float z, float cos_half, int light)
     float squared_falloff = falloff * falloff;
     float step_factor = exp(-2.0 * squared_falloff);
     ivec2 size = 2 * last_order + 1;
-    int stride = TEXELS * (steep ? 1 : size.x);  // of the list, across
+    int stride = TEXELS * (steep ? 1 : size.x);  // texels per order across
 
     float deviation = sqrt(0.5) / (sigma * r);
 
@@ -98,9 +98,9 @@ vec3 from_order_to_order(vec2 uv, float r, float z, float cos_half, int light)
         int low = max(int(ceil(centre - reach)), -last.y);
         int high = min(int(floor(centre + reach)), last.y);
         vec2 power = vec2(0.0);
-        vec2 moment = vec2(0.0);  // the orders' mean place across the ray
+        vec2 moment = vec2(0.0);  // power times the order's distance across the ray
         int texel = first_texel(interval, steep ? ivec2(low, n) : ivec2(n, low));
-        // exp(−f²x²) of x, x + 1, …: factors that are a geometric series themselves
+        // exp(−f²x²) at x, x + 1, …: the ratios of neighbours are a geometric series
         float across = float(low) - centre;
         float weight = exp(-squared_falloff * across * across);
         float factor = exp(-squared_falloff * (2.0 * across + 1.0));
@@ -129,7 +129,7 @@ vec3 from_order_to_order(vec2 uv, float r, float z, float cos_half, int light)
     return sum * (0.5 * inverse_scale * sqrt(PI) / (sigma * r));
 }
 
-// Power times reflectance at one wavenumber, over all orders in reach.
+// Power times reflectance at one wavenumber, summed over all orders in reach.
 float reflected_at(vec2 uv, float r, float z, float k, float cos_half)
 {
     vec2 falloff = sigma * spacing;
@@ -144,7 +144,7 @@ float reflected_at(vec2 uv, float r, float z, float k, float cos_half)
     float power = 0.0;
     for (int y = low; y <= high; ++y) {
         float apart = falloff.y * (float(y) - place.y);
-        float width = sqrt(max(REACH * REACH - apart * apart, 0.0)) / falloff.x;  // of a disc
+        float width = sqrt(max(REACH * REACH - apart * apart, 0.0)) / falloff.x;  // half a chord
         int first = max(int(ceil(place.x - width)), -last_order.x);
         int last = min(int(floor(place.x + width)), last_order.x);
         float from = falloff.x * (float(first) - place.x);
@@ -188,7 +188,7 @@ vec3 from_wavelength_to_wavelength(vec2 uv, float r, float z, float cos_half, in
 
 #ifdef MONOCHROME
 
-uniform float wavenumber;        // of the only light, rad/µm, whose colour is `light_colour`
+uniform float wavenumber;        // wavenumber of monochromatic light, rad/µm
 
 vec3 diffracted(vec2 uv, float z, float cos_half, int light)
 {

@@ -1,5 +1,5 @@
-// One fragment: lights over the surface, or what its lobes meet of the surroundings (LOOKED_UP).
-// What a method adds is `diffracted`.
+// Shade one fragment: under lights, or by surroundings looked up along its lobes (LOOKED_UP). Each
+// method defines `diffracted`.
 
 in vec3 v_position;
 in vec3 v_normal;
@@ -9,9 +9,9 @@ in vec3 v_colour;
 in vec2 v_axis;
 
 uniform vec3 eye;
-uniform vec3 view_axis;           // of an orthographic camera, towards it; zero otherwise
-uniform vec4 light_place[LIGHTS];   // w = 0: direction towards it; w = 1: position
-uniform vec3 sky[4];              // irradiance over π: the mean, and its change along x, y, z
+uniform vec3 view_axis;           // direction to an orthographic camera; zero otherwise
+uniform vec4 light_place[LIGHTS];   // w = 0: direction to the light; w = 1: position
+uniform vec3 sky[4];              // irradiance over π: mean, and gradient along x, y, z
 
 uniform bool two_sided;
 #ifdef COLOUR_MAPPED
@@ -35,13 +35,13 @@ uniform mat3 normal_uv;
 uniform vec3 emission;            // radiance, on the side that the normal points to
 #endif
 #ifdef PIGMENT_IN_LIGHT
-uniform mat3 pigment_in_light;    // from a pigment's colour to that under this light
+uniform mat3 pigment_in_light;    // from a pigment's colour to its colour under this light
 #endif
 #ifdef WEIGHTED
-uniform float light_density;      // as `lights.Light.density`
+uniform float light_density;      // `lights.Light.density`
 #endif
 #if defined(SHADOWED) || defined(LOOKED_UP)
-uniform bool solid;               // a closed body, seen from outside: rays that lead in are lost
+uniform bool solid;               // closed surface, seen from outside: rays inwards are blocked
 #endif
 
 uniform float exposure;           // factor, for a display
@@ -51,7 +51,7 @@ out vec4 fragment;
 #if defined(DIFFRACTING) || defined(GLOSS)
 #define LOBES
 
-// f·cosθ of what is mirrored or diffracted times the light's irradiance.
+// f·cosθ of specular reflection or diffraction times the light's irradiance.
 vec3 lobes(vec3 wi, vec3 wo, vec2 rotation, int light)
 {
 #ifdef GLOSS
@@ -68,16 +68,16 @@ vec3 lobes(vec3 wi, vec3 wo, vec2 rotation, int light)
 #if defined(BUMPED) || defined(NORMAL_MAPPED)
 #define TURNED
 
-// A normal that is turned from the surface's own, so that it faces the eye: its facet's other slope,
-// as of Mitsuba's `flip_invalid_normals`.
+// Flip the slope of a perturbed normal that faces away from the eye, like Mitsuba's
+// `flip_invalid_normals`.
 vec3 facing(vec3 turned, vec3 n, vec3 towards_eye)
 {
     if (dot(towards_eye, n) * dot(towards_eye, turned) > 0.0) return turned;
     return 2.0 * dot(turned, n) * n - turned;
 }
 
-// What a facet turned from the surface's normal keeps of light from a direction: the share that
-// rough facets as steep as it would (Estevez et al. 2019, Mitsuba's `use_shadowing_function`).
+// Share of the light from a direction that reaches a facet with a perturbed normal, like that of
+// rough facets as steep (Estevez et al. 2019, Mitsuba's `use_shadowing_function`).
 float kept_by_facet(vec3 turned, vec3 n, vec3 direction)
 {
     float slope = dot(turned, n), height = dot(direction, n);
@@ -97,7 +97,7 @@ float bump_at(ivec2 texel)
     return texelFetch(bump_map, ((texel % size) + size) % size, 0).r;
 }
 
-// The gradient of the heights over (u, v), between the four texels around.
+// Gradient of the heights over (u, v), from the four surrounding texels.
 vec2 bump_gradient()
 {
     vec2 size = vec2(textureSize(bump_map, 0));
@@ -110,7 +110,7 @@ vec2 bump_gradient()
     return vec2(dot(bump_uv[0].xy, gradient), dot(bump_uv[1].xy, gradient));
 }
 
-// The normal of a surface that is displaced along its own (Blinn 1978).
+// Normal of a surface displaced along its normal (Blinn 1978).
 vec3 bumped(vec3 n)
 {
     vec3 x = dFdx(v_position), y = dFdy(v_position);
@@ -127,7 +127,7 @@ vec3 bumped(vec3 n)
 
 #endif
 
-// A place in a picture whose edges go on beyond it.
+// Clamp texture coordinates to a picture.
 vec2 within(vec2 place, vec2 size) { return clamp(place, 0.5 / size, 1.0 - 0.5 / size); }
 
 void main()

@@ -1,7 +1,7 @@
-// From a vertex to its place in the picture, and to what a fragment needs of the surface.
+// Project a vertex, and pass the surface's attributes to fragments.
 //
-// The tangent frame travels, not the directions to light and eye: interpolated directions are off by
-// the square of the frame's turn within a triangle, as much as a speckle of colour is wide.
+// The tangent frame is interpolated, not the directions to light and eye: interpolated directions
+// would be off by the square of the frame's rotation within a triangle, as much as a colour speckle.
 
 in vec3 position;
 in vec3 normal;

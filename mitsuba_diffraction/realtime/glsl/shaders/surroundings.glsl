@@ -1,13 +1,13 @@
-// What comes from a direction: the environment, and area lights that are flat, or what stands before
-// them; see surroundings.py.
+// Light from a direction: the environment, flat area lights, and flat shapes that obstruct them; see
+// surroundings.py.
 
-uniform vec2 sequence;            // of the frame: what is drawn
-uniform float least_distance;     // from a plane: a surface does not see itself
+uniform vec2 sequence;            // numbers of the frame, from 0 to 1
+uniform float least_distance;     // least distance from a plane: a surface does not see itself
 
 #ifdef ENVIRONMENT
-uniform sampler2D environment;    // radiance, linear sRGB: around the z axis, and from it
-uniform float environment_density;  // with which lights are drawn from it, over the radiance
-uniform vec4 sun;                 // its direction, and the cosine of its radius
+uniform sampler2D environment;    // radiance, linear sRGB: angle around the z axis, angle from it
+uniform float environment_density;  // probability density of drawn lights over the radiance
+uniform vec4 sun;                 // direction, and cosine of the radius
 uniform vec3 sun_radiance;
 
 vec3 environment_radiance(vec3 direction)
@@ -22,13 +22,13 @@ float density_of_environment(vec3 radiance) { return environment_density * dot(r
 
 #ifdef FLATS
 #if FLATS > 0
-uniform vec4 flat_x[FLATS];       // to the square or disk: local places ...
-uniform vec4 flat_y[FLATS];
-uniform vec4 flat_z[FLATS];       // ... and the distance from its plane
-uniform vec4 flat_light[FLATS];   // radiance, and the density per area with which lights are drawn
+uniform vec4 flat_x[FLATS];       // coordinate x on the unit square or disk
+uniform vec4 flat_y[FLATS];       // coordinate y
+uniform vec4 flat_z[FLATS];       // distance from the plane
+uniform vec4 flat_light[FLATS];   // radiance, and density per area of drawn lights
 #endif
 
-// Radiance from a direction, with which density lights are drawn there, and from how far it comes.
+// Radiance from a direction, density of lights drawn along it, and (`nearest`) distance.
 vec4 arriving(vec3 position, vec3 direction, out float nearest)
 {
     nearest = 1e30;
@@ -60,7 +60,7 @@ vec4 arriving(vec3 position, vec3 direction, out float nearest)
 }
 #endif
 
-// Numbers from 0 to 1, other ones at every pixel (the integer hash of Jarzynski and Olano 2020).
+// Numbers from 0 to 1 that differ by pixel (integer hash of Jarzynski and Olano 2020).
 vec2 drawn_numbers()
 {
     uvec3 v = uvec3(uvec2(gl_FragCoord.xy), 7u) * 1664525u + 1013904223u;

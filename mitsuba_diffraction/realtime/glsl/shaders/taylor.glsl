@@ -1,20 +1,20 @@
-// The thesis' table: the DFT of (2h/H)ⁿ, complex, summed as a Taylor series in κH/2
-// before it is squared. Shared by flss, nmm and pq; what is summed says methods/ in Python.
+// Table of the thesis: complex DFTs of (2h/H)ⁿ, summed as a Taylor series in κH/2 before the sum is
+// squared. flss, nmm and pq share it; thesis/methods documents the formulas.
 
-#define SKIPS_UNLIT  // loops end early where no fragment is lit
+#define SKIPS_UNLIT  // skip unlit fragments, so that loops can end early
 
-uniform sampler2D amplitudes;       // TEXELS texels a bin: real, imaginary of two terms each
-uniform sampler2D amplitude_zero;   // the same of order 0, less 1
+uniform sampler2D amplitudes;       // TEXELS texels per bin: real and imaginary part of two terms
+uniform sampler2D amplitude_zero;   // series of order 0, minus 1
 uniform sampler2D responses;        // linear sRGB / 2π over k, one row per light
 uniform ivec2 last_order;
-uniform vec2 spacing;               // of bins, rad/µm
-uniform vec2 exponents;             // of the window, per squared bin
+uniform vec2 spacing;               // spacing of bins, rad/µm
+uniform vec2 exponents;             // exponents of the window, per squared bin
 uniform float half_range;           // H/2, µm
 uniform float inverse_scale;
 uniform float first_wavelength;     // µm
 uniform float last_wavelength;
 uniform float wavelength_step;
-uniform vec2 repeats;               // of the patch, for pq
+uniform vec2 repeats;               // copies of the patch, for pq
 
 // The light's response times dλ/λ² in 1/µm² at a wavelength in µm, for a step of 1 µm.
 vec3 response(float wavelength, int light)
@@ -37,7 +37,7 @@ float kernel(float apart, float exponent)
 #endif
 }
 
-// |sin(πnx)/(n sin(πx))|, 1 at whole numbers: n copies of the patch.
+// |sin(πnx)/(n sin(πx))|, 1 at integers: interference of n copies of the patch.
 float copies(float x, float n)
 {
     float part = x - floor(x + 0.5);
@@ -62,7 +62,7 @@ ivec2 first_bin(vec2 place)
     return ivec2(floor(place + 0.5 * vec2(odd))) - (taps - 1) / 2;
 }
 
-// S: the power under the window, 1 for a flat mirror in its direction.
+// S, the power under the window: 1 for a flat mirror in the mirror direction.
 float window_power(vec2 uv, float z, float wavelength)
 {
     float k = 2.0 * PI / wavelength;
@@ -101,14 +101,14 @@ float window_power(vec2 uv, float z, float wavelength)
     return power;
 }
 
-// What a wavelength (µm) adds, for a step of 1 µm.
+// Contribution of a wavelength in µm, for a step of 1 µm.
 vec3 of_wavelength(vec2 uv, float z, float cos_half, float wavelength, int light)
 {
     float reflected = reflectance_at(cos_half, 2.0 * PI / wavelength);
     return window_power(uv, z, wavelength) * reflected * response(wavelength, light);
 }
 
-// The trapezoidal rule over the whole spectrum; its last interval may be shorter.
+// Trapezoidal rule over the whole spectrum; the last interval may be shorter.
 vec3 over_spectrum(vec2 uv, float z, float cos_half, int light)
 {
     vec3 sum = vec3(0.0);

@@ -1,4 +1,4 @@
-// One triangle that covers the picture.
+// Triangle that covers the picture.
 
 void main()
 {

@@ -1,5 +1,5 @@
-// Diffraction as a material of three.js (r158 or later; tested with r187): each of its lights
-// through `diffraction`, over a matt base of the colour `color`; an environment by samples.
+// Diffraction as a material of three.js (r158 or later; tested with r187), over a diffuse base of the
+// colour `color`, under all lights of the scene and a sampled environment.
 import * as THREE from "three";
 import { EXRLoader } from "three/addons/loaders/EXRLoader.js";
 
@@ -37,8 +37,8 @@ for (int n = 0; n < SAMPLES; ++n) {
 }
 `;
 
-// The material. folder: of constants.json; method: "lut" or "spectral"; environment: of
-// `sampled`; the rest: parameters of MeshLambertMaterial. Geometries need the attribute
+// Create the material. folder: folder of constants.json; method: "lut" or "spectral"; environment:
+// result of `sampled`; others: parameters of MeshLambertMaterial. Geometries need the attribute
 // `tangent` (`computeTangents()`), along the patch's x axis.
 export async function diffractionMaterial(folder = ".", { method = "lut", environment = [], ...parameters } = {}) {
   const constants = await (await fetch(`${folder}/constants.json`)).json();
@@ -61,8 +61,8 @@ export async function diffractionMaterial(folder = ".", { method = "lut", enviro
   return material;
 }
 
-// Directions and irradiances of an equirectangular float texture (RGBA), one in each of `count`
-// equal shares of its light.
+// Sample an equirectangular float texture (RGBA): a direction and its irradiance in each of `count`
+// parts of equal light.
 export function sampled({ image: { data, width, height } }, count = 64) {
   const weights = new Float64Array(width * height);
   let total = 0;

@@ -1,4 +1,4 @@
-// Mitsuba's pinhole camera: it looks along its z axis, y is up and x to the left.
+// Mitsuba's pinhole camera, which looks along its z axis; y is up and x to the left.
 
 class Camera {
   constructor(described, subject, box) {
@@ -10,14 +10,14 @@ class Camera {
     this.target = plus(this.eye, this.axis(2), distance > 0 ? distance : norm(minus(middle, this.eye)));
     this.reach = norm(minus(subject[1], subject[0]));
     this.up = this.upright();
-    // where the subject is in the picture, from side to side, in tangents of angles
+    // horizontal position and width of the subject in the picture, in tangents of angles
     const toCamera = inverse(this.matrix);
     const across = cornersOf(subject).map((p) => [0, 2].map((n) => dot(toCamera[n], p) + toCamera[n][3])).map(([x, z]) => -x / z);
     const [left, right] = [Math.min(...across), Math.max(...across)];
     this.subject = distance > 0 && Number.isFinite(right - left) ? [0.5 * (left + right), 0.52 * (right - left)] : [0, Infinity];
   }
 
-  // The axis of the world that points up: a camera that looks at a ground looks against it.
+  // World axis that points up; a camera that looks down at a ground looks against it.
   upright() {
     const axes = [0, 1, 2].flatMap((n) => [1, -1].map((sign) => [0, 1, 2].map((i) => (i === n ? sign : 0))));
     const up = this.axis(1), ahead = this.axis(2);
@@ -47,7 +47,7 @@ class Camera {
     this.set(axes, plus(this.target, rotated(minus(this.eye, this.target), axis, angle)));
   }
 
-  // Around the target; never over the top, where left and right would change places.
+  // Orbit around the target; never over the top, where left and right would be swapped.
   orbit(right, down) {
     this.turn(this.up, -right);
     const height = Math.asin(clamp(-dot(this.axis(2), this.up), -1, 1));
@@ -67,8 +67,8 @@ class Camera {
     this.set([0, 1, 2].map((n) => this.axis(n)), plus(this.target, this.axis(2), -distance));
   }
 
-  // Tangents of half the angles of view, and of the middle: all of the scene's picture is in what the
-  // panel leaves of the window, `free` of its width; all of the subject where it is upright.
+  // Tangents of half the angles of view, and of the middle. The whole picture of the scene fits into
+  // the part of the window beside the panel, `free` of its width; in upright windows only the subject.
   view(aspect, free = 1) {
     const { fov, size } = this.described;
     const across = Math.tan((fov * Math.PI) / 360), own = size[0] / size[1];
@@ -78,7 +78,7 @@ class Camera {
     return [upright * aspect, upright, half < across ? middle : 0];
   }
 
-  // From world to clip space; `jitter` shifts the picture, in units of half of it, and so does `lift`.
+  // Matrix from world to clip space; `jitter` and `lift` shift the picture, in units of half its size.
   projection(aspect, free, jitter, lift) {
     const toCamera = inverse(this.matrix);
     const [low, high] = this.box;

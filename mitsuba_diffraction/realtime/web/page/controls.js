@@ -1,4 +1,4 @@
-// Mouse, fingers, keys and the panel.
+// Controls by mouse, touch, keys and the panel.
 
 const element = (id) => document.getElementById(id);
 
@@ -16,7 +16,7 @@ class Controls {
     this.all();
   }
 
-  // The panel as the viewer is.
+  // Set the panel to the viewer's state.
   all() {
     const { viewer } = this;
     element("exposure").value = Math.log2(viewer.exposure);
@@ -68,7 +68,7 @@ class Controls {
     new ResizeObserver(() => this.arrange()).observe(element("panel"));
   }
 
-  // The map of what the cursor rests on.
+  // Update the BRDF map of the point under the cursor.
   look({ clientX, clientY }) {
     if (!element("map_of").open) return;
     this.map.at = [clientX, clientY];
@@ -76,7 +76,7 @@ class Controls {
     this.looking = setTimeout(() => this.map.update(), 30);
   }
 
-  // The address says what is seen, once nothing moves.
+  // Store the view in the page's address while nothing moves.
   link() {
     const { viewer } = this;
     this.linked = setInterval(() => {
@@ -87,7 +87,7 @@ class Controls {
         try {
           history.replaceState(null, "", text);
         } catch {
-          clearInterval(this.linked); // in a cell of a notebook there is no address
+          clearInterval(this.linked); // a cell of a notebook has no address
         }
       this.address = text;
     }, 500);
@@ -113,7 +113,7 @@ class Controls {
     setTimeout(() => element("hint").classList.add("gone"), 2000);
   }
 
-  // The picture is beside the panel where there is room, above it where that is a sheet.
+  // Place the picture beside the panel if the window is wide enough, or above it on narrow screens.
   arrange() {
     const { viewer } = this;
     const { clientWidth: whole, clientHeight: high } = viewer.canvas;
@@ -143,7 +143,7 @@ class Controls {
     camera.pan(right * step, down * step);
   }
 
-  // Two fingers: their middle pans, their distance zooms.
+  // Two fingers: pan by their middle, zoom by their distance.
   pinch(before, event) {
     const other = [...this.pointers].find(([id]) => id !== event.pointerId)[1];
     const apart = (a) => Math.hypot(a.clientX - other.clientX, a.clientY - other.clientY);
@@ -192,13 +192,13 @@ class Controls {
     element("save").addEventListener("click", () => this.save());
     element("fold").addEventListener("click", () => document.body.classList.toggle("folded"));
     if (matchMedia("(max-width: 560px)").matches) document.body.classList.add("folded");
-    if (matchMedia("(pointer: coarse)").matches) element("hint").textContent = "One finger turns · two pan and zoom · + for the light";
+    if (matchMedia("(pointer: coarse)").matches) element("hint").textContent = "One finger: orbit · two: pan and zoom · +: light";
     const losses = Object.entries(header.loss).map(
       ([method, [mean, most]]) => `${method}: ΔE2000 ${mean.toFixed(2)}, 99 % below ${most.toFixed(2)}`);
-    const lines = [`Rounded tables: ${losses.join("; ")}.`];
+    const lines = [`Error of rounded tables: ${losses.join("; ")}.`];
     if (header.omissions.length) lines.push(`Not shown: ${header.omissions.join("; ")}.`);
     for (const [method, reason] of Object.entries(header.left_out)) lines.push(`Without ${method}: ${reason}.`);
-    lines.push("No light between surfaces; while something moves, few lights stand for all. Lights in the scene's place, a lamp that was moved and one wavelength are sets of points, which lobes do not look up.");
+    lines.push("Light between surfaces is left out. While something moves, a few lights represent all. Lights other than the scene's, moved lights and light of one wavelength are sets of points, without reflections in narrow lobes.");
     element("about").textContent = lines.join(" ");
   }
 
@@ -206,11 +206,11 @@ class Controls {
     return this.change({ method });
   }
 
-  // Below its scale, all wavelengths.
+  // Choose one wavelength, or all at the left end of the slider.
   scrub(nm) {
     const wavelength = nm < 380 ? null : nm;
     if (wavelength !== null && this.viewer.wavelength !== null) {
-      this.viewer.wavelength = wavelength; // programs are there
+      this.viewer.wavelength = wavelength; // the programs are compiled already
       this.viewer.touch();
       this.label();
       this.map.update();
@@ -256,7 +256,7 @@ class Controls {
   }
 
   save() {
-    this.viewer.present(); // what was shown last may be gone
+    this.viewer.present(); // the browser may have cleared the canvas
     this.viewer.canvas.toBlob((blob) => {
       const link = document.createElement("a");
       link.href = URL.createObjectURL(blob);

@@ -1,4 +1,4 @@
-// From the page's own text to arrays and pictures; the other half of sections.py.
+// Decode arrays and pictures from the page's text, which sections.py encodes.
 
 function bytesOf(id) {
   const text = atob(document.getElementById(id).textContent.trim());
@@ -14,7 +14,7 @@ async function inflated(bytes) {
 
 const ARRAYS = { Uint8Array, Int16Array, Uint16Array, Uint32Array, Float32Array };
 
-// Byte planes back to rows, differences back to numbers.
+// Decode byte planes to rows, and differences to numbers.
 function restored(planes, layout) {
   const { rows, columns, differences } = layout;
   const array = new ARRAYS[layout.kind](rows * columns);

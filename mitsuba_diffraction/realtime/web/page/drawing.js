@@ -1,4 +1,4 @@
-// Programs, textures and pictures in the making.
+// WebGL programs, textures and framebuffers, and drawing with them.
 
 const ADD = `#version 300 es
 precision highp float;
@@ -6,7 +6,7 @@ precision highp sampler2D;
 uniform sampler2D sums;
 uniform sampler2D sample_;
 uniform bool first;
-uniform float covers; // 0: what lobes meet covers nothing new
+uniform float covers; // 0: looked-up surroundings add no coverage
 out vec4 fragment;
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
@@ -46,7 +46,7 @@ class Program {
     this.unit = 0;
   }
 
-  // Sets those that the program reads: compilers remove the others.
+  // Set the uniforms that the program reads: compilers remove the others.
   set(values) {
     const { gl } = this;
     for (const [name, value] of Object.entries(values)) {
@@ -120,7 +120,7 @@ class Part {
   }
 }
 
-// A picture of floats, with depth if surfaces are drawn into it.
+// Framebuffer of floats, with depth if surfaces are drawn into it.
 class Target {
   constructor(gl, width, height, depth = false) {
     this.gl = gl;
@@ -146,7 +146,7 @@ class Target {
   }
 }
 
-const RESPONSES = 4; // rows: lights at once
+const RESPONSES = 4; // rows, one per light
 const PIXEL = { floats: new Float32Array(4), bytes: new Uint8Array(4) };
 
 class Drawing {
@@ -176,7 +176,7 @@ class Drawing {
     return drawing;
   }
 
-  // A method's tables and programs, when it is first wanted; lit: of `viewer.lit`.
+  // Load a method's tables and compile its programs; lit: `viewer.lit`.
   async prepare(method, lit, progress) {
     if (!this.tables[method]) {
       await progress(`Unpacking the tables of ${method}`);
@@ -188,7 +188,7 @@ class Drawing {
     for (const surface of this.surfaces) for (const light of Object.values(lit)) this.program(surface, method, light);
   }
 
-  // Compiled once for each of: a surface's source, definitions of its light, main function.
+  // Program of a surface, compiled once for each source, definitions of the light and main function.
   program(surface, method, lit, main = "surface") {
     const { gl, header } = this;
     const number = surface.programs[method], key = `${number} ${lit} ${main}`;
@@ -204,7 +204,7 @@ class Drawing {
     this.sums = [new Target(this.gl, width, height), new Target(this.gl, width, height)];
   }
 
-  // The lights' spectra, for the method that adds up wavelengths.
+  // Upload the lights' spectra for the method `spectral`.
   setResponses(lights) {
     const { gl, daylight, spectra, header } = this;
     const columns = header.light.columns, channels = header.light.channels, waves = columns / channels;
@@ -226,7 +226,7 @@ class Drawing {
     });
   }
 
-  // The surfaces with a main function; view: as Viewer.begin makes it.
+  // Draw all surfaces with a main function; view: from Viewer.begin.
   drawSurfaces(view, main) {
     const octaves = Math.log2(view.heights);
     const [first, last] = this.header.octaves;
@@ -250,7 +250,7 @@ class Drawing {
     });
   }
 
-  // One sample of every pixel in rows [bottom, top) of a picture, linear.
+  // Draw one sample of every pixel in rows [bottom, top) of a picture, linear.
   drawRows(view, bottom, top) {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.sample.frame);
@@ -273,7 +273,7 @@ class Drawing {
     this.triangle();
   }
 
-  // One that covers the picture.
+  // Draw a triangle that covers the picture.
   triangle() {
     const { gl } = this;
     gl.bindVertexArray(this.empty);
@@ -281,7 +281,7 @@ class Drawing {
     gl.bindVertexArray(null);
   }
 
-  // Adds the sample to the sums; or, of a preview, holds it beside them.
+  // Add the sample to the sums; a preview is stored beside them.
   keep(view, first) {
     if (view.preview) {
       [this.sample, this.held] = [this.held, this.sample];
@@ -295,8 +295,8 @@ class Drawing {
     this.full(this.sums[0].frame, view.width, view.height);
   }
 
-  // On the screen: the mean of the samples so far; half: the last sum lacks its other half. Smaller
-  // pictures are stretched by the browser, several times as fast as drivers in software do it.
+  // Show the mean of the samples so far; half: the last sum has only the first kind of frame. The
+  // browser enlarges smaller pictures, several times as fast as software drivers.
   show(view, count, exposure, half) {
     const { width, height } = view, { canvas } = this.gl;
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
@@ -309,14 +309,14 @@ class Drawing {
     this.full(null, width, height);
   }
 
-  // Waits until all is drawn; frame: null is the screen.
+  // Wait until all is drawn; frame: null is the screen.
   finish(frame = this.sample.frame) {
     const { gl } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
     gl.readPixels(0, 0, 1, 1, gl.RGBA, frame ? gl.FLOAT : gl.UNSIGNED_BYTE, frame ? PIXEL.floats : PIXEL.bytes);
   }
 
-  // Mean of the samples, linear sRGB and coverage, from the bottom row up.
+  // Read the mean of the samples, linear sRGB and coverage, from the bottom row up.
   read(count) {
     const { gl, width, height } = this;
     const numbers = new Float32Array(4 * width * height);

@@ -1,17 +1,17 @@
-// Lights: the scene's own, or one in their place, each as a sequence of lights without extent.
+// Lights: those of the scene, or one light instead, each as a sequence of lights without extent.
 //
-// Directions are on a disc as seen from above, the camera below: the middle is overhead, the inner
-// circle the horizon, the rim straight down.
+// The panel shows directions on a disc as seen from above, with the camera at the bottom: the middle
+// is overhead, the inner circle the horizon, and the rim straight down.
 
 const HORIZON = 0.68;
 const POWER = Math.log(HORIZON) / Math.log(0.5);
-const SUN = (0.267 * Math.PI) / 180; // radius of its disc
+const SUN = (0.267 * Math.PI) / 180; // radius of the sun's disc
 const KINDS = { scene: "The scene's", sun: "Sun", lamp: "Lamp", window: "Window", sky: "Environment" };
-const FILL = 0.12; // of a light that is not the scene's, from a dome, so that shadows are not black
+const FILL = 0.12; // share of light from a dome beside a light that replaces the scene's
 const LUMINANCE = [0.2126, 0.7152, 0.0722];
 const DARK = [0, 0, 0];
 
-// Evenly spread numbers, from the middle on (M. Roberts 2018, by the plastic number).
+// Evenly distributed points, from the middle on, by the plastic number (M. Roberts 2018).
 const even = (n) => [(0.5 + n * 0.7548776662) % 1, (0.5 + n * 0.569840291) % 1];
 
 class Lights {
@@ -36,7 +36,7 @@ class Lights {
     this.direction = dot(first, this.camera.up) > 0.05 ? first : unit(plus(this.camera.up, first, 0.5));
   }
 
-  // Mean luminance that the scene's own lights bring to the middle.
+  // Mean luminance of the scene's lights in the middle.
   irradiance() {
     const { samples } = this.header.light;
     const brought = samples.map(({ place, colour }) => {
@@ -50,14 +50,14 @@ class Lights {
     return unit(place[3] ? minus(place, this.middle) : place);
   }
 
-  // Right, away from the camera, and up.
+  // Axes of the disc: right, away from the camera, and up.
   frame() {
     const { up } = this.camera;
     const right = unit(times(this.camera.axis(0), -1));
     return [right, cross(up, right), up];
   }
 
-  // Where the light that is moved is on the disc.
+  // Position of the movable light on the disc.
   get point() {
     const direction = this.kind === "scene" ? this.towards(this.own[this.chosen].place) : this.direction;
     const [right, away, up] = this.frame();
@@ -82,13 +82,13 @@ class Lights {
     light.place = light.place[3] ? [...plus(this.middle, direction, distance), 1] : [...direction, 0];
   }
 
-  // Whether they are the scene's, and lights that have a place are where they were.
+  // Whether all lights are the scene's, and none with a position has been moved.
   get whole() {
     const was = this.header.light.own;
     return this.kind === "scene" && this.own.every(({ place }, n) => !place[3] || place.every((x, i) => x === was[n].place[i]));
   }
 
-  // Whether there is a light that can be moved.
+  // Whether a light can be moved.
   get movable() {
     return this.kind !== "scene" || this.own.length > 0;
   }
@@ -98,22 +98,22 @@ class Lights {
     this.point = [x + right, y + away];
   }
 
-  // Few lights that look like all, and a smooth sky, while something moves.
+  // A few representative lights and a smooth sky, for moving pictures.
   get few() {
     if (this.kind === "scene") return { lights: this.own, sky: this.sky };
     const only = this.kind === "sky";
-    // of a white dome, E/π of a plane that faces it
+    // E/π of a plane that faces a white dome
     const mean = ((only ? 1 : FILL) * this.level) / Math.PI;
     const sky = [0.5, ...times(this.camera.up, 0.5)].flatMap((x) => [x, x, x].map((one) => one * mean));
     return { lights: only ? [] : [this.made(-1)], sky };
   }
 
-  // How many lights differ.
+  // Number of different lights in the sequence.
   get count() {
     return this.kind === "scene" ? this.header.light.samples.length : 256;
   }
 
-  // Number n of the sequence, whose mean is the light.
+  // Light number n of the sequence, whose mean is all light.
   sample(n) {
     if (this.kind !== "scene") return this.made(n);
     const { samples } = this.header.light;
@@ -125,11 +125,11 @@ class Lights {
     return { ...light, place, axis: turned(light.axis) };
   }
 
-  // A light of another kind than the scene's; n = -1 is its middle.
+  // Light number n of a kind that replaces the scene's; n = -1 is its middle.
   made(n) {
     const { direction, level: brightness, middle, reach } = this;
     const level = n < 0 ? brightness : (brightness * 4) / 3;
-    const filling = this.kind !== "sky" && n >= 0 && n % 4 === 3; // a quarter of the sequence
+    const filling = this.kind !== "sky" && n >= 0 && n % 4 === 3; // a quarter of all is the dome
     const [x, y] = n < 0 ? [0.5, 0.5] : even(filling ? (n - 3) / 4 : n);
     const across = unit(cross(Math.abs(dot(direction, this.camera.up)) > 0.99 ? this.camera.axis(0) : this.camera.up, direction));
     const upwards = cross(direction, across);
@@ -155,7 +155,7 @@ class Lights {
   }
 }
 
-// The rotation that leads from one direction to another the short way.
+// Shortest rotation from one direction to another.
 function turning(from, to) {
   const axis = cross(from, to), sine = norm(axis);
   if (sine < 1e-9) return (v) => v;
@@ -163,7 +163,7 @@ function turning(from, to) {
   return (v) => rotated(v.slice(0, 3), unit(axis), angle);
 }
 
-// What shaders read of lights. colour: of each wavelength's light, where there is only one.
+// Uniforms of lights. colour: of monochromatic light, or null.
 function lightUniforms(lights, colour) {
   const places = new Float32Array(16), colours = new Float32Array(12);
   lights.forEach((light, n) => {

@@ -1,4 +1,4 @@
-// What is seen as a page's address, behind its #.
+// View of the page as text in its address, after the #.
 
 const numbers = (list) => list.map((x) => Number(x.toPrecision(6))).join(",");
 const listed = (text, n) => {
@@ -19,7 +19,7 @@ function viewToText(viewer) {
   return new URLSearchParams(found).toString().replaceAll("%2C", ",");
 }
 
-// What of an address a page can show; parts that make no sense are as at first.
+// Set the view from the text of an address; invalid parts keep their defaults.
 function textToView(text, viewer) {
   const given = new URLSearchParams(text), { camera, lights, header } = viewer;
   const [eye, target, x] = ["eye", "target", "x"].map((name) => listed(given.get(name), 3));

@@ -1,4 +1,4 @@
-// From the page's data to a viewer, or to words about why not.
+// Start of the page: read the data and create the viewer, or show an error.
 
 const state = (name) => (document.documentElement.dataset.state = name);
 
@@ -12,12 +12,12 @@ function fail(error) {
 async function busy(text) {
   element("busy").textContent = `${text} …`;
   element("busy").hidden = false;
-  await new Promise((resolve) => setTimeout(resolve, 20)); // so that it is seen
+  await new Promise((resolve) => setTimeout(resolve, 20)); // lets the browser draw the text
 }
 
-// The page's own text, all of which must be there.
+// Read header and data from the page, and check that they are complete.
 function contents() {
-  const cut = new Error("This page is not complete: its data is missing or cut off. Export it again, or copy all of the file.");
+  const cut = new Error("This page is incomplete: its data is missing or truncated. Export it again, or copy the whole file.");
   try {
     const header = JSON.parse(element("header").textContent);
     const bytes = bytesOf("data");
@@ -35,19 +35,19 @@ function context(canvas, header) {
   const gl = canvas.getContext("webgl2", { antialias: false, alpha: false, powerPreference: "high-performance", preserveDrawingBuffer: true });
   if (!gl)
     throw new Error(
-      "This browser has no WebGL 2. Update it, switch on hardware acceleration in its settings, or take another one.");
+      "This browser has no WebGL 2. Update it, enable hardware acceleration in its settings, or use another browser.");
   const { tables, surfaces, around } = header;
   const parts = [...Object.values(tables).flat(), ...surfaces.map((surface) => surface.parts), ...(around ? [around.parts, ...around.lobes] : [])];
   const textures = parts.flatMap((part) => part.textures);
-  const needs = { EXT_color_buffer_float: "pictures of floats" };
+  const needs = { EXT_color_buffer_float: "float framebuffers" };
   if (textures.some(({ smooth, kind }) => smooth && kind === "single"))
     needs.OES_texture_float_linear = "linear filtering of float textures";
   for (const [name, words] of Object.entries(needs))
     if (!gl.getExtension(name))
-      throw new Error(`This browser's WebGL lacks ${words} (${name}). Update the graphics driver, or take another browser.`);
+      throw new Error(`This browser's WebGL lacks ${words} (${name}). Update the graphics driver, or use another browser.`);
   const most = gl.getParameter(gl.MAX_TEXTURE_SIZE);
   const widest = Math.max(...textures.map(({ width, height }) => Math.max(width, height)));
-  if (widest > most) throw new Error(`The scene needs textures of ${widest} texels a side; this device has ${most}.`);
+  if (widest > most) throw new Error(`The scene needs textures of ${widest} texels a side; this device supports ${most}.`);
   return gl;
 }
 
@@ -68,13 +68,13 @@ async function start() {
   canvas.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
     viewer.lost = true;
-    element("message").textContent = "The graphics driver stopped. The picture comes back when it does; if not, load the page again.";
+    element("message").textContent = "The graphics driver stopped. The picture returns when the driver restarts; otherwise reload the page.";
     element("message").hidden = false;
     state("lost");
   });
   canvas.addEventListener("webglcontextrestored", async () => {
     try {
-      context(canvas, header); // extensions have to be asked for anew
+      context(canvas, header); // enables the extensions again
       viewer.drawing = await Drawing.load(gl, header, data, busy);
       await prepared();
       viewer.lost = false;
@@ -89,7 +89,7 @@ async function start() {
       fail(error);
     }
   });
-  // a page that is closed, or a notebook's cell that is run again, keeps no textures
+  // free textures when the page is closed or a notebook's cell is run again
   window.addEventListener("pagehide", ({ persisted }) => {
     if (!persisted) gl.getExtension("WEBGL_lose_context")?.loseContext();
   });

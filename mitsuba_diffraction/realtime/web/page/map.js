@@ -1,4 +1,4 @@
-// The BRDF of the point under the cursor, over all view directions, and its strongest orders.
+// BRDF map of the point under the cursor, over all view directions, and its strongest orders.
 
 const SIDE = 144; // pixels
 
@@ -6,10 +6,10 @@ class BrdfMap {
   constructor(viewer, canvas, words) {
     Object.assign(this, { viewer, canvas, words });
     canvas.width = canvas.height = SIDE;
-    this.at = null; // on the viewer's canvas, CSS pixels
+    this.at = null; // position on the viewer's canvas, CSS pixels
   }
 
-  // Textures and framebuffers, in the context that there is now.
+  // Create textures and framebuffers in the current context.
   prepare() {
     const { gl } = this.viewer.drawing;
     if (this.gl === gl) return;
@@ -36,12 +36,12 @@ class BrdfMap {
     this.drawn = target(gl.RGBA8, SIDE, 1);
   }
 
-  // Directions of eye and light there, in the patch's axes, and the surface; null where none is.
+  // Directions of eye and light at a pixel, in the patch's axes, and the surface; null without one.
   pick(x, y) {
     const { viewer, gl } = this;
     const { drawing, canvas } = viewer;
     const view = viewer.viewed();
-    // the pixel is all of the picture
+    // the picture consists of this pixel alone
     const [w, h] = [canvas.clientWidth, canvas.clientHeight];
     const row = (n, scale, middle) => view.matrix[n].map((value, i) => scale * (value - middle * view.matrix[3][i]));
     const matrix = [row(0, w, (2 * (x + 0.5)) / w - 1), row(1, h, 1 - (2 * (y + 0.5)) / h), view.matrix[2], view.matrix[3]];
@@ -71,7 +71,7 @@ class BrdfMap {
     const diffracts = this.found && this.found.surface.height_scale !== undefined;
     this.canvas.hidden = !diffracts;
     if (!diffracts) {
-      this.words.textContent = "Point at a surface that diffracts: this is what it reflects, and where to.";
+      this.words.textContent = "Point at a surface that diffracts: the map shows its BRDF by view direction.";
       return;
     }
     this.draw(this.found);
@@ -107,23 +107,23 @@ class BrdfMap {
       flat.stroke();
     };
     mark([0, 0], SIDE / 2 - 0.5, "#ffffff40");
-    mark(wi, 4, "#ffffff"); // the eye
-    if (wo[2] > 0) mark(times(wo, -1), 2, "#8ab8ff"); // the mirror's direction
+    mark(wi, 4, "#ffffff"); // eye
+    if (wo[2] > 0) mark(times(wo, -1), 2, "#8ab8ff"); // mirror direction
   }
 
-  // The strongest orders, and which wavelength of each leaves in the plane of the eye.
+  // The strongest orders, and the wavelength of each that is diffracted towards the eye.
   orders({ wi, wo, surface }) {
-    if (wo[2] <= 0) return "In the light's back.";
+    if (wo[2] <= 0) return "The light is behind the surface.";
     const list = this.viewer.header.orders[surface.table];
-    if (!list.length) return "White ring: the eye. Blue: the mirror's direction.";
+    if (!list.length) return "White ring: eye. Blue: mirror direction.";
     const [u, v] = plus(wi, wo);
     const lines = list.slice(0, 3).map(([x, y]) => {
       const length = Math.hypot(x, y), angle = ((Math.atan2(y, x) * 180) / Math.PI + 180) % 180;
       const along = Math.abs(u * x + v * y) / length, nm = (2e3 * Math.PI * along) / length;
       const off = (Math.asin(clamp(Math.abs(u * y - v * x) / length, 0, 1)) * 180) / Math.PI;
-      const seen = nm >= 380 && nm <= 780 ? `${nm.toFixed(0)} nm${off < 1 ? "" : `, ${off.toFixed(0)}° off`}` : "no colour here";
+      const seen = nm >= 380 && nm <= 780 ? `${nm.toFixed(0)} nm${off < 1 ? "" : `, ${off.toFixed(0)}° off`}` : "not visible";
       return `${((2 * Math.PI) / length).toFixed(2)} µm at ${angle.toFixed(0)}°: ${seen}`;
     });
-    return `Strongest periods, and what of each goes to the eye (ring):\n${lines.join("\n")}`;
+    return `Strongest periods, and the wavelength towards the eye (ring):\n${lines.join("\n")}`;
   }
 }

@@ -1,8 +1,8 @@
-// A surface's triangles in the graphics card's memory; the other half of sections.py.
+// Decode a surface's triangles, which sections.py encodes, and upload them.
 
 const ATTRIBUTES = { position: 3, normal: 3, tangent: 3, texcoord: 2, colour: 3, axis: 2 };
 
-// Two numbers of sixteen bits to a direction of three (Cigolle et al. 2014).
+// Decode a direction from two 16-bit integers (Cigolle et al. 2014).
 function fromOctahedron(a, b, to, at) {
   if (a === -32768) {
     to[at] = to[at + 1] = to[at + 2] = 0;
@@ -55,7 +55,7 @@ async function uploadMesh(gl, data, mesh) {
     gl.enableVertexAttribArray(location);
     gl.vertexAttribPointer(location, size, direction ? gl.SHORT : gl.FLOAT, direction, stride * values.BYTES_PER_ELEMENT, 0);
   });
-  // one buffer: an array has only one
+  // one buffer for all levels: a vertex array has one index buffer
   const parts = [], lists = [];
   for (const few of FEWER) {
     const list = count > 3 * few ? coarser(positions, few) : null;
@@ -67,7 +67,7 @@ async function uploadMesh(gl, data, mesh) {
   gl.bindVertexArray(null);
   return {
     count,
-    // detail: 0 draws all triangles, each step fewer
+    // detail: 0 draws all triangles, larger numbers fewer
     draw(detail) {
       const few = detail ? parts[detail - 1] : null;
       for (const [location, value] of constants) gl.vertexAttrib4fv(location, value);
@@ -79,11 +79,10 @@ async function uploadMesh(gl, data, mesh) {
   };
 }
 
-const FEWER = [20000, 5000]; // triangles while something moves: rasterisers in software draw few at once
-const CELLS = 100; // along the longest side, or fewer
+const FEWER = [20000, 5000]; // triangles while something moves, for slow software rasterisers
+const CELLS = 100; // cells along the longest side, at most
 
-// Corners of triangles that are left when one vertex stands for all in its cell (Rossignac and
-// Borrel 1993), few enough.
+// Simplify triangles by merging all vertices in a cell (Rossignac and Borrel 1993).
 function coarser(positions, most, cells = CELLS) {
   const low = [0, 1, 2].map(() => Infinity), high = [0, 1, 2].map(() => -Infinity);
   for (let i = 0; i < positions.length; ++i) {

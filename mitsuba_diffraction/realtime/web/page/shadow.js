@@ -1,6 +1,6 @@
-// Shadow maps as glsl/shadows.py makes them, of what surrounds the subject.
+// Shadow maps like glsl/shadows.py, of the subject and its neighbourhood.
 
-const BIAS = 0.75, STEEPEST = 16; // in texels, as there
+const BIAS = 0.75, STEEPEST = 16; // texels, see glsl/shadows.py
 
 class ShadowMap {
   constructor(gl, header, size) {
@@ -16,17 +16,17 @@ class ShadowMap {
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.DEPTH_ATTACHMENT, gl.TEXTURE_2D, this.texture, 0);
     gl.drawBuffers([gl.NONE]);
-    // lights far off need all that may stand between; the map covers the subject and its shadows
+    // depths include the whole scene, which may shade; the map covers the subject and its shadows
     this.corners = cornersOf(box);
     const room = 0.8 * norm(minus(subject[1], subject[0]));
     const around = [0, 1].map((n) => subject[n].map((x, i) => clamp(x + (n ? room : -room), box[0][i], box[1][i])));
     this.covered = cornersOf(around);
   }
 
-  // From what a light sees to uniforms; n: its number, by which the map is shifted within a texel.
+  // Draw the map of a light and return uniforms; n: number that shifts the map within a texel.
   draw(light, casters, detail, n) {
     const { gl, size } = this;
-    // while the camera moves the light does not
+    // reuse the map while only the camera moves
     const key = String([light.place, light.axis, light.cone, casters.length, detail, n]);
     if (key === this.key) return this.uniforms;
     this.key = key;

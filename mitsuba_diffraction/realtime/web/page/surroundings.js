@@ -1,8 +1,8 @@
-// What surrounds the scene: its environment, shapes that emit light, and what lobes meet; as
-// glsl/progressive.py and glsl/surroundings.py have it.
+// Surroundings of the scene: environment, shapes that emit light, and look-ups along lobes, like
+// glsl/progressive.py and glsl/surroundings.py.
 
 const WHITE = { place: [0, 0, 1, 0], colour: [1, 1, 1], axis: DARK, cone: [0, 0], spectrum: -1, density: 0 };
-// Other numbers for each sample, as glsl/progressive.py has them.
+// Numbers of each sample, like glsl/progressive.py.
 const drawnNumbers = (n) => [0.5 + Math.sqrt(1.25), Math.sqrt(19)].map((step) => (0.5 + (n + 1) * step) % 1);
 
 class Surroundings {
@@ -19,13 +19,13 @@ class Surroundings {
     return around;
   }
 
-  // For a surface whose lobes look it up.
+  // Bind the data for a surface whose lobes look up the surroundings.
   use(program, table) {
     this.part.use(program);
     this.lobes[table]?.use(program);
   }
 
-  // Behind the scene the environment, and what emits light; dark, that only covers.
+  // Draw the environment in the background and shapes that emit light; unless bright, in black.
   draw(view, drawing) {
     const { gl } = this, { uniforms, matrix, up, bright, width, height } = view;
     if (bright && this.background) {
@@ -34,7 +34,7 @@ class Surroundings {
       this.part.use(this.background);
       this.background.set({
         ...uniforms, from_clip: columnMajor(invertible(matrix)), picture_size: [width, height],
-        horizon: up, // a ground ends somewhere, and beyond it the sky begins
+        horizon: up, // a sky that is dark below is mirrored at the horizon
       });
       drawing.triangle();
       gl.enable(gl.DEPTH_TEST);

@@ -1,4 +1,4 @@
-// Vectors are arrays of three; matrices arrays of four rows, for column vectors.
+// Vectors are arrays of three numbers; matrices are arrays of four rows, for column vectors.
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const plus = (a, b, f = 1) => [a[0] + f * b[0], a[1] + f * b[1], a[2] + f * b[2]];
@@ -30,7 +30,7 @@ const columnMajor = (m) => new Float32Array([0, 1, 2, 3].flatMap((j) => m.map((r
 
 const transposed = (m) => m.map((_, i) => m.map((row) => row[i]));
 
-// Inverse of any matrix that has one, by Gauss and Jordan.
+// Inverse of any invertible matrix, by Gauss and Jordan.
 function invertible(m) {
   const rows = m.map((row, i) => [...row, ...row.map((_, j) => (i === j ? 1 : 0))]);
   for (let c = 0; c < rows.length; ++c) {

@@ -1,20 +1,20 @@
-// What is drawn when. While something moves: few lights, few pixels, few triangles. Then once all
-// pixels, and after that one light after another, or sample after sample, until it is smooth.
+// Schedule of drawing. While something moves: few lights, few pixels, few triangles. Afterwards one
+// picture of all pixels, and then one light or sample after another, until the picture is smooth.
 
-const BUSY = 100;   // ms that a step may take before the page answers again
-const STEPS = 16;   // at most, of one sample: each draws all triangles anew
-const FLUENT = 35;  // ms that a picture should take while something moves
-const SMALLEST = 0.1; // share of either side
-const POOR = 0.3;   // below this, rather fewer triangles
-const STILL = 200;  // ms after the last change
-const SMOOTH = 8;   // lights before their mean is shown
+const BUSY = 100;   // longest step before the page handles events again, ms
+const STEPS = 16;   // largest number of steps per sample: each draws all triangles
+const FLUENT = 35;  // desired time of a picture while something moves, ms
+const SMALLEST = 0.1; // smallest size of a moving picture, relative to the window
+const POOR = 0.3;   // relative size below which the number of triangles is reduced
+const STILL = 200;  // ms after the last change until the picture counts as still
+const SMOOTH = 8;   // number of lights before their mean is shown
 const LIGHT = { few: (n, sky) => `#define LIGHTS_LIT ${n}\n${sky ? "#define SKY\n" : ""}`, one: "#define LIGHTS_LIT 1\n" };
 const WEIGHTED = "#define WEIGHTED\n", LOOKED_UP = "#define LOOKED_UP\n", GLANCE = "#define GLANCE\n";
 const MONOCHROME = "#define MONOCHROME\n";
-// of a light that casts no shadow
+// uniforms of a light without shadows
 const UNSHADOWED = { light_axis: [0, 0, 0], light_cone: [0, 0], shadow_matrix: new Float32Array(16), shadow_planes: new Float32Array(16), shadow_bias: 0, shadow_steepest: 0 };
 
-// Evenly spread places in a pixel, from its middle on (the R₂ sequence of M. Roberts).
+// Evenly distributed points in a pixel, from the middle on (the R₂ sequence of M. Roberts).
 const spread = (n, share) => ((0.5 + n * share) % 1) * 2 - 1;
 
 class Viewer {
@@ -23,18 +23,18 @@ class Viewer {
     this.camera = new Camera(header.camera, header.subject, header.box);
     this.lights = new Lights(header, this.camera);
     this.method = header.methods[0];
-    this.wavelength = null; // nm, of light of one wavelength
+    this.wavelength = null; // wavelength of monochromatic light, nm
     this.shadows = true;
     this.exposure = 1;
     this.heights = 1;
-    this.free = 1;        // share of the width that the panel leaves
-    this.lift = 0;        // share of the height that it takes, as a sheet below
-    this.most = undefined; // samples, where the default is not wanted
-    this.count = 0;       // samples in the sums
-    this.steps = 8;       // of one sample, from the bottom up
-    this.share = 0.25;    // of either side, while something moves
-    this.detail = 1;      // of the triangles then: 0 is all
-    this.finest = 0;      // that it may be
+    this.free = 1;        // share of the width beside the panel
+    this.lift = 0;        // share of the height that the panel covers as a sheet below
+    this.most = undefined; // number of samples instead of the default
+    this.count = 0;       // number of samples in the sums
+    this.steps = 8;       // steps per sample, from the bottom up
+    this.share = 0.25;    // relative size of moving pictures
+    this.detail = 1;      // level of triangles in moving pictures: 0 is all
+    this.finest = 0;      // finest level that is fast enough
     this.changed = 0;
     this.dirty = true;
     this.waiting = [];
@@ -49,22 +49,22 @@ class Viewer {
     return performance.now() - this.changed < STILL;
   }
 
-  // The method that draws: one wavelength is looked up where all are.
+  // Method that draws: `spectral` for monochromatic light.
   get drawn() {
     return this.wavelength === null ? this.method : "spectral";
   }
 
-  // Whether the scene's environment and lights are seen: its own light, all of it, where it was.
+  // Whether environment and emitters are drawn: all light is the scene's, and none has been moved.
   get around() {
     return this.drawing.around && this.wavelength === null && this.lights.whole;
   }
 
-  // Whether lobes look up what they meet.
+  // Whether lobes look up the surroundings.
   get looksUp() {
     return this.around && this.shadows;
   }
 
-  // Definitions of the light that programs are compiled with: few lights at once, or one.
+  // Definitions of the light for programs: a few lights at once, or one.
   get lit() {
     const { lights, sky } = this.lights.few;
     const one = this.wavelength === null ? "" : MONOCHROME;
@@ -74,7 +74,7 @@ class Viewer {
       : { glance, few, one: LIGHT.one + one };
   }
 
-  // Something that is drawn is another now.
+  // Restart the picture after a change.
   touch() {
     this.dirty = true;
     this.sample = undefined;
@@ -108,30 +108,30 @@ class Viewer {
     const { around, looksUp } = this, lookup = one && this.half;
     const { lights: few, sky } = lights.few;
     const chosen = lookup ? [WHITE] : one ? [lights.sample(this.count)] : few;
-    // few sizes: another one needs another canvas
+    // few different sizes, since each needs another canvas
     const share = moving ? 2 ** (Math.floor(2 * Math.log2(this.share)) / 2) : 1;
     const detail = moving ? this.detail : 0;
     const width = Math.max(1, Math.round(drawing.width * share));
     const height = Math.max(1, Math.round(drawing.height * share));
-    // what emits light stands in the way of light from far away only
+    // shapes that only emit light shade only directional lights
     const far = around && chosen[0]?.place[3] === 0;
     const casters = far ? [...drawing.surfaces, ...drawing.around.glowing] : drawing.surfaces.filter(({ emits }) => !emits);
     const shadow = this.shadows && chosen.length && !lookup ? drawing.shadows[moving ? "coarse" : "fine"].draw(chosen[0], casters, detail, one ? this.count : 0) : UNSHADOWED;
-    // the quick method stands for the other
+    // draw moving pictures by the faster method
     const method = moving && this.wavelength === null && drawing.tables.lut ? "lut" : this.drawn;
     if (method === "spectral") drawing.setResponses(chosen);
     const view = this.viewed([spread(this.count, 0.7548776662) / width, spread(this.count, 0.569840291) / height]);
     const colour = this.colour();
     Object.assign(view.uniforms, { sky: colour ? monochrome(sky, colour) : sky, ...lightUniforms(chosen, colour), ...shadow });
     const sun = around && lights.own.find(({ name }) => name.startsWith("sun of "));
-    if (sun) view.uniforms.sun = [...unit(sun.place), this.header.around.parts.uniforms.sun[3]]; // it may have been moved
+    if (sun) view.uniforms.sun = [...unit(sun.place), this.header.around.parts.uniforms.sun[3]]; // may have been moved
     if (lookup) view.uniforms.sequence = drawnNumbers(this.count);
     else view.uniforms.light_density = chosen[0]?.density ?? 0;
     const lit = this.lit[lookup ? "lookup" : one ? "one" : moving ? "glance" : "few"], bright = lookup || !(one && looksUp);
     this.sample = { ...view, method, width, height, preview, moving, detail, lit, around, looksUp: looksUp && one, lookup, bright, row: 0, time: 0 };
   }
 
-  // What does not depend on the light.
+  // Matrix and uniforms that do not depend on the light.
   viewed(jitter = [0, 0]) {
     const matrix = this.camera.projection(this.drawing.width / this.drawing.height, this.free, jitter, this.lift);
     const uniforms = { view_projection: columnMajor(matrix), eye: this.camera.eye, view_axis: [0, 0, 0], exposure: 1 };
@@ -139,7 +139,7 @@ class Viewer {
     return { matrix, up: this.camera.up, method: this.drawn, heights: this.heights, uniforms };
   }
 
-  // Linear sRGB of the one wavelength, as bright as the light; null of all.
+  // Linear sRGB of monochromatic light, or null for all wavelengths.
   colour() {
     if (this.wavelength === null) return null;
     const { first, step, colours } = this.header.light.monochrome;
@@ -163,7 +163,7 @@ class Viewer {
       });
   }
 
-  // While something moves: one picture, so small that it takes no longer than it may.
+  // Draw one picture while something moves, small enough to be fast.
   glance() {
     const start = performance.now();
     this.begin(true);
@@ -177,7 +177,7 @@ class Viewer {
     this.report(sample, 0);
   }
 
-  // While nothing moves: samples, or rows of one, until the page should answer again.
+  // Draw samples, or rows of one, while nothing moves, until the page should handle events.
   improve() {
     const start = performance.now();
     let shown, done;
@@ -186,7 +186,7 @@ class Viewer {
       const { sample } = this;
       this.draw(sample, start);
       if (sample.row < sample.height) break;
-      const half = sample.looksUp && !sample.lookup; // the other one is what lobes meet
+      const half = sample.looksUp && !sample.lookup; // the second half looks up the surroundings
       const few = this.shadows && this.count + 1 < Math.min(SMOOTH, this.enough);
       const early = !sample.preview && (half || few) && this.shown;
       this.keep(sample, early);
@@ -195,13 +195,13 @@ class Viewer {
       else if (!half) this.count += 1;
       if (!early) shown = true;
       done = sample;
-      if (performance.now() - start > BUSY / 2) break; // else several at once
+      if (performance.now() - start > BUSY / 2) break; // else draw several at once
     }
     if (shown) this.present();
     if (done) this.report(done, this.count);
   }
 
-  // A sample that is drawn; early: too few are there to be shown.
+  // Add a finished sample; early: too few samples to show.
   keep(sample, early = false) {
     this.drawing.keep(sample, this.count === 0 && !sample.lookup);
     if (!early) this.shown = sample;
@@ -209,8 +209,8 @@ class Viewer {
     this.sample = undefined;
   }
 
-  // The next picture's size, so that it takes as long as it may; and its triangles, fewer for good
-  // where it would get too small.
+  // Adapt the size of the next moving picture to the desired time; reduce its triangles permanently
+  // if it would get too small.
   adapt(time) {
     const factor = clamp(Math.sqrt(FLUENT / Math.max(time, 1)), 0.5, 1.3);
     this.share = clamp(this.share * factor, SMALLEST, 1);
@@ -220,7 +220,7 @@ class Viewer {
     } else if (this.share === 1 && time < FLUENT / 4 && this.detail > this.finest) this.detail -= 1;
   }
 
-  // Rows of a sample, until it has all or the page should answer again.
+  // Draw rows of a sample, until it is complete or the page should handle events.
   draw(sample, start) {
     let last = performance.now();
     while (sample.row < sample.height && last - start < BUSY / 2) {
@@ -228,7 +228,7 @@ class Viewer {
       this.drawing.drawRows(sample, sample.row, top);
       this.drawing.finish();
       const now = performance.now();
-      // as many rows at once as can be drawn while nobody notices
+      // as many rows at once as can be drawn without a noticeable delay
       if (now - last > BUSY) this.steps = Math.min(STEPS, this.steps * 2);
       else if (now - last < BUSY / 3) this.steps = Math.max(1, this.steps / 2);
       sample.time += now - last;
@@ -237,12 +237,12 @@ class Viewer {
     }
   }
 
-  // The samples so far, at another exposure perhaps.
+  // Show the samples so far, with the current exposure.
   present() {
     if (this.shown) this.drawing.show(this.shown, this.count, this.exposure, this.half);
   }
 
-  // Resolves when a still picture has so many samples, fails after some ms.
+  // Resolve when a still picture has so many samples; fail after some ms.
   settled(count = this.enough, patience = 120e3) {
     this.wake();
     return new Promise((resolve, reject) => {
@@ -251,7 +251,7 @@ class Viewer {
     });
   }
 
-  // Another method, wavelength or kind of light: what the change makes is compiled first.
+  // Change method, wavelength or kind of light, after compiling the programs for it.
   async change(change, progress) {
     const before = { method: this.method, wavelength: this.wavelength, kind: this.lights.kind };
     const set = ({ method = this.method, wavelength = this.wavelength, kind = this.lights.kind }) => {
@@ -260,13 +260,13 @@ class Viewer {
     };
     set(change);
     const { drawn, lit } = this;
-    set(before); // what is drawn meanwhile is there
+    set(before); // meanwhile, draw with the programs that exist
     await this.drawing.prepare(drawn, lit, progress);
     set(change);
     this.touch();
   }
 }
 
-// Light of one colour as bright as a smooth sky's.
+// Smooth sky in one colour, with the same luminance.
 const monochrome = (sky, colour) =>
   [0, 3, 6, 9].flatMap((n) => times(colour, dot(sky.slice(n, n + 3), LUMINANCE)));

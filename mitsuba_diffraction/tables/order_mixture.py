@@ -1,0 +1,213 @@
+"""Orders for integrals over directions: a few strong ones, and a density of all others."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from .table import DiffractionTable
+from .window import tap_matrix
+
+#: An order whose power ever exceeds this is summed on its own, if it is among the strongest.
+STRONG, MOST_STRONG = 2e-3, 96
+#: Samples of an order's power over one period in κ (that of a squared Bessel function).
+PER_PERIOD = 16
+FEWEST_KAPPAS, MOST_KAPPAS = 16, 160
+
+_FADED = 12.0  # exp(−12) = 6e-6 of a Gaussian's peak is nothing
+#: Bins closer than this (in 1/σ) are joined: together they are hardly wider than one lobe.
+_JOINED = 1.0
+
+
+@dataclass(frozen=True)
+class OrderMixture:
+    """Powers as functions of κ = 0, step, 2·step, … (κ already divided by the height scale).
+
+    Attributes
+    ----------
+    kappa_step : rad/µm.
+    frequency : (n, 2) of the strong orders, rad/µm.
+    powers : (kappas, n) of the strong orders.
+    central : (kappas,), power of order 0.
+    density : (kappas, ny, nx), power of all others per (rad/µm)², smoothed; q = 0 in the middle.
+    pitch : rad/µm between samples of the density.
+    uncertainty : rad/µm, how far a strong order's power may lie from its frequency.
+    """
+
+    kappa_step: float
+    frequency: NDArray[np.float64]
+    powers: NDArray[np.float32]
+    central: NDArray[np.float64]
+    density: NDArray[np.float32]
+    pitch: float
+    uncertainty: float
+
+    def order_0(self, kappa: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Power of order 0 at κ, shape of κ."""
+        return np.interp(kappa, self.kappa_step * np.arange(len(self.central)), self.central)
+
+    def strong(self, kappa: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Powers of the strong orders at κ of shape (m,), shape (n, m)."""
+        position = np.clip(kappa / self.kappa_step, 0.0, len(self.powers) - 1.001)
+        lower = position.astype(int)
+        share = (position - lower).astype(np.float32)
+        return (self.powers[lower].T * (1.0 - share)) + self.powers[lower + 1].T * share
+
+    def strong_at(self, kappa: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Powers of the strong orders, each at its own κ, shape of κ (..., n)."""
+        position = np.clip(kappa / self.kappa_step, 0.0, len(self.powers) - 1.001)
+        lower = position.astype(int)
+        share = (position - lower).astype(np.float32)
+        order = np.arange(self.powers.shape[1])
+        low, high = self.powers[lower, order], self.powers[lower + 1, order]
+        return np.asarray(low * (1.0 - share) + high * share)
+
+
+def order_mixture(
+    table: DiffractionTable, height_scale: float, smoothing: float, *, apart: bool = False
+) -> OrderMixture:
+    """Sort a table's orders.
+
+    Parameters
+    ----------
+    table : the diffraction table.
+    height_scale : factor on its heights.
+    smoothing : standard deviation of the density's smoothing, rad/µm, the lobe's own included.
+    apart : whether order 0 is apart from the density even if its lobe is as wide.
+    """
+    expansion = table.expansion
+    kappa_max = table.q_limit * height_scale
+    periods = kappa_max * expansion.half_range / math.pi
+    count = int(np.clip(math.ceil(PER_PERIOD * periods), FEWEST_KAPPAS, MOST_KAPPAS)) + 1
+    kappas = np.linspace(0.0, min(kappa_max, expansion.kappa_max), count)
+    lobe = 1.0 / (math.sqrt(2.0) * table.sigma)  # standard deviation
+    all_smooth = lobe >= smoothing
+    smoothing = max(smoothing, lobe)
+    axes = [_Axis(table, axis) for axis in (0, 1)]
+    pitch = 0.5 * smoothing
+    half = math.ceil(table.q_limit / pitch) + 1
+    grid = pitch * (np.arange(2 * half, dtype=float) - half + 0.5)
+    splats = [_splat(axis.frequency, grid, smoothing) for axis in axes]
+    density = np.empty((count, 2 * half, 2 * half), np.float32)
+    central = np.empty(count)
+    powers = np.empty((count, 0), np.float32)
+    strongest = np.zeros((len(axes[1].frequency), len(axes[0].frequency)), np.float32)
+    kept = []
+    powers_at = _Powers(table, axes)
+    for n, kappa in enumerate(kappas):
+        power, central[n] = powers_at(float(kappa))
+        if all_smooth and not apart:  # order 0 then is as wide as any other
+            power[len(power) // 2, power.shape[1] // 2] += central[n]
+            central[n] = 0.0
+        np.maximum(strongest, power, out=strongest)
+        density[n] = (splats[0] @ (splats[1] @ power).T).T
+        kept.append(power if power.nbytes * count < 400e6 else None)
+    chosen = _choose(strongest) if not all_smooth else np.zeros((0, 2), int)
+    rows, columns = chosen.T
+    if len(chosen):
+        powers = np.empty((count, len(chosen)), np.float32)
+        for n, kappa in enumerate(kappas):
+            held = kept[n]
+            power = held if held is not None else powers_at(float(kappa))[0]
+            powers[n] = power[rows, columns]
+            chosen_splats = splats[1][:, rows].multiply(powers[n]) @ splats[0][:, columns].T
+            density[n] -= chosen_splats.toarray()
+    np.maximum(density, 0.0, out=density)
+    frequency = np.stack([axes[0].frequency[columns], axes[1].frequency[rows]], axis=1)
+    return OrderMixture(
+        kappa_step=float(kappas[1]) / height_scale,
+        frequency=frequency,
+        powers=powers,
+        central=central,
+        density=density,
+        pitch=pitch,
+        uncertainty=max(axis.uncertainty for axis in axes),
+    )
+
+
+class _Axis:
+    """Where the powers along one axis are: at the bins, at bins joined, or between them."""
+
+    def __init__(self, table: DiffractionTable, axis: int) -> None:
+        last, spacing = table.grid.last[axis], table.spacing[axis]
+        step = table.grid.steps[axis]
+        bins = np.arange(-last, last + 1)
+        if table.grid.coherent:
+            # The window's power is as smooth as a lobe: sampled densely, its sum is its integral
+            density = max(1, math.ceil(step / 0.8))
+            positions = np.arange(-last * density, last * density + 1) / density
+            self.frequency = positions * spacing
+            self.matrix = tap_matrix(positions, -last, len(bins), table.grid.exponents[axis], None)
+            self.weight = step / density / math.sqrt(math.pi)
+            self.uncertainty = 0.5 * spacing / density
+            return
+        joined = max(1, round(_JOINED / step))
+        joined += (joined + 1) % 2  # odd: order 0 stays in the middle of its own
+        group = np.rint(bins / joined).astype(int)
+        first = group[0]
+        self.frequency = np.arange(first, group[-1] + 1) * joined * spacing
+        self.matrix = np.zeros((len(self.frequency), len(bins)), np.float32)
+        self.matrix[group - first, np.arange(len(bins))] = 1.0
+        self.weight = 1.0
+        self.uncertainty = 0.5 * (joined - 1) * spacing
+
+
+class _Powers:
+    """Powers at any κ; keeps the coefficients of the last interval in single precision."""
+
+    def __init__(self, table: DiffractionTable, axes: list[_Axis]) -> None:
+        self._table, self._axes = table, axes
+        self._interval = -1
+        self._coefficients: NDArray[np.float32] = np.zeros((0, 0), np.float32)
+
+    def __call__(self, kappa: float) -> tuple[NDArray[np.float32], float]:
+        """Powers (ny, nx) of all orders but order 0, and that of order 0."""
+        table, axes = self._table, self._axes
+        expansion = table.expansion
+        interval = int(expansion.interval(kappa))
+        _, ny, nx, components, terms = table.coefficients.shape
+        if interval != self._interval:
+            flat = table.coefficients[interval].reshape(-1, terms)
+            self._interval, self._coefficients = interval, flat.astype(np.float32)
+        scaled = (expansion.weights(kappa) / table.scale).astype(np.float32)
+        parts = (self._coefficients @ scaled).reshape(ny, nx, components)
+        centre = table.order_0_at(kappa)
+        if table.grid.coherent:
+            amplitude = parts[..., 0] + 1j * parts[..., 1]
+            amplitude[table.grid.last[1], table.grid.last[0]] = complex(*centre)
+            field = (axes[0].matrix @ (axes[1].matrix @ amplitude).T).T
+            weight = axes[0].weight * axes[1].weight
+            return np.abs(field).astype(np.float32) ** 2 * weight, 0.0
+        if expansion.kind == "power":
+            power, order_0 = np.maximum(parts[..., 0], 0.0), max(float(centre[0]), 0.0)
+        else:
+            power, order_0 = np.sum(parts**2, axis=-1), float(np.sum(centre**2))
+        if len(axes[0].frequency) < nx:
+            power = power @ axes[0].matrix.T
+        if len(axes[1].frequency) < ny:
+            power = axes[1].matrix @ power
+        return power, order_0
+
+
+def _splat(
+    frequency: NDArray[np.floating], grid: NDArray[np.floating], deviation: float
+) -> sparse.csr_array:
+    """Gaussian weights from frequencies to a grid, (grid, frequencies), of integral 1."""
+    exponent = 0.5 * ((frequency - grid[:, None]) / deviation) ** 2
+    weights = np.exp(-exponent) / (math.sqrt(2.0 * math.pi) * deviation)
+    weights[exponent > _FADED] = 0.0
+    return sparse.csr_array(weights.astype(np.float32))
+
+
+def _choose(strongest: NDArray[np.float32]) -> NDArray[np.int64]:
+    """(row, column) of the orders worth a sum of their own, strongest first."""
+    flat = strongest.ravel()
+    many = min(MOST_STRONG, flat.size)
+    candidates = np.argpartition(flat, flat.size - many)[-many:]
+    candidates = candidates[flat[candidates] > STRONG]
+    candidates = candidates[np.argsort(-flat[candidates])]
+    return np.stack(np.unravel_index(candidates, strongest.shape), axis=1)
