@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.ndimage import map_coordinates
 
 from ...optics import blend, boundary, fresnel
@@ -62,13 +61,13 @@ class Boundary:
         """w."""
         return np.asarray(sum(self.normals(cos_i, cos_o)))
 
-    def tangential(self, cos_i: Real, cos_o: Real, cos_turn: ArrayLike) -> Real:
+    def tangential(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> Real:
         """Tangential part of ωi + ωo, in units of k."""
         incident, outgoing = self.came**2 * (1.0 - cos_i**2), self.left**2 * (1.0 - cos_o**2)
         cross = 2.0 * np.sqrt(np.maximum(incident * outgoing, 0.0)) * cos_turn
         return np.sqrt(np.maximum(incident + outgoing + cross, 0.0))
 
-    def common(self, cos_i: Real, cos_o: Real, cos_turn: ArrayLike) -> Real:
+    def common(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> Real:
         """G without the material: what varies steeply towards the horizon."""
         sines = np.sqrt(np.maximum((1.0 - cos_i**2) * (1.0 - cos_o**2), 0.0))
         one_plus_dot = 1.0 + cos_i * cos_o + sines * cos_turn
@@ -98,7 +97,7 @@ class Boundary:
         """K and B at the nodes: the same at all wavelengths, if the index is."""
         return self.at(*self.nodes)
 
-    def at(self, cos_i: Real, cos_o: Real, cos_turn: ArrayLike) -> tuple[Complex, Complex]:
+    def at(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> tuple[Complex, Complex]:
         """K and B at cosines that broadcast."""
         cos_i, cos_o, cos_turn = np.broadcast_arrays(cos_i, cos_o, cos_turn)
         sin_i, sin_o = (np.sqrt(np.maximum(1.0 - c**2, 0.0)) for c in (cos_i, cos_o))
@@ -123,12 +122,13 @@ class Gain:
     wavenumber: float
     height_scale: float
 
-    def ratio(self, cos_i: Real, cos_o: Real, cos_turn: ArrayLike) -> Real:
+    def ratio(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> Real:
         """G over what all materials have in common: smooth up to the horizon; all broadcast."""
         if self.boundary.index is None:
             return np.ones(np.broadcast_shapes(*map(np.shape, (cos_i, cos_o, cos_turn))))
-        ends = (np.clip(cosine, LEAST_COSINE, 1.0) for cosine in (cos_i, cos_o))
-        return self._ratio(self.boundary.at, *ends, np.asarray(cos_turn))
+        incident, outgoing = (np.clip(c, LEAST_COSINE, 1.0) for c in (cos_i, cos_o))
+        ends = incident, outgoing, np.asarray(cos_turn)
+        return self._ratio(self.boundary.at(*ends), *ends)
 
     def __call__(self, cos_i: float, cos_o: Real, turn: Real) -> Real:
         """G at cosθi, cosθo and φo − φi, linear between a table's nodes."""
@@ -147,7 +147,7 @@ class Gain:
     @cached_property
     def _table(self) -> Real:
         """`ratio` at the nodes, (POLAR, POLAR, AZIMUTHS)."""
-        values = self._ratio(lambda *ends: self.boundary.at_nodes, *self.boundary.nodes)
+        values = self._ratio(self.boundary.at_nodes, *self.boundary.nodes)
         if self.boundary.came != self.boundary.left:
             return values.reshape(POLAR, POLAR, AZIMUTHS)
         table = np.empty((POLAR, POLAR, AZIMUTHS))
@@ -155,10 +155,13 @@ class Gain:
         table[i, o] = table[o, i] = values
         return table
 
-    def _ratio(self, matrices: object, cos_i: Real, cos_o: Real, cos_turn: Real) -> Real:
+    def _ratio(
+        self, both: tuple[Complex, Complex], cos_i: Real, cos_o: Real, cos_turn: Real
+    ) -> Real:
+        """`ratio` from K and B at cosines."""
         surface, k = self.boundary, self.wavenumber
-        assert callable(matrices)
-        jones, gentle = matrices(cos_i, cos_o, cos_turn)
+        assert surface.index is not None
+        jones, gentle = both
         w = np.maximum(surface.width(cos_i, cos_o), surface.least)
         if surface.model == "small_slope":
             variance = self.roughness.at(k * surface.tangential(cos_i, cos_o, cos_turn))

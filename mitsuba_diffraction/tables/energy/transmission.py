@@ -19,7 +19,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.ndimage import median_filter
 
 from ...optics import boundary, coat, fresnel, through
@@ -68,7 +67,18 @@ class Medium:
 
 
 @dataclass(frozen=True)
-class Passed(Boundary):
+class Dielectric(Boundary):
+    """Boundary of a real index."""
+
+    @property
+    def real(self) -> float:
+        """The index."""
+        assert isinstance(self.index, (int, float))
+        return float(self.index)
+
+
+@dataclass(frozen=True)
+class Passed(Dielectric):
     """Light that goes through, down or up; through a sheet, out of its flat side as well."""
 
     down: bool = True
@@ -76,7 +86,7 @@ class Passed(Boundary):
 
     def normals(self, cos_i: Real, cos_o: Real) -> tuple[Real, Real]:
         if self.thin:
-            n = self.index
+            n = self.real
             return (cos_i, _deeper(cos_o, n)) if self.down else (_deeper(cos_i, n), cos_o)
         return super().normals(cos_i, cos_o)
 
@@ -84,12 +94,12 @@ class Passed(Boundary):
         q_i, q_o = self.normals(cos_i, cos_o)
         return np.abs(q_i - q_o)
 
-    def common(self, cos_i: Real, cos_o: Real, cos_turn: ArrayLike) -> Real:
+    def common(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> Real:
         q_i, q_o = self.normals(cos_i, cos_o)
         return np.asarray(1.0 / (q_i * q_o * np.maximum(np.abs(q_i - q_o), self.least) ** 2))
 
     def matrices(self, wi: Real, wo: Real) -> tuple[Complex, Complex]:
-        n = self.index
+        n = self.real
         above, below = (wi, wo * _DOWN) if self.down else (wo, wi * _DOWN)
         inside = coat.refracted(below * _DOWN, n) * _DOWN if self.thin else below
         first, second = through.kirchhoff(above, inside, n), through.small_slope(above, inside, n)
@@ -101,24 +111,24 @@ class Passed(Boundary):
     def order_0(self, gain: Gain, cos_i: Real, cos_o: Real) -> Real:
         ends = zip((cos_i, cos_o), (0, 1) if self.down else (1, 0), strict=True)
         shares = [
-            through.flat_transmittances(np.atleast_1d(cosine), self.index, self.thin, side)
+            through.flat_transmittances(np.atleast_1d(cosine), self.real, self.thin, side)
             for cosine, side in ends
         ]
         return np.asarray(np.mean(np.sqrt(shares[0] * shares[1]), axis=0))
 
 
-class Beneath(Boundary):
+class Beneath(Dielectric):
     """Light from below a sheet that the structure sends back, through its flat side."""
 
     def normals(self, cos_i: Real, cos_o: Real) -> tuple[Real, Real]:
-        return _deeper(cos_i, self.index), _deeper(cos_o, self.index)
+        return _deeper(cos_i, self.real), _deeper(cos_o, self.real)
 
-    def common(self, cos_i: Real, cos_o: Real, cos_turn: ArrayLike) -> Real:
+    def common(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> Real:
         q_i, q_o = self.normals(cos_i, cos_o)
         return np.asarray(1.0 / (q_i * q_o * (q_i + q_o) ** 2))
 
     def matrices(self, wi: Real, wo: Real) -> tuple[Complex, Complex]:
-        n = self.index
+        n = self.real
         inside = coat.refracted(wi, n), coat.refracted(wo, n)
         first, second = (
             coat.transmitted(model(*inside, 1.0 / n), wi, wo, n, 1.0 / n)
@@ -142,7 +152,7 @@ class Returned(Boundary):
     def width(self, cos_i: Real, cos_o: Real) -> Real:
         return np.hypot(*(_deeper(cosine, self.sheet) - cosine for cosine in (cos_i, cos_o)))
 
-    def common(self, cos_i: Real, cos_o: Real, cos_turn: ArrayLike) -> Real:
+    def common(self, cos_i: Real, cos_o: Real, cos_turn: Real | float) -> Real:
         shares = []
         for cosine in (cos_i, cos_o):  # T² R / (1 − R²), the mean of both polarisations
             back = np.abs(np.stack(fresnel.amplitudes(cosine, self.sheet))) ** 2
@@ -150,7 +160,7 @@ class Returned(Boundary):
         return np.sqrt(shares[0] * shares[1]) + 0.0 * np.asarray(cos_turn)
 
 
-def _deeper(cosine: Real, index: complex | fresnel.Filmed | float | None) -> Real:
+def _deeper(cosine: Real, index: float) -> Real:
     """q in a sheet of light at an angle outside."""
     return np.sqrt(index**2 - 1.0 + cosine**2)
 

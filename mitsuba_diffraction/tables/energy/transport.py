@@ -90,9 +90,9 @@ class Orders:
         if self.has_weak:
             half = grid.half
             turned = half.phi[:, None] + self.nodes.azimuth
-            shares = [Way(self, gain, at).weak(half.phi) for at in half.theta.tolist()]
+            parts = [Way(self, gain, at).weak(half.phi) for at in half.theta.tolist()]
             to_nodes = grid.interpolation(self.nodes.theta, turned)
-            weak = Weak(np.stack(shares), to_nodes, half.interpolation(theta[:, None], phi))
+            weak = Weak(np.stack(parts), to_nodes, half.interpolation(theta[:, None], phi))
         if self.has_strong:
             shares, polar, azimuth = (
                 np.stack(part) for part in zip(*(way.strong(phi) for way in ways), strict=True)
@@ -175,7 +175,7 @@ class Way:
             return shares
         ends = math.sqrt(1.0 - high**2), math.sqrt(1.0 - low**2)
         step = (ends[1] - ends[0]) / _LOBE_NODES
-        cos_o = ends[0] + step * (np.arange(_LOBE_NODES) + 0.5)
+        cos_o: Real = ends[0] + step * (np.arange(_LOBE_NODES, dtype=np.float64) + 0.5)
         sin_o = np.sqrt(1.0 - cos_o**2)
         parts = np.exp(-(((sin_o - self._sine) / width) ** 2)) * 2.0 * step / width**2 * cos_o
         parts *= i0e(2.0 * sin_o * self._sine / width**2)
