@@ -112,10 +112,20 @@ def _range(values: NDArray[np.floating]) -> list[float]:
 
 
 def energy_warnings(summary: dict[str, Any]) -> list[str]:
-    """Return a warning for each material of which more than `MUCH` of the albedo is removed."""
-    return [
+    """Return a warning for each material that loses much, or loses what the model does not gain."""
+    much = [
         f"with {name}, the model gains energy: up to {100 * energy['taken, largest']:.0f} % of the "
         "light is removed (up to 80° from the normal; energy_conserving=false keeps it)"
         for name, energy in summary.items()
         if energy["taken, largest"] > MUCH
+    ]
+    lost = {
+        name: 1.0 - energy["conserved over raw where that is at most 1"][0]
+        for name, energy in summary.items()
+    }
+    return much + [
+        f"with {name}, directions that gain nothing lose up to {100 * share:.0f} %, too: strong "
+        "orders become propagating between the scale's directions, as on gratings (docs/energy.md)"
+        for name, share in lost.items()
+        if share > MUCH
     ]

@@ -34,11 +34,25 @@ it. The formulas are those of `optics.through`.
 XML and the same in Python:
 
     <bsdf type="diffraction_dielectric">
-        <string name="heightfield" value="film.toml"/>
+        <string name="heightfield" value="scale.png"/>
+        <float name="pixel_size" value="0.0488"/>
+        <float name="max_height" value="0.375"/>
         <boolean name="thin" value="true"/>
     </bsdf>
 
-    mi.load_dict({"type": "diffraction_dielectric", "heightfield": "film.toml", "thin": True})
+    import mitsuba_diffraction  # before Mitsuba: registers the plugin
+    import mitsuba as mi
+
+    mi.set_variant("llvm_ad_spectral")
+    sheet = mi.load_dict(
+        {
+            "type": "diffraction_dielectric",
+            "heightfield": "scale.png",
+            "pixel_size": 0.0488,
+            "max_height": 0.375,
+            "thin": True,
+        }
+    )
 """
 
 from __future__ import annotations
