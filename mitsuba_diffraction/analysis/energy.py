@@ -1,4 +1,4 @@
-"""What a table's surface reflects of three materials, and what energy conservation takes."""
+"""Albedo of a table's surface for three materials, before and after energy conservation."""
 
 from __future__ import annotations
 
@@ -15,31 +15,32 @@ from ..tables.energy.transmission import Medium, Sides
 from ..tables.energy.transport import Orders
 from ..tables.table import DiffractionTable
 
-#: Polar angles (degrees) and wavelengths (nm) looked at, at `AZIMUTHS` azimuths each.
+#: Polar angles (degrees), wavelengths (nm), and number of azimuths of the albedos.
 ANGLES, WAVELENGTHS, AZIMUTHS = (0.0, 30.0, 45.0, 60.0, 70.0, 75.0, 80.0), (450.0, 550.0, 650.0), 24
-#: Angles that are told of one by one.
+#: Polar angles whose losses are listed, degrees.
 SHOWN = (0.0, 45.0, 60.0, 75.0)
-#: And those at which R + T is.
+#: Polar angles of R + T, degrees.
 PASSED = (0.0, 30.0, 45.0, 60.0, 75.0)
-#: What is taken beyond this share is warned of.
+#: Removed share of the albedo from which on a warning is issued.
 MUCH = 0.05
 
 
 def energy_summary(table: DiffractionTable) -> dict[str, Any]:
-    """For each material what is reflected, before and after, and how much of it is taken.
+    """Return the albedo of each material before and after conservation, and the removed share.
 
     The albedos are sums over the orders at 24 azimuths of seven angles up to 80° at 450, 550 and
-    650 nm, not at the directions for which the scale was made.
+    650 nm, not at the nodes for which the scale is computed.
     """
     materials: dict[str, tuple[str, Index]] = {
         "dielectric 1.5": ("small_slope", lambda wavelengths: np.full(len(wavelengths), 1.5 + 0j)),
         "aluminium": ("small_slope", _aluminium),
         "none (R = 1)": ("kirchhoff", lambda wavelengths: None),
     }
-    return {name: _of_material(table, *material) for name, material in materials.items()}
+    return {name: _material_summary(table, *material) for name, material in materials.items()}
 
 
 def _aluminium(wavelengths: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Return Mitsuba's complex index of aluminium, (n,)."""
     parts = []
     for name in ("eta", "k"):
         nodes, values = np.loadtxt(
@@ -49,36 +50,38 @@ def _aluminium(wavelengths: NDArray[np.float64]) -> NDArray[np.complex128]:
     return np.asarray(parts[0] + 1j * parts[1])
 
 
-def _of_material(table: DiffractionTable, model: str, index: Index) -> dict[str, Any]:
-    found = Energy(table, model, index, table.wavelength_range).at(1.0)
+def _material_summary(table: DiffractionTable, model: str, index: Index) -> dict[str, Any]:
+    """Return the summary of one material."""
+    energy = Energy(table, model, index, table.wavelength_range).at(1.0)
     theta, phi = np.radians(ANGLES), _azimuths()
     surface = Surface(Orders(table), model, index)
-    pairs = [surface.albedos(found.scale, theta, phi, wavelength) for wavelength in WAVELENGTHS]
-    raw, kept = (np.stack(part).astype(float) for part in zip(*pairs, strict=True))
-    taken = 1.0 - kept / raw
+    pairs = [surface.albedos(energy.scale, theta, phi, wavelength) for wavelength in WAVELENGTHS]
+    raw, conserved = (np.stack(part).astype(float) for part in zip(*pairs, strict=True))
+    removed = 1.0 - conserved / raw
     gains = raw > 1.0
     result: dict[str, Any] = {
         "model": model,
         "albedo": _range(raw),
-        "albedo, conserved": _range(kept),
-        "taken, largest": round(float(taken.max()), 4),
+        "albedo, conserved": _range(conserved),
+        "taken, largest": round(float(removed.max()), 4),
         "taken at": {
-            f"{angle:g}°": round(float(taken[:, ANGLES.index(angle)].max()), 4) for angle in SHOWN
+            f"{angle:g}°": round(float(removed[:, ANGLES.index(angle)].max()), 4) for angle in SHOWN
         },
-        "conserved over raw where that is at most 1": _range((kept / raw)[~gains]),
-        "within 1 % there": round(float((np.abs(taken[~gains]) <= 0.0101).mean()), 3),
+        "conserved over raw where that is at most 1": _range((conserved / raw)[~gains]),
+        "within 1 % there": round(float((np.abs(removed[~gains]) <= 0.0101).mean()), 3),
     }
     if gains.any():
-        result["conserved where raw is above 1"] = _range(kept[gains])
-        inside = (kept[gains] >= 0.97) & (kept[gains] <= 1.001)
+        result["conserved where raw is above 1"] = _range(conserved[gains])
+        inside = (conserved[gains] >= 0.97) & (conserved[gains] <= 1.001)
         result["between 0.97 and 1.001 there"] = round(float(inside.mean()), 3)
     return result
 
 
 def sides_summary(table: DiffractionTable) -> dict[str, Any]:
-    """R + T of a lossless dielectric of index 1.5 and of a thin sheet of it, as it is and scaled.
+    """Return R + T of a dielectric of index 1.5 and of a thin sheet of it, raw and conserved.
 
-    Least and largest of 24 azimuths at 450, 550 and 650 nm, of light from above and from below.
+    Values are the least and the largest of 24 azimuths at 450, 550 and 650 nm, for light from above
+    and from below.
     """
     theta, phi = np.radians(PASSED), _azimuths()
     result: dict[str, Any] = {}
@@ -99,19 +102,30 @@ def sides_summary(table: DiffractionTable) -> dict[str, Any]:
 
 
 def _azimuths() -> NDArray[np.float64]:
-    """Off the grid, and off the axes of symmetry; radians."""
+    """Return azimuths in radians, off the grid's nodes and the axes of symmetry."""
     return (np.arange(AZIMUTHS, dtype=np.float64) + 0.3) * (2.0 * np.pi / AZIMUTHS)
 
 
 def _range(values: NDArray[np.floating]) -> list[float]:
+    """Return the smallest and the largest value."""
     return [round(float(values.min()), 3), round(float(values.max()), 3)]
 
 
 def energy_warnings(summary: dict[str, Any]) -> list[str]:
-    """Which materials lose much."""
-    return [
-        f"made of {name}, the model gains energy: up to {100 * found['taken, largest']:.0f} % is "
-        "taken (up to 80° from the normal; energy_conserving=false keeps it)"
-        for name, found in summary.items()
-        if found["taken, largest"] > MUCH
+    """Return a warning for each material that loses much, or loses what the model does not gain."""
+    much = [
+        f"with {name}, the model gains energy: up to {100 * energy['taken, largest']:.0f} % of the "
+        "light is removed (up to 80° from the normal; energy_conserving=false keeps it)"
+        for name, energy in summary.items()
+        if energy["taken, largest"] > MUCH
+    ]
+    lost = {
+        name: 1.0 - energy["conserved over raw where that is at most 1"][0]
+        for name, energy in summary.items()
+    }
+    return much + [
+        f"with {name}, directions that gain nothing lose up to {100 * share:.0f} %, too: strong "
+        "orders become propagating between the scale's directions, as on gratings (docs/energy.md)"
+        for name, share in lost.items()
+        if share > MUCH
     ]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..heights.field import HeightField
 from ..heights.spectra import FloatArray, far_field, height_spectrum, order_powers, profile
+from ..tables.energy.gain import Boundary
 from ..tables.energy.grid import FINE
 from ..tables.energy.transport import Orders
 from ..tables.table import DiffractionTable
@@ -146,14 +147,9 @@ def albedo_figure(table: DiffractionTable) -> Figure:
     phi = np.arange(0.0, 360.1, 5.0)
     wavelengths = np.geomspace(*table.wavelength_range, WAVELENGTHS)
     azimuths = np.radians(np.concatenate([AZIMUTHS, phi]))
-    albedo = np.array(
-        [
-            orders.transport(np.radians(theta), azimuths, orders.gain(w, "kirchhoff", None), FINE)(
-                weights
-            )
-            for w in wavelengths.tolist()
-        ]
-    )
+    boundary, angles = Boundary(None, "kirchhoff"), np.radians(theta)
+    gains = [orders.gain(wavelength, boundary) for wavelength in wavelengths.tolist()]
+    albedo = np.array([orders.transport(angles, azimuths, gain, FINE)(weights) for gain in gains])
     figure = Figure(figsize=(12, 5.2), layout="constrained")
     name = table.source.get("name", "table")
     figure.suptitle(f"{name}: raw directional albedo, R = 1")

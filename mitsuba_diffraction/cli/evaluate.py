@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
     from ..heights.spectra import dominant_periods
     from ..thesis.methods import make
     from ..thesis.methods.method import trapezoid_rule
-    from ..thesis.methods.periodic import check_period
+    from ..thesis.methods.periods import check_period
     from ..thesis.period_fit import Beam, measure
     from ..thesis.period_fit.plot import figure, save_csv, save_npz
     from ..thesis.period_fit.ridge import check_axes

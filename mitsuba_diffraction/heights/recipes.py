@@ -117,14 +117,14 @@ class Recipe:
             If the file cannot be written.
         """
         content: dict[str, Any] = {}
-        arguments = [dict(one) for one in self.arguments]
+        arguments = [dict(values) for values in self.arguments]
         if self.generator is None:
             sources = [os.path.relpath(source, path.parent) for source in self.sources]
             content["source"] = sources[0] if len(sources) == 1 else sources
         else:
             content["generator"] = self.generator
             if len(arguments) > 1:  # which differ by their seeds alone
-                content["seeds"] = [one.pop("seed") for one in arguments]
+                content["seeds"] = [values.pop("seed") for values in arguments]
         content |= {**self.options.specified(), **self.table, "output": f"{path.stem}.exr"}
         lines = [f"# {line}" for line in comment.splitlines()]
         lines += [f"{name} = {_toml(value)}" for name, value in content.items()]

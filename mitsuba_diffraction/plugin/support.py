@@ -26,7 +26,6 @@ class Support:
     nested : a BSDF beneath the structure.
     thesis : the layering of the thesis of 2014.
     placed : windows that sit where the light falls, `coherence="surface"`.
-    shadowing : V-shaped grooves.
     shaders : the realtime renderer.
     """
 
@@ -39,7 +38,6 @@ class Support:
     nested: bool = True
     thesis: bool = True
     placed: bool = True
-    shadowing: bool = True
     shaders: bool = True
 
 
@@ -62,8 +60,7 @@ COLOURS = Support("an RGB variant, whose light has no wavelengths to tell speckl
 VARYING = Support("a height_scale that varies", shaders=False)
 TRANSMISSION = Support(
     "the plugin diffraction_dielectric, through which light goes",
-    second_order=False, coat=False, film=False, nested=False, thesis=False, placed=False,
-    shadowing=False, shaders=False,
+    nested=False, placed=False,
 )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from tests.support.furnace import (
     DIELECTRIC,
     assert_at_most_white,
     bsdf,
+    steep_sinusoid,
     white_pair,
 )
 
@@ -47,3 +48,21 @@ def test_a_dielectric_is_as_it_is():
 def test_only_booleans_are_accepted():
     with pytest.raises((md.DiffractionError, RuntimeError), match="energy_conserving"):
         bsdf("sinusoid", energy_conserving="yes")
+
+
+@pytest.mark.parametrize("material", ["Al", "none"])
+def test_scales_that_come_and_go_with_the_heights_load_and_update(material, coarse):
+    given = {"material": material, "model": "kirchhoff", "coherence_width": 18.5}
+    bsdf = mi.load_dict(md.bsdf_dict(steep_sinusoid(), height_scale=0.02, **given))
+    parameters = mi.traverse(bsdf)
+    for height_scale in (0.002, 0.01, 0.05, 0.2, 1.0):
+        parameters["height_scale"] = height_scale
+        parameters.update()
+        si = dr.zeros(mi.SurfaceInteraction3f)
+        si.wi, si.wavelengths = (
+            mi.Vector3f(polar(70.0, 10.0)),
+            mi.Spectrum(400.0, 500.0, 600.0, 700.0),
+        )
+        value = np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(polar(70.0, 190.0))))
+        assert np.all(np.isfinite(value))
+        assert value.min() > 0.0

@@ -18,6 +18,7 @@ from tests.support.furnace import (
     furnace,
     furnace_in,
     random_directions,
+    steep_sinusoid,
     white_pair,
 )
 from tests.support.lanes import lanes
@@ -181,3 +182,18 @@ def test_kernels_twin_agrees_with_numpy():
         assert np.array(ours) == pytest.approx(
             found.at(np.arccos(z), azimuth, wavelength), rel=2e-3
         )
+
+
+def test_a_film_s_scale_comes_and_goes_with_heights_of_a_texture(coarse):
+    heights = {
+        "type": "bitmap",
+        "bitmap": mi.Bitmap(np.linspace(0.002, 0.2, 16, dtype=np.float32).reshape(4, 4, 1)),
+        "raw": True,
+    }
+    given = {"material": "Al", "film_ior": 1.5, "film_thickness": 100.0, "coherence_width": 18.5}
+    bsdf = mi.load_dict(md.bsdf_dict(steep_sinusoid(), height_scale=heights, **given))
+    si = dr.zeros(mi.SurfaceInteraction3f, 4)
+    si.wi, si.uv = mi.Vector3f(polar(70.0, 10.0)), mi.Point2f([0.1, 0.4, 0.6, 0.9], 0.5)
+    si.wavelengths = mi.Spectrum(400.0, 500.0, 600.0, 700.0)
+    value = np.array(bsdf.eval(mi.BSDFContext(), si, mi.Vector3f(polar(70.0, 190.0))))
+    assert np.all(np.isfinite(value))

@@ -34,11 +34,25 @@ it. The formulas are those of `optics.through`.
 XML and the same in Python:
 
     <bsdf type="diffraction_dielectric">
-        <string name="heightfield" value="film.toml"/>
+        <string name="heightfield" value="scale.png"/>
+        <float name="pixel_size" value="0.0488"/>
+        <float name="max_height" value="0.375"/>
         <boolean name="thin" value="true"/>
     </bsdf>
 
-    mi.load_dict({"type": "diffraction_dielectric", "heightfield": "film.toml", "thin": True})
+    import mitsuba_diffraction  # before Mitsuba: registers the plugin
+    import mitsuba as mi
+
+    mi.set_variant("llvm_ad_spectral")
+    sheet = mi.load_dict(
+        {
+            "type": "diffraction_dielectric",
+            "heightfield": "scale.png",
+            "pixel_size": 0.0488,
+            "max_height": 0.375,
+            "thin": True,
+        }
+    )
 """
 
 from __future__ import annotations
@@ -56,7 +70,6 @@ from ..layers import CoatedPair, transmittances
 from ..parameter_changes import check_parameters
 from ..sampling import EVEN, direction_of, with_even_share
 from ..sources import TableProvider, from_cache
-from ..support import TRANSMISSION
 from ..surface import DiffractingSurface
 from ..types import (
     Colour,
@@ -105,7 +118,8 @@ class DiffractionDielectric(DiffractingSurface):
     balance : scales by which both sides add up to 1, or None.
     """
 
-    only_traced = TRANSMISSION.choice
+    #: Feature that shaders do not support.
+    only_traced = "light that goes through"
 
     def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
         read = read_parameters(props, provider)

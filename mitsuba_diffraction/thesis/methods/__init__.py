@@ -22,7 +22,8 @@ from __future__ import annotations
 
 from .make import NAMES, make, make_all, method_map
 from .method import FullSpectrum, Gain, Method
-from .periodic import OrdersOnly, Period, Rainbow, Repeated, estimate_periods
+from .periodic import OrdersOnly, Rainbow, Repeated
+from .periods import Period, estimate_periods
 
 __all__ = [
     "NAMES", "FullSpectrum", "Gain", "Method", "OrdersOnly", "Period", "Rainbow", "Repeated",

@@ -20,7 +20,8 @@ from ...tables.build.spectrum import NEAR
 from ...tables.table import DiffractionTable
 from ...tables.window import taps_for
 from .method import FullSpectrum, Gain, Method, trapezoid_rule
-from .periodic import OrdersOnly, Rainbow, Repeated, check_period, estimate_periods, required_period
+from .periodic import OrdersOnly, Rainbow, Repeated
+from .periods import check_period, estimate_periods, required_period
 
 NAMES = ("spectral", "flss", "nmm", "pq", "pq-sinc", "rainbow")
 

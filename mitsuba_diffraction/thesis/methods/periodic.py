@@ -1,126 +1,29 @@
 """Methods of the thesis for periodic surfaces: `nmm`, `pq` and `rainbow`.
 
 `nmm` evaluates only the wavelengths whose orders reach the view direction, `pq` repeats the patch
-without any other window, and `rainbow` has colours from the period of a grating alone. The period
-is estimated from the autocorrelation of the heights (NumPy only).
+without any other window, and `rainbow` has colours from the period of a grating alone (NumPy only).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...errors import DiffractionError
-from ...heights.field import HeightField
 from ...optics.colour import response
 from ...optics.geometry import diffraction_coordinates, sigma_of, wavenumber
 from ...tables.build.spectrum import NEAR
 from ...tables.lookup import Kernel, weighted_sum
 from ...tables.table import DiffractionTable
 from .method import SPECULAR_WAVELENGTH, Array, FullSpectrum, Gain, Method, UniformMethod
+from .periods import Period
 
-#: Least confidence of a usable period: the ring-shaped autocorrelation of a random surface reaches
-#: 0.1 by chance, snake scales across their fingers 0.5 and more.
-LEAST_CONFIDENCE = 0.3
-
-_SHORTEST, _LONGEST = 1e-2, 1e3  # periods that are accepted, µm
 #: Choices of `weights` in `OrdersOnly`, and of `interpolation` in `Repeated`.
 WEIGHTS, INTERPOLATIONS = ("step", "lobe"), ("linear", "sinc")
-
-
-@dataclass(frozen=True)
-class Period:
-    """Estimate of a patch's period along one axis."""
-
-    axis: str  # "x" or "y"
-    length: float  # µm; NaN if the autocorrelation has no peak
-    # 0 to 1, rise of the autocorrelation from its valley (or from 0, if that is higher) to its
-    # peak at `length`; 1 for an exact grating
-    confidence: float
-
-    @property
-    def reliable(self) -> bool:
-        """Whether the confidence is at least `LEAST_CONFIDENCE`."""
-        return self.confidence >= LEAST_CONFIDENCE
-
-    def __str__(self) -> str:
-        if not np.isfinite(self.length):
-            return f"along {self.axis}: none"
-        return f"along {self.axis}: {self.length:.4g} µm, confidence {self.confidence:.2f}"
-
-
-def estimate_periods(field: HeightField) -> tuple[Period, Period]:
-    """Estimate the periods along x and along y.
-
-    The autocorrelation r of the heights, which tile the plane, is followed along each axis from lag
-    0 down to the first valley and up to the first peak that rises by `LEAST_CONFIDENCE`, or else to
-    the peak that rises most. A parabola through the peak and its neighbours gives the lag between
-    pixels. Lags up to half of the patch are examined: the patch's length is a period of any tile.
-    """
-    centred = field.heights - field.heights.mean()
-    power = np.abs(np.fft.fft2(centred)) ** 2
-    # the mean over one axis of the 2D spectrum is the spectrum of lag 0 along that axis
-    correlations = (np.fft.ifft(power.mean(axis=0)).real, np.fft.ifft(power.mean(axis=1)).real)
-    periods = [
-        _first_peak(axis, correlation, pixel)
-        for axis, correlation, pixel in zip("xy", correlations, field.pixel_size, strict=True)
-    ]
-    return periods[0], periods[1]
-
-
-def main_period(field: HeightField) -> Period:
-    """Return the estimate with the greater confidence; that along x if they are equal."""
-    along_x, along_y = estimate_periods(field)
-    return along_y if along_y.confidence > along_x.confidence else along_x
-
-
-def required_period(field: HeightField, method: str, period: float | None) -> Period:
-    """Return the user's period (along the main axis), or else the estimate if it is reliable."""
-    estimate = main_period(field)
-    if period is not None:
-        return Period(estimate.axis, check_period(period), 1.0)
-    if estimate.reliable:
-        return estimate
-    estimates = "; ".join(str(p) for p in estimate_periods(field))
-    raise DiffractionError(
-        f"method '{method}' needs a period, and {field.name} has no reliable one ({estimates}; "
-        f"at least {LEAST_CONFIDENCE:g} is needed); give period in µm, or choose another method"
-    )
-
-
-def check_period(period: float) -> float:
-    """Refuse a period that is out of range."""
-    if not _SHORTEST <= period <= _LONGEST:
-        raise DiffractionError(f"period={period} must be from {_SHORTEST:g} to {_LONGEST:g} µm")
-    return float(period)
-
-
-def _first_peak(axis: str, correlation: NDArray[np.float64], pixel: float) -> Period:
-    """Return the period of the first high peak of an autocorrelation (n,), else of the highest."""
-    if correlation[0] <= 0.0:  # a flat patch
-        return Period(axis, np.nan, 0.0)
-    r = correlation / correlation[0]
-    half = r.size // 2
-    valley = 1.0
-    best = Period(axis, np.nan, 0.0)
-    for lag in range(1, half + 1):  # inclusive: an odd number of pixels may hold two periods
-        valley = min(valley, r[lag])
-        before, after = r[lag - 1], r[(lag + 1) % r.size]
-        if not (r[lag] > before and r[lag] >= after - 1e-12):
-            continue
-        rise = float(min(r[lag] - max(valley, 0.0), 1.0))
-        if rise > best.confidence:
-            bend = before - 2.0 * r[lag] + after
-            shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
-            best = Period(axis, float((lag + shift) * pixel), rise)
-        if best.reliable:
-            break
-    return best
 
 
 class OrdersOnly(Method):

@@ -87,7 +87,12 @@ def test_reciprocity(some_variant, kind):
     [("dielectric", 40.0), ("dielectric", 150.0), ("sheet", 60.0), ("sheet", 130.0)],
 )
 def test_the_density_is_that_of_the_samples_on_both_sides(some_variant, kind, theta, side):
-    case = Case(ROUGH, theta, DISPERSED, SMALL | INDICES | SIDES[kind])
+    case = Case(
+        ROUGH,
+        theta,
+        DISPERSED,
+        SMALL | INDICES | {"plugin": "diffraction_dielectric"} | SIDES[kind],
+    )
     test = chi_square(OneSide(case.load(), side), case, samples=1 << 19)
     assert test.run(0.01, 8, quiet=True), test.messages
     assert test.histogram_sum[0] > 0.01, test.messages

@@ -13,9 +13,9 @@ from mitsuba_diffraction.realtime.web.export import Page, make_page
 from tests.support.browser import BROWSERS, FLAGS, SIZE, Tab, load_scene
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Any]:
-    """Chromium, driven by Playwright, in a user's folder of its own."""
+    """Chromium, driven by Playwright; open, it takes a tenth of a processor even with no page."""
     api = pytest.importorskip("playwright.sync_api")
     path = next((p for p in map(shutil.which, BROWSERS) if p), None)
     if path is None:

@@ -20,7 +20,7 @@ def test_light_from_below_is_none(rough, of_rough):
 @pytest.mark.parametrize(
     ("name", "arguments", "text"),
     [
-        ("ray", {}, "method='ray' is unknown; choose one of default, flss"),
+        ("ray", {}, "method='ray' is unknown; choose one of spectral, flss"),
         ("flss", {"step": 0.0}, "step=0 nm does not fit"),
         ("flss", {"step": 900.0}, "step=900 nm does not fit"),
         ("flss", {"wavelength_range": (700.0, 400.0)}, "wavelength_range=700, 400 nm"),

@@ -1,0 +1,53 @@
+"""Flat and shallow surfaces that let light through send all of it on, whatever index and window."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from tests.support.directions import polar, rough_patch
+from tests.support.transmitting import SIDES
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning"),
+    pytest.mark.usefixtures("some_variant", "coarse"),
+]
+
+FIELDS = {
+    "flat": md.HeightField(np.zeros((8, 8)), 8.0),
+    "5 nm": rough_patch((200, 200), (0.1, 0.1), 0.005, 1.0),
+}
+#: From above and from below.
+DIRECTIONS = np.array([polar(theta, 20.0) * [1, 1, side] for theta in (0, 45) for side in (1, -1)])
+SAMPLES = 1 << 12
+
+
+def passed(field, kind, index, width):
+    """Mean weight of samples (4 wavelengths, directions), its error, and the largest weight."""
+    parameters = {"int_ior": index, "ext_ior": 1.0, "coherence_width": width, **SIDES[kind]}
+    bsdf = mi.load_dict(md.bsdf_dict(FIELDS[field], plugin="diffraction_dielectric", **parameters))
+    count = len(DIRECTIONS)
+    si = dr.zeros(mi.SurfaceInteraction3f, count * SAMPLES)
+    si.wi = mi.Vector3f(np.repeat(DIRECTIONS, SAMPLES, axis=0).astype(np.float32).T)
+    si.wavelengths = mi.Spectrum(410.0, 500.0, 590.0, 690.0)
+    rng = mi.PCG32(count * SAMPLES)
+    sample1, sample2 = rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32())
+    context = mi.BSDFContext(mi.TransportMode.Importance)
+    weights = np.array(bsdf.sample(context, si, sample1, sample2)[1], float)
+    weights = weights.reshape(-1, count, SAMPLES)
+    return weights.mean(axis=2), weights.std(axis=2) / np.sqrt(SAMPLES), weights.max()
+
+
+@pytest.mark.parametrize("kind", SIDES)
+@pytest.mark.parametrize(
+    ("field", "index", "width"),
+    [("5 nm", 1.2, 65.0), ("flat", 1.06, 10.0)],
+)
+def test_no_light_comes_from_nothing(field, kind, index, width):
+    mean, error, most = passed(field, kind, index, width)
+    # the table's tolerance, and what 4 standard errors of 64 trials leave
+    assert np.all(np.abs(mean - 1.0) < 4.0 * error + 5e-3)
+    assert most < 20.0  # one of ten samples or more is drawn from each side
