@@ -235,7 +235,7 @@ def test_over_white_it_returns_what_the_film_lets_through(some_variant, theta):
         ({**OXIDE, "material": "none"}, "material='none'"),
         ({**OXIDE, "coat_ior": 1.5}, "coat_ior"),
         ({**OXIDE, "layering": "thesis", "nested": {"type": "diffuse"}}, "layering='thesis'"),
-        ({**OXIDE, "film_k": 0.1, "nested": {"type": "diffuse"}}, "leave film_k out"),
+        ({**OXIDE, "film_k": 0.1, "nested": {"type": "diffuse"}}, "film_k"),
     ],
 )
 def test_what_is_no_film_is_one_line(some_variant, parameters, line):
