@@ -128,7 +128,7 @@ def test_the_second_order_is_told_and_changes_the_map(run, heights):
         (["-m", "scalar_rgb"], "variant 'scalar_rgb'"),
         (["--material", "Unobtainium"], "Unobtainium"),
         (["--fill", "hope"], "fill"),
-        (["--second-order", "true"], "second_order=true is for"),  # of what has an index
+        (["--second-order", "true"], "second_order=true"),  # of what has an index
     ],
 )
 def test_what_does_not_fit_is_one_line(run, heights, here, options, text):

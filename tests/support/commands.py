@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -90,6 +91,8 @@ def small_tree(folder: Path) -> Path:
     counts = np.tile(np.int16(np.round(wave)), (32, 1))
     (folder / "scan.spm").write_bytes(nanoscope(counts, scan_size="8 4 ~m"))
     assert make_mesh(["knot", "-o", str(folder / "mesh.ply")]) == 0
+    # what `plan` writes, which is not run here
+    shutil.copy(folder / "precompute" / "elaphe_like.toml", folder / "snake.toml")
     return folder
 
 
