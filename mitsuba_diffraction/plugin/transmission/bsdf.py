@@ -18,8 +18,9 @@ model : string [small_slope]
     `small_slope` or `kirchhoff`, as of `diffraction`.
 energy_conserving : boolean [true]
     Makes R + T 1, since a dielectric loses no light: order 0 is multiplied by c(ωi) c(ωo), c on the
-    directions of both sides. It takes a few seconds the first time and is kept in the cache, in
-    steps of 0.01 of eta. `false` is the model as it is, for checks.
+    directions of both sides. Where the other orders of a steep surface exceed 1 on their own, all
+    light is attenuated by t(ωi) t(ωo). It takes a few seconds the first time and is kept in the
+    cache, in steps of 0.01 of eta. `false` is the model as it is, for checks.
 
 The model is that of `diffraction` where light is reflected; light that goes through has orders of
 κ = k (n cosθt − cosθi). Component 0 is the reflection, component 1 the transmission. Orders that
@@ -164,10 +165,9 @@ class DiffractionDielectric(DiffractingSurface):
         rotation = self.orientation.rotation(si, active)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         # c(ωi) c(ωo), by which order 0 makes up for what R + T lacks or exceeds
-        change = None
-        if self.balance is not None and self.balance.takes:
-            k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
-            change = self.balance.product((si.wi, wo), rotation, k, scale)
+        change, where = None, (self.power.wavenumbers(si), self.scale_at(si, active))
+        if self.balance is not None and self.balance.scales_order_0:
+            change = self.balance.order_0_scale((si.wi, wo), rotation, *where)
         if asked.reflection:
             for reflected, sign in ((self._above, 1.0), (self._below, -1.0)):
                 lit = active & (sign * cos_i > 0.0) & (cos_i * cos_o > 0.0)
@@ -182,6 +182,9 @@ class DiffractionDielectric(DiffractingSurface):
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
             orders = self.power.density(crossing, self.scale_at(si, active), si) * dr.square(out)
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
+        if self.balance is not None and self.balance.attenuates:
+            # t(ωi) t(ωo), where the orders of a steep surface exceed 1 on their own
+            value *= mi.Spectrum(self.balance.attenuation((si.wi, wo), rotation, *where))
         return value, density
 
     def sample(
@@ -417,7 +420,8 @@ class DiffractionDielectric(DiffractingSurface):
             (self.balance, self.boundary, self.inner_boundary, self.mirror),
             self.thin,
             str(self.boundary),
-            0 if self.balance is None else self.balance.takes,
+            self.balance is not None and self.balance.scales_order_0,
+            self.balance is not None and self.balance.attenuates,
         )
 
     def to_string(self) -> str:

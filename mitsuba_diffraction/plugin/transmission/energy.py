@@ -22,7 +22,7 @@ INDEX_STEP = 0.01
 
 
 class SidesModel:
-    """Scale c of directions on either side, at the height scale and index last given.
+    """Scales c and t of directions on either side, at the height scale and index last given.
 
     Parameters
     ----------
@@ -42,10 +42,11 @@ class SidesModel:
         self._table, self._material, self._model, self._thin = table, material, model, thin
         mono = wavelength, wavelength
         self._range = mono if mi.is_monochromatic else table.wavelength_range
-        self._above, self._below = DirectionLookup(), DirectionLookup()
+        #: c above and below, t above and below
+        self._lookups = [DirectionLookup() for _ in range(4)]
 
     def update(self, height_scale: float, differentiable: bool, lowest: float | None) -> None:
-        """Look up, or compute, c at another height scale or index; see `EnergyModel.update`."""
+        """Look up, or compute, c and t at another height scale or index; see `EnergyModel.update`."""
         index = round(plain(self._material.eta) / INDEX_STEP) * INDEX_STEP
         medium = Medium(index, self._model, self._thin)
         energy = SidesEnergy(self._table, medium, self._range)
@@ -54,16 +55,21 @@ class SidesModel:
         else:
             nodes = energy.between(lowest, height_scale)
         scales = [energy.at(node) for node in nodes]
-        for side, lookup in enumerate((self._above, self._below)):
-            tables = scales_of([scale[side] if scale else None for scale in scales])
+        for n, lookup in enumerate(self._lookups):
+            tables = scales_of([scale[n] if n < len(scale) else None for scale in scales])
             lookup.update(tables, nodes, height_scale, lowest is not None)
 
     @property
-    def takes(self) -> bool:
-        """Whether order 0 is scaled at all."""
-        return self._above.present
+    def scales_order_0(self) -> bool:
+        """Whether order 0 is scaled by c."""
+        return self._lookups[0].present
 
-    def product(
+    @property
+    def attenuates(self) -> bool:
+        """Whether all light is attenuated by t."""
+        return self._lookups[2].present
+
+    def order_0_scale(
         self,
         directions: tuple[Vector3f, Vector3f],
         rotation: Rotation,
@@ -71,17 +77,34 @@ class SidesModel:
         height_scale: Float,
     ) -> Colour:
         """c(ωi) c(ωo) per channel, of directions in the shading frame."""
-        ends = [self._at(one, rotation, wavenumbers, height_scale) for one in directions]
-        return ends[0] * ends[1]
+        return self._product(self._lookups[:2], directions, rotation, wavenumbers, height_scale)
 
-    def _at(
-        self, direction: Vector3f, rotation: Rotation, wavenumbers: list[Float], height_scale: Float
+    def attenuation(
+        self,
+        directions: tuple[Vector3f, Vector3f],
+        rotation: Rotation,
+        wavenumbers: list[Float],
+        height_scale: Float,
     ) -> Colour:
-        """c at a direction, per channel."""
-        tangential, cosine = in_patch(direction, rotation), mi.Frame3f.cos_theta(direction)
-        sides = zip(
-            self._above.at(tangential, cosine, wavenumbers, height_scale),
-            self._below.at(tangential, -cosine, wavenumbers, height_scale),
-            strict=True,
-        )
-        return mi.UnpolarizedSpectrum([dr.select(cosine > 0.0, *both) for both in sides])
+        """t(ωi) t(ωo) per channel, of directions in the shading frame."""
+        return self._product(self._lookups[2:], directions, rotation, wavenumbers, height_scale)
+
+    def _product(
+        self,
+        lookups: list[DirectionLookup],
+        directions: tuple[Vector3f, Vector3f],
+        rotation: Rotation,
+        wavenumbers: list[Float],
+        height_scale: Float,
+    ) -> Colour:
+        """Product of a scale at both directions, each on its side."""
+        product = mi.UnpolarizedSpectrum(1.0)
+        for direction in directions:
+            tangential, cosine = in_patch(direction, rotation), mi.Frame3f.cos_theta(direction)
+            sides = zip(
+                lookups[0].at(tangential, cosine, wavenumbers, height_scale),
+                lookups[1].at(tangential, -cosine, wavenumbers, height_scale),
+                strict=True,
+            )
+            product *= mi.UnpolarizedSpectrum([dr.select(cosine > 0.0, *both) for both in sides])
+        return product

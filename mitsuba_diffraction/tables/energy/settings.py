@@ -31,6 +31,7 @@ class EnergySettings:
     largest : of a scale; of all light at most 1 from 80° on, since part of a lobe is below the
         horizon there, and what is above reaches across directions of very different scales.
     close : R + T that differs from 1 by less needs no scale.
+    tolerated : R + T between nodes above this is attenuated.
     passes : how often scales are lowered where an albedo between nodes is above the ceiling.
     """
 
@@ -54,6 +55,7 @@ class EnergySettings:
     ceiling: float = 1.001
     largest: float = 1.5
     close: float = 5e-4
+    tolerated: float = 1.004
     passes: int = 4
 
 

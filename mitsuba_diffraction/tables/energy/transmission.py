@@ -7,7 +7,9 @@ directions of both sides such that with f = f_0 + f_orders
     f'(ωi, ωo) = f_orders + f_0 c(ωi) c(ωo)   sends on   R + T = 1,
 
 by the iteration of `scaling`, on both sides stacked. A sheet loses the light beyond its critical
-angle; c puts that back likewise. Where order 0 has too little light, R + T stays as it is.
+angle; c puts that back likewise. Where order 0 has too little light to make up for what is missing,
+that stays missing. Where the other orders of a steep surface exceed 1 on their own, all light is
+attenuated by t(ωi) t(ωo), t at most 1.
 
 Side 0 is above the structure, 1 below: within the dielectric, or outside of the flat other side of
 a sheet. In what goes through, w = |qi − qo|, q at the structure.
@@ -17,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -28,7 +31,7 @@ from .conservation import between, wavelengths_of
 from .gain import Boundary, Gain
 from .grid import Array, DirectionalTable, DirectionGrid, Real
 from .scaling import lowered, parallel, scaled
-from .settings import energy_settings
+from .settings import EnergySettings, energy_settings
 from .transport import Mirrored, Orders, Way
 
 #: Where order 0 has less of the light, it is not changed.
@@ -186,6 +189,44 @@ class SideSums:
         return sums.astype(np.float32)
 
 
+@dataclass(frozen=True)
+class Middles:
+    """R + T in the middles of the grid's cells, for scales (2, polar + 1, azimuthal) at its nodes.
+
+    Attributes
+    ----------
+    sums : R + T there.
+    here : interpolation of a scale to the middles.
+    """
+
+    sums: SideSums
+    here: Callable[[Array], Array]
+    settings: EnergySettings
+
+    def order_0(self, c: Array) -> Array:
+        """Sums of order 0 scaled by c."""
+        return np.stack([self.here(side) for side in c]) * self.sums.zeroth(c)
+
+    def order_0_excess(self, c: Array) -> Array:
+        """Factor by which order 0 is too large, for `lowered`."""
+        room = np.maximum(np.float32(self.settings.ceiling) - self.sums.orders, 1e-6)
+        zeroth = self.order_0(c)
+        factor = np.clip(zeroth / room, 1.0, self.settings.largest**2)
+        return np.where(zeroth > FAINT, factor, 1.0).astype(np.float32)
+
+    def total(self, c: Array) -> Array:
+        """R + T with order 0 scaled by c."""
+        return self.sums.orders + self.order_0(c)
+
+    def excess(self, total: Array, t: Array) -> Array:
+        """Factor by which R + T, attenuated by t, is too large, for `lowered`.
+
+        Light sent on is attenuated by t as well, which is at most 1: the bound t(ωi) (R + T).
+        """
+        attenuated = np.stack([self.here(side) for side in t]) * total
+        return np.maximum(attenuated / np.float32(self.settings.ceiling), 1.0)
+
+
 class Sides:
     """A table's surface at one height scale, of one dielectric."""
 
@@ -200,7 +241,7 @@ class Sides:
         self._grid = DirectionGrid(self._settings.side_polar, self._settings.azimuthal)
 
     def scale(self, wavelength_range: tuple[float, float]) -> list[DirectionalTable] | None:
-        """Find c above and below; None where R + T is 1 as it is."""
+        """Find c above and below, then t if any is less than 1; None where R + T is 1 as it is."""
         grid, settings = self._grid, self._settings
         wavelengths = wavelengths_of(wavelength_range, settings.side_wavelengths)
         ones = np.stack([grid.ones] * 2)
@@ -216,34 +257,35 @@ class Sides:
             # what lies within one row, as a lobe at the critical angle, is left to itself
             return np.asarray(median_filter(c, (1, 3, 1), mode="nearest"))
 
-        scale = np.stack(parallel(solved, wavelengths.tolist()))
-        if np.all(scale == 1.0):
+        c = np.stack(parallel(solved, wavelengths.tolist()))
+        if np.all(c == 1.0):
             return None
-        scale = lowered(scale, parallel(self._excess, between(wavelengths).tolist()), settings)
-        return [DirectionalTable(wavelengths, scale[:, side]) for side in (0, 1)]
+        middles = parallel(self._middles, between(wavelengths).tolist())
+        c = lowered(c, [cells.order_0_excess for cells in middles], settings)
+        scales = [DirectionalTable(wavelengths, c[:, side]) for side in (0, 1)]
+        totals = [
+            cells.total(0.5 * (c[n] + c[min(n + 1, len(c) - 1)])) for n, cells in enumerate(middles)
+        ]
+        if max(total.max() for total in totals) > settings.tolerated:
+            excess = [
+                partial(cells.excess, total) for cells, total in zip(middles, totals, strict=True)
+            ]
+            t = lowered(np.ones_like(c), excess, settings)
+            scales += [DirectionalTable(wavelengths, t[:, side]) for side in (0, 1)]
+        return scales
 
-    def _excess(self, wavelength: float) -> Callable[[Array], Array]:
-        """Factor by which order 0 between nodes is too large, for `lowered`."""
+    def _middles(self, wavelength: float) -> Middles:
         theta, phi = self._grid.middles(1)
-        sums, here = (
-            self._sums(theta, phi, wavelength),
-            self._grid.interpolation(theta[:, None], phi),
-        )
-        room = np.maximum(np.float32(self._settings.ceiling) - sums.orders, 1e-6)
-
-        def of_page(c: Array) -> Array:
-            zeroth = np.stack([here(side) for side in c]) * sums.zeroth(c)
-            factor = np.clip(zeroth / room, 1.0, self._settings.largest**2)
-            return np.where(zeroth > FAINT, factor, 1.0).astype(np.float32)
-
-        return of_page
+        here = self._grid.interpolation(theta[:, None], phi)
+        return Middles(self._sums(theta, phi, wavelength), here, self._settings)
 
     def sums(
         self, scale: Sequence[DirectionalTable] | None, theta: Real, phi: Real, wavelength: float
     ) -> tuple[Array, Array]:
         """R + T as it is and scaled, (2, t, p) each, of light from above and from below.
 
-        Exact sums at these angles (rad), not the grid's; nm.
+        Exact sums at these angles (rad), not the grid's; nm. Where light is attenuated they are
+        bounds: t(ωo) counts as 1.
         """
         sums = self._sums(theta, phi, wavelength)
         raw = sums.orders + sums.zeroth(np.stack([self._grid.ones] * 2))
@@ -251,7 +293,8 @@ class Sides:
             return raw, raw
         here = np.stack([side.at(theta[:, None], phi, wavelength) for side in scale])
         pages = np.stack([side.page(wavelength) for side in scale])
-        return raw, sums.orders + here * sums.zeroth(pages)
+        total = sums.orders + here[:2] * sums.zeroth(pages[:2])
+        return raw, total * here[2:] if len(scale) > 2 else total
 
     def _sums(self, theta: Real, phi: Real, wavelength: float) -> SideSums:
         grid, half, surface = self._grid, self._grid.half, self._orders
