@@ -1,6 +1,6 @@
 """Energy conservation, and the light that goes beneath (Dr.Jit): `tables.energy` in a kernel.
 
-What is reflected is multiplied by s(ωi) s(ωo), reciprocal, where the model would reflect more than
+What is reflected is multiplied by e(ωi) e(ωo), reciprocal, where the model would reflect more than
 it gets; T = 1 − a(ω) of a dielectric's own albedo goes on to what lies beneath.
 """
 
@@ -131,7 +131,7 @@ class EnergyModel:
             )
 
     def brightness(self, height_scale: float) -> Array | None:
-        """s for who knows no wavelengths, (polar + 1, azimuthal): their mean as the eye has it."""
+        """Luminous mean of the energy scale e over wavelengths, (polar + 1, azimuthal)."""
         nodes = self._energy.nodes(height_scale)
         found = [self._energy.at(node) for node in nodes]
         scales = scales_of([one.scale for one in found])
@@ -148,12 +148,12 @@ class EnergyModel:
         return between(ratios, nodes, height_scale)
 
     @property
-    def takes(self) -> int:
-        """Number that tells which factors the BSDF is multiplied by; 0 for none."""
+    def active_factors(self) -> int:
+        """Factors that the BSDF is multiplied by: 1 energy scale, 2 mean second order, 3 both."""
         return self._scale.present + 2 * self._mean.present
 
     def factor(self, pair: Pair, wavenumbers: list[Float], height_scale: Float) -> Colour:
-        """s(ωi) s(ωo), per channel; of a film g(ωi) g(ωo) as well (`optics.mean_second_order`).
+        """e(ωi) e(ωo), per channel; of a film g(ωi) g(ωo) as well (`optics.mean_second_order`).
 
         height_scale : the one given to `update`; needed where derivatives with respect to it are,
             and where it varies.

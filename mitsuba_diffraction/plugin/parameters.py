@@ -45,7 +45,7 @@ class Parameters:
     layering : how diffraction and the nested BSDF share the light.
     nested : the BSDF beneath, or None.
     second_order : the second order of small slope, or None.
-    only_traced : choice that shaders do not support, or None.
+    not_in_shaders : choice that shaders do not support, or None.
     """
 
     surface: SurfaceParameters
@@ -57,7 +57,7 @@ class Parameters:
     layering: Layering
     nested: BSDF | None
     second_order: SecondOrder | None
-    only_traced: str | None
+    not_in_shaders: str | None
 
 
 def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
@@ -104,7 +104,7 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
         layering=_layering(props, layering, flat, nested is not None),
         nested=nested,
         second_order=second_order,
-        only_traced=undrawn[0] if undrawn else None,
+        not_in_shaders=undrawn[0] if undrawn else None,
     )
 
 

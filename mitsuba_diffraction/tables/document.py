@@ -314,7 +314,7 @@ def _list(value: Any, name: str) -> list[Any]:
 def _names(fields: Iterable[str], allowed: Iterable[str], required: Iterable[str]) -> None:
     missing, unknown = set(required) - set(fields), set(fields) - set(allowed)
     if missing:
-        raise ValueError(f"no {', '.join(sorted(missing))}")
+        raise ValueError(f"missing entries: {', '.join(sorted(missing))}")
     if unknown:
         raise ValueError(f"unknown entry {quoted(min(unknown))}")
 

@@ -119,7 +119,7 @@ class DiffractionDielectric(DiffractingSurface):
     """
 
     #: Feature that shaders do not support.
-    only_traced = "light that goes through"
+    not_in_shaders = "light that goes through"
 
     def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
         read = read_parameters(props, provider)
@@ -165,7 +165,7 @@ class DiffractionDielectric(DiffractingSurface):
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         # c(ωi) c(ωo), by which order 0 makes up for what R + T lacks or exceeds
         change = None
-        if self.balance is not None and self.balance.takes:
+        if self.balance is not None and self.balance.active_factors:
             k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
             change = self.balance.product((si.wi, wo), rotation, k, scale)
         if asked.reflection:
@@ -417,7 +417,7 @@ class DiffractionDielectric(DiffractingSurface):
             (self.balance, self.boundary, self.inner_boundary, self.mirror),
             self.thin,
             str(self.boundary),
-            0 if self.balance is None else self.balance.takes,
+            0 if self.balance is None else self.balance.active_factors,
         )
 
     def to_string(self) -> str:

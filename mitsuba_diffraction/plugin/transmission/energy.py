@@ -59,7 +59,7 @@ class SidesModel:
             lookup.update(tables, nodes, height_scale, lowest is not None)
 
     @property
-    def takes(self) -> bool:
+    def active_factors(self) -> bool:
         """Whether order 0 is scaled at all."""
         return self._above.present
 
