@@ -19,9 +19,12 @@ incidence. Row 0 and column 0 of a matrix are s, row 1 and column 1 are p: E_out
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..errors import DiffractionError
 from .fresnel import Filmed, Index, amplitudes, faces
 
 Real = NDArray[np.float64]
@@ -85,20 +88,46 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     4 cosθi cosθo N/w² is then R(cosθ_half) (1 + ωi·ωo)²/(w² cosθi cosθo) (Stam 1999, eq. 7).
     """
     incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
-    s_in, s_out = polarisation_axes(incident, outgoing)
-    axis = facet_axis(incident, outgoing, s_in)
     total = incident + outgoing
     # |ωi + ωo|² = 2(1 + ωi·ωo) is the form that survives opposite grazing directions
     one_plus_dot = 0.5 * np.sum(total * total, axis=-1)
     cos_half = np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0))
     if isinstance(index, Filmed):
         index = index.tilted(0.5 * total[..., 2] / cos_half)
-    r_s, r_p = amplitudes(cos_half, index)
+    return facet_matrices(incident, outgoing, *amplitudes(cos_half, index))
+
+
+def facet_matrices(wi: ArrayLike, wo: ArrayLike, r_s: Complex, r_p: Complex) -> Complex:
+    """Jones matrices (..., 2, 2) of facets that mirror ωi to ωo with coefficients r_s, r_p."""
+    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    s_in, s_out = polarisation_axes(incident, outgoing)
+    axis, total = facet_axis(incident, outgoing, s_in), incident + outgoing
     zero = np.zeros_like(r_s)
     facet = jones_matrix(ss=r_s, sp=zero, ps=zero, pp=r_p)
     turned = turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident)
+    one_plus_dot = 0.5 * np.sum(total * total, axis=-1)
     scale = one_plus_dot / (2 * incident[..., 2] * outgoing[..., 2])
     return np.asarray(scale[..., None, None] * turned)
+
+
+Matrices = Callable[[ArrayLike, ArrayLike, Index], Complex]
+
+#: Boundary models by name: their Jones matrices (..., 2, 2) from ωi, ωo and the index. Those of
+#: `small_slope` are blended with Kirchhoff's by the roughness (`blend`); no others depend on the
+#: heights. The first is the default of a material with an index.
+MODELS: dict[str, Matrices] = {"small_slope": small_slope, "kirchhoff": kirchhoff}
+
+
+def matrices_of(model: str) -> Matrices:
+    """Jones matrices of a model by name; an unknown one is refused."""
+    return MODELS[checked_model(model)]
+
+
+def checked_model(model: str, models: Iterable[str] = MODELS) -> str:
+    """Return the name of a boundary model if it is one of `models`."""
+    if model not in (names := tuple(models)):
+        raise DiffractionError(f"model='{model}' is unknown; choose one of {', '.join(names)}")
+    return model
 
 
 def polarisation_axes(wi: ArrayLike, wo: ArrayLike) -> tuple[Real, Real]:

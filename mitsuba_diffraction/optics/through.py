@@ -35,6 +35,9 @@ from numpy.typing import ArrayLike
 from .boundary import Complex, Real, facet_axis, polarisation_axes, turn
 from .fresnel import amplitudes, decaying_root
 
+#: Boundary models that are known for light that goes through.
+MODELS = ("small_slope", "kirchhoff")
+
 
 def small_slope(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
     """Jones matrices of first order, (..., 2, 2).

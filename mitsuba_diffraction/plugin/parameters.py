@@ -111,15 +111,16 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
 def _model(props: Properties, material: Reflectance) -> str:
     """Name of the boundary model; by default small slope if there is an index and no thesis."""
     scalar = isinstance(material, Perfect) or props.get("layering", LAYERINGS[0]) == "thesis"
-    return choice(props, "model", MODELS[::-1] if scalar else MODELS)
+    default = "kirchhoff" if scalar else "small_slope"
+    return choice(props, "model", (default, *(name for name in MODELS if name != default)))
 
 
 def _asked(props: Properties, nested: BSDF | None) -> Iterator[tuple[str, str]]:
     """Features that a scene asks for, as messages call them."""
     if nested is not None:
         yield "nested", f"the nested BSDF {kind_of(nested)}"
-    if props.get("model", "") == "small_slope":
-        yield "small_slope", "model='small_slope'"
+    if (model := props.get("model", "kirchhoff")) != "kirchhoff":
+        yield "index", f"model='{model}'"
     if props.get("layering", "") == "thesis":
         yield "thesis", "layering='thesis'"
     if coherence_of(props) == SURFACE:
@@ -143,8 +144,8 @@ def _choices(props: Properties, material: Reflectance, model: str) -> Iterator[S
         yield support.COAT
     if "film_ior" in props:
         yield support.FILM
-    if model == "kirchhoff":
-        yield support.KIRCHHOFF
+    if model != "small_slope":
+        yield support.without_second_order(model)
     if props.get("layering", "") == "thesis":
         yield support.THESIS
     if coherence_of(props) != COHERENCES[0]:

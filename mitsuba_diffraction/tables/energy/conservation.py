@@ -48,7 +48,7 @@ class Surface:
     Attributes
     ----------
     orders : of the table.
-    model : "kirchhoff" or "small_slope".
+    model : one of `optics.boundary.MODELS`.
     index : of the material over that of the medium above it.
     """
 
