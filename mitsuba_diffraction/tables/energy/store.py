@@ -43,8 +43,8 @@ class Energy(HeightScales):
 
         def make() -> list[DirectionalTable]:
             surface = Surface(Orders(self.table, height_scale), self.model, self.index)
-            made = surface.conservation(self.wavelength_range)
-            return [made.albedo] if made.scale is None else [made.albedo, made.scale]
+            energy = surface.conservation(self.wavelength_range)
+            return [energy.albedo] if energy.scale is None else [energy.albedo, energy.scale]
 
         index = rounded(self.index(np.geomspace(*self.wavelength_range, PROBES)))
         made_of = [height_scale, self.model, index, *self.wavelength_range]
@@ -90,19 +90,21 @@ def rounded(index: NDArray[np.complex128] | Filmed | None) -> list[str] | None:
     return [f"{n.real:.5g} {n.imag:.5g}" for n in index]
 
 
-def record(made: list[DirectionalTable]) -> Record:
+def record(pages: list[DirectionalTable]) -> Record:
     """Pack tables of directions for the cache."""
-    return Record([table.wavelengths.tolist() for table in made], [table.values for table in made])
+    return Record(
+        [table.wavelengths.tolist() for table in pages], [table.values for table in pages]
+    )
 
 
 def tables(record: Record) -> list[DirectionalTable]:
     """Unpack and check them."""
-    made = []
+    pages = []
     for wavelengths, values in zip(record.document, record.arrays, strict=True):
         if values.ndim != 3 or len(values) != len(wavelengths) or not np.isfinite(values).all():
             raise ValueError(
                 f"directional table of shape {values.shape}; expected (wavelengths, polar, "
                 "azimuthal), finite"
             )
-        made.append(DirectionalTable(np.array(wavelengths, float), values))
-    return made
+        pages.append(DirectionalTable(np.array(wavelengths, float), values))
+    return pages
