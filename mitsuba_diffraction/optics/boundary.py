@@ -37,19 +37,18 @@ _NORMAL = 1e-12
 def small_slope(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     """Jones matrices B of the first-order small-slope approximation, (..., 2, 2).
 
-    With k0, k the tangential parts of −ωi and ωo, q0, q their cosines, q' = √(ε − k²), all in
-    units of the wavenumber, and unit vectors k̂0, k̂ (Rice 1951; Elfouhaily and Guérin 2004,
-    section 4; ε is the square of `index`):
+    With t0, t the tangential parts of −ωi and ωo, γ0, γ their cosines, γ' = √(ε − t²), and unit
+    vectors t̂0, t̂ (Rice 1951; Elfouhaily and Guérin 2004, section 4; ε is the square of `index`):
 
-        B_ss = −(ε−1) (k̂·k̂0)                       / ((q+q')(q0+q0'))
-        B_pp =  (ε−1) (q' q0' (k̂·k̂0) − ε |k||k0|)  / ((εq+q')(εq0+q0'))
-        B_ps =  (ε−1) q'  ẑ·(k̂0×k̂)                 / ((εq+q')(q0+q0'))    s in, p out
-        B_sp =  (ε−1) q0' ẑ·(k̂0×k̂)                 / ((q+q')(εq0+q0'))    p in, s out
+        B_ss = −(ε−1) (t̂·t̂0)                       / ((γ+γ')(γ0+γ0'))
+        B_pp =  (ε−1) (γ' γ0' (t̂·t̂0) − ε |t||t0|)  / ((εγ+γ')(εγ0+γ0'))
+        B_ps =  (ε−1) γ'  ẑ·(t̂0×t̂)                 / ((εγ+γ')(γ0+γ0'))    s in, p out
+        B_sp =  (ε−1) γ0' ẑ·(t̂0×t̂)                 / ((γ+γ')(εγ0+γ0'))    p in, s out
 
     By the reciprocity theorem they are products of the fields E0 and E of light along ωi and along
-    ωo at the flat interface, (ε−1) (E·E0 tangential + D D0/ε normal) over 4 q q0 (Elson 1977,
+    ωo at the flat interface, (ε−1) (E·E0 tangential + D D0/ε normal) over 4 γ γ0 (Elson 1977,
     Applied Optics 16, 2872). A film that follows the heights has two interfaces, which are
-    displaced alike: their products add up. For k = k0 the sums are r_s and r_p of the film.
+    displaced alike: their products add up. For t = t0 the sums are r_s and r_p of the film.
 
     Parameters
     ----------
@@ -60,7 +59,7 @@ def small_slope(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     s_in, s_out = polarisation_axes(wi, wo)
     incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
     sine0, sine = np.hypot(*_xy(incident)), np.hypot(*_xy(outgoing))
-    # k̂ is s turned by 90°, so products of the s axes equal products of k̂
+    # t̂ is s turned by 90°, so products of the s axes equal products of t̂
     (x0, y0), (x, y) = _xy(s_in), _xy(s_out)
     dot, cross = x0 * x + y0 * y, x0 * y - y0 * x
     products = [

@@ -220,13 +220,13 @@ class LightPath:
         self._facet()
 
     def _level(self) -> None:
-        """k̂·k̂0 and ẑ·(k̂0×k̂); one direction is the other where either is the normal."""
+        """t̂·t̂0 and ẑ·(t̂0×t̂); one direction is the other where either is the normal."""
         first, second = self._first, self._second
         slanted = (self._square0 > LEVEL) & (self._square > LEVEL)
         inverse = dr.rsqrt(dr.select(slanted, self._square0, 1.0)) * dr.rsqrt(
             dr.select(slanted, self._square, 1.0)
         )
-        # k̂0 points against ω0
+        # t̂0 points against ω0
         dot = -dr.fma(first.x, second.x, first.y * second.y) * inverse
         self._across = dr.fma(first.x, second.y, -first.y * second.x)
         self._dot = dr.select(slanted, dot, 1.0)
