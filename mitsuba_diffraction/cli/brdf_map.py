@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import DiffractionError, DiffractionWarning
+from ..optics.boundary import MODELS
 from ..optics.colour import ILLUMINANTS
 from ..scene.load import set_variant
 from . import options
@@ -98,7 +99,7 @@ def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:
         "--coat-ior", metavar="N", type=float, help="index of a flat clear coat over the surface"
     )
     group.add_argument(
-        "--model", choices=("small_slope", "kirchhoff"),
+        "--model", choices=tuple(MODELS),
         help="model of the boundary; default: small_slope for materials with an index",
     )  # fmt: skip
     if turned:

@@ -210,7 +210,7 @@ class SceneFiles:
 
     @property
     def digest(self) -> str:
-        """Digest of the scene, its values and its files, wherever they all lie."""
+        """Digest of the scene, its values and its files, independent of the folders they lie in."""
         root = os.path.dirname(self.scene)
         contents = [(os.path.relpath(path, root), digest) for path, digest in self.files]
         return key_of(os.path.basename(self.scene), self.values, contents)

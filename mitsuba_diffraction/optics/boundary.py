@@ -19,9 +19,12 @@ incidence. Row 0 and column 0 of a matrix are s, row 1 and column 1 are p: E_out
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..errors import DiffractionError
 from .fresnel import Filmed, Index, amplitudes, faces
 
 Real = NDArray[np.float64]
@@ -34,19 +37,18 @@ _NORMAL = 1e-12
 def small_slope(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     """Jones matrices B of the first-order small-slope approximation, (..., 2, 2).
 
-    With k0, k the tangential parts of −ωi and ωo, q0, q their cosines, q' = √(ε − k²), all in
-    units of the wavenumber, and unit vectors k̂0, k̂ (Rice 1951; Elfouhaily and Guérin 2004,
-    section 4; ε is the square of `index`):
+    With t0, t the tangential parts of −ωi and ωo, γ0, γ their cosines, γ' = √(ε − t²), and unit
+    vectors t̂0, t̂ (Rice 1951; Elfouhaily and Guérin 2004, section 4; ε is the square of `index`):
 
-        B_ss = −(ε−1) (k̂·k̂0)                       / ((q+q')(q0+q0'))
-        B_pp =  (ε−1) (q' q0' (k̂·k̂0) − ε |k||k0|)  / ((εq+q')(εq0+q0'))
-        B_ps =  (ε−1) q'  ẑ·(k̂0×k̂)                 / ((εq+q')(q0+q0'))    s in, p out
-        B_sp =  (ε−1) q0' ẑ·(k̂0×k̂)                 / ((q+q')(εq0+q0'))    p in, s out
+        B_ss = −(ε−1) (t̂·t̂0)                       / ((γ+γ')(γ0+γ0'))
+        B_pp =  (ε−1) (γ' γ0' (t̂·t̂0) − ε |t||t0|)  / ((εγ+γ')(εγ0+γ0'))
+        B_ps =  (ε−1) γ'  ẑ·(t̂0×t̂)                 / ((εγ+γ')(γ0+γ0'))    s in, p out
+        B_sp =  (ε−1) γ0' ẑ·(t̂0×t̂)                 / ((γ+γ')(εγ0+γ0'))    p in, s out
 
     By the reciprocity theorem they are products of the fields E0 and E of light along ωi and along
-    ωo at the flat interface, (ε−1) (E·E0 tangential + D D0/ε normal) over 4 q q0 (Elson 1977,
+    ωo at the flat interface, (ε−1) (E·E0 tangential + D D0/ε normal) over 4 γ γ0 (Elson 1977,
     Applied Optics 16, 2872). A film that follows the heights has two interfaces, which are
-    displaced alike: their products add up. For k = k0 the sums are r_s and r_p of the film.
+    displaced alike: their products add up. For t = t0 the sums are r_s and r_p of the film.
 
     Parameters
     ----------
@@ -57,7 +59,7 @@ def small_slope(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     s_in, s_out = polarisation_axes(wi, wo)
     incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
     sine0, sine = np.hypot(*_xy(incident)), np.hypot(*_xy(outgoing))
-    # k̂ is s turned by 90°, so products of the s axes equal products of k̂
+    # t̂ is s turned by 90°, so products of the s axes equal products of t̂
     (x0, y0), (x, y) = _xy(s_in), _xy(s_out)
     dot, cross = x0 * x + y0 * y, x0 * y - y0 * x
     products = [
@@ -85,20 +87,46 @@ def kirchhoff(wi: ArrayLike, wo: ArrayLike, index: Index) -> Complex:
     4 cosθi cosθo N/w² is then R(cosθ_half) (1 + ωi·ωo)²/(w² cosθi cosθo) (Stam 1999, eq. 7).
     """
     incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
-    s_in, s_out = polarisation_axes(incident, outgoing)
-    axis = facet_axis(incident, outgoing, s_in)
     total = incident + outgoing
     # |ωi + ωo|² = 2(1 + ωi·ωo) is the form that survives opposite grazing directions
     one_plus_dot = 0.5 * np.sum(total * total, axis=-1)
     cos_half = np.sqrt(np.minimum(0.5 * one_plus_dot, 1.0))
     if isinstance(index, Filmed):
         index = index.tilted(0.5 * total[..., 2] / cos_half)
-    r_s, r_p = amplitudes(cos_half, index)
+    return facet_matrices(incident, outgoing, *amplitudes(cos_half, index))
+
+
+def facet_matrices(wi: ArrayLike, wo: ArrayLike, r_s: Complex, r_p: Complex) -> Complex:
+    """Jones matrices (..., 2, 2) of facets that mirror ωi to ωo with coefficients r_s, r_p."""
+    incident, outgoing = np.asarray(wi, np.float64), np.asarray(wo, np.float64)
+    s_in, s_out = polarisation_axes(incident, outgoing)
+    axis, total = facet_axis(incident, outgoing, s_in), incident + outgoing
     zero = np.zeros_like(r_s)
     facet = jones_matrix(ss=r_s, sp=zero, ps=zero, pp=r_p)
     turned = turn(s_out, axis, outgoing) @ facet @ turn(axis, s_in, -incident)
+    one_plus_dot = 0.5 * np.sum(total * total, axis=-1)
     scale = one_plus_dot / (2 * incident[..., 2] * outgoing[..., 2])
     return np.asarray(scale[..., None, None] * turned)
+
+
+Matrices = Callable[[ArrayLike, ArrayLike, Index], Complex]
+
+#: Boundary models by name: their Jones matrices (..., 2, 2) from ωi, ωo and the index. Those of
+#: `small_slope` are blended with Kirchhoff's by the roughness (`blend`); no others depend on the
+#: heights. The first is the default of a material with an index.
+MODELS: dict[str, Matrices] = {"small_slope": small_slope, "kirchhoff": kirchhoff}
+
+
+def matrices_of(model: str) -> Matrices:
+    """Jones matrices of a model by name; an unknown one is refused."""
+    return MODELS[checked_model(model)]
+
+
+def checked_model(model: str, models: Iterable[str] = MODELS) -> str:
+    """Return the name of a boundary model if it is one of `models`."""
+    if model not in (names := tuple(models)):
+        raise DiffractionError(f"model='{model}' is unknown; choose one of {', '.join(names)}")
+    return model
 
 
 def polarisation_axes(wi: ArrayLike, wo: ArrayLike) -> tuple[Real, Real]:

@@ -2,16 +2,18 @@
 
 With l along an order's spatial frequency q and t across it,
 
-    r_l = a* D_l / |a|²,   a the spectrum of exp(−iκh),   D_l the spectrum of (∂_l h)² exp(−iκh),
+    r_l = a D_l* / |a|²,   a the spectrum of exp(iκh),   D_l the spectrum of (∂_l h)² exp(iκh),
 
-and r_t likewise. The ratios distinguish hills from pits, which the power |a|² does not. Many orders
-share a cell of q, whose r is Σ a* D / Σ |a|²: the part that all windows on a surface have in
+and r_t likewise, with a and D in the signs of eq. (2): means of exp(i q·r) times the function. The
+transforms here are of exp(−iκh) with exp(−i q·r), complex conjugates of both, so that the code has
+a* D. The ratios distinguish hills from pits, which the power |a|² does not. Many orders
+share a cell of q, whose r is Σ a D* / Σ |a|²: the part that all windows on a surface have in
 common, without the speckle of one of them. Where a period is short each cell is one order. Order 0
 has no ratio: it keeps the power of the first order.
 
 Slopes are those of the surface filtered by 1/(1 + (q/23)²), q in rad/µm: finer structure diffracts
 light into waves that do not travel. At vertical walls the filter removes most of the slope
-variance; there r is multiplied by the gate ρ²/(ρ² + 0.01), with ρ the fraction that remains.
+variance; there r is multiplied by the gate G = ρ²/(ρ² + 0.01), with ρ the fraction that remains.
 """
 
 from __future__ import annotations

@@ -35,17 +35,20 @@ from numpy.typing import ArrayLike
 from .boundary import Complex, Real, facet_axis, polarisation_axes, turn
 from .fresnel import amplitudes, decaying_root
 
+#: Boundary models that are known for light that goes through.
+MODELS = ("small_slope", "kirchhoff")
+
 
 def small_slope(wi: ArrayLike, wo: ArrayLike, index: float) -> Complex:
     """Jones matrices of first order, (..., 2, 2).
 
-    With k0, k the tangential parts of −ωi and n ωo and q0, q, q0', q' the normal ones above and
-    inside (q beyond the critical angle is imaginary),
+    With t0, t the tangential parts of −ωi and n ωo and γ0, γ, γ0', γ' the normal ones above and
+    inside (γ beyond the critical angle is imaginary),
 
-        B_ss = (ε−1) (k̂·k̂0)                     / ((q+q')(q0+q0'))
-        B_pp = (ε−1) n (q q0' (k̂·k̂0) + |k||k0|)  / ((εq+q')(εq0+q0'))
-        B_ps = (ε−1) n q  ẑ·(k̂0×k̂)              / ((εq+q')(q0+q0'))    s in, p out
-        B_sp = −(ε−1) q0' ẑ·(k̂0×k̂)              / ((q+q')(εq0+q0'))    p in, s out
+        B_ss = (ε−1) (t̂·t̂0)                     / ((γ+γ')(γ0+γ0'))
+        B_pp = (ε−1) n (γ γ0' (t̂·t̂0) + |t||t0|)  / ((εγ+γ')(εγ0+γ0'))
+        B_ps = (ε−1) n γ  ẑ·(t̂0×t̂)              / ((εγ+γ')(γ0+γ0'))    s in, p out
+        B_sp = −(ε−1) γ0' ẑ·(t̂0×t̂)              / ((γ+γ')(εγ0+γ0'))    p in, s out
 
     Parameters
     ----------

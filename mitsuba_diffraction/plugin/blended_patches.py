@@ -74,8 +74,8 @@ Ask = Callable[[BSDF, Context, Mask], Sequence[Any]]
 class DiffractionMix(mi.BSDF):
     """Several BSDFs, blended by weights that vary over the surface."""
 
-    #: To who draws without Mitsuba, as `Diffraction.only_traced`.
-    only_traced = "a mix of surfaces"
+    #: Feature that shaders do not support, as `Diffraction.not_in_shaders`.
+    not_in_shaders = "a mix of surfaces"
 
     def __init__(self, props: Properties) -> None:
         super().__init__(props)

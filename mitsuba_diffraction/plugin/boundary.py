@@ -11,13 +11,16 @@ and in polarised variants the Mueller matrix of J' takes the place of N'.
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
 from ..optics.blend import NODES_PER_OCTAVE, RoughnessTable
+from ..optics.boundary import checked_model
 from ..tables.table import DiffractionTable
 from .directions import Pair, TablePoint
 from .fresnel import (
@@ -36,9 +39,6 @@ from .fresnel import (
 from .layers import CoatedPair, UnderFilm, bounced, transmittances
 from .memory import index_between, read_record, upload
 from .types import Float, Interaction, Mask, Number, Spectrum, Vector3f
-
-#: The first is the default of a material with an index.
-MODELS = ("small_slope", "kirchhoff")
 
 #: Entries ss, sp, ps, pp of a Jones matrix: first the outgoing, then the incident polarisation.
 Jones = tuple[Number, Number, Number, Number]
@@ -69,7 +69,7 @@ class Kirchhoff:
         """
         layered = isinstance(pair, CoatedPair) or isinstance(self.material, UnderFilm)
         if (mi.is_polarized or layered) and not isinstance(self.material, Perfect):
-            light = _Path(pair, mode)
+            light = LightPath(pair, mode)
             indices = self.material.indices(si, active)
             matrices = [light.kirchhoff(index) for index in indices]
             return light.of_jones(matrices, indices, self.material)
@@ -109,7 +109,7 @@ class SmallSlope:
         mode: mi.TransportMode,
     ) -> Spectrum:
         """See `Kirchhoff.factor`."""
-        light = _Path(pair, mode)
+        light = LightPath(pair, mode)
         indices = self.material.indices(si, active)
         if isinstance(self.material, UnderFilm):
             wavenumbers = self.material.wavenumbers(wavenumbers)
@@ -158,12 +158,19 @@ class SmallSlope:
 
 Boundary = Kirchhoff | SmallSlope
 
+#: Boundaries by the names of `optics.boundary.MODELS`, from a material and a table. The first is
+#: the default of a material with an index.
+MODELS: dict[str, Callable[[Any, DiffractionTable], Boundary]] = {
+    "small_slope": lambda material, table: SmallSlope(material, table.roughness),
+    "kirchhoff": lambda material, table: Kirchhoff(material),
+}
+
 
 def boundary_of(model: str, material: Reflectance | UnderFilm, table: DiffractionTable) -> Boundary:
-    """Return the boundary of a model; small slope is for materials with an index."""
-    if model == "kirchhoff" or isinstance(material, Perfect):
+    """Return the boundary of a model; a perfect reflector, without an index, has Kirchhoff's."""
+    if isinstance(material, Perfect):
         return Kirchhoff(material)
-    return SmallSlope(material, table.roughness)
+    return MODELS[checked_model(model, MODELS)](material, table)
 
 
 def _one_minus_exp(x: Float) -> Float:
@@ -179,7 +186,7 @@ def _of_the_normal(index: Index) -> Float:
     return squared((index - 1.0) / (index + 1.0))
 
 
-class _Path:
+class LightPath:
     """Light along −ω0, then along ω: what Jones matrices need of it besides the index.
 
     Axes are s = ẑ×d/|ẑ×d| and p = d×s of the direction d of travel, as in `optics.boundary`.
@@ -213,13 +220,13 @@ class _Path:
         self._facet()
 
     def _level(self) -> None:
-        """k̂·k̂0 and ẑ·(k̂0×k̂); one direction is the other where either is the normal."""
+        """t̂·t̂0 and ẑ·(t̂0×t̂); one direction is the other where either is the normal."""
         first, second = self._first, self._second
         slanted = (self._square0 > LEVEL) & (self._square > LEVEL)
         inverse = dr.rsqrt(dr.select(slanted, self._square0, 1.0)) * dr.rsqrt(
             dr.select(slanted, self._square, 1.0)
         )
-        # k̂0 points against ω0
+        # t̂0 points against ω0
         dot = -dr.fma(first.x, second.x, first.y * second.y) * inverse
         self._across = dr.fma(first.x, second.y, -first.y * second.x)
         self._dot = dr.select(slanted, dot, 1.0)
@@ -250,7 +257,11 @@ class _Path:
         if isinstance(index, Filmed):
             index = index.tilted(0.5 * self._w * dr.rcp(dr.maximum(self._cos_half, 1e-4)))
         square = dr.fma(-self._cos_half, self._cos_half, 1.0)
-        r_s, r_p = (r * self._one_plus_dot for r in amplitudes(self._cos_half, square, index))
+        return self.of_facet(*amplitudes(self._cos_half, square, index))
+
+    def of_facet(self, r_s: Number, r_p: Number) -> Jones:
+        """Return 2 cosθi cosθo J of facets with these coefficients at their own axes."""
+        r_s, r_p = r_s * self._one_plus_dot, r_p * self._one_plus_dot
         return (
             r_s * self._cc - r_p * self._ss,
             r_s * self._cs + r_p * self._sc,

@@ -112,18 +112,17 @@ model : string [small_slope]
     index, and of layering `thesis`.
 second_order : string or boolean [auto]
     Multiplies orders by the second order of small slope (Voronovich 1994), a factor of directions
-    and of the heights' slopes. `auto` applies it if the table changes colours by 5 % or more: of
-    discs and blazed gratings, not of skins. `true` applies it wherever it is known: light that a
-    dielectric denser than the medium above it reflects, bare or under a coat, by model
+    and of the heights' slopes. `auto` applies it if the second order changes the table's colours by
+    5 % or more: on discs and blazed gratings, not on skins. `true` applies it wherever it is known:
+    light that a dielectric denser than the medium above it reflects, bare or under a coat, by model
     `small_slope`, in an ensemble, without layering `thesis`; elsewhere it is refused. `false`
     leaves it out. The change is measured when the table is built, for index 1.5 in light from 60°
     and heights as they are (`mitsuba-diffraction info`). For light from 60° it lowers the error of
-    colours on a CD's pits from a third to a tenth (docs/validation.md). Polarised variants
-    multiply matrices by the factor for unpolarised light. Order 0, sampled directions and the
-    light for what lies beneath are the same without it. Coefficients follow the index in steps of
-    0.01.
+    colours on a CD's pits from a third to a tenth (docs/validation.md). Polarised variants multiply
+    matrices by the factor for unpolarised light. Order 0, sampled directions and the light for what
+    lies beneath are the same without it. Coefficients follow the index in steps of 0.01.
 energy_conserving : boolean [true]
-    Scales the BSDF by s(ωi) s(ωo) so that no direction reflects more than it receives; reciprocal.
+    Scales the BSDF by e(ωi) e(ωo) so that no direction reflects more than it receives; reciprocal.
     The scale belongs to the table, model, material and wavelength. Dielectrics are unaffected;
     gratings of metal lose some per cent of the light in directions without gain, too
     (docs/energy.md). `false` keeps the model as it is, for checks. The scale costs seconds the
@@ -233,11 +232,12 @@ class Diffraction(DiffractingSurface):
     def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
         read = read_parameters(props, provider)
         super().__init__(props, read.surface, read.reflectance)
+        # self.fresnel is the flat surface with its layers, self.boundary the structure alone
         self.boundary, self.coat = read.boundary, read.coat
         self.mirror = None if self.coat is None else Kirchhoff(self.coat)
         self.nested: BSDF = read.nested  # or None
         self.layering, self.vcavity = read.layering, read.vcavity
-        self.only_traced = read.only_traced
+        self.not_in_shaders = read.not_in_shaders
         self._second_order = read.second_order
         self._energy = None
         if read.scales_energy:
@@ -257,16 +257,16 @@ class Diffraction(DiffractingSurface):
 
     def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
         """Return f cosθo per wavelength."""
-        active = self._above(si, wo, active)
-        above, nested = self._lobes(ctx)
+        active = self._lit(si, wo, active)
+        diffracts, nested = self._lobes(ctx)
         value = mi.Spectrum(0.0)
-        if above:
+        if diffracts:
             # Eq. 1: (u, v, w) = ωi + ωo
             pair = self._pair(si, wo, active)
             # Eq. 2 and 3: ⟨|P|²⟩ at q = k (u, v) and κ = k w, for each wavelength
             power = self.power.power(pair, self.scale_at(si, active), si)
             # Eq. 4 to 10: times N' of the material and the rest
-            value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
+            value = self.layering.diffraction_share * self.diffracted(ctx, si, pair, power, active)
         if nested is not None:
             # T(ωi) T(ωo) f of the BSDF beneath
             beneath = mi.Spectrum(self._beneath(si, wo, active))
@@ -275,35 +275,35 @@ class Diffraction(DiffractingSurface):
 
     def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
         """Return the density of `sample` per solid angle."""
-        active = self._above(si, wo, active)
-        above, nested = self._lobes(ctx)
+        active = self._lit(si, wo, active)
+        diffracts, nested = self._lobes(ctx)
         density = mi.Float(0.0)
-        if above:
+        if diffracts:
             pair = self._pair(si, wo, active).outer
             density = with_even_share(self.power.density(pair, self._drawing_scale(si, active), si))
         if nested is not None:
             beneath = self.nested.pdf(nested, si, wo, active)
-            density = dr.lerp(beneath, density, self._glossy_share(above, si, active))
+            density = dr.lerp(beneath, density, self._glossy_share(diffracts, si, active))
         return dr.select(active, density, 0.0)
 
     def eval_pdf(
         self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
     ) -> tuple[Spectrum, Float]:
         """Return `eval` and `pdf` at once."""
-        active = self._above(si, wo, active)
-        above, nested = self._lobes(ctx)
+        active = self._lit(si, wo, active)
+        diffracts, nested = self._lobes(ctx)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
-        if above:
+        if diffracts:
             pair = self._pair(si, wo, active)
             scales = self.scale_at(si, active), self._drawing_scale(si, active)
             power, orders = self.power.both(pair, *scales, si)
             density = with_even_share(orders)
-            value = self.layering.above * self.diffracted(ctx, si, pair, power, active)
+            value = self.layering.diffraction_share * self.diffracted(ctx, si, pair, power, active)
         if nested is not None:
             beneath = mi.Spectrum(self._beneath(si, wo, active))
             nested_value, nested_density = self.nested.eval_pdf(nested, si, wo, active)
             value += beneath * nested_value
-            density = dr.lerp(nested_density, density, self._glossy_share(above, si, active))
+            density = dr.lerp(nested_density, density, self._glossy_share(diffracts, si, active))
         return dr.select(active, value, 0.0), dr.select(active, density, 0.0)
 
     def sample(
@@ -320,13 +320,13 @@ class Diffraction(DiffractingSurface):
         no share in them. All others are mixed with it, in value and density.
         """
         active = mi.Mask(active) & (mi.Frame3f.cos_theta(si.wi) > 0.0)
-        above, nested = self._lobes(ctx)
+        diffracts, nested = self._lobes(ctx)
         result = dr.zeros(mi.BSDFSample3f)
         result.eta = 1.0
         result.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
         share, delta, weight = mi.Float(1.0), mi.Mask(False), mi.Spectrum(0.0)
         if nested is not None:
-            share = self._glossy_share(above, si, active)
+            share = self._glossy_share(diffracts, si, active)
             chosen = active & (sample1 >= share)
             remaining = (sample1 - share) / dr.select(chosen, 1.0 - share, 1.0)
             below, weight = self.nested.sample(nested, si, remaining, sample2, chosen)
@@ -334,7 +334,7 @@ class Diffraction(DiffractingSurface):
             result = dr.select(chosen, below, result)
             delta = chosen & mi.has_flag(below.sampled_type, mi.BSDFFlags.Delta)
             sample1 = dr.select(chosen, sample1, sample1 / dr.select(chosen, 1.0, share))
-        if above:
+        if diffracts:
             drawn = self._draw(si, sample1, sample2, active)
             result.wo = drawn if nested is None else dr.select(chosen, result.wo, drawn)
         value, density = self.eval_pdf(ctx, si, result.wo, active & ~delta)
@@ -355,7 +355,9 @@ class Diffraction(DiffractingSurface):
             level.wi = mi.Vector3f(0.0, 0.0, 1.0)
             beneath = self._beneath(level, level.wi, active)
             nested = self.nested.eval_diffuse_reflectance(level, active)
-            reflectance = self.layering.above * reflectance + mi.Spectrum(beneath) * nested
+            reflectance = (
+                self.layering.diffraction_share * reflectance + mi.Spectrum(beneath) * nested
+            )
         return dr.select(active, dr.clip(reflectance, 0.0, 1.0), 0.0)
 
     def traverse(self, callback: Callback) -> None:
@@ -379,15 +381,15 @@ class Diffraction(DiffractingSurface):
         if self.vcavity:
             factor *= vcavity(pair.cos_i, pair.cos_o, pair.one_plus_dot)
         if self._second_order is not None:
-            # Eq. 10: Σ F_j |a_j|² over orders other than 0, which keeps its power. Others keep
-            # theirs as well where a mirror's lobe, the most that order 0 can have, outshines them
+            # Eq. 10: Σ F_j |a_j|². Only power beyond a mirror's lobe is taken for orders other than
+            # 0: order 0 cannot exceed that lobe. Weaker orders beneath it stay uncorrected
             mirror = dr.abs(self.power.flat(pair, si))
             others = power - dr.clip(power, -mirror, mirror)  # colours may be negative
             added = self._second_order.added(pair, scale, k)
             power = power + others * mi.UnpolarizedSpectrum(added)
         power = factor * power
-        if self._energy is not None and self._energy.takes:
-            # s(ωi) s(ωo), by which no direction reflects more than it receives
+        if self._energy is not None and self._energy.active_factors:
+            # Energy scales e(ωi) e(ωo), so that no direction reflects more than it receives
             power *= self._energy.factor(pair, k, scale)
         # Eq. 5 to 9: N' or a Mueller matrix from Jones matrices
         value = self.lobe(ctx, si, pair, self.boundary, power, active)
@@ -417,21 +419,22 @@ class Diffraction(DiffractingSurface):
         pair = Pair(si, wo, self.orientation.rotation(si, active), active)
         return pair if self.coat is None else CoatedPair(pair, self.coat.eta)
 
-    def _above(self, si: Interaction, wo: Vector3f, active: Mask) -> Mask:
+    def _lit(self, si: Interaction, wo: Vector3f, active: Mask) -> Mask:
+        """Mask of lanes whose two directions lie above the surface."""
         cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
         return mi.Mask(active) & (cos_i > 0.0) & (cos_o > 0.0)
 
     def _lobes(self, ctx: Context) -> tuple[bool, Context | None]:
         """Whether a context asks for the diffraction, and its request to the nested BSDF."""
-        above = ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0)
+        diffracts = ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0)
         if self.nested is None or ctx.component == 0:
-            return above, None
+            return diffracts, None
         lobes = self.nested.flags()
         asked = mi.BSDFContext(ctx.mode, ctx.type_mask, ctx.component)
         if ctx.component != ALL_COMPONENTS:
             asked.component -= 1
             lobes = self.nested.flags(asked.component)
-        return above, asked if ctx.type_mask & int(lobes) & int(mi.BSDFFlags.All) else None
+        return diffracts, asked if ctx.type_mask & int(lobes) & int(mi.BSDFFlags.All) else None
 
     def _draw(self, si: Interaction, sample1: Float, sample2: Vector2f, active: Mask) -> Vector3f:
         """Draw a direction, possibly below the surface, where it has no density and no value."""
@@ -446,9 +449,9 @@ class Diffraction(DiffractingSurface):
         ordered = direction_of(from_patch(uv, rotation) - mi.Vector2f(si.wi.x, si.wi.y))
         return dr.select(sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), ordered)
 
-    def _glossy_share(self, above: bool, si: Interaction, active: Mask) -> Float:
+    def _glossy_share(self, diffracts: bool, si: Interaction, active: Mask) -> Float:
         """Share of the samples for diffraction over a nested BSDF: by reflected power."""
-        if not above:
+        if not diffracts:
             return mi.Float(0.0)
         reflectance = self.fresnel.reflectance(mi.Frame3f.cos_theta(si.wi), si, active)
         mean = dr.mean(mi.unpolarized_spectrum(reflectance))
@@ -485,8 +488,9 @@ class Diffraction(DiffractingSurface):
             str(self.boundary),
             self.coat is None,
             self._second_order is None,
-            0 if self._energy is None else self._energy.takes,
-            getattr(material, "reflects_all", False),  # other kernels
+            0 if self._energy is None else self._energy.active_factors,
+            # these choose other kernels
+            getattr(material, "reflects_all", False),
             getattr(material, "channels", None),
             getattr(material, "tint", None) is None,
         )
@@ -514,7 +518,7 @@ class Diffraction(DiffractingSurface):
         return self._energy is not None and self._energy.conserving
 
     def energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
-        """Return s of the mean wavelength, for shaders; None where all s are 1.
+        """Return the energy scale e of the mean wavelength for shaders; None where all are 1.
 
         (polar + 1, azimuthal) on `tables.energy.grid.FINE`.
         """

@@ -1,6 +1,6 @@
 """Energy conservation, and the light that goes beneath (Dr.Jit): `tables.energy` in a kernel.
 
-What is reflected is multiplied by s(ωi) s(ωo), reciprocal, where the model would reflect more than
+What is reflected is multiplied by e(ωi) e(ωo), reciprocal, where the model would reflect more than
 it gets; T = 1 − a(ω) of a dielectric's own albedo goes on to what lies beneath.
 """
 
@@ -107,20 +107,20 @@ class EnergyModel:
             self._mean.update(means, around, height_scale, lowest is not None)
         if not (self.conserving or beneath):
             return
-        found = [self._energy.at(node) for node in nodes]
+        conserved = [self._energy.at(node) for node in nodes]
         if self.conserving:
-            scales = scales_of([one.scale for one in found])
-            self._warn(found)
+            scales = scales_of([energy.scale for energy in conserved])
+            self._warn(conserved)
             self._scale.update(scales, nodes, height_scale, lowest is not None)
         if beneath:
-            ratios = [self._ratio(one.albedo) for one in found]
+            ratios = [self._ratio(energy.albedo) for energy in conserved]
             self._reflected.update(ratios, nodes, height_scale, lowest is not None)
 
-    def _warn(self, found: list[Conservation]) -> None:
+    def _warn(self, conserved: list[Conservation]) -> None:
         """Say once that much is taken of a real material."""
-        if self._warned or isinstance(self._material, Perfect) or found[0].scale is None:
+        if self._warned or isinstance(self._material, Perfect) or conserved[0].scale is None:
             return
-        albedo = found[0].albedo
+        albedo = conserved[0].albedo
         largest = float(albedo.values[:, albedo.grid.theta <= math.radians(80.0)].max())
         if largest > 1.0 + MUCH:
             self._warned = True
@@ -131,13 +131,13 @@ class EnergyModel:
             )
 
     def brightness(self, height_scale: float) -> Array | None:
-        """s for who knows no wavelengths, (polar + 1, azimuthal): their mean as the eye has it."""
+        """Luminous mean of the energy scale e over wavelengths, (polar + 1, azimuthal)."""
         nodes = self._energy.nodes(height_scale)
-        found = [self._energy.at(node) for node in nodes]
-        scales = scales_of([one.scale for one in found])
+        conserved = [self._energy.at(node) for node in nodes]
+        scales = scales_of([energy.scale for energy in conserved])
         if scales is None:
             return None
-        scale = between([one.on(FINE) for one in scales], nodes, height_scale)
+        scale = between([scale.on(FINE) for scale in scales], nodes, height_scale)
         weights = response(scale.wavelengths)[:, 1] * scale.wavelengths
         return np.average(scale.values, axis=0, weights=weights).astype(np.float32)
 
@@ -148,17 +148,17 @@ class EnergyModel:
         return between(ratios, nodes, height_scale)
 
     @property
-    def takes(self) -> int:
-        """Number that tells which factors the BSDF is multiplied by; 0 for none."""
+    def active_factors(self) -> int:
+        """Factors that the BSDF is multiplied by: 1 energy scale, 2 mean second order, 3 both."""
         return self._scale.present + 2 * self._mean.present
 
     def factor(self, pair: Pair, wavenumbers: list[Float], height_scale: Float) -> Colour:
-        """s(ωi) s(ωo), per channel; of a film g(ωi) g(ωo) as well (`optics.mean_second_order`).
+        """e(ωi) e(ωo), per channel; of a film g(ωi) g(ωo) as well (`optics.mean_second_order`).
 
         height_scale : the one given to `update`; needed where derivatives with respect to it are,
             and where it varies.
         """
-        found = mi.UnpolarizedSpectrum(1.0)
+        product = mi.UnpolarizedSpectrum(1.0)
         for lookup in (self._scale, self._mean):
             if lookup.present:
                 both = zip(
@@ -166,8 +166,10 @@ class EnergyModel:
                     lookup.at(pair.outgoing, pair.cos_o, wavenumbers, height_scale),
                     strict=True,
                 )
-                found *= mi.UnpolarizedSpectrum([one * other for one, other in both])
-        return found
+                product *= mi.UnpolarizedSpectrum(
+                    [incident * outgoing for incident, outgoing in both]
+                )
+        return product
 
     def reflected(
         self, tangential: Vector2f, cosine: Float, wavenumbers: list[Float], height_scale: Float
@@ -179,18 +181,18 @@ class EnergyModel:
 
     def _mean_gain(self, height_scale: float) -> DirectionalTable:
         """g at a height scale."""
-        found = mean_exponents(self._energy.table, self._exact, self._energy.wavelength_range)
-        values = limited(found.values * height_scale**2).astype(np.float32)
-        return DirectionalTable(found.wavelengths, values)
+        exponents = mean_exponents(self._energy.table, self._exact, self._energy.wavelength_range)
+        values = limited(exponents.values * height_scale**2).astype(np.float32)
+        return DirectionalTable(exponents.wavelengths, values)
 
     def _ratio(self, albedo: DirectionalTable) -> DirectionalTable:
-        found = self._indices(albedo.wavelengths)
-        assert found is not None  # without an index no light goes beneath
-        flat = fresnel.reflectance(np.cos(albedo.grid.theta), found[:, None])
+        index = self._indices(albedo.wavelengths)
+        assert index is not None  # without an index no light goes beneath
+        flat = fresnel.reflectance(np.cos(albedo.grid.theta), index[:, None])
         # of an index of 1 there is neither
         ratio = np.where(flat > 1e-9, 1.0 / np.maximum(flat, 1e-9), 0.0)[:, :, None]
         values = albedo.values * ratio
-        if isinstance(found, fresnel.Filmed):  # which may reflect next to nothing
+        if isinstance(index, fresnel.Filmed):  # which may reflect next to nothing
             values = np.minimum(values, MOST_RATIO)
         return DirectionalTable(albedo.wavelengths, values.astype(np.float32))
 
@@ -207,16 +209,16 @@ def indices_of(
         film, thickness = material.numbers()
         rounded = _rounded(thickness, THICKNESS_STEP)
         return fresnel.Filmed(index, film, 2.0 * np.pi * rounded / wavelengths)
-    found = []
+    indices = []
     for wavelength in wavelengths if mi.is_spectral else wavelengths[:1]:
         si = dr.zeros(mi.SurfaceInteraction3f)
         if mi.is_spectral:
             si.wavelengths = mi.UnpolarizedSpectrum(float(wavelength))
         channels = [_complex(n) for n in material.indices(si, True)]
-        found.append(channels[0] if not mi.is_rgb else channels)
+        indices.append(channels[0] if not mi.is_rgb else channels)
     if not mi.is_rgb:
-        return np.broadcast_to(np.array(found), wavelengths.shape)
-    colours = np.broadcast_to(np.array(found[0]), len(RGB_WAVELENGTHS))
+        return np.broadcast_to(np.array(indices), wavelengths.shape)
+    colours = np.broadcast_to(np.array(indices[0]), len(RGB_WAVELENGTHS))
     return np.interp(wavelengths, RGB_WAVELENGTHS[::-1], colours[::-1])
 
 
@@ -230,13 +232,13 @@ def _rounded_indices(
     """`indices_of`, to a step: an optimisation of them waits rarely, and sees s, g and the ratio of
     albedos as constants.
     """
-    found = indices_of(material, wavelengths)
-    if found is None:
+    exact = indices_of(material, wavelengths)
+    if exact is None:
         return None
-    if isinstance(found, fresnel.Filmed):
-        index, film, depth = found.parts
+    if isinstance(exact, fresnel.Filmed):
+        index, film, depth = exact.parts
         return fresnel.Filmed(_rounded(index, step), _rounded(film, step), depth)
-    return _rounded(found, step)
+    return _rounded(exact, step)
 
 
 def _complex(number: Float) -> complex:

@@ -290,7 +290,7 @@ class Transmission:
     """
 
     fresnel: Reflectance | UnderCoat | UnderFilm
-    above = 1.0
+    diffraction_share = 1.0
 
     def beneath(
         self, si: Interaction, wo: Vector3f, active: Mask, ratios: tuple[Colour, Colour]
@@ -321,7 +321,7 @@ class Blend:
     weight: float
 
     @property
-    def above(self) -> float:
+    def diffraction_share(self) -> float:
         """Factor of the diffraction."""
         return 1.0 - self.weight
 

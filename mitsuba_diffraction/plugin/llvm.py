@@ -47,8 +47,8 @@ class Library:
     def at(cls, path: str | os.PathLike[str]) -> Library:
         """The library at `path`, links followed, since only the real file's name is telling."""
         real = Path(path).resolve()
-        found = _VERSION_IN_NAME.match(real.name) or _VERSION_IN_FOLDER.search(real.as_posix())
-        return cls(real, int(found[1]) if found else None)
+        version = _VERSION_IN_NAME.match(real.name) or _VERSION_IN_FOLDER.search(real.as_posix())
+        return cls(real, int(version[1]) if version else None)
 
     def __str__(self) -> str:
         return f"{self.version or 'unknown version'} ({self.path})"
@@ -216,10 +216,10 @@ def _start_again() -> str:
 
 
 def _nothing_usable() -> str:
-    found = ", ".join(str(library) for library in find_llvm()) or "none"
+    libraries = ", ".join(str(library) for library in find_llvm()) or "none"
     return (
-        f"there is no LLVM that Dr.Jit can use; found: {found}; usable: {OLDEST} or newer, best "
-        f"{TESTED}; {_install()}"
+        f"there is no LLVM that Dr.Jit can use; found: {libraries}; usable: {OLDEST} or newer, "
+        f"best {TESTED}; {_install()}"
     )
 
 

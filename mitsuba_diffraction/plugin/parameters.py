@@ -45,7 +45,7 @@ class Parameters:
     layering : how diffraction and the nested BSDF share the light.
     nested : the BSDF beneath, or None.
     second_order : the second order of small slope, or None.
-    only_traced : choice that shaders do not support, or None.
+    not_in_shaders : choice that shaders do not support, or None.
     """
 
     surface: SurfaceParameters
@@ -57,7 +57,7 @@ class Parameters:
     layering: Layering
     nested: BSDF | None
     second_order: SecondOrder | None
-    only_traced: str | None
+    not_in_shaders: str | None
 
 
 def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
@@ -104,22 +104,23 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
         layering=_layering(props, layering, flat, nested is not None),
         nested=nested,
         second_order=second_order,
-        only_traced=undrawn[0] if undrawn else None,
+        not_in_shaders=undrawn[0] if undrawn else None,
     )
 
 
 def _model(props: Properties, material: Reflectance) -> str:
     """Name of the boundary model; by default small slope if there is an index and no thesis."""
     scalar = isinstance(material, Perfect) or props.get("layering", LAYERINGS[0]) == "thesis"
-    return choice(props, "model", MODELS[::-1] if scalar else MODELS)
+    default = "kirchhoff" if scalar else "small_slope"
+    return choice(props, "model", (default, *(name for name in MODELS if name != default)))
 
 
 def _asked(props: Properties, nested: BSDF | None) -> Iterator[tuple[str, str]]:
     """Features that a scene asks for, as messages call them."""
     if nested is not None:
         yield "nested", f"the nested BSDF {kind_of(nested)}"
-    if props.get("model", "") == "small_slope":
-        yield "small_slope", "model='small_slope'"
+    if (model := props.get("model", "kirchhoff")) != "kirchhoff":
+        yield "index", f"model='{model}'"
     if props.get("layering", "") == "thesis":
         yield "thesis", "layering='thesis'"
     if coherence_of(props) == SURFACE:
@@ -143,8 +144,8 @@ def _choices(props: Properties, material: Reflectance, model: str) -> Iterator[S
         yield support.COAT
     if "film_ior" in props:
         yield support.FILM
-    if model == "kirchhoff":
-        yield support.KIRCHHOFF
+    if model != "small_slope":
+        yield support.without_second_order(model)
     if props.get("layering", "") == "thesis":
         yield support.THESIS
     if coherence_of(props) != COHERENCES[0]:

@@ -33,12 +33,12 @@ def number(props: Properties, name: str, default: float) -> float:
         return default
     value = props.get(name)
     try:
-        found = float(value)
+        parsed = float(value)
     except (TypeError, ValueError):
         raise DiffractionError(f"{name}={value!r} must be a number") from None
-    if not math.isfinite(found):
+    if not math.isfinite(parsed):
         raise DiffractionError(f"{name}={value} must be a finite number")
-    return found
+    return parsed
 
 
 def kind_of(element: BSDF) -> str:

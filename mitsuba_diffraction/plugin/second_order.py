@@ -17,46 +17,18 @@ from ..errors import DiffractionError
 from ..optics.second_order import LIMIT, NODES, coefficient_table
 from ..optics.second_order_change import applies
 from ..optics.slope_ratios import SlopeRatios
-from ..settings import COHERENCES, checked
+from ..settings import checked
 from ..tables.table import DiffractionTable
-from .boundary import MODELS, SmallSlope
+from .boundary import SmallSlope
 from .directions import Pair
-from .fresnel import Dielectric, Reflectance
-from .layers import LAYERINGS
+from .fresnel import Dielectric
 from .memory import index_between, read_record, upload
-from .properties import flag
 from .types import Float, Index, Kind, Number, Properties
 
 #: Step to which indices are rounded for c.
 INDEX_STEP = 0.01
 # Cosines are clipped to this: the derivative of an angle at 1 is infinite
 _NORMAL = 1.0 - 1e-7
-
-
-def material_of_second_order(props: Properties, material: Reflectance) -> Dielectric | None:
-    """Return the dielectric that the second order may apply to, or None.
-
-    Raises
-    ------
-    DiffractionError
-        If `second_order` is no such setting, or true where the second order is not known.
-    """
-    asked = checked("second_order", props.get("second_order", "auto"))
-    dielectric = material if isinstance(material, Dielectric) else None
-    defaults = {"model": MODELS[0], "coherence": COHERENCES[0], "layering": LAYERINGS[0]}
-    excluded = [
-        *([f"the material '{material}'"] if dielectric is None else []),
-        *(f"{name}={props.get(name)}" for name in defaults if _differs(props, name, defaults)),
-        *(["film_ior"] if "film_ior" in props else []),
-        *(f"{name}=true" for name in ("thin", "transmission") if flag(props, name, False)),
-        *(["an index below that of the medium above"] if _is_below(dielectric) else []),
-    ]
-    if excluded and asked is True:
-        raise DiffractionError(
-            "second_order=true is for light that a dielectric reflects, by model='small_slope' and "
-            f"coherence='ensemble', not for {excluded[0]}; leave one out"
-        )
-    return dielectric if asked and not excluded else None
 
 
 def ratios_of_second_order(props: Properties, table: DiffractionTable) -> SlopeRatios | None:
@@ -81,14 +53,6 @@ def ratios_of_second_order(props: Properties, table: DiffractionTable) -> SlopeR
             )
         return None
     return ratios if applies(asked, ratios) else None
-
-
-def _is_below(dielectric: Dielectric | None) -> bool:
-    return dielectric is not None and float(dr.slice(dielectric.eta)) < 1.0
-
-
-def _differs(props: Properties, name: str, defaults: dict[str, str]) -> bool:
-    return name in props and props.get(name) != defaults[name]
 
 
 class SecondOrder:

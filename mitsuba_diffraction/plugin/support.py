@@ -19,7 +19,7 @@ class Support:
     Attributes
     ----------
     choice : name of the choice, for messages.
-    small_slope : the boundary model of that name.
+    index : boundary models that need a refractive index, all but Kirchhoff's.
     second_order : the second order of small slope.
     energy : scales that conserve energy, which need the albedo of the structure.
     coat, film : layers over the structure.
@@ -30,7 +30,7 @@ class Support:
     """
 
     choice: str
-    small_slope: bool = True
+    index: bool = True
     second_order: bool = True
     energy: bool = True
     coat: bool = True
@@ -43,11 +43,10 @@ class Support:
 
 MIRROR = Support(
     "material='none', a mirror without a refractive index",
-    small_slope=False, second_order=False, coat=False, film=False, nested=False,
+    index=False, second_order=False, coat=False, film=False, nested=False,
 )  # fmt: skip
 CONDUCTOR = Support("a conductor, which lets no light through", second_order=False, nested=False)
 RARER = Support("an int_ior below the index of the medium above", second_order=False)
-KIRCHHOFF = Support("model='kirchhoff'", second_order=False)
 COAT = Support("coat_ior", energy=False, film=False, thesis=False)
 FILM = Support(
     "a thin film (film_ior)", second_order=False, coat=False, thesis=False, shaders=False
@@ -62,6 +61,11 @@ TRANSMISSION = Support(
     "the plugin diffraction_dielectric, through which light goes",
     nested=False, placed=False,
 )  # fmt: skip
+
+
+def without_second_order(model: str) -> Support:
+    """Return the declaration of a boundary model other than small slope; shaders draw Kirchhoff."""
+    return Support(f"model='{model}'", second_order=False, shaders=model == "kirchhoff")
 
 
 def check_combination(asked: Mapping[str, str], choices: Sequence[Support]) -> None:

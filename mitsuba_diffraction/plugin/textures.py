@@ -135,7 +135,7 @@ class VaryingHeightScale:
         return index_between(self.texture.eval_1(si, active), LEAST_SCALE, self.high)
 
     def refusal(self) -> str | None:
-        """Reason why the bitmap's factors are not allowed, or None."""
+        """Reason why the bitmap's height scales are not allowed, or None."""
         low, high = self.range()
         if low >= 0.0 and high <= self.high * (1.0 + 1e-6):
             return None

@@ -16,8 +16,8 @@ arguments     checks of the arguments
 
 from __future__ import annotations
 
+from ..optics.boundary import MODELS
 from ..settings import COHERENCES
-from .arguments import MODELS
 from .bsdf import brdf, mueller
 from .integral import screen_power, window_power
 from .transmission import btdf

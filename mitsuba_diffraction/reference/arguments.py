@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, quoted
+from ..optics.boundary import MODELS, checked_model
 from ..optics.fresnel import Filmed
 from ..optics.geometry import sigma_of, wavenumber
 from ..settings import SURFACE, checked
 from .model import Light
-
-MODELS = ("kirchhoff", "small_slope")
 
 
 def width_of(value: float) -> float:
@@ -60,15 +60,17 @@ def window_of(
     return Window(sigma, coherence, centres)
 
 
-def model_of(model: str | None, index: NDArray[np.complex128] | Filmed | None) -> str:
-    """Name of the model: by default "small_slope" where there is an index."""
+def model_of(
+    model: str | None,
+    index: NDArray[np.complex128] | Filmed | None,
+    models: Iterable[str] = MODELS,
+) -> str:
+    """Name of the model, one of `models`: by default "small_slope" where there is an index."""
     if model is None:
         return "kirchhoff" if index is None else "small_slope"
-    if model not in MODELS:
-        raise DiffractionError(f"model='{model}' is unknown; choose one of {', '.join(MODELS)}")
-    if model == "small_slope" and index is None:
+    if checked_model(model, models) != "kirchhoff" and index is None:
         raise DiffractionError(
-            "model='small_slope' needs an index: give eta (and k of a conductor), or "
+            f"model='{model}' needs an index: give eta (and k of a conductor), or "
             "model='kirchhoff' for a perfect reflector"
         )
     return model

@@ -38,7 +38,7 @@ class Material:
 
     Attributes
     ----------
-    model : one of `arguments.MODELS`.
+    model : one of `optics.boundary.MODELS`.
     index : (n,) n + ik over that of the medium above it, under a film where there is one; None for
         a perfect reflector.
     coat : index of a clear coat over the surface, over that of the medium above it, or None.
@@ -82,7 +82,8 @@ def brdf(
     coherence : "ensemble", the power averaged over every position of the window; "patch", the
         power under one window centred on the patch; "surface", under one centred on `place`.
     place : (n, 2) or (2,), µm along x and y from the patch's first pixel; it tiles the plane.
-    model : "small_slope", the default where there is an index, or "kirchhoff".
+    model : "small_slope", the default where there is an index, "kirchhoff", or another of
+        `optics.boundary.MODELS`.
     eta, k : (n,) or scalar, the index eta + ik of the material over that of the medium above it;
         without eta the surface is a perfect reflector, R = 1, by model "kirchhoff".
     coat : index of a flat clear coat over the surface, over that of the medium above
@@ -206,8 +207,9 @@ def _structure(
     field: HeightField, light: Light, index: Complex, material: Material, window: Window
 ) -> tuple[Real, Complex]:
     """⟨|P|²⟩ and J of the heights, in the medium where `light` and `index` are given."""
-    if material.model == "kirchhoff":
-        return window_power(field, *light, *window), models.kirchhoff(light, index)
+    if material.model != "small_slope":
+        matrices = boundary.matrices_of(material.model)
+        return window_power(field, *light, *window), matrices(light.wi, light.wo, index)
     s = models.share(field, light, index)
     jones = models.blended(models.kirchhoff(light, index), models.small_slope(light, index), s)
     if material.second_order:

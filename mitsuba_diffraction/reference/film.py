@@ -20,8 +20,8 @@ Complex = NDArray[np.complex128]
 def jones(field: HeightField, light: models.Light, film: Filmed, model: str) -> Complex:
     """J of the filmed boundary; by small slope times √(g(ωi) g(ωo)), the mean second order."""
     wi, wo, wavelength = light
-    if model == "kirchhoff":
-        return boundary.kirchhoff(wi, wo, film)
+    if model != "small_slope":
+        return boundary.matrices_of(model)(wi, wo, film)
     matrices = blend.jones(wi, wo, film, models.share(field, light, film))
     gain = _mean_gain(field, (wi[:, 2], wo[:, 2]), wavelength, film)
     return matrices * np.sqrt(gain)[:, None, None]

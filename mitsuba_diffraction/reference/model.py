@@ -1,7 +1,7 @@
 """The default model in one file: light that a rough surface reflects (NumPy, float64).
 
 A surface of heights h(r) tiles the plane. Light of wavelength λ arrives from ωi and leaves along
-ωo, unit vectors that point away from the surface; n = η + ik is the material's index over that of
+ωo, unit vectors that point away from the surface; n is the material's complex index over that of
 the medium above it. Lengths are in µm. The equations have the numbers of docs/theory.md:
 
     (u, v, w) = ωi + ωo,   k = 2π/λ,   q = k (u, v),   κ = k w                                  (1)
@@ -10,18 +10,21 @@ the medium above it. Lengths are in µm. The equations have the numbers of docs/
     f = 4 cosθi cosθo N / (λ² A w²) · ⟨|P|²⟩,   A = πσ²                                         (4)
     N = ½ Σ |J|² over the four entries of J                                                     (5)
     J = (1 − s) K + s B                                                                         (6)
-    K = (1 + ωi·ωo) / (2 cosθi cosθo) · T(ωo) diag(r_s, r_p) T(ωi)                              (7)
+    K = (1 + ωi·ωo) / (2 cosθi cosθo) · U(ωo) diag(r_s, r_p) U(ωi)                              (7)
     B = (ε − 1) · [the four entries in `small_slope`],   ε = n²                                 (8)
     s = exp(−R₀(κσ_q)²/2 − (κσ_q)⁴/3),   R₀ = |(n − 1)/(n + 1)|²                                (9)
-    F_j = |1 + x_j|²,   x_j = s (c_l r_l + c_t r_t), |x_j| at most ½,   F_0 = 1                (10)
+    σ_q² = Σ_q' |h_q'|² (1 − exp(−(4q'/q)⁴)) exp(−(q'/2q)⁴),   h_q' the heights' spectrum
+    F_j = |1 + x_j|²,   x_j = s G (c_l r_l + c_t r_t), |x_j| at most ½,   F_0 = 1              (10)
 
-(2) are orders of the phase screen exp(iκh); (3) is the power under a Gaussian window exp(−r²/2σ²),
-averaged over its positions (Stam 1999, eq. 7–12). K is Kirchhoff's tangent plane: Fresnel's r_s and
-r_p at the half vector, T the turn between the axes of the surface and the facet's. B is first-order
-small slope (Rice 1951; Voronovich 1985), (10) its second order (Voronovich 1994): c_l, c_t depend
-on directions and index, r = a* D/|a|² on the spectra D of squared slopes along and across q_j. Rows
-and columns of J are s and p, outgoing and incoming. Indices and results are arrays (n,) as in
-`Light`. coat.py, film.py and transmission.py wrap this.
+(2) are the orders of the phase screen exp(iκh), q_j = 2π (j_x/W_x, j_y/W_y) with W the patch's
+size. P in (3) is the transform of the window exp(−r²/2σ²) times the screen; its power is averaged
+over positions of the window (Stam 1999, eq. 7–12). K is Kirchhoff's tangent plane: Fresnel's r_s,
+r_p at the half vector; U turns between the facet's axes and s = ẑ×d/|ẑ×d|, p = d×s of light along
+d. Rows and columns of J are s and p, outgoing and incoming. B is first-order small slope (Rice
+1951; Voronovich 1985), (10) its second order (Voronovich 1994): c_l, c_t depend on directions and
+index, r = a D*/|a|² on the heights, D the spectra of (∂h)² exp(iκh) along and across q_j, slopes
+filtered, G their gate (optics/slope_ratios.py). Indices and results are arrays (n,) as in `Light`.
+coat.py, film.py and transmission.py wrap this.
 """
 
 from __future__ import annotations
@@ -83,8 +86,7 @@ def ensemble_power(
     k, power = 2e3 * np.pi / light.wavelength, np.zeros(len(light.wavelength))
     slopes = None if second is None else Slopes.from_heights(field.heights, field.pixel_size)
     for n, (wi, wo) in enumerate(zip(light.wi, light.wo, strict=True)):
-        # (1): the frequency q and the phase per height κ
-        u, v, w = wi + wo
+        u, v, w = wi + wo  # (1): frequency q, and phase per height κ
         q, kappa = (k[n] * u, k[n] * v), k[n] * w
         screen = np.exp(1j * kappa * field.heights)
         orders = orders_near(q, sigma, screen, field.pixel_size)
@@ -141,13 +143,13 @@ def second_order_factors(
     orders: Orders, screen: Complex, slopes: Slopes, c: Complex, s: float
 ) -> Real:
     """F_j of (10), (y, x); c : c_l and c_t, the second order's kernel for these directions."""
-    # D: spectra of the products xx, xy, yy of the filtered slopes, times the screen
+    # Spectra of the products xx, xy, yy of the filtered slopes times the screen: D of (10)
     spectra = orders.waves_y @ (slopes.products * screen) @ orders.waves_x.T / screen.size
     q = np.stack(np.meshgrid(orders.qx, orders.qy), axis=-1)
     others = np.any(q != 0, axis=-1) & (orders.a != 0)  # F_0 = 1
-    # r = a D*/|a|² along and across q_j, times the gate of the slopes
-    r = along(q[others], np.moveaxis(spectra[:, others], 0, -1)) / orders.a[others][:, None]
-    x = s * (slopes.gate * np.conj(r) @ c)
+    d = along(q[others], np.moveaxis(spectra[:, others], 0, -1))
+    r = np.conj(d / orders.a[others][:, None])  # a D*/|a|²
+    x = s * (slopes.gate * r @ c)
     factors = np.ones(orders.a.shape)
     factors[others] = np.abs(1.0 + x / np.maximum(1.0, np.abs(x) / 0.5)) ** 2
     return factors
@@ -162,7 +164,6 @@ def share(field: HeightField, light: Light, index: Index) -> Real:
     """s of (9), the part of small slope in J."""
     total, k = light.wi + light.wo, 2e3 * np.pi / light.wavelength
     q = k * np.hypot(total[:, 0], total[:, 1])
-    # σ_q² = Σ_q' |h_q'|² (1 − exp(−(4q'/q)⁴)) exp(−(q'/2q)⁴), h_q' the heights' spectrum
     variance = ScaleRoughness.from_heights(field.heights, field.pixel_size).at(q)
     roughness = np.square(k * total[:, 2]) * variance  # (κσ_q)²
     return np.exp(-roughness * (0.5 * reflectance(1.0, index) + roughness / 3))
@@ -182,18 +183,18 @@ def kirchhoff(light: Light, index: Complex) -> Complex:
 
 
 def small_slope(light: Light, index: Complex) -> Complex:
-    """B of (8), (n, 2, 2); k0, k̂0 and k, k̂ are tangential parts of −ωi and ωo over 2π/λ."""
+    """B of (8), (n, 2, 2); t0 and t are the tangential parts of −ωi and ωo (no unit)."""
     wi, wo, _ = light
     (x0, y0, _), (x, y, _) = (axis.T for axis in polarisation_axes(wi, wo))
-    dot, cross = x0 * x + y0 * y, x0 * y - y0 * x  # k̂·k̂0 and ẑ·(k̂0×k̂)
-    k0, k, epsilon = np.hypot(wi[:, 0], wi[:, 1]), np.hypot(wo[:, 0], wo[:, 1]), index * index
-    inside0, inside = decaying_root(epsilon - k0**2), decaying_root(epsilon - k**2)
-    s0, s = 1 / (wi[:, 2] + inside0), 1 / (wo[:, 2] + inside)
-    p0, p = 1 / (epsilon * wi[:, 2] + inside0), 1 / (epsilon * wo[:, 2] + inside)
+    dot, cross = x0 * x + y0 * y, x0 * y - y0 * x  # t̂·t̂0 and ẑ·(t̂0×t̂)
+    t0, t, epsilon = np.hypot(wi[:, 0], wi[:, 1]), np.hypot(wo[:, 0], wo[:, 1]), index * index
+    inside0, inside = decaying_root(epsilon - t0**2), decaying_root(epsilon - t**2)
+    over_s0, over_s = 1 / (wi[:, 2] + inside0), 1 / (wo[:, 2] + inside)
+    over_p0, over_p = 1 / (epsilon * wi[:, 2] + inside0), 1 / (epsilon * wo[:, 2] + inside)
     entries = jones_matrix(
-        ss=-s * s0 * dot,
-        sp=s * (inside0 * p0) * cross,
-        ps=(inside * p) * s0 * cross,
-        pp=(inside * p) * (inside0 * p0) * dot - epsilon * p * p0 * k * k0,
+        ss=-over_s * over_s0 * dot,
+        sp=over_s * (inside0 * over_p0) * cross,
+        ps=(inside * over_p) * over_s0 * cross,
+        pp=(inside * over_p) * (inside0 * over_p0) * dot - epsilon * over_p * over_p0 * t * t0,
     )
     return entries * (epsilon - 1)[:, None, None]

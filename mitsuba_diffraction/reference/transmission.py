@@ -39,7 +39,7 @@ def btdf(
     width = width_of(coherence_width)
     checked("coherence", coherence)
     first, second, lam = directions_of(wi, wo, wavelength)
-    model = model_of(model, index_of(eta, 0.0, lam, None))
+    model = model_of(model, index_of(eta, 0.0, lam, None), through.MODELS)
     if not 1.0 < float(eta) < np.inf:
         raise DiffractionError(f"eta={eta} must be one real index above 1")
     swapped = first[:, 2:] < 0

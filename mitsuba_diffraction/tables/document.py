@@ -176,8 +176,8 @@ def _check_agreement(table: DiffractionTable) -> None:
 
 def _settings(fields: Mapping[str, Any]) -> TableSettings:
     _names(fields, fields, _REQUIRED)
-    given = {name: fields[name] for name in _SETTINGS if name in fields}
-    return TableSettings(**{"second_order": False, **given})
+    settings = {name: fields[name] for name in _SETTINGS if name in fields}
+    return TableSettings(**{"second_order": False, **settings})
 
 
 def _expansion(fields: Mapping[str, Any]) -> Expansion:
@@ -314,7 +314,7 @@ def _list(value: Any, name: str) -> list[Any]:
 def _names(fields: Iterable[str], allowed: Iterable[str], required: Iterable[str]) -> None:
     missing, unknown = set(required) - set(fields), set(fields) - set(allowed)
     if missing:
-        raise ValueError(f"no {', '.join(sorted(missing))}")
+        raise ValueError(f"missing entries: {', '.join(sorted(missing))}")
     if unknown:
         raise ValueError(f"unknown entry {quoted(min(unknown))}")
 
@@ -331,9 +331,9 @@ def _whole(value: Any, name: str, low: int, high: int) -> int:
 
 
 def _two(value: Any, name: str) -> list[Any]:
-    found = _list(value, name)
-    _require(len(found) == 2, f"{name}={quoted(value)}")
-    return found
+    pair = _list(value, name)
+    _require(len(pair) == 2, f"{name}={quoted(value)}")
+    return pair
 
 
 def _pair(value: Any, name: str, low: float, high: float) -> tuple[float, float]:
@@ -347,10 +347,10 @@ def _whole_pair(value: Any, name: str, low: int, high: int) -> tuple[int, int]:
 
 
 def _numbers(value: Any, name: str, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
-    found = np.array(value)
-    right = len(shape) == found.ndim and all(
-        n in (None, m) for n, m in zip(shape, found.shape, strict=True)
+    array = np.array(value)
+    right = len(shape) == array.ndim and all(
+        n in (None, m) for n, m in zip(shape, array.shape, strict=True)
     )
-    _require(right and found.dtype.kind in "if", f"{name} of shape {found.shape}")
-    _require(np.isfinite(found).all() and np.abs(found).max(initial=0.0) < 1e12, name)
-    return found.astype(float)
+    _require(right and array.dtype.kind in "if", f"{name} of shape {array.shape}")
+    _require(np.isfinite(array).all() and np.abs(array).max(initial=0.0) < 1e12, name)
+    return array.astype(float)

@@ -14,7 +14,7 @@ from ..optics.geometry import wavenumber
 from .energy.conservation import Index
 from .energy.grid import FINE, DirectionalTable, DirectionGrid
 from .energy.scaling import parallel
-from .energy.store import PROBES, cached, rounded
+from .energy.store import PROBES, cached_directions, rounded
 from .table import DiffractionTable
 
 #: Phase of a fringe, rad, from one wavelength to the next, and most wavelengths: within a twentieth
@@ -59,4 +59,4 @@ def mean_exponents(
         return [exponents(table.roughness, index, wavelength_range)]
 
     probes = rounded(index(np.geomspace(*wavelength_range, PROBES)))
-    return cached("film", table, [STEP, MOST, probes, *wavelength_range], make)[0]
+    return cached_directions("film", table, [STEP, MOST, probes, *wavelength_range], make)[0]

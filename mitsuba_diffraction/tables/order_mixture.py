@@ -96,7 +96,7 @@ def order_mixture(
     central = np.empty(count)
     powers = np.empty((count, 0), np.float32)
     strongest = np.zeros((len(axes[1].frequency), len(axes[0].frequency)), np.float32)
-    kept = []
+    stored = []
     powers_at = _Powers(table, axes)
     for n, kappa in enumerate(kappas):
         power, central[n] = powers_at(float(kappa))
@@ -105,13 +105,13 @@ def order_mixture(
             central[n] = 0.0
         np.maximum(strongest, power, out=strongest)
         density[n] = (splats[0] @ (splats[1] @ power).T).T
-        kept.append(power if power.nbytes * count < 400e6 else None)
+        stored.append(power if power.nbytes * count < 400e6 else None)
     chosen = _choose(strongest) if not all_smooth else np.zeros((0, 2), int)
     rows, columns = chosen.T
     if len(chosen):
         powers = np.empty((count, len(chosen)), np.float32)
         for n, kappa in enumerate(kappas):
-            held = kept[n]
+            held = stored[n]
             power = held if held is not None else powers_at(float(kappa))[0]
             powers[n] = power[rows, columns]
             chosen_splats = splats[1][:, rows].multiply(powers[n]) @ splats[0][:, columns].T

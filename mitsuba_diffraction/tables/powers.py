@@ -68,9 +68,9 @@ def power_series(
         order_0 = table.order_0[:, 0]
         return table.coefficients[:, :, :, 0], order_0, table.scale, old
     new = power_expansion(table)
-    found = powers_of(table.coefficients.astype(np.float32), old, new)
+    coefficients = powers_of(table.coefficients.astype(np.float32), old, new)
     order_0 = np.empty((new.intervals, new.terms))
     for interval in range(new.intervals):
         values = order_0_power(table, new.nodes(interval)) - new.order_0_offset(interval)
         order_0[interval] = values @ new.fit(interval)
-    return found, order_0, table.scale**2, new
+    return coefficients, order_0, table.scale**2, new

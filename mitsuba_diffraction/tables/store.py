@@ -80,7 +80,7 @@ def key_of(*parts: Any) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
 
 
-def kept(
+def cached(
     kind: str,
     key: str,
     memory: MutableMapping[str, T],
@@ -260,7 +260,7 @@ def cached_table(
 ) -> DiffractionTable:
     """Return the table of heights with this digest, from memory, from disk, or built and stored."""
     key = table_key(digest, settings)
-    return kept("table", key, _tables, build, _table_record, _table_of)
+    return cached("table", key, _tables, build, _table_record, _table_of)
 
 
 def _table_record(table: DiffractionTable) -> Record:
@@ -272,7 +272,9 @@ def _table_of(record: Record) -> DiffractionTable:
     description = parse_document(record.document)
     (coefficients,) = record.arrays
     if coefficients.shape != description.shape:
-        raise ValueError(f"coefficients of another shape than {description.shape}")
+        raise ValueError(
+            f"coefficients have shape {coefficients.shape}; expected {description.shape}"
+        )
     return description.table(coefficients)
 
 
@@ -293,7 +295,9 @@ def cached_colours(table: DiffractionTable) -> ColourTable:
     """Return the colours of a table, from memory, from disk, or summed and stored."""
     key = key_of(COLOUR_VERSION, table.digest())
     memory = _colours.setdefault(table, {})
-    return kept("colours", key, memory, lambda: ColourTable.build(table), colour_record, colours_of)
+    return cached(
+        "colours", key, memory, lambda: ColourTable.build(table), colour_record, colours_of
+    )
 
 
 def colour_record(colours: ColourTable) -> Record:

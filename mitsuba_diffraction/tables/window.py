@@ -149,7 +149,7 @@ def apply_window(matrices: Sequence[sparse.csr_array], bins: NDArray[Any]) -> ND
 
 
 def rows_by_trim(taps: tuple[int, int], trims: Sequence[int]) -> dict[int, list[int]]:
-    """Rows of taps that leave out the same number at either end, by that number."""
+    """Map from the number of taps skipped at either end of a row to the rows that skip it."""
     rows: dict[int, list[int]] = {}
     for row in range(taps[1]):
         rows.setdefault(trims[row] if trims else 0, []).append(row)

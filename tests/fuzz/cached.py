@@ -17,7 +17,7 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction.tables import store
 from mitsuba_diffraction.tables.energy import store as energy
 from mitsuba_diffraction.tables.energy.grid import DirectionalTable
-from mitsuba_diffraction.tables.store import VARIABLE, Record, kept
+from mitsuba_diffraction.tables.store import VARIABLE, Record, cached
 from tests.fuzz.damage import damaged
 from tests.support.directions import rough_patch
 
@@ -82,7 +82,7 @@ def _get(name: str, folder: str) -> tuple[Record, int]:
     before = os.environ.get(VARIABLE)
     os.environ[VARIABLE] = folder
     try:
-        return kind.pack(kept(name, _KEY, {}, make, kind.pack, kind.unpack)), len(made)
+        return kind.pack(cached(name, _KEY, {}, make, kind.pack, kind.unpack)), len(made)
     finally:
         if before is None:
             del os.environ[VARIABLE]

@@ -345,7 +345,7 @@ def test_below_the_surface_there_is_no_light_in_any_model():
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
-        ({"model": "rice", "eta": 1.5}, "kirchhoff, small_slope"),
+        ({"model": "rice", "eta": 1.5}, "small_slope, kirchhoff"),
         ({"model": "small_slope"}, "eta"),
         ({"eta": 0.0}, "eta"),
         ({"eta": np.nan}, "eta"),

@@ -12,7 +12,7 @@ import pytest
 
 from mitsuba_diffraction import DiffractionWarning
 from mitsuba_diffraction.tables import store
-from mitsuba_diffraction.tables.store import Record, cache_folder, kept
+from mitsuba_diffraction.tables.store import Record, cache_folder, cached
 
 VALUES = np.linspace(0.0, 1.0, 37, dtype=np.float32).reshape(1, 37)
 KEY = "3" * 64
@@ -34,7 +34,7 @@ def get(made, memory=None, key=KEY):
         made.append(key)
         return "a text", VALUES, VALUES[0].astype(np.float16)
 
-    return kept(
+    return cached(
         "values",
         key,
         {} if memory is None else memory,
@@ -118,7 +118,7 @@ def test_the_folder_is_the_variable_s_or_the_user_s(monkeypatch):
 MANY = """
 import os, sys, time
 import numpy as np
-from mitsuba_diffraction.tables.store import Record, kept
+from mitsuba_diffraction.tables.store import Record, cached
 
 def make():
     with open(sys.argv[1], "a") as file:
@@ -133,7 +133,7 @@ while len(children) < 7:
         children.clear()
         break
     children.append(child)
-found = kept("values", "k", {}, make, lambda v: Record(None, [v]), lambda r: r.arrays[0])
+found = cached("values", "k", {}, make, lambda v: Record(None, [v]), lambda r: r.arrays[0])
 for child in children:
     assert os.waitpid(child, 0)[1] == 0
 os._exit(0 if found.sum() == 10 else 1)

@@ -27,7 +27,7 @@ from .accuracy import Sample
 
 @dataclass(frozen=True)
 class Setting:
-    """Settings of one table."""
+    """Table of the trade-off: its label, build arguments, and conversions afterwards."""
 
     group: str  # name of the parameter that varies
     name: str  # label of this value

@@ -120,7 +120,7 @@ class DiffractionDielectric(DiffractingSurface):
     """
 
     #: Feature that shaders do not support.
-    only_traced = "light that goes through"
+    not_in_shaders = "light that goes through"
 
     def __init__(self, props: Properties, provider: TableProvider = from_cache) -> None:
         read = read_parameters(props, provider)

@@ -99,8 +99,10 @@ class Sides:
     @classmethod
     def of(cls, n: Float, thin: bool, down: Mask) -> Sides:
         """Return the indices of light that goes through, downwards where `down`."""
-        one = mi.Float(1.0)
-        return cls(one, one) if thin else cls(dr.select(down, one, n), dr.select(down, n, one))
+        outside = mi.Float(1.0)
+        if thin:
+            return cls(outside, outside)
+        return cls(dr.select(down, outside, n), dr.select(down, n, outside))
 
     @staticmethod
     def cosine(cosine: Float, n: Float, down: Mask, thin: bool) -> Float:

@@ -120,7 +120,7 @@ def make_shader(bsdf: Any, methods: Sequence[str] = tuple(EXPORTED)) -> Shader:
             f"bsdf={type(bsdf).__name__} does not diffract: give one of type 'diffraction', for "
             "instance mi.load_dict(md.bsdf_dict(...))"
         )
-    if lacking := bsdf.only_traced:
+    if lacking := bsdf.not_in_shaders:
         raise DiffractionError(
             f"the surface has {lacking}, which the shaders do not support: export it without, or "
             "render it with Mitsuba"

@@ -51,7 +51,7 @@ class Map:
 
     @cached_property
     def _fit(self) -> Array:
-        """Matrix from values (n, k) at texels with spectra to the least-squares fit (3, k)."""
+        """Pseudo-inverse (3, n) of the texels' colours, for fits to their spectra."""
         assert self.colours is not None
         return np.asarray(np.linalg.pinv(self.colours.astype(float), rcond=1e-3))
 

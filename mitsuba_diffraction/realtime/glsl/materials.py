@@ -189,7 +189,7 @@ def read_material(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -
         if len(inner) > 1 and inner[0] is not inner[-1]:
             omissions.append(f"the back of {name}, another material")
         bsdf = inner[0]
-    if only := getattr(bsdf, "only_traced", None):
+    if only := getattr(bsdf, "not_in_shaders", None):
         raise DiffractionError(
             f"{name} has {only}, which the shaders do not support; leave it out, or render the "
             "scene with Mitsuba"
@@ -362,7 +362,7 @@ def diffracts(bsdf: Any) -> bool:
     """Return whether a BSDF, or the first BSDF inside its wrappers, diffracts."""
     while bsdf.class_name() in _WRAPPERS:
         bsdf = next(b for b in children(bsdf).values() if _is_bsdf(b))
-    return hasattr(bsdf, "only_traced")
+    return hasattr(bsdf, "not_in_shaders")
 
 
 def _diffuse(bsdf: Any, omissions: list[str], name: str, light: Spectrum) -> Map:

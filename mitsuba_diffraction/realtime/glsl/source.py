@@ -167,7 +167,7 @@ def _term(term: str, macros: Mapping[str, str]) -> bool:
 
 
 def _number(word: str, macros: Mapping[str, str]) -> int:
-    """Expand a word to an integer."""
+    """Value of an integer literal, or of a macro that stands for one."""
     while word in macros:
         word = macros[word].split()[0]
     return int(word)

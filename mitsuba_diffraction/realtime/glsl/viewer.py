@@ -144,7 +144,7 @@ class Viewer(moderngl_window.WindowConfig):
 
     @property
     def _surface(self) -> dict[str, float | None]:
-        """Height scale and coherence width of the surfaces."""
+        """Height scale and coherence width of the surfaces, as set in the viewer."""
         return {"scale": self.scale, "coherence_width": None if self._baked else self.width}
 
     def _light(self, size: tuple[int, int]) -> ProgressiveLight:

@@ -356,7 +356,7 @@ def _table(wanted: _Wanted, setting: _Setting, attempt: Attempt) -> DiffractionT
 
 
 def _grid(wanted: _Wanted, taps: tuple[int, int]) -> Grid:
-    """The bins that these taps can read."""
+    """Grid of DFT bins, wide enough for window sums with so many taps (x, y)."""
     limit, spacing = wanted.frequency_limit, wanted.spacing
     if max(taps) > MAX_TAPS:
         raise too_wide(wanted.patches[0].extent, wanted.settings, taps)

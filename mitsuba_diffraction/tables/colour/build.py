@@ -268,7 +268,7 @@ class _Source:
 
     @property
     def width(self) -> int:
-        """Numbers that a point has, at most."""
+        """Most coefficients looked up at one point, or weights of its series."""
         return max(self._bins.shape[1], self.expansion.intervals * self.expansion.terms)
 
     def at(

@@ -1,18 +1,18 @@
 """Energy conservation: a scale of directions by which no more is reflected than comes in.
 
 The model f gains energy on some surfaces at some angles. With the albedo a(ω) of f at one
-wavelength, s is sought such that
+wavelength, e is sought such that
 
-    f'(ωi, ωo) = f(ωi, ωo) s(ωi) s(ωo)   reflects   s(ωi) ∫ f s cosθo dωo = min(a(ωi), 1):
+    f'(ωi, ωo) = f(ωi, ωo) e(ωi) e(ωo)   reflects   e(ωi) ∫ f e cosθo dωo = min(a(ωi), 1):
 
-reciprocal, since s s is symmetric, and with nothing taken from directions that gain nothing, since
-their s is a little above 1 where that of their partners is below. That is the scaling of a
+reciprocal, since e e is symmetric, and with nothing taken from directions that gain nothing, since
+their e is a little above 1 where that of their partners is below. That is the scaling of a
 symmetric kernel to given sums (`scaling`). What is left to do:
 
 - Between the grid's directions and wavelengths an order may appear or vanish (a Rayleigh anomaly).
-  So the albedo is looked at between them too, and s lowered around where it is above 1.
+  So the albedo is looked at between them too, and e lowered around where it is above 1.
 - No scaling exists where a direction's partners all gain and it does not: the light between two
-  groups of directions, as a blazed grating has them, is one sum for both. There s ends up between.
+  groups of directions, as a blazed grating has them, is one sum for both. There e ends up between.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Index = Callable[[Real], "NDArray[np.complex128] | Filmed | None"]
 
 @dataclass(frozen=True)
 class Conservation:
-    """Albedo of the model as it is, and the scale s; None where the albedo is at most 1."""
+    """Albedo of the model as it is, and the scale e; None where the albedo is at most 1."""
 
     albedo: DirectionalTable
     scale: DirectionalTable | None
@@ -48,7 +48,7 @@ class Surface:
     Attributes
     ----------
     orders : of the table.
-    model : "kirchhoff" or "small_slope".
+    model : one of `optics.boundary.MODELS`.
     index : of the material over that of the medium above it.
     """
 

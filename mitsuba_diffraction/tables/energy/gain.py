@@ -37,7 +37,7 @@ class Boundary:
     Attributes
     ----------
     index : n + ik over that of the medium of the light, or that under a film; None for R = 1.
-    model : "kirchhoff" or "small_slope".
+    model : one of `optics.boundary.MODELS`.
     came, left : indices of the media of incident and outgoing light over that of the medium above.
     sign : of the orders' frequencies: from within, heights are turned over.
     least : of w; powers of orders over w² have a limit for w → 0.
@@ -74,9 +74,12 @@ class Boundary:
         return np.asarray((one_plus_dot / (cos_i + cos_o)) ** 2 / (cos_i * cos_o))
 
     def matrices(self, wi: Real, wo: Real) -> tuple[Complex, Complex]:
-        """K and B of directions that are both as if above."""
+        """K and B of directions that are both as if above; twice J of a model without heights."""
         assert self.index is not None
-        return boundary.kirchhoff(wi, wo, self.index), boundary.small_slope(wi, wo, self.index)
+        if self.model == "small_slope":
+            return boundary.kirchhoff(wi, wo, self.index), boundary.small_slope(wi, wo, self.index)
+        jones = boundary.matrices_of(self.model)(wi, wo, self.index)
+        return jones, jones
 
     def order_0(self, gain: Gain, cos_i: Real, cos_o: Real) -> Real:
         """G of order 0 across its lobe."""

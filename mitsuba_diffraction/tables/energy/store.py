@@ -14,7 +14,7 @@ from ...optics import mean_second_order
 from ...optics.fresnel import Filmed
 from ..height_scales import HeightScales
 from ..order_mixture import MOST_STRONG, STRONG
-from ..store import Record, kept, key_of
+from ..store import Record, cached, key_of
 from ..table import DiffractionTable
 from .conservation import Conservation, Index, Surface
 from .grid import DirectionalTable
@@ -43,12 +43,12 @@ class Energy(HeightScales):
 
         def make() -> list[DirectionalTable]:
             surface = Surface(Orders(self.table, height_scale), self.model, self.index)
-            made = surface.conservation(self.wavelength_range)
-            return [made.albedo] if made.scale is None else [made.albedo, made.scale]
+            energy = surface.conservation(self.wavelength_range)
+            return [energy.albedo] if energy.scale is None else [energy.albedo, energy.scale]
 
         index = rounded(self.index(np.geomspace(*self.wavelength_range, PROBES)))
         made_of = [height_scale, self.model, index, *self.wavelength_range]
-        albedo, *scale = cached("energy", self.table, made_of, make)
+        albedo, *scale = cached_directions("energy", self.table, made_of, make)
         return Conservation(albedo, scale[0] if scale else None)
 
 
@@ -66,10 +66,10 @@ class SidesEnergy(HeightScales):
             return Sides(self.table, height_scale, self.medium).scale(self.wavelength_range) or []
 
         made_of = [height_scale, *astuple(self.medium), *self.wavelength_range]
-        return cached("sides", self.table, made_of, make)
+        return cached_directions("sides", self.table, made_of, make)
 
 
-def cached(
+def cached_directions(
     kind: str,
     table: DiffractionTable,
     made_of: list[Any],
@@ -78,7 +78,7 @@ def cached(
     """Return tables of directions by all that they are made of: from memory, disk, or made."""
     versions = VERSION, mean_second_order.VERSION, STRONG, MOST_STRONG, astuple(energy_settings())
     key = key_of(kind, versions, table.digest(), made_of)
-    return kept(kind, key, _known.setdefault(table, {}), make, record, tables)
+    return cached(kind, key, _known.setdefault(table, {}), make, record, tables)
 
 
 def rounded(index: NDArray[np.complex128] | Filmed | None) -> list[str] | None:
@@ -90,16 +90,21 @@ def rounded(index: NDArray[np.complex128] | Filmed | None) -> list[str] | None:
     return [f"{n.real:.5g} {n.imag:.5g}" for n in index]
 
 
-def record(made: list[DirectionalTable]) -> Record:
+def record(pages: list[DirectionalTable]) -> Record:
     """Pack tables of directions for the cache."""
-    return Record([table.wavelengths.tolist() for table in made], [table.values for table in made])
+    return Record(
+        [table.wavelengths.tolist() for table in pages], [table.values for table in pages]
+    )
 
 
 def tables(record: Record) -> list[DirectionalTable]:
     """Unpack and check them."""
-    made = []
+    pages = []
     for wavelengths, values in zip(record.document, record.arrays, strict=True):
         if values.ndim != 3 or len(values) != len(wavelengths) or not np.isfinite(values).all():
-            raise ValueError(f"values of shape {values.shape}")
-        made.append(DirectionalTable(np.array(wavelengths, float), values))
-    return made
+            raise ValueError(
+                f"directional table of shape {values.shape}; expected (wavelengths, polar, "
+                "azimuthal), finite"
+            )
+        pages.append(DirectionalTable(np.array(wavelengths, float), values))
+    return pages

@@ -46,7 +46,7 @@ class Medium:
     Attributes
     ----------
     index : over that of the medium above.
-    model : "kirchhoff" or "small_slope".
+    model : one of `optics.through.MODELS`.
     thin : whether below is beyond the flat side of a sheet.
     """
 
@@ -56,7 +56,7 @@ class Medium:
 
     def ways(self, least: float) -> list[tuple[int, int, Boundary]]:
         """Sides that light comes from and goes to, and by which boundary; least : of w."""
-        n, model = self.index, self.model
+        n, model = self.index, boundary.checked_model(self.model, through.MODELS)
         inside = 1.0 if self.thin else n
         ways: list[tuple[int, int, Boundary]] = [
             (0, 0, Boundary(n, model)),

@@ -238,11 +238,11 @@ def _lobe_means(width: float, radius: Real) -> tuple[Real, Real, Real]:
     cosine = np.sqrt(np.maximum(1.0 - radius**2, 1e-12))
     edge, places, means = _lobes(width)
     at = radius > edge
-    found = [np.ones_like(radius), cosine, 1.0 / cosine]
-    for values, tabulated in zip(found, means, strict=True):
+    share_and_means = [np.ones_like(radius), cosine, 1.0 / cosine]
+    for values, tabulated in zip(share_and_means, means, strict=True):
         values[at] = np.interp(radius[at], places, tabulated)
-    found[0][radius >= places[-1]] = 0.0
-    return found[0], found[1], found[2]
+    share_and_means[0][radius >= places[-1]] = 0.0
+    return share_and_means[0], share_and_means[1], share_and_means[2]
 
 
 @lru_cache(maxsize=64)
