@@ -160,7 +160,7 @@ def test_weights_that_mean_nothing_are_refused(some_variant, parameters, said):
 def test_shaders_refuse_it(some_variant):
     sensor = {"type": "perspective", "film": {"type": "hdrfilm"}}
     scene = {"type": "scene", "disk": {"type": "disk", "bsdf": mix(weight_back=0.5)}, "s": sensor}
-    with pytest.raises(md.DiffractionError, match=r"a mix of surfaces of .* path tracer"):
+    with pytest.raises(md.DiffractionError, match="a mix of surfaces"):
         read_scene(mi.load_dict(scene))
 
 

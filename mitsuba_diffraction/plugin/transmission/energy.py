@@ -46,7 +46,7 @@ class SidesModel:
         self._lookups = [DirectionLookup() for _ in range(4)]
 
     def update(self, height_scale: float, differentiable: bool, lowest: float | None) -> None:
-        """Look up, or compute, c and t at another height scale or index; see `EnergyModel.update`."""
+        """Look up, or compute, c and t at another height scale or index: `EnergyModel.update`."""
         index = round(plain(self._material.eta) / INDEX_STEP) * INDEX_STEP
         medium = Medium(index, self._model, self._thin)
         energy = SidesEnergy(self._table, medium, self._range)

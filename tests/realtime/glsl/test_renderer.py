@@ -167,7 +167,7 @@ def test_another_height_scale_has_its_own_energy(
     monkeypatch.setattr(
         type(plate),
         "energy_scale",
-        lambda self, scale: (np.full(shape, scales[scale], np.float32), False),
+        lambda self, scale: np.full(shape, scales[scale], np.float32),
     )
     scene = {
         "type": "scene",

@@ -77,7 +77,7 @@ as `info --energy` prints them: model → `energy_conserving`, the default.
 
 Only order 0 is scaled. Where it has too little light, the missing part stays missing. Where the
 other orders exceed 1 on their own, all light is attenuated; these sums are then bounds. Both happen
-on blazed gratings, whose order 0 has little light. `energy_conserving=false` is the model as it is."""
+on blazed gratings, whose order 0 has little light. `energy_conserving=false` keeps the model's."""
 
 
 def _recipes(measured: Measurements) -> str:
