@@ -379,24 +379,16 @@ def _mueller(jones: Jones) -> list[Float]:
     rows, columns = (_product(ss, sp), _product(ps, pp)), (_product(ss, ps), _product(sp, pp))
     same, other = _product(ss, pp), _product(sp, ps)
     real, imag = dr.real, dr.imag
+    first, second = rows
+    left, right = columns
     return [
-        a + b + c + d,
-        a - b + c - d,
-        real(rows[0]) + real(rows[1]),
-        -imag(rows[0]) - imag(rows[1]),
-        a + b - c - d,
-        a - b - c + d,
-        real(rows[0]) - real(rows[1]),
-        imag(rows[1]) - imag(rows[0]),
-        real(columns[0]) + real(columns[1]),
-        real(columns[0]) - real(columns[1]),
-        real(same) + real(other),
+        a + b + c + d, a - b + c - d, real(first) + real(second), -imag(first) - imag(second),
+        a + b - c - d, a - b - c + d, real(first) - real(second), imag(second) - imag(first),
+        real(left) + real(right), real(left) - real(right), real(same) + real(other),
         imag(other) - imag(same),
-        imag(columns[0]) + imag(columns[1]),
-        imag(columns[0]) - imag(columns[1]),
-        imag(same) + imag(other),
+        imag(left) + imag(right), imag(left) - imag(right), imag(same) + imag(other),
         real(same) - real(other),
-    ]
+    ]  # fmt: skip
 
 
 def _product(x: Number, y: Number) -> Number:
