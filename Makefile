@@ -31,14 +31,14 @@ demo: setup  ## tabulate a snake scale, render three scenes with it, the snake i
 	@$(RENDER) scenes/snake.xml -s 32 -D sun_azimuth=60 -o out/snake_other_light.exr
 	@echo "Compare out/snake.png and out/snake_other_light.png: the colours move with the sun."
 
-# one thread for linear algebra in each of the two processes
-# TIMES=1 prints what the processor time went into
-PYTEST := OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest -n 2 --dist worksteal $(if $(TIMES),--processor-time)
+# one thread for linear algebra in each process; TIMES=1 prints what the processor time went into
+PYTEST := OPENBLAS_NUM_THREADS=1 $(PYTHON3) -m pytest --dist worksteal $(if $(TIMES),--processor-time)
 test: setup .venv/browser  ## run the quick tests, of every part: three minutes
-	@$(PYTEST) -m "not thorough"
+	@$(PYTEST) -n 2 -m "not thorough"
 
+# three processes: browsers and workers of a cluster are waited for
 test-all: setup .venv/browser  ## run all tests: ten minutes
-	@$(PYTEST)
+	@$(PYTEST) -n 3
 
 # for as long as you like: make fuzz SECONDS=600; the same cases again: make fuzz SEED=1
 fuzz: setup  ## try random surfaces, damaged files and command lines for a minute
