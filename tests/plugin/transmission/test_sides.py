@@ -125,7 +125,7 @@ def test_conserved_both_sides_add_up_to_all_light(some_variant, kind, theta, len
     size = {"periods": math.ceil(width / period), "pixels_per_period": math.ceil(period / 0.0895)}
     grating = md.gratings.sinusoidal(period, depth, **size)
     common = {"field": grating, "coherence_width": width, **SIDES[kind]}
-    before = use_energy_settings(EnergySettings(side_wavelengths=3, azimuthal=36))  # one near 550 nm
+    before = use_energy_settings(EnergySettings(side_wavelengths=3, azimuthal=36))  # one at 550
     raw, conserved = (sampled(both(energy_conserving=e, **common), theta)[0] for e in (False, True))
     use_energy_settings(before)
     error = 3 * raw.std() / np.sqrt(len(raw))
