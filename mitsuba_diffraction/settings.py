@@ -99,6 +99,10 @@ def _half_axes(value: Any) -> tuple[float, float] | None:
     return positive(x), positive(y)
 
 
+def _width(value: Any) -> str | float:
+    return "auto" if value == "auto" else _between(0.0, MAX_COHERENCE_WIDTH)(value)
+
+
 def _windows(value: Any) -> str | float | None:
     if value is None or value == "none":
         return None
@@ -126,7 +130,8 @@ class TableSettings:
 
     Attributes
     ----------
-    coherence_width : 4σ of the Gaussian amplitude window, µm.
+    coherence_width : 4σ of the Gaussian amplitude window, µm; "auto" is 65 µm, or the smaller side
+        of a narrower patch, unless the patch repeats exactly (`heights.coherence`).
     coherence : "ensemble" (window power averaged over its position) or "patch" (one window).
     basis : "svd" (also as "auto"), "chebyshev" or "taylor"; see `tables.expansion`.
     tolerance : relative error of ⟨|P|²⟩ at the worst κ, as `tables.build.error` measures it.
@@ -148,9 +153,10 @@ class TableSettings:
         With the setting, its value and what is allowed.
     """
 
-    coherence_width: float = _setting(
-        65.0, _between(0.0, MAX_COHERENCE_WIDTH), "µm, 4σ of the amplitude window",
-        f"a positive number of µm, at most {MAX_COHERENCE_WIDTH:g} (65 is usual)", metavar="W",
+    coherence_width: str | float = _setting(
+        "auto", _width, "µm, 4σ of the amplitude window; auto is 65, or the smaller side of a "
+        "narrower scan", f"a positive number of µm, at most {MAX_COHERENCE_WIDTH:g}, or auto",
+        metavar="auto|W", type=str,
     )  # fmt: skip
     coherence: str = _setting(
         "ensemble", help="average over window positions, or one window on the patch",
@@ -197,6 +203,13 @@ class TableSettings:
             object.__setattr__(self, name, checked(name, getattr(self, name)))
         if self.second_order == "auto" and (self.coherent or self.basis == "taylor"):
             object.__setattr__(self, "second_order", False)
+
+    @property
+    def width(self) -> float:
+        """Coherence width, µm, of settings that `heights.coherence.resolved` returned."""
+        if isinstance(self.coherence_width, str):
+            raise ValueError("coherence_width is to be resolved first")
+        return self.coherence_width
 
     @property
     def coherent(self) -> bool:

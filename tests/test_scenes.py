@@ -53,7 +53,8 @@ def test_its_patch_is_a_recipe(name: str) -> None:
     defaults = parameters_of(SCENES / f"{name}.xml")
     assert defaults is not None
     assert Recipe.load(SCENES / str(defaults["patch"])).generator
-    assert {"spp", "resx", "resy", "patch", "pixel_size", "max_height"} <= set(defaults)
+    advised = {"level", "periodic", "coherence_width"}  # by messages on heights
+    assert {"spp", "resx", "resy", "patch", "pixel_size", "max_height", *advised} <= set(defaults)
 
 
 @pytest.mark.usefixtures("variant")

@@ -64,7 +64,7 @@ class Views:
         wo: ArrayLike,
         wavelength: ArrayLike,
         *,
-        coherence_width: float = 65.0,
+        coherence_width: float,
         eta: ArrayLike | None = None,
         k: ArrayLike = 0.0,
     ) -> None:

@@ -37,6 +37,7 @@ from ..cluster.jobs import run_jobs
 from ..cluster.tasks import Failed, MissingFiles, SceneFiles
 from ..errors import DiffractionError, DiffractionWarning, one_line
 from ..files import read_text, readable_file
+from ..heights.coherence import REPEATS
 from ..heights.field import HeightField
 from ..heights.load import load_heights
 from ..heights.read import LoadOptions, is_recipe
@@ -54,7 +55,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Version of the rows: raise it when their values change.
-VERSION = 2
+VERSION = 3
 #: Number of gratings in a row.
 PERIODS = 3
 #: Names of the files in a survey's folder.
@@ -189,6 +190,8 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     table = cached_table(digest, settings, lambda: build_with(fields, settings))
     row |= {"orders_x": table.coefficients.shape[2], "orders_y": table.coefficients.shape[1]}
     row |= {"table_mb": table.nbytes / 1e6, "table_error": table.largest_error}
+    row["coherence_width_um"] = table.coherence_width
+    row["tiling"] = REPEATS if table.source.get("repeats") else ""
     if "windows" in table.source:
         row["windows"] = table.source["windows"]["number"]
         row["standard_error"] = table.source["windows"]["standard_error"]["colours"]
@@ -384,7 +387,8 @@ def _sheet(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Figure:
         period = row.get("period_1_um")
         title = "" if period is None else f"{period:.3g} µm at {row['direction_1_deg']:.0f}°, "
         axes.set_title(
-            f"{Path(row['file']).name[:34]}\n{title}iridescence {row['iridescence']:.2g}",
+            f"{Path(row['file']).name[:34]}\n{title}iridescence {row['iridescence']:.2g}"
+            + (f"\n{row['tiling']}" if row["tiling"] else ""),
             fontsize=6,
         )
     for axes in figure.axes:

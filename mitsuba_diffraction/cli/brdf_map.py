@@ -19,7 +19,7 @@ from .report import check_outputs, save_report
 
 _KEPT = "that of the table or recipe, else "
 _TABLE = {
-    "coherence_width": f"{_KEPT}65", "coherence": f"{_KEPT}ensemble", "basis": f"{_KEPT}auto",
+    "coherence_width": f"{_KEPT}auto", "coherence": f"{_KEPT}ensemble", "basis": f"{_KEPT}auto",
     "tolerance": f"{_KEPT}1e-3", "terms": "as many as the tolerance needs",
     "second_order": f"{_KEPT}auto",
 }  # fmt: skip
@@ -300,7 +300,7 @@ def _surface(bsdf: Any) -> str:
     return "; ".join(
         [
             "R = 1" if str(bsdf.fresnel) == "none" else f"{bsdf.fresnel}, {bsdf.model}",
-            f"{table.coherence}, coherence width {table.coherence_width:g} µm",
+            f"{table.coherence}, coherence width {table.width_text}",
             *([f"heights × {scale:g}"] if scale != 1.0 else []),
             *([f"turned by {turn:g}°"] if turn != 0.0 else []),
         ]

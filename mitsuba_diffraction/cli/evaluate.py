@@ -78,6 +78,7 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from ..atomic import atomic_path
+    from ..heights.coherence import resolved_width
     from ..heights.spectra import dominant_periods
     from ..thesis.methods import make
     from ..thesis.methods.method import trapezoid_rule
@@ -97,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
     steps = trapezoid_rule(spectrum["wavelength_range"], spectrum["step"])[0]
     viewing_angles(args.angles, args.angle_step, args.theta, args.order)
     patch, settings = options.load_patch(args)
-    width = settings.get("coherence_width", 65.0)
+    width = resolved_width(settings.get("coherence_width", "auto"), [patch])
     gratings = dominant_periods(patch)
     if args.phi is None and gratings:
         beam = Beam(args.theta, float(round(gratings[0].direction)))  # known to a degree

@@ -143,6 +143,7 @@ def _draw(args: argparse.Namespace) -> None:
 
 
 def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
+    from ..heights.coherence import resolved_width, width_reason
     from ..heights.load import load_heights
 
     field = load_heights(file, options.load_options(args))
@@ -150,6 +151,7 @@ def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
         "kind": "height field",
         **field.summary(),
         **_periods(field),
+        "window": width_reason(resolved_width("auto", [field]), [field]),
         "warnings": options.table_warnings(field, TableSettings()),
     }
 
@@ -163,6 +165,7 @@ def _periods(field: HeightField) -> dict[str, list[str]]:
 
 
 def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
+    from ..heights.coherence import resolved, width_reason
     from ..heights.recipes import Recipe
 
     recipe = Recipe.load(file)
@@ -180,6 +183,7 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
         "output": str(recipe.output),
         "output exists": recipe.output.is_file(),
         "patches": [{**field.summary(), **_periods(field)} for field in fields],
+        "window": width_reason(resolved(settings, fields).width, fields),
         "warnings": list(dict.fromkeys(warnings)),
     }
 

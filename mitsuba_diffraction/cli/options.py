@@ -48,7 +48,11 @@ _HEIGHTS: dict[str, tuple[str, str]] = {
         "plane: subtract the best plane; lines: also align the scan lines; default: none",
     ),
     "clip": ("N", "clip heights beyond N robust standard deviations (dust)"),
-    "periodic": ("METHOD", "smooth or taper: make the patch tile without seams; default: none"),
+    "periodic": (
+        "METHOD",
+        "smooth or taper: make the patch tile without seams; exact: it is whole periods of a "
+        "surface that repeats; default: none",
+    ),
 }
 _TABLE = (
     "coherence_width", "coherence", "basis", "tolerance", "terms", "taps", "height_scale_max",
@@ -353,13 +357,14 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
 
 def table_warnings(field: HeightField, settings: TableSettings) -> list[str]:
     """List the warnings of a table of these heights, or its refusal if size alone decides."""
-    from ..heights.validity import window_warning
+    from ..heights.coherence import resolved, window_warning
     from ..tables.build.checks import check_window
 
     lines = field.validity(settings.wavelength_range)
+    settings = resolved(settings, [field])
     try:
         check_window(field.extent, settings)
     except DiffractionError as error:
         return [*lines, f"{field.name}: {error}"]
-    small = window_warning(field, settings.coherence_width)
+    small = window_warning(settings.width, [field])
     return [*lines, *([small] if small else [])]

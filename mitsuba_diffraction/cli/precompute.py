@@ -156,6 +156,7 @@ def _report(
         yield "patch", patch
         for line in field.history:
             yield "", line
+    yield "window", table.source["window"]
     if "windows" in table.source:
         windows = table.source["windows"]
         width, height = windows["extent"]

@@ -28,9 +28,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     options.add_output(parser, "where files go; default: tradeoff", default=Path("tradeoff"))
     parser.add_argument("--quick", action="store_true", help="fewer settings, a smaller patch")
-    options.add_table(
-        parser, ["coherence_width"], coherence_width="65, or the default patch's width if less"
-    )
+    options.add_table(parser, ["coherence_width"])
     budget = parser.add_argument_group("recommend a setting with")
     budget.add_argument(
         "--max-error", metavar="E", type=number_between(0.0, 1.0),
@@ -64,12 +62,13 @@ def run(args: argparse.Namespace) -> int:
     from ..analysis.tradeoff.accuracy import Sample
     from ..analysis.tradeoff.report import draw_depths, draw_trade, lines, plain, save_csv
     from ..heights import gratings
+    from ..heights.coherence import resolved_width
 
     side, pairs, lanes, rounds, depths = _QUICK if args.quick else _FULL
-    width = args.coherence_width or (65.0 if args.heights else min(65.0, side * PIXEL))
     field = options.own_patch(args)
     if field is None:
         field = gratings.elaphe_like(side * PIXEL, side)
+    width = resolved_width(options.table_options(args).get("coherence_width", "auto"), [field])
     set_variant("llvm_ad_spectral")
     with Bar(args) as bar:
         results = measure(

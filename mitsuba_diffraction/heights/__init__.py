@@ -12,6 +12,7 @@ seams        steps of height where the edges of tiled patches meet
 gratings     height fields computed from formulas
 validity     warnings where a patch leaves the model or its own resolution
 spectra      spectrum of heights, and powers of their orders
+coherence    coherence width that a patch allows
 lengths      checks of lengths, counts and other numbers that users write
 """
 

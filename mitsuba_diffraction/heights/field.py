@@ -42,6 +42,9 @@ class HeightField:
     cut_out
         Whether the patch is a part of a larger surface, as a scan or a cropped patch is: opposite
         edges need not meet, and `validity` warns if they do not.
+    periodic
+        Whether the patch is whole periods of a surface that repeats exactly, as a grating by a
+        formula. Any other patch limits the coherence width (`heights.coherence`).
 
     Raises
     ------
@@ -55,6 +58,7 @@ class HeightField:
     name: str = field(default="height field", kw_only=True)
     history: tuple[str, ...] = field(default=(), kw_only=True)
     cut_out: bool = field(default=False, kw_only=True)
+    periodic: bool = field(default=False, kw_only=True)
 
     # The package `heights` sets these: their modules import this class.
     load: ClassVar[Callable[..., HeightField]]  #: `load.load`: read a file
@@ -69,6 +73,7 @@ class HeightField:
         name: str = "height field",
         history: Iterable[str] = (),
         cut_out: bool = False,
+        periodic: bool = False,
     ) -> None:
         size = pixel_size_of(pixel_size, f"{name}: pixel_size")
         if size is None:
@@ -84,6 +89,7 @@ class HeightField:
         object.__setattr__(self, "name", " ".join(str(name).split()))
         object.__setattr__(self, "history", tuple(history))
         object.__setattr__(self, "cut_out", bool(cut_out))
+        object.__setattr__(self, "periodic", bool(periodic))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -136,26 +142,37 @@ class HeightField:
         for start in range(0, self.shape[0], ROWS):
             yield self.heights[start : start + ROWS + overlap]
 
-    def changed(
-        self, heights: npt.ArrayLike, line: str, *, cut_out: bool | None = None
-    ) -> HeightField:
-        """Return the patch with other heights on the same pixels and `line` added to `history`."""
+    def varies_along(self, axis: int) -> bool:
+        """Return whether any height changes along y (axis 0) or x (axis 1)."""
+        first = self.heights[0] if axis == 0 else self.heights[:, :1]
+        blocks = range(0, self.shape[0], ROWS)
+        return any(
+            bool(np.any(rows != (first if axis == 0 else first[start : start + ROWS])))
+            for start, rows in zip(blocks, self._blocks(), strict=True)
+        )
+
+    def changed(self, heights: npt.ArrayLike, line: str, **flags: bool) -> HeightField:
+        """Return the patch with other heights on the same pixels and `line` added to `history`.
+
+        flags : `cut_out` and `periodic`, if they change.
+        """
         return HeightField(
             heights,
             self.pixel_size,
             name=self.name,
             history=(*self.history, line),
-            cut_out=self.cut_out if cut_out is None else cut_out,
+            **{"cut_out": self.cut_out, "periodic": self.periodic, **flags},
         )
 
     @cached_property
     def _digest(self) -> str:
-        content = hashlib.sha256(repr((self.shape, self.pixel_size)).encode())
+        shape = (self.shape, self.pixel_size, *(["periodic"] if self.periodic else []))
+        content = hashlib.sha256(repr(shape).encode())
         content.update(np.ascontiguousarray(self.heights, dtype="<f8").data)
         return content.hexdigest()
 
     def digest(self) -> str:
-        """Return the SHA-256 of shape, pixel size and heights in hexadecimal."""
+        """Return the SHA-256 of shape, pixel size, `periodic` and heights in hexadecimal."""
         return self._digest
 
     def summary(self) -> dict[str, Any]:

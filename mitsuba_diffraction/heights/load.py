@@ -55,9 +55,9 @@ def load(
     clip
         Clip heights to this many robust standard deviations; default not at all.
     periodic
-        "smooth" or "taper" make opposite edges of the patch meet; default "none". The
-        treatments are applied in the order crop, fill, level, clip, periodic, and each leaves a
-        line in `history`.
+        "smooth" or "taper" make opposite edges of the patch meet; "exact" states that the patch is
+        whole periods of a surface that repeats; default "none". The treatments are applied in the
+        order crop, fill, level, clip, periodic, and each leaves a line in `history`.
 
     Raises
     ------

@@ -88,7 +88,7 @@ def crop(field: HeightField, size: Size) -> HeightField:
     if heights.shape == field.shape:
         return field
     line = crop_line(field.shape, (heights.shape[0], heights.shape[1]), field.pixel_size)
-    return field.changed(heights, line, cut_out=True)
+    return field.changed(heights, line, cut_out=True, periodic=False)
 
 
 def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[FloatArray, str]:
@@ -340,6 +340,12 @@ def periodic_taper(field: HeightField) -> HeightField:
     return _reported(
         field, heights, f"tapered to its mean height over {TAPER_SHARE:.0%} along each border"
     )
+
+
+def periodic_exact(field: HeightField) -> HeightField:
+    """Take the patch for whole periods of a surface that repeats exactly; heights stay."""
+    line = "taken for whole periods of a surface that repeats exactly"
+    return field.changed(field.heights, line, cut_out=False, periodic=True)
 
 
 def _reported(field: HeightField, heights: FloatArray, what: str) -> HeightField:

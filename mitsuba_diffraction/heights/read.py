@@ -21,10 +21,21 @@ from .formats import RawHeights
 from .formats.grids import read_npy, read_text
 from .formats.images import is_park_tiff, read_exr, read_image
 from .formats.instruments import read_instrument
-from .lengths import crop_of, height_of, height_unit_of, micrometres_of, pixel_size_of
+from .lengths import (
+    crop_of,
+    height_of,
+    height_unit_of,
+    is_auto,
+    micrometres_of,
+    pixel_size_of,
+)
 
 LEVELS = {"plane": preprocess.level_plane, "lines": preprocess.level_lines}
-PERIODICS = {"smooth": preprocess.periodic_smooth, "taper": preprocess.periodic_taper}
+PERIODICS = {
+    "smooth": preprocess.periodic_smooth,
+    "taper": preprocess.periodic_taper,
+    "exact": preprocess.periodic_exact,
+}
 
 
 @dataclass(frozen=True)
@@ -70,8 +81,8 @@ def _channel(value: object) -> str | int | None:
 
 
 def _choice(value: object, name: str, choices: tuple[str, ...]) -> str | None:
-    """Check that parameter `name` has one of its choices."""
-    if value is None:
+    """Check that parameter `name` has one of its choices; "auto" leaves it to the file."""
+    if value is None or is_auto(value):
         return None
     if not isinstance(value, str) or value not in choices:
         raise DiffractionError(

@@ -37,14 +37,8 @@ FACET = 0.01
 #: seams' share of the light outside the mirror direction, weighted with the angle's squared sine.
 SEAM_SHARE = 0.1
 
-# Narrowest useful coherence window, µm: a wavelength and a half.
-_NARROWEST = 1.0
-
-# A patch narrower than this fraction of the coherence width is reported.
-_SMALLER = 0.9
-
 #: Version of the texts, which cached tables store: raise it when a text changes.
-TEXTS_VERSION = 3
+TEXTS_VERSION = 4
 
 
 def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830.0)) -> list[str]:
@@ -171,25 +165,3 @@ def units_warning(field: HeightField) -> str:
             "an image: max_height) by 1000"
         )
     return ""
-
-
-def window_warning(field: HeightField, coherence_width: float) -> str:
-    """Return a warning of a patch that is smaller than the coherence window, or ""."""
-    width, height = field.extent
-    if min(width, height) >= _SMALLER * coherence_width:
-        return ""
-    fitting = _two_digits(min(width, height))
-    advice = f"use coherence_width={fitting:g} (--coherence-width {fitting:g}) or a larger patch"
-    if fitting < _NARROWEST:
-        advice = "use a larger patch, or check its pixel size, which is in µm"
-    return (
-        f"{field.name}: the patch of {width:.4g} × {height:.4g} µm is smaller than the coherence "
-        f"width of {coherence_width:g} µm: its repetition diffracts like a grating; unless the "
-        f"surface is periodic, {advice}"
-    )
-
-
-def _two_digits(length: float) -> float:
-    """Round a length down to two digits."""
-    unit = 10.0 ** (math.floor(math.log10(length)) - 1)
-    return float(f"{math.floor(length / unit * (1 + 1e-9)) * unit:.2g}")

@@ -33,8 +33,9 @@ clip : float [none]
     Number of robust standard deviations, at least 1, beyond which heights are clipped, as of dust.
 periodic : string [none]
     Treatment of opposite edges, which meet where the patch is tiled: `smooth` keeps the periodic
-    component (Moisan 2011), `taper` attenuates heights towards the edges; `none`. Treatments are
-    applied in the order crop, fill, level, clip, periodic.
+    component (Moisan 2011), `taper` attenuates heights towards the edges; `exact` leaves heights as
+    they are and states that the patch is whole periods of a surface that repeats; `none`.
+    Treatments are applied in the order crop, fill, level, clip, periodic.
 orientation : float or texture ∂ [0]
     Angle in degrees from the first tangent to the patch's x axis, up to 36000. Or a texture (raw,
     in a float format such as EXR) or mesh attribute of three channels, the first two of which are
@@ -49,9 +50,10 @@ height_scale_max : float [of a bitmap]
 
 The table
 ---------
-coherence_width : float or string [65]
+coherence_width : float or string [auto]
     4σ of the Gaussian amplitude window, µm: the width over which light is coherent. `auto` is the
-    width of the table or the recipe, else 65.
+    width of the table or the recipe, else 65 (sunlight), or the smaller side of a narrower scan: a
+    wider window shows the scan's repetition as a grating. Patches that repeat exactly keep 65.
 coherence : string [ensemble]
     `ensemble`: the mean over many windows, as seen by a pixel that covers many coherence areas.
     `patch`: the speckle of a single window, the same everywhere. `surface`: the speckle of the

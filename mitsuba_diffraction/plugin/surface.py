@@ -196,7 +196,7 @@ class DiffractingSurface(mi.BSDF):
             placed["coherence"] = f"surface, {self.window_positions}"  # see textures.PLACED
         shown = {
             "table": self.table,
-            "coherence_width": f"{self.table.coherence_width:g} µm",
+            "coherence_width": self.table.width_text,
             **placed,
             "tolerance": f"{self.table.tolerance:g}",
             "surface": self.fresnel,

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError, quoted
+from ..heights.coherence import resolved_width
+from ..heights.field import HeightField
 from ..optics.boundary import MODELS, checked_model
 from ..optics.fresnel import Filmed
 from ..optics.geometry import sigma_of, wavenumber
@@ -16,12 +18,14 @@ from ..settings import SURFACE, checked
 from .model import Light
 
 
-def width_of(value: float) -> float:
-    """Check a coherence width; unlike a table's, it has no largest value."""
+def width_of(value: str | float, field: HeightField) -> float:
+    """Return a coherence width in µm, checked; unlike a table's, it has no largest value."""
+    if value == "auto":
+        return resolved_width("auto", [field])
     number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
     if not (number and 0.0 < value < np.inf):
         shown = f"{value:g}" if number else quoted(value)
-        raise DiffractionError(f"coherence_width={shown} must be a positive number of µm")
+        raise DiffractionError(f"coherence_width={shown} must be a positive number of µm, or auto")
     return float(value)
 
 
@@ -40,8 +44,8 @@ class Window(NamedTuple):
 def window_of(
     coherence_width: float, coherence: str, place: ArrayLike | None, count: int
 ) -> Window:
-    """Check a window's width, coherence and place, for so many direction pairs."""
-    sigma = sigma_of(width_of(coherence_width))
+    """Check a window's coherence and place, for so many direction pairs; its width is in µm."""
+    sigma = sigma_of(coherence_width)
     if coherence != SURFACE:
         checked("coherence", coherence)
     if (place is None) == (coherence == SURFACE):

@@ -21,7 +21,7 @@ from ..settings import COHERENCES
 from . import coat as coats
 from . import film as films
 from . import model as models
-from .arguments import Window, directions_of, index_of, model_of, window_of
+from .arguments import Window, directions_of, index_of, model_of, width_of, window_of
 from .integral import window_power
 from .model import Light
 from .second_order import resolved
@@ -57,7 +57,7 @@ def brdf(
     wo: ArrayLike,
     wavelength: ArrayLike,
     *,
-    coherence_width: float = 65.0,
+    coherence_width: str | float = "auto",
     coherence: str = "ensemble",
     place: ArrayLike | None = None,
     model: str | None = None,
@@ -78,7 +78,8 @@ def brdf(
     wi, wo : (n, 3) or (3,), unit vectors in the patch's frame, pointing away from the surface;
         x runs along rows, y along columns, z is the normal.
     wavelength : (n,) or scalar, vacuum wavelength in nm.
-    coherence_width : 4σ of the amplitude window, µm.
+    coherence_width : 4σ of the amplitude window, µm; "auto" is 65 µm, or the smaller side of a
+        narrower patch, unless it repeats exactly (`heights.coherence`).
     coherence : "ensemble", the power averaged over every position of the window; "patch", the
         power under one window centred on the patch; "surface", under one centred on `place`.
     place : (n, 2) or (2,), µm along x and y from the patch's first pixel; it tiles the plane.
@@ -103,7 +104,7 @@ def brdf(
         place that is missing or superfluous, or arrays whose shapes do not fit.
     """
     light = directions_of(wi, wo, wavelength)
-    window = window_of(coherence_width, coherence, place, len(light.wavelength))
+    window = window_of(width_of(coherence_width, field), coherence, place, len(light.wavelength))
     index = index_of(eta, k, light.wavelength, film)
     material = _material(field, model_of(model, index), index, coat, window, second_order)
     if material.index is None:
@@ -120,7 +121,7 @@ def mueller(
     *,
     eta: ArrayLike,
     k: ArrayLike = 0.0,
-    coherence_width: float = 65.0,
+    coherence_width: str | float = "auto",
     coherence: str = "ensemble",
     place: ArrayLike | None = None,
     model: str | None = None,
@@ -134,7 +135,7 @@ def mueller(
     `optics.boundary.polarisation_axes`. Entry (0, 0) is `brdf`.
     """
     light = directions_of(wi, wo, wavelength)
-    window = window_of(coherence_width, coherence, place, len(light.wavelength))
+    window = window_of(width_of(coherence_width, field), coherence, place, len(light.wavelength))
     index = index_of(eta, k, light.wavelength, film)
     material = _material(field, model_of(model, index), index, coat, window, second_order)
     if material.index is None:

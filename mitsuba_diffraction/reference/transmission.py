@@ -23,7 +23,7 @@ def btdf(
     *,
     eta: float,
     thin: bool = False,
-    coherence_width: float = 65.0,
+    coherence_width: str | float = "auto",
     coherence: str = "ensemble",
     model: str | None = None,
 ) -> NDArray[np.float64]:
@@ -36,7 +36,7 @@ def btdf(
     eta : real index of the dielectric, above 1.
     thin : whether the direction below is outside of a thin sheet, beyond its flat other side.
     """
-    width = width_of(coherence_width)
+    width = width_of(coherence_width, field)
     checked("coherence", coherence)
     first, second, lam = directions_of(wi, wo, wavelength)
     model = model_of(model, index_of(eta, 0.0, lam, None), through.MODELS)

@@ -177,7 +177,9 @@ def _check_agreement(table: DiffractionTable) -> None:
 def _settings(fields: Mapping[str, Any]) -> TableSettings:
     _names(fields, fields, _REQUIRED)
     settings = {name: fields[name] for name in _SETTINGS if name in fields}
-    return TableSettings(**{"second_order": False, **settings})
+    checked = TableSettings(**{"second_order": False, **settings})
+    _require(checked.coherence_width != "auto", "coherence_width")
+    return checked
 
 
 def _expansion(fields: Mapping[str, Any]) -> Expansion:

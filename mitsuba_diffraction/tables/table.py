@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import DiffractionError
+from ..heights.coherence import REPEATS
 from ..optics.blend import RoughnessTable
 from ..optics.geometry import sigma_of, wavenumber
 from ..optics.second_order_change import applies
@@ -71,7 +72,13 @@ class DiffractionTable:
     @property
     def coherence_width(self) -> float:
         """4σ of the Gaussian amplitude window, µm."""
-        return self.settings.coherence_width
+        return self.settings.width
+
+    @property
+    def width_text(self) -> str:
+        """Coherence width in words, with a mark where the patch's repetition shows as a grating."""
+        mark = f" ({REPEATS})" if self.source.get("repeats") else ""
+        return f"{self.coherence_width:.4g} µm{mark}"
 
     @property
     def coherence(self) -> str:

@@ -295,7 +295,7 @@ def time_compiled(
     resolution: int,
     samples: int,
     step: float = 5.0,
-    coherence_width: float = 65.0,
+    coherence_width: str | float = "auto",
     tolerance: float = 1e-3,
     progress: Progress | None = None,
 ) -> Compiled:

@@ -123,7 +123,7 @@ def test_the_second_order_is_told_and_changes_the_map(run, heights):
         (["--wavelength-range", "300", "400"], "table's shortest wavelength, 360 nm"),
         (["--resolution", "99999"], "resolution=99999 must be"),
         (["--samples", "0"], "samples=0 must be"),
-        (["--coherence-width", "-1"], "coherence_width=-1"),
+        (["--coherence-width", "-1"], "coherence_width='-1'"),
         (["-o", "missing/a.exr"], "cannot write 'missing/a.exr'"),
         (["-m", "scalar_rgb"], "variant 'scalar_rgb'"),
         (["--material", "Unobtainium"], "Unobtainium"),

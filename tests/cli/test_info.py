@@ -33,8 +33,8 @@ def test_json_has_the_numbers(run, heights):
     assert data["extent"] == pytest.approx([6.0, 6.0])
     # a sine's amplitude over √2, over two whole periods
     assert data["rms_height"] == pytest.approx(0.02 / np.sqrt(2), rel=1e-6)
-    (small,) = data["warnings"]  # the default window is 65 µm
-    assert "coherence_width=6 (--coherence-width 6)" in small
+    assert data["warnings"] == []
+    assert data["window"].startswith("6 µm, the patch's smaller side")
 
 
 def test_treatments_are_listed(run, heights):

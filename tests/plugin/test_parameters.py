@@ -151,7 +151,7 @@ def test_a_table_is_warned_of_where_it_is_built_and_not_where_it_is_found(
         bsdf = load(coarse, coherence_width=10.0)
     lines = [str(w.message) for w in caught]
     assert len(lines) == 2
-    assert sum("smaller than the coherence width of 10 µm" in line for line in lines) == 1
+    assert sum("coherence_width=4.5 (--coherence-width 4.5)" in line for line in lines) == 1
     assert sum(line.startswith("coarse: pixels of 0.15 µm") for line in lines) == 1
     bsdf.table.save(tmp_path / "coarse.exr")
     with warnings.catch_warnings():

@@ -17,12 +17,14 @@ SAMPLES = 1 << 13
 def sinusoid() -> md.HeightField:
     """1.6 µm period, 0.3 µm deep: orders up to ±4, strong Rayleigh spikes."""
     x = np.arange(64) * (1.6 / 64)
-    return md.HeightField(np.tile(0.15 * np.cos(2 * np.pi * x / 1.6), (8, 1)), (0.025, 0.05))
+    return md.HeightField(
+        np.tile(0.15 * np.cos(2 * np.pi * x / 1.6), (8, 1)), (0.025, 0.05), periodic=True
+    )
 
 
 def sawtooth() -> md.HeightField:
     """2.5 µm period, 0.25 µm deep."""
-    return md.HeightField(np.tile(np.arange(100) * 0.0025, (8, 1)), (0.025, 0.05))
+    return md.HeightField(np.tile(np.arange(100) * 0.0025, (8, 1)), (0.025, 0.05), periodic=True)
 
 
 def rough() -> md.HeightField:
@@ -100,4 +102,4 @@ def steep_sinusoid() -> md.HeightField:
     """A scale is found for some height scales, and none needed for others near them."""
     x = np.arange(66) * 0.0915
     heights = 0.166 * np.sin(2 * np.pi * x / (66 * 0.0915 / 2))
-    return md.HeightField(np.tile(heights, (22, 1)).copy(), (0.0915, 0.0656))
+    return md.HeightField(np.tile(heights, (22, 1)).copy(), (0.0915, 0.0656), periodic=True)

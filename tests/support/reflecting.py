@@ -20,7 +20,9 @@ def index_of(value):
 
 def grating(depth: float = 0.2) -> md.HeightField:
     x = np.arange(32) * (1.6 / 32)
-    return md.HeightField(np.tile(0.5 * depth * np.cos(2 * np.pi * x / 1.6), (8, 1)), 0.05)
+    return md.HeightField(
+        np.tile(0.5 * depth * np.cos(2 * np.pi * x / 1.6), (8, 1)), 0.05, periodic=True
+    )
 
 
 def rough() -> md.HeightField:

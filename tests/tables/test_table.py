@@ -67,11 +67,15 @@ def test_a_table_remembers_its_source_and_its_warnings():
     assert table.source["digest"] == coarse.digest()
     assert table.source["shape"] == [64, 63]
     warnings = table.source["warnings"]
-    assert any("smaller than the coherence width of 65 µm" in line for line in warnings)
+    assert any("coherence_width=12 (--coherence-width 12)" in line for line in warnings)
+    assert table.source["repeats"]
+    assert "repetition" in table.width_text
     assert any("pixel" in line for line in warnings)
     assert all("coarse.png" in line and "\n" not in line for line in warnings)
     gentle = rough_patch((64, 64), (0.08, 0.08), 0.05)
-    assert DiffractionTable.build(gentle, **DEFAULTS).source["warnings"] == []
+    fitting = DiffractionTable.build(gentle, **DEFAULTS)
+    assert fitting.source["warnings"] == []
+    assert fitting.width_text == f"{fitting.coherence_width:g} µm"
 
 
 def test_the_summary_is_plain_data():

@@ -108,7 +108,7 @@ def measure(
     field: HeightField,
     chosen: Sequence[Setting],
     *,
-    coherence_width: float = 65.0,
+    coherence_width: float,
     pairs: int = 240,
     lanes: int = 1 << 19,
     rounds: int = 7,

@@ -17,11 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ...errors import DiffractionError
+from ..coherence import USUAL_WIDTH
 from ..field import MAX_PIXELS, HeightField, check_pixel_count
 from ..lengths import count_between, number_between, pixel_size_of
-
-# Width of a patch where `periods` is not set, µm: about the default coherence window.
-_USUAL_WIDTH = 65.0
 
 Axis = Literal["x", "y"]
 
@@ -131,14 +129,15 @@ def _grating(
     pixel = pixel_size_of(length / profile.size, f"{kind}: pixel size (period/pixels_per_period)")
     assert pixel is not None  # a number never means "auto"
     if periods is None:
-        periods = max(1, round(_USUAL_WIDTH / length))
+        periods = max(1, round(USUAL_WIDTH / length))
     along = count_between(periods, f"{kind}: periods", 1, MAX_PIXELS) * profile.size
     across = along if rows is None else count_between(rows, f"{kind}: rows", 2, MAX_PIXELS)
     name = f"{kind} grating"
     check_pixel_count(across, along, name)
     line = height * np.tile(profile, along // profile.size)
     heights = np.broadcast_to(line, (across, along))
-    return HeightField(heights if axis == "x" else heights.T, pixel, name=name)
+    heights = heights if axis == "x" else heights.T
+    return HeightField(heights, pixel, name=name, periodic=True)
 
 
 def _samples(pixels_per_period: int, kind: str) -> int:

@@ -231,7 +231,7 @@ def _words(bsdf: Any) -> str:
     """Describe a surface: material, coherence width, height scale."""
     table = bsdf.table
     return (
-        f"{bsdf.fresnel}, coherence width {table.coherence_width:g} µm, "
+        f"{bsdf.fresnel}, coherence width {table.width_text}, "
         f"height scale {float(np.array(bsdf.height_scale).ravel()[0]):g}"
     )
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError, warn
+from ...heights.coherence import resolved
 from ...heights.field import HeightField
 from ...heights.validity import units_warning
 from ...optics.geometry import sigma_of
@@ -164,7 +165,7 @@ class _Wanted:
     @property
     def steps(self) -> tuple[float, float]:
         """Spacing of the bins in units of 1/σ."""
-        sigma = sigma_of(self.settings.coherence_width)
+        sigma = sigma_of(self.settings.width)
         return (sigma * self.spacing[0], sigma * self.spacing[1])
 
     @property
@@ -198,7 +199,7 @@ class _Setting:
 def build_table(
     heights: HeightField | Sequence[HeightField],
     *,
-    coherence_width: float = TableSettings.coherence_width,
+    coherence_width: str | float = TableSettings.coherence_width,
     coherence: str = TableSettings.coherence,
     basis: str = TableSettings.basis,
     tolerance: float = TableSettings.tolerance,
@@ -245,6 +246,7 @@ def build_with(
     run : what does the work of windows, as `map` does here.
     """
     scans = [heights] if isinstance(heights, HeightField) else list(heights)
+    settings = resolved(settings, scans)
     patches = windows_of(scans, settings, run)
     if patches is scans:
         check_patches(scans, settings)

@@ -69,7 +69,7 @@ def check_window(extent: tuple[float, float], settings: TableSettings) -> None:
     DiffractionError
         If no table of such a patch could be rendered with.
     """
-    width = settings.coherence_width
+    width = settings.width
     # The longer side: a grating is a few pixels high, and constant along them
     if width > MOST_PATCHES * max(extent):
         raise build_error(
@@ -87,7 +87,7 @@ def too_wide(
     extent: tuple[float, float], settings: TableSettings, taps: tuple[int, int]
 ) -> DiffractionError:
     """An error about a patch so wide that a look-up would read more taps than there may be."""
-    width = settings.coherence_width
+    width = settings.width
     return build_error(
         f"the patch is {max(extent):.4g} µm wide, so much more than the coherence window that a "
         f"look-up would read {taps[0]}×{taps[1]} orders; average over windows of it (windows=auto, "

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...heights.coherence import repeats, width_reason, window_warning
 from ...heights.field import LARGE, HeightField
-from ...heights.validity import window_warning
 from ...optics.blend import RoughnessTable, ScaleRoughness
 from ...optics.geometry import wavenumber
 from ...settings import TableSettings
@@ -34,13 +34,16 @@ def describe(
     """
     windows = patches if isinstance(patches, Windows) else None
     scans = windows.scans if windows else patches
-    first, coherence_width = scans[0], settings.coherence_width
+    first, coherence_width = scans[0], settings.width
     if windows:  # which are levelled and fade: the scans' own tilt and edges are nowhere
         scans = [
-            HeightField(s.heights, s.pixel_size, name=s.name, history=s.history) for s in scans
+            HeightField(
+                s.heights, s.pixel_size, name=s.name, history=s.history, periodic=s.periodic
+            )
+            for s in scans
         ]
     warnings = [line for scan in scans for line in scan.validity(settings.wavelength_range)]
-    small = window_warning(first, coherence_width)
+    small = window_warning(coherence_width, scans)
     if small:
         warnings.append(small)
     if taps[0] * taps[1] > _SLOW:
@@ -53,6 +56,9 @@ def describe(
             f"scene, --crop {coherence_width:g})"
         )
     source = first.summary() | {"digest": first.digest(), "warnings": warnings}
+    source["window"] = width_reason(coherence_width, scans)
+    if repeats(coherence_width, scans):
+        source["repeats"] = True
     if len(scans) > 1:
         source["patches"] = [p.summary() | {"digest": p.digest()} for p in scans]
     if windows:

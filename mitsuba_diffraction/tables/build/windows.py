@@ -265,11 +265,11 @@ def windows_of(
         )
     width = settings.windows
     if isinstance(width, str):
-        width = AUTO * settings.coherence_width
-    elif width < settings.coherence_width:
+        width = AUTO * settings.width
+    elif width < settings.width:
         raise build_error(
-            f"windows={width:g} µm are narrower than coherence_width={settings.coherence_width:g}; "
-            f"take windows='auto', {AUTO * settings.coherence_width:g} µm"
+            f"windows={width:g} µm are narrower than coherence_width={settings.width:g}; "
+            f"take windows='auto', {AUTO * settings.width:g} µm"
         )
     if min(width / d for d in scans[0].pixel_size) < 4:
         return scans  # pixels so coarse that something else is wrong

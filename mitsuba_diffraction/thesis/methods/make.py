@@ -12,6 +12,7 @@ import numpy as np
 from ...analysis.maps import hemisphere
 from ...analysis.maps.result import Bands, BrdfMap, Light
 from ...errors import DiffractionError
+from ...heights.coherence import resolved_width
 from ...heights.field import HeightField
 from ...optics.geometry import wavenumber
 from ...progress import Progress
@@ -41,7 +42,7 @@ def make_all(
     names: Sequence[str],
     heights: HeightField,
     *,
-    coherence_width: float = 65.0,
+    coherence_width: str | float = "auto",
     coherence: str | None = None,
     tolerance: float = 1e-3,
     terms: int | None = None,
@@ -61,8 +62,8 @@ def make_all(
     ----------
     names : names of `NAMES`.
     heights : the patch, which tiles the plane.
-    coherence_width : 4σ of the Gaussian amplitude window, µm; for `pq`, the width that is filled
-        with copies of the patch.
+    coherence_width : 4σ of the Gaussian amplitude window, µm, or "auto" (`heights.coherence`); for
+        `pq`, the width that is filled with copies of the patch.
     coherence : "patch", one window on the patch's centre, or "ensemble", the mean power of all
         positions. By default "ensemble" for `spectral`, and "patch", as in the thesis, for `flss`
         and `nmm`. `pq` always adds amplitudes; `rainbow` has no window.
@@ -90,8 +91,9 @@ def make_all(
     trapezoid_rule(wavelength_range, step)
     if period is not None:
         check_period(period)
+    width = resolved_width(coherence_width, [heights])
     common: dict[str, Any] = {
-        "coherence_width": coherence_width, "tolerance": tolerance, "height_scale_max": 1.0,
+        "coherence_width": width, "tolerance": tolerance, "height_scale_max": 1.0,
         "wavelength_range": wavelength_range, "progress": progress, "second_order": False,
     }  # fmt: skip
 
@@ -112,12 +114,12 @@ def make_all(
         return OrdersOnly(flss("flss"), periods, weights=nmm_weights, specular=specular, name=name)
 
     def pq(name: str) -> Repeated:
-        x, y = (max(2, round(coherence_width / extent)) for extent in heights.extent)
-        width = max(heights.extent)  # coherence width of the table, which `Repeated` does not use
-        step_x, step_y = (0.5 * math.pi * width / extent for extent in heights.extent)
+        x, y = (max(2, round(width / extent)) for extent in heights.extent)
+        widest = max(heights.extent)  # coherence width of the table, which `Repeated` does not use
+        step_x, step_y = (0.5 * math.pi * widest / extent for extent in heights.extent)
         most = max(SINC_TAPS, *taps_for((step_x, step_y), tolerance * TAPS_SHARE, True))
         copies = table(
-            coherence="patch", basis="taylor", terms=terms, coherence_width=width, taps=most
+            coherence="patch", basis="taylor", terms=terms, coherence_width=widest, taps=most
         )
         return Repeated(
             copies, repeats or (x, y), interpolation="sinc" if name == "pq-sinc" else "linear",
@@ -131,7 +133,7 @@ def make_all(
         "pq": pq,
         "pq-sinc": pq,
         "rainbow": lambda name: Rainbow(
-            required_period(heights, name, period), coherence_width=coherence_width,
+            required_period(heights, name, period), coherence_width=width,
             wavelength_range=wavelength_range, name=name,
         ),
     }  # fmt: skip

@@ -82,7 +82,9 @@ def test_a_dielectric_gains_nothing_and_nothing_is_taken(tables, surface):
 
 def test_a_gentle_metal_gains_nothing_and_nothing_is_taken():
     x = np.arange(32) * (2.5 / 32)
-    gentle = md.HeightField(np.tile(0.02 * np.cos(2 * np.pi * x / 2.5), (8, 1)), 2.5 / 32)
+    gentle = md.HeightField(
+        np.tile(0.02 * np.cos(2 * np.pi * x / 2.5), (8, 1)), 2.5 / 32, periodic=True
+    )
     table = md.DiffractionTable.build(gentle)
     metal = Surface(Orders(table), "small_slope", index_of(ALUMINIUM))
     found = metal.conservation((550.0, 550.0))
