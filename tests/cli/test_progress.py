@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import time
 
-
 import pytest
 
 from mitsuba_diffraction.cli import console
