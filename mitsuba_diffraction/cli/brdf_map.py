@@ -90,10 +90,12 @@ def add_surface(group: argparse._ArgumentGroup, *, turned: bool = True) -> None:
     """
     group.add_argument(
         "--material", metavar="NAME",
-        help="conductor, e.g. Al, or none for a reflectance of 1; default: none",
+        help="conductor, e.g. Al, or none for a reflectance of 1; default: a dielectric",
     )  # fmt: skip
     group.add_argument(
-        "--int-ior", metavar="N", help="dielectric of this index (or name) instead, e.g. 1.5"
+        "--int-ior",
+        metavar="N",
+        help="index of the dielectric, or its name; default: 1.5, as in scenes",
     )
     group.add_argument(
         "--coat-ior", metavar="N", type=float, help="index of a flat clear coat over the surface"
@@ -276,9 +278,7 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
     for option in options.used_heights_options(args):
         name = option.removeprefix("--").replace("-", "_")
         parameters[name] = getattr(args, name)
-    if "int_ior" not in parameters:
-        parameters.setdefault("material", "none")
-    elif _is_number(parameters["int_ior"]):
+    if "int_ior" in parameters and _is_number(parameters["int_ior"]):
         parameters["int_ior"] = float(parameters["int_ior"])
     props = mi.Properties("diffraction")
     for name, value in {"heightfield": str(args.source), **settings, **parameters}.items():

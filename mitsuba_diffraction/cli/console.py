@@ -41,6 +41,9 @@ _SIZE = 80, 24
 # Below it a bar would only flash by.
 _DELAY = 0.5  # seconds
 
+#: Seconds between lines on progress where there is no terminal.
+EVERY = 10.0
+
 INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 TERMINATED = 143  # 128 + SIGTERM
 _CODES = {signal.SIGINT: INTERRUPTED, signal.SIGTERM: TERMINATED}
@@ -137,9 +140,9 @@ def _without_stamp(text: str) -> str:
 
 
 class Bar:
-    """Progress bar, or nothing where nobody looks.
+    """Progress bar on a terminal; elsewhere a line every `EVERY` seconds.
 
-    args : the parsed command line; `args.progress` is true, false, or `None` for "if a terminal".
+    args : the parsed command line; `args.progress` is true or false for a bar always or nothing.
     delay : seconds before the bar is first drawn.
     """
 
@@ -149,18 +152,29 @@ class Bar:
         self._wanted = sys.stderr.isatty() if args.progress is None else args.progress
         self._unit, self._delay = unit, delay
         self._bar: Any = None
+        self._in_lines = args.progress is None and not self._wanted
+        self._state, self._over = "working", threading.Event()
 
     def __call__(self, done: int, total: int, text: str) -> None:
         """Show `done` of `total`; both may start again for a second stage.
 
         A stage whose `total` is 0 has no known length: only its text is shown, at once.
         """
+        part = f", {done} of {total}{self._unit} ({done / total:.0%})" if total else ""
+        self._state = f"{text}{part}"
         if not self._wanted:
             return
         if self._bar is None or total != self._bar.total or done < self._bar.n:
             self._start(total, text)
         self._bar.set_description(text, refresh=False)
         self._bar.update(done - self._bar.n)
+
+    def _say_regularly(self) -> None:
+        """Say how far the work is, until it ends."""
+        seconds = 0.0
+        while not self._over.wait(EVERY):
+            seconds += EVERY
+            say(f"{self._state}, after {seconds:g} s")
 
     def _start(self, total: int, text: str) -> None:
         from tqdm import tqdm
@@ -178,6 +192,8 @@ class Bar:
         )  # fmt: skip
 
     def __enter__(self) -> Self:
+        if self._in_lines:
+            threading.Thread(target=self._say_regularly, daemon=True).start()
         return self
 
     def __exit__(
@@ -186,6 +202,7 @@ class Bar:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self._over.set()
         if self._bar is not None:
             self._bar.close()
 

@@ -142,9 +142,12 @@ def run(args: argparse.Namespace) -> int:
             ))  # fmt: skip
     for name, text in report:
         print(f"  {name:<9} {text}")
-    asked = TableSettings(coherence_width=width, wavelength_range=spectrum["wavelength_range"])
-    for text in options.table_warnings(patch, asked):
-        say_warning(text)
+    asked = TableSettings(
+        coherence_width=settings.get("coherence_width", "auto"),
+        wavelength_range=spectrum["wavelength_range"],
+    )
+    if notes := options.notes(args, patch, asked):
+        say_warning(notes)
     save_report(args, {"patch": patch.name, "method": args.method, "theta": beam.theta,
                        "phi": beam.phi, **more})  # fmt: skip
     return 0

@@ -45,6 +45,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "that it scatters",
     )  # fmt: skip
     options.add_heights(parser)
+    options.add_table(parser.add_argument_group("the table"), ["coherence_width"])
 
 
 def run(args: argparse.Namespace) -> int:
@@ -143,16 +144,17 @@ def _draw(args: argparse.Namespace) -> None:
 
 
 def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
-    from ..heights.coherence import resolved_width, width_reason
+    from ..heights.coherence import resolved, width_reason
     from ..heights.load import load_heights
 
     field = load_heights(file, options.load_options(args))
+    settings = TableSettings(**options.table_options(args))
     return {
         "kind": "height field",
         **field.summary(),
         **_periods(field),
-        "window": width_reason(resolved_width("auto", [field]), [field]),
-        "warnings": options.table_warnings(field, TableSettings()),
+        "window": width_reason(resolved(settings, [field]).width, [field]),
+        "warnings": options.table_warnings(field, settings),
     }
 
 
@@ -173,7 +175,7 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     with Bar(args) as bar:
         bar(0, 0, "making heights")
         fields = recipe.fields(options.load_options(args))
-    settings = TableSettings(**table)
+    settings = TableSettings(**{**table, **options.table_options(args)})
     warnings = [line for field in fields for line in options.table_warnings(field, settings)]
     return {
         "kind": "recipe",

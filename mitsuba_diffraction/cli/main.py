@@ -110,7 +110,8 @@ def _add_common(group: argparse._ActionsContainer) -> None:
         "--progress",
         action=argparse.BooleanOptionalAction,
         default=argparse.SUPPRESS,
-        help="show progress bars, or never; by default if stderr is a terminal",
+        help="show progress bars, or nothing; by default bars on a terminal, else a line every ten "
+        "seconds",
     )
 
 

@@ -358,7 +358,7 @@ def load_patch(args: argparse.Namespace) -> tuple[HeightField, dict[str, Any]]:
 def table_warnings(field: HeightField, settings: TableSettings) -> list[str]:
     """List the warnings of a table of these heights, or its refusal if size alone decides."""
     from ..heights.coherence import resolved, window_warning
-    from ..tables.build.checks import check_window
+    from ..tables.build.checks import check_window, expected_taps, slow_warning
 
     lines = field.validity(settings.wavelength_range)
     settings = resolved(settings, [field])
@@ -366,5 +366,14 @@ def table_warnings(field: HeightField, settings: TableSettings) -> list[str]:
         check_window(field.extent, settings)
     except DiffractionError as error:
         return [*lines, f"{field.name}: {error}"]
-    small = window_warning(settings.width, [field])
-    return [*lines, *([small] if small else [])]
+    lines.append(window_warning(settings.width, [field]))
+    lines.append(slow_warning(field, settings.width, expected_taps(field.extent, settings)))
+    return [line for line in lines if line]
+
+
+def notes(args: argparse.Namespace, field: HeightField, settings: TableSettings) -> str:
+    """Return a line on the number of notes on heights and the command that prints them, or ""."""
+    from ..heights.load import notes_line
+
+    lines = table_warnings(field, settings)
+    return notes_line(lines, args.source, load_options(args), settings)

@@ -105,6 +105,8 @@ def _precompute(sources: Sequence[Path], args: argparse.Namespace) -> dict[str, 
         if by_recipe:
             output.parent.mkdir(parents=True, exist_ok=True)
         table.save(output)
+    for line in table.source["warnings"]:
+        warn(line)
     print(f"{', '.join(map(str, sources))} -> {output}")
     for label, text in _report(fields, table, output, time.perf_counter() - start):
         print(f"  {label:<6} {text}")

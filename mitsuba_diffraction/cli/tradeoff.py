@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from ..errors import DiffractionWarning
 from ..scene.load import set_variant
 from . import options
 from .console import Bar
@@ -70,7 +72,8 @@ def run(args: argparse.Namespace) -> int:
         field = gratings.elaphe_like(side * PIXEL, side)
     width = resolved_width(options.table_options(args).get("coherence_width", "auto"), [field])
     set_variant("llvm_ad_spectral")
-    with Bar(args) as bar:
+    with Bar(args) as bar, warnings.catch_warnings():
+        warnings.simplefilter("ignore", DiffractionWarning)  # `info` has them
         results = measure(
             field,
             list(settings(args.quick)),

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import os
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
 
 from ..files import readable_file
+from ..settings import TableSettings
 from .field import HeightField
 from .lengths import Crop, Height, PixelSize
 from .read import LoadOptions, kind_of, read_heights, treat
@@ -78,6 +82,33 @@ def load_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightFi
     if kind_of(file) == "recipe":
         return Recipe.load(file).field(options)
     return read_heights(file, options)
+
+
+def notes_line(
+    lines: Sequence[str],
+    path: str | os.PathLike[str],
+    options: LoadOptions,
+    settings: TableSettings,
+) -> str:
+    """Return a line on how many notes there are on a file, and the command that prints them.
+
+    Parameters
+    ----------
+    lines : the notes; without any the line is empty.
+    path, options, settings : the file, and how its heights are read and its table is built.
+    """
+    if not lines:
+        return ""
+    values = options.specified()
+    if settings.coherence_width != "auto":
+        values["coherence_width"] = settings.coherence_width
+    words = ["mitsuba-diffraction", "info", os.fspath(path)]
+    for name, value in values.items():
+        numbers = value if isinstance(value, tuple) else (value,)
+        text = ",".join(n if isinstance(n, str) else f"{n:.9g}" for n in numbers)
+        words += [f"--{name.replace('_', '-')}", text]
+    number = "1 note" if len(lines) == 1 else f"{len(lines)} notes"
+    return f"{number} on '{Path(path).name}': {shlex.join(words)}"
 
 
 def treated(

@@ -123,8 +123,9 @@ def fill_missing(heights: FloatArray, method: str | None, name: str) -> tuple[Fl
         raise DiffractionError(f"{name}: no height is a finite number; the patch is empty")
     if method is None:
         raise DiffractionError(
-            f"{name}: {share} have no height (NaN or masked); choose how to fill them with fill, "
-            f"one of {', '.join(FILLS)}, or keep the middle without them with crop"
+            f"{name}: {share} have no height (NaN or masked); fill them, fill={' or '.join(FILLS)} "
+            f"(precompute --fill {FILLS[0]}), or keep the middle without them, crop (precompute "
+            "--crop)"
         )
     if count > LARGEST_SHARE * heights.size:
         raise DiffractionError(f"{name}: {share} have no height, too many to fill; crop the patch")

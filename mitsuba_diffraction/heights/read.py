@@ -22,6 +22,8 @@ from .formats.grids import read_npy, read_text
 from .formats.images import is_park_tiff, read_exr, read_image
 from .formats.instruments import read_instrument
 from .lengths import (
+    LONGEST_PIXEL,
+    SHORTEST_PIXEL,
     crop_of,
     height_of,
     height_unit_of,
@@ -134,6 +136,8 @@ _SUFFIX = {
     ".npy": "npy", ".txt": "text", ".csv": "text", ".tsv": "text", ".xyz": "text",
     ".toml": "recipe",
 }  # fmt: skip
+
+_PIXELS = f"{SHORTEST_PIXEL:g} to {LONGEST_PIXEL:g} µm"
 
 # Relative difference up to which a pixel size given by the user equals the file's: rounding.
 _SAME_SIZE = 1e-3
@@ -279,7 +283,7 @@ def _missing_lengths(shown: str, height: bool, pixel: bool) -> DiffractionError:
     """Return the error of a file without the height of white, or without pixel size, or both."""
     known = (
         (height, "how high white is", "max_height", "0.375"),
-        (pixel, "how large a pixel is", "pixel_size", "0.05"),
+        (pixel, f"how large a pixel is, {_PIXELS}", "pixel_size", "0.05"),
     )
     lacks, names, values = zip(*(words for missing, *words in known if missing), strict=True)
     examples = dict(zip(names, values, strict=True)).items()

@@ -38,7 +38,7 @@ FACET = 0.01
 SEAM_SHARE = 0.1
 
 #: Version of the texts, which cached tables store: raise it when a text changes.
-TEXTS_VERSION = 4
+TEXTS_VERSION = 5
 
 
 def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830.0)) -> list[str]:
@@ -56,34 +56,35 @@ def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830
     lines = []
     if field.rms_slope > IMPOSSIBLE_SLOPE:
         lines.append(
-            f"{field.name}: RMS slope {field.rms_slope:.2g} is impossible for a surface: "
-            f"{units_warning(field)}"
+            f"{field.name}: {units_warning(field)}; no surface has an RMS slope of "
+            f"{field.rms_slope:.2g}"
         )
     elif field.rms_slope > STEEP_SLOPE:
         lines.append(
-            f"{field.name}: RMS slope {field.rms_slope:.2g} is above {STEEP_SLOPE:g}: colours "
-            "differ from rigorous solutions by more than 20 %, on steeper surfaces completely"
+            f"{field.name}: do not rely on its colours: RMS slope {field.rms_slope:.2g} is above "
+            f"{STEEP_SLOPE:g}, where they differ from rigorous solutions by more than 20 %, on "
+            "steeper surfaces completely"
         )
     elif field.rms_slope > GENTLE_SLOPE:
         lines.append(
-            f"{field.name}: RMS slope {field.rms_slope:.2g} is above {GENTLE_SLOPE:g}: expect "
-            "colours to differ from rigorous solutions by 5 to 20 % in light 60° from the normal, "
-            "by less nearer to the normal, by more at edges and with model='kirchhoff'"
+            f"{field.name}: expect colours to differ from rigorous solutions by 5 to 20 % in light "
+            f"60° from the normal: RMS slope {field.rms_slope:.2g} is above {GENTLE_SLOPE:g}; they "
+            "differ by less nearer to the normal, by more at edges and with model='kirchhoff'"
         )
     coarse = max(field.pixel_size)
     if coarse > shortest / 4:
         # k |(u, v)| reaches 2k at grazing angles on both sides, the pixels π/dx
         reach = shortest / (2 * coarse)
         lines.append(
-            f"{field.name}: pixels of {coarse:.3g} µm are coarser than a quarter of the "
-            f"shortest wavelength, which is {shortest / 4:.3g} µm: they do not resolve directions "
-            f"with |sinθi + sinθo| above {reach:.2g} at {shortest * 1000:g} nm"
-            + (f"; {units_warning(field)}" if coarse > COARSEST_PIXEL else "")
+            f"{field.name}: {units_warning(field) or 'scan with finer pixels'}: pixels of "
+            f"{coarse:.3g} µm are coarser than a quarter of the shortest wavelength, which is "
+            f"{shortest / 4:.3g} µm, and do not resolve directions with |sinθi + sinθo| above "
+            f"{reach:.2g} at {shortest * 1000:g} nm"
         )
     if 0 < field.range < SMALLEST_RANGE:
         lines.append(
-            f"{field.name}: heights span only {field.range:.2g} µm, less than an atom: "
-            "are they in metres? Multiply them by 1e6"
+            f"{field.name}: multiply the heights by 1e6 if they are in metres: they span only "
+            f"{field.range:.2g} µm, less than an atom"
         )
     if field.cut_out:
         lines += edge_lines(field, shortest)
@@ -114,9 +115,9 @@ def edge_lines(field: HeightField, shortest: float) -> list[str]:
         slope_x, slope_y = plane_of(field)
         turn = math.degrees(2 * math.atan(math.hypot(slope_x, slope_y)))
         lines.append(
-            f"{field.name}: not levelled: the best plane rises {plane_rise(field):.3g} µm across "
-            f"the patch and turns the mirror direction by {turn:.2g}°; try level=plane "
-            "(--level plane)"
+            f"{field.name}: use level=plane (--level plane): the patch is not levelled; its best "
+            f"plane rises {plane_rise(field):.3g} µm across it and turns the mirror direction by "
+            f"{turn:.2g}°"
         )
         without_tilt, levelled = level, " even after levelling"
     seams = seams_of(without_tilt)
@@ -133,9 +134,9 @@ def edge_lines(field: HeightField, shortest: float) -> list[str]:
             else "with no step between neighbours inside"
         )
         lines.append(
-            f"{field.name}: opposite edges differ by {worst.step:.3g} µm RMS{levelled}, "
-            f"{compared}: the patch tiles the surface, and its seams, {share:.0%} of the "
-            "mean-square slope, diffract like a grating; try periodic=smooth (--periodic smooth)"
+            f"{field.name}: use periodic=smooth (--periodic smooth): the patch tiles the surface, "
+            f"and its seams, {share:.0%} of the mean-square slope, diffract like a grating; "
+            f"opposite edges differ by {worst.step:.3g} µm RMS{levelled}, {compared}"
         )
     return lines
 

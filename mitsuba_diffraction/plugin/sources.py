@@ -15,7 +15,7 @@ from ..errors import DiffractionError, warn
 from ..files import readable_file
 from ..heights import gratings
 from ..heights.field import HeightField
-from ..heights.load import load_heights
+from ..heights.load import load_heights, notes_line
 from ..heights.read import LoadOptions, is_recipe, treat
 from ..heights.recipes import Recipe
 from ..settings import MAX_HEIGHT_SCALE, TableSettings
@@ -182,7 +182,13 @@ def _request(
     def build(settings: TableSettings) -> DiffractionTable:
         heights = load()
         mi.Log(mi.LogLevel.Info, f"diffraction: building the table of {heights[0].name}")
-        return build_with(heights, settings)
+        table = build_with(heights, settings)
+        lines = table.source["warnings"]
+        if lines and recipe is not None:
+            lines = [notes_line(lines, recipe.path, recipe.options, settings)]
+        for line in lines:
+            warn(line)
+        return table
 
     room = min(HEIGHT_SCALE_ROOM * max(1.0, height_scale), MAX_HEIGHT_SCALE)
     settings = TableSettings(**{"height_scale_max": room, **asked})

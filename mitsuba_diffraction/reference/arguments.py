@@ -23,7 +23,7 @@ def width_of(value: str | float, field: HeightField) -> float:
     if value == "auto":
         return resolved_width("auto", [field])
     number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-    if not (number and 0.0 < value < np.inf):
+    if not (number and 0.0 < float(value) < np.inf):
         shown = f"{value:g}" if number else quoted(value)
         raise DiffractionError(f"coherence_width={shown} must be a positive number of µm, or auto")
     return float(value)

@@ -14,6 +14,8 @@ from pathlib import Path
 
 from ..errors import DiffractionError, quoted
 from ..files import refuse_pipe
+from ..heights.recipes import LOAD_KEYS
+from ..settings import RECIPE_SETTINGS
 
 _REFERENCE = re.compile(r"\$(\w+)")
 # Mitsuba stops at 15 includes within each other.
@@ -43,6 +45,10 @@ def check_parameters(scene: Path, values: Mapping[str, str]) -> None:
         )
         close = difflib.get_close_matches(name, known, 1)
         hint = f"; did you mean {close[0]}?" if close else ""
+        if name in (*LOAD_KEYS, *RECIPE_SETTINGS) and "patch" in known:
+            option = f"--{name.replace('_', '-')} {values[name]}"
+            hint = f"; or run 'mitsuba-diffraction precompute FILE {option} -o TABLE.exr' first, "
+            hint += "and give -D patch=TABLE.exr"
         raise DiffractionError(
             f"-D {name}: '{scene}' has no parameter {name!r}; it has (with defaults) {listed}{hint}"
         )

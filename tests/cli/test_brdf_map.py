@@ -59,6 +59,7 @@ def test_options_reach_the_map(run, heights):
         "brdf-map", heights, *QUICK, "-o", "a.exr", "--theta", "30", "--phi", "90", "--samples",
         "2", "--cosine", "--spectral", "--illuminant", "E", "--wavelength-range", "400", "700",
         "--step", "100", "--exposure", "1.5", "--height-scale", "0.5", "--orientation", "90",
+        "--material", "none",
     )  # fmt: skip
     assert ran.code == 0, ran.err
     assert "exposure +1.5 stops" in ran.out
@@ -128,7 +129,7 @@ def test_the_second_order_is_told_and_changes_the_map(run, heights):
         (["-m", "scalar_rgb"], "variant 'scalar_rgb'"),
         (["--material", "Unobtainium"], "Unobtainium"),
         (["--fill", "hope"], "fill"),
-        (["--second-order", "true"], "second_order=true"),  # of what has an index
+        (["--second-order", "true", "--material", "none"], "second_order=true"),
     ],
 )
 def test_what_does_not_fit_is_one_line(run, heights, here, options, text):

@@ -95,7 +95,7 @@ def test_tilt_is_said_before_the_work_and_once(run, heights, here, monkeypatch):
     ran = run("precompute", "tilted.npy", *QUICK)
     assert ran.code == 0
     (line,) = [line for line in ran.err.splitlines() if "not levelled" in line]
-    assert line.endswith("try level=plane (--level plane)")
+    assert "tilted.npy: use level=plane (--level plane): " in line
 
     def build(*_, **__):
         raise DiffractionError("none")

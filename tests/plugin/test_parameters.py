@@ -152,7 +152,7 @@ def test_a_table_is_warned_of_where_it_is_built_and_not_where_it_is_found(
     lines = [str(w.message) for w in caught]
     assert len(lines) == 2
     assert sum("coherence_width=4.5 (--coherence-width 4.5)" in line for line in lines) == 1
-    assert sum(line.startswith("coarse: pixels of 0.15 µm") for line in lines) == 1
+    assert sum("pixels of 0.15 µm" in line for line in lines) == 1
     bsdf.table.save(tmp_path / "coarse.exr")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -166,10 +166,11 @@ def test_tilt_of_a_file_is_said_and_can_be_treated_in_the_scene(
     tilted = PATCH.heights + 0.004 * np.arange(PATCH.shape[1])
     np.save(tmp_path / "tilted.npy", tilted)
     given = {"heightfield": str(tmp_path / "tilted.npy"), "pixel_size": 0.08, **SMALL}
-    said = r"^tilted\.npy: not levelled: .* try level=plane \(--level plane\)$"
-    with pytest.warns(md.DiffractionWarning, match=said) as caught:
+    counted = r"^\d notes? on 'tilted\.npy': mitsuba-diffraction info .* --pixel-size 0.08,0.08"
+    with pytest.warns(md.DiffractionWarning, match=counted) as caught:
         loads(**given)()
-    assert sum("not levelled" in str(w.message) for w in caught) == 1
+    assert len(caught) == 1
+    said = r"^tilted\.npy: use level=plane \(--level plane\): "
     field = md.HeightField.load(tmp_path / "tilted.npy", pixel_size=0.08)
     with pytest.warns(md.DiffractionWarning, match=said):
         load(field)  # as an array, too

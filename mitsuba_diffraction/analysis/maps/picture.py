@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,8 @@ _DECADES = 6.0
 _DPI = 100
 # Margins of the axes, inches: left, right, bottom, top.
 _MARGINS = (0.85, 0.35, 1.25, 0.75)
+# Mean width of a letter and height of a line of the caption, inches.
+_LETTER, _LINE = 0.06, 0.145
 _COLOUR_BAR = 1.0
 _SMALLEST_AXES = 4.8
 _TEXT, _SUN = "#303030", "#e0c060"
@@ -92,6 +95,8 @@ def figure(brdf_map: BrdfMap, exposure: float | None, *, title: str, notes: str)
     side = max(brdf_map.resolution * 1.02 / _DPI, _SMALLEST_AXES)
     left, right, bottom, top = _MARGINS
     right += _COLOUR_BAR if single else 0.0
+    noted = textwrap.wrap(notes, int((side + right) / _LETTER)) or [""]
+    bottom += _LINE * (len(noted) - 1)
     width, height = left + side + right, bottom + side + top
     from matplotlib.figure import Figure
 
@@ -112,8 +117,7 @@ def figure(brdf_map: BrdfMap, exposure: float | None, *, title: str, notes: str)
             f"{brdf_map.bands}, illuminant {brdf_map.illuminant}",
             f"white is {quantity} = {2.0**-stops:.3g} /sr: exposure {signed(stops)} stops{how}",
         ]
-    lines.append(notes)
-    lines.append(LEGEND)
+    lines += [*noted, LEGEND]
     result.text(
         left / width, 0.08 / height, "\n".join(lines), fontsize=8, color=_TEXT, va="bottom",
         linespacing=1.3,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 import warnings
 from pathlib import Path
@@ -10,8 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import DiffractionError, warn
+from ...errors import DiffractionError
 from ..field import check_pixel_count
+from ..lengths import LONGEST_PIXEL, SHORTEST_PIXEL
 from . import RawHeights, first_line
 
 # Signals that instruments record in nanometres beside the topography.
@@ -32,8 +32,7 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
         A file of any format that SurfaceTopography recognises by content: NanoScope, Gwyddion, IBW,
         NID, MI, X3P, JPK, WSxM, ...
     channel
-        Index or name of the channel; by default the first that holds heights. A warning lists the
-        others if there are any.
+        Index or name of the channel; by default the first that holds heights. The note lists all.
 
     Returns
     -------
@@ -83,21 +82,15 @@ def read_instrument(path: Path, channel: str | int | None = None) -> RawHeights:
             ) from error
         finally:
             reader.close()
-    if choice.others:
-        warn(
-            f"{shown} has several height channels; {choice.channel.name!r} is read; choose another "
-            f"with channel: {choice.others}"
-        )
     raw.notes = (choice.note,)
     return raw
 
 
 class _Choice(NamedTuple):
-    """Channel to read, its line in the history, and a list of all height channels if several."""
+    """Channel to read, and its line in the history."""
 
     channel: Any
     note: str
-    others: str
 
 
 def _choose(channels: list[Any], requested: str | int | None, shown: str) -> _Choice:
@@ -107,7 +100,7 @@ def _choose(channels: list[Any], requested: str | int | None, shown: str) -> _Ch
     listed = _list(channels)
     if requested is not None:
         channel = _named(channels, requested, shown)
-        return _Choice(channel, f"channel {channel.name!r}, chosen among {listed}", "")
+        return _Choice(channel, f"channel {channel.name!r}, chosen among {listed}")
     heights = [c for c in channels if _is_height(c) and not _NOT_HEIGHT.search(c.name)]
     if not heights:  # without units, which the user may know
         heights = [c for c in channels if c.dim == 2 and _units(c) == (None, None)]
@@ -116,7 +109,9 @@ def _choose(channels: list[Any], requested: str | int | None, shown: str) -> _Ch
     note = f"channel {heights[0].name!r}"
     if len(channels) > 1:
         note += f", the {'first' if len(heights) > 1 else 'only'} height channel among {listed}"
-    return _Choice(heights[0], note, _list(heights) if len(heights) > 1 else "")
+    if len(heights) > 1:
+        note += "; channel (precompute --channel) chooses another"
+    return _Choice(heights[0], note)
 
 
 def _list(channels: list[Any]) -> str:
@@ -214,8 +209,8 @@ def _read_channel(reader: Any, channel: Any, shown: str) -> RawHeights:
     if sized and lateral_scale is not None:
         width, length = (float(size) * lateral_scale for size in topography.physical_sizes)
         pixel_size = (width / nx, length / ny)
-        if not all(math.isfinite(size) and size > 0 for size in pixel_size):
-            raise DiffractionError(f"{what} states a size of {width:g} x {length:g} µm")
+        if not all(SHORTEST_PIXEL <= size <= LONGEST_PIXEL for size in pixel_size):
+            pixel_size = None  # some files state metres, or 0; the user has to say
     # heights()[ix, iy] with iy downwards from the top of the picture, as instruments show it
     return RawHeights(
         values.T[::-1], pixel_size, unit=_in_micrometres(height), stated=str(height or "")

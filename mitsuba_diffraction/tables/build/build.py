@@ -232,7 +232,10 @@ def build_table(
         coherence_width, coherence, basis, tolerance, terms, taps, wavelength_range,
         height_scale_max, checked("frequency_limit", frequency_limit), windows, second_order,
     )  # fmt: skip
-    return build_with(heights, settings, progress)
+    table = build_with(heights, settings, progress)
+    for line in table.source["warnings"]:
+        warn(line)
+    return table
 
 
 def build_with(
@@ -241,7 +244,7 @@ def build_with(
     progress: Progress | None = None,
     run: Run = map,
 ) -> DiffractionTable:
-    """`build_table` with its arguments in one record.
+    """Build a table as `build_table`; its `source` has the warnings, which nobody is told here.
 
     run : what does the work of windows, as `map` does here.
     """
@@ -259,8 +262,6 @@ def build_with(
         if not questions:
             raise
         raise DiffractionError(f"{error}; or {questions[0]}") from error
-    for line in table.source.get("warnings", ()):
-        warn(line)
     return table
 
 

@@ -23,6 +23,9 @@ MOST_PATCHES = 400
 #: What taps may use up of the tolerance when their number is chosen.
 TAPS_SHARE = 0.5
 
+#: Orders read in a look-up that slow rendering down; 16 are usual.
+SLOW = 150
+
 #: Heights of both, a slope of 89.4° and a range in µm, are some hundred nm taken for µm.
 HOPELESS_SLOPE, HOPELESS_RANGE = 100.0, 50.0
 
@@ -77,10 +80,27 @@ def check_window(extent: tuple[float, float], settings: TableSettings) -> None:
             f"of {extent[0]:.4g} × {extent[1]:.4g} µm; check both units, or give a larger patch "
             "(of a grating: more periods)"
         )
-    steps = tuple(sigma_of(width) * 2.0 * np.pi / length for length in extent)
-    taps = taps_for((steps[0], steps[1]), settings.tolerance * TAPS_SHARE, settings.coherent)
+    taps = expected_taps(extent, settings)
     if settings.taps is None and max(taps) > MAX_TAPS:
         raise too_wide(extent, settings, taps)
+
+
+def expected_taps(extent: tuple[float, float], settings: TableSettings) -> tuple[int, int]:
+    """Return the orders (x, y) that a look-up will probably read, for a patch this large, µm."""
+    x, y = (sigma_of(settings.width) * 2.0 * np.pi / length for length in extent)
+    return taps_for((x, y), settings.tolerance * TAPS_SHARE, settings.coherent)
+
+
+def slow_warning(field: HeightField, width: float, taps: tuple[int, int]) -> str:
+    """Return a warning of look-ups that read too many orders under a window, µm; else ""."""
+    if taps[0] * taps[1] <= SLOW:
+        return ""
+    return (
+        f"{field.name}: average over windows (windows=auto, precompute --windows auto), or crop "
+        f"the heights (crop={width:g}, --crop {width:g}): the patch of {field.extent[0]:.4g} × "
+        f"{field.extent[1]:.4g} µm is so much larger than the coherence width of {width:g} µm that "
+        f"every look-up reads {taps[0]}×{taps[1]} orders, and rendering will be slow"
+    )
 
 
 def too_wide(
@@ -91,8 +111,7 @@ def too_wide(
     return build_error(
         f"the patch is {max(extent):.4g} µm wide, so much more than the coherence window that a "
         f"look-up would read {taps[0]}×{taps[1]} orders; average over windows of it (windows=auto, "
-        f"--windows auto), or crop the heights, for instance to {width:g} µm (crop={width:g} of a "
-        f"scene, --crop {width:g})"
+        f"precompute --windows auto), or crop the heights (crop={width:g}, --crop {width:g})"
     )
 
 

@@ -14,10 +14,10 @@ from ...heights.field import LARGE, HeightField
 from ...optics.blend import RoughnessTable, ScaleRoughness
 from ...optics.geometry import wavenumber
 from ...settings import TableSettings
+from .checks import slow_warning
 from .spectrum import Spectrum
 from .windows import Windows
 
-_SLOW = 150  # orders read in a look-up; 16 are usual
 # A large patch has the roughness of windows with so many points a side.
 _PART = 2048
 _GREEN = 550.0  # nm, where the variation between patches is stated
@@ -46,15 +46,9 @@ def describe(
     small = window_warning(coherence_width, scans)
     if small:
         warnings.append(small)
-    if taps[0] * taps[1] > _SLOW:
-        warnings.append(
-            f"{first.name}: the patch of {first.extent[0]:.4g} × {first.extent[1]:.4g} µm is so "
-            f"much larger than the coherence width of {coherence_width:g} µm that every look-up "
-            f"reads {taps[0]}×{taps[1]} orders: rendering will be slow; average over "
-            "windows (windows=auto, --windows auto), or crop the heights, "
-            f"for instance to {coherence_width:g} µm (crop={coherence_width:g} of a "
-            f"scene, --crop {coherence_width:g})"
-        )
+    slow = slow_warning(first, coherence_width, taps)
+    if slow:
+        warnings.append(slow)
     source = first.summary() | {"digest": first.digest(), "warnings": warnings}
     source["window"] = width_reason(coherence_width, scans)
     if repeats(coherence_width, scans):

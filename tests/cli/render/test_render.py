@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import re
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -172,10 +174,14 @@ def test_a_patch_that_does_not_fit_is_one_line(run, patch_scene, definition, sai
     assert "room.xml', line" in line.err
 
 
-def test_doubts_about_a_patch_are_said_once(run, patch_scene):
+def test_doubts_about_a_patch_are_counted_and_info_has_them(run, patch_scene):
     ran = run(
         "render", patch_scene, "-m", "llvm_ad_spectral", "-s", "1", "-o", "a.png",
         "-D", "pixel_size=0.2",
     )  # fmt: skip
     assert ran.code == 0
-    assert sum("coarser than a quarter" in line for line in ran.err.splitlines()) == 1
+    (line,) = ran.err.splitlines()
+    number, command = re.search(r"(\d+) notes? on .*: mitsuba-diffraction (.*)$", line).groups()
+    described = json.loads(run(*shlex.split(command), "--json").out)
+    assert len(described["warnings"]) == int(number) > 0
+    assert sum("coarser than a quarter" in line for line in described["warnings"]) == 1

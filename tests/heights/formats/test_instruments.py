@@ -49,12 +49,16 @@ def test_height_channel_is_found_among_others(tmp_path):
     assert "'ZSensor', the only height channel" in field.history[0]
 
 
-def test_of_several_height_channels_the_first_is_taken_with_a_warning(tmp_path):
-    path = write(tmp_path, [("Height", "nm"), ("ZSensor", "nm")])
-    with pytest.warns(DiffractionWarning, match="several height channels.*'ZSensor'") as caught:
-        field = HeightField.load(path)
-    assert len(caught) == 1
+def test_of_several_height_channels_the_first_is_taken_and_all_are_listed(tmp_path):
+    field = HeightField.load(write(tmp_path, [("Height", "nm"), ("ZSensor", "nm")]))
     assert "'Height', the first height channel" in field.history[0]
+    assert "'ZSensor'" in field.history[0]
+
+
+def test_a_size_that_no_scan_has_is_asked_for(tmp_path):
+    path = write(tmp_path, scan_size="3 2 m")
+    assert "pixel_size" in refusal(path)
+    assert HeightField.load(path, pixel_size=0.05).pixel_size == (0.05, 0.05)
 
 
 def test_channel_is_chosen_by_name_or_index(tmp_path):
