@@ -1,8 +1,9 @@
 """The commands that docs and notebooks show run, in their order, on small patches and pictures.
 
-What is not run here: `make`, `pip` and `apt`, which set up what runs these tests; `view`, which
-opens a window; `tradeoff`, `compare` and `plan`, which take long at their smallest, and
-are run smaller still by their own tests. test_docs.py checks what these would be given.
+What is not run here: the gallery's, whose scenes test_scenes_thorough.py renders; `make`, `pip` and
+`apt`, which set up what runs these tests; `view`, which opens a window; `tradeoff`, `compare` and
+`plan`, which take long at their smallest, and are run smaller still by their own tests.
+test_docs.py checks what these would be given.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ def tree(tmp_path_factory):
     return small_tree(tmp_path_factory.mktemp("clone"))
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if p != "README.md" and commands(p)])
+@pytest.mark.parametrize(
+    "page", [p for p in PAGES if p not in ("README.md", "docs/gallery.md") and commands(p)]
+)
 def test_the_commands_of_a_page_run(page, tree, monkeypatch):
     run_page(page, tree, monkeypatch)

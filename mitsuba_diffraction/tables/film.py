@@ -14,13 +14,10 @@ from ..optics.geometry import wavenumber
 from .energy.conservation import Index
 from .energy.grid import FINE, DirectionalTable, DirectionGrid
 from .energy.scaling import parallel
+from .energy.settings import energy_settings
 from .energy.store import PROBES, cached_directions, rounded
 from .table import DiffractionTable
 
-#: Phase of a fringe, rad, from one wavelength to the next, and most wavelengths: within a twentieth
-#: of the most there is up to a path 2 n d of 3 µm, and three times that at 12 µm. Under thin films
-#: waves in between come and go, which three times the step misses by 0.03.
-STEP, MOST = 0.1, 64
 _FEWEST = 8
 
 
@@ -34,8 +31,13 @@ def exponents(
     low, high = wavelength_range
     film = index(np.array([low]))
     assert isinstance(film, Filmed)
+    settings = energy_settings()
     path = 2.0 * float((film.parts[1] * film.parts[2]).real[0])
-    count = int(np.clip(math.ceil(path * (1.0 - low / high) / STEP), _FEWEST, MOST))
+    count = int(
+        np.clip(
+            math.ceil(path * (1.0 - low / high) / settings.fringe_step), _FEWEST, settings.fringes
+        )
+    )
     wavelengths = np.geomspace(low, high, count if high > low else 1)
     films = index(wavelengths)
     assert isinstance(films, Filmed)
@@ -59,4 +61,4 @@ def mean_exponents(
         return [exponents(table.roughness, index, wavelength_range)]
 
     probes = rounded(index(np.geomspace(*wavelength_range, PROBES)))
-    return cached_directions("film", table, [STEP, MOST, probes, *wavelength_range], make)[0]
+    return cached_directions("film", table, [probes, *wavelength_range], make)[0]

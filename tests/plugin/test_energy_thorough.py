@@ -56,7 +56,7 @@ def test_white_furnace_of_one_wavelength(name, seed):
     assert short.mean() < 0.1
 
 
-@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize("name", ["sawtooth", "rough"])
 def test_white_furnace_in_colours(name):
     """RGB variants have one scale for each channel, the mean over its wavelengths."""
     mi.set_variant("llvm_ad_rgb")
@@ -67,7 +67,7 @@ def test_white_furnace_in_colours(name):
     assert np.median(mean) > 0.9
 
 
-@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize("name", ["sawtooth", "rough"])
 def test_white_furnace_over_a_white_base(name):
     assert_at_most_white(white_pair(name))
 

@@ -97,7 +97,7 @@ SMALLER = {
         "pixels=240": "pixels=128",
         "PAIRS = 80": "PAIRS = 40",
         "TOLERANCES = (1e-1, 1e-3, 1e-5)": "TOLERANCES = (1e-1, 1e-3)",
-        "measure_depths(6)": "measure_depths(2)",
+        "measure_depths(6)": "measure_depths(2, deepest=4.0)",
         "t in (1e-2, 1e-3, 1e-5)": "t in (1e-2,)",
         "pairs=40, lanes=1 << 16, rounds=3": "pairs=20, lanes=1 << 12, rounds=1",
         "spp=64": "spp=16",

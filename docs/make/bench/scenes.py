@@ -269,6 +269,7 @@ def _deviation(
     si = dr.zeros(mi.SurfaceInteraction3f, lanes)
     si.wi = mi.Vector3f(*(float(c) for c in Light(theta, phi).direction))
     si.wavelengths = mi.Spectrum(wavelength)
+    dr.make_opaque(si.wi, si.wavelengths)  # one kernel for all of them
     random = mi.PCG32(size=lanes, initstate=SEED)
     numbers = [random.next_float32() for _ in range(3)]
     _, weight = bsdf.sample(mi.BSDFContext(), si, numbers[0], mi.Point2f(numbers[1], numbers[2]))

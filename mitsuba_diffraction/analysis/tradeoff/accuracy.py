@@ -209,10 +209,10 @@ class Depths:
     intervals: NDArray[np.int64]  # (n,) intervals of κ in the default series
 
 
-def measure_depths(count: int, progress: Progress = silent) -> Depths:
-    """Measure the error of each series on a rough patch with `count` depths, 1 nm to 20 µm."""
+def measure_depths(count: int, progress: Progress = silent, deepest: float = 20.0) -> Depths:
+    """Measure each series' error on a rough patch with `count` depths, 1 nm to `deepest` µm."""
     shape = _rough()
-    depths = np.geomspace(1e-3, 20.0, count)
+    depths = np.geomspace(1e-3, deepest, count)
     names = (
         f"Taylor, {TERMS} terms, heights from 0",
         f"Taylor, {TERMS} terms, centred heights",

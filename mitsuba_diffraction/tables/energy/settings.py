@@ -24,6 +24,10 @@ class EnergySettings:
     parts, few_parts : a cell is looked at in the middles of so many parts either way; on surfaces
         of at most `few_orders` strong orders, whose albedos have kinks, in more.
     rings, steps : directions of the quadrature over weak orders: rings, and azimuths on the widest.
+    fringe_step, fringes : phase of a film's fringe, rad, from one wavelength of the second order's
+        mean to the next, and most wavelengths: within a twentieth of the most there is up to a path
+        2 n d of 3 µm, and three times that at 12 µm. Under thin films waves in between come and go,
+        which three times the step misses by 0.03.
     sweeps : of Sinkhorn and Knopp's iteration.
     threshold : an albedo that is nowhere above needs no scale.
     target : albedos above are scaled to this; what is left to 1 is for what lies between nodes.
@@ -41,6 +45,8 @@ class EnergySettings:
     side_wavelengths: int = 8
     wavelengths: int = 16
     film_wavelengths: int = 16
+    fringe_step: float = 0.1
+    fringes: int = 64
     coarse_polar: int = 20
     coarse_azimuthal: int = 30
     coarse_wavelengths: int = 4

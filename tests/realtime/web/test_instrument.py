@@ -48,10 +48,10 @@ def clock_stopped(page: Any) -> Iterator[None]:
 
 
 def test_all_light_is_that_of_the_desktop(scene: Any, page_file: Path, tab: Any) -> None:
-    expected = of_the_desktop(scene, 8)
+    expected = of_the_desktop(scene, 4)
     opened = tab()
     assert opened.open(page_file) == "ready"
-    found = picture(opened, shadows=True, samples=8)
+    found = picture(opened, shadows=True, samples=4)
     inside = (found[..., 3] > 0.99) & (expected[..., 3] > 0.99)
     errors = delta_e(expected[..., :3], found[..., :3])[inside]
     # rounded tables; edges of shadows fall between other texels of the maps, in a few pixels
@@ -211,15 +211,14 @@ def test_at_rest_nothing_is_drawn(opened: Tab) -> None:
     assert drawn == [0, None, True]
 
 
-@pytest.mark.parametrize("persisted", [False, True])
-def test_a_page_that_is_closed_frees_the_graphics_cards_memory(
-    page_file: Path, tab: Any, persisted: bool
-) -> None:
+def test_a_page_that_is_closed_frees_the_graphics_cards_memory(page_file: Path, tab: Any) -> None:
     opened = tab()
     assert opened.open(page_file) == "ready"
-    event = f"new PageTransitionEvent('pagehide', {{persisted: {str(persisted).lower()}}})"
-    opened.page.evaluate(f"window.dispatchEvent({event})")
-    assert opened.page.evaluate("viewer.drawing.gl.isContextLost()") is not persisted
+    for persisted in ("true", "false"):  # one that may be shown again keeps it
+        event = f"new PageTransitionEvent('pagehide', {{persisted: {persisted}}})"
+        opened.page.evaluate(f"window.dispatchEvent({event})")
+        lost = opened.page.evaluate("viewer.drawing.gl.isContextLost()")
+        assert lost is (persisted == "false")
 
 
 def test_a_window_of_another_size_is_filled(opened: Tab) -> None:

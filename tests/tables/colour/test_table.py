@@ -53,7 +53,7 @@ def test_colours_are_the_integral_over_wavelengths(case: str) -> None:
     heights, arguments = CASES[case]
     table = DiffractionTable.build(heights, **{"coherence_width": WIDTH, **arguments})
     colours = ColourTable.build(table)
-    u, v, w = directions(300)
+    u, v, w = directions(120)
     expected, found = integral(table, u, v, w), colours.colour(u, v, w)
     away = np.hypot(u, v) > 3.0 * colours.radius_end / 4.5
     # azimuths 0.75 lobes apart, interpolated linearly, cut peaks by up to 7 % and 2 % on average;
