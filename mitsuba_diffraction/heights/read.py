@@ -89,7 +89,7 @@ def _choice(value: object, name: str, choices: tuple[str, ...]) -> str | None:
         return None
     if not isinstance(value, str) or value not in choices:
         raise DiffractionError(
-            f"{name}: expected one of {', '.join(map(repr, choices))}, got {value!r}"
+            f"{name}: expected one of {', '.join(map(repr, ('auto', *choices)))}, got {value!r}"
         )
     return value
 
