@@ -98,6 +98,8 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
 
 def _refuse_heights_options(args: argparse.Namespace, kind: str) -> None:
     refused = options.used_heights_options(args)
+    if args.coherence_width is not None:
+        refused.append("--coherence-width")
     if refused:
         args.parser.error(f"argument {refused[0]}: '{args.file}' is {kind}, not heights")
 

@@ -45,13 +45,14 @@ _HEIGHTS: dict[str, tuple[str, str]] = {
     "fill": ("METHOD", "points without data: nearest or harmonic; default: refuse them"),
     "level": (
         "METHOD",
-        "plane: subtract the best plane; lines: also align the scan lines; default: none",
+        "plane: subtract the best plane; lines: also align the scan lines; none; default: plane if "
+        "the tilt of a file shows",
     ),
     "clip": ("N", "clip heights beyond N robust standard deviations (dust)"),
     "periodic": (
         "METHOD",
         "smooth or taper: make the patch tile without seams; exact: it is whole periods of a "
-        "surface that repeats; default: none",
+        "surface that repeats; none; default: smooth if the seams of a file show",
     ),
 }
 _TABLE = (

@@ -55,13 +55,15 @@ def load(
         Method to fill points without data: "nearest" or "harmonic" (see
         `preprocess.fill_missing`); by default they are refused.
     level
-        "plane" subtracts the best plane, "lines" aligns the scan lines first; default "none".
+        "plane" subtracts the best plane, "lines" aligns the scan lines first; "none". By default
+        "plane" where a tilt shows once the patch is tiled (`validity.tilted`).
     clip
         Clip heights to this many robust standard deviations; default not at all.
     periodic
         "smooth" or "taper" make opposite edges of the patch meet; "exact" states that the patch is
-        whole periods of a surface that repeats; default "none". The treatments are applied in the
-        order crop, fill, level, clip, periodic, and each leaves a line in `history`.
+        whole periods of a surface that repeats; "none". By default "smooth" where seams show
+        (`validity.seam_defects`). The treatments are applied in the order crop, fill, level, clip,
+        periodic, and each leaves a line in `history`.
 
     Raises
     ------
