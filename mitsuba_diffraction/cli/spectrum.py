@@ -151,9 +151,9 @@ def _measured(
         # Mitsuba loads no table that begins later than the light that it renders
         span = (min(lam[0], SHORTEST), max(lam[-1], LONGEST))
         how = options.load_options(args)
-        table = table_of(file, how, options.table_options(args) | {"wavelength_range": span})
-        notes = table.source.get("warnings", ())
-        if line := notes_line(notes, file, how, TableSettings(**options.table_options(args))):
+        asked = options.table_options(args) | {"wavelength_range": span}
+        table = table_of(file, how, asked)
+        if line := notes_line(table.source["warnings"], file, how, TableSettings(**asked)):
             say(line)
     return spectrum(
         bsdf_of(table, **surface_parameters(args)),
