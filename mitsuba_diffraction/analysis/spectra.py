@@ -424,7 +424,8 @@ def spectra_figure(spectra: Spectra, title: str = "") -> Figure:
     highest = 100.0 * np.maximum(spectra.value.max(axis=0), 0.0)
     if 0.0 < _APART * highest.min() < highest.max():  # a mirror's reflection beside weak light
         axes.set_yscale("log")
-        axes.set_ylim(1e-2 * highest.min(), 2.0 * highest.max())
+        lowest = max(50.0 * float(spectra.value.min()), 1e-2 * highest.min())
+        axes.set_ylim(lowest, 2.0 * highest.max())
     else:
         axes.set_ylim(0.0, None)
     axes.set_title(
