@@ -3,6 +3,8 @@
 Contents
 --------
 maps       BRDF maps over the hemisphere of view directions
+spectra    reflectance spectra as a spectrometer measures them
+scans      tables and BSDFs of scans and recipes
 survey     table, map and statistics of many scans
 tradeoff   accuracy against speed and memory
 timing     kernel times, measured in alternating rounds
