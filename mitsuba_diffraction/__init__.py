@@ -13,6 +13,7 @@ design             patches from their BRDF, reliefs for given colours
 shader_comparison  comparison of the shaders with the path tracer
 cluster            rendering on many processes and machines
 web                pages that show a scene in a browser or a notebook
+spectrum           reflectance spectra as a spectrometer measures them
 reference          the BRDF straight from its integral, in double precision
 bsdf_dict          a dictionary for `mi.load_dict` from arrays
 DiffractionError   error of every bad input, in one line
@@ -32,8 +33,7 @@ if sys.argv[:1] == ["-m"] and __name__ in sys.orig_argv:  # `python -m`: __main_
 
 import importlib
 from importlib.metadata import version
-from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .plugin.llvm import select_llvm
 
@@ -49,6 +49,7 @@ from .tables import DiffractionTable  # noqa: E402
 if TYPE_CHECKING:
     from . import cluster
     from .analysis import design, maps, tradeoff
+    from .analysis.spectra import spectrum
     from .realtime import glsl, shader_comparison, web
     from .thesis import period_fit
 
@@ -67,6 +68,7 @@ __all__ = [
     "period_fit",
     "reference",
     "shader_comparison",
+    "spectrum",
     "tradeoff",
     "web",
 ]
@@ -84,7 +86,9 @@ _ON_DEMAND = {
 }
 
 
-def __getattr__(name: str) -> ModuleType:
+def __getattr__(name: str) -> Any:
     if name in _ON_DEMAND:
         return importlib.import_module(f"{__name__}.{_ON_DEMAND[name]}")
+    if name == "spectrum":
+        return importlib.import_module(f"{__name__}.analysis.spectra").spectrum
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -273,17 +273,25 @@ def surface_bsdf(args: argparse.Namespace) -> Any:
 
     from ..plugin.bsdf import Diffraction
 
-    parameters = {n: getattr(args, n) for n in _SURFACE if getattr(args, n, None) is not None}
+    parameters = surface_parameters(args)
     settings = {k: v for k, v in options.table_options(args).items() if k in _TABLE}
     for option in options.used_heights_options(args):
         name = option.removeprefix("--").replace("-", "_")
         parameters[name] = getattr(args, name)
-    if "int_ior" in parameters and _is_number(parameters["int_ior"]):
-        parameters["int_ior"] = float(parameters["int_ior"])
     props = mi.Properties("diffraction")
     for name, value in {"heightfield": str(args.source), **settings, **parameters}.items():
         props[name] = value
     return Diffraction(props)
+
+
+def surface_parameters(args: argparse.Namespace) -> dict[str, Any]:
+    """Return the options of `add_surface` that are parameters of the BSDF, by name."""
+    if args.material is not None and args.int_ior is not None:
+        args.parser.error("argument --int-ior: not allowed with argument --material")
+    parameters = {n: getattr(args, n) for n in _SURFACE if getattr(args, n, None) is not None}
+    if "int_ior" in parameters and _is_number(parameters["int_ior"]):
+        parameters["int_ior"] = float(parameters["int_ior"])
+    return parameters
 
 
 def _is_number(text: str) -> bool:

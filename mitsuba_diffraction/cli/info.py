@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from ..heights.field import HeightField
 
 _MESHES = (".ply", ".obj", ".serialized")
+#: Settings of a table that its warnings depend on.
+_TABLE = ("coherence_width", "wavelength_range")
 #: Meshes that have to be converted first, to say so instead of looking for heights in them.
 _OTHER_MESHES = (".stl", ".glb", ".gltf", ".fbx", ".dae", ".3ds", ".3mf", ".off", ".blend")
 
@@ -45,7 +47,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "that it scatters",
     )  # fmt: skip
     options.add_heights(parser)
-    options.add_table(parser.add_argument_group("the table"), ["coherence_width"])
+    options.add_table(parser.add_argument_group("the table"), _TABLE)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -98,6 +100,7 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
 
 def _refuse_heights_options(args: argparse.Namespace, kind: str) -> None:
     refused = options.used_heights_options(args)
+    refused += [f"--{n.replace('_', '-')}" for n in _TABLE if getattr(args, n) is not None]
     if refused:
         args.parser.error(f"argument {refused[0]}: '{args.file}' is {kind}, not heights")
 

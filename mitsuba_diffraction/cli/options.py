@@ -45,13 +45,14 @@ _HEIGHTS: dict[str, tuple[str, str]] = {
     "fill": ("METHOD", "points without data: nearest or harmonic; default: refuse them"),
     "level": (
         "METHOD",
-        "plane: subtract the best plane; lines: also align the scan lines; default: none",
+        "plane: subtract the best plane; lines: also align the scan lines; none; default: plane if "
+        "the tilt of a file shows",
     ),
     "clip": ("N", "clip heights beyond N robust standard deviations (dust)"),
     "periodic": (
         "METHOD",
         "smooth or taper: make the patch tile without seams; exact: it is whole periods of a "
-        "surface that repeats; default: none",
+        "surface that repeats; none; default: smooth if the seams of a file show",
     ),
 }
 _TABLE = (
@@ -156,6 +157,39 @@ def add_source(parser: argparse.ArgumentParser, *, tables: bool = False) -> None
         "source", metavar="SOURCE", type=Path,
         help=accepted if tables else "heights of any format, or a recipe (.toml)",
     )  # fmt: skip
+
+
+def add_files(parser: argparse.ArgumentParser, kinds: str) -> None:
+    """Add the argument FILE..., files of these kinds; see `expanded`."""
+    parser.add_argument(
+        "files", metavar="FILE", type=Path, nargs="+",
+        help=f"{kinds}; folders and patterns of names, too",
+    )  # fmt: skip
+
+
+def expanded(paths: Sequence[Path]) -> list[Path]:
+    """Return files: a folder stands for all files in it, a pattern (* ? [) for those it matches.
+
+    Hidden files are left out. Raises a DiffractionError if a folder or a pattern has no files.
+    """
+    files: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            matching = [p for p in sorted(path.iterdir()) if _is_plain(p)]
+            if not matching:
+                raise DiffractionError(f"the folder '{path}' has no files; name one with scans")
+        elif any(c in path.name for c in "*?[") and not path.exists():
+            matching = [p for p in sorted(path.parent.glob(path.name)) if _is_plain(p)]
+            if not matching:
+                raise DiffractionError(f"no file matches '{path}'; name files, or a folder of them")
+        else:
+            matching = [path]
+        files += matching
+    return list(dict.fromkeys(files))
+
+
+def _is_plain(path: Path) -> bool:
+    return path.is_file() and not path.name.startswith(".")
 
 
 def add_output(parser: argparse.ArgumentParser, text: str, *suffixes: str, **more: Any) -> None:

@@ -55,13 +55,15 @@ def load(
         Method to fill points without data: "nearest" or "harmonic" (see
         `preprocess.fill_missing`); by default they are refused.
     level
-        "plane" subtracts the best plane, "lines" aligns the scan lines first; default "none".
+        "plane" subtracts the best plane, "lines" aligns the scan lines first; "none". By default
+        "plane" where a tilt shows once the patch is tiled (`validity.tilted`).
     clip
         Clip heights to this many robust standard deviations; default not at all.
     periodic
         "smooth" or "taper" make opposite edges of the patch meet; "exact" states that the patch is
-        whole periods of a surface that repeats; default "none". The treatments are applied in the
-        order crop, fill, level, clip, periodic, and each leaves a line in `history`.
+        whole periods of a surface that repeats; "none". By default "smooth" where seams show
+        (`validity.seam_defects`). The treatments are applied in the order crop, fill, level, clip,
+        periodic, and each leaves a line in `history`.
 
     Raises
     ------
@@ -103,6 +105,8 @@ def notes_line(
     if settings.coherence_width != "auto":
         values["coherence_width"] = settings.coherence_width
     words = ["mitsuba-diffraction", "info", os.fspath(path)]
+    if settings.wavelength_range != TableSettings.wavelength_range:
+        words += ["--wavelength-range", *(f"{end:g}" for end in settings.wavelength_range)]
     for name, value in values.items():
         numbers = value if isinstance(value, tuple) else (value,)
         text = ",".join(n if isinstance(n, str) else f"{n:.9g}" for n in numbers)

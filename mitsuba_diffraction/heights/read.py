@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import DiffractionError, warn
 from ..files import readable_file
 from . import preprocess
-from .field import HeightField
+from .field import LARGE, HeightField
 from .formats import RawHeights
 from .formats.grids import read_npy, read_text
 from .formats.images import is_park_tiff, read_exr, read_image
@@ -31,6 +31,7 @@ from .lengths import (
     micrometres_of,
     pixel_size_of,
 )
+from .validity import seam_defects, tilted
 
 LEVELS = {"plane": preprocess.level_plane, "lines": preprocess.level_lines}
 PERIODICS = {
@@ -42,7 +43,7 @@ PERIODICS = {
 
 @dataclass(frozen=True)
 class LoadOptions:
-    """Checked parameters of `HeightField.load`; `None` means the file's value, or no treatment."""
+    """Checked parameters of `HeightField.load`; `None` means the file's value, or the default."""
 
     pixel_size: tuple[float, float] | None = None
     max_height: float | None = None
@@ -88,7 +89,7 @@ def _choice(value: object, name: str, choices: tuple[str, ...]) -> str | None:
         return None
     if not isinstance(value, str) or value not in choices:
         raise DiffractionError(
-            f"{name}: expected one of {', '.join(map(repr, choices))}, got {value!r}"
+            f"{name}: expected one of {', '.join(map(repr, ('auto', *choices)))}, got {value!r}"
         )
     return value
 
@@ -137,6 +138,8 @@ _SUFFIX = {
     ".toml": "recipe",
 }  # fmt: skip
 
+# µm; what is a tilt for this wavelength is one for longer ones, nearly.
+_SHORTEST = 0.36
 _PIXELS = f"{SHORTEST_PIXEL:g} to {LONGEST_PIXEL:g} µm"
 
 # Relative difference up to which a pixel size given by the user equals the file's: rounding.
@@ -148,11 +151,27 @@ def read_heights(path: str | os.PathLike[str], options: LoadOptions) -> HeightFi
     file = readable_file(path)
     raw, measured = _read(file, options.channel)
     field = _to_field(raw, file, options)
-    if measured and options.level in (None, "none"):
+    options = replace(options, crop=None)  # `_to_field` crops before it fills gaps
+    small = field.heights.size <= LARGE  # wider scans are cut into windows, which are levelled
+    if options.level is None and options.periodic != "exact" and small and tilted(field, _SHORTEST):
+        field = _by_default(LEVELS["plane"](field), "level")
+    elif measured and options.level in (None, "none"):
         rise = preprocess.plane_rise(field)
         line = f"not levelled: the best plane rises {rise:.3g} µm across the patch"
         field = field.changed(field.heights, line)
-    return treat(field, replace(options, crop=None))  # `_to_field` crops before it fills gaps
+    field = treat(field, replace(options, periodic=None))
+    if options.periodic is None and small and seam_defects(field)[1] is not None:
+        return _by_default(PERIODICS["smooth"](field), "periodic")
+    return treat(field, LoadOptions(periodic=options.periodic))
+
+
+def _by_default(field: HeightField, option: str) -> HeightField:
+    """Say in the last line of the history that nobody asked for this treatment."""
+    *lines, last = field.history
+    return HeightField(
+        field.heights, field.pixel_size, name=field.name, cut_out=field.cut_out,
+        history=(*lines, f"{last} (by default; {option}=none leaves it out)"),
+    )  # fmt: skip
 
 
 def is_recipe(path: str | os.PathLike[str]) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from .field import HeightField
 from .preprocess import level_plane, plane_of, plane_rise
-from .seams import seams_of
+from .seams import Seam, seams_of
 
 #: RMS slopes up to which the default model's colours are within 5 % and 20 % of rigorous solutions,
 #: for sinusoids of keratin and aluminium in light up to 60° from the normal. docs/validation.md has
@@ -38,7 +38,7 @@ FACET = 0.01
 SEAM_SHARE = 0.1
 
 #: Version of the texts, which cached tables store: raise it when a text changes.
-TEXTS_VERSION = 5
+TEXTS_VERSION = 6
 
 
 def validity(field: HeightField, wavelength_range: Sequence[float] = (360.0, 830.0)) -> list[str]:
@@ -104,14 +104,9 @@ def edge_lines(field: HeightField, shortest: float) -> list[str]:
     list of str
         At most one line on the tilt and one on the seams.
     """
-    if field.range == 0:
-        return []
-    level = level_plane(field)
-    if level.rms_height < FACET * field.rms_height:
-        return []
     lines = []
     without_tilt, levelled = field, ""
-    if _tilted(field, level, shortest):
+    if tilted(field, shortest):
         slope_x, slope_y = plane_of(field)
         turn = math.degrees(2 * math.atan(math.hypot(slope_x, slope_y)))
         lines.append(
@@ -119,14 +114,9 @@ def edge_lines(field: HeightField, shortest: float) -> list[str]:
             f"plane rises {plane_rise(field):.3g} µm across it and turns the mirror direction by "
             f"{turn:.2g}°"
         )
-        without_tilt, levelled = level, " even after levelling"
-    seams = seams_of(without_tilt)
-    defects = [seam for seam in seams if seam.defect]
-    slope = sum(seam.slope for seam in defects)
-    inside = sum(seam.slope_inside for seam in seams)
-    if slope > SEAM_SHARE * (slope + inside):
-        worst = max(defects, key=lambda seam: seam.slope)
-        share = slope / (slope + inside)
+        without_tilt, levelled = level_plane(field), " even after levelling"
+    share, worst = seam_defects(without_tilt)
+    if worst is not None:
         largest = worst.largest_inside
         compared = (
             f"{worst.step / largest:.2g} times the largest step between neighbours inside"
@@ -141,12 +131,35 @@ def edge_lines(field: HeightField, shortest: float) -> list[str]:
     return lines
 
 
-def _tilted(field: HeightField, level: HeightField, shortest: float) -> bool:
+def seam_defects(field: HeightField) -> tuple[float, Seam | None]:
+    """Return the seams' share of the mean-square slope, and the worst; None where none shows."""
+    if _is_facet(field):
+        return 0.0, None
+    seams = seams_of(field)
+    defects = [seam for seam in seams if seam.defect]
+    slope = sum(seam.slope for seam in defects)
+    inside = sum(seam.slope_inside for seam in seams)
+    if not slope > SEAM_SHARE * (slope + inside):
+        return 0.0, None
+    return slope / (slope + inside), max(defects, key=lambda seam: seam.slope)
+
+
+def _is_facet(field: HeightField) -> bool:
+    """Return whether a patch is flat, or but for noise one facet."""
+    return field.range == 0 or level_plane(field).rms_height < FACET * field.rms_height
+
+
+def tilted(field: HeightField, shortest: float) -> bool:
     """Return whether the least-squares plane is a relevant tilt along one axis at least.
 
     A tilt raises one edge over the opposite one by the plane's rise. The plane that fits a few
     periods of a grating does not: the edges meet, or differ by a step that occurs inside, too.
+
+    shortest : shortest wavelength, µm.
     """
+    if _is_facet(field):
+        return False
+    level = level_plane(field)
     least = max(shortest / QUARTER_WAVE, CHANCE * level.rms_height)
     for slope, length, seam in zip(plane_of(field), field.extent, seams_of(field), strict=True):
         rise = slope * length

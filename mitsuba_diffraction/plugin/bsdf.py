@@ -27,14 +27,16 @@ crop : float or string [none]
 fill : string [none]
     Treatment of points without data: `none` refuses them, `nearest` copies the nearest height,
     `harmonic` spans a membrane over the gap.
-level : string [none]
+level : string [auto]
     `plane` subtracts the best plane; `lines` aligns the scan lines by their medians first; `none`.
+    `auto` is `plane` for a file of heights whose tilt shows where the patch is tiled, else `none`.
 clip : float [none]
     Number of robust standard deviations, at least 1, beyond which heights are clipped, as of dust.
-periodic : string [none]
+periodic : string [auto]
     Treatment of opposite edges, which meet where the patch is tiled: `smooth` keeps the periodic
     component (Moisan 2011), `taper` attenuates heights towards the edges; `exact` leaves heights as
-    they are and states that the patch is whole periods of a surface that repeats; `none`.
+    they are and states that the patch is whole periods of a surface that repeats; `none`. `auto`
+    is `smooth` for a file of heights whose seams would diffract like a grating, else `none`.
     Treatments are applied in the order crop, fill, level, clip, periodic.
 orientation : float or texture ∂ [0]
     Angle in degrees from the first tangent to the patch's x axis, up to 36000. Or a texture (raw,

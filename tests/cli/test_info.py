@@ -180,9 +180,14 @@ def test_a_recipe_is_drawn_and_a_table_is_not(run, table, tmp_path):
     recipe.write_text(text)
     assert run("info", recipe, "--picture", tmp_path / "recipe.pdf").code == 0
     assert (tmp_path / "recipe.pdf").stat().st_size > 1000
-    ran = run("info", table, "--picture", tmp_path / "table.png")
-    assert ran.code == 2
-    assert "is a table, not heights" in ran.err
+    for option in (
+        ("--picture", tmp_path / "table.png"),
+        ("--coherence-width", "5"),
+        ("--wavelength-range", "400", "700"),
+    ):
+        ran = run("info", table, *option)
+        assert ran.code == 2
+        assert "is a table, not heights" in ran.err
 
 
 def test_only_a_table_has_an_albedo(run, heights, tmp_path):

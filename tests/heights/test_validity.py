@@ -84,7 +84,7 @@ def test_what_is_made_is_not_asked_and_what_is_cut_is(tmp_path):
     made = HeightField(SCALE + 0.01 * X, 0.05)
     assert not any("--level" in line or "--periodic" in line for line in made.validity())
     np.save(tmp_path / "tilt.npy", made.heights)
-    loaded = HeightField.load(tmp_path / "tilt.npy", pixel_size=0.05)
+    loaded = HeightField.load(tmp_path / "tilt.npy", pixel_size=0.05, level="none", periodic="none")
     assert sum("--level plane" in line for line in loaded.validity()) == 1
     tiling = rough_patch((64, 64), (0.05, 0.05), 0.05)
     assert not any("--periodic" in line for line in tiling.validity())
@@ -99,5 +99,25 @@ def test_measured_patches(shared_afm):
     )
     assert edge_lines(period, SHORTEST) == []
     pytest.importorskip("SurfaceTopography")
-    scan = HeightField.load(shared_afm / "nanoscope-10um.di")
+    scan = HeightField.load(shared_afm / "nanoscope-10um.di", periodic="none")
     assert any("--periodic smooth" in line for line in scan.validity())
+    assert edge_lines(HeightField.load(shared_afm / "nanoscope-10um.di"), SHORTEST) == []
+
+
+def test_files_are_mended_by_default_and_left_alone_where_nothing_shows(tmp_path):
+    def loaded(heights, **options):
+        np.save(tmp_path / "a.npy", heights)
+        return HeightField.load(tmp_path / "a.npy", pixel_size=0.05, **options)
+
+    tilted = SCALE + 0.01 * X
+    mended = loaded(tilted)
+    assert edge_lines(mended, SHORTEST) == []
+    assert [line.split()[0] for line in mended.history] == ["plane", "made"]
+    asked = loaded(tilted, level="plane", periodic="smooth")
+    np.testing.assert_array_equal(mended.heights, asked.heights)
+    np.testing.assert_array_equal(loaded(tilted, level="none", periodic="none").heights, tilted)
+    np.testing.assert_array_equal(loaded(tilted, periodic="exact").heights, tilted)
+    for name in ("rough", "noise", "flat"):
+        np.testing.assert_array_equal(loaded(MADE[name]().heights).heights, MADE[name]().heights)
+    teeth = gratings.blazed(2.5, 0.3, periods=2, pixels_per_period=40).heights
+    np.testing.assert_array_equal(loaded(teeth).heights, teeth)

@@ -166,12 +166,13 @@ def test_tilt_of_a_file_is_said_and_can_be_treated_in_the_scene(
     tilted = PATCH.heights + 0.004 * np.arange(PATCH.shape[1])
     np.save(tmp_path / "tilted.npy", tilted)
     given = {"heightfield": str(tmp_path / "tilted.npy"), "pixel_size": 0.08, **SMALL}
+    raw = {"level": "none", "periodic": "none"}
     counted = r"^\d notes? on 'tilted\.npy': mitsuba-diffraction info .* --pixel-size 0.08,0.08"
     with pytest.warns(md.DiffractionWarning, match=counted) as caught:
-        loads(**given)()
+        loads(**given, **raw)()
     assert len(caught) == 1
     said = r"^tilted\.npy: use level=plane \(--level plane\): "
-    field = md.HeightField.load(tmp_path / "tilted.npy", pixel_size=0.08)
+    field = md.HeightField.load(tmp_path / "tilted.npy", pixel_size=0.08, **raw)
     with pytest.warns(md.DiffractionWarning, match=said):
         load(field)  # as an array, too
     level = loads(**given, level="plane", periodic="smooth")()  # nothing to warn of

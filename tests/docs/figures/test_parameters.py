@@ -77,8 +77,8 @@ def test_the_choices_are_those_of_the_code(some_variant):
 
     choices = {
         "fill": ("none", *preprocess.FILLS),
-        "level": ("none", *options.LEVELS),
-        "periodic": ("none", *options.PERIODICS),
+        "level": ("auto", "none", *options.LEVELS),
+        "periodic": ("auto", "none", *options.PERIODICS),
         "shadowing": code.SHADOWINGS,
         "layering": code.LAYERINGS,
         "basis": (*BASES, "auto"),

@@ -94,5 +94,5 @@ def test_a_patch_in_memory_is_treated_as_a_file_is(tmp_path):
 def test_no_treatment_changes_nothing():
     field = HeightField(ROUGH, 0.1)
     assert np.array_equal(field.treated().heights, field.heights)
-    with pytest.raises(DiffractionError, match="level: expected one of 'none', 'plane', 'lines'"):
+    with pytest.raises(DiffractionError, match="level: expected one of 'auto', 'none', 'plane'"):
         field.treated(level="bow")

@@ -1,0 +1,438 @@
+"""Reflectance spectra as a spectrometer with a fibre measures them.
+
+A lamp shines on the surface from one direction, parallel light. A detector collects a cone of
+directions. Its signal at one wavelength, per power that falls on the surface, is
+
+    P(λ) = ∫ f(ωi, ωo, λ) cosθo dωo   over the cone.
+
+A white standard, Lambertian of reflectance 1, has f = 1/π. Spectra relative to white are P over
+that of the standard in the same place: the reflectance factor of CIE 15:2018, section 6. Detectors
+lie in the plane of incidence: at +θ on the far side of the normal, where a mirror reflects the lamp
+of angle θ to, and at −θ on the lamp's side.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..atomic import atomic_path
+from ..errors import DiffractionError
+from ..heights.field import HeightField
+from ..optics.colour import encode_srgb, linear_srgb, response
+from ..optics.geometry import wavenumber
+from ..plugin.dictionary import bsdf_dict
+from ..plugin.llvm import require_loaded_llvm
+from ..plugin.memory import upload
+from ..progress import Progress, silent
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Reals = NDArray[np.float64]
+
+#: What spectra are relative to: a white standard, a perfect mirror at its own angle, or the light
+#: that falls on the surface.
+RELATIVE = ("white", "mirror", "none")
+#: Default wavelengths: first, last and step, nm.
+FIRST, LAST, STEP = 300.0, 830.0, 5.0
+#: Steepest direction of a lamp or of the edge of a detector's cone, degrees.
+STEEPEST = 89.0
+#: Wavelengths that a spectrum may have.
+MOST = 10_000
+
+# Nodes of the cone: radii and azimuths per standard deviation of the narrowest lobe, and at least.
+_PER_LOBE, _FEWEST_RADII, _FEWEST_AZIMUTHS = 1.25, 8, 16
+# Most nodes of a cone: larger cones hold so many lobes that coarser sums are as good.
+_MOST_NODES = 1 << 18
+# Of a curve drawn: the brightest channel of its colour, so that white is grey on white paper.
+_BRIGHTEST = 0.35
+# Ratio of the highest to the lowest curve from which on the axis is logarithmic.
+_APART = 20.0
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Angles of a measurement, degrees.
+
+    Parameters
+    ----------
+    light : angle of the lamp from the normal, 0 to 89.
+    detectors : angles of the detectors in the plane of incidence; the mirror's is +`light`.
+    azimuth : of the lamp, from the patch's x axis towards its y axis, −360 to 360.
+    acceptance : full angle of the cone that a detector collects.
+
+    Raises
+    ------
+    DiffractionError
+        If an angle is out of range, there is no detector, or a cone reaches below the surface.
+    """
+
+    light: float = 30.0
+    detectors: tuple[float, ...] = (30.0,)
+    azimuth: float = 0.0
+    acceptance: float = 2.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.light <= STEEPEST:
+            raise DiffractionError(
+                f"light={self.light:g}: the lamp must be 0 to {STEEPEST:g} degrees from the normal"
+            )
+        if not -360.0 <= self.azimuth <= 360.0:
+            raise DiffractionError(
+                f"light_azimuth={self.azimuth:g} must be from -360 to 360 degrees"
+            )
+        if not 0.01 <= self.acceptance <= 120.0:
+            raise DiffractionError(
+                f"acceptance={self.acceptance:g}: the full angle of the detector's cone must be "
+                "from 0.01 to 120 degrees, e.g. 2"
+            )
+        if not self.detectors:
+            raise DiffractionError("there is no detector; give at least one angle, e.g. 30")
+        furthest = STEEPEST - 0.5 * self.acceptance
+        for angle in self.detectors:
+            if not abs(angle) <= furthest:
+                raise DiffractionError(
+                    f"detector={angle:g}: a cone of {self.acceptance:g} degrees around it reaches "
+                    f"below the surface; detectors must be from {-furthest:g} to {furthest:g} "
+                    "degrees from the normal"
+                )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the detectors' columns, e.g. light30_detector0."""
+        return tuple(f"light{self.light:g}_detector{angle:g}" for angle in self.detectors)
+
+
+@dataclass(frozen=True)
+class Spectra:
+    """Reflectance spectra of one surface.
+
+    Attributes
+    ----------
+    wavelength : (n,) nm.
+    value : (n, detectors), for unpolarised light; 1 is all of what `relative` names.
+    s, p : the same for light polarised across and in the plane of incidence, or None.
+    error : standard errors of `value` where it is a mean over several surfaces, or None.
+    geometry : angles.
+    relative : one of `RELATIVE`.
+    """
+
+    wavelength: Reals
+    value: Reals
+    geometry: Geometry
+    relative: str
+    s: Reals | None = None
+    p: Reals | None = None
+    error: Reals | None = None
+
+    def columns(self) -> dict[str, Reals]:
+        """Return the spectra by name: each detector's, and its s and p if there are any."""
+        columns = {}
+        for suffix, values in (("", self.value), ("_s", self.s), ("_p", self.p)):
+            if values is not None:
+                names = (f"{name}{suffix}" for name in self.geometry.names)
+                columns |= dict(zip(names, values.T, strict=True))
+        return columns
+
+
+def spectrum(
+    bsdf: Any,
+    light: float = 30.0,
+    detectors: Sequence[float] = (30.0,),
+    *,
+    light_azimuth: float = 0.0,
+    acceptance: float = 2.0,
+    relative: str = "white",
+    wavelengths: ArrayLike | None = None,
+    progress: Progress = silent,
+) -> Spectra:
+    """Return the reflectance spectra of a surface in a spectrometer.
+
+    Parameters
+    ----------
+    bsdf : a Mitsuba BSDF of the current variant, spectral and vectorised. In a polarised variant
+        the result has s and p as well.
+    light : angle of the lamp from the normal, degrees; its light is parallel.
+    detectors : angles of the detectors in the plane of incidence, degrees; see `Geometry`.
+    light_azimuth : azimuth of the lamp from the patch's x axis, degrees.
+    acceptance : full angle of a detector's cone, degrees.
+    relative : "white", relative to a Lambertian standard of reflectance 1; "mirror", relative to a
+        perfect mirror, seen where it reflects the lamp to; "none", the share of the incident light
+        that enters the detector.
+    wavelengths : nm; default: 360 to 830 in steps of 5.
+    progress : called as progress(done, total, text).
+
+    Raises
+    ------
+    DiffractionError
+        If an argument is out of range, or the variant is neither spectral nor vectorised.
+    """
+    geometry = Geometry(light, tuple(float(d) for d in detectors), light_azimuth, acceptance)
+    check_relative(relative)
+    if not mi.is_spectral or "scalar" in mi.variant():
+        raise DiffractionError(
+            f"variant '{mi.variant()}' does not support spectra; use llvm_ad_spectral, or "
+            "llvm_ad_spectral_polarized for s and p"
+        )
+    require_loaded_llvm()
+    lam = check_wavelengths(
+        np.arange(360.0, LAST + 1.0, STEP) if wavelengths is None else wavelengths
+    )
+    table = getattr(bsdf, "table", None)
+    if table is not None and lam.min() < table.wavelength_range[0]:
+        raise DiffractionError(
+            f"wavelength {lam.min():g} nm is below the table's shortest, "
+            f"{table.wavelength_range[0]:g} nm; give longer ones, or build a wider table with "
+            "'mitsuba-diffraction precompute --wavelength-range'"
+        )
+    signals = _signals(bsdf, table, geometry, lam, progress)
+    if relative == "white":
+        half = math.radians(0.5 * acceptance)
+        # ∫ cosθ/π dω over a cone about a direction at θ: cosθ sin²(half)
+        angles = np.radians(geometry.detectors)
+        signals = signals / (np.cos(angles) * math.sin(half) ** 2)
+    elif relative == "mirror":
+        signals = signals / _of_mirror(table, geometry, lam)
+    value, s, p = signals if mi.is_polarized else (signals[0], None, None)
+    return Spectra(lam, value, geometry, relative, s, p)
+
+
+def check_relative(relative: str) -> None:
+    """Refuse a word that is none of `RELATIVE`."""
+    if relative not in RELATIVE:
+        raise DiffractionError(
+            f"relative='{relative}' is unknown; choose one of {', '.join(RELATIVE)}"
+        )
+
+
+def check_wavelengths(wavelengths: ArrayLike) -> Reals:
+    """Return wavelengths (n,) in nm, increasing; refuse others."""
+    lam = np.asarray(wavelengths, np.float64)
+    if lam.ndim != 1 or not 1 <= lam.size <= MOST or not np.isfinite(lam).all():
+        raise DiffractionError(f"wavelengths must be a list of 1 to {MOST} numbers, in nm")
+    if lam[0] <= 0.0 or not np.all(np.diff(lam) > 0.0):
+        raise DiffractionError("wavelengths must be above 0 nm and increase, e.g. 400, 405, 410")
+    return lam
+
+
+def mean_spectra(spectra: Sequence[Spectra]) -> Spectra:
+    """Return the mean of spectra of the same wavelengths and geometry, with standard errors.
+
+    The standard error is the standard deviation between the surfaces over the root of their number.
+    """
+    first = spectra[0]
+    if len(spectra) == 1:
+        return first
+    values = np.stack([one.value for one in spectra])
+    polarised = first.s is not None
+    return replace(
+        first,
+        value=values.mean(axis=0),
+        error=values.std(axis=0, ddof=1) / math.sqrt(len(spectra)),
+        s=np.mean([one.s for one in spectra], axis=0) if polarised else None,
+        p=np.mean([one.p for one in spectra], axis=0) if polarised else None,
+    )
+
+
+def _signals(bsdf: Any, table: Any, geometry: Geometry, lam: Reals, progress: Progress) -> Reals:
+    """Return P, (1 or 3, n, detectors): unpolarised, and in a polarised variant s and p."""
+    # exp(−σ²k²Δ²) has the standard deviation 1/(√2 σk)
+    lobe = 0.05 if table is None else 1.0 / (2**0.5 * table.sigma * float(wavenumber(lam[0])))
+    parts = 3 if mi.is_polarized else 1
+    result = np.zeros((parts, lam.size, len(geometry.detectors)))
+    for n, angle in enumerate(geometry.detectors):
+        progress(n, len(geometry.detectors), "detectors")
+        directions, weights = _cone(geometry, angle, lobe)
+        result[:, :, n] = _integrals(bsdf, geometry, lam, directions, weights)
+    progress(len(geometry.detectors), len(geometry.detectors), "detectors")
+    return result
+
+
+def _light(geometry: Geometry) -> Reals:
+    """Return the unit vector (3,) towards the lamp."""
+    return _in_plane(geometry, -geometry.light)
+
+
+def _in_plane(geometry: Geometry, angle: float) -> Reals:
+    """Return the unit vector (3,) at an angle in the plane of incidence, + away from the lamp."""
+    theta, phi = math.radians(-angle), math.radians(geometry.azimuth)
+    return np.array(
+        [math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)]
+    )
+
+
+def _cone(geometry: Geometry, angle: float, lobe: float) -> tuple[Reals, Reals]:
+    """Return directions (m, 3) in a detector's cone and their solid angles (m,).
+
+    Gauss and Legendre's nodes in the angle from the axis, even ones around it: the cone's edge is
+    sharp, and lobes inside are smooth.
+    """
+    half = math.radians(0.5 * geometry.acceptance)
+    radii = max(math.ceil(_PER_LOBE * half / lobe), _FEWEST_RADII)
+    around = max(math.ceil(_PER_LOBE * 2.0 * math.pi * half / lobe), _FEWEST_AZIMUTHS)
+    excess = math.sqrt(max(radii * around / _MOST_NODES, 1.0))
+    radii, around = round(radii / excess), round(around / excess)
+    nodes, weights = np.polynomial.legendre.leggauss(radii)
+    alpha = 0.5 * half * (nodes + 1.0)
+    psi = 2.0 * np.pi * (np.arange(around) + 0.5) / around
+    alpha, psi = (a.ravel() for a in np.meshgrid(alpha, psi, indexing="ij"))
+    axis = _in_plane(geometry, angle)
+    across = _across(geometry)
+    along = np.cross(across, axis)
+    directions = (
+        np.cos(alpha)[:, None] * axis
+        + (np.sin(alpha) * np.cos(psi))[:, None] * along
+        + (np.sin(alpha) * np.sin(psi))[:, None] * across
+    )
+    solid = np.repeat(0.5 * half * weights, around) * np.sin(alpha) * 2.0 * np.pi / around
+    return directions, solid
+
+
+def _across(geometry: Geometry) -> Reals:
+    """Return the unit vector (3,) normal to the plane of incidence: s."""
+    phi = math.radians(geometry.azimuth)
+    return np.array([-math.sin(phi), math.cos(phi), 0.0])
+
+
+def _integrals(
+    bsdf: Any, geometry: Geometry, lam: Reals, directions: Reals, weights: Reals
+) -> Reals:
+    """Return ∫ f cosθo dωo, (1 or 3, n).
+
+    The detector is Mitsuba's camera and the lamp its emitter: `eval` has the lamp's cosine, and its
+    Mueller matrix is for light that goes from the lamp to the detector.
+    """
+    light = _light(geometry)
+    si = dr.zeros(mi.SurfaceInteraction3f, len(directions))
+    si.n = mi.Normal3f(0.0, 0.0, 1.0)
+    si.sh_frame = mi.Frame3f(si.n)
+    si.wi = mi.Vector3f(*(upload(mi.Float, column) for column in directions.T))
+    towards = mi.Vector3f(*(float(c) for c in light))
+    dr.make_opaque(towards)
+    turned = weights * directions[:, 2] / light[2]
+    stokes = _stokes(light, _across(geometry))
+    context, packet = mi.BSDFContext(), len(mi.UnpolarizedSpectrum())
+    sums = np.zeros((3 if mi.is_polarized else 1, lam.size))
+    for first in range(0, lam.size, packet):
+        index = np.minimum(np.arange(first, first + packet), lam.size - 1)
+        values = mi.UnpolarizedSpectrum([mi.Float(float(w)) for w in lam[index]])
+        dr.make_opaque(values)  # one kernel for all wavelengths
+        si.wavelengths = values
+        f = bsdf.eval(context, si, towards)
+        parts = [f] if not mi.is_polarized else [f[0, 0], f[0, 1], f[0, 2]]
+        dr.eval(parts)
+        found = np.stack([np.asarray(x, np.float64) @ turned for x in parts])
+        used = min(packet, lam.size - first)
+        if mi.is_polarized:
+            turn = stokes[1] * found[1] + stokes[2] * found[2]
+            found = np.stack([found[0], found[0] + turn, found[0] - turn])
+        sums[:, first : first + used] = found[:, :used]
+    return sums
+
+
+def _stokes(light: Reals, across: Reals) -> Reals:
+    """Return the Stokes vector (3,) of s light from the lamp about Mitsuba's axes of that light."""
+    direction = -light
+    basis = np.array(mi.mueller.stokes_basis(mi.Vector3f(*direction.tolist())), np.float64).ravel()
+    double = 2.0 * math.atan2(across @ np.cross(direction, basis), across @ basis)
+    return np.array([1.0, math.cos(double), math.sin(double)])
+
+
+def _of_mirror(table: Any, geometry: Geometry, lam: Reals) -> Reals:
+    """Return P (n, 1) of a perfect mirror of the same coherence, where it reflects the lamp to."""
+    if table is None:
+        return np.ones((lam.size, 1))
+    check = replace(geometry, detectors=(geometry.light,))
+    flat = HeightField(np.zeros((8, 8)), table.coherence_width / 8.0, periodic=True)
+    mirror = mi.load_dict(
+        bsdf_dict(
+            flat, coherence_width=table.coherence_width, material="none", model="kirchhoff",
+            energy_conserving=False,
+        )
+    )  # fmt: skip
+    return np.asarray(_signals(mirror, mirror.table, check, lam, silent)[0])
+
+
+def save_csv(spectra: Spectra, path: str | os.PathLike[str]) -> None:
+    """Write spectra as the R package pavo reads them: `wl` in nm, then one column each, per cent.
+
+    Without comments or units, which `read.csv` would take for data.
+    """
+    _write(path, spectra.wavelength, spectra.columns())
+
+
+def save_errors(spectra: Spectra, path: str | os.PathLike[str]) -> None:
+    """Write the standard errors of a mean, in the columns of `save_csv`, per cent."""
+    assert spectra.error is not None
+    columns = dict(zip(spectra.geometry.names, spectra.error.T, strict=True))
+    _write(path, spectra.wavelength, columns)
+
+
+def _write(path: str | os.PathLike[str], wavelength: Reals, columns: dict[str, Reals]) -> None:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["wl", *columns])
+    for n, lam in enumerate(wavelength):
+        writer.writerow([f"{lam:g}", *(f"{100.0 * values[n]:.6g}" for values in columns.values())])
+    with atomic_path(path) as temporary:
+        temporary.write_text(text.getvalue(), "utf-8")
+
+
+def colour_of(spectra: Spectra) -> Reals:
+    """Return the colour of each spectrum in daylight, (detectors, 3) sRGB, as dark as ink."""
+    step = np.gradient(spectra.wavelength) if spectra.wavelength.size > 1 else np.ones(1)
+    weights = response(spectra.wavelength) * step[:, None]
+    linear = np.maximum(linear_srgb(spectra.value.T @ weights), 0.0)
+    brightest = linear.max(axis=1, keepdims=True)
+    return encode_srgb(_BRIGHTEST * linear / np.where(brightest > 0.0, brightest, 1.0))
+
+
+def spectra_figure(spectra: Spectra, title: str = "") -> Figure:
+    """Draw spectra over wavelength, each in its own colour, with bands of one standard error."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.5, 4.2), dpi=120, layout="constrained")
+    axes = figure.subplots()
+    geometry = spectra.geometry
+    colours = colour_of(spectra)
+    styles = ("-", "--", "-.", ":")
+    for n, (angle, colour) in enumerate(zip(geometry.detectors, colours, strict=True)):
+        values, style = 100.0 * spectra.value[:, n], styles[n % len(styles)]
+        axes.plot(spectra.wavelength, values, style, color=colour, label=f"detector at {angle:g}°")
+        if spectra.error is not None:
+            error = 100.0 * spectra.error[:, n]
+            axes.fill_between(
+                spectra.wavelength, values - error, values + error, color=colour, alpha=0.2, lw=0
+            )
+    against = {
+        "white": "reflectance (% of a white standard)",
+        "mirror": "reflectance (% of a perfect mirror)",
+        "none": "collected (% of the incident light)",
+    }
+    axes.set(xlabel="wavelength (nm)", ylabel=against[spectra.relative])
+    highest = 100.0 * np.maximum(spectra.value.max(axis=0), 0.0)
+    if 0.0 < _APART * highest.min() < highest.max():  # a mirror's reflection beside weak light
+        axes.set_yscale("log")
+        lowest = max(50.0 * float(spectra.value.min()), 1e-2 * highest.min())
+        axes.set_ylim(lowest, 2.0 * highest.max())
+    else:
+        axes.set_ylim(0.0, None)
+    axes.set_title(
+        f"{title}\nlamp at {geometry.light:g}°, azimuth {geometry.azimuth:g}°; cone of "
+        f"{geometry.acceptance:g}°".strip(),
+        fontsize=9,
+    )
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.25)
+    return figure

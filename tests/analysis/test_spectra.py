@@ -1,0 +1,179 @@
+"""Spectra against closed forms, and against the reference integrated over the acceptance."""
+
+from __future__ import annotations
+
+import math
+
+import mitsuba as mi
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import jv
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction.analysis.spectra import (
+    STEEPEST,
+    Geometry,
+    check_wavelengths,
+    colour_of,
+    mean_spectra,
+    save_csv,
+    save_errors,
+    spectra_figure,
+)
+from tests.support.directions import rough_patch
+from tests.support.variants import obstacle
+
+LAM = np.array([420.0, 500.0, 580.0, 660.0])
+FLAT = md.HeightField(np.zeros((8, 8)), 1.0, periodic=True)
+
+
+@pytest.fixture(params=["llvm_ad_spectral", "llvm_ad_spectral_polarized"], autouse=True)
+def variant(request):
+    if reason := obstacle(request.param):
+        pytest.skip(reason)
+    mi.set_variant(request.param)
+    return request.param
+
+
+def load(field, **parameters):
+    return mi.load_dict(md.bsdf_dict(field, **parameters))
+
+
+def fresnel(theta: float, n: float) -> tuple[float, float]:
+    """s and p reflectance of a flat dielectric."""
+    c, ct = math.cos(theta), math.sqrt(1.0 - (math.sin(theta) / n) ** 2)
+    return ((c - n * ct) / (c + n * ct)) ** 2, ((ct - n * c) / (ct + n * c)) ** 2
+
+
+def test_a_cone_wider_than_the_lobe_collects_what_a_flat_surface_reflects(variant):
+    """A lobe of the window 20 µm wide is within 3 % of a cone of 20°; R is linear across it."""
+    surface = load(FLAT, coherence_width=20.0, int_ior=1.5)
+    s, p = fresnel(math.radians(45.0), 1.5)
+    light = md.spectrum(surface, 45.0, [45.0, -30.0], acceptance=20.0, relative="none",
+                        wavelengths=LAM)  # fmt: skip
+    assert light.value[:, 0] == pytest.approx(0.5 * (s + p), rel=2e-3)
+    assert light.value[:, 1] == pytest.approx(0.0, abs=1e-9)
+    if light.s is None:
+        assert "polarized" not in variant
+    else:
+        assert light.s[:, 0] == pytest.approx(s, rel=2e-3)
+        assert light.p[:, 0] == pytest.approx(p, rel=2e-3)
+    mirror = md.spectrum(surface, 45.0, [45.0], acceptance=0.5, relative="mirror", wavelengths=LAM)
+    assert mirror.value == pytest.approx(0.5 * (s + p), rel=2e-3)
+
+
+def test_a_cone_amid_the_mirror_s_lobe_collects_its_closed_form():
+    """P = 1 − exp(−σ²k²Δ²) around the normal, Δ the sine of the half angle."""
+    width = 10.0
+    raw = {"material": "none", "model": "kirchhoff", "energy_conserving": False}
+    surface = load(FLAT, coherence_width=width, **raw)
+    light = md.spectrum(surface, 0.0, [0.0], acceptance=4.0, relative="none", wavelengths=LAM)
+    sigma, k = 0.25 * width, 2e3 * np.pi / LAM
+    expected = 1.0 - np.exp(-((sigma * k * math.sin(math.radians(2.0))) ** 2))
+    assert light.value[:, 0] == pytest.approx(expected, rel=2e-3)
+
+
+def test_cones_around_orders_of_a_sinusoid_collect_its_bessel_functions():
+    """J_m(κa)² with κ = k (1 + cosθ); the period of eight wavelengths has no obliquity to 1 %."""
+    depth = 0.08
+    field = md.gratings.sinusoidal(period=8.0, depth=depth, periods=4)
+    surface = load(field, coherence_width=32.0, material="none", model="kirchhoff",
+                   energy_conserving=False)  # fmt: skip
+    lam = 560.0
+    first = math.degrees(math.asin(1e-3 * lam / 8.0))
+    light = md.spectrum(surface, 0.0, [0.0, first, -first], acceptance=3.8, relative="none",
+                        wavelengths=[lam])  # fmt: skip
+    kappa = 2e3 * math.pi / lam * (1.0 + math.cos(math.radians(first)))
+    expected = jv(1, 0.5 * kappa * depth) ** 2
+    assert light.value[0, 1] == pytest.approx(expected, rel=0.01)
+    assert light.value[0, 2] == pytest.approx(expected, rel=0.01)
+    assert light.value[0, 0] == pytest.approx(jv(0, 2e3 * math.pi / lam * depth) ** 2, rel=2e-3)
+
+
+def test_spectra_are_the_reference_s_over_the_acceptance():
+    patch = rough_patch((48, 48), (0.15, 0.15), 0.08)
+    light, acceptance = 20.0, 5.0
+    surface = load(patch, int_ior=1.5)
+    found = md.spectrum(surface, light, [0.0, 35.0], light_azimuth=30.0, acceptance=acceptance,
+                        wavelengths=LAM[::3])  # fmt: skip
+    # even discs of solid angle around the detector's direction, by the golden angle
+    n = 400
+    alpha = np.arccos(1 - (np.arange(n) + 0.5) / n * (1 - math.cos(math.radians(acceptance / 2))))
+    psi = np.pi * (3.0 - math.sqrt(5.0)) * np.arange(n)
+    phi = math.radians(30.0)
+    towards = math.radians(light)
+    wi = np.array([math.sin(towards) * math.cos(phi), math.sin(towards) * math.sin(phi),
+                   math.cos(towards)])  # fmt: skip
+    for column, angle in enumerate((0.0, 35.0)):
+        theta = math.radians(angle)
+        axis = np.array([-math.sin(theta) * math.cos(phi), -math.sin(theta) * math.sin(phi),
+                         math.cos(theta)])  # fmt: skip
+        side = np.array([-math.sin(phi), math.cos(phi), 0.0])
+        up = np.cross(axis, side)
+        wo = (np.cos(alpha)[:, None] * axis + (np.sin(alpha) * np.cos(psi))[:, None] * side
+              + (np.sin(alpha) * np.sin(psi))[:, None] * up)  # fmt: skip
+        for row, lam in enumerate(LAM[::3]):
+            f = md.reference.brdf(patch, wi, wo, lam, eta=1.5)
+            expected = (f * wo[:, 2]).sum() / (wo[:, 2] / np.pi).sum()
+            # the table's tolerance, and 400 directions of the cone
+            assert found.value[row, column] == pytest.approx(expected, rel=0.01)
+
+
+def test_a_white_surface_is_a_white_standard():
+    white = mi.load_dict({"type": "diffuse", "reflectance": 1.0})
+    found = md.spectrum(white, 30.0, [-50.0, 0.0, 80.0], acceptance=10.0, wavelengths=LAM)
+    assert found.value == pytest.approx(1.0, rel=1e-5)
+
+
+def test_means_have_standard_errors_and_files_have_columns(tmp_path):
+    white, grey = (
+        md.spectrum(mi.load_dict({"type": "diffuse", "reflectance": r}), wavelengths=LAM)
+        for r in (1.0, 0.5)
+    )
+    mean = mean_spectra([white, grey])
+    assert mean.value == pytest.approx(0.75, rel=1e-5)
+    assert mean.error == pytest.approx(0.25, rel=1e-5)
+    assert mean_spectra([white]) is white
+    save_csv(mean, tmp_path / "s.csv")
+    save_errors(mean, tmp_path / "e.csv")
+    rows = np.genfromtxt(tmp_path / "s.csv", delimiter=",", names=True)
+    assert rows.dtype.names[:2] == ("wl", "light30_detector30")
+    assert rows["wl"] == pytest.approx(LAM)
+    assert rows["light30_detector30"] == pytest.approx(75.0, rel=1e-4)
+    errors = np.genfromtxt(tmp_path / "e.csv", delimiter=",", names=True)
+    assert errors["light30_detector30"] == pytest.approx(25.0, rel=1e-4)
+    red, green, blue = colour_of(mean)[0]
+    assert np.ptp([red, green, blue]) < 0.2  # four wavelengths make almost a grey
+    axes = spectra_figure(mean, "a scan").axes[0]
+    assert "nm" in axes.get_xlabel()
+    assert "%" in axes.get_ylabel()
+
+
+@settings(max_examples=40)
+@given(
+    st.floats(), st.lists(st.floats(), max_size=3), st.floats(), st.floats(),
+)  # fmt: skip
+def test_geometries_are_measurable_or_refused(light, detectors, azimuth, acceptance):
+    try:
+        geometry = Geometry(light, tuple(detectors), azimuth, acceptance)
+    except md.DiffractionError as error:
+        assert "\n" not in str(error)
+        return
+    assert 0.0 <= geometry.light <= STEEPEST
+    assert max(map(abs, geometry.detectors)) + 0.5 * geometry.acceptance <= STEEPEST
+
+
+@pytest.mark.parametrize("wrong", [[], [[500.0]], [500.0, 400.0], [-5.0], [math.nan]])
+def test_wavelengths_that_are_none_are_refused(wrong):
+    with pytest.raises(md.DiffractionError):
+        check_wavelengths(wrong)
+
+
+def test_what_a_table_does_not_hold_is_refused():
+    surface = load(FLAT, coherence_width=10.0)
+    with pytest.raises(md.DiffractionError, match="wavelength-range"):
+        md.spectrum(surface, wavelengths=[320.0, 400.0])
+    with pytest.raises(md.DiffractionError, match="relative"):
+        md.spectrum(surface, relative="grey")

@@ -1,0 +1,88 @@
+"""`spectrum`: scans, recipes or tables in, a CSV for pavo and a picture out, or one line."""
+
+from __future__ import annotations
+
+import json
+import os
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction.heights import gratings
+
+pytestmark = pytest.mark.usefixtures("coarse")
+
+PIXEL = ["--pixel-size", str(1.6 / 64)]
+QUICK = ["--coherence-width", "6", "--wavelength-range", "400", "700", "--step", "50"]
+
+
+@pytest.fixture(autouse=True)
+def here(here, working_variant):
+    """The same where the variant works."""
+    if working_variant != "llvm_ad_spectral":
+        pytest.skip("the variant is set by name elsewhere")
+    return here
+
+
+@pytest.fixture
+def scans(here):
+    """A folder of two scans of one kind of surface."""
+    folder = here / "scans"
+    folder.mkdir()
+    for n in range(2):
+        field = gratings.sinusoidal(period=1.6, depth=0.03 + 0.01 * n, periods=5, rows=20)
+        np.save(folder / f"scan{n}.npy", field.heights)
+    return folder
+
+
+def read(path):
+    return np.genfromtxt(path, delimiter=",", names=True)
+
+
+def test_a_csv_and_a_picture_are_written_and_named(run, scans, here):
+    ran = run("spectrum", scans / "scan0.npy", *PIXEL, *QUICK, "--light", "20", "--detector", "20",
+              "0", "--json", "s.json")  # fmt: skip
+    assert ran.code == 0, ran.err
+    assert {"scan0-spectrum.csv", "scan0-spectrum.png"} <= set(os.listdir(here))
+    rows = read("scan0-spectrum.csv")
+    assert rows["wl"].tolist() == [400.0, 450.0, 500.0, 550.0, 600.0, 650.0, 700.0]
+    assert rows["light20_detector20"].min() > 100.0  # the mirror's light, in per cent of white
+    document = json.loads((here / "s.json").read_text("utf-8"))
+    assert document["spectra"]["light20_detector0"][0] == pytest.approx(
+        rows["light20_detector0"][0] / 100.0, rel=1e-4
+    )
+
+
+def test_a_folder_and_a_pattern_are_repeated_scans(run, scans, here):
+    ran = run("spectrum", scans, *PIXEL, *QUICK, "-o", "folder.csv")
+    assert ran.code == 0, ran.err
+    ran = run("spectrum", scans / "*.npy", *PIXEL, *QUICK, "-o", "pattern.csv")
+    assert ran.code == 0, ran.err
+    assert (here / "folder.csv").read_bytes() == (here / "pattern.csv").read_bytes()
+    assert (read("folder-errors.csv")["light30_detector30"] > 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["--detector", "89.5"], "89.5"),
+        (["--light", "90"], "90"),
+        (["--acceptance", "0"], "acceptance"),
+        (["--light-azimuth", "1000"], "1000"),
+    ],
+)
+def test_impossible_geometries_are_one_line(run, scans, here, arguments, named):
+    ran = run("spectrum", scans / "scan0.npy", *PIXEL, *QUICK, *arguments)
+    assert ran.code == 1
+    (line,) = [text for text in ran.err.splitlines() if "error" in text]
+    assert named in line
+    assert sorted(os.listdir(here)) == ["scans"]
+
+
+def test_folders_without_scans_and_patterns_without_files_are_one_line(run, here):
+    (here / "empty").mkdir()
+    for source in (here / "empty", here / "none*.npy"):
+        ran = run("spectrum", source)
+        assert ran.code == 1
+        (line,) = ran.err.splitlines()
+        assert str(source) in line
