@@ -28,7 +28,7 @@ from ..heights.field import HeightField
 from ..heights.load import load_heights
 from ..heights.read import is_recipe
 from ..heights.recipes import Recipe
-from ..heights.spectra import dominant_periods
+from ..heights.spectra import examine_periods
 from ..progress import Progress, silent
 from ..scene.load import error_of
 from ..settings import TableSettings
@@ -37,6 +37,7 @@ from ..tables.store import cached_table, key_of
 from .iridescence import diffracted_light
 from .maps import brdf_map
 from .maps.result import BrdfMap, Light
+from .repeats import sample_of, scan_files, write_repeats
 from .survey_files import write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
@@ -45,7 +46,7 @@ VERSION = 3
 #: Number of gratings in a row.
 PERIODS = 3
 #: Names of the files in a survey's folder.
-TABLE, SCANS = "survey.csv", "scans"
+TABLE, SAMPLES, SCANS = "survey.csv", "samples.csv", "scans"
 
 
 @dataclass(frozen=True)
@@ -114,10 +115,13 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     (ny, nx), (width, height) = fields[0].shape, fields[0].extent
     row |= {"patches": len(fields), "pixels_x": nx, "pixels_y": ny}
     row |= {"width_um": width, "height_um": height}
-    gratings = dominant_periods(fields[0], PERIODS)
+    gratings, weak = examine_periods(fields[0], PERIODS)
     for n, grating in enumerate(gratings, 1):
         row |= {f"period_{n}_um": grating.period, f"direction_{n}_deg": grating.direction}
         row[f"share_{n}"] = grating.share
+    if weak is not None:
+        row |= {"weak_period_um": weak.period, "weak_direction_deg": weak.direction}
+        row["weak_share"] = weak.share
     digest = key_of("survey", *(field.digest() for field in fields))
     table = cached_table(digest, settings, lambda: build_with(fields, settings))
     row |= {"orders_x": table.coefficients.shape[2], "orders_y": table.coefficients.shape[1]}
@@ -175,18 +179,19 @@ def run_survey(
     theta: float = 30.0,
     resolution: int = 160,
     threads: int = 0,
+    repeats: str = "name",
     client: Any = None,
     progress: Progress = silent,
 ) -> list[dict[str, Any]]:
     """Measure every scan that the folder does not have yet, and write the results of all.
 
-    The folder holds `survey.csv`, a row for each scan; contact sheets of the maps; and in `scans` a
-    table (.exr), a map (.png) and a row (.json) of each scan. They are named by the content of the
-    scan and its treatment.
+    The folder holds `survey.csv`, a row for each scan; `samples.csv`, means and standard errors of
+    repeated scans; contact sheets of the maps; and in `scans` a table (.exr), a map (.png) and a
+    row (.json) of each scan. They are named by the content of the scan and its treatment.
 
     Parameters
     ----------
-    files : scans of any format, or recipes.
+    files : scans of any format, recipes, folders of them, or patterns as in "scans/*.spm".
     folder : folder of the survey, created if it does not exist.
     treatments : treatments by patterns (`load_treatments`).
     common : treatment of all files, which takes precedence.
@@ -194,6 +199,7 @@ def run_survey(
     theta : angle of the light from the normal, degrees, across the strongest grating's grooves.
     resolution : pixels a side of the maps.
     threads : threads of Dr.Jit in workers; 0 for one per core.
+    repeats : how repeated scans of a sample are told, one of `repeats.REPEATS`.
     client : `distributed.Client`, or None to measure in this process.
     progress : called as progress(scans done, scans in all, text).
 
@@ -204,12 +210,14 @@ def run_survey(
     Raises
     ------
     DiffractionError
-        If there are no files, or the folder cannot be written.
+        If there are no files, a folder or a pattern yields none, or the folder cannot be written.
     """
+    files = scan_files(files)
     if not files:
         raise DiffractionError("there is no scan to survey; name files")
     scans = folder / SCANS
     scans.mkdir(parents=True, exist_ok=True)
+    named = [{"file": str(file), "sample": sample_of(file, repeats)} for file in files]
     rows: dict[int, dict[str, Any]] = {}
     jobs: dict[int, Job] = {}
     for n, file in enumerate(files):
@@ -233,11 +241,12 @@ def run_survey(
             rows[n] = {"reason": f"{result.text} {result.worker}".strip()}
         else:
             rows[n] = _store(scans, files[n], jobs[n], result)
-        write_rows(folder / TABLE, files, rows)  # complete even if Ctrl-C ends the next scan
+        write_rows(folder / TABLE, named, rows)  # complete even if Ctrl-C ends the next scan
         progress(done, len(todo), "scans")
-    named = write_rows(folder / TABLE, files, rows)
-    write_sheets(folder, named)
-    return named
+    result = write_rows(folder / TABLE, named, rows)
+    write_repeats(folder / SAMPLES, result)
+    write_sheets(folder, result)
+    return result
 
 
 def _files_of(file: Path) -> SceneFiles:

@@ -19,12 +19,18 @@ _COLUMNS, _ROWS = 6, 8  # maps in a contact sheet
 
 
 def write_rows(
-    path: Path, files: Sequence[Path], rows_by_number: Mapping[int, Mapping[str, Any]]
+    path: Path,
+    named: Sequence[Mapping[str, str]],
+    rows_by_number: Mapping[int, Mapping[str, Any]],
 ) -> list[dict[str, Any]]:
-    """Write the measured rows in the order of the files as CSV, and return them."""
-    rows = [{"file": str(files[n]), **rows_by_number[n]} for n in sorted(rows_by_number)]
+    """Write the measured rows in the order of the files as CSV, and return them.
+
+    named : columns that name each file, the first of its row.
+    """
+    rows = [{**named[n], **rows_by_number[n]} for n in sorted(rows_by_number)]
     columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
-    names = ["file", "reason", *(n for n in columns if n not in ("file", "reason"))]
+    first = ("file", "sample", "reason")
+    names = [*first, *(name for name in columns if name not in first)]
     text = io.StringIO()
     writer = csv.DictWriter(text, names, restval="", lineterminator="\n")
     writer.writeheader()

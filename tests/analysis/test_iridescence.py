@@ -1,4 +1,4 @@
-"""The index of iridescence: a mirror's is 0, a sinusoid's known, and a coherence width changes none."""
+"""The index of iridescence: a mirror's is 0, a sinusoid's known, no width changes it."""
 
 from __future__ import annotations
 
