@@ -9,6 +9,7 @@ tangents               a patch laid smoothly over any mesh
 plan                   what a plan says, and `render --plan`
 render                 a scene to a picture; `render --frames`: pictures of a scene that changes
 brdf_map               the hemisphere of view directions, by the BSDF or by a method
+spectrum               reflectance spectra as a spectrometer measures them
 evaluate, sweep        the methods of the thesis
 survey                 many scans: a row, a table and a map each
 tradeoff               accuracy against speed and memory

@@ -89,7 +89,8 @@ def run(args: argparse.Namespace) -> int:
     lam = _wavelengths(args)
 
     variant = set_variant("llvm_ad_spectral_polarized" if args.polarisation else "llvm_ad_spectral")
-    from ..analysis.spectra import Geometry, mean_spectra, save_csv, save_errors, spectra_figure
+    from ..analysis.spectra import Geometry, mean_spectra
+    from ..analysis.spectra_files import save_csv, save_errors, spectra_figure
     from ..atomic import atomic_path
 
     detectors = (args.light,) if args.detector is None else tuple(args.detector)
