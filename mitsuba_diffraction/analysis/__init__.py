@@ -7,6 +7,10 @@ spectra        reflectance spectra as a spectrometer measures them
 spectra_files  CSV and plot of spectra
 scans          tables and BSDFs of scans and recipes
 survey         table, map and statistics of many scans
+treatments     options of a survey by patterns of file names
+repeats        files of a survey, and means over repeated scans of a sample
+survey_files   rows of a survey as CSV, and contact sheets
+iridescence    colours of the diffracted light, and how much they change with direction
 tradeoff       accuracy against speed and memory
 timing         kernel times, measured in alternating rounds
 machine        description of the machine that measures
