@@ -153,7 +153,8 @@ def _measured(
         span = (min(lam[0], SHORTEST), max(lam[-1], LONGEST))
         how = options.load_options(args)
         asked = options.table_options(args) | {"wavelength_range": span}
-        table = table_of(file, how, asked)
+        bar(0, 0, f"tabulating {file.name}")
+        table = table_of(file, how, asked, bar)
         if line := notes_line(table.source["warnings"], file, how, TableSettings(**asked)):
             say(line)
     return spectrum(
