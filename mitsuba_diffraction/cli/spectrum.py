@@ -139,9 +139,9 @@ def _measured(
     from ..tables.store import loaded_table
 
     if is_table(file):
-        settings = [f"--{n.replace('_', '-')}" for n in options.table_options(args)]
-        settings = [name for name in settings if name != "--wavelength-range"]
-        if refused := [*options.used_heights_options(args), *settings]:
+        names = [f"--{n.replace('_', '-')}" for n in options.table_options(args)]
+        names = [name for name in names if name != "--wavelength-range"]
+        if refused := [*options.used_heights_options(args), *names]:
             raise DiffractionError(
                 f"'{file}' is a table, which has its own; leave {refused[0]} out"
             )
