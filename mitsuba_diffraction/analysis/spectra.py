@@ -13,31 +13,23 @@ of angle θ to, and at −θ on the lamp's side.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..atomic import atomic_path
 from ..errors import DiffractionError
 from ..heights.field import HeightField
-from ..optics.colour import encode_srgb, linear_srgb, response
 from ..optics.geometry import wavenumber
 from ..plugin.dictionary import bsdf_dict
 from ..plugin.llvm import require_loaded_llvm
 from ..plugin.memory import upload
 from ..progress import Progress, silent
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Reals = NDArray[np.float64]
 
@@ -55,10 +47,6 @@ MOST = 10_000
 _PER_LOBE, _FEWEST_RADII, _FEWEST_AZIMUTHS = 1.25, 8, 16
 # Most nodes of a cone: larger cones hold so many lobes that coarser sums are as good.
 _MOST_NODES = 1 << 18
-# Of a curve drawn: the brightest channel of its colour, so that white is grey on white paper.
-_BRIGHTEST = 0.35
-# Ratio of the highest to the lowest curve from which on the axis is logarithmic.
-_APART = 20.0
 
 
 @dataclass(frozen=True)
@@ -138,7 +126,7 @@ class Spectra:
 
     def columns(self) -> dict[str, Reals]:
         """Return the spectra by name: each detector's, and its s and p if there are any."""
-        columns = {}
+        columns: dict[str, Reals] = {}
         for suffix, values in (("", self.value), ("_s", self.s), ("_p", self.p)):
             if values is not None:
                 names = (f"{name}{suffix}" for name in self.geometry.names)
@@ -234,14 +222,18 @@ def mean_spectra(spectra: Sequence[Spectra]) -> Spectra:
     first = spectra[0]
     if len(spectra) == 1:
         return first
-    values = np.stack([one.value for one in spectra])
-    polarised = first.s is not None
+    values = np.stack([each.value for each in spectra])
+
+    def mean_of(parts: Sequence[Reals | None]) -> Reals | None:
+        there = [part for part in parts if part is not None]
+        return np.mean(there, axis=0) if there else None
+
     return replace(
         first,
         value=values.mean(axis=0),
         error=values.std(axis=0, ddof=1) / math.sqrt(len(spectra)),
-        s=np.mean([one.s for one in spectra], axis=0) if polarised else None,
-        p=np.mean([one.p for one in spectra], axis=0) if polarised else None,
+        s=mean_of([each.s for each in spectra]),
+        p=mean_of([each.p for each in spectra]),
     )
 
 
@@ -362,77 +354,3 @@ def _of_mirror(table: Any, geometry: Geometry, lam: Reals) -> Reals:
         )
     )  # fmt: skip
     return np.asarray(_signals(mirror, mirror.table, check, lam, silent)[0])
-
-
-def save_csv(spectra: Spectra, path: str | os.PathLike[str]) -> None:
-    """Write spectra as the R package pavo reads them: `wl` in nm, then one column each, per cent.
-
-    Without comments or units, which `read.csv` would take for data.
-    """
-    _write(path, spectra.wavelength, spectra.columns())
-
-
-def save_errors(spectra: Spectra, path: str | os.PathLike[str]) -> None:
-    """Write the standard errors of a mean, in the columns of `save_csv`, per cent."""
-    assert spectra.error is not None
-    columns = dict(zip(spectra.geometry.names, spectra.error.T, strict=True))
-    _write(path, spectra.wavelength, columns)
-
-
-def _write(path: str | os.PathLike[str], wavelength: Reals, columns: dict[str, Reals]) -> None:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["wl", *columns])
-    for n, lam in enumerate(wavelength):
-        writer.writerow([f"{lam:g}", *(f"{100.0 * values[n]:.6g}" for values in columns.values())])
-    with atomic_path(path) as temporary:
-        temporary.write_text(text.getvalue(), "utf-8")
-
-
-def colour_of(spectra: Spectra) -> Reals:
-    """Return the colour of each spectrum in daylight, (detectors, 3) sRGB, as dark as ink."""
-    step = np.gradient(spectra.wavelength) if spectra.wavelength.size > 1 else np.ones(1)
-    weights = response(spectra.wavelength) * step[:, None]
-    linear = np.maximum(linear_srgb(spectra.value.T @ weights), 0.0)
-    brightest = linear.max(axis=1, keepdims=True)
-    return encode_srgb(_BRIGHTEST * linear / np.where(brightest > 0.0, brightest, 1.0))
-
-
-def spectra_figure(spectra: Spectra, title: str = "") -> Figure:
-    """Draw spectra over wavelength, each in its own colour, with bands of one standard error."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.5, 4.2), dpi=120, layout="constrained")
-    axes = figure.subplots()
-    geometry = spectra.geometry
-    colours = colour_of(spectra)
-    styles = ("-", "--", "-.", ":")
-    for n, (angle, colour) in enumerate(zip(geometry.detectors, colours, strict=True)):
-        values, style = 100.0 * spectra.value[:, n], styles[n % len(styles)]
-        axes.plot(spectra.wavelength, values, style, color=colour, label=f"detector at {angle:g}°")
-        if spectra.error is not None:
-            error = 100.0 * spectra.error[:, n]
-            axes.fill_between(
-                spectra.wavelength, values - error, values + error, color=colour, alpha=0.2, lw=0
-            )
-    against = {
-        "white": "reflectance (% of a white standard)",
-        "mirror": "reflectance (% of a perfect mirror)",
-        "none": "collected (% of the incident light)",
-    }
-    axes.set(xlabel="wavelength (nm)", ylabel=against[spectra.relative])
-    highest = 100.0 * np.maximum(spectra.value.max(axis=0), 0.0)
-    if 0.0 < _APART * highest.min() < highest.max():  # a mirror's reflection beside weak light
-        axes.set_yscale("log")
-        lowest = max(50.0 * float(spectra.value.min()), 1e-2 * highest.min())
-        axes.set_ylim(lowest, 2.0 * highest.max())
-    else:
-        axes.set_ylim(0.0, None)
-    axes.set_title(
-        f"{title}\nlamp at {geometry.light:g}°, azimuth {geometry.azimuth:g}°; cone of "
-        f"{geometry.acceptance:g}°".strip(),
-        fontsize=9,
-    )
-    axes.legend(fontsize=8)
-    axes.grid(alpha=0.25)
-    return figure

@@ -108,18 +108,18 @@ def groups_of(passes: Sequence[Pass]) -> list[Sequence[Pass]]:
     return [passes[n : n + GROUP] for n in range(0, len(passes), GROUP)]
 
 
-def render_pass(scene: Any, sensor: Any, one: Pass) -> NDArray[np.float64]:
+def render_pass(scene: Any, sensor: Any, each: Pass) -> NDArray[np.float64]:
     """Return the film's raw storage after a pass: weighted sums beside the sums of the weights.
 
     Raises a DiffractionError if Mitsuba refuses or fails to render.
     """
     integrator, film = integrator_of(scene), sensor.film()
     try:
-        integrator.render(scene, sensor, seed=one.seed, spp=one.spp, develop=False)
+        integrator.render(scene, sensor, seed=each.seed, spp=each.spp, develop=False)
         raw = np.array(film.develop(raw=True), dtype=np.float64)
     except RuntimeError as error:
         raise error_of("cannot render", error) from error
-    return raw * one.spp if _splats(integrator) else raw
+    return raw * each.spp if _splats(integrator) else raw
 
 
 def developed(scene: Any, sensor: Any, total: NDArray[np.float64], spp: int) -> Any:
@@ -178,14 +178,14 @@ def render_passes(
     done = 0
     for group in groups_of(passes_of(sensor, spp, seed, variant)):
         part: NDArray[np.float64] | float = 0.0
-        for one in group:
+        for each in group:
             if stop.asked:
                 break
-            raw = render_pass(scene, sensor, one)
+            raw = render_pass(scene, sensor, each)
             if stop.asked and variant.startswith("scalar"):
                 break  # Mitsuba left this pass unfinished; a JIT variant never does
             part = part + raw
-            done += one.spp
+            done += each.spp
             progress(min(done, spp), spp, "rendering")
         total = total + part
     if done == 0:  # asked to stop before there was anything

@@ -16,8 +16,10 @@ from mitsuba_diffraction.analysis.spectra import (
     STEEPEST,
     Geometry,
     check_wavelengths,
-    colour_of,
     mean_spectra,
+)
+from mitsuba_diffraction.analysis.spectra_files import (
+    colour_of,
     save_csv,
     save_errors,
     spectra_figure,
