@@ -16,25 +16,24 @@ from typing import Any, NamedTuple
 
 from ..errors import DiffractionError
 from ..scene.denoise import denoised, require_denoiser
-from ..scene.frames import FILMS, MISSING, Frame, digest_of, render_frames, write_film, write_frame
+from ..scene.frames import (
+    FILMS,
+    MISSING,
+    Frame,
+    check_film,
+    digest_of,
+    render_frames,
+    write_film,
+    write_frame,
+)
 from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink
 from ..scene.parameters import values_of_frames
-from ..scene.passes import (
-    Result,
-    Stop,
-    integrator_of,
-    render_passes,
-)
+from ..scene.passes import Result, Stop, integrator_of, render_passes
 from ..scene.pictures import colours_of, count_bad, write_exr, write_png
 from . import options
 from .console import INTERRUPTED, Bar, mitsuba_warnings, say, say_warning
 from .options import change, number_between, whole_number
-from .plan import (
-    add_plan_options,
-    check_plan_options,
-    load_by_plan,
-    recipe_file,
-)
+from .plan import add_plan_options, check_plan_options, load_by_plan, recipe_file
 from .report import check_writable, save_report
 from .workers import add_threads, add_workers, client_of, film_of, on_workers, say_report
 
@@ -50,8 +49,8 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_scene(parser)
     options.add_output(
         parser, "EXR, with a PNG beside it, or only a PNG; default: the scene's name with .exr in "
-        "the current folder. With --frames: a folder, or a film, .webp or .gif, whose frames go "
-        "into a folder of its name; default: the folder SCENE_frames", metavar="OUT",
+        "the current folder. With --frames: a folder, or a film, .webp, .gif or .mp4, whose "
+        "frames go into a folder of its name; default: the folder SCENE_frames", metavar="OUT",
     )  # fmt: skip
     options.add_samples(parser, 1, None)
     options.add_exposure(parser, 0.0, "of the PNG, in stops: +1 doubles the light; default: 0")
@@ -208,8 +207,8 @@ def _run_one(args: argparse.Namespace) -> int:
             raise KeyboardInterrupt  # before the first pass: there is no picture
         report = _finish(args, result, outputs, variant, start)
         if args.denoise:
-            _write_denoised(args, denoised(scene, sensor, result.bitmap, result.spp, args.seed),
-                            outputs, variant)  # fmt: skip
+            clean = denoised(scene, sensor, result.bitmap, result.spp, args.seed)
+            _write_denoised(args, clean, outputs.denoised)
             report["files"] += outputs.denoised
     save_report(args, report)
     if result.interrupted:
@@ -251,15 +250,14 @@ def _finish(
     }  # fmt: skip
 
 
-def _write_denoised(args: argparse.Namespace, picture: Any, outputs: Outputs, variant: str) -> None:
+def _write_denoised(args: argparse.Namespace, picture: Any, files: Sequence[Path]) -> None:
     """Write the denoised picture beside the noisy one."""
-    for path in outputs.denoised:
+    for path in files:
         if path.suffix.lower() == ".png":
             write_png(picture, path, args.exposure, args.view)
         else:
-            origin = {"scene": str(args.scene), "variant": variant, "seed": args.seed}
-            write_exr(picture, path, {**origin, "denoised": "Open Image Denoise"})
-    print(f"{' and '.join(map(str, outputs.denoised))}: denoised")
+            write_exr(picture, path, {"scene": str(args.scene), "denoised": "Open Image Denoise"})
+    print(f"{' and '.join(map(str, files))}: denoised")
 
 
 def _check_colours(scene: Any, sensor: Any, args: argparse.Namespace, output: Path) -> None:
@@ -278,6 +276,7 @@ def _run_frames(args: argparse.Namespace) -> int:
     folder, film = _folder_and_film(args)
     check_writable(folder / "frame_0000.png", make_folder=True)
     if film is not None:
+        check_film(film)
         check_writable(film)
     frames = _frames(args, folder)
     reasons = {frame.png: frame.outdated(args.exr) for frame in frames}
