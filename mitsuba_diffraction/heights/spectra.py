@@ -76,7 +76,8 @@ class Periodicity:
     share: float  # of the variance of the heights, 0 to 1, without harmonics
 
     def __str__(self) -> str:
-        return f"{self.period:.4g} µm along {self.direction:.0f}°, {self.share:.0%} of the variance"
+        degrees = round(self.direction)
+        return f"{self.period:.4g} µm along {degrees}°, {self.share:.0%} of the variance"
 
 
 class Periods(NamedTuple):
