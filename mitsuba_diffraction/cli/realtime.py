@@ -50,6 +50,7 @@ def add_view(subparsers: options.Subparsers) -> None:
 
 def view(args: argparse.Namespace) -> int:
     """Show the scene, and return the exit code."""
+    options.put_on_stage(args)
     parameters = options.scene_parameters(args)
     check_writable(args.output / "view_000.png")
     try:
@@ -106,8 +107,9 @@ def add_compare(subparsers: options.Subparsers) -> None:
 
 def compare(args: argparse.Namespace) -> int:
     """Compare, and return the exit code."""
+    options.put_on_stage(args)
     parameters = options.scene_parameters(args)
-    folder = args.output or Path(f"{args.scene.stem}_compare")
+    folder = args.output or Path(f"{args.name.stem}_compare")
     if folder.exists() and not folder.is_dir():
         raise DiffractionError(f"-o {folder}: it is a file; name a folder")
     check_writable(folder / "compare.json", make_folder=True)
@@ -154,6 +156,7 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
 
 def export_viewer(args: argparse.Namespace) -> int:
     """Export, and return the exit code."""
+    options.put_on_stage(args)
     parameters = options.scene_parameters(args)
     check_writable(args.output)
 
@@ -164,7 +167,7 @@ def export_viewer(args: argparse.Namespace) -> int:
     with mitsuba_warnings(), Bar(args, delay=0) as bar:
         bar(0, 0, "loading")
         page = export_viewer(
-            _scene(args, parameters), args.output, title=args.scene.stem, sensor=args.sensor,
+            _scene(args, parameters), args.output, title=args.name.stem, sensor=args.sensor,
             progress=bar, methods=WEB_METHODS if args.method == "all" else (args.method,),
         )  # fmt: skip
     if page.omissions:

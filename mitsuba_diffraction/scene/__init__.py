@@ -6,6 +6,9 @@ load         variants set and scenes loaded; Mitsuba's errors in one line
 parameters   names that -D may set, and values that change from frame to frame
 passes       rendering in passes of samples; EXR and PNG of the picture
 frames       frames of an animation, and a film of them
+additions    meshes and materials put into a scene before Mitsuba makes its objects
+fitted_mesh  mesh files put on a stage: upright, centred, standing on the floor
+stage        the studio for meshes without a scene
 planning     the recipes of tables that suffice for a scene
 orientation  directions that a patch follows over a mesh
 """

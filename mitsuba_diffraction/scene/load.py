@@ -11,6 +11,7 @@ traceback; warnings go to a logger of its own.
 from __future__ import annotations
 
 import re
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path, PurePath
 from typing import Any
@@ -81,17 +82,17 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
     import mitsuba as mi
 
     from ..plugin import registration  # noqa: F401  registers the plugin
+    from .additions import split_materials
 
     readable_file(file)
+    parameters, materials = split_materials(parameters)
     refuse_pipes(file, parameters)
     check_parameters(file, parameters)
     for name in _TAKEN:
         if name in parameters:
             raise DiffractionError(f"-D {name}: Mitsuba reserves this name; rename the parameter")
     try:
-        # In threads Mitsuba 3.9 loads no faster, since its parser waits for each object; and Ctrl-C
-        # reaches a plugin in Python on the main thread only
-        scene = mi.load_file(str(file), parallel=False, **parameters)
+        scene = _instantiated(file, parameters, materials)
     except (RuntimeError, UnicodeDecodeError) as error:
         raise error_of("cannot load the scene", error) from error
     if not isinstance(scene, mi.Scene):
@@ -106,6 +107,32 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
         check_attributes(shape, number)
     _warn_of_missing_uv(surfaces)
     return scene
+
+
+def _instantiated(file: Path, parameters: Mapping[str, Any], materials: Mapping[str, str]) -> Any:
+    """Parse a scene, put meshes and materials into it, and make Mitsuba's objects of it."""
+    import mitsuba as mi
+
+    from .additions import fit_meshes, put_materials
+
+    config = mi.parser.ParserConfig(mi.variant())
+    # In threads Mitsuba 3.9 loads no faster, since its parser waits for each object; and Ctrl-C
+    # reaches a plugin in Python on the main thread only
+    config.parallel = False
+    before = mi.file_resolver()
+    resolver = mi.FileResolver(before)
+    resolver.prepend(str(file.absolute().parent))
+    mi.set_file_resolver(resolver)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            state = mi.parser.parse_file(config, str(file), **parameters)
+            fit_meshes(state, Path(folder))
+            put_materials(state, materials)
+            mi.parser.transform_all(config, state)
+            loaded = mi.parser.instantiate(config, state)
+    finally:
+        mi.set_file_resolver(before)
+    return loaded[0] if isinstance(loaded, list) and len(loaded) == 1 else loaded
 
 
 def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
