@@ -2,12 +2,19 @@
 
 Contents
 --------
-maps       BRDF maps over the hemisphere of view directions
-survey     table, map and statistics of many scans
-tradeoff   accuracy against speed and memory
-timing     kernel times, measured in alternating rounds
-machine    description of the machine that measures
-pictures   pictures of patches and of raw albedo
-design     surfaces from their BRDF or colours, by gradients with respect to the heights
-energy     albedo of a table's surface before and after energy conservation
+maps           BRDF maps over the hemisphere of view directions
+spectra        reflectance spectra as a spectrometer measures them
+spectra_files  CSV and plot of spectra
+scans          tables and BSDFs of scans and recipes
+survey         table, map and statistics of many scans
+treatments     options of a survey by patterns of file names
+repeats        files of a survey, and means over repeated scans of a sample
+survey_files   rows of a survey as CSV, and contact sheets
+iridescence    colours of the diffracted light, and how much they change with direction
+tradeoff       accuracy against speed and memory
+timing         kernel times, measured in alternating rounds
+machine        description of the machine that measures
+pictures       pictures of patches and of raw albedo
+design         surfaces from their BRDF or colours, by gradients with respect to the heights
+energy         albedo of a table's surface before and after energy conservation
 """

@@ -13,6 +13,7 @@ from ..errors import DiffractionWarning
 from ..heights.load import load_heights
 from ..heights.read import LoadOptions, is_recipe
 from ..heights.recipes import Recipe
+from ..progress import Progress, silent
 from ..scene.load import error_of
 from ..settings import TableSettings
 from ..tables.build.build import build_with
@@ -20,7 +21,9 @@ from ..tables.store import cached_table, key_of
 from ..tables.table import DiffractionTable
 
 
-def table_of(path: Path, options: LoadOptions, settings: dict[str, Any]) -> DiffractionTable:
+def table_of(
+    path: Path, options: LoadOptions, settings: dict[str, Any], progress: Progress = silent
+) -> DiffractionTable:
     """Return the table of a file of heights or a recipe, from the cache or built.
 
     Parameters
@@ -28,6 +31,7 @@ def table_of(path: Path, options: LoadOptions, settings: dict[str, Any]) -> Diff
     path : heights of any format, or a recipe, whose own settings the others precede.
     options : how heights are read.
     settings : settings of the table by name.
+    progress : called as progress(done, total, text).
 
     Raises
     ------
@@ -43,7 +47,7 @@ def table_of(path: Path, options: LoadOptions, settings: dict[str, Any]) -> Diff
     digest = key_of("scan", *(field.digest() for field in fields))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DiffractionWarning)  # the table keeps its warnings
-        return cached_table(digest, asked, lambda: build_with(fields, asked))
+        return cached_table(digest, asked, lambda: build_with(fields, asked, progress))
 
 
 def bsdf_of(table: DiffractionTable, **parameters: Any) -> Any:

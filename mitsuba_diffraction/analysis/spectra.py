@@ -13,31 +13,22 @@ of angle θ to, and at −θ on the lamp's side.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..atomic import atomic_path
 from ..errors import DiffractionError
-from ..heights.field import HeightField
-from ..optics.colour import encode_srgb, linear_srgb, response
-from ..optics.geometry import wavenumber
-from ..plugin.dictionary import bsdf_dict
+from ..optics.geometry import kirchhoff_factor, wavenumber
+from ..plugin.fresnel import Conductor, tabulated_range
 from ..plugin.llvm import require_loaded_llvm
 from ..plugin.memory import upload
 from ..progress import Progress, silent
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Reals = NDArray[np.float64]
 
@@ -53,12 +44,8 @@ MOST = 10_000
 
 # Nodes of the cone: radii and azimuths per standard deviation of the narrowest lobe, and at least.
 _PER_LOBE, _FEWEST_RADII, _FEWEST_AZIMUTHS = 1.25, 8, 16
-# Most nodes of a cone: larger cones hold so many lobes that coarser sums are as good.
-_MOST_NODES = 1 << 18
-# Of a curve drawn: the brightest channel of its colour, so that white is grey on white paper.
-_BRIGHTEST = 0.35
-# Ratio of the highest to the lowest curve from which on the axis is logarithmic.
-_APART = 20.0
+# Most nodes of a cone, a gigabyte of memory: 120° at 300 nm have 2.5 million under 65 µm.
+_MOST_NODES = 1 << 22
 
 
 @dataclass(frozen=True)
@@ -138,7 +125,7 @@ class Spectra:
 
     def columns(self) -> dict[str, Reals]:
         """Return the spectra by name: each detector's, and its s and p if there are any."""
-        columns = {}
+        columns: dict[str, Reals] = {}
         for suffix, values in (("", self.value), ("_s", self.s), ("_p", self.p)):
             if values is not None:
                 names = (f"{name}{suffix}" for name in self.geometry.names)
@@ -189,6 +176,9 @@ def spectrum(
     lam = check_wavelengths(
         np.arange(360.0, LAST + 1.0, STEP) if wavelengths is None else wavelengths
     )
+    material = getattr(getattr(bsdf, "boundary", None), "material", None)
+    if isinstance(material, Conductor):
+        check_material(material.name, lam)
     table = getattr(bsdf, "table", None)
     if table is not None and lam.min() < table.wavelength_range[0]:
         raise DiffractionError(
@@ -226,6 +216,17 @@ def check_wavelengths(wavelengths: ArrayLike) -> Reals:
     return lam
 
 
+def check_material(material: str, wavelengths: Reals) -> None:
+    """Refuse wavelengths (n,) in nm beyond Mitsuba's table of a conductor."""
+    limits = tabulated_range(material)
+    if limits is not None and not limits[0] <= wavelengths.min() <= wavelengths.max() <= limits[1]:
+        raise DiffractionError(
+            f"material='{material}' is known from {limits[0]:.4g} to {limits[1]:.4g} nm, and the "
+            f"wavelengths are {wavelengths.min():g} to {wavelengths.max():g} nm; give others "
+            "(--wavelength-range)"
+        )
+
+
 def mean_spectra(spectra: Sequence[Spectra]) -> Spectra:
     """Return the mean of spectra of the same wavelengths and geometry, with standard errors.
 
@@ -234,21 +235,24 @@ def mean_spectra(spectra: Sequence[Spectra]) -> Spectra:
     first = spectra[0]
     if len(spectra) == 1:
         return first
-    values = np.stack([one.value for one in spectra])
-    polarised = first.s is not None
+    values = np.stack([each.value for each in spectra])
+
+    def mean_of(parts: Sequence[Reals | None]) -> Reals | None:
+        there = [part for part in parts if part is not None]
+        return np.mean(there, axis=0) if there else None
+
     return replace(
         first,
         value=values.mean(axis=0),
         error=values.std(axis=0, ddof=1) / math.sqrt(len(spectra)),
-        s=np.mean([one.s for one in spectra], axis=0) if polarised else None,
-        p=np.mean([one.p for one in spectra], axis=0) if polarised else None,
+        s=mean_of([each.s for each in spectra]),
+        p=mean_of([each.p for each in spectra]),
     )
 
 
 def _signals(bsdf: Any, table: Any, geometry: Geometry, lam: Reals, progress: Progress) -> Reals:
     """Return P, (1 or 3, n, detectors): unpolarised, and in a polarised variant s and p."""
-    # exp(−σ²k²Δ²) has the standard deviation 1/(√2 σk)
-    lobe = 0.05 if table is None else 1.0 / (2**0.5 * table.sigma * float(wavenumber(lam[0])))
+    lobe = _lobe(table, lam)
     parts = 3 if mi.is_polarized else 1
     result = np.zeros((parts, lam.size, len(geometry.detectors)))
     for n, angle in enumerate(geometry.detectors):
@@ -257,6 +261,11 @@ def _signals(bsdf: Any, table: Any, geometry: Geometry, lam: Reals, progress: Pr
         result[:, :, n] = _integrals(bsdf, geometry, lam, directions, weights)
     progress(len(geometry.detectors), len(geometry.detectors), "detectors")
     return result
+
+
+def _lobe(table: Any, lam: Reals) -> float:
+    """Return the standard deviation of the narrowest lobe, rad: of exp(−σ²k²Δ²), 1/(√2 σk)."""
+    return 0.05 if table is None else 1.0 / (2**0.5 * table.sigma * float(wavenumber(lam[0])))
 
 
 def _light(geometry: Geometry) -> Reals:
@@ -281,8 +290,12 @@ def _cone(geometry: Geometry, angle: float, lobe: float) -> tuple[Reals, Reals]:
     half = math.radians(0.5 * geometry.acceptance)
     radii = max(math.ceil(_PER_LOBE * half / lobe), _FEWEST_RADII)
     around = max(math.ceil(_PER_LOBE * 2.0 * math.pi * half / lobe), _FEWEST_AZIMUTHS)
-    excess = math.sqrt(max(radii * around / _MOST_NODES, 1.0))
-    radii, around = round(radii / excess), round(around / excess)
+    if radii * around > _MOST_NODES:
+        narrower = geometry.acceptance * math.sqrt(_MOST_NODES / (radii * around))
+        raise DiffractionError(
+            f"acceptance={geometry.acceptance:g}: the lobes of so wide a coherence window are too "
+            f"fine to add up over this cone; take at most {0.99 * narrower:.2g} degrees"
+        )
     nodes, weights = np.polynomial.legendre.leggauss(radii)
     alpha = 0.5 * half * (nodes + 1.0)
     psi = 2.0 * np.pi * (np.arange(around) + 0.5) / around
@@ -350,89 +363,19 @@ def _stokes(light: Reals, across: Reals) -> Reals:
 
 
 def _of_mirror(table: Any, geometry: Geometry, lam: Reals) -> Reals:
-    """Return P (n, 1) of a perfect mirror of the same coherence, where it reflects the lamp to."""
+    """Return P (n, 1) of a perfect mirror of the same coherence, where it reflects the lamp to.
+
+    Its f is Kirchhoff's factor times ⟨|P|²⟩ = 4π²σ⁴ exp(−σ²q²), eq. 3 and 4 of `reference.model`.
+    """
     if table is None:
         return np.ones((lam.size, 1))
-    check = replace(geometry, detectors=(geometry.light,))
-    flat = HeightField(np.zeros((8, 8)), table.coherence_width / 8.0, periodic=True)
-    mirror = mi.load_dict(
-        bsdf_dict(
-            flat, coherence_width=table.coherence_width, material="none", model="kirchhoff",
-            energy_conserving=False,
-        )
-    )  # fmt: skip
-    return np.asarray(_signals(mirror, mirror.table, check, lam, silent)[0])
-
-
-def save_csv(spectra: Spectra, path: str | os.PathLike[str]) -> None:
-    """Write spectra as the R package pavo reads them: `wl` in nm, then one column each, per cent.
-
-    Without comments or units, which `read.csv` would take for data.
-    """
-    _write(path, spectra.wavelength, spectra.columns())
-
-
-def save_errors(spectra: Spectra, path: str | os.PathLike[str]) -> None:
-    """Write the standard errors of a mean, in the columns of `save_csv`, per cent."""
-    assert spectra.error is not None
-    columns = dict(zip(spectra.geometry.names, spectra.error.T, strict=True))
-    _write(path, spectra.wavelength, columns)
-
-
-def _write(path: str | os.PathLike[str], wavelength: Reals, columns: dict[str, Reals]) -> None:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["wl", *columns])
-    for n, lam in enumerate(wavelength):
-        writer.writerow([f"{lam:g}", *(f"{100.0 * values[n]:.6g}" for values in columns.values())])
-    with atomic_path(path) as temporary:
-        temporary.write_text(text.getvalue(), "utf-8")
-
-
-def colour_of(spectra: Spectra) -> Reals:
-    """Return the colour of each spectrum in daylight, (detectors, 3) sRGB, as dark as ink."""
-    step = np.gradient(spectra.wavelength) if spectra.wavelength.size > 1 else np.ones(1)
-    weights = response(spectra.wavelength) * step[:, None]
-    linear = np.maximum(linear_srgb(spectra.value.T @ weights), 0.0)
-    brightest = linear.max(axis=1, keepdims=True)
-    return encode_srgb(_BRIGHTEST * linear / np.where(brightest > 0.0, brightest, 1.0))
-
-
-def spectra_figure(spectra: Spectra, title: str = "") -> Figure:
-    """Draw spectra over wavelength, each in its own colour, with bands of one standard error."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.5, 4.2), dpi=120, layout="constrained")
-    axes = figure.subplots()
-    geometry = spectra.geometry
-    colours = colour_of(spectra)
-    styles = ("-", "--", "-.", ":")
-    for n, (angle, colour) in enumerate(zip(geometry.detectors, colours, strict=True)):
-        values, style = 100.0 * spectra.value[:, n], styles[n % len(styles)]
-        axes.plot(spectra.wavelength, values, style, color=colour, label=f"detector at {angle:g}°")
-        if spectra.error is not None:
-            error = 100.0 * spectra.error[:, n]
-            axes.fill_between(
-                spectra.wavelength, values - error, values + error, color=colour, alpha=0.2, lw=0
-            )
-    against = {
-        "white": "reflectance (% of a white standard)",
-        "mirror": "reflectance (% of a perfect mirror)",
-        "none": "collected (% of the incident light)",
-    }
-    axes.set(xlabel="wavelength (nm)", ylabel=against[spectra.relative])
-    highest = 100.0 * np.maximum(spectra.value.max(axis=0), 0.0)
-    if 0.0 < _APART * highest.min() < highest.max():  # a mirror's reflection beside weak light
-        axes.set_yscale("log")
-        lowest = max(50.0 * float(spectra.value.min()), 1e-2 * highest.min())
-        axes.set_ylim(lowest, 2.0 * highest.max())
-    else:
-        axes.set_ylim(0.0, None)
-    axes.set_title(
-        f"{title}\nlamp at {geometry.light:g}°, azimuth {geometry.azimuth:g}°; cone of "
-        f"{geometry.acceptance:g}°".strip(),
-        fontsize=9,
-    )
-    axes.legend(fontsize=8)
-    axes.grid(alpha=0.25)
-    return figure
+    directions, solid = _cone(geometry, geometry.light, _lobe(table, lam))
+    light, sigma = _light(geometry), float(table.sigma)
+    squares = np.square(directions[:, :2] + light[:2]).sum(axis=1)
+    weights = 4.0 * np.pi**2 * sigma**4 * solid * directions[:, 2]
+    signals = [
+        kirchhoff_factor(light, directions, each, sigma)
+        @ (weights * np.exp(-np.square(sigma * wavenumber(each)) * squares))
+        for each in lam
+    ]
+    return np.array(signals)[:, None]

@@ -1,34 +1,20 @@
 """Surveys of many scans: table, map, statistics, gratings and colours of each.
 
 Scans that the folder does not yet have are measured, in this process or on workers; then the CSV
-of all rows and contact sheets are written. A TOML file of patterns selects reading options and
-treatments:
-
-    ["snakes/*.png"]
-    pixel_size = 0.0488
-    max_height = 0.375
-    level = "plane"
-
-Patterns are matched with the whole path and with the file's name. Where several match, later ones
-override earlier ones. Keys are those of recipes.
+of all rows, the means of repeated scans and contact sheets are written.
 """
 
 from __future__ import annotations
 
-import csv
-import fnmatch
 import io
 import json
-import math
-import os
 import tempfile
 import time
-import tomllib
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -36,84 +22,31 @@ from ..atomic import atomic_path
 from ..cluster.jobs import run_jobs
 from ..cluster.tasks import Failed, MissingFiles, SceneFiles
 from ..errors import DiffractionError, DiffractionWarning, one_line
-from ..files import read_text, readable_file
+from ..files import readable_file
 from ..heights.coherence import REPEATS
 from ..heights.field import HeightField
 from ..heights.load import load_heights
-from ..heights.read import LoadOptions, is_recipe
-from ..heights.recipes import LOAD_KEYS, Recipe, options_and_settings
-from ..heights.spectra import dominant_periods
+from ..heights.read import is_recipe
+from ..heights.recipes import Recipe
+from ..heights.spectra import examine_periods
 from ..progress import Progress, silent
 from ..scene.load import error_of
-from ..settings import RECIPE_SETTINGS, TableSettings
+from ..settings import TableSettings
 from ..tables.build.build import build_with
 from ..tables.store import cached_table, key_of
+from .iridescence import diffracted_light
 from .maps import brdf_map
-from .maps.result import BrdfMap, colours_of, iridescence
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .maps.result import BrdfMap, Light
+from .repeats import sample_of, scan_files, write_repeats
+from .survey_files import write_rows, write_sheets
+from .treatments import Treatment, treatment_for
 
 #: Version of the rows: raise it when their values change.
-VERSION = 3
+VERSION = 4
 #: Number of gratings in a row.
 PERIODS = 3
 #: Names of the files in a survey's folder.
-TABLE, SHEET, SCANS = "survey.csv", "sheet", "scans"
-_COLUMNS, _ROWS = 6, 8  # maps in a contact sheet
-
-
-@dataclass(frozen=True)
-class Treatment:
-    """Options to read a file, and settings of its table."""
-
-    options: LoadOptions = field(default_factory=LoadOptions)
-    settings: Mapping[str, Any] = field(default_factory=dict)
-
-    def updated(self, other: Treatment) -> Treatment:
-        """Return this treatment, replaced by the values that `other` sets."""
-        return Treatment(self.options.updated(other.options), {**self.settings, **other.settings})
-
-
-def load_treatments(
-    path: str | os.PathLike[str] | None,
-) -> Sequence[tuple[str, Treatment]]:
-    """Read patterns and their treatments from a TOML file, in its order; none if path is `None`.
-
-    Raises
-    ------
-    DiffractionError
-        If the file cannot be read, or a pattern has an option without a valid value.
-    """
-    if path is None:
-        return []
-    try:
-        content = tomllib.loads(read_text(path))
-    except tomllib.TOMLDecodeError as error:
-        raise DiffractionError(f"cannot read '{path}': {one_line(str(error))}") from error
-    return [(pattern, _treatment(f"'{path}': [{pattern!r}]", v)) for pattern, v in content.items()]
-
-
-def treatment_for(file: Path, treatments: Sequence[tuple[str, Treatment]]) -> Treatment:
-    """Combine the treatments of the patterns that match a file."""
-    result = Treatment()
-    for pattern, treatment in treatments:
-        if fnmatch.fnmatch(str(file), pattern) or fnmatch.fnmatch(file.name, pattern):
-            result = result.updated(treatment)
-    return result
-
-
-def _treatment(where: str, values: Any) -> Treatment:
-    """Check the options of one pattern."""
-    if not isinstance(values, dict):
-        raise DiffractionError(f"{where}: expected a pattern in brackets with options below it")
-    unknown = set(values) - {*LOAD_KEYS, *RECIPE_SETTINGS}
-    if unknown:
-        raise DiffractionError(
-            f"{where}: unknown key {min(unknown)!r}; known are "
-            f"{', '.join((*LOAD_KEYS, *RECIPE_SETTINGS))}"
-        )
-    return Treatment(*options_and_settings(values, where))
+TABLE, SAMPLES, SCANS = "survey.csv", "samples.csv", "scans"
 
 
 @dataclass(frozen=True)
@@ -161,7 +94,7 @@ def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured |
         row["reason"] = str(error)
     except Exception as error:  # one scan must not end a survey of a thousand
         row["reason"] = f"unexpected {type(error).__name__}: {one_line(str(error))}"
-    row["seconds"] = round(time.perf_counter() - start, 2)
+    row["time_s"] = round(time.perf_counter() - start, 2)
     return Measured(row, files)
 
 
@@ -182,10 +115,13 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
     (ny, nx), (width, height) = fields[0].shape, fields[0].extent
     row |= {"patches": len(fields), "pixels_x": nx, "pixels_y": ny}
     row |= {"width_um": width, "height_um": height}
-    gratings = dominant_periods(fields[0], PERIODS)
+    gratings, weak = examine_periods(fields[0], PERIODS)
     for n, grating in enumerate(gratings, 1):
         row |= {f"period_{n}_um": grating.period, f"direction_{n}_deg": grating.direction}
         row[f"share_{n}"] = grating.share
+    if weak is not None:
+        row |= {"weak_period_um": weak.period, "weak_direction_deg": weak.direction}
+        row["weak_share"] = weak.share
     digest = key_of("survey", *(field.digest() for field in fields))
     table = cached_table(digest, settings, lambda: build_with(fields, settings))
     row |= {"orders_x": table.coefficients.shape[2], "orders_y": table.coefficients.shape[1]}
@@ -208,9 +144,9 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
         measured = brdf_map(bsdf, job.theta, phi, resolution=job.resolution)
         content = file.read_bytes()
     row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
-    row["iridescence"] = iridescence(measured)
-    row |= {f"share_{name}": share for name, share in colours_of(measured).items()}
-    row["diffracted"] = _diffracted_share(measured)
+    diffracted = diffracted_light(table, Light(job.theta, phi))
+    row |= {"diffracted": diffracted.share, "iridescence": diffracted.iridescence()}
+    row |= {f"share_{name}": share for name, share in diffracted.hues().items()}
     return {".exr": content, ".png": _png(measured)}
 
 
@@ -221,12 +157,6 @@ def _heights(path: Path, treatment: Treatment) -> tuple[list[HeightField], Table
         settings = {**recipe.table, **treatment.settings}
         return recipe.fields(treatment.options), TableSettings(**settings)
     return [load_heights(path, treatment.options)], TableSettings(**treatment.settings)
-
-
-def _diffracted_share(brdf_map: BrdfMap) -> float:
-    """Return the share of the luminous power outside the mirror direction's lobe."""
-    luminance = brdf_map.luminance
-    return float(luminance[brdf_map.away_from_mirror()].sum() / max(luminance.sum(), 1e-30))
 
 
 def _png(brdf_map: BrdfMap) -> bytes:
@@ -249,18 +179,19 @@ def run_survey(
     theta: float = 30.0,
     resolution: int = 160,
     threads: int = 0,
+    repeats: str = "name",
     client: Any = None,
     progress: Progress = silent,
 ) -> list[dict[str, Any]]:
     """Measure every scan that the folder does not have yet, and write the results of all.
 
-    The folder holds `survey.csv`, a row for each scan; contact sheets of the maps; and in `scans` a
-    table (.exr), a map (.png) and a row (.json) of each scan. They are named by the content of the
-    scan and its treatment.
+    The folder holds `survey.csv`, a row for each scan; `samples.csv`, means and standard errors of
+    repeated scans; contact sheets of the maps; and in `scans` a table (.exr), a map (.png) and a
+    row (.json) of each scan. They are named by the content of the scan and its treatment.
 
     Parameters
     ----------
-    files : scans of any format, or recipes.
+    files : scans of any format, recipes, folders of them, or patterns as in "scans/*.spm".
     folder : folder of the survey, created if it does not exist.
     treatments : treatments by patterns (`load_treatments`).
     common : treatment of all files, which takes precedence.
@@ -268,6 +199,7 @@ def run_survey(
     theta : angle of the light from the normal, degrees, across the strongest grating's grooves.
     resolution : pixels a side of the maps.
     threads : threads of Dr.Jit in workers; 0 for one per core.
+    repeats : how repeated scans of a sample are told, one of `repeats.REPEATS`.
     client : `distributed.Client`, or None to measure in this process.
     progress : called as progress(scans done, scans in all, text).
 
@@ -278,12 +210,14 @@ def run_survey(
     Raises
     ------
     DiffractionError
-        If there are no files, or the folder cannot be written.
+        If there are no files, a folder or a pattern yields none, or the folder cannot be written.
     """
+    files = scan_files(files)
     if not files:
         raise DiffractionError("there is no scan to survey; name files")
     scans = folder / SCANS
     scans.mkdir(parents=True, exist_ok=True)
+    named = [{"file": str(file), "sample": sample_of(file, repeats)} for file in files]
     rows: dict[int, dict[str, Any]] = {}
     jobs: dict[int, Job] = {}
     for n, file in enumerate(files):
@@ -307,11 +241,12 @@ def run_survey(
             rows[n] = {"reason": f"{result.text} {result.worker}".strip()}
         else:
             rows[n] = _store(scans, files[n], jobs[n], result)
-        _write_table(folder / TABLE, files, rows)  # complete even if Ctrl-C ends the next scan
+        write_rows(folder / TABLE, named, rows)  # complete even if Ctrl-C ends the next scan
         progress(done, len(todo), "scans")
-    named = _write_table(folder / TABLE, files, rows)
-    _write_sheets(folder, named)
-    return named
+    result = write_rows(folder / TABLE, named, rows)
+    write_repeats(folder / SAMPLES, result)
+    write_sheets(folder, result)
+    return result
 
 
 def _files_of(file: Path) -> SceneFiles:
@@ -345,52 +280,3 @@ def _store(scans: Path, file: Path, job: Job, result: Measured) -> dict[str, Any
         with atomic_path(scans / f"{stem}.json") as temporary:
             temporary.write_text(json.dumps(row), "utf-8")
     return row
-
-
-def _write_table(
-    path: Path, files: Sequence[Path], rows_by_number: Mapping[int, Mapping[str, Any]]
-) -> list[dict[str, Any]]:
-    """Write the measured rows in the order of the files as CSV, and return them."""
-    rows = [{"file": str(files[n]), **rows_by_number[n]} for n in sorted(rows_by_number)]
-    columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
-    names = ["file", "reason", *(n for n in columns if n not in ("file", "reason"))]
-    text = io.StringIO()
-    writer = csv.DictWriter(text, names, restval="", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    with atomic_path(path) as temporary:
-        temporary.write_text(text.getvalue(), "utf-8")
-    return rows
-
-
-def _write_sheets(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write contact sheets of all maps."""
-    per_page = _COLUMNS * _ROWS
-    measured = [row for row in rows if not row["reason"]]
-    for page in range(math.ceil(len(measured) / per_page)):
-        name = SHEET if len(measured) <= per_page else f"{SHEET}-{page + 1:03d}"
-        with atomic_path(folder / f"{name}.png") as temporary:
-            sheet = _sheet(folder, measured[page * per_page : (page + 1) * per_page])
-            sheet.savefig(temporary, format="png")
-
-
-def _sheet(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Figure:
-    """Draw a contact sheet: maps with file name, strongest grating and iridescence."""
-    from matplotlib.figure import Figure
-    from PIL import Image
-
-    lines = math.ceil(len(rows) / _COLUMNS)
-    figure = Figure(figsize=(2.2 * _COLUMNS, 2.7 * lines), dpi=100, layout="constrained")
-    for axes, row in zip(figure.subplots(lines, _COLUMNS, squeeze=False).flat, rows, strict=False):
-        with Image.open(folder / row["map"]) as picture:
-            axes.imshow(picture)
-        period = row.get("period_1_um")
-        title = "" if period is None else f"{period:.3g} µm at {row['direction_1_deg']:.0f}°, "
-        axes.set_title(
-            f"{Path(row['file']).name[:34]}\n{title}iridescence {row['iridescence']:.2g}"
-            + (f"\n{row['tiling']}" if row["tiling"] else ""),
-            fontsize=6,
-        )
-    for axes in figure.axes:
-        axes.set_axis_off()
-    return figure

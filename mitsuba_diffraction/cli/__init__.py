@@ -8,7 +8,9 @@ info                   what is in a file
 tangents               a patch laid smoothly over any mesh
 plan                   what a plan says, and `render --plan`
 render                 a scene to a picture; `render --frames`: pictures of a scene that changes
+tonemap                a linear EXR to a PNG
 brdf_map               the hemisphere of view directions, by the BSDF or by a method
+spectrum               reflectance spectra as a spectrometer measures them
 evaluate, sweep        the methods of the thesis
 survey                 many scans: a row, a table and a map each
 tradeoff               accuracy against speed and memory

@@ -159,12 +159,15 @@ def _heights(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def _periods(field: HeightField) -> dict[str, list[str]]:
-    """Return the gratings found in the patch, if any."""
-    from ..heights.spectra import dominant_periods
+def _periods(field: HeightField) -> dict[str, Any]:
+    """Return the gratings of the patch, and a structure that is too weak for one, if any."""
+    from ..heights.spectra import LEAST_SHARE, examine_periods
 
-    periods = [str(grating) for grating in dominant_periods(field)]
-    return {"periods": periods} if periods else {}
+    gratings, weak = examine_periods(field)
+    described: dict[str, Any] = {"periods": [str(grating) for grating in gratings] or ["none"]}
+    if weak is not None:
+        described["weak period"] = f"{weak}, below the {LEAST_SHARE:.0%} of a grating"
+    return described
 
 
 def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError, quoted
 from ..files import readable_file
+from ..optics.display import VIEWS
 from ..scene.parameters import Change, change_of
 from ..settings import TableSettings, checked, described_setting
 
@@ -303,6 +304,15 @@ def add_exposure(group: Group, default: float | None, text: str) -> None:
     group.add_argument(
         "--exposure", metavar="EV", type=number_between(-100, 100), default=default, help=text
     )
+
+
+def add_view(group: Group) -> None:
+    """Add the view by which a picture's linear light is shown."""
+    group.add_argument(
+        "--view", choices=VIEWS, default="natural",
+        help="natural keeps hues and turns what is bright to white; standard clips each channel "
+        "by itself; default: natural",
+    )  # fmt: skip
 
 
 def add_scene(parser: argparse.ArgumentParser) -> None:

@@ -33,6 +33,7 @@ def add_view(subparsers: options.Subparsers) -> None:
         "--method", choices=METHODS, default="lut", help="method of the shaders; default: lut"
     )
     options.add_exposure(parser, 0.0, "stops to start with: +1 doubles the light; default: 0")
+    options.add_view(parser)
     parser.add_argument(
         "--size", metavar="WxH", type=_size, default=(1280, 800),
         help="size of the window in pixels; default: 1280x800",
@@ -64,7 +65,8 @@ def view(args: argparse.Namespace) -> int:
     with mitsuba_warnings():
         frames, milliseconds = show(
             _scene(args, parameters), sensor=args.sensor, method=args.method, stops=args.exposure,
-            size=args.size, folder=args.output, frames=args.frames, window=args.window,
+            view=args.view, size=args.size, folder=args.output, frames=args.frames,
+            window=args.window,
         )  # fmt: skip
     print(f"{frames} frames, {milliseconds:.3g} ms each at the end, method {args.method}")
     return 0
@@ -151,6 +153,10 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
         "--method", choices=(*WEB_METHODS, "all"), default="all",
         help="method on the page; all leaves out those that do not suit the scene; default: all",
     )  # fmt: skip
+    options.add_view(parser)
+    parser.add_argument(
+        "--title", metavar="TEXT", help="title of the page; default: the scene's name"
+    )
     options.add_json(parser, "what the page shows")
 
 
@@ -167,8 +173,9 @@ def export_viewer(args: argparse.Namespace) -> int:
     with mitsuba_warnings(), Bar(args, delay=0) as bar:
         bar(0, 0, "loading")
         page = export_viewer(
-            _scene(args, parameters), args.output, title=args.name.stem, sensor=args.sensor,
-            progress=bar, methods=WEB_METHODS if args.method == "all" else (args.method,),
+            _scene(args, parameters), args.output, title=args.title or args.name.stem,
+            sensor=args.sensor, view=args.view, progress=bar,
+            methods=WEB_METHODS if args.method == "all" else (args.method,),
         )  # fmt: skip
     if page.omissions:
         say_warning(f"the page does not show: {'; '.join(dict.fromkeys(page.omissions))}")

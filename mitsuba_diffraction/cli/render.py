@@ -21,13 +21,10 @@ from ..scene.parameters import values_of_frames
 from ..scene.passes import (
     Result,
     Stop,
-    colours_of,
-    count_bad,
     integrator_of,
     render_passes,
-    write_exr,
-    write_png,
 )
+from ..scene.pictures import colours_of, count_bad, write_exr, write_png
 from . import options
 from .console import INTERRUPTED, Bar, mitsuba_warnings, say, say_warning
 from .options import change, number_between, whole_number
@@ -57,6 +54,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     options.add_samples(parser, 1, None)
     options.add_exposure(parser, 0.0, "of the PNG, in stops: +1 doubles the light; default: 0")
+    options.add_view(parser)
     parser.add_argument(
         "--preview", action="store_true",
         help="half the width and height, and at most 16 samples, unless -s is given",
@@ -216,7 +214,7 @@ def _finish(
     if colours is None:
         say_warning("the film holds no colours that a PNG could show; only the EXR was written")
     else:
-        write_png(colours, outputs.png, args.exposure)
+        write_png(colours, outputs.png, args.exposure, args.view)
         written.append(outputs.png)
     width, height = result.bitmap.size()
     samples = "1 sample" if result.spp == 1 else f"{result.spp} samples"
@@ -361,6 +359,7 @@ def _frames(args: argparse.Namespace, folder: Path) -> list[Frame]:
                 "variant": args.mode or "the default",
                 "sensor": args.sensor,
                 "exposure": args.exposure,
+                "view": args.view,
                 "preview": args.preview,
                 "version": version("mitsuba_diffraction"),
             },

@@ -89,11 +89,14 @@ def run(args: argparse.Namespace) -> int:
     lam = _wavelengths(args)
 
     variant = set_variant("llvm_ad_spectral_polarized" if args.polarisation else "llvm_ad_spectral")
-    from ..analysis.spectra import Geometry, mean_spectra, save_csv, save_errors, spectra_figure
+    from ..analysis.spectra import Geometry, check_material, mean_spectra
+    from ..analysis.spectra_files import save_csv, save_errors, spectra_figure
     from ..atomic import atomic_path
 
     detectors = (args.light,) if args.detector is None else tuple(args.detector)
     geometry = Geometry(args.light, detectors, args.light_azimuth, args.acceptance)
+    if args.material is not None:  # before its table is built
+        check_material(args.material, lam)
     with mitsuba_warnings(), Bar(args) as bar:
         spectra = mean_spectra([_measured(args, file, geometry, lam, bar) for file in files])
     save_csv(spectra, output)
@@ -138,9 +141,9 @@ def _measured(
     from ..tables.store import loaded_table
 
     if is_table(file):
-        settings = [f"--{n.replace('_', '-')}" for n in options.table_options(args)]
-        settings = [name for name in settings if name != "--wavelength-range"]
-        if refused := [*options.used_heights_options(args), *settings]:
+        names = [f"--{n.replace('_', '-')}" for n in options.table_options(args)]
+        names = [name for name in names if name != "--wavelength-range"]
+        if refused := [*options.used_heights_options(args), *names]:
             raise DiffractionError(
                 f"'{file}' is a table, which has its own; leave {refused[0]} out"
             )
@@ -152,7 +155,8 @@ def _measured(
         span = (min(lam[0], SHORTEST), max(lam[-1], LONGEST))
         how = options.load_options(args)
         asked = options.table_options(args) | {"wavelength_range": span}
-        table = table_of(file, how, asked)
+        bar(0, 0, f"tabulating {file.name}")
+        table = table_of(file, how, asked, bar)
         if line := notes_line(table.source["warnings"], file, how, TableSettings(**asked)):
             say(line)
     return spectrum(

@@ -22,11 +22,16 @@ def add_parser(subparsers: options.Subparsers) -> None:
         subparsers, "survey", run, "measure many scans: tables, maps, gratings, colours",
         "For each scan build its table, map its BRDF and measure its heights, the gratings in "
         "it, the colours that it shows and how much they change with direction. Writes "
-        "survey.csv, contact sheets, and a table and a map of each scan. A scan that fails is "
-        "a row with its reason; a second run measures only new scans.",
+        "survey.csv, samples.csv (means and standard errors of repeated scans), contact sheets, "
+        "and a table and a map of each scan. A scan that fails is a row with its reason, and the "
+        "command then exits with 1; a second run measures only new scans.",
     )  # fmt: skip
     parser.add_argument(
-        "files", metavar="FILE", type=Path, nargs="+", help="scans of any format, or recipes"
+        "files",
+        metavar="FILE",
+        type=Path,
+        nargs="+",
+        help="scans of any format, recipes, folders of them, or patterns like 'scans/*.spm'",
     )
     options.add_output(parser, "default: survey", default=Path("survey"))
     parser.add_argument(
@@ -41,6 +46,11 @@ def add_parser(subparsers: options.Subparsers) -> None:
     parser.add_argument(
         "--resolution", metavar="N", type=whole_number(8), default=160,
         help="pixels of a map a side; default: 160",
+    )  # fmt: skip
+    parser.add_argument(
+        "--repeats", choices=("name", "folder"), default="name",
+        help="which scans are of one sample: those whose names differ in their last number, or "
+        "those of one folder; default: name",
     )  # fmt: skip
     options.add_mode(parser)
     options.add_heights(parser)
@@ -65,9 +75,10 @@ def run(args: argparse.Namespace) -> int:
     seconds = time.perf_counter() - start
     save_report(args, {"rows": rows, "seconds": seconds})
     print(
-        f"{args.output}: {len(rows) - failed} scans in survey.csv, {failed} failed, {seconds:.1f} s"
+        f"{args.output}: {len(rows) - failed} scans in survey.csv, {failed} failed, "
+        f"{len({row['sample'] for row in rows})} samples in samples.csv, {seconds:.1f} s"
     )
-    return 0
+    return 1 if failed else 0
 
 
 def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
@@ -75,7 +86,8 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
     own_options, settings = options.load_options(args), options.table_options(args)
     check_writable(args.output / "survey.csv", make_folder=True)
 
-    from ..analysis.survey import Treatment, load_treatments, run_survey
+    from ..analysis.survey import run_survey
+    from ..analysis.treatments import Treatment, load_treatments
 
     treatments = load_treatments(args.treatments)
     variant = set_variant(args.mode or "llvm_ad_rgb")
@@ -89,5 +101,6 @@ def _measured(args: argparse.Namespace) -> list[dict[str, Any]]:
         return run_survey(
             args.files, args.output, treatments=treatments,
             common=Treatment(own_options, settings), variant=variant, theta=args.theta,
-            resolution=args.resolution, threads=worker_threads(args), client=client, progress=bar,
+            resolution=args.resolution, threads=worker_threads(args), repeats=args.repeats,
+            client=client, progress=bar,
         )  # fmt: skip

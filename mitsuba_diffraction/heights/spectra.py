@@ -7,12 +7,12 @@ frequency (0, 0) in the middle (`numpy.fft.fftshift`).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.ndimage import gaussian_filter, map_coordinates, maximum_filter
 
 from .field import HeightField
 
@@ -27,6 +27,11 @@ LEAST_SHARE = 0.1
 _PROFILE = 0.9
 # Fewer periods than this in a patch cannot be told from its tilt and bending.
 _FEWEST_PERIODS = 2.5
+# Least share of a weak structure that is worth mentioning.
+_LEAST_WEAK = 0.01
+# Least height of a fundamental, relative to the harmonic that is examined. The side lobes of a Hann
+# window are below 1e-3.
+_LEAST_FUNDAMENTAL = 0.02
 # Peaks closer in direction than this, degrees, are harmonics or irregularities of one grating.
 _SAME = 15.0
 # Background along a peak's direction: frequencies that are the peak's divided by these factors.
@@ -71,58 +76,168 @@ class Periodicity:
     share: float  # of the variance of the heights, 0 to 1, without harmonics
 
     def __str__(self) -> str:
-        return f"{self.period:.4g} µm along {self.direction:.0f}°, {self.share:.0%} of the variance"
+        degrees = round(self.direction)
+        return f"{self.period:.4g} µm along {degrees}°, {self.share:.0%} of the variance"
+
+
+class Periods(NamedTuple):
+    """Gratings of a patch, and the strongest periodic structure that is too weak for a grating."""
+
+    gratings: list[Periodicity]  # the largest share of variance first
+    weak: Periodicity | None  # holds less than `LEAST_SHARE`; None if no other peak stands out
 
 
 def dominant_periods(field: HeightField, most: int = 3) -> list[Periodicity]:
-    """Find at most `most` gratings in a patch's spectrum, the largest share of variance first.
+    """Return the gratings of `examine_periods`."""
+    return examine_periods(field, most).gratings
+
+
+def examine_periods(field: HeightField, most: int = 3) -> Periods:
+    """Find at most `most` gratings in a patch's spectrum.
 
     A peak is a grating if it is `CONTRAST` times above its surroundings and holds `LEAST_SHARE` of
     the variance. The frequency is the centre of mass of the power around the peak. Of several peaks
-    in one direction, such as harmonics, only the strongest counts. A grating has two and a half
-    periods at least, unless the heights hardly change along the other axis: the patch tiles the
-    plane, so such a profile is a grating.
+    in one direction only the strongest counts. If a peak at a half or a third of its frequency
+    stands out, too, it is a harmonic, and the lower peak is the grating.
+
+    Tilt and bow of a scan are subtracted first, as the best surface of second degree. A grating has
+    two and a half periods at least, unless the patch is whole periods (not `cut_out`) and hardly
+    changes along the other axis: the patch tiles the plane, so such a profile is a grating.
     """
     central = field.heights[tuple(_central(n) for n in field.shape)]
-    patch = HeightField(central, field.pixel_size)
-    power = height_spectrum(patch)
-    total = float(power.sum())
-    if not total > 0.0:
-        return []
-    fx, fy = np.broadcast_arrays(*frequencies(patch))
-    (width, height), (ny, nx) = patch.extent, patch.shape
-    repeats = np.hypot(fx * width, fy * height)
-    half = (fy > 0) | ((fy == 0) & (fx > 0))
-    left = np.where(half & (repeats >= _FEWEST_PERIODS), power, 0.0)
+    if field.cut_out or central.shape != field.shape:
+        central = _without_bow(central)
+    spectrum = _Spectrum(HeightField(central, field.pixel_size))
+    if not spectrum.total > 0.0:
+        return Periods([], None)
+    candidates = spectrum.summits & spectrum.half & (spectrum.repeats >= _FEWEST_PERIODS)
+    left = np.where(candidates, spectrum.power, 0.0)
     gratings: list[Periodicity] = []
+    weak: list[Periodicity] = []
     for _ in range(_CANDIDATES):
-        iy, ix = np.unravel_index(left.argmax(), left.shape)
-        highest = float(left[iy, ix])
-        if len(gratings) == most or not highest > 0.0:
+        index = np.unravel_index(left.argmax(), left.shape)
+        if len(gratings) == most or not left[index] > 0.0:
             break
-        peak = np.array([fx[iy, ix], fy[iy, ix]])
+        peak = spectrum.peak(int(index[0]), int(index[1]))
+        if not (peak.repeats >= _FEWEST_PERIODS and peak.contrast > CONTRAST):
+            left[peak.near] = 0.0
+            continue
+        lower = spectrum.fundamental(peak)
+        share = peak.share if lower is None else peak.share + lower.share
+        lowest = lower or peak
+        if share < LEAST_SHARE:
+            if share >= _LEAST_WEAK:
+                weak.append(_periodicity(lowest.centre, share))
+            left[peak.near] = 0.0
+            continue
+        if lowest.repeats >= _FEWEST_PERIODS:
+            gratings.append(_periodicity(lowest.centre, min(share, 1.0)))
+        left[peak.explained] = spectrum.power[peak.explained] = 0.0
+    gratings.sort(key=lambda grating: -grating.share)
+    if not gratings and not field.cut_out:
+        gratings = _repeated_profile(field)
+    weak.sort(key=lambda structure: -structure.share)
+    return Periods(gratings, weak[0] if weak else None)
+
+
+@dataclass(frozen=True, eq=False)
+class _Peak:
+    """Peak of a spectrum; masks have the spectrum's shape."""
+
+    centre: FloatArray  # centre of mass (fx, fy), 1/µm
+    highest: tuple[int, int]  # row and column of the highest value
+    near: npt.NDArray[np.bool_]  # bins of the peak
+    line: npt.NDArray[np.bool_]  # bins of its direction, of all frequencies
+    explained: npt.NDArray[np.bool_]  # its line and directions that count as the same
+    share: float  # of the variance
+    repeats: float  # periods in the patch
+    contrast: float  # highest value over the largest median of the surroundings
+
+
+class _Spectrum:
+    """Power spectrum of a patch, in which peaks are examined."""
+
+    def __init__(self, patch: HeightField) -> None:
+        self.power = height_spectrum(patch)
+        self.total = float(self.power.sum())
+        self.fx, self.fy = np.broadcast_arrays(*frequencies(patch))
+        self.extent = patch.extent
+        self.repeats = np.hypot(self.fx * patch.extent[0], self.fy * patch.extent[1])
+        # bins above their neighbours: the skirts of a peak are not
+        self.summits = self.power == maximum_filter(self.power, 3, mode="wrap")
+        self.half = (self.fy > 0) | ((self.fy == 0) & (self.fx > 0))
+
+    def peak(self, iy: int, ix: int, without: npt.NDArray[np.bool_] | None = None) -> _Peak:
+        """Return the peak around the bin in row `iy` and column `ix`.
+
+        without : bins of another peak, which do not count.
+        """
+        (ny, nx), (width, height) = self.power.shape, self.extent
+        fx, fy, power = self.fx, self.fy, self.power
+        top = np.array([fx[iy, ix], fy[iy, ix]])
         rows, columns = np.abs(np.arange(ny) - iy), np.abs(np.arange(nx) - ix)
         near = (rows[:, None] <= _LOBE) & (columns <= _LOBE)
-        along = (fx * peak[0] + fy * peak[1]) / (peak @ peak)  # in units of the peak's frequency
-        across = (fx * peak[1] - fy * peak[0]) / (peak @ peak)
+        along = (fx * top[0] + fy * top[1]) / (top @ top)  # in units of the peak's frequency
+        across = (fx * top[1] - fy * top[0]) / (top @ top)
         near |= (np.abs(along - 1) < _SPREAD) & (np.abs(across) < _FAN * along)
+        if without is not None:
+            near &= ~without
         weight = power[near]
-        share = 2.0 * float(weight.sum()) / total  # twice: the mirror image holds as much
-        centre = np.array([weight @ fx[near], weight @ fy[near]]) / weight.sum()
-        aside = np.hypot((fx - along * peak[0]) * width, (fy - along * peak[1]) * height)
+        mass = max(float(weight.sum()), 1e-300)
+        centre = np.array([weight @ fx[near], weight @ fy[near]]) / mass
+        aside = np.hypot((fx - along * top[0]) * width, (fy - along * top[1]) * height)
         line = aside < _LOBE + 1
-        ring = (np.abs(repeats - repeats[iy, ix]) < 1.5) & ~line & half
+        repeats = self.repeats[iy, ix]
+        ring = (np.abs(self.repeats - repeats) < 1.5) & ~line & self.half
         beside = line & (along > 1 / _BESIDE[1]) & (along < 1 / _BESIDE[0])
-        beside &= repeats < repeats[iy, ix] - _LOBE - 0.5  # the lobe lies between two bins
+        beside &= self.repeats < repeats - _LOBE - 0.5  # the lobe lies between two bins
         background = [float(np.median(power[part])) for part in (ring, beside) if part.any()]
-        repeated = np.hypot(*(centre * (width, height))) >= _FEWEST_PERIODS
-        if share >= LEAST_SHARE and repeated and highest > CONTRAST * max(background, default=0.0):
-            gratings.append(_periodicity(centre, min(share, 1.0)))
-            explained = line | (np.abs(across) <= math.tan(math.radians(_SAME)) * np.abs(along))
-            left[explained] = power[explained] = 0.0
-        else:
-            left[near] = 0.0
-    return sorted(gratings, key=lambda grating: -grating.share) or _repeated_profile(field)
+        return _Peak(
+            centre=centre,
+            highest=(iy, ix),
+            near=near,
+            line=line,
+            explained=line | (np.abs(across) <= math.tan(math.radians(_SAME)) * np.abs(along)),
+            share=2.0 * mass / self.total,  # twice: the mirror image holds as much
+            repeats=float(np.hypot(*(centre * (width, height)))),
+            contrast=float(power[iy, ix] / max(max(background, default=0.0), 1e-300)),
+        )
+
+    def fundamental(self, peak: _Peak) -> _Peak | None:
+        """Return the peak of which another is the second or third harmonic; None without one."""
+        top = np.array([self.fx[peak.highest], self.fy[peak.highest]])
+        along = (self.fx * top[0] + self.fy * top[1]) / (top @ top)
+        bin_width = 1.0 / self.repeats[peak.highest]
+        for harmonic in (2, 3):
+            middle = 1.0 / harmonic
+            half = max(_SPREAD * middle, 0.75 * bin_width)
+            band = peak.line & self.summits & (np.abs(along - middle) <= half)
+            if not band.any() or not self.power[band].max() > 0.0:
+                continue
+            index = np.unravel_index(np.where(band, self.power, 0.0).argmax(), band.shape)
+            lower = self.peak(int(index[0]), int(index[1]), peak.near)
+            # what remains of a bow decreases with the frequency, a fundamental does not
+            below = peak.line & (along > 0.5 * bin_width) & (along < middle - half)
+            tops_bow = self.power[index] > self.power[below].max(initial=0.0)
+            if (
+                lower.contrast > CONTRAST
+                and self.power[index] > _LEAST_FUNDAMENTAL * self.power[peak.highest]
+                and (tops_bow or lower.repeats >= 2 * _FEWEST_PERIODS)
+            ):
+                # the harmonic's frequency is known better, since it repeats more often
+                centre, repeats = peak.centre / harmonic, peak.repeats / harmonic
+                return replace(lower, centre=centre, repeats=repeats)
+        return None
+
+
+def _without_bow(heights: FloatArray) -> FloatArray:
+    """Subtract the least-squares surface of second degree."""
+    y, x = (np.linspace(-1.0, 1.0, count) for count in heights.shape)
+    terms = np.stack(np.broadcast_arrays(
+        1.0, x, y[:, None], x**2, y[:, None] ** 2, x * y[:, None]
+    )).reshape(6, -1)  # fmt: skip
+    solution = np.linalg.lstsq(terms @ terms.T, terms @ heights.ravel(), rcond=None)[0]
+    return np.asarray(heights - (solution @ terms).reshape(heights.shape))
 
 
 def _repeated_profile(field: HeightField) -> list[Periodicity]:

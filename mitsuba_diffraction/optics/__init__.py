@@ -13,4 +13,5 @@ mean_second_order    mean of the second order under a thin film, for either dire
 coat       a clear coat over a structure
 through    light that goes through a dielectric, or a thin sheet
 colour     spectra to XYZ and sRGB; differences of colours
+display    linear sRGB to the values of a screen, by a view
 """

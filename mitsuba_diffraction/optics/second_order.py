@@ -125,7 +125,7 @@ class Perturbation:
         """Flux of waves against test waves −k that go down in the material, and γ = κ_z + κ'_z."""
         to = _wave(k, self._index) * [-1, -1, -1]
         tests, fields = axes(to, self._index), axes(wave, 1.0)
-        products = [np.einsum("...i,...i", one, e) for one in tests for e in fields]
+        products = [np.einsum("...i,...i", test, e) for test in tests for e in fields]
         stacked = np.stack(products, axis=-1)
         flux = (self._index**2 - 1.0) * stacked.reshape(*stacked.shape[:-1], 2, 2)
         return flux, (wave + to)[..., 2, None, None]

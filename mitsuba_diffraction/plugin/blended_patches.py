@@ -80,10 +80,10 @@ class DiffractionMix(mi.BSDF):
     def __init__(self, props: Properties) -> None:
         super().__init__(props)
         objects = dict(props.objects())
-        self.bsdfs = {name: one for name, one in objects.items() if isinstance(one, mi.BSDF)}
+        self.bsdfs = {name: bsdf for name, bsdf in objects.items() if isinstance(bsdf, mi.BSDF)}
         self.weights = _weights(props, list(self.bsdfs), objects)
         self._held = list(self.bsdfs.values())  # where `dr.freeze` finds them
-        components = [one.flags(n) for one in self._held for n in range(one.component_count())]
+        components = [bsdf.flags(n) for bsdf in self._held for n in range(bsdf.component_count())]
         self.m_components = components  # at once: what it gives back is a copy
         self.m_flags = functools.reduce(operator.or_, components)
         self.parameters = [
@@ -102,12 +102,14 @@ class DiffractionMix(mi.BSDF):
     def eval(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Spectrum:
         """Return f cosθo per wavelength."""
         weights = [self._weights_at(si, _wide(active, si, wo.z))]
-        return self._sum(ctx, weights, lambda one, own, on: [one.eval(own, si, wo, on)], "v")[0]
+        ask: Ask = lambda bsdf, context, on: [bsdf.eval(context, si, wo, on)]  # noqa: E731
+        return self._sum(ctx, weights, ask, "v")[0]
 
     def pdf(self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True) -> Float:
         """Return the density of `sample` per solid angle."""
         shares = [self._shares(ctx, self._weights_at(si, _wide(active, si, wo.z)))]
-        return self._sum(ctx, shares, lambda one, own, on: [one.pdf(own, si, wo, on)], "d")[0]
+        ask: Ask = lambda bsdf, context, on: [bsdf.pdf(context, si, wo, on)]  # noqa: E731
+        return self._sum(ctx, shares, ask, "d")[0]
 
     def eval_pdf(
         self, ctx: Context, si: Interaction, wo: Vector3f, active: Mask = True
@@ -116,7 +118,7 @@ class DiffractionMix(mi.BSDF):
         weights = self._weights_at(si, _wide(active, si, wo.z))
         both = [weights, self._shares(ctx, weights)]
         value, density = self._sum(
-            ctx, both, lambda one, own, on: one.eval_pdf(own, si, wo, on), "vd"
+            ctx, both, lambda bsdf, context, on: bsdf.eval_pdf(context, si, wo, on), "vd"
         )
         return value, density
 
@@ -137,11 +139,11 @@ class DiffractionMix(mi.BSDF):
         result, value = dr.zeros(mi.BSDFSample3f), mi.Spectrum(0.0)
         chosen, weight, share = mi.UInt32(_ALL), mi.Float(0.0), mi.Float(0.0)
         lower = mi.Float(0.0)
-        for n, one, own, first in self._asked(ctx):
+        for n, bsdf, context, first in self._asked(ctx):
             here = (shares[n] > 0.0) & (sample1 >= lower) & (sample1 < lower + shares[n])
             left = (sample1 - lower) * dr.rcp(dr.select(here, shares[n], 1.0))
             lower = lower + shares[n]
-            draw = functools.partial(_drawn, one, own, si, left, sample2)
+            draw = functools.partial(_drawn, bsdf, context, si, left, sample2)
             drawn, of_drawn = _where(here, draw, (result, value))
             result, value = dr.select(here, drawn, result), dr.select(here, of_drawn, value)
             result.sampled_component += dr.select(here, mi.UInt32(first), 0)
@@ -152,7 +154,7 @@ class DiffractionMix(mi.BSDF):
         others, density = self._sum(
             ctx,
             [weights, shares],
-            lambda one, own, on: one.eval_pdf(own, si, result.wo, on),
+            lambda bsdf, context, on: bsdf.eval_pdf(context, si, result.wo, on),
             "vd",
             lambda n: smooth & (chosen != n),
         )
@@ -164,13 +166,13 @@ class DiffractionMix(mi.BSDF):
     def eval_diffuse_reflectance(self, si: Interaction, active: Mask = True) -> Spectrum:
         """Return the weighted reflectances of the surfaces, for denoisers."""
         weights = [self._weights_at(si, _wide(active, si))]
-        ask: Ask = lambda one, own, on: [one.eval_diffuse_reflectance(si, on)]  # noqa: E731
+        ask: Ask = lambda bsdf, context, on: [bsdf.eval_diffuse_reflectance(si, on)]  # noqa: E731
         return self._sum(mi.BSDFContext(), weights, ask, "v")[0]
 
     def traverse(self, callback: Callback) -> None:
         """Expose surfaces and weights."""
-        for name, one in self.bsdfs.items():
-            callback.put(name, one, mi.ParamFlags.Differentiable)
+        for name, bsdf in self.bsdfs.items():
+            callback.put(name, bsdf, mi.ParamFlags.Differentiable)
         for name, weight in self.weights.items():
             if isinstance(weight, Bounded):
                 weight.traverse(callback)
@@ -184,7 +186,7 @@ class DiffractionMix(mi.BSDF):
     @property
     def together(self) -> list[Changing]:
         """This BSDF and the surfaces in it, whose changes are refused together."""
-        return [self, *(one for one in self._held if hasattr(one, "mix"))]
+        return [self, *(bsdf for bsdf in self._held if hasattr(bsdf, "mix"))]
 
     def refusals(self) -> Iterator[str | None]:
         """See `Changing.refusals`."""
@@ -199,8 +201,10 @@ class DiffractionMix(mi.BSDF):
 
     def to_string(self) -> str:
         """Describe all parameters, for people."""
-        lines = [f"  {name} = {one},\n" for name, one in self.bsdfs.items()]
-        lines += [f"  {_PREFIX}{name} = {_text(one)},\n" for name, one in self.weights.items()]
+        lines = [f"  {name} = {bsdf},\n" for name, bsdf in self.bsdfs.items()]
+        lines += [
+            f"  {_PREFIX}{name} = {_text(weight)},\n" for name, weight in self.weights.items()
+        ]
         return f"DiffractionMix[\n{''.join(lines)}]"
 
     # ------------------------------------------------------------------ the weights
@@ -208,29 +212,29 @@ class DiffractionMix(mi.BSDF):
     def _weights_at(self, si: Interaction, active: Mask) -> list[Float]:
         """Return the surfaces' weights, of sum 1; 0 where inactive or where all are 0."""
         explicit = [_weight_at(weight, si, active) for weight in self.weights.values()]
-        rest = dr.maximum(1.0 - sum(one for one in explicit if one is not None), 0.0)
-        weights = [rest if one is None else one for one in explicit]
+        rest = dr.maximum(1.0 - sum(weight for weight in explicit if weight is not None), 0.0)
+        weights = [rest if weight is None else weight for weight in explicit]
         total: Float = sum(weights, mi.Float(0.0))
         some = mi.Mask(active) & (total > 0.0)
         scale = dr.select(some, dr.rcp(dr.select(some, total, 1.0)), 0.0)
-        return [one * scale for one in weights]
+        return [weight * scale for weight in weights]
 
     def _shares(self, ctx: Context, weights: list[Float]) -> list[Float]:
         """Return shares of the samples: the weights; for a component of one surface, all."""
         if ctx.component == _ALL:
             return weights
-        return [dr.select(one > 0.0, mi.Float(1.0), 0.0) for one in weights]
+        return [dr.select(weight > 0.0, mi.Float(1.0), 0.0) for weight in weights]
 
     def _asked(self, ctx: Context) -> Iterator[tuple[int, BSDF, Context, int]]:
         """Yield number, surface, context for that surface, and its first component."""
         first = 0
-        for n, one in enumerate(self._held):
+        for n, bsdf in enumerate(self._held):
             if ctx.component == _ALL:
-                yield n, one, ctx, first
-            elif first <= ctx.component < first + one.component_count():
+                yield n, bsdf, ctx, first
+            elif first <= ctx.component < first + bsdf.component_count():
                 context = mi.BSDFContext(ctx.mode, ctx.type_mask, ctx.component - first)
-                yield n, one, context, 0
-            first += one.component_count()
+                yield n, bsdf, context, 0
+            first += bsdf.component_count()
 
     def _sum(
         self,
@@ -243,9 +247,9 @@ class DiffractionMix(mi.BSDF):
         """Sum the surfaces' answers, "v"alues and "d"ensities, times their shares."""
         nothing = [mi.Spectrum(0.0) if kind == "v" else mi.Float(0.0) for kind in kinds]
         totals = list(nothing)
-        for n, one, own, _ in self._asked(ctx):
+        for n, bsdf, context, _ in self._asked(ctx):
             on = mi.Mask((shares[0][n] > 0.0) & where(n))
-            answers = _where(on, functools.partial(ask, one, own), nothing)
+            answers = _where(on, functools.partial(ask, bsdf, context), nothing)
             totals = [
                 total + dr.select(on, part * share[n], 0.0)
                 for total, part, share in zip(totals, answers, shares, strict=True)
@@ -254,7 +258,7 @@ class DiffractionMix(mi.BSDF):
 
     def _sum_refusal(self) -> str | None:
         """Reason to refuse weights whose sum is 0 in places of the UV square, or None."""
-        if any(one is None or is_attribute(one) for one in self.weights.values()):
+        if any(weight is None or is_attribute(weight) for weight in self.weights.values()):
             return None
         totals = [sum(self._weights_at(si, True), mi.Float(0.0)) for si in _square()]
         if min(dr.slice(dr.min(total)) for total in totals) > 0.0:
@@ -265,15 +269,15 @@ class DiffractionMix(mi.BSDF):
 
 def _wide(active: Mask, si: Interaction, *arrays: Float) -> Mask:
     """Return a mask as wide as the arrays of its branch; otherwise Dr.Jit ends the process."""
-    for one in (si.wi.z, *arrays):
-        active = mi.Mask(active) & dr.isfinite(one)
+    for value in (si.wi.z, *arrays):
+        active = mi.Mask(active) & dr.isfinite(value)
     return active
 
 
 def _drawn(
-    one: BSDF, own: Context, si: Interaction, sample1: Float, sample2: Vector2f, on: Mask
+    bsdf: BSDF, context: Context, si: Interaction, sample1: Float, sample2: Vector2f, on: Mask
 ) -> Sequence[Any]:
-    return one.sample(own, si, sample1, sample2, on)
+    return bsdf.sample(context, si, sample1, sample2, on)
 
 
 def _where(on: Mask, ask: Callable[[Mask], Sequence[Any]], otherwise: Sequence[Any]) -> Any:
@@ -282,7 +286,7 @@ def _where(on: Mask, ask: Callable[[Mask], Sequence[Any]], otherwise: Sequence[A
         return ask(on) if on else otherwise
     # copies: Dr.Jit makes what comes out of both branches of what the one returned
     return dr.if_stmt(
-        (), on, lambda: tuple(ask(on)), lambda: tuple(type(one)(one) for one in otherwise)
+        (), on, lambda: tuple(ask(on)), lambda: tuple(type(value)(value) for value in otherwise)
     )
 
 

@@ -267,7 +267,9 @@ class Conductor:
     def _channels(self) -> Array:
         """n + ik of RGB's channels, without a medium."""
         si = dr.zeros(mi.SurfaceInteraction3f)
-        eta, k = (np.array(dr.detach(one.eval(si, True))).ravel() for one in (self.eta, self.k))
+        eta, k = (
+            np.array(dr.detach(texture.eval(si, True))).ravel() for texture in (self.eta, self.k)
+        )
         return np.asarray(eta + 1j * k)
 
     def traverse(self, callback: Callback) -> None:
@@ -281,8 +283,8 @@ class Conductor:
         if self._spectrum is None or not np.array_equal(self._channels(), self._spectrum[1]):
             return
         medium = 1.0 if self.medium is None else float(dr.slice(dr.detach(self.medium.eta)))
-        spectrum, channels = (fresnel.reflectance(1.0, one / medium) for one in self._spectrum)
-        self.tint = [mi.Color3f(one) for one in metal_tint(_VISIBLE, spectrum, channels).T.tolist()]
+        spectrum, channels = (fresnel.reflectance(1.0, index / medium) for index in self._spectrum)
+        self.tint = [mi.Color3f(rgb) for rgb in metal_tint(_VISIBLE, spectrum, channels).T.tolist()]
         dr.make_opaque(self.tint)
 
     def __str__(self) -> str:
@@ -342,6 +344,15 @@ def _conductors() -> list[str]:
         (name for name in names if name.removesuffix("_palik") not in names - {name}),
         key=str.lower,
     )
+
+
+def tabulated_range(material: str) -> tuple[float, float] | None:
+    """Return the first and the last wavelength, nm, of Mitsuba's table of a conductor, if any."""
+    file = Path(str(mi.file_resolver().resolve(f"data/ior/{material}.eta.spd")))
+    if not file.is_file():
+        return None
+    nodes = np.loadtxt(file)[:, 0]
+    return float(nodes[0]), float(nodes[-1])
 
 
 def _at(material: str, name: str, wavelength: float) -> Texture:

@@ -195,16 +195,16 @@ class UnderFilm:
         """The channels' values of those of `indices`."""
         return values if self.channels is None else self.channels.sums(values)
 
-    def wavenumbers(self, given: list[Float]) -> list[Float]:
+    def wavenumbers(self, wavenumbers: list[Float]) -> list[Float]:
         """Return wavenumbers of `indices`, rad/µm, from those of the channels."""
         if self.channels is None:
-            return given
+            return wavenumbers
         return [mi.Float(k) for k in wavenumber(self.channels.wavelengths).tolist()]
 
     def traverse(self, callback: Callback) -> None:
         """Expose the material's index, and `film_eta`, `film_k` and `film_thickness`."""
-        for one in (self.material, self.film, self._k, self._thickness):
-            one.traverse(callback)
+        for part in (self.material, self.film, self._k, self._thickness):
+            part.traverse(callback)
 
     def refusal(self) -> str | None:
         """Reason why the film is too thick to interfere or opaque, or None."""
@@ -263,13 +263,13 @@ def _complex(index: Number) -> Number:
     return index if dr.is_complex_v(index) else mi.Complex2f(index, 0.0)
 
 
-def _between(found: list[Number], wavelengths: list[float]) -> list[Number]:
+def _between(values: list[Number], wavelengths: list[float]) -> list[Number]:
     """Interpolate an index from red, green and blue to other wavelengths, constant outside."""
-    if len(found) == 1:
-        return found * len(wavelengths)
+    if len(values) == 1:
+        return values * len(wavelengths)
     shares = [np.interp(wavelengths, RGB_WAVELENGTHS[::-1], row) for row in np.eye(3)]
     rows = np.stack(shares[::-1], axis=1).tolist()
-    return [sum(n * w for n, w in zip(found, row, strict=True)) for row in rows]
+    return [sum(n * w for n, w in zip(values, row, strict=True)) for row in rows]
 
 
 def plain(number: Float) -> float:

@@ -84,7 +84,7 @@ def film_of(
     film = Dielectric(read_index(props, "film_ior"), medium, "film_eta")
     k, thickness = number(props, "film_k", 0.0), number(props, "film_thickness", 0.0)
     filmed = UnderFilm(material, film, k, thickness, wavelength, shortest)
-    for refused in (*(one.refusal() for one in filmed.changeable), filmed.refusal()):
+    for refused in (*(parameter.refusal() for parameter in filmed.changeable), filmed.refusal()):
         if refused:
             raise DiffractionError(refused)
     return filmed

@@ -155,10 +155,10 @@ def take_changes(changed: Changing, together: Sequence[Changing]) -> None:
         check_parameters(together)
         changed.derive()
     except BaseException:  # an interrupted computation leaves nothing half done either
-        for one in together:
-            for parameter in one.parameters:
+        for each in together:
+            for parameter in each.parameters:
                 parameter.restore()
-            one.derive()
+            each.derive()
         raise
     for parameter in changed.parameters:
         parameter.keep()
@@ -172,12 +172,12 @@ def check_parameters(together: Sequence[Changing]) -> None:
     DiffractionError
         With all that is refused.
     """
-    if refused := [line for one in together for line in _refused(one)]:
+    if refused := [line for each in together for line in _refused(each)]:
         raise DiffractionError("; ".join(refused))
 
 
 def _refused(changed: Changing) -> list[str]:
-    refused = [line for one in changed.parameters if (line := one.refusal())]
+    refused = [line for each in changed.parameters if (line := each.refusal())]
     return refused or [line for line in changed.refusals() if line]
 
 
@@ -215,11 +215,11 @@ def arrays_within(*holders: Any) -> list[Any]:
 
     They are the very objects, so that what Dr.Jit assigns to them the kernels see.
     """
-    found: dict[int, Any] = {}
+    values: dict[int, Any] = {}
     for holder in holders:
         for value in _walk(holder, set()):
-            found.setdefault(id(value), value)
-    return list(found.values())
+            values.setdefault(id(value), value)
+    return list(values.values())
 
 
 def marks(table: DiffractionTable, *constants: object) -> list[Any]:

@@ -93,7 +93,7 @@ def read_parameters(props: Properties, provider: TableProvider) -> Parameters:
         ratios = ratios_of_second_order(props, surface.table)
         if ratios is not None and isinstance(boundary, SmallSlope):
             second_order = SecondOrder(material, boundary, ratios)
-    undrawn = [one.choice for one in choices if not one.shaders]
+    undrawn = [choice.choice for choice in choices if not choice.shaders]
     return Parameters(
         surface=surface,
         reflectance=flat,

@@ -71,9 +71,9 @@ def name_of(element: Any, number: int | None = None) -> str:
     return kind if number is None else f"shape {number + 1} ({kind})"
 
 
-def own_id(given: str) -> str:
+def own_id(name: str) -> str:
     """Return the id that the scene gives, empty if Mitsuba made it up."""
-    return "" if given.startswith(_UNNAMED) else given
+    return "" if name.startswith(_UNNAMED) else name
 
 
 def _with_article(kind: str) -> str:

@@ -16,7 +16,8 @@ from ..files import refuse_pipe
 from ..progress import Progress
 from .load import load_scene, preview_samples, sensor_of, shrink
 from .parameters import files_of
-from .passes import Stop, colours_of, count_bad, render_passes, write_exr, write_png
+from .passes import Stop, render_passes
+from .pictures import colours_of, count_bad, write_exr, write_png
 
 #: Suffixes of films, and what Pillow needs to know about each.
 FILMS: dict[str, dict[str, Any]] = {
@@ -67,7 +68,7 @@ def render_frames(
     """Render and write frame after frame, in the variant that is set; ends early after Ctrl-C.
 
     frames : settings hold `samples` (a number, or a text for the scene's own), `seed`, `sensor`,
-        `exposure` and `preview`.
+        `exposure`, `view` and `preview`.
     with_exr : write a linear EXR beside each PNG.
     progress : called as progress(samples done, samples in all, text).
 
@@ -119,7 +120,8 @@ def write_frame(frame: Frame, bitmap: Any, scene: Path, variant: str, with_exr: 
     if with_exr:
         write_exr(bitmap, frame.exr, {"scene": str(scene), "variant": variant})
     # the PNG marks the frame as done
-    write_png(colours, frame.png, frame.settings["exposure"], {_KEY: json.dumps(frame.settings)})
+    exposure, view = frame.settings["exposure"], frame.settings["view"]
+    write_png(colours, frame.png, exposure, view, {_KEY: json.dumps(frame.settings)})
 
 
 def write_film(frames: Sequence[Path], film: Path, fps: float) -> None:

@@ -1,7 +1,5 @@
 """Rendering in passes, so that there is progress to show and Ctrl-C keeps the picture so far.
 
-Pictures are written as EXR, linear, and as PNG, for the eye.
-
 A seed gives the same random numbers everywhere, and with one Dr.Jit thread the same picture bit for
 bit. Several threads add their samples to the film in the order in which they finish, in single
 precision, so that two runs of one process agree within 1e-6 of the film's largest value. Filters
@@ -12,22 +10,17 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from types import FrameType
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..atomic import atomic_path
-from ..errors import DiffractionError, one_line
+from ..errors import DiffractionError
 from ..progress import Progress
 from .load import error_of
-
-# Pixel formats that a screen can show, and what becomes of them in a PNG.
-_SHOWN_AS = {"RGB": "RGB", "RGBA": "RGBA", "XYZ": "RGB", "XYZA": "RGBA", "Y": "Y", "YA": "YA"}
 
 #: Passes that a task of a cluster renders, at most; their sum is what is added to the picture.
 GROUP = 8
@@ -35,71 +28,6 @@ GROUP = 8
 # Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
 # wavefronts exhaust the memory. Fixed, so that a seed gives the same random numbers everywhere.
 _SAMPLES = {"llvm": 2**21, "cuda": 2**24}
-
-
-def colours_of(bitmap: Any) -> Any | None:
-    """Return the part of a film's bitmap that a screen can show; None if there is none.
-
-    Beside colours a film may hold further channels (normals, depth, ...), and a spectral film
-    holds only bands.
-    """
-    parts = dict(bitmap.split())
-    root = parts.get("<root>")
-    if root is None or root.pixel_format().name not in _SHOWN_AS:
-        return None
-    return root
-
-
-def write_exr(bitmap: Any, path: Path, metadata: Mapping[str, str | int]) -> None:
-    """Write all channels, linear, in single precision, with metadata as EXR attributes."""
-    for key, value in metadata.items():
-        bitmap.metadata()[key] = value
-    _write(bitmap, path)
-
-
-def write_png(
-    colours: Any, path: Path, exposure: float = 0.0, metadata: Mapping[str, str] | None = None
-) -> None:
-    """Write 8 bits per channel: values times 2^exposure, sRGB transfer, clipped to [0, 1].
-
-    colours : what `colours_of` returns; its alpha is premultiplied, that of the PNG is not.
-    exposure : stops.
-    metadata : text to store with it, ASCII.
-    """
-    import mitsuba as mi
-
-    values = np.array(colours, dtype=np.float32)
-    has_alpha = colours.has_alpha()
-    light = values[..., :-1] if has_alpha else values
-    light *= np.float32(2.0**exposure)
-    np.nan_to_num(values, copy=False, nan=0.0)
-    exposed = mi.Bitmap(values, pixel_format=colours.pixel_format())
-    transform = mi.Bitmap.AlphaTransform
-    shown = exposed.convert(
-        getattr(mi.Bitmap.PixelFormat, _SHOWN_AS[colours.pixel_format().name]),
-        mi.Struct.Type.UInt8,
-        True,
-        transform.Unpremultiply if has_alpha else transform.Empty,
-    )
-    for key, value in (metadata or {}).items():
-        shown.metadata()[key] = value
-    _write(shown, path)
-
-
-def count_bad(bitmap: Any) -> int:
-    """Count the pixels that hold a NaN or an infinity."""
-    return int((~np.isfinite(np.array(bitmap))).any(axis=-1).sum())
-
-
-def _write(bitmap: Any, path: Path) -> None:
-    with atomic_path(path) as temporary:
-        try:
-            bitmap.write(str(temporary))
-        except RuntimeError as error:  # Mitsuba's exception for a full disk
-            reason = one_line(str(error)).rpartition(": ")[2]
-            raise DiffractionError(
-                f"cannot write '{path}': {reason}; nothing was left behind"
-            ) from error
 
 
 @dataclass(frozen=True)
@@ -180,18 +108,18 @@ def groups_of(passes: Sequence[Pass]) -> list[Sequence[Pass]]:
     return [passes[n : n + GROUP] for n in range(0, len(passes), GROUP)]
 
 
-def render_pass(scene: Any, sensor: Any, one: Pass) -> NDArray[np.float64]:
+def render_pass(scene: Any, sensor: Any, each: Pass) -> NDArray[np.float64]:
     """Return the film's raw storage after a pass: weighted sums beside the sums of the weights.
 
     Raises a DiffractionError if Mitsuba refuses or fails to render.
     """
     integrator, film = integrator_of(scene), sensor.film()
     try:
-        integrator.render(scene, sensor, seed=one.seed, spp=one.spp, develop=False)
+        integrator.render(scene, sensor, seed=each.seed, spp=each.spp, develop=False)
         raw = np.array(film.develop(raw=True), dtype=np.float64)
     except RuntimeError as error:
         raise error_of("cannot render", error) from error
-    return raw * one.spp if _splats(integrator) else raw
+    return raw * each.spp if _splats(integrator) else raw
 
 
 def developed(scene: Any, sensor: Any, total: NDArray[np.float64], spp: int) -> Any:
@@ -250,14 +178,14 @@ def render_passes(
     done = 0
     for group in groups_of(passes_of(sensor, spp, seed, variant)):
         part: NDArray[np.float64] | float = 0.0
-        for one in group:
+        for each in group:
             if stop.asked:
                 break
-            raw = render_pass(scene, sensor, one)
+            raw = render_pass(scene, sensor, each)
             if stop.asked and variant.startswith("scalar"):
                 break  # Mitsuba left this pass unfinished; a JIT variant never does
             part = part + raw
-            done += one.spp
+            done += each.spp
             progress(min(done, spp), spp, "rendering")
         total = total + part
     if done == 0:  # asked to stop before there was anything

@@ -254,7 +254,7 @@ def _ratios(fields: Mapping[str, Any]) -> SlopeRatios:
     names = ("cell", "orders", "kappa", "shape", "values", "change")
     _names(fields, names, names)
     orders, shape = _two(fields["orders"], "orders"), _list(fields["shape"], "shape")
-    _require(all(isinstance(one, bool) for one in orders), "orders")
+    _require(all(isinstance(number, bool) for number in orders), "orders")
     _require(len(shape) == 4 and shape[1] == 2, f"{_RATIOS} of shape {shape}")
     shape = [_whole(n, "shape", 2, _MOST_CELLS) for n in shape]
     data = base64.b64decode(str(fields["values"]), validate=True)
@@ -339,12 +339,12 @@ def _two(value: Any, name: str) -> list[Any]:
 
 
 def _pair(value: Any, name: str, low: float, high: float) -> tuple[float, float]:
-    x, y = (_number(one, name, low, high) for one in _two(value, name))
+    x, y = (_number(number, name, low, high) for number in _two(value, name))
     return x, y
 
 
 def _whole_pair(value: Any, name: str, low: int, high: int) -> tuple[int, int]:
-    x, y = (_whole(one, name, low, high) for one in _two(value, name))
+    x, y = (_whole(number, name, low, high) for number in _two(value, name))
     return x, y
 
 

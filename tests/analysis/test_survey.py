@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import os
+import re
 import signal
 import time
 from pathlib import Path
@@ -15,17 +16,12 @@ from PIL import Image
 
 from mitsuba_diffraction import DiffractionError, HeightField, gratings
 from mitsuba_diffraction.analysis import survey as module
-from mitsuba_diffraction.analysis.maps import Bands, BrdfMap, Light
+from mitsuba_diffraction.analysis.repeats import sample_of, scan_files, write_repeats
 from mitsuba_diffraction.analysis.survey import (
-    Treatment,
-    colours_of,
-    iridescence,
-    load_treatments,
     run_survey,
-    treatment_for,
 )
+from mitsuba_diffraction.analysis.treatments import Treatment, load_treatments, treatment_for
 from mitsuba_diffraction.cli import main
-from mitsuba_diffraction.optics.colour import response
 
 pytestmark = [pytest.mark.thorough, pytest.mark.usefixtures("coarse")]
 
@@ -121,8 +117,8 @@ def test_the_command_writes_the_folder(run, scans, tmp_path):
         "survey", *scans[:2], tmp_path / "none.npy", "-o", tmp_path / "out", "--pixel-size", PIXEL,
         "--coherence-width", 6, "--tolerance", 0.05, "--resolution", 24,
     )  # fmt: skip
-    assert ran.code == 0
-    assert "1 scans in survey.csv, 2 failed" in ran.out
+    assert ran.code == 1
+    assert "1 scans in survey.csv, 2 failed, 3 samples" in ran.out
     assert "none.npy" in ran.err
 
 
@@ -144,6 +140,40 @@ def test_treatments_that_are_none_are_one_line(tmp_path, text):
         load_treatments(_toml(tmp_path, text))
 
 
+def test_scans_are_files_folders_and_patterns(tmp_path):
+    for name in ("b_1.npy", "b_2.npy", "a.txt", "notes.md", ".hidden.npy"):
+        (tmp_path / name).touch()
+    (tmp_path / "empty").mkdir()
+    listed = scan_files([tmp_path / "b_*.npy", tmp_path, tmp_path / "missing.npy"])
+    assert [file.name for file in listed] == ["b_1.npy", "b_2.npy", "a.txt", "missing.npy"]
+    for nothing in (tmp_path / "empty", tmp_path / "*.spm"):
+        with pytest.raises(DiffractionError, match=re.escape(str(nothing))):
+            scan_files([nothing])
+
+
+@pytest.mark.parametrize(
+    ("name", "sample"),
+    [("s/scale_1.spm", "s/scale"), ("s/scale-02.spm", "s/scale"), ("s/scale.003", "s/scale"),
+     ("s/scale (4).spm", "s/scale"), ("s/65um.png", "s/65um"), ("s/7.spm", "s")],
+)  # fmt: skip
+def test_repeated_scans_have_names_with_a_number(name, sample):
+    assert sample_of(Path(name)) == str(Path(sample))
+    assert sample_of(Path(name), "folder") == "s"
+
+
+def test_samples_have_means_and_standard_errors(tmp_path):
+    rows = [{"sample": "a", "reason": "", "iridescence": i} for i in (0.1, 0.2, 0.3)]
+    rows += [{"sample": "a", "reason": "damaged"}, {"sample": "b", "reason": "", "range_um": 2.0}]
+    first, second = write_repeats(tmp_path / "samples.csv", rows)
+    assert (first["scans"], first["failed"]) == (3, 1)
+    assert first["iridescence"] == pytest.approx(0.2)
+    assert first["iridescence_se"] == pytest.approx(0.1 / math.sqrt(3))
+    assert second["range_um"] == 2.0
+    assert "range_um_se" not in second
+    with (tmp_path / "samples.csv").open(encoding="utf-8") as file:
+        assert [row["sample"] for row in csv.DictReader(file)] == ["a", "b"]
+
+
 def test_a_disc_is_more_iridescent_than_a_scale_and_both_than_a_mirror(tmp_path):
     made = {
         "mirror": np.zeros((160, 160)), "scale": gratings.elaphe_like(20.0, 160).heights,
@@ -158,38 +188,8 @@ def test_a_disc_is_more_iridescent_than_a_scale_and_both_than_a_mirror(tmp_path)
     )  # fmt: skip
     assert [row["reason"] for row in rows] == ["", "", ""]
     mirror, scale, disc = (row["iridescence"] for row in rows)
-    assert mirror < 0.2 * scale  # a lobe of 20 µm is wider in red light
-    assert scale < disc
-
-
-def _map(spectrum, n=32):
-    """A map whose directions reflect (n, n, bands) between 400 and 700 nm."""
-    bands = Bands(400.0, 700.0, 10.0)
-    xyz = spectrum @ response(bands.wavelengths()) * bands.width
-    centres = (np.arange(n) + 0.5) * 2 / n - 1
-    inside = (np.hypot(centres, centres[:, None]) < 1).astype(np.float32)
-    xyz = (xyz * inside[..., None]).astype(np.float32)
-    return BrdfMap(Light(), bands, inside, xyz, None, False, "D65", 1)
-
-
-def test_one_colour_is_not_iridescent_however_bright():
-    brightness = np.random.default_rng(1).uniform(0.1, 3.0, (32, 32, 1))
-    red = np.linspace(400, 700, 30) > 600
-    for spectrum in (np.ones(30), red.astype(float)):
-        assert iridescence(_map(brightness * spectrum)) < 1e-3
-    assert colours_of(_map(brightness * red))["red"] > 0.99
-    assert colours_of(_map(brightness * np.ones(30)))["grey"] > 0.99
-
-
-def test_a_rainbow_is_iridescent():
-    wavelength, place = np.linspace(400, 700, 30), np.linspace(430, 660, 32)[:, None]
-    spectrum = np.exp(-(((wavelength - place) / 15) ** 2))
-    rainbow = _map(np.broadcast_to(spectrum, (32, 32, 30)))
-    pale = _map(np.broadcast_to(spectrum + 1.0, (32, 32, 30)))
-    assert iridescence(rainbow) > 0.15
-    assert iridescence(pale) < 0.5 * iridescence(rainbow)
-    shares = colours_of(rainbow)
-    assert sum(share > 0.03 for share in shares.values()) >= 4
+    assert mirror == 0.0
+    assert 0.02 < scale < disc
 
 
 def test_gratings_of_two_directions_are_both_found():

@@ -13,6 +13,7 @@ from mitsuba_diffraction.heights import gratings
 from mitsuba_diffraction.heights.gratings import blazed, sinusoidal
 from mitsuba_diffraction.heights.spectra import (
     dominant_periods,
+    examine_periods,
     far_field,
     frequencies,
     height_spectrum,
@@ -202,3 +203,51 @@ def test_the_measured_scale_is_within_the_spread_of_its_windows(shared_afm):
         (whole.period, whole.direction), np.mean(found, 0), np.std(found, 0), strict=True
     ):
         assert abs(value - mean) < spread
+
+
+def scan(heights, noise=0.001):
+    """A scan of 20 µm, 256 pixels wide, of heights(x, y) in µm with white noise."""
+    y, x = np.mgrid[:256, :256] * (20.0 / 256)
+    rough = np.random.default_rng(1).standard_normal(x.shape) * noise
+    return HeightField(heights(x, y) + rough, 20.0 / 256, cut_out=True)
+
+
+@pytest.mark.parametrize(
+    "heights",
+    [
+        lambda x, y: 0.01 * x,
+        lambda x, y: 0.001 * (x - 8) ** 2 + 0.02 * y,
+        lambda x, y: 1e-4 * (x - 12) ** 3,
+        lambda x, y: 0.05 * np.tanh(x - 9),
+        lambda x, y: 0.05 * np.cos(2 * np.pi * x / 20),
+    ],
+    ids=["tilt", "bow", "third degree", "edge", "one wave"],
+)
+def test_a_scan_without_repeats_has_no_period(heights):
+    assert examine_periods(scan(heights)) == ([], None)
+
+
+@pytest.mark.parametrize("fundamental", [1.0, 0.5, 0.2])
+@pytest.mark.parametrize("harmonic", [2, 3])
+def test_a_harmonic_is_told_from_the_fundamental(fundamental, harmonic):
+    def fringes(x, y):
+        phase = 2 * np.pi * (x + 0.3 * y) / 4.0
+        return 0.05 * (fundamental * np.cos(phase) + np.cos(harmonic * phase + 0.7)) + 0.01 * x
+
+    (found,) = dominant_periods(scan(fringes))
+    assert found.period == pytest.approx(4.0 / np.hypot(1, 0.3), rel=PERIOD)
+
+
+@pytest.mark.parametrize(("depth", "is_grating"), [(0.02, True), (0.008, False)])
+def test_a_weak_line_in_noise_is_a_grating_or_below_the_threshold(depth, is_grating):
+    found = examine_periods(scan(lambda x, y: depth * np.cos(2 * np.pi * x / 2.6), 0.03))
+    (line,) = found.gratings if is_grating else [found.weak]
+    assert line.period == pytest.approx(2.6, rel=PERIOD)
+    assert (line.share >= 0.1) == is_grating
+
+
+def test_one_period_of_a_grating_is_known_only_where_it_repeats():
+    blaze = blazed(2.5, 0.25, periods=1)
+    (found,) = dominant_periods(blaze)
+    assert found.period == pytest.approx(2.5)
+    assert dominant_periods(HeightField(blaze.heights, blaze.pixel_size, cut_out=True)) == []

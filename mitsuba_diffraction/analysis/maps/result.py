@@ -1,4 +1,4 @@
-"""BRDF maps: light, wavelengths, values, exposure for display, and measures of iridescence."""
+"""BRDF maps: light, wavelengths, values and exposure for display."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from ...optics.colour import encode_srgb, linear_srgb
 from ...optics.geometry import check_angles
 
 Image = NDArray[np.float32]
-Reals = NDArray[np.float64]
 
 #: Least wavelength step, nm: it moves no order by as much as a pixel.
 FINEST_STEP = 0.1
@@ -23,12 +22,6 @@ _NO_EXPOSURE = 0.0
 _WORTH_SHOWING = 1e-3
 # Largest share of the map that may be brighter than white by this factor.
 _CLIPPED, _CLIPPED_FROM = 1e-3, 8.0
-#: Names of the sextants of hue, from red on, each 60° wide in HSV.
-HUES = ("red", "yellow", "green", "cyan", "blue", "magenta")
-#: Saturation below which a colour counts as grey.
-GREY = 0.1
-# Luminance, relative to the brightest direction, below which a direction has no colour.
-_DARK = 1e-9
 
 
 @dataclass(frozen=True)
@@ -229,70 +222,3 @@ class BrdfMap:
         centres = (np.arange(n) + 0.5) * (2.0 / n) - 1.0
         x, y, _ = self.light.mirror
         return np.hypot(centres[None, :] - x, centres[:, None] - y) > self.lobe + 2.0 / n
-
-
-def iridescence(brdf_map: BrdfMap) -> float:
-    """Return the iridescence: how much colour changes with the view direction.
-
-    This is the root mean square distance of the chromaticity from its mean, in the CIE 1976 u'v'
-    diagram (CIE 15:2018, 8.1), over the hemisphere of view directions (by projected solid angle),
-    weighted by luminance Y:
-
-        I = √(Σ Y |c − c̄|² / Σ Y),   c = (u', v'),   c̄ = Σ Y c / Σ Y
-
-    A surface with one colour in all directions, white or a pigment's, has 0; equally bright pure
-    colours of the spectrum between 450 and 650 nm have 0.25. Light in the mirror direction's lobe
-    counts, too, so colours beside strong gloss have little weight.
-    """
-    xyz = _xyz(brdf_map, _coloured(brdf_map))
-    weight = xyz[:, 1]
-    if not weight.sum() > 0.0:
-        return 0.0
-    chromaticity = _chromaticity(xyz)
-    mean = np.average(chromaticity, axis=0, weights=weight)
-    squares = np.sum(np.square(chromaticity - mean), axis=1)
-    return float(np.sqrt(np.average(squares, weights=weight)))
-
-
-def colours_of(brdf_map: BrdfMap) -> dict[str, float]:
-    """Return the shares of the luminance away from the mirror's lobe, by hue: they add up to 1.
-
-    The hue is that of linear sRGB, clipped to the display's gamut, in sextants of HSV around the
-    primaries and their mixtures; "grey" has a saturation below `GREY`. All shares of a dark map are
-    0.
-    """
-    from matplotlib.colors import rgb_to_hsv
-
-    names = (*HUES, "grey")
-    away = _coloured(brdf_map) & brdf_map.away_from_mirror()
-    weight = _xyz(brdf_map, away)[:, 1]
-    if not weight.sum() > 0.0:
-        return dict.fromkeys(names, 0.0)
-    linear = brdf_map.linear[away].astype(np.float64)
-    clipped = np.clip(linear, 0.0, None)
-    brightest = clipped.max(axis=1, keepdims=True)
-    hsv = rgb_to_hsv(np.divide(clipped, brightest, out=np.zeros_like(clipped), where=brightest > 0))
-    sextant = np.floor(hsv[:, 0] * 6.0 + 0.5).astype(int) % 6
-    sextant[hsv[:, 1] < GREY] = 6
-    total = np.bincount(sextant, weight, minlength=7)
-    return dict(zip(names, (total / total.sum()).tolist(), strict=True))
-
-
-def _coloured(brdf_map: BrdfMap) -> NDArray[np.bool_]:
-    """Return the pixels (n, n) that have enough light for a colour, as a mask."""
-    lit = brdf_map.luminance > _DARK * brdf_map.luminance.max()
-    return np.asarray((brdf_map.coverage > 0.0) & lit)
-
-
-def _xyz(brdf_map: BrdfMap, directions: NDArray[np.bool_]) -> Reals:
-    """Return X, Y, Z (n, 3) of the pixels in a mask."""
-    if brdf_map.xyz is None:
-        raise ValueError("a map of a single wavelength has no colours")
-    return np.asarray(brdf_map.xyz[directions], np.float64)
-
-
-def _chromaticity(xyz: Reals) -> Reals:
-    """Return u', v' of CIE 1976: 4X and 9Y over X + 15Y + 3Z."""
-    weights = np.array([1.0, 15.0, 3.0])
-    total = np.maximum(xyz @ weights, 1e-300)
-    return np.stack([4.0 * xyz[:, 0] / total, 9.0 * xyz[:, 1] / total], axis=-1)

@@ -12,6 +12,7 @@ from ...optics.colour import daylight
 from ...plugin.memory import upload
 from ...plugin.properties import name_of
 from .packing import daylight_colour
+from .source import display_definitions
 
 Array = NDArray[np.float64]
 
@@ -85,16 +86,16 @@ def read_lights(scene: Any, middle: Array, most: int) -> Lighting:
     return lighting
 
 
-def light_definitions(lights: int, sky: bool, displayed: bool = False) -> dict[str, str]:
+def light_definitions(lights: int, sky: bool, view: str | None = None) -> dict[str, str]:
     """Return the shader's definitions of the light: number of lights, and whether a sky exists.
 
-    displayed : whether the picture is for a screen, exposed and with the transfer curve of sRGB.
+    view : view by which a screen shows the picture (`optics.display`); None leaves it linear.
     """
     definitions = {"LIGHTS_LIT": str(lights)}
     if sky:
         definitions["SKY"] = ""
-    if displayed:
-        definitions["DISPLAYED"] = ""
+    if view is not None:
+        definitions |= {"DISPLAYED": "", **display_definitions(view)}
     return definitions
 
 

@@ -26,6 +26,7 @@ from .materials import coat_index, height_scale
 from .methods import vertex_array
 from .scene import RealtimeScene
 from .shadows import SIZE, Casters, ShadowMap
+from .source import display_definitions
 from .surroundings import flat_shapes, pack_flats, pack_lobes, pack_obstacles
 from .texels import Packed, Uniform
 
@@ -46,6 +47,7 @@ class Drawing(Protocol):
     context: Any
     scene: RealtimeScene
     mitsuba_scene: Any
+    view: str
     buffers: list[Any]
 
     def target(self, width: int, height: int) -> Target:
@@ -212,7 +214,10 @@ class ProgressiveLight:
         self.restart(camera)
         self._add = compile_plain(context, "whole.vert", "add.frag")
         self._triangle = context.vertex_array(self._add, [])
-        self._mean = compile_plain(context, "whole.vert", "mean.frag", ("library.glsl",))
+        self._mean = compile_plain(
+            context, "whole.vert", "mean.frag", ("library.glsl", "display.glsl"),
+            display_definitions(renderer.view),
+        )  # fmt: skip
         self._whole = context.vertex_array(self._mean, [])
 
     @property
@@ -299,7 +304,7 @@ class ProgressiveLight:
         context.enable_only(moderngl.NOTHING)
 
     def show(self, frame: Any, exposure: float) -> None:
-        """Draw the picture so far into a framebuffer of the same size, exposed, as sRGB."""
+        """Draw the picture so far into a framebuffer of the same size, exposed, for a screen."""
         moderngl = require_moderngl()
         context: Any = self._renderer.context
         frame.use()

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import warn
+from ...optics.display import check_view
 from ...tables.energy.grid import FINE
 from .camera import Camera
 from .context import (
@@ -54,14 +55,20 @@ class Renderer:
     scene : a `mi.Scene` of the current variant, or an XML file.
     sensor : index of the camera.
     context : a moderngl context; by default one without a window, through EGL.
+    view : view of pictures for a screen, one of `optics.display.VIEWS`.
 
     Raises
     ------
     DiffractionError
-        If OpenGL 3.3 is missing, nothing diffracts, or the camera is not a perspective one.
+        If OpenGL 3.3 is missing, nothing diffracts, the camera is not a perspective one, or the
+        view is unknown.
     """
 
-    def __init__(self, scene: Any, *, sensor: int = 0, context: Any = None) -> None:
+    def __init__(
+        self, scene: Any, *, sensor: int = 0, context: Any = None, view: str = "natural"
+    ) -> None:
+        check_view(view)
+        self.view = view
         self.mitsuba_scene = load(scene)
         self.scene: RealtimeScene = read_scene(self.mitsuba_scene, sensor)
         self._warn([o for o in self.scene.omissions if o not in self.scene.of_light])
@@ -163,7 +170,7 @@ class Renderer:
         frame : framebuffer of moderngl with a depth buffer.
         method : one of `source.METHODS`.
         camera : by default the scene's camera.
-        exposure : factor on the light, for display as sRGB; None leaves the picture linear.
+        exposure : factor on the light, for a screen by `view`; None leaves the picture linear.
         scale : height scale of all patches instead of the scene's; see `energy_for`.
         coherence_width : coherence width of all patches instead of the scene's, µm; not for `lut`
             and `pq`, whose tables include it.
@@ -171,7 +178,8 @@ class Renderer:
         self.draw_lights(
             frame, method, camera or self.camera, self.lights,
             light_definitions(
-                len(self.lights), bool(np.any(self.sky != 0.0)), exposure is not None
+                len(self.lights), bool(np.any(self.sky != 0.0)),
+                None if exposure is None else self.view,
             ),
             {"sky": np.asarray(self.sky, np.float32), "exposure": exposure or 1.0},
             scale=scale, coherence_width=coherence_width,

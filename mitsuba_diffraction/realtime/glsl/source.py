@@ -12,7 +12,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...errors import DiffractionError
+from ...optics.display import check_view, constants
 from .texels import PAGE
 
 Dialect = Literal["desktop", "web"]
@@ -80,26 +84,28 @@ def fragment_parts(
     """Return names and texts of the parts of `fragment_source`; parameters and errors as there."""
     if method not in METHODS:
         raise DiffractionError(f"method={method!r} is unknown; choose one of {', '.join(METHODS)}")
-    constants = _CONSTANTS | dict(definitions)
-    lines = [f"#define {name} {value}\n" for name, value in constants.items()]
+    known = _CONSTANTS | dict(definitions)
+    lines = [f"#define {name} {value}\n" for name, value in known.items()]
     parts = [("preamble", _PREAMBLES[dialect] + "".join(lines))]
     shared = ["library.glsl", "boundary.glsl"]
     if method in THESIS_METHODS:
         shared.append("taylor.glsl")
-    if "SHADOWED" in constants:
+    if "SHADOWED" in known:
         shared.append("shadow.glsl")
     shared.append("layers.glsl")
-    if "SECOND_ORDER" in constants:
+    if "SECOND_ORDER" in known:
         shared.append("second_order.glsl")
-    if "DIFFRACTING" in constants:
+    if "DIFFRACTING" in known:
         shared.append("pair.glsl")
-    if "GLOSS" in constants:
+    if "GLOSS" in known:
         shared.append("gloss.glsl")
-    if "WEIGHTED" in constants or "LOOKED_UP" in constants:
+    if "WEIGHTED" in known or "LOOKED_UP" in known:
         shared += ["obstacles.glsl", "surroundings.glsl", "lobes.glsl"]
     shared.append(f"{method}.glsl")
-    if "DIFFRACTING" in constants:
+    if "DIFFRACTING" in known:
         shared.append("diffraction.glsl")
+    if "DISPLAYED" in known:
+        shared.append("display.glsl")
     return parts + [(name, shader_file(name)) for name in (*shared, main)]
 
 
@@ -113,9 +119,28 @@ def plain_source(
 
     shared : files that it includes.
     """
-    constants = _CONSTANTS | dict(definitions or {})
-    lines = [f"#define {key} {value}\n" for key, value in constants.items()]
+    known = _CONSTANTS | dict(definitions or {})
+    lines = [f"#define {key} {value}\n" for key, value in known.items()]
     return _PREAMBLES[dialect] + "".join((*lines, *map(shader_file, shared), shader_file(name)))
+
+
+def display_definitions(view: str) -> dict[str, str]:
+    """Return the definitions with which shaders/display.glsl shows light by a view.
+
+    Raises a DiffractionError if the view is unknown.
+    """
+    check_view(view)
+    if view == "standard":
+        return {}
+    return {f"DISPLAY_{name}": _literal(value) for name, value in constants().items()}
+
+
+def _literal(value: float | NDArray[np.float64]) -> str:
+    """Write a number, a vector or a matrix, whose columns come first, in GLSL."""
+    numbers = np.asarray(value).T.ravel()
+    text = ", ".join(f"{number:.9g}" if number % 1.0 else f"{number:.1f}" for number in numbers)
+    kind = {1: "float", 2: "vec2", 3: "vec3", 9: "mat3"}[numbers.size]
+    return f"{kind}({text})"
 
 
 _COMPARISONS = {"==": operator.eq, "!=": operator.ne, ">": operator.gt, "<": operator.lt}

@@ -17,7 +17,7 @@ from PIL import Image
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError
-from ...optics.colour import encode_srgb
+from ...optics.display import shown
 from ..shader_comparison.path_traced import PathTracing
 from .camera import Camera, Orbit, dragged
 from .context import check_version
@@ -63,6 +63,7 @@ class Viewer(moderngl_window.WindowConfig):
     sensor = 0
     method = "lut"
     stops = 0.0
+    view = "natural"
     folder = Path()
     frames = 0  # number of frames to close after; 0: never
     spp = 64
@@ -86,7 +87,9 @@ class Viewer(moderngl_window.WindowConfig):
     def _load(self) -> Iterator[str]:
         """Load in steps; the window can be closed between them."""
         yield "reading the scene ..."
-        self.renderer = Renderer(self.mitsuba_scene, sensor=self.sensor, context=self.ctx)
+        self.renderer = Renderer(
+            self.mitsuba_scene, sensor=self.sensor, context=self.ctx, view=self.view
+        )
         yield f"tables of method {self.method} ..."
         self.renderer.texture_bytes(self.method)
         yield "lights, shadows and surroundings ..."
@@ -257,7 +260,7 @@ class Viewer(moderngl_window.WindowConfig):
         self.message = f"path tracing: {tracing.done} of {tracing.spp} samples"
         if tracing.finished:
             self.tracing = None
-            encoded = encode_srgb(tracing.image * 2.0**self.stops)
+            encoded = shown(tracing.image * 2.0**self.stops, self.view)
             path = write_screenshot(encoded, self.folder, "view_path")
             self.message = f"written: {path} (direct light, {tracing.spp} samples)"
 
@@ -323,6 +326,7 @@ def show(
     sensor: int = 0,
     method: str = "lut",
     stops: float = 0.0,
+    view: str = "natural",
     size: tuple[int, int] = (1280, 800),
     folder: Path = Path(),
     frames: int = 0,
@@ -332,6 +336,7 @@ def show(
 
     sensor : index of the first camera.
     method, stops : first method, and exposure in stops.
+    view : view of pictures, one of `optics.display.VIEWS`.
     size : size of the window, pixels.
     folder : folder of screenshots.
     frames : number of frames after which to close; 0 waits for the user.
@@ -342,7 +347,7 @@ def show(
     Raises a DiffractionError if no window can be opened, or as `Renderer`.
     """
     settings = {
-        "mitsuba_scene": scene, "sensor": sensor, "method": method, "stops": stops,
+        "mitsuba_scene": scene, "sensor": sensor, "method": method, "stops": stops, "view": view,
         "folder": folder, "frames": frames, "window_size": size,
     }  # fmt: skip
     kind = type("SceneViewer", (Viewer,), settings)

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from ...errors import DiffractionError, DiffractionWarning, warn
 from ...progress import Progress, silent
-from ...scene.passes import Stop, render_passes, write_exr
+from ...scene.passes import Stop, render_passes
+from ...scene.pictures import write_exr
 from ..glsl.context import clock_of
 from ..glsl.renderer import Renderer
 from ..glsl.scene import load

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ...atomic import atomic_path
 from ...errors import DiffractionError
+from ...optics.display import check_view
 from ...progress import Progress, silent
 from ...tables.table import DiffractionTable
 from ..glsl.emitters import Emitters
@@ -30,7 +31,13 @@ from ..glsl.materials import (
     pack_surface,
 )
 from ..glsl.scene import RealtimeScene, box_of, load, read_scene
-from ..glsl.source import fragment_parts, fragment_source, plain_source, shader_file, vertex_source
+from ..glsl.source import (
+    display_definitions,
+    fragment_parts,
+    plain_source,
+    shader_file,
+    vertex_source,
+)
 from ..glsl.texels import Packed
 from .light import packed_light, packed_surroundings
 from .sections import Sections, packed_mesh, packed_parts, sections_of
@@ -74,6 +81,7 @@ def make_page(
     title: str | None = None,
     methods: Sequence[str] = WEB_METHODS,
     sensor: int = 0,
+    view: str = "natural",
     progress: Progress = silent,
 ) -> Page:
     """Build the page of a scene.
@@ -85,22 +93,25 @@ def make_page(
     methods : methods of `WEB_METHODS`; the page starts with the first, and leaves out the last
         ones where it would have more than 25 MB.
     sensor : index of the camera.
+    view : view of the page's picture, one of `optics.display.VIEWS`.
     progress : called as progress(done, total, text).
 
     Raises
     ------
     DiffractionError
-        If nothing in the scene diffracts, a method is unknown, or the page would be too large.
+        If nothing in the scene diffracts, a method or the view is unknown, or the page would
+        be too large.
     """
     unknown = [method for method in methods if method not in WEB_METHODS]
     if unknown or not methods or len(set(methods)) < len(methods):
         raise DiffractionError(
             f"methods={list(methods)!r}: choose from {', '.join(WEB_METHODS)}, each at most once"
         )
+    check_view(view)
     if title is None:
         is_file = isinstance(scene, str | os.PathLike)
         title = Path(scene).stem if is_file else "Diffraction"
-    header, data = _packed(load(scene), sensor, title, methods, progress)
+    header, data = _packed(load(scene), sensor, title, methods, view, progress)
     text = _filled(header, data)
     if len(text.encode()) > MAX_BYTES:
         raise DiffractionError(
@@ -161,7 +172,7 @@ def _asset(name: str) -> str:
 
 
 def _packed(
-    loaded: Any, sensor: int, title: str, methods: Sequence[str], progress: Progress
+    loaded: Any, sensor: int, title: str, methods: Sequence[str], view: str, progress: Progress
 ) -> tuple[dict[str, Any], bytes]:
     """Return the page's header as JSON types, and all arrays and pictures, compressed.
 
@@ -223,7 +234,7 @@ def _packed(
         "box": [scene.low.tolist(), scene.high.tolist()],
         "subject": [x.tolist() for x in box_of([s.vertices[:, :3] for s in scene.diffracting])],
     }
-    _add_programs(header, surfaces, shown, packed, definitions)
+    _add_programs(header, surfaces, shown, packed, definitions, view)
     header["loss"] = {
         method: _worst([packed[method, n].loss for n in range(len(tables))]) for method in shown
     }
@@ -266,6 +277,7 @@ def _add_programs(
     methods: Sequence[str],
     packed: Any,
     around: dict[str, str],
+    view: str,
 ) -> None:
     """Add all distinct shader sources, and the number of each surface's source.
 
@@ -273,6 +285,7 @@ def _add_programs(
     main functions.
 
     around : definitions of the surroundings.
+    view : view of the page's picture.
     """
     sources: list[str] = []
     for entry, common in surfaces:
@@ -292,8 +305,8 @@ def _add_programs(
     }
     header["vertex"] = vertex_source("web")
     header["shadow"] = plain_source("position.frag", dialect="web")
-    whole = fragment_source(
-        methods[0], packed[methods[0], 0].packed.definitions, "web", "shown.frag"
+    whole = plain_source(
+        "shown.frag", ("library.glsl", "display.glsl"), display_definitions(view), "web"
     )
     header["shown"] = {"vertex": vertex_source("web", "whole.vert"), "fragment": whole}
 

@@ -42,23 +42,24 @@ def packed_light(
     `samples` is the sequence; each light has the number of the light in `own` that it moves with
     (−1: none).
     """
-    own = scene.lighting.lights
+    lights = scene.lighting.lights
     sequence = list(itertools.islice(emitters.lights(), SAMPLES)) if emitters else []
     if len({id(light) for light in sequence}) < len(sequence) and _equal(sequence):
         sequence = sequence[:1]
-    spectra = [np.asarray(light.spectrum, np.float32).ravel() for light in [*own, *sequence]]
+    spectra = [np.asarray(light.spectrum, np.float32).ravel() for light in [*lights, *sequence]]
     values = np.stack(spectra) if spectra else None
     daylight = pack_responses([(np.array([360.0, 830.0]), np.ones(2))]).textures[0]
     return {
-        "own": [_described(light, n) for n, light in enumerate(own)],
+        "own": [_described(light, n) for n, light in enumerate(lights)],
         "samples": [
-            _described(light, len(own) + n) | {"of": _owner(light, own), "density": light.density}
+            _described(light, len(lights) + n)
+            | {"of": _owner(light, lights), "density": light.density}
             for n, light in enumerate(sequence)
         ],
         "sky": scene.lighting.sky.ravel().tolist(),
         "spectra": None if values is None else sections.add(packed_array(values)),
         "columns": 0 if values is None else values.shape[1],
-        "channels": 3 if spectra and [*own, *sequence][0].spectrum.ndim > 1 else 1,
+        "channels": 3 if spectra and [*lights, *sequence][0].spectrum.ndim > 1 else 1,
         "daylight": sections.add(packed_array(daylight.data.reshape(-1, 4))),
         "wavenumbers": list(WAVENUMBERS),
         "monochrome": {"first": _FIRST, "step": _STEP, "colours": _monochrome().tolist()},
@@ -82,9 +83,9 @@ def _equal(lights: Sequence[Light]) -> bool:
     )
 
 
-def _owner(light: Light, own: Sequence[Light]) -> int:
+def _owner(light: Light, lights: Sequence[Light]) -> int:
     """Return the number of the light in `own` with which a light moves, or −1."""
-    for number, other in enumerate(own):
+    for number, other in enumerate(lights):
         if not other.name.endswith(light.name) or light.place[3] != other.place[3]:
             continue
         a, b = (x.place[:3] / np.linalg.norm(x.place[:3]) for x in (light, other))

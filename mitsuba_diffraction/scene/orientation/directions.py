@@ -73,9 +73,9 @@ class Surface:
 
         pairs, cotangents = [], []
         for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):  # the angle at c is opposite to a–b
-            one, two = corners[:, a] - corners[:, c], corners[:, b] - corners[:, c]
+            first, second = corners[:, a] - corners[:, c], corners[:, b] - corners[:, c]
             pairs.append(faces[:, [a, b]])
-            cotangents.append((one * two).sum(axis=1) / double)
+            cotangents.append((first * second).sum(axis=1) / double)
         edges, inverse = np.unique(np.sort(np.concatenate(pairs)), axis=0, return_inverse=True)
         weights = np.bincount(inverse.reshape(-1), np.concatenate(cotangents) / 2, len(edges))
         areas = np.bincount(faces.ravel(), np.repeat(double / 6, 3), len(places))

@@ -196,17 +196,17 @@ def triangulated_ply(data: bytes) -> bytes | None:
 
 
 def _triangulated(data: bytes) -> bytes | None:
-    found = re.match(rb"ply\r?\n(?:.*\n)*?end_header\r?\n", data)
-    if found is None:
+    match = re.match(rb"ply\r?\n(?:.*\n)*?end_header\r?\n", data)
+    if match is None:
         return None
-    header = found[0].decode("latin-1").splitlines()
+    header = match[0].decode("latin-1").splitlines()
     starts = [n for n, line in enumerate(header) if line.startswith("element ")]
     elements = [header[a:b] for a, b in zip(starts, [*starts[1:], -1], strict=True)]
     if [e[0].split()[1] for e in elements[:2]] != ["vertex", "face"]:
         return None
     read = _read_ascii if any("format ascii" in line for line in header) else _read_binary
     order = ">" if any("binary_big_endian" in line for line in header) else "<"
-    vertices, polygons = read(data[found.end() :], elements[0], elements[1], order)
+    vertices, polygons = read(data[match.end() :], elements[0], elements[1], order)
     if len(polygons) < int(elements[1][0].split()[2]):
         return None
     triangles = [(p[0], p[n], p[n + 1]) for p in polygons for n in range(1, len(p) - 1)]

@@ -307,20 +307,20 @@ def _jumps(
     first = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
 
     # sharp folds (scale edges, corners of a box) are edges of the surface, not of the texture
-    one, two = owner[first], owner[first + 1]
-    smooth = good[one] & good[two] & ((normals[one] * normals[two]).sum(axis=1) > 0.5)
-    first, one, two = first[smooth], one[smooth], two[smooth]
+    this, other = owner[first], owner[first + 1]
+    smooth = good[this] & good[other] & ((normals[this] * normals[other]).sum(axis=1) > 0.5)
+    first, this, other = first[smooth], this[smooth], other[smooth]
     cosine = np.full(len(first), -1.0)
     for end in (0, 1):  # it must jump at both, or it is the turn within a triangle
         ways = [
             _laid(tangent[face], normals[face], ends[at, end])
-            for face, at in ((one, first), (two, first + 1))
+            for face, at in ((this, first), (other, first + 1))
         ]
-        laid_over = carried(ways[0], normals[one], normals[two])  # a fold alone is no turn
+        laid_over = carried(ways[0], normals[this], normals[other])  # a fold alone is no turn
         cosine = np.maximum(cosine, (laid_over * ways[1]).sum(axis=1))
     marked = np.zeros(len(welded), dtype=bool)
     jump = cosine < np.cos(np.radians(TURN))
-    marked[one[jump]] = marked[two[jump]] = True
+    marked[this[jump]] = marked[other[jump]] = True
     return marked, edges[first[cosine < np.cos(np.radians(BREAK))]]
 
 

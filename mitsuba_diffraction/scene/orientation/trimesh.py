@@ -135,13 +135,13 @@ def oriented_mesh(
     wanted = tangential(directions[faces], ends)
     texture, along = _unrolled(corners, ends, wanted)
     if uv is not None:
-        given = uv[faces]
+        coordinates = uv[faces]
         sides = corners[:, 1:] - corners[:, :1]
-        dp_du, _, area = texture_tangents(sides, given[:, 1:] - given[:, :1])
+        dp_du, _, area = texture_tangents(sides, coordinates[:, 1:] - coordinates[:, :1])
         good = (area != 0)[:, None]
         along = np.where(good, dp_du, along)
         # where they span nothing, they must span a little
-        texture = np.where(good[:, None], given, given[:, :1] + 1e-4 * texture)
+        texture = np.where(good[:, None], coordinates, coordinates[:, :1] + 1e-4 * texture)
     first = tangential(along[:, None], ends)
     second = np.cross(ends, first)
     turn = np.stack([(wanted * first).sum(axis=2), (wanted * second).sum(axis=2)], axis=2)

@@ -57,8 +57,8 @@ def test_bare_gathers_read_what_a_look_up_reads(factories, queries):
             for axis, taps in enumerate(table.grid.taps)
         ]
         column, row = (f.astype(int) + n for f, n in zip(first, table.grid.last, strict=True))
-        for j in range(table.grid.taps[1]):
-            for i in range(table.grid.taps[0]):
+        for j, columns in enumerate(table.grid.tapped()):
+            for i in columns:
                 bins = table.coefficients[interval, row + j, column + i].astype(float)
                 expected += bins.sum(axis=(1, 2))
     gathered = np.array(bare_gathers(table, queries)())

@@ -1,4 +1,4 @@
-// Picture of two kinds of frames from their sums, with the transfer curve of sRGB.
+// Picture of two kinds of frames from their sums, for a display.
 
 uniform sampler2D first;
 uniform sampler2D second;
@@ -12,5 +12,5 @@ void main()
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     vec3 light = weights.x * texelFetch(first, pixel, 0).rgb
                + weights.y * texelFetch(second, pixel, 0).rgb;
-    fragment = vec4(encode_srgb(exposure * light), 1.0);
+    fragment = vec4(displayed(exposure * light), 1.0);
 }

@@ -1,4 +1,4 @@
-// Picture of a page: mean of the samples over a background, with the transfer curve of sRGB.
+// Picture of a page: mean of the samples over a background, for a display.
 
 uniform sampler2D samples;   // sums of linear sRGB and of coverage
 uniform float sample_count;
@@ -10,5 +10,5 @@ out vec4 fragment;
 void main()
 {
     vec4 mean = texelFetch(samples, ivec2(gl_FragCoord.xy), 0) / sample_count;
-    fragment = vec4(encode_srgb(mean.rgb * exposure + background * (1.0 - mean.a)), 1.0);
+    fragment = vec4(displayed(mean.rgb * exposure + background * (1.0 - mean.a)), 1.0);
 }

@@ -255,7 +255,7 @@ void main()
 #endif
 #endif
 #ifdef DISPLAYED
-    radiance = encode_srgb(radiance * exposure);
+    radiance = displayed(radiance * exposure);
 #endif
     fragment = vec4(radiance, 1.0);
 }

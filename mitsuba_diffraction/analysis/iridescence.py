@@ -1,0 +1,188 @@
+"""Colours of the light that a patch diffracts out of the mirror's lobe, and how much they change.
+
+They are computed from the orders of a table and not from the pixels of a map, so that they depend
+neither on a resolution nor, above `WINDOW`, on the coherence width.
+
+References
+----------
+M. G. Meadows, N. I. Morehouse, R. L. Rutowski, J. M. Douglas and K. J. McGraw, Quantifying
+iridescent coloration in animals, Behavioral Ecology and Sociobiology 65, 1317-1327 (2011).
+H. Gruson, C. Andraud, W. Daney de Marcillac, S. Berthier, M. Elias and D. Gomez, Quantitative
+characterization of iridescent colours in biological studies, Interface Focus 9, 20180049 (2019).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from ..errors import DiffractionError
+from ..optics.colour import linear_srgb, response
+from ..optics.geometry import sigma_of, wavenumber
+from ..tables.powers import order_0_power, power_series
+from ..tables.table import DiffractionTable
+from .maps.result import Light
+
+Reals = NDArray[np.float64]
+
+#: Coherence width of the index, µm; its lobes are 3.3° wide (half maximum, 550 nm, at the normal),
+#: about the acceptance of a fibre. It is the narrowest window that whole scans are used with.
+WINDOW = 10.0
+#: Names of the sextants of hue, from red on, each 60° wide in HSV.
+HUES = ("red", "yellow", "green", "cyan", "blue", "magenta")
+#: Saturation below which a colour counts as grey.
+GREY = 0.1
+
+#: Range of wavelengths that the index covers, nm, and their step: an order moves by less than a
+#: lobe from one to the next.
+SHORTEST, LONGEST, STEP = 380.0, 780.0, 5.0
+# Side of a direction's cell, in sines: half of the narrowest lobe's standard deviation.
+_CELL = 0.008
+# Luminance, relative to the brightest direction, below which a direction has no colour.
+_DARK = 1e-9
+
+
+@dataclass(frozen=True)
+class DiffractedLight:
+    """Light that leaves a patch outside the mirror's lobe, by direction.
+
+    Attributes
+    ----------
+    xyz : (n, n, 3), X, Y, Z of equal cells of the directions' sines; a mirror's total has Y = 1.
+    share : luminous power outside the mirror's lobe, as a share of all reflected light.
+    """
+
+    xyz: Reals
+    share: float
+
+    def iridescence(self) -> float:
+        """Return the root mean square distance of the chromaticity u'v' from its mean.
+
+        I = √(Σ Y |c − c̄|² / Σ Y) over the cells, with c = (u', v') of CIE 1976 (CIE 15:2018, 8.1)
+        and c̄ = Σ Y c / Σ Y. 0 if no light is diffracted.
+        """
+        xyz = self._coloured()
+        if not len(xyz):
+            return 0.0
+        chromaticity = _chromaticity(xyz)
+        mean = np.average(chromaticity, axis=0, weights=xyz[:, 1])
+        squares = np.sum(np.square(chromaticity - mean), axis=1)
+        return float(np.sqrt(np.average(squares, weights=xyz[:, 1])))
+
+    def hues(self) -> dict[str, float]:
+        """Return the shares of the luminance by hue: they add up to 1, or are 0 without light.
+
+        The hue is that of linear sRGB, clipped to the display's gamut, in sextants of HSV around
+        the primaries and their mixtures; "grey" has a saturation below `GREY`.
+        """
+        from matplotlib.colors import rgb_to_hsv
+
+        names, xyz = (*HUES, "grey"), self._coloured()
+        if not len(xyz):
+            return dict.fromkeys(names, 0.0)
+        clipped = np.clip(linear_srgb(xyz), 0.0, None)
+        hsv = rgb_to_hsv(clipped / np.maximum(clipped.max(axis=1, keepdims=True), 1e-300))
+        sextant = np.floor(hsv[:, 0] * 6.0 + 0.5).astype(int) % 6
+        sextant[hsv[:, 1] < GREY] = 6
+        total = np.bincount(sextant, xyz[:, 1], minlength=7)
+        return dict(zip(names, (total / total.sum()).tolist(), strict=True))
+
+    def _coloured(self) -> Reals:
+        """Return X, Y, Z (m, 3) of the cells that have enough light for a colour."""
+        luminance = self.xyz[..., 1]
+        lit = luminance > _DARK * luminance.max(initial=0.0)
+        return np.asarray(self.xyz[lit])
+
+
+def diffracted_light(table: DiffractionTable, light: Light) -> DiffractedLight:
+    """Collect the orders of a table by direction, in daylight (D65) and with R = 1.
+
+    An order of power P leaves in the direction sinθo = λq/2π − sinθi. It is seen through a
+    coherence window of `WINDOW`, or the table's if that is narrower. Orders of periods as long as
+    the window and longer, order 0 among them, are the mirror's lobe and left out. Powers are those
+    of Kirchhoff's integral (equations 3 and 4 of docs/theory.md), before energy is conserved.
+
+    table : all orders, of any coherence; one of `patch` counts as the mean of all windows.
+
+    Raises
+    ------
+    DiffractionError
+        If the table lacks orders, or wavelengths from 380 nm on.
+    """
+    if table.wavelength_range[0] > SHORTEST:
+        raise DiffractionError(
+            f"iridescence requires a table from {SHORTEST:g} nm on, and this table starts at "
+            f"{table.wavelength_range[0]:g} nm; build it with a wider wavelength_range"
+        )
+    coefficients, _, scale, expansion = power_series(table.averaged)
+    width = min(WINDOW, table.coherence_width)
+    qx, qy = (
+        spacing * np.arange(-last, last + 1)
+        for spacing, last in zip(table.spacing, table.grid.last, strict=True)
+    )
+    frequency = np.hypot(qx, qy[:, None])
+    # 1e-6: rounding decides about orders of exactly that period otherwise
+    mirror = frequency < (1.0 + 1e-6) * 2.0 * math.pi / width
+    count = 2 * math.ceil(1.15 / _CELL)
+    xyz = np.zeros((count, count, 3))
+    central = np.zeros(3)
+    for wavelength in np.arange(SHORTEST + 0.5 * STEP, LONGEST, STEP):
+        k = float(wavenumber(wavelength))
+        x, y = qx / k - light.direction[0], qy / k - light.direction[1]
+        z2 = 1.0 - x**2 - y[:, None] ** 2
+        rows, columns = np.nonzero(z2 > 0.0)
+        sines = np.stack([x[columns], y[rows]], axis=-1)
+        cosine = np.sqrt(z2[rows, columns])
+        w = light.direction[2] + cosine
+        factors = expansion.weights(k * w) / scale
+        interval = expansion.interval(k * w)
+        power = np.einsum("nt,nt->n", coefficients[interval, rows, columns], factors)
+        power = np.maximum(power, 0.0) * _obliquity(sines, cosine, light)
+        near = mirror[rows, columns]
+        weights = response(wavelength) * STEP
+        central += weights * power[near].sum()
+        order_0 = order_0_power(table.averaged, np.array(2.0 * k * light.direction[2]))
+        central += weights * float(order_0)
+        lobe = 1.0 / (math.sqrt(2.0) * k * sigma_of(width))  # standard deviation of its power
+        xyz += _spread(sines[~near], power[~near], lobe, count)[..., None] * weights
+    diffracted = float(xyz[..., 1].sum())
+    return DiffractedLight(xyz, diffracted / max(diffracted + central[1], 1e-300))
+
+
+def _obliquity(sines: Reals, cosine: Reals, light: Light) -> Reals:
+    """Return the power of an order over |a_j|²: ((1 + ωi·ωo)/w)² / (cosθi cosθo) (n,).
+
+    The integral of equation 4 of docs/theory.md over the lobe, R = 1; 1 in the mirror direction.
+    """
+    cos_i = light.direction[2]
+    total = sines + light.direction[:2]
+    w = cosine + cos_i
+    dot = 0.5 * (np.sum(total**2, axis=1) + w**2)
+    return np.asarray((dot / w) ** 2 / (cos_i * cosine))
+
+
+def _spread(sines: Reals, power: Reals, lobe: float, count: int) -> Reals:
+    """Distribute powers (n,) at sines (n, 2) over the cells (count, count), with their lobes."""
+    position = sines / _CELL + 0.5 * count
+    lower = np.floor(position).astype(int)
+    part = position - lower
+    cells = np.zeros(count * count)
+    for right in (0, 1):
+        for up in (0, 1):
+            weight = power * np.abs(1 - right - part[:, 0]) * np.abs(1 - up - part[:, 1])
+            index = (lower[:, 1] + up) * count + lower[:, 0] + right
+            cells += np.bincount(index, weight, minlength=count * count)
+    # Linear weights have widened the lobe by the variance 1/6 on average
+    deviation = math.sqrt((lobe / _CELL) ** 2 - 1.0 / 6.0)
+    return np.asarray(gaussian_filter(cells.reshape(count, count), deviation, mode="constant"))
+
+
+def _chromaticity(xyz: Reals) -> Reals:
+    """Return u', v' of CIE 1976: 4X and 9Y over X + 15Y + 3Z."""
+    weights = np.array([1.0, 15.0, 3.0])
+    total = np.maximum(xyz @ weights, 1e-300)
+    return np.stack([4.0 * xyz[:, 0] / total, 9.0 * xyz[:, 1] / total], axis=-1)

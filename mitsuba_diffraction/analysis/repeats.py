@@ -1,0 +1,111 @@
+"""Files of a survey, and which of them are repeated scans of one sample."""
+
+from __future__ import annotations
+
+import csv
+import glob
+import io
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..atomic import atomic_path
+from ..errors import DiffractionError
+from .iridescence import HUES
+
+#: How repeated scans are told: by names that differ in their last number, or by folders.
+REPEATS = ("name", "folder")
+#: Columns of rows that are averaged over repeated scans.
+AVERAGED = (
+    "range_um", "rms_height_um", "rms_slope", "period_1_um", "share_1", "diffracted",
+    "iridescence", *(f"share_{name}" for name in (*HUES, "grey")),
+)  # fmt: skip
+
+# Files that lie beside scans and hold no heights.
+_NO_SCANS = (
+    ".cfg", ".doc", ".docx", ".gz", ".html", ".ini", ".json", ".log", ".md", ".ods", ".pdf", ".py",
+    ".r", ".xls", ".xlsx", ".xml", ".yaml", ".zip",
+)  # fmt: skip
+# Number at the end of a name, with what separates it.
+_NUMBER = re.compile(r"[\s_.()#-]*\d+\)?$")
+
+
+def scan_files(names: Iterable[Path]) -> list[Path]:
+    """List scans: files as they are named, files of folders, and files that match patterns.
+
+    Folders are not searched deeper; hidden files, and files of documents, are left out of them.
+
+    Raises
+    ------
+    DiffractionError
+        If a folder holds no file, or no file matches a pattern.
+    """
+    files: dict[Path, None] = {}
+    for name in names:
+        if name.is_dir():
+            held = [f for f in sorted(name.iterdir()) if f.is_file() and _may_be_scan(f)]
+            if not held:
+                raise DiffractionError(f"'{name}' holds no scans; name another folder")
+        elif not name.exists() and glob.has_magic(str(name)):
+            held = [Path(f) for f in sorted(glob.glob(str(name), recursive=True))]
+            held = [f for f in held if f.is_file()]
+            if not held:
+                raise DiffractionError(f"no file matches '{name}'; check the pattern")
+        else:
+            held = [name]
+        files |= dict.fromkeys(held)
+    return list(files)
+
+
+def _may_be_scan(file: Path) -> bool:
+    return not file.name.startswith(".") and file.suffix.lower() not in _NO_SCANS
+
+
+def sample_of(file: Path, repeats: str = "name") -> str:
+    """Return the sample of a scan: its folder, or its path without the number at the end.
+
+    The suffix is left out: `scale_1.spm`, `scale-02.spm` and `scale.003` are scans of `scale`.
+    """
+    if repeats == "folder":
+        return str(file.parent)
+    name = _NUMBER.sub("", file.stem)
+    return str(file.parent / name) if name else str(file.parent)
+
+
+def write_repeats(path: Path, rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Write a row for each sample as CSV, with means and standard errors, and return the rows.
+
+    The standard error of the mean is s/√n, with s the standard deviation of n measured scans; it is
+    empty for a single scan. A quantity that some scans lack has the mean of the others.
+    """
+    samples: dict[str, list[Mapping[str, Any]]] = {}
+    for row in rows:
+        samples.setdefault(row["sample"], []).append(row)
+    averaged = [_averaged(sample, scans) for sample, scans in samples.items()]
+    text = io.StringIO()
+    columns = [f"{name}{end}" for name in AVERAGED for end in ("", "_se")]
+    names = ["sample", "scans", "failed", *columns]
+    writer = csv.DictWriter(text, names, restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(averaged)
+    with atomic_path(path) as temporary:
+        temporary.write_text(text.getvalue(), "utf-8")
+    return averaged
+
+
+def _averaged(sample: str, scans: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Average the measured rows of a sample."""
+    measured = [row for row in scans if not row["reason"]]
+    result: dict[str, Any] = {"sample": sample, "scans": len(measured)}
+    result["failed"] = len(scans) - len(measured)
+    for name in AVERAGED:
+        values = [row[name] for row in measured if name in row]
+        if values:
+            result[name] = float(np.mean(values))
+        if len(values) > 1:
+            result[f"{name}_se"] = float(np.std(values, ddof=1) / math.sqrt(len(values)))
+    return result

@@ -1,0 +1,73 @@
+"""Files of a survey: rows as CSV, and contact sheets of the maps."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..atomic import atomic_path
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SHEET = "sheet"
+_COLUMNS, _ROWS = 6, 8  # maps in a contact sheet
+
+
+def write_rows(
+    path: Path,
+    named: Sequence[Mapping[str, str]],
+    rows_by_number: Mapping[int, Mapping[str, Any]],
+) -> list[dict[str, Any]]:
+    """Write the measured rows in the order of the files as CSV, and return them.
+
+    named : columns that name each file, the first of its row.
+    """
+    rows = [{**named[n], **rows_by_number[n]} for n in sorted(rows_by_number)]
+    columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
+    first = ("file", "sample", "reason")
+    names = [*first, *(name for name in columns if name not in first)]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, names, restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    with atomic_path(path) as temporary:
+        temporary.write_text(text.getvalue(), "utf-8")
+    return rows
+
+
+def write_sheets(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write contact sheets of all maps."""
+    per_page = _COLUMNS * _ROWS
+    measured = [row for row in rows if not row["reason"]]
+    for page in range(math.ceil(len(measured) / per_page)):
+        name = SHEET if len(measured) <= per_page else f"{SHEET}-{page + 1:03d}"
+        with atomic_path(folder / f"{name}.png") as temporary:
+            sheet = _sheet(folder, measured[page * per_page : (page + 1) * per_page])
+            sheet.savefig(temporary, format="png")
+
+
+def _sheet(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Figure:
+    """Draw a contact sheet: maps with file name, strongest grating and iridescence."""
+    from matplotlib.figure import Figure
+    from PIL import Image
+
+    lines = math.ceil(len(rows) / _COLUMNS)
+    figure = Figure(figsize=(2.2 * _COLUMNS, 2.7 * lines), dpi=100, layout="constrained")
+    for axes, row in zip(figure.subplots(lines, _COLUMNS, squeeze=False).flat, rows, strict=False):
+        with Image.open(folder / row["map"]) as picture:
+            axes.imshow(picture)
+        period = row.get("period_1_um")
+        title = "" if period is None else f"{period:.3g} µm at {row['direction_1_deg']:.0f}°, "
+        axes.set_title(
+            f"{Path(row['file']).name[:34]}\n{title}iridescence {row['iridescence']:.2g}"
+            + (f"\n{row['tiling']}" if row["tiling"] else ""),
+            fontsize=6,
+        )
+    for axes in figure.axes:
+        axes.set_axis_off()
+    return figure

@@ -1,0 +1,81 @@
+"""Options to read scans, and settings of their tables, by patterns of file names.
+
+A TOML file of patterns selects reading options and treatments:
+
+    ["snakes/*.png"]
+    pixel_size = 0.0488
+    max_height = 0.375
+    level = "plane"
+
+Patterns are matched with the whole path and with the file's name. Where several match, later ones
+override earlier ones. Keys are those of recipes.
+"""
+
+from __future__ import annotations
+
+import fnmatch
+import os
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..errors import DiffractionError, one_line
+from ..files import read_text
+from ..heights.read import LoadOptions
+from ..heights.recipes import LOAD_KEYS, options_and_settings
+from ..settings import RECIPE_SETTINGS
+
+
+@dataclass(frozen=True)
+class Treatment:
+    """Options to read a file, and settings of its table."""
+
+    options: LoadOptions = field(default_factory=LoadOptions)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    def updated(self, other: Treatment) -> Treatment:
+        """Return this treatment, replaced by the values that `other` sets."""
+        return Treatment(self.options.updated(other.options), {**self.settings, **other.settings})
+
+
+def load_treatments(
+    path: str | os.PathLike[str] | None,
+) -> Sequence[tuple[str, Treatment]]:
+    """Read patterns and their treatments from a TOML file, in its order; none if path is `None`.
+
+    Raises
+    ------
+    DiffractionError
+        If the file cannot be read, or a pattern has an option without a valid value.
+    """
+    if path is None:
+        return []
+    try:
+        content = tomllib.loads(read_text(path))
+    except tomllib.TOMLDecodeError as error:
+        raise DiffractionError(f"cannot read '{path}': {one_line(str(error))}") from error
+    return [(pattern, _treatment(f"'{path}': [{pattern!r}]", v)) for pattern, v in content.items()]
+
+
+def treatment_for(file: Path, treatments: Sequence[tuple[str, Treatment]]) -> Treatment:
+    """Combine the treatments of the patterns that match a file."""
+    result = Treatment()
+    for pattern, treatment in treatments:
+        if fnmatch.fnmatch(str(file), pattern) or fnmatch.fnmatch(file.name, pattern):
+            result = result.updated(treatment)
+    return result
+
+
+def _treatment(where: str, values: Any) -> Treatment:
+    """Check the options of one pattern."""
+    if not isinstance(values, dict):
+        raise DiffractionError(f"{where}: expected a pattern in brackets with options below it")
+    unknown = set(values) - {*LOAD_KEYS, *RECIPE_SETTINGS}
+    if unknown:
+        raise DiffractionError(
+            f"{where}: unknown key {min(unknown)!r}; known are "
+            f"{', '.join((*LOAD_KEYS, *RECIPE_SETTINGS))}"
+        )
+    return Treatment(*options_and_settings(values, where))

@@ -1,0 +1,33 @@
+"""`mitsuba-diffraction tonemap`: from the linear EXR of a picture to a PNG."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..scene.load import set_variant
+from ..scene.pictures import read_exr, write_png
+from . import options
+from .report import check_outputs
+
+
+def add_parser(subparsers: options.Subparsers) -> None:
+    parser = options.add_command(
+        subparsers, "tonemap", run, "show a linear EXR as a PNG",
+        "Write a PNG of a picture that exists as a linear EXR, with another exposure or view "
+        "than it was rendered with.",
+    )  # fmt: skip
+    parser.add_argument("picture", metavar="FILE.exr", type=Path, help="linear picture")
+    options.add_output(parser, "PNG to write; default: beside the EXR, with its name", ".png")
+    options.add_exposure(parser, 0.0, "stops: +1 doubles the light; default: 0")
+    options.add_view(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the PNG, and return the exit code."""
+    output = args.output or args.picture.with_suffix(".png")
+    check_outputs([output], [args.picture], "picture")
+    set_variant("scalar_rgb")  # bitmaps belong to no variant, but Mitsuba asks for one
+    write_png(read_exr(args.picture), output, args.exposure, args.view)
+    print(f"{output}: view {args.view}, {args.exposure:+g} stops")
+    return 0

@@ -1,0 +1,112 @@
+"""Pictures: EXR, linear and with all channels, and PNG, for the eye."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..atomic import atomic_path
+from ..errors import DiffractionError, one_line
+from ..files import readable_file
+from ..optics.display import natural
+
+# Pixel formats that a screen can show, and what becomes of them in a PNG.
+_SHOWN_AS = {"RGB": "RGB", "RGBA": "RGBA", "XYZ": "RGB", "XYZA": "RGBA", "Y": "Y", "YA": "YA"}
+
+
+def read_exr(path: Path) -> Any:
+    """Read the colours of an EXR as `colours_of` returns them.
+
+    Raises a DiffractionError if the file is no EXR, or holds no colours that a screen can show.
+    """
+    import mitsuba as mi
+
+    readable_file(path)
+    if path.suffix.lower() != ".exr":
+        raise DiffractionError(f"'{path}' is no EXR; name a picture that 'render' wrote as .exr")
+    try:
+        colours = colours_of(mi.Bitmap(str(path)))
+    except RuntimeError as error:
+        reason = one_line(str(error)).rpartition("] ")[2]
+        raise DiffractionError(f"cannot read '{path}' as a picture: {reason}") from error
+    if colours is None:
+        raise DiffractionError(
+            f"'{path}' holds no colours that a screen could show; name a picture with the channels "
+            "R, G, B or Y"
+        )
+    return colours
+
+
+def colours_of(bitmap: Any) -> Any | None:
+    """Return the part of a film's bitmap that a screen can show; None if there is none.
+
+    Beside colours a film may hold further channels (normals, depth, ...), and a spectral film
+    holds only bands.
+    """
+    parts = dict(bitmap.split())
+    root = parts.get("<root>")
+    if root is None or root.pixel_format().name not in _SHOWN_AS:
+        return None
+    return root
+
+
+def write_exr(bitmap: Any, path: Path, metadata: Mapping[str, str | int]) -> None:
+    """Write all channels, linear, in single precision, with metadata as EXR attributes."""
+    for key, value in metadata.items():
+        bitmap.metadata()[key] = value
+    _write(bitmap, path)
+
+
+def write_png(
+    colours: Any,
+    path: Path,
+    exposure: float = 0.0,
+    view: str = "natural",
+    metadata: Mapping[str, str] | None = None,
+) -> None:
+    """Write 8 bits per channel: values times 2^exposure, shown by a view, sRGB's transfer curve.
+
+    colours : result of `colours_of`; its alpha is premultiplied, that of the PNG is not.
+    exposure : stops.
+    view : one of `optics.display.VIEWS`.
+    metadata : text to store with it, ASCII.
+    """
+    import mitsuba as mi
+
+    shown_as = getattr(mi.Bitmap.PixelFormat, _SHOWN_AS[colours.pixel_format().name])
+    has_alpha, transform = colours.has_alpha(), mi.Bitmap.AlphaTransform
+    straight = colours.convert(
+        shown_as, mi.Struct.Type.Float32, False,
+        transform.Unpremultiply if has_alpha else transform.Empty,
+    )  # fmt: skip
+    values = np.nan_to_num(np.array(straight, dtype=np.float32), copy=False, nan=0.0)
+    values = values.reshape(*values.shape[:2], -1)  # one channel has no axis
+    light = values[..., :-1] if has_alpha else values
+    exposed = light * 2.0 ** np.float64(exposure)
+    if view == "natural":
+        exposed = natural(np.broadcast_to(exposed, (*exposed.shape[:2], 3)))
+    light[...] = np.clip(exposed[..., : light.shape[-1]], 0.0, 1.0)
+    linear = mi.Bitmap(values, pixel_format=shown_as)
+    encoded = linear.convert(shown_as, mi.Struct.Type.UInt8, True, transform.Empty)
+    for key, value in (metadata or {}).items():
+        encoded.metadata()[key] = value
+    _write(encoded, path)
+
+
+def count_bad(bitmap: Any) -> int:
+    """Count the pixels that hold a NaN or an infinity."""
+    return int((~np.isfinite(np.array(bitmap))).any(axis=-1).sum())
+
+
+def _write(bitmap: Any, path: Path) -> None:
+    with atomic_path(path) as temporary:
+        try:
+            bitmap.write(str(temporary))
+        except RuntimeError as error:  # Mitsuba's exception for a full disk
+            reason = one_line(str(error)).rpartition(": ")[2]
+            raise DiffractionError(
+                f"cannot write '{path}': {reason}; nothing was left behind"
+            ) from error

@@ -1,0 +1,67 @@
+"""`tonemap`: the PNG of an EXR that exists."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from mitsuba_diffraction.optics.display import shown
+from tests.support.room import QUICK, png
+
+pytestmark = pytest.mark.usefixtures("here")
+
+
+def write(name, **channels):
+    """Write an EXR of these channels."""
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, channels).write(name)
+
+
+@pytest.fixture
+def light():
+    """Colours from black to far beyond white, some outside the gamut."""
+    rng = np.random.default_rng(1)
+    return (rng.normal(0.6, 0.6, (16, 24, 3)) * 4.0 ** rng.normal(0, 2, (16, 24, 1))).astype("f4")
+
+
+@pytest.mark.parametrize("view", ["natural", "standard"])
+def test_the_png_shows_the_view_and_the_exr_stays(run, light, view):
+    write("a.exr", RGB=light)
+    before = Path("a.exr").read_bytes()
+    assert run("tonemap", "a.exr", "--view", view, "--exposure", "-1").code == 0
+    # Mitsuba dithers between the two neighbours
+    assert np.abs(png("a.png")[0] - 255 * shown(light / 2, view)).max() < 1.01
+    assert Path("a.exr").read_bytes() == before
+
+
+def test_render_writes_the_same_png(run, scene):
+    assert run("render", scene, *QUICK, "-o", "a.exr", "--exposure", "1").code == 0
+    assert run("tonemap", "a.exr", "-o", "b.png", "--exposure", "1").code == 0
+    assert np.abs(png("a.png")[0].astype(int) - png("b.png")[0]).max() <= 1  # dithered
+
+
+def test_luminance_and_alpha_are_shown(run, light):
+    write("a.exr", Y=np.ascontiguousarray(light[..., 0]), A=np.full(light.shape[:2], 0.5, "f4"))
+    assert run("tonemap", "a.exr").code == 0
+    picture, mode = png("a.png")
+    assert mode == "LA"
+    expected = shown(np.repeat(2 * light[..., :1], 3, axis=-1))[..., 0]  # alpha is premultiplied
+    assert np.abs(picture[..., 0] - 255 * expected).max() < 1.01
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("none.exr", "none.exr"), ("words.exr", "cannot read"), ("a.txt", "no EXR"),
+     ("depth.exr", "holds no colours")],
+)  # fmt: skip
+def test_other_files_are_refused_in_one_line(run, light, name, said):
+    for file in ("words.exr", "a.txt"):
+        Path(file).write_text("words", encoding="utf-8")
+    write("depth.exr", height=np.ascontiguousarray(light[..., 0]))
+    line = run("tonemap", name).failed_in_one_line()
+    assert said in line
+    assert not [file for file in os.listdir() if file.endswith(".png")]
