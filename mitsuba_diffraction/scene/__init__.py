@@ -6,6 +6,7 @@ load         variants set and scenes loaded; Mitsuba's errors in one line
 parameters   names that -D may set, and values that change from frame to frame
 passes       rendering in passes of samples
 pictures     EXR and PNG of pictures
+denoise      pictures without noise, by Open Image Denoise
 frames       frames of an animation, and a film of them
 additions    meshes and materials put into a scene before Mitsuba makes its objects
 fitted_mesh  mesh files put on a stage: upright, centred, standing on the floor

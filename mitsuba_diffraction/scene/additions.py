@@ -91,6 +91,23 @@ def put_materials(state: Any, materials: Mapping[str, str]) -> None:
             _put_on_bsdf(state, number, text)
 
 
+def put_box_filters(state: Any) -> None:
+    """Give all films box filters, which keep the noise of each pixel apart, as denoisers need it.
+
+    state : `mi.parser.ParserState`, its references resolved.
+    """
+    for node in state.nodes:
+        if node.type != mi.ObjectType.Film:
+            continue
+        for name in list(node.props.keys()):
+            value = node.props[name]
+            if isinstance(value, mi.Properties.ResolvedReference) and (
+                state.nodes[value.index()].type == mi.ObjectType.ReconstructionFilter
+            ):
+                del node.props[name]
+        node.props["box"] = mi.load_dict({"type": "box"})
+
+
 def _node_of(state: Any, name: str) -> int:
     """Return the number of the BSDF or shape of this id."""
     kinds = (mi.ObjectType.BSDF, mi.ObjectType.Shape)

@@ -74,8 +74,10 @@ def set_variant(name: str | None) -> str:
     return name
 
 
-def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
+def load_scene(file: Path, parameters: Mapping[str, Any], *, box_filter: bool = False) -> Any:
     """Load an XML scene in the variant that is set.
+
+    box_filter : give all films a box as reconstruction filter instead of their own.
 
     Raises a DiffractionError if the file or anything that it refers to is missing or wrong.
     """
@@ -92,7 +94,7 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
         if name in parameters:
             raise DiffractionError(f"-D {name}: Mitsuba reserves this name; rename the parameter")
     try:
-        scene = _instantiated(file, parameters, materials)
+        scene = _instantiated(file, parameters, materials, box_filter)
     except (RuntimeError, UnicodeDecodeError) as error:
         raise error_of("cannot load the scene", error) from error
     if not isinstance(scene, mi.Scene):
@@ -109,11 +111,13 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
     return scene
 
 
-def _instantiated(file: Path, parameters: Mapping[str, Any], materials: Mapping[str, str]) -> Any:
-    """Parse a scene, put meshes and materials into it, and make Mitsuba's objects of it."""
+def _instantiated(
+    file: Path, parameters: Mapping[str, Any], materials: Mapping[str, str], box_filter: bool
+) -> Any:
+    """Parse a scene, put meshes, materials and filters into it, and make Mitsuba's objects of it."""
     import mitsuba as mi
 
-    from .additions import fit_meshes, put_materials
+    from .additions import fit_meshes, put_box_filters, put_materials
 
     config = mi.parser.ParserConfig(mi.variant())
     # In threads Mitsuba 3.9 loads no faster, since its parser waits for each object; and Ctrl-C
@@ -121,7 +125,7 @@ def _instantiated(file: Path, parameters: Mapping[str, Any], materials: Mapping[
     config.parallel = False
     before = mi.file_resolver()
     resolver = mi.FileResolver(before)
-    resolver.prepend(str(file.absolute().parent))
+    resolver.prepend(str(file.absolute().parent))  # files that the scene names are relative to it
     mi.set_file_resolver(resolver)
     try:
         with tempfile.TemporaryDirectory() as folder:
@@ -129,10 +133,11 @@ def _instantiated(file: Path, parameters: Mapping[str, Any], materials: Mapping[
             fit_meshes(state, Path(folder))
             put_materials(state, materials)
             mi.parser.transform_all(config, state)
-            loaded = mi.parser.instantiate(config, state)
+            if box_filter:
+                put_box_filters(state)
+            return mi.parser.instantiate(config, state)
     finally:
         mi.set_file_resolver(before)
-    return loaded[0] if isinstance(loaded, list) and len(loaded) == 1 else loaded
 
 
 def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
