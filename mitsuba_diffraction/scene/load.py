@@ -114,7 +114,7 @@ def load_scene(file: Path, parameters: Mapping[str, Any], *, box_filter: bool = 
 def _instantiated(
     file: Path, parameters: Mapping[str, Any], materials: Mapping[str, str], box_filter: bool
 ) -> Any:
-    """Parse a scene, put meshes, materials and filters into it, and make Mitsuba's objects of it."""
+    """Parse a scene, put meshes, materials and filters in, and make Mitsuba's objects of it."""
     import mitsuba as mi
 
     from .additions import fit_meshes, put_box_filters, put_materials
