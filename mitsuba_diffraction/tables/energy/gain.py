@@ -52,6 +52,8 @@ class Boundary:
 
     #: Whether heights do not matter.
     flat = False
+    #: Whether G is the same if both directions are exchanged: not between two sides.
+    symmetric = True
 
     def normals(self, cos_i: Real, cos_o: Real) -> tuple[Real, Real]:
         """qi and qo."""
@@ -91,7 +93,7 @@ class Boundary:
         angle = 0.5 * np.pi * (1.0 - np.linspace(1.0, 0.0, POLAR) ** 2)  # denser towards grazing
         cosine = np.maximum(np.cos(angle), LEAST_COSINE)
         i, o = np.indices((POLAR, POLAR)).reshape(2, -1)
-        if self.came == self.left:  # reciprocity gives the rest
+        if self.symmetric:  # reciprocity gives the rest
             i, o = np.tril_indices(POLAR)
         return cosine[i, None], cosine[o, None], np.cos(np.linspace(0.0, np.pi, AZIMUTHS))
 
@@ -151,7 +153,7 @@ class Gain:
     def _table(self) -> Real:
         """`ratio` at the nodes, (POLAR, POLAR, AZIMUTHS)."""
         values = self._ratio(self.boundary.at_nodes, *self.boundary.nodes)
-        if self.boundary.came != self.boundary.left:
+        if not self.boundary.symmetric:
             return values.reshape(POLAR, POLAR, AZIMUTHS)
         table = np.empty((POLAR, POLAR, AZIMUTHS))
         i, o = np.tril_indices(POLAR)

@@ -84,6 +84,7 @@ class Dielectric(Boundary):
 class Passed(Dielectric):
     """Light that goes through, down or up; through a sheet, out of its flat side as well."""
 
+    symmetric = False
     down: bool = True
     thin: bool = False
 
