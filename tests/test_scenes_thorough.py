@@ -43,6 +43,20 @@ def test_it_renders_with_a_gentle_patch(name: str, gentle: dict[str, str]) -> No
     assert image.max() > 0.0
 
 
+@pytest.mark.parametrize(
+    "name", ["cd", "cd_window", "grating", "grating_window", "material_ball", "scales"]
+)
+def test_it_renders_without_kernels(name: str, gentle: dict[str, str]) -> None:
+    """In the variant that compiles none, which is quicker for few samples."""
+    import mitsuba as mi
+
+    mi.set_variant("scalar_spectral")
+    tiny = {"spp": "2", "resx": "24", "resy": "20"}
+    image = rendered(name, **tiny, **{key: gentle[key] for key in ("patch", "pixel_size")})
+    assert np.isfinite(image).all()
+    assert image.max() > 0.0
+
+
 @pytest.mark.usefixtures("variant")
 def test_the_snake_fills_half_of_the_picture() -> None:
     import mitsuba as mi
