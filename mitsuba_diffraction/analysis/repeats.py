@@ -103,7 +103,7 @@ def _averaged(sample: str, scans: Sequence[Mapping[str, Any]]) -> dict[str, Any]
     result: dict[str, Any] = {"sample": sample, "scans": len(measured)}
     result["failed"] = len(scans) - len(measured)
     for name in AVERAGED:
-        values = [row[name] for row in measured if name in row]
+        values = [row[name] for row in measured if row.get(name, "") != ""]
         if values:
             result[name] = float(np.mean(values))
         if len(values) > 1:

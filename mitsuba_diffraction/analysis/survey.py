@@ -23,7 +23,7 @@ from ..cluster.jobs import run_jobs
 from ..cluster.tasks import Failed, MissingFiles, SceneFiles
 from ..errors import DiffractionError, DiffractionWarning, one_line
 from ..files import readable_file
-from ..heights.coherence import REPEATS
+from ..heights.coherence import REPEATS, widest_window
 from ..heights.field import HeightField
 from ..heights.load import load_heights
 from ..heights.read import is_recipe
@@ -34,7 +34,7 @@ from ..scene.load import error_of
 from ..settings import TableSettings
 from ..tables.build.build import build_with
 from ..tables.store import cached_table, key_of
-from .iridescence import diffracted_light
+from .iridescence import WINDOW, diffracted_light
 from .maps import brdf_map
 from .maps.result import BrdfMap, Light
 from .repeats import sample_of, scan_files, write_repeats
@@ -42,7 +42,7 @@ from .survey_files import write_rows, write_sheets
 from .treatments import Treatment, treatment_for
 
 #: Version of the rows: raise it when their values change.
-VERSION = 4
+VERSION = 5
 #: Number of gratings in a row.
 PERIODS = 3
 #: Names of the files in a survey's folder.
@@ -145,7 +145,10 @@ def _measure(job: Job, row: dict[str, Any]) -> dict[str, bytes]:
         content = file.read_bytes()
     row |= {"light_theta_deg": job.theta, "light_phi_deg": phi}
     diffracted = diffracted_light(table, Light(job.theta, phi))
-    row |= {"diffracted": diffracted.share, "iridescence": diffracted.iridescence()}
+    row["diffracted"] = diffracted.share
+    # a smaller scan has too few orders of its own: chance decides
+    enough = widest_window(fields) >= 0.99 * WINDOW
+    row["iridescence"] = diffracted.iridescence() if enough else ""
     row |= {f"share_{name}": share for name, share in diffracted.hues().items()}
     return {".exr": content, ".png": _png(measured)}
 

@@ -51,6 +51,11 @@ def write_sheets(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
             sheet.savefig(temporary, format="png")
 
 
+def _iridescence(index: float | str) -> str:
+    """Text of an index, or of none."""
+    return "too small for an index" if isinstance(index, str) else f"iridescence {index:.2g}"
+
+
 def _sheet(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Figure:
     """Draw a contact sheet: maps with file name, strongest grating and iridescence."""
     from matplotlib.figure import Figure
@@ -64,7 +69,7 @@ def _sheet(folder: Path, rows: Sequence[Mapping[str, Any]]) -> Figure:
         period = row.get("period_1_um")
         title = "" if period is None else f"{period:.3g} µm at {row['direction_1_deg']:.0f}°, "
         axes.set_title(
-            f"{Path(row['file']).name[:34]}\n{title}iridescence {row['iridescence']:.2g}"
+            f"{Path(row['file']).name[:34]}\n{title}{_iridescence(row['iridescence'])}"
             + (f"\n{row['tiling']}" if row["tiling"] else ""),
             fontsize=6,
         )

@@ -162,36 +162,11 @@ def add_source(parser: argparse.ArgumentParser, *, tables: bool = False) -> None
 
 
 def add_files(parser: argparse.ArgumentParser, kinds: str) -> None:
-    """Add the argument FILE..., files of these kinds; see `expanded`."""
+    """Add the argument FILE..., files of these kinds; `analysis.repeats.scan_files` reads it."""
     parser.add_argument(
         "files", metavar="FILE", type=Path, nargs="+",
         help=f"{kinds}; folders and patterns of names, too",
     )  # fmt: skip
-
-
-def expanded(paths: Sequence[Path]) -> list[Path]:
-    """Return files: a folder stands for all files in it, a pattern (* ? [) for those it matches.
-
-    Hidden files are left out. Raises a DiffractionError if a folder or a pattern has no files.
-    """
-    files: list[Path] = []
-    for path in paths:
-        if path.is_dir():
-            matching = [p for p in sorted(path.iterdir()) if _is_plain(p)]
-            if not matching:
-                raise DiffractionError(f"the folder '{path}' has no files; name one with scans")
-        elif any(c in path.name for c in "*?[") and not path.exists():
-            matching = [p for p in sorted(path.parent.glob(path.name)) if _is_plain(p)]
-            if not matching:
-                raise DiffractionError(f"no file matches '{path}'; name files, or a folder of them")
-        else:
-            matching = [path]
-        files += matching
-    return list(dict.fromkeys(files))
-
-
-def _is_plain(path: Path) -> bool:
-    return path.is_file() and not path.name.startswith(".")
 
 
 def add_output(parser: argparse.ArgumentParser, text: str, *suffixes: str, **more: Any) -> None:

@@ -80,7 +80,9 @@ def run(args: argparse.Namespace) -> int:
     """Measure the spectra, and return the exit code."""
     start = time.perf_counter()
     options.load_options(args)  # wrong options are reported before Mitsuba is loaded
-    files = options.expanded(args.files)
+    from ..analysis.repeats import scan_files
+
+    files = scan_files(args.files)
     output = args.output or Path(f"{files[0].stem}-spectrum.csv")
     written = [output, output.with_suffix(".png")]
     if len(files) > 1:
