@@ -126,7 +126,8 @@ def run(args: argparse.Namespace) -> int:
             notes="\n".join(f"{name}: {text}" for name, text in report),
         ).savefig(path, format="png")  # fmt: skip
     save_csv(written[1], response, ridge, period, args.order)
-    more |= {"fitted_period": fitted, "residual": np.nan if fit is None else fit.residual,
+    more |= {"fitted_period": fitted, "fit_error": np.nan if fit is None else fit.error,
+             "residual": np.nan if fit is None else fit.residual,
              "coherence_width": width, "source": str(args.source)}  # fmt: skip
     save_npz(written[2], response, ridge, period, args.order, more)
     print(
@@ -148,6 +149,7 @@ def run(args: argparse.Namespace) -> int:
     )
     if notes := options.notes(args, patch, asked):
         say_warning(notes)
+    print(f"  {'period':<9} {_published(fit, more.get('window_error'))}")
     save_report(args, {"patch": patch.name, "method": args.method, "theta": beam.theta,
                        "phi": beam.phi, **more})  # fmt: skip
     return 0
@@ -251,7 +253,8 @@ def _windows(
         lines.append(("windows", str(error)))
     else:
         periods = 1e3 * fits.periods
-        more |= {"window_periods": fits.periods, "window_places": fits.centres}
+        more |= {"window_periods": fits.periods, "window_places": fits.centres,
+                 "window_error": fits.error}  # fmt: skip
         lines.append(
             ("windows", f"{periods.size} of {args.positions} window positions: "
              f"{1e3 * fits.mean:.5g} ± {1e3 * fits.spread:.2g} nm, {periods.min():.5g} to "
@@ -268,6 +271,26 @@ def _windows(
              "window, on the corner)")
         )  # fmt: skip
     return lines, more
+
+
+def _published(fit: Fit | None, window_error: float | None) -> str:
+    """Describe the period to publish: that of the fit, with all errors that are known.
+
+    window_error : µm, of the window's position; None if it was not examined.
+    """
+    if fit is None:
+        return "none to publish: no ridge follows the grating equation"
+    parts = [f"fit {1e3 * fit.error:.2g} nm"]
+    if window_error is None:
+        parts.append("window's position not examined")
+    else:
+        parts.append(f"window's position {1e3 * window_error:.2g} nm")
+    error = 1e3 * math.hypot(fit.error, window_error or 0.0)
+    digits = max(0, 1 - math.floor(math.log10(error))) if error > 0.0 else 2
+    return (
+        f"{1e3 * fit.period:.{digits}f} ± {error:.{digits}f} nm to publish ({', '.join(parts)}; "
+        "the pixel size's relative error, unknown here, adds to it)"
+    )
 
 
 def _fitted(fit: Any) -> tuple[str, str]:

@@ -15,25 +15,25 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import DiffractionError
-from ..scene.frames import FILMS, MISSING, Frame, digest_of, render_frames, write_film, write_frame
+from ..scene.denoise import denoised, require_denoiser
+from ..scene.frames import (
+    FILMS,
+    MISSING,
+    Frame,
+    check_film,
+    digest_of,
+    render_frames,
+    write_film,
+    write_frame,
+)
 from ..scene.load import load_scene, preview_samples, sensor_of, set_variant, shrink
 from ..scene.parameters import values_of_frames
-from ..scene.passes import (
-    Result,
-    Stop,
-    integrator_of,
-    render_passes,
-)
+from ..scene.passes import Result, Stop, integrator_of, render_passes
 from ..scene.pictures import colours_of, count_bad, write_exr, write_png
 from . import options
 from .console import INTERRUPTED, Bar, mitsuba_warnings, say, say_warning
 from .options import change, number_between, whole_number
-from .plan import (
-    add_plan_options,
-    check_plan_options,
-    load_by_plan,
-    recipe_file,
-)
+from .plan import add_plan_options, check_plan_options, load_by_plan, recipe_file
 from .report import check_writable, save_report
 from .workers import add_threads, add_workers, client_of, film_of, on_workers, say_report
 
@@ -49,12 +49,17 @@ def add_parser(subparsers: options.Subparsers) -> None:
     options.add_scene(parser)
     options.add_output(
         parser, "EXR, with a PNG beside it, or only a PNG; default: the scene's name with .exr in "
-        "the current folder. With --frames: a folder, or a film, .webp or .gif, whose frames go "
-        "into a folder of its name; default: the folder SCENE_frames", metavar="OUT",
+        "the current folder. With --frames: a folder, or a film, .webp, .gif or .mp4, whose "
+        "frames go into a folder of its name; default: the folder SCENE_frames", metavar="OUT",
     )  # fmt: skip
     options.add_samples(parser, 1, None)
     options.add_exposure(parser, 0.0, "of the PNG, in stops: +1 doubles the light; default: 0")
     options.add_view(parser)
+    parser.add_argument(
+        "--denoise", action="store_true",
+        help="write a denoised picture, too, with _denoised in its name (extra denoise); the film "
+        "gets the box filter, which the denoiser needs",
+    )  # fmt: skip
     parser.add_argument(
         "--preview", action="store_true",
         help="half the width and height, and at most 16 samples, unless -s is given",
@@ -95,6 +100,8 @@ def run(args: argparse.Namespace) -> int:
     if on_workers(args) and args.plan is not None:
         args.parser.error("argument --plan: is for one process; leave the workers out")
     moving = bool(args.animate or args.turn)
+    if args.denoise and (args.frames is not None or on_workers(args)):
+        args.parser.error("argument --denoise: is for one picture in one process")
     if args.frames is not None:
         if not moving:
             args.parser.error("argument --frames: say what changes, with --animate or --turn")
@@ -125,6 +132,12 @@ class Outputs(NamedTuple):
     def only_png(self) -> bool:
         """Whether no EXR is written."""
         return self.named == self.png
+
+    @property
+    def denoised(self) -> list[Path]:
+        """Files of the denoised picture, of the same kinds."""
+        files = dict.fromkeys((self.named, self.png))
+        return [file.with_name(f"{file.stem}_denoised{file.suffix}") for file in files]
 
 
 def _outputs(args: argparse.Namespace) -> Outputs:
@@ -166,13 +179,17 @@ def _on_workers(args: argparse.Namespace) -> int:
 def _run_one(args: argparse.Namespace) -> int:
     parameters = options.scene_parameters(args)
     outputs = _outputs(args)
+    if args.denoise:
+        require_denoiser()
+        for path in outputs.denoised:
+            check_writable(path)
 
     start = time.perf_counter()
     variant = set_variant(args.mode)
     with mitsuba_warnings():
         with Bar(args, unit=" spp", delay=0) as bar:
             spp = args.spp or 0
-            load = partial(load_scene, args.scene, parameters)
+            load = partial(load_scene, args.scene, parameters, box_filter=args.denoise)
             bar(0, spp, "loading")
             scene = load() if args.plan is None else load_by_plan(args, variant, load, bar)
             sensor = sensor_of(scene, args.sensor)
@@ -189,6 +206,10 @@ def _run_one(args: argparse.Namespace) -> int:
         if result.spp == 0:
             raise KeyboardInterrupt  # before the first pass: there is no picture
         report = _finish(args, result, outputs, variant, start)
+        if args.denoise:
+            clean = denoised(scene, sensor, result.bitmap, result.spp, args.seed)
+            _write_denoised(args, clean, outputs.denoised)
+            report["files"] += outputs.denoised
     save_report(args, report)
     if result.interrupted:
         say(f"interrupted; the picture has {result.spp} of {spp} samples per pixel")
@@ -229,6 +250,16 @@ def _finish(
     }  # fmt: skip
 
 
+def _write_denoised(args: argparse.Namespace, picture: Any, files: Sequence[Path]) -> None:
+    """Write the denoised picture beside the noisy one."""
+    for path in files:
+        if path.suffix.lower() == ".png":
+            write_png(picture, path, args.exposure, args.view)
+        else:
+            write_exr(picture, path, {"scene": str(args.scene), "denoised": "Open Image Denoise"})
+    print(f"{' and '.join(map(str, files))}: denoised")
+
+
 def _check_colours(scene: Any, sensor: Any, args: argparse.Namespace, output: Path) -> None:
     """Refuse a film without colours for a PNG, before the work is done."""
     film = sensor.film()
@@ -245,6 +276,7 @@ def _run_frames(args: argparse.Namespace) -> int:
     folder, film = _folder_and_film(args)
     check_writable(folder / "frame_0000.png", make_folder=True)
     if film is not None:
+        check_film(film)
         check_writable(film)
     frames = _frames(args, folder)
     reasons = {frame.png: frame.outdated(args.exr) for frame in frames}

@@ -89,12 +89,14 @@ def run(args: argparse.Namespace) -> int:
     lam = _wavelengths(args)
 
     variant = set_variant("llvm_ad_spectral_polarized" if args.polarisation else "llvm_ad_spectral")
-    from ..analysis.spectra import Geometry, mean_spectra
+    from ..analysis.spectra import Geometry, check_material, mean_spectra
     from ..analysis.spectra_files import save_csv, save_errors, spectra_figure
     from ..atomic import atomic_path
 
     detectors = (args.light,) if args.detector is None else tuple(args.detector)
     geometry = Geometry(args.light, detectors, args.light_azimuth, args.acceptance)
+    if args.material is not None:  # before its table is built
+        check_material(args.material, lam)
     with mitsuba_warnings(), Bar(args) as bar:
         spectra = mean_spectra([_measured(args, file, geometry, lam, bar) for file in files])
     save_csv(spectra, output)

@@ -27,6 +27,9 @@ LEAST_SHARE = 0.1
 _PROFILE = 0.9
 # Fewer periods than this in a patch cannot be told from its tilt and bending.
 _FEWEST_PERIODS = 2.5
+# Fewest periods of a fundamental. A plane that is subtracted from few periods of a grating leaves
+# power below it.
+_FEWEST_FUNDAMENTAL = 1.75
 # Least share of a weak structure that is worth mentioning.
 _LEAST_WEAK = 0.01
 # Least height of a fundamental, relative to the harmonic that is examined. The side lobes of a Hann
@@ -76,7 +79,8 @@ class Periodicity:
     share: float  # of the variance of the heights, 0 to 1, without harmonics
 
     def __str__(self) -> str:
-        return f"{self.period:.4g} µm along {self.direction:.0f}°, {self.share:.0%} of the variance"
+        degrees = round(self.direction)
+        return f"{self.period:.4g} µm along {degrees}°, {self.share:.0%} of the variance"
 
 
 class Periods(NamedTuple):
@@ -211,7 +215,9 @@ class _Spectrum:
             middle = 1.0 / harmonic
             half = max(_SPREAD * middle, 0.75 * bin_width)
             band = peak.line & self.summits & (np.abs(along - middle) <= half)
-            if not band.any() or not self.power[band].max() > 0.0:
+            if peak.repeats < harmonic * _FEWEST_FUNDAMENTAL or not band.any():
+                continue
+            if not self.power[band].max() > 0.0:
                 continue
             index = np.unravel_index(np.where(band, self.power, 0.0).argmax(), band.shape)
             lower = self.peak(int(index[0]), int(index[1]), peak.near)

@@ -42,8 +42,8 @@ class DirectionLookup:
         self.present = tables is not None
         if tables is None:
             return
-        maps = np.stack([_pages(table) for table in tables])
-        self._pages, self._polar, self._azimuthal = maps.shape[1:4]
+        maps = np.stack([_cells(table) for table in tables])
+        self._polar, self._azimuthal, self._pages = maps.shape[1:4]
         self._last, self._varies = len(nodes) - 2, varies
         width = (nodes[-1] - nodes[0]) / (len(nodes) - 1)
         if not varies:
@@ -69,7 +69,7 @@ class DirectionLookup:
         cell, s, t = self._cell(*self._place(tangential, cosine))
 
         def page(n: Index) -> Float:
-            corners = self._corners(n * (self._polar * self._azimuthal) + cell, share)
+            corners = self._corners(cell * self._pages + n, share)
             return dr.lerp(dr.lerp(*corners[:2], t), dr.lerp(*corners[2:], t), s)
 
         if mi.is_rgb or self._pages == 1:
@@ -96,18 +96,18 @@ class DirectionLookup:
         s, t = dr.clip(row - i, 0.0, 1.0), dr.clip(column - j, 0.0, 1.0)
         return i * self._azimuthal + j, s, t
 
-    def _corners(self, cell: Index, share: Float | None) -> list[Float]:
-        """Values at a cell's corners; interpolated here only where they vary or a derivative is
-        wanted.
+    def _corners(self, page: Index, share: Float | None) -> list[Float]:
+        """Values at the corners of a cell on one page, given by its number in memory.
 
-        share : of the way to the second node, or the number of one and the share of the way on.
+        share : position between height scales, in units of their distance; None where the uploaded
+            values are interpolated already.
         """
         if share is None:
-            return read_record(self._values, cell, 4)
+            return read_record(self._values, page, 4)
         lower = index_between(dr.floor(share), 0.0, float(self._last))
         size = self._pages * self._polar * self._azimuthal
-        cell = cell + mi.UInt32(lower) * size
-        ends = (read_record(self._nodes, at, 4) for at in (cell, cell + size))
+        page = page + mi.UInt32(lower) * size
+        ends = (read_record(self._nodes, at, 4) for at in (page, page + size))
         return [dr.lerp(*both, share - lower) for both in zip(*ends, strict=True)]
 
 
@@ -130,14 +130,17 @@ def between(
     return DirectionalTable(low.wavelengths, low.values * (1 - share) + high.values * share)
 
 
-def _pages(table: DirectionalTable) -> Array:
-    """All four corners of each cell together: (channels or wavelengths, rows, columns, 4)."""
+def _cells(table: DirectionalTable) -> Array:
+    """Values at the corners of each cell, (rows, columns, channels or wavelengths, 4).
+
+    All wavelengths of a cell lie together: a call reads several of them, within few cache lines.
+    """
     values = table.values
     if mi.is_rgb and len(values) > 1:
         values = np.tensordot(_sensitivities(table.wavelengths), values, 1).astype(np.float32)
     right = np.roll(values, -1, axis=2)
     corners = (values[:, :-1], right[:, :-1], values[:, 1:], right[:, 1:])
-    return np.stack(corners, axis=-1)
+    return np.stack(corners, axis=-1).transpose(1, 2, 0, 3)
 
 
 def _sensitivities(wavelengths: NDArray[np.float64]) -> NDArray[np.float64]:

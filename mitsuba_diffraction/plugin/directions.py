@@ -21,12 +21,12 @@ class Pair:
 
     Attributes
     ----------
-    wi, wo : in the shading frame.
-    cos_i, cos_o : of the angles to the normal.
+    wi, wo : ωi and ωo in the shading frame.
+    cos_i, cos_o : cosines of their angles to the normal.
     uv : tangential part of ωi + ωo, in the patch's frame.
-    w : its normal part.
+    w : normal part of ωi + ωo.
     one_plus_dot : 1 + ωi·ωo.
-    above : whether they are; else they are those below, turned over.
+    above : whether light stays above the surface; else both directions are mirrored from below.
     """
 
     above = True

@@ -346,6 +346,15 @@ def _conductors() -> list[str]:
     )
 
 
+def tabulated_range(material: str) -> tuple[float, float] | None:
+    """Return the first and the last wavelength, nm, of Mitsuba's table of a conductor, if any."""
+    file = Path(str(mi.file_resolver().resolve(f"data/ior/{material}.eta.spd")))
+    if not file.is_file():
+        return None
+    nodes = np.loadtxt(file)[:, 0]
+    return float(nodes[0]), float(nodes[-1])
+
+
 def _at(material: str, name: str, wavelength: float) -> Texture:
     """Part of a material's index at one wavelength, as a texture."""
     value = float(_tabulated(material, name, wavelength))

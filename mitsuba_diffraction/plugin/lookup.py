@@ -74,7 +74,7 @@ class DeviceTable:
 
         qx, qy, kappa : mi.Float, rad/µm. What light cannot probe is NaN, never a guess; beyond
             the `frequency_limit` of a table it is 0.
-        windows : where they are; none for that of the table itself.
+        windows : positions of windows; empty for the table's own.
         """
         grid, expansion = self.grid, self.expansion
         inside = within(qx, qy, self.radii) & (kappa <= expansion.kappa_max * (1 + 1e-6))
@@ -122,7 +122,7 @@ class DeviceTable:
         return self._place(x, y, self.series.at(kappa).interval)[0]
 
     def read(self, index: Index) -> list[Packet]:
-        """All floats of the bin with this index, in packets."""
+        """Numbers of the bin with this index, in packets."""
         return read_packets(self._coefficients, index, self.record.numbers)
 
     def order_0(self, kappa: Float) -> Float:
@@ -256,7 +256,7 @@ def _taps(
 ) -> tuple[Index, Weight]:
     """Array index of the first tap, and the weight of tap n as a function.
 
-    looped : the function is to take variables, too.
+    looped : whether the function must accept Dr.Jit variables, not only numbers.
     """
     first = _first_bin(position, taps)
     # Frequencies beyond the bins see the zeros at the margin, which is as wide as the taps

@@ -1,7 +1,7 @@
 """The diffracted power in a variant's own channels, and a density to draw directions from.
 
-The BSDF asks for these two, and is the same for all variants otherwise. This is the model of
-variants with wavelengths, `rgb_power` that of variants with colours.
+All else in the BSDF is the same for every variant. `SpectralPower` serves variants with
+wavelengths, `rgb_power` those with colours.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ class PowerModel(Protocol):
         """⟨|P|²⟩ / (4π²σ⁴ λ²) in 1/µm², per channel."""
 
     def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
-        """Density per solid angle of drawing ωo: by `draw`."""
+        """Density per solid angle with which `draw` draws ωo."""
 
     def both(
         self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
     ) -> tuple[Colour, Float]:
-        """`power` at one height scale, and `density` outside of a coat at the other."""
+        """`power` at `height_scale`, and `density` at `drawing_scale`, outside of a coat."""
 
     def wavenumbers(self, si: Interaction) -> list[Float]:
         """2π/λ of each channel, rad/µm."""
@@ -43,7 +43,7 @@ class PowerModel(Protocol):
         """`power` of a flat surface."""
 
     def zeroth(self, pair: Pair | TablePoint, height_scale: Float, si: Interaction) -> Colour:
-        """Part of `power` that is order 0's, in ensembles."""
+        """Contribution of order 0 to `power` of an ensemble."""
 
     def draw(
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
@@ -58,7 +58,7 @@ class SpectralPower:
     ----------
     table : the diffraction table.
     wavelength : nm, for mono variants.
-    places : where windows sit; None for the table's own.
+    places : positions of windows; None for the table's own window.
 
     Attributes
     ----------
@@ -80,14 +80,17 @@ class SpectralPower:
         return mi.UnpolarizedSpectrum(self._each(functions, si, pair, height_scale)[0])
 
     def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
-        """See `PowerModel.density`; the mean of all wavelengths'."""
+        """See `PowerModel.density`; the mean over all wavelengths."""
         functions = [self._density(pair, height_scale)]
         return _mean(self._each(functions, si, pair, height_scale)[0])
 
     def both(
         self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction
     ) -> tuple[Colour, Float]:
-        """See `PowerModel.both`; the density first, before its neighbours fill the caches."""
+        """See `PowerModel.both`.
+
+        The density is computed first: the look-up of power evicts its small tables from the cache.
+        """
         functions = [self._density(pair.outer, drawing_scale), self._power(pair, height_scale, si)]
         densities, powers = self._each(functions, si, pair, height_scale)
         return mi.UnpolarizedSpectrum(powers), _mean(densities)
@@ -117,7 +120,7 @@ class SpectralPower:
     def draw(
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
     ) -> Vector2f:
-        """See `PowerModel.draw`; for a wavelength that is drawn too."""
+        """See `PowerModel.draw`; the wavelength to draw for is random, too."""
         wavelengths = self._wavelengths(si)
         count = len(wavelengths)
         hero = dr.clip(mi.UInt32(sample1 * count), 0, count - 1)
@@ -158,10 +161,10 @@ class SpectralPower:
         pair: Pair | TablePoint | Crossing,
         scale: Float,
     ) -> list[list[Float]]:
-        """Each function(k) for each wavelength.
+        """Evaluate each function of k at each wavelength.
 
-        In a loop, which makes a smaller and faster kernel. Derivatives do not flow through loops
-        without further ado, so then it is unrolled; so it is where there is no kernel.
+        A loop over wavelengths makes a smaller and faster kernel. It is unrolled where derivatives
+        are wanted, which do not pass such loops, and in scalar variants, which have no kernel.
         """
         wavenumbers = self.wavenumbers(si)
         count = len(wavenumbers)

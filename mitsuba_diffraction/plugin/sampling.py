@@ -47,9 +47,9 @@ class Strategy(NamedTuple):
 
     Attributes
     ----------
-    share : of the samples that order 0 gets.
-    band : of κ, whose density the other orders are drawn from.
-    unit : of that band's levels.
+    share : share of the samples that order 0 gets.
+    band : number of the band of κ whose density the other orders are drawn from.
+    unit : factor from the band's stored levels to densities.
     """
 
     share: Float
@@ -58,7 +58,7 @@ class Strategy(NamedTuple):
 
 
 class OrderSampler:
-    """Draws spatial frequencies for one wavelength, and says how densely."""
+    """Sampler of spatial frequencies for one wavelength, and its density."""
 
     def __init__(self, table: DiffractionTable) -> None:
         densities = proposals(table)
@@ -70,7 +70,7 @@ class OrderSampler:
         self._column_sums = upload(mi.Float, densities.columns)
         self._levels = upload(mi.UInt32, densities.levels.view(np.uint32))
         self._lobes = densities.lobes
-        # What a whole lobe of the window holds of a cell that it is in the middle of
+        # Share of a window's lobe that lies within a cell, when the lobe is at its centre
         self._within = [math.erf(0.5 * table.sigma * cell) for cell in densities.cell]
         largest = [
             table.sigma / (math.sqrt(math.pi) * within) if lobe else 1.0 / cell
@@ -150,7 +150,7 @@ def order_0_share(power: Float, cos_i: Float) -> Float:
 
 
 def direction_of(tangential: Vector2f) -> Vector3f:
-    """A unit vector from its tangential part; from beyond the horizon there is none: z is −1."""
+    """Return the unit vector with this tangential part; z is −1 beyond the horizon."""
     squared = dr.squared_norm(tangential)
     cos = dr.select(squared <= 1.0, dr.safe_sqrt(1.0 - squared), -1.0)
     return mi.Vector3f(tangential.x, tangential.y, cos)

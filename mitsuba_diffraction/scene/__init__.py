@@ -6,6 +6,7 @@ load         variants set and scenes loaded; Mitsuba's errors in one line
 parameters   names that -D may set, and values that change from frame to frame
 passes       rendering in passes of samples
 pictures     EXR and PNG of pictures
+denoise      pictures without noise, by Open Image Denoise
 frames       frames of an animation, and a film of them
 planning     the recipes of tables that suffice for a scene
 orientation  directions that a patch follows over a mesh

@@ -19,10 +19,11 @@ from .parameters import files_of
 from .passes import Stop, render_passes
 from .pictures import colours_of, count_bad, write_exr, write_png
 
-#: Suffixes of films, and what Pillow needs to know about each.
+#: Suffixes of films, and the options with which Pillow writes them; `.mp4` is written by ffmpeg.
 FILMS: dict[str, dict[str, Any]] = {
     ".webp": {"quality": 85, "method": 4},
     ".gif": {"optimize": True},
+    ".mp4": {},
 }
 #: Why a frame that is not there is rendered.
 MISSING = ("", "")
@@ -125,12 +126,15 @@ def write_frame(frame: Frame, bitmap: Any, scene: Path, variant: str, with_exr: 
 
 
 def write_film(frames: Sequence[Path], film: Path, fps: float) -> None:
-    """Join PNG files to an endless film, an animated WebP or GIF by its suffix.
+    """Join PNG files to a film by its suffix: an endless WebP or GIF, or an MP4 (H.264).
 
-    Raises a DiffractionError if Pillow cannot write such a file.
+    Raises a DiffractionError if the film cannot be written.
     """
     from PIL import Image
 
+    if film.suffix.lower() == ".mp4":
+        _write_mp4(frames, film, fps)
+        return
     # not as open files, of which there may be too many
     pictures = [Image.open(io.BytesIO(path.read_bytes())) for path in frames]
     try:
@@ -145,6 +149,52 @@ def write_film(frames: Sequence[Path], film: Path, fps: float) -> None:
     finally:
         for picture in pictures:
             picture.close()
+
+
+def check_film(film: Path) -> None:
+    """Raise a DiffractionError if what writes films of this format is not installed."""
+    if film.suffix.lower() == ".mp4":
+        _require_ffmpeg()
+
+
+def _require_ffmpeg() -> Any:
+    """Import imageio-ffmpeg.
+
+    Raises a DiffractionError if it is not installed.
+    """
+    try:
+        import imageio_ffmpeg
+    except ImportError as error:
+        raise DiffractionError(
+            "films ending in .mp4 need imageio-ffmpeg: pip install 'mitsuba-diffraction[film]'; "
+            "or name a film ending in .webp or .gif"
+        ) from error
+    return imageio_ffmpeg
+
+
+def _write_mp4(frames: Sequence[Path], film: Path, fps: float) -> None:
+    """Join PNG files to an MP4; pictures of odd size lose a row or a column, as H.264 requires."""
+    from PIL import Image
+
+    ffmpeg = _require_ffmpeg()
+    with Image.open(frames[0]) as first:
+        width, height = (max(2, length - length % 2) for length in first.size)
+    # matrix and tags of sRGB's primaries, without which players guess by the size of the picture
+    colours = ["-vf", "scale=out_color_matrix=bt709", "-colorspace", "bt709"]
+    colours += ["-color_primaries", "bt709", "-color_trc", "iec61966-2-1"]
+    try:
+        with atomic_path(film) as temporary:
+            writer = ffmpeg.write_frames(
+                str(temporary), (width, height), fps=fps, macro_block_size=2, quality=None,
+                output_params=[*colours, "-crf", "16", "-f", "mp4"], ffmpeg_log_level="error",
+            )  # fmt: skip
+            writer.send(None)
+            for path in frames:
+                with Image.open(path) as picture:
+                    writer.send(picture.convert("RGB").crop((0, 0, width, height)).tobytes())
+            writer.close()
+    except (OSError, RuntimeError) as error:
+        raise DiffractionError(f"cannot write '{film}': {error}") from error
 
 
 def digest_of(scene: Path, values: Mapping[str, str]) -> str:

@@ -73,8 +73,10 @@ def set_variant(name: str | None) -> str:
     return name
 
 
-def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
+def load_scene(file: Path, parameters: Mapping[str, Any], *, box_filter: bool = False) -> Any:
     """Load an XML scene in the variant that is set.
+
+    box_filter : give all films a box as reconstruction filter instead of their own.
 
     Raises a DiffractionError if the file or anything that it refers to is missing or wrong.
     """
@@ -91,7 +93,10 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
     try:
         # In threads Mitsuba 3.9 loads no faster, since its parser waits for each object; and Ctrl-C
         # reaches a plugin in Python on the main thread only
-        scene = mi.load_file(str(file), parallel=False, **parameters)
+        if box_filter:
+            scene = _load_with_box_filter(file, parameters)
+        else:
+            scene = mi.load_file(str(file), parallel=False, **parameters)
     except (RuntimeError, UnicodeDecodeError) as error:
         raise error_of("cannot load the scene", error) from error
     if not isinstance(scene, mi.Scene):
@@ -106,6 +111,35 @@ def load_scene(file: Path, parameters: Mapping[str, Any]) -> Any:
         check_attributes(shape, number)
     _warn_of_missing_uv(surfaces)
     return scene
+
+
+def _load_with_box_filter(file: Path, parameters: Mapping[str, Any]) -> Any:
+    """Load a scene as `mi.load_file` does, with box filters in all films."""
+    import mitsuba as mi
+    from mitsuba import parser
+
+    config = parser.ParserConfig(mi.variant())
+    config.parallel = False
+    state = parser.parse_file(config, str(file), **parameters)
+    parser.transform_all(config, state)
+    for node in state.nodes:
+        if node.type != mi.ObjectType.Film:
+            continue
+        for name in list(node.props.keys()):
+            value = node.props[name]
+            if isinstance(value, mi.Properties.ResolvedReference) and (
+                state.nodes[value.index()].type == mi.ObjectType.ReconstructionFilter
+            ):
+                del node.props[name]
+        node.props["box"] = mi.load_dict({"type": "box"})
+    before = mi.file_resolver()
+    resolver = mi.FileResolver(before)
+    resolver.prepend(str(file.parent))  # files that the scene names are relative to it
+    mi.set_file_resolver(resolver)
+    try:
+        return parser.instantiate(config, state)
+    finally:
+        mi.set_file_resolver(before)
 
 
 def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:

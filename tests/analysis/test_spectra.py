@@ -173,6 +173,26 @@ def test_wavelengths_that_are_none_are_refused(wrong):
         check_wavelengths(wrong)
 
 
+def test_a_wide_cone_collects_a_mirror_s_narrow_lobe_wherever_it_lies():
+    """A lobe of a standard deviation of 0.17°, 20° from the axis of a cone of 120°."""
+    surface = load(FLAT, coherence_width=65.0, int_ior=1.5)
+    light = md.spectrum(surface, 0.0, [20.0], acceptance=120.0, relative="none",
+                        wavelengths=[420.0])  # fmt: skip
+    assert light.value[0] == pytest.approx(0.04, rel=2e-3)
+
+
+def test_a_mirror_is_all_of_a_mirror():
+    metal = load(FLAT, coherence_width=10.0, material="none", energy_conserving=False)
+    light = md.spectrum(metal, 50.0, [50.0], relative="mirror", wavelengths=LAM)
+    assert light.value == pytest.approx(1.0, rel=1e-4)  # single precision
+
+
+def test_wavelengths_beyond_a_metal_s_table_are_refused():
+    metal = load(FLAT, coherence_width=10.0, material="Al")
+    with pytest.raises(md.DiffractionError, match=r"298\.8 to 885\.6"):
+        md.spectrum(metal, wavelengths=[800.0, 900.0])
+
+
 def test_what_a_table_does_not_hold_is_refused():
     surface = load(FLAT, coherence_width=10.0)
     with pytest.raises(md.DiffractionError, match="wavelength-range"):

@@ -69,6 +69,7 @@ def test_a_folder_and_a_pattern_are_repeated_scans(run, scans, here):
         (["--light", "90"], "90"),
         (["--acceptance", "0"], "acceptance"),
         (["--light-azimuth", "1000"], "1000"),
+        (["--material", "Al", "--wavelength-range", "800", "900"], "885.6 nm"),
     ],
 )
 def test_impossible_geometries_are_one_line(run, scans, here, arguments, named):

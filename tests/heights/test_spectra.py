@@ -246,6 +246,13 @@ def test_a_weak_line_in_noise_is_a_grating_or_below_the_threshold(depth, is_grat
     assert (line.share >= 0.1) == is_grating
 
 
+@pytest.mark.parametrize("periods", [3, 4, 5, 8])
+def test_a_scan_of_few_whole_periods_of_a_blaze_has_its_period(periods):
+    blaze = blazed(2.5, 0.25, periods=periods, rows=48 * periods)
+    (found,) = dominant_periods(HeightField(blaze.heights, blaze.pixel_size, cut_out=True))
+    assert found.period == pytest.approx(2.5, rel=PERIOD)
+
+
 def test_one_period_of_a_grating_is_known_only_where_it_repeats():
     blaze = blazed(2.5, 0.25, periods=1)
     (found,) = dominant_periods(blaze)

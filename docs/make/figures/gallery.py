@@ -98,7 +98,9 @@ PICTURES = (
     ),
     _scene(
         "cd", "A compact disc under a lamp",
-        "Colours appear where the tracks run across the plane of lamp and camera.",
+        "Colours appear where the tracks run across the plane of lamp and camera. `--denoise` "
+        "writes the picture without grain, shown here, beside the noisy one.",
+        "--denoise",
     ),
     _scene(
         "cd_window", "The disc under a window",
@@ -218,6 +220,8 @@ def make(picture: Picture, target: Path, scenes: Path) -> None:
             if code != 0:
                 raise DiffractionError(f"{picture.name}: '{command}' failed; see above")
         rendered = Path(words[-1])
+        if "--denoise" in words:
+            rendered = rendered.with_stem(f"{rendered.stem}_denoised")
         if target.suffix == ".jpg":
             write_jpeg(rendered, target, most=_MOST)
             return

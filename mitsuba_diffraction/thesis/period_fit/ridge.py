@@ -158,6 +158,7 @@ class Fit:
     """Period of the grating equation that fits a ridge, and how well it fits."""
 
     period: float  # µm
+    error: float  # standard error, µm, of scatter about the fit and of the lobe's slope
     residual: float  # RMS difference of ridge and grating equation, degrees
     largest: float  # largest difference, degrees
     points: int  # number of maxima
@@ -325,8 +326,28 @@ def fit_period(ridge: Ridge) -> Fit:
     difference = difference[np.isfinite(difference)]
     return Fit(
         period=period,
+        error=_error(ridge, period),
         residual=float(np.sqrt(np.mean(difference**2))) if difference.size else np.nan,
         largest=float(np.abs(difference).max()) if difference.size else np.nan,
         points=int(fitted.sum()),
         wavelengths=int(fitted.size),
     )
+
+
+def _error(ridge: Ridge, period: float) -> float:
+    """Return the error of a fitted period in µm, the quadratic sum of two.
+
+    Scatter: the standard error of the slope u over mλ (least squares). Slope: where the brightness
+    changes with u, the maximum of a Gaussian lobe of variance s² is shifted by s² d(ln f)/du; the
+    gradient is that along the ridge.
+    """
+    fitted = ridge.has_maximum
+    response = ridge.response
+    abscissa = abs(ridge.order) * response.wavelengths[fitted] * 1e-3
+    u = ridge.frequency[fitted]
+    rest = u - abscissa / period
+    scatter = math.sqrt(float(rest @ rest) / (u.size - 1) / float(abscissa @ abscissa)) * period
+    # σ_u² of exp(−σ²k²Δu²)
+    variance = 0.5 / (response.sigma * wavenumber(response.wavelengths[fitted])) ** 2
+    gradient = float(np.polyfit(u, np.log(ridge.heights[fitted]), 1)[0])
+    return period * math.hypot(scatter, gradient * float(np.mean(variance / u)))

@@ -8,6 +8,7 @@ three changes the period of an exact grating.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import partial
 
@@ -32,6 +33,7 @@ class WindowFits:
 
     centres: Array  # (n, 2), centres of the windows, µm
     fits: tuple[Fit | None, ...]  # one for each window; `None` with too few maxima
+    independent: float  # number of windows on the patch that do not overlap, at least 1
 
     @property
     def periods(self) -> Array:
@@ -47,6 +49,11 @@ class WindowFits:
     def spread(self) -> float:
         """Standard deviation between windows, µm; 0 for a single one."""
         return float(self.periods.std(ddof=1)) if self.periods.size > 1 else 0.0
+
+    @property
+    def error(self) -> float:
+        """Standard error of the patch's mean period, from the spread between windows, µm."""
+        return self.spread / math.sqrt(self.independent)
 
 
 def window_fits(
@@ -92,7 +99,9 @@ def window_fits(
         raise DiffractionError(
             f"none of {count} windows shows order {order} at enough wavelengths to fit a period to"
         )
-    return WindowFits(centres, tuple(fits))
+    # powers of two windows at a distance r are correlated by exp(−r²/2σ²), whose area is 2πσ²
+    independent = max(1.0, float(np.prod(extent)) / (2.0 * math.pi * table.sigma**2))
+    return WindowFits(centres, tuple(fits), independent)
 
 
 def _lattice(count: int) -> Array:

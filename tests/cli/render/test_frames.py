@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -160,6 +162,31 @@ def test_a_film_holds_all_frames_without_end(render, suffix):
         assert film.info["duration"] == 100
 
 
+def test_an_mp4_holds_all_frames(render):
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    assert render("--frames", "3", *LIGHT, "-o", "film.mp4", "--fps", "10").code == 0
+    decoded = subprocess.run(
+        [ffmpeg.get_ffmpeg_exe(), "-i", "film.mp4", "-f", "rawvideo", "-pix_fmt", "rgb24", "-"],
+        capture_output=True, check=True,
+    )  # fmt: skip
+    assert b"16x10" in decoded.stderr
+    assert b"10 fps" in decoded.stderr
+    frames = np.frombuffer(decoded.stdout, np.uint8).reshape(3, 10, 16, 3)
+    pictures = []
+    for n in range(3):
+        with Image.open(f"film/frame_000{n}.png") as picture:
+            pictures.append(np.asarray(picture))
+    # eight bits of video, compressed
+    np.testing.assert_allclose(frames.mean(axis=(1, 2)), np.mean(pictures, axis=(1, 2)), atol=3)
+
+
+def test_a_film_without_its_extra_is_refused_before_the_work(render, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    line = render("--frames", "2", *LIGHT, "-o", "film.mp4").failed_in_one_line()
+    assert "pip install 'mitsuba-diffraction[film]'" in line
+    assert os.listdir() == ["room.xml"]
+
+
 def test_linear_frames_can_be_asked_for(render):
     assert render("--frames", "2", *LIGHT, "--exr", "-o", "out").code == 0
     pixels = OpenEXR.File("out/frame_0001.exr").channels()["RGB"].pixels
@@ -186,7 +213,7 @@ def test_a_preview_is_half_as_wide_and_quick(render):
         (["--frames", "2", "--animate", "light=nan:1"], "expected numbers"),
         (["--frames", "2", *LIGHT, "-D", "light=1"], "leave -D light=1 out"),
         (["--frames", "2", *LIGHT, "--turn", "light"], "'light' is set more than once"),
-        (["--frames", "2", *LIGHT, "-o", "a.mp4"], "a film ending in .webp or .gif"),
+        (["--frames", "2", *LIGHT, "-o", "a.avi"], "a film ending in .webp or .gif or .mp4"),
     ],
 )
 def test_unusable_options_are_usage_errors(render, options, said):

@@ -1,0 +1,63 @@
+"""Denoising of pictures by Intel's Open Image Denoise (extra `denoise`), on the processor.
+
+The film's filter has to be a box (`load.load_scene`): wider ones spread noise over several pixels,
+and the denoiser keeps such noise.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..errors import DiffractionError
+from ..optics.colour import linear_srgb
+from .pictures import colours_of
+
+# samples per pixel of albedo and normals, which noise only at outlines and in depth of field
+_SAMPLES = 64
+
+
+def require_denoiser() -> Any:
+    """Import pyoidn.
+
+    Raises a DiffractionError if it is not installed.
+    """
+    try:
+        import pyoidn
+    except ImportError as error:
+        raise DiffractionError(
+            "--denoise needs pyoidn: pip install 'mitsuba-diffraction[denoise]'"
+        ) from error
+    return pyoidn
+
+
+def denoised(scene: Any, sensor: Any, picture: Any, spp: int, seed: int) -> Any:
+    """Denoise a picture with the albedo and the normals of its scene.
+
+    scene, sensor : scene and sensor that rendered the picture, of the variant that is set.
+    picture : `mi.Bitmap` of the film.
+    spp, seed : samples per pixel and seed of the picture.
+
+    Returns a `mi.Bitmap` of linear sRGB. Raises a DiffractionError if pyoidn is not installed, or
+    the picture holds no colours.
+    """
+    import mitsuba as mi
+
+    denoiser = require_denoiser()
+    colours = colours_of(picture)
+    if colours is None:
+        raise DiffractionError("--denoise: the film holds no colours; give it the format rgb")
+    rgb, single = mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32
+    noisy = np.nan_to_num(np.array(colours.convert(rgb, single, False)), nan=0.0)
+    kinds = mi.load_dict({"type": "aov", "aovs": "albedo:albedo,normal:sh_normal"})
+    kinds.render(scene, sensor, seed=seed, spp=min(spp, _SAMPLES))
+    guides = dict(sensor.film().bitmap().split())
+    albedo, normal = (np.array(guides[name], np.float32) for name in ("albedo", "normal"))
+    # the denoiser clips negative numbers, which saturated colours have in sRGB and none has in XYZ
+    to_srgb = linear_srgb(np.eye(3))
+    xyz = noisy @ np.linalg.inv(to_srgb).astype(np.float32)
+    clean = denoiser.denoise(
+        np.ascontiguousarray(xyz), np.clip(albedo, 0.0, 1.0), normal, hdr=True, clean_aux=True
+    )
+    return mi.Bitmap((clean @ to_srgb).astype(np.float32), pixel_format=rgb)

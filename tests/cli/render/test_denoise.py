@@ -1,0 +1,39 @@
+"""`render --denoise`: a picture without noise beside the noisy one."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import numpy as np
+import pytest
+
+from tests.support.room import QUICK, SCENE, pixels
+
+__all__ = ["SCENE"]  # read by the fixture `scene`
+
+
+def test_the_denoised_picture_is_nearer_to_the_truth(run, scene):
+    pytest.importorskip("pyoidn")
+    assert run("render", scene, *QUICK, "-s", "4", "--denoise", "-o", "a.exr").code == 0
+    assert sorted(os.listdir()) == [
+        "a.exr", "a.png", "a_denoised.exr", "a_denoised.png", "room.xml"
+    ]  # fmt: skip
+    assert run("render", scene, *QUICK, "-s", "256", "--seed", "9", "-o", "b.exr").code == 0
+    noisy, clean, truth = (pixels(name) for name in ("a.exr", "a_denoised.exr", "b.exr"))
+    inside = np.s_[3:-3, 3:-3]  # the truth has another filter, which matters at edges
+    errors = [np.abs(image - truth)[inside].mean() for image in (noisy, clean)]
+    assert errors[1] < 0.9 * errors[0]
+
+
+def test_without_the_extra_it_is_refused_at_once(run, scene, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyoidn", None)
+    line = run("render", scene, *QUICK, "--denoise").failed_in_one_line()
+    assert "pip install 'mitsuba-diffraction[denoise]'" in line
+    assert os.listdir() == ["room.xml"]
+
+
+def test_frames_are_not_denoised(run, scene):
+    ran = run("render", scene, *QUICK, "--denoise", "--frames", "2", "--turn", "spp")
+    assert ran.code == 2
+    assert "one picture in one process" in ran.err
