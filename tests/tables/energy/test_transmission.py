@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction import DiffractionTable, HeightField, gratings
-from mitsuba_diffraction.tables.energy.gain import FARTHEST, Gain
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
 from mitsuba_diffraction.tables.energy.transmission import Medium, Sides
 from tests.support.directions import rough_patch
@@ -118,21 +117,3 @@ def test_heights_that_are_scaled_are_as_others():
         table = DiffractionTable.build(field, coherence_width=20.0, height_scale_max=2.2)
         totals.append(Sides(table, scale, medium).sums(None, THETA, PHI, 550.0)[0])
     assert totals[0] == pytest.approx(totals[1], abs=1e-4)
-
-
-@pytest.mark.parametrize("thin", KINDS.values(), ids=KINDS)
-def test_the_tabulated_gain_is_the_gain_in_both_directions(thin):
-    """Above and below are different sides, also where light has the same angle on both."""
-    roughness = DiffractionTable.build(gentle()).roughness
-    rng = np.random.default_rng(0)
-    cos_o, turn = rng.uniform(0.3, 1.0, 300), rng.uniform(-np.pi, np.pi, 300)
-    for came, left, path in Medium(1.5, "small_slope", thin).ways(0.1):
-        if came == left:
-            continue
-        gain = Gain(path, roughness, 2 * np.pi / 0.55, 1.0)
-        for cos_i in (0.98, 0.6):
-            ends = np.array(cos_i), cos_o, np.cos(turn)
-            exact = path.common(*ends) * gain.ratio(*ends)
-            exact = exact * (path.tangential(*ends) < FARTHEST)
-            # linear between nodes, and a kink at the critical angle
-            assert np.abs(gain(cos_i, cos_o, turn) - exact).sum() < 2e-2 * exact.sum()
