@@ -14,6 +14,7 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction.cli.main import build_parser
 from mitsuba_diffraction.scene.parameters import parameters_of
+from mitsuba_diffraction.scene.stage import MESHES, STUDIO
 from scenes.make.__main__ import build_parser as meshes_parser
 from tests.support import ROOT
 from tests.support.pages import FENCE, PAGES, blocks, spans, typed
@@ -75,7 +76,8 @@ def check_command(words: list[str]) -> None:
         assert stop.code == 0, words  # --help and --version
         return
     if hasattr(args, "scene") and hasattr(args, "parameters"):
-        known = parameters_of(ROOT / args.scene)
+        scene = STUDIO if args.scene.suffix in MESHES else ROOT / args.scene
+        known = parameters_of(scene)
         assert known is not None
         assert {name for name, _ in args.parameters} <= set(known)
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import DiffractionError
+from ..scene.stage import MESHES, OTHER_MESHES
 from ..settings import TableSettings
 from . import options
 from .console import Bar, mitsuba_warnings
@@ -17,11 +18,8 @@ from .report import lines_of, plain, save_report
 if TYPE_CHECKING:
     from ..heights.field import HeightField
 
-_MESHES = (".ply", ".obj", ".serialized")
 #: Settings of a table that its warnings depend on.
 _TABLE = ("coherence_width", "wavelength_range")
-#: Meshes that have to be converted first, to say so instead of looking for heights in them.
-_OTHER_MESHES = (".stl", ".glb", ".gltf", ".fbx", ".dae", ".3ds", ".3mf", ".off", ".blend")
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -83,14 +81,14 @@ def _describe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
     readable_file(file)
     if is_recipe(file):
         return _recipe(file, args)
-    if file.suffix.lower() in (*_MESHES, *_OTHER_MESHES):
+    if file.suffix.lower() in (*MESHES, *OTHER_MESHES):
         _refuse_heights_options(args, "a mesh")
         return _mesh(file)
     if file.suffix.lower() == ".xml":
         raise DiffractionError(
             f"'{file}' is a scene, which `mitsuba-diffraction render` renders; info describes what "
             "a scene names: tables, heights (images, NPY, text, instrument files), recipes (TOML) "
-            f"and meshes ({', '.join(_MESHES)})"
+            f"and meshes ({', '.join(MESHES)})"
         )
     if is_table(file):
         _refuse_heights_options(args, "a table")
@@ -199,12 +197,25 @@ def _recipe(file: Path, args: argparse.Namespace) -> dict[str, Any]:
 def _mesh(file: Path) -> dict[str, Any]:
     import mitsuba as mi
 
+    from ..scene.fitted_mesh import fit_of
     from ..scene.orientation.files import has_own_normals, load_mesh, load_orientation
     from ..scene.orientation.tangents import check_tangents
 
     if mi.variant() is None:
         mi.set_variant("scalar_rgb")  # any reads meshes; this one needs neither GPU nor LLVM
     with mitsuba_warnings():
-        report = check_tangents(*load_mesh(file), load_orientation(file))
+        mesh = load_mesh(file)
+        report = check_tangents(*mesh, load_orientation(file))
     summary = report.summary()
-    return {"kind": "mesh", **summary, "normals": summary["normals"] and has_own_normals(file)}
+    try:
+        fit: Any = fit_of(mesh.positions, file).summary()
+    except DiffractionError as error:
+        fit = f"none: {error}"
+    low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
+    return {
+        "kind": "mesh",
+        "bounding box, x y z": [f"{a:.4g} to {b:.4g}" for a, b in zip(low, high, strict=True)],
+        **summary,
+        "normals": summary["normals"] and has_own_normals(file),
+        "fit of render MESH --patch FILE": fit,
+    }

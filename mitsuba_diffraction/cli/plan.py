@@ -68,6 +68,7 @@ def planning_variant(requested: str | None) -> str:
 
 def run(args: argparse.Namespace) -> int:
     """Plan, report, and return the exit code."""
+    options.put_on_stage(args)
     parameters = options.scene_parameters(args)
     if args.output is not None:
         check_writable(args.output)

@@ -51,6 +51,7 @@ def add_view(subparsers: options.Subparsers) -> None:
 
 def view(args: argparse.Namespace) -> int:
     """Show the scene, and return the exit code."""
+    options.put_on_stage(args)
     parameters = options.scene_parameters(args)
     check_writable(args.output / "view_000.png")
     try:
@@ -108,8 +109,9 @@ def add_compare(subparsers: options.Subparsers) -> None:
 
 def compare(args: argparse.Namespace) -> int:
     """Compare, and return the exit code."""
+    options.put_on_stage(args)
     parameters = options.scene_parameters(args)
-    folder = args.output or Path(f"{args.scene.stem}_compare")
+    folder = args.output or Path(f"{args.name.stem}_compare")
     if folder.exists() and not folder.is_dir():
         raise DiffractionError(f"-o {folder}: it is a file; name a folder")
     check_writable(folder / "compare.json", make_folder=True)
@@ -160,6 +162,7 @@ def add_export_viewer(subparsers: options.Subparsers) -> None:
 
 def export_viewer(args: argparse.Namespace) -> int:
     """Export, and return the exit code."""
+    options.put_on_stage(args)
     parameters = options.scene_parameters(args)
     check_writable(args.output)
 
@@ -170,7 +173,7 @@ def export_viewer(args: argparse.Namespace) -> int:
     with mitsuba_warnings(), Bar(args, delay=0) as bar:
         bar(0, 0, "loading")
         page = export_viewer(
-            _scene(args, parameters), args.output, title=args.title or args.scene.stem,
+            _scene(args, parameters), args.output, title=args.title or args.name.stem,
             sensor=args.sensor, view=args.view, progress=bar,
             methods=WEB_METHODS if args.method == "all" else (args.method,),
         )  # fmt: skip

@@ -97,6 +97,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Render, and return the exit code."""
     check_plan_options(args)
+    options.put_on_stage(args)
     if on_workers(args) and args.plan is not None:
         args.parser.error("argument --plan: is for one process; leave the workers out")
     moving = bool(args.animate or args.turn)
@@ -142,7 +143,7 @@ class Outputs(NamedTuple):
 
 def _outputs(args: argparse.Namespace) -> Outputs:
     """Return the files of `-o`, or of its default, after checking that they can be written."""
-    output = args.output or Path(args.scene.with_suffix(".exr").name)
+    output = args.output or Path(args.name.with_suffix(".exr").name)
     if output.suffix.lower() not in (".exr", ".png"):
         args.parser.error(
             f"argument -o: expected a name ending in .exr or .png, got {str(output)!r}"
@@ -352,7 +353,7 @@ def _say_why(reasons: Mapping[Path, tuple[str, str] | None]) -> None:
 
 def _folder_and_film(args: argparse.Namespace) -> tuple[Path, Path | None]:
     """Return the folder of the frames, and the film, if there is one."""
-    output = args.output or Path(f"{args.scene.stem}_frames")
+    output = args.output or Path(f"{args.name.stem}_frames")
     if output.suffix.lower() in FILMS:
         return output.with_suffix(""), output
     if output.suffix:

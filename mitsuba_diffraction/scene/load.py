@@ -11,6 +11,7 @@ traceback; warnings go to a logger of its own.
 from __future__ import annotations
 
 import re
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path, PurePath
 from typing import Any
@@ -83,20 +84,17 @@ def load_scene(file: Path, parameters: Mapping[str, Any], *, box_filter: bool = 
     import mitsuba as mi
 
     from ..plugin import registration  # noqa: F401  registers the plugin
+    from .additions import split_materials
 
     readable_file(file)
+    parameters, materials = split_materials(parameters)
     refuse_pipes(file, parameters)
     check_parameters(file, parameters)
     for name in _TAKEN:
         if name in parameters:
             raise DiffractionError(f"-D {name}: Mitsuba reserves this name; rename the parameter")
     try:
-        # In threads Mitsuba 3.9 loads no faster, since its parser waits for each object; and Ctrl-C
-        # reaches a plugin in Python on the main thread only
-        if box_filter:
-            scene = _load_with_box_filter(file, parameters)
-        else:
-            scene = mi.load_file(str(file), parallel=False, **parameters)
+        scene = _instantiated(file, parameters, materials, box_filter)
     except (RuntimeError, UnicodeDecodeError) as error:
         raise error_of("cannot load the scene", error) from error
     if not isinstance(scene, mi.Scene):
@@ -113,31 +111,31 @@ def load_scene(file: Path, parameters: Mapping[str, Any], *, box_filter: bool = 
     return scene
 
 
-def _load_with_box_filter(file: Path, parameters: Mapping[str, Any]) -> Any:
-    """Load a scene as `mi.load_file` does, with box filters in all films."""
+def _instantiated(
+    file: Path, parameters: Mapping[str, Any], materials: Mapping[str, str], box_filter: bool
+) -> Any:
+    """Parse a scene, put meshes, materials and filters in, and make Mitsuba's objects of it."""
     import mitsuba as mi
-    from mitsuba import parser
 
-    config = parser.ParserConfig(mi.variant())
+    from .additions import fit_meshes, put_box_filters, put_materials
+
+    config = mi.parser.ParserConfig(mi.variant())
+    # In threads Mitsuba 3.9 loads no faster, since its parser waits for each object; and Ctrl-C
+    # reaches a plugin in Python on the main thread only
     config.parallel = False
-    state = parser.parse_file(config, str(file), **parameters)
-    parser.transform_all(config, state)
-    for node in state.nodes:
-        if node.type != mi.ObjectType.Film:
-            continue
-        for name in list(node.props.keys()):
-            value = node.props[name]
-            if isinstance(value, mi.Properties.ResolvedReference) and (
-                state.nodes[value.index()].type == mi.ObjectType.ReconstructionFilter
-            ):
-                del node.props[name]
-        node.props["box"] = mi.load_dict({"type": "box"})
     before = mi.file_resolver()
     resolver = mi.FileResolver(before)
-    resolver.prepend(str(file.parent))  # files that the scene names are relative to it
+    resolver.prepend(str(file.absolute().parent))  # files that the scene names are relative to it
     mi.set_file_resolver(resolver)
     try:
-        return parser.instantiate(config, state)
+        with tempfile.TemporaryDirectory() as folder:
+            state = mi.parser.parse_file(config, str(file), **parameters)
+            fit_meshes(state, Path(folder))
+            put_materials(state, materials)
+            mi.parser.transform_all(config, state)
+            if box_filter:
+                put_box_filters(state)
+            return mi.parser.instantiate(config, state)
     finally:
         mi.set_file_resolver(before)
 

@@ -1,0 +1,224 @@
+"""Meshes and materials put into a parsed scene, before Mitsuba makes objects of it.
+
+A shape of type `fitted_mesh` becomes a mesh on the stage (`fitted_mesh.py`). A surface that the
+command line puts on an id replaces the BSDF of that id, or that of the shape of that id.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import mitsuba as mi
+
+from ..errors import DiffractionError
+from .fitted_mesh import fitted_mesh
+from .orientation.files import write_ply
+
+#: Shape that is put on the stage.
+FITTED = "fitted_mesh"
+#: Prefix of scene parameters that are surfaces for ids: `material:ID` = `FILE[,parameter=value…]`.
+MATERIAL = "material:"
+
+_COMMA = re.compile(r",(?=\s*\w+=)")
+# With one of these the surface is opaque, and nothing lies beneath it.
+_CONDUCTORS = ("material", "eta", "k")
+
+
+class SceneValues(NamedTuple):
+    """Values of a scene's parameters, and surfaces by the id that they are put on."""
+
+    parameters: dict[str, Any]
+    materials: dict[str, str]
+
+
+def split_materials(values: Mapping[str, Any]) -> SceneValues:
+    """Separate parameters of a scene from surfaces for its ids."""
+    materials = {k[len(MATERIAL) :]: v for k, v in values.items() if k.startswith(MATERIAL)}
+    parameters = {k: v for k, v in values.items() if not k.startswith(MATERIAL)}
+    return SceneValues(parameters, materials)
+
+
+def fit_meshes(state: Any, folder: Path) -> None:
+    """Replace shapes of type `fitted_mesh` by PLY files of the fitted meshes.
+
+    state : `mi.parser.ParserState`.
+    folder : where the files are written.
+
+    Raises a DiffractionError if a file is no mesh, or cannot be put on the stage.
+    """
+    for number, node in enumerate(state.nodes):
+        if node.props.plugin_name() != FITTED:
+            continue
+        props = node.props
+        if "filename" not in props:
+            raise DiffractionError(f"shape '{FITTED}': the parameter filename is missing")
+        file = Path(str(mi.file_resolver().resolve(props["filename"])))
+        mesh = fitted_mesh(file, fit=_boolean(props, "fit"), up=props.get("up", "auto"))
+        written = folder / f"{number}.ply"
+        write_ply(written, mesh)
+        ply = _copy(props, "ply", leave=("filename", "fit", "up"))
+        ply["filename"] = str(written)
+        node.props = ply
+
+
+def _boolean(props: Any, name: str) -> bool:
+    """Read a parameter that -D may set: true or false, as text."""
+    text = str(props.get(name, "true")).lower()
+    if text not in ("true", "false"):
+        raise DiffractionError(f"{name}={text!r} must be true or false")
+    return text == "true"
+
+
+def put_materials(state: Any, materials: Mapping[str, str]) -> None:
+    """Put surfaces on the BSDFs or shapes of these ids.
+
+    A dielectric, the default, keeps the BSDF of the scene beneath it, as its pigment. A conductor
+    replaces it.
+
+    state : `mi.parser.ParserState`.
+    materials : `FILE[,parameter=value…]` by id.
+
+    Raises a DiffractionError if an id is unknown; the text names those of the scene.
+    """
+    for name, text in materials.items():
+        number = _node_of(state, name)
+        if state.nodes[number].type == mi.ObjectType.Shape:
+            _put_on_shape(state, number, text)
+        else:
+            _put_on_bsdf(state, number, text)
+
+
+def put_box_filters(state: Any) -> None:
+    """Give all films box filters, which keep the noise of each pixel apart, as denoisers need it.
+
+    state : `mi.parser.ParserState`, its references resolved.
+    """
+    for node in state.nodes:
+        if node.type != mi.ObjectType.Film:
+            continue
+        for name in list(node.props.keys()):
+            value = node.props[name]
+            if isinstance(value, mi.Properties.ResolvedReference) and (
+                state.nodes[value.index()].type == mi.ObjectType.ReconstructionFilter
+            ):
+                del node.props[name]
+        node.props["box"] = mi.load_dict({"type": "box"})
+
+
+def _node_of(state: Any, name: str) -> int:
+    """Return the number of the BSDF or shape of this id."""
+    kinds = (mi.ObjectType.BSDF, mi.ObjectType.Shape)
+    known = {k: n for k, n in state.id_to_index.items() if state.nodes[n].type in kinds}
+    if name not in known:
+        listed = ", ".join(sorted(known, key=lambda k: (known[k], k)))
+        raise DiffractionError(
+            f"--material {name}: no BSDF or shape of the scene has this id; there are "
+            f"{listed or 'none: add id attributes to the scene'}"
+        )
+    return int(known[name])
+
+
+def _put_on_shape(state: Any, number: int, text: str) -> None:
+    """Give a shape a BSDF with the surface, over that of the scene."""
+    shape = state.nodes[number].props
+    beneath, replaced = None, []
+    for key in shape.keys():  # noqa: SIM118 - Properties is no mapping
+        kind = shape.type(key)
+        if kind == mi.Properties.Type.ResolvedReference:
+            target = shape[key].index()
+        elif kind == mi.Properties.Type.Reference:
+            target = state.id_to_index.get(shape[key].id(), -1)
+        else:
+            continue
+        if target >= 0 and state.nodes[target].type == mi.ObjectType.BSDF:
+            beneath = target
+            replaced.append(key)
+    surface = _surface(text, None if beneath is None else _inside(state, beneath))
+    changed = _copy(shape, shape.plugin_name(), leave=replaced)
+    changed.set_id(shape.id())
+    changed["bsdf"] = mi.Properties.ResolvedReference(_append(state, _two_sided(state, surface)))
+    state.nodes[number].props = changed
+
+
+def _put_on_bsdf(state: Any, number: int, text: str) -> None:
+    """Replace a BSDF by the surface over it; both sides, unless it is part of another BSDF."""
+    props = state.nodes[number].props
+    name, inside = props.id(), _inside(state, number)
+    if inside == number:  # the node is replaced, so what lies beneath needs one of its own
+        inside = _append(state, _copy(props, props.plugin_name()))
+    surface = _surface(text, inside)
+    nested = any(
+        node.type == mi.ObjectType.BSDF and number in _targets(node) for node in state.nodes
+    )
+    replaced = surface if nested else _two_sided(state, surface)
+    replaced.set_id(name)
+    state.nodes[number].props = replaced
+
+
+def _inside(state: Any, number: int) -> int:
+    """Return the number of the BSDF within `twosided`, or of the BSDF itself."""
+    node = state.nodes[number]
+    if node.props.plugin_name() != "twosided":
+        return number
+    targets = _targets(node)
+    return targets[0] if targets else number
+
+
+def _targets(node: Any) -> list[int]:
+    """Return the numbers of the nodes within a node."""
+    resolved = mi.Properties.Type.ResolvedReference
+    props = node.props
+    names = [name for name in props.keys() if props.type(name) == resolved]  # noqa: SIM118
+    return [int(props[name].index()) for name in names]
+
+
+def _surface(text: str, beneath: int | None) -> Any:
+    """Return the properties of the BSDF `diffraction` for `FILE[,parameter=value…]`."""
+    file, *parameters = _COMMA.split(text)
+    props = mi.Properties("diffraction")
+    props["heightfield"] = str(Path(file).absolute())
+    names = []
+    for parameter in parameters:
+        name, _, value = parameter.partition("=")
+        name = name.strip()
+        names.append(name)
+        props[name] = _value(value.strip())
+    if beneath is not None and not set(names) & set(_CONDUCTORS):
+        props["beneath"] = mi.Properties.ResolvedReference(beneath)
+    return props
+
+
+def _value(text: str) -> float | bool | str:
+    """Return a parameter's value as XML would declare it: number, boolean or string."""
+    if text in ("true", "false"):
+        return text == "true"
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _two_sided(state: Any, surface: Any) -> Any:
+    props = mi.Properties("twosided")
+    props["bsdf"] = mi.Properties.ResolvedReference(_append(state, surface))
+    return props
+
+
+def _append(state: Any, props: Any) -> int:
+    """Add a BSDF to the scene; return its number."""
+    node = mi.parser.SceneNode()
+    node.type, node.props = mi.ObjectType.BSDF, props
+    state.nodes.append(node)
+    return len(state.nodes) - 1
+
+
+def _copy(props: Any, plugin: str, leave: Sequence[str] = ()) -> Any:
+    """Return properties without their id, for a plugin of this name."""
+    copy = mi.Properties(plugin)
+    for name in props.keys():  # noqa: SIM118 - Properties is no mapping
+        if name not in leave:
+            copy[name] = props[name]
+    return copy

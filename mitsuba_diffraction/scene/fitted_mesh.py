@@ -1,0 +1,153 @@
+"""Mesh files put on the stage of `scenes/own_mesh.xml`: upright, centred, standing on the floor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from ..errors import DiffractionError
+from .orientation.directions import direction_field
+from .orientation.files import load_mesh, load_orientation
+from .orientation.tangents import check_tangents
+from .orientation.trimesh import TriangleMesh, oriented_mesh, vertex_normals
+
+Floats = NDArray[np.float64]
+
+#: Values of `up`: the axis of the file that points upwards on the stage.
+UPS = ("auto", "x", "y", "z", "-x", "-y", "-z")
+#: Radius and height of the cylinder around the z axis that the camera of the stage sees whole.
+STAGE_RADIUS, STAGE_HEIGHT = 4.2, 6.0
+# Vertices of the lowest 2 % count as feet: soles and bases are rarely flatter.
+_FEET = 0.02
+# A resting area that is twice as large overrules the convention of the file format.
+_CLEARLY = 2.0
+
+
+class Fit(NamedTuple):
+    """Rotation, scale and shift that put a mesh on the stage.
+
+    Attributes
+    ----------
+    up : axis of the file that points upwards.
+    rotation : (3, 3), of determinant 1.
+    scale : factor on all lengths.
+    shift : (3,), added after rotation and scale.
+    size : (3,) lengths of the fitted mesh along x, y and z.
+    """
+
+    up: str
+    rotation: Floats
+    scale: float
+    shift: Floats
+    size: Floats
+
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers, for printing."""
+        return {
+            "up": self.up,
+            "factor on lengths": self.scale,
+            "size on the stage, x y z": " x ".join(f"{length:.3g}" for length in self.size),
+        }
+
+
+def fit_of(positions: Floats, file: Path, up: str = "auto") -> Fit:
+    """Compute how a mesh is put on the stage.
+
+    Parameters
+    ----------
+    positions : (n, 3) vertices.
+    file : file of the mesh, whose format suggests an axis and whose name is quoted in errors.
+    up : one of `UPS`; `auto` takes y or z, whichever the mesh stands on more firmly.
+
+    Raises
+    ------
+    DiffractionError
+        If `up` is none of these, a vertex is not finite, or the mesh has no volume.
+    """
+    if up not in UPS:
+        raise DiffractionError(f"up={up!r} is unknown; choose one of {', '.join(UPS)}")
+    lost = np.flatnonzero(~np.isfinite(positions).all(axis=1))
+    if len(lost):
+        raise DiffractionError(
+            f"mesh '{file}': vertex {lost[0]} is not finite ({len(lost)} such vertices); "
+            "repair the mesh"
+        )
+    sides = np.ptp(positions, axis=0)
+    if sides.min() <= 1e-6 * sides.max() or sides.max() == 0.0:
+        described = " x ".join(f"{side:.3g}" for side in sides)
+        raise DiffractionError(
+            f"mesh '{file}': its bounding box of {described} is flat, so it cannot stand on the "
+            "stage; give it a thickness, or use the rectangle of scenes/plate.xml"
+        )
+    if up == "auto":
+        up = _guessed_up(positions, file)
+    rotation = _upright(up)
+    turned = positions @ rotation.T
+    low, high = turned.min(axis=0), turned.max(axis=0)
+    middle = (low + high) / 2
+    radius = float(np.hypot(*(turned - middle)[:, :2].T).max())
+    scale = min(STAGE_RADIUS / radius, STAGE_HEIGHT / float(high[2] - low[2]))
+    shift = -scale * np.array([middle[0], middle[1], low[2]])
+    return Fit(up, rotation, scale, shift, scale * (high - low))
+
+
+def fitted_mesh(file: Path, *, fit: bool = True, up: str = "auto") -> TriangleMesh:
+    """Read a mesh, put it on the stage, and give its patch a direction.
+
+    The direction is the file's `vertex_orientation`; else ∂p/∂u where texture coordinates suit a
+    patch; else the smoothest field of directions.
+
+    Raises
+    ------
+    DiffractionError
+        If the file is no mesh, or the mesh does not fit.
+    """
+    positions, normals, uv, faces = load_mesh(file)
+    placed = fit_of(positions, file, up)
+    if normals is None:
+        normals = vertex_normals(positions, faces)
+    orientation = load_orientation(file)
+    if orientation is None and check_tangents(positions, normals, uv, faces).usable:
+        orientation = np.tile([1.0, 0.0], (len(positions), 1))
+    if fit:
+        positions = placed.scale * (positions @ placed.rotation.T) + placed.shift
+        normals = normals @ placed.rotation.T
+    if orientation is not None and uv is not None:
+        return TriangleMesh(positions, normals, uv, faces, orientation)
+    field = direction_field(positions, normals, faces)
+    return oriented_mesh(positions, normals, faces, field.directions, uv)
+
+
+def _upright(up: str) -> Floats:
+    """Return the rotation (3, 3) that turns an axis of the file to z."""
+    axis = {"x": 0, "y": 1, "z": 2}[up[-1]]
+    rotation = np.roll(np.eye(3), axis - 2, axis=0)
+    if up[-1] == "y":  # x stays, so that the front of a y-up mesh looks towards the camera
+        rotation = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    if up[0] == "-":
+        rotation = np.diag([1.0, -1.0, -1.0]) @ rotation
+    return rotation
+
+
+def _guessed_up(positions: Floats, file: Path) -> str:
+    """Return y or z: the convention of the format, unless the mesh stands better on the other.
+
+    Blender, scanners and CAD write PLY with z up; OBJ has y up in most programs.
+    """
+    usual, other = ("z", "y") if file.suffix.lower() == ".ply" else ("y", "z")
+    areas = {up: _resting_area(positions @ _upright(up).T) for up in (usual, other)}
+    return other if areas[other] > _CLEARLY * areas[usual] else usual
+
+
+def _resting_area(positions: Floats) -> float:
+    """Area of the convex hull of the feet, as a share of the bounding box seen from above."""
+    low, sides = positions.min(axis=0), np.ptp(positions, axis=0)
+    feet = positions[positions[:, 2] <= low[2] + _FEET * sides[2], :2]
+    try:
+        return float(ConvexHull(feet).volume / (sides[0] * sides[1]))
+    except (QhullError, ValueError):  # fewer than three feet, or all on a line
+        return 0.0

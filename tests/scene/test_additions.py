@@ -1,0 +1,60 @@
+"""Surfaces put on ids of a scene that mitsuba-blender exported."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.scene.load import load_scene
+
+EXPORTED = """<scene version="2.1.0">
+	<bsdf type="twosided" id="mat-Skin" name="mat-Skin">
+		<bsdf type="principled" name="bsdf"><rgb name="base_color" value="0.3 0.1 0.1"/></bsdf>
+	</bsdf>
+	<bsdf type="twosided" id="mat-Ground" name="mat-Ground">
+		<bsdf type="diffuse" name="bsdf"/>
+	</bsdf>
+	<shape type="sphere" id="elm__0" name="elm__0"><ref id="mat-Skin" name="bsdf"/></shape>
+	<shape type="rectangle" id="elm__4" name="elm__4"><ref id="mat-Ground" name="bsdf"/></shape>
+</scene>"""
+SETTINGS = ",pixel_size=0.08,coherence_width=4,energy_conserving=false"
+
+
+@pytest.fixture
+def surface(tmp_path: Path) -> Path:
+    mi.set_variant("llvm_ad_spectral")
+    (tmp_path / "scene.xml").write_text(EXPORTED)
+    heights = 0.05 * np.sin(2 * np.pi * np.arange(64) / 16)
+    np.save(tmp_path / "grating.npy", np.tile(heights, (64, 1)))
+    return tmp_path
+
+
+def bsdfs(folder: Path, materials: dict[str, str]) -> dict[str, str]:
+    """Text of each shape's BSDF, by id."""
+    values = {f"material:{k}": f"{folder / 'grating.npy'}{v}" for k, v in materials.items()}
+    scene = load_scene(folder / "scene.xml", values)
+    return {shape.id(): str(shape.bsdf()) for shape in scene.shapes()}
+
+
+@pytest.mark.parametrize("name", ["mat-Skin", "elm__0"])
+def test_a_surface_is_put_on_the_id_alone_over_what_is_there(surface, name):
+    texts = bsdfs(surface, {name: SETTINGS})
+    assert "Diffraction[" in texts["elm__0"]
+    assert "Principled" in texts["elm__0"]
+    assert texts["elm__0"].startswith("TwoSided[")
+    assert "Diffraction[" not in texts["elm__4"]
+
+
+def test_a_metal_replaces_what_is_there(surface):
+    texts = bsdfs(surface, {"mat-Skin": SETTINGS + ",material=Al", "elm__4": SETTINGS})
+    assert "Principled" not in texts["elm__0"]
+    assert "Diffuse" in texts["elm__4"]
+
+
+def test_unknown_ids_are_answered_with_those_of_the_scene(surface):
+    with pytest.raises(DiffractionError, match="mat-Skin, mat-Ground, elm__0, elm__4"):
+        bsdfs(surface, {"mat-Scales": SETTINGS})
