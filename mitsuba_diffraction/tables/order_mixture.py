@@ -35,7 +35,6 @@ class OrderMixture:
     central : (kappas,), power of order 0.
     density : (kappas, ny, nx), power of all others per (rad/µm)², smoothed; q = 0 in the middle.
     pitch : rad/µm between samples of the density.
-    uncertainty : rad/µm, how far a strong order's power may lie from its frequency.
     """
 
     kappa_step: float
@@ -44,18 +43,6 @@ class OrderMixture:
     central: NDArray[np.float64]
     density: NDArray[np.float32]
     pitch: float
-    uncertainty: float
-
-    def order_0(self, kappa: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Power of order 0 at κ, shape of κ."""
-        return np.interp(kappa, self.kappa_step * np.arange(len(self.central)), self.central)
-
-    def strong(self, kappa: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Powers of the strong orders at κ of shape (m,), shape (n, m)."""
-        position = np.clip(kappa / self.kappa_step, 0.0, len(self.powers) - 1.001)
-        lower = position.astype(int)
-        share = (position - lower).astype(np.float32)
-        return (self.powers[lower].T * (1.0 - share)) + self.powers[lower + 1].T * share
 
     def strong_at(self, kappa: NDArray[np.float64]) -> NDArray[np.float32]:
         """Powers of the strong orders, each at its own κ, shape of κ (..., n)."""
@@ -125,7 +112,6 @@ def order_mixture(
         central=central,
         density=density,
         pitch=pitch,
-        uncertainty=max(axis.uncertainty for axis in axes),
     )
 
 
@@ -143,7 +129,6 @@ class _Axis:
             self.frequency = positions * spacing
             self.matrix = tap_matrix(positions, -last, len(bins), table.grid.exponents[axis], None)
             self.weight = step / density / math.sqrt(math.pi)
-            self.uncertainty = 0.5 * spacing / density
             return
         joined = max(1, round(_JOINED / step))
         joined += (joined + 1) % 2  # odd: order 0 stays in the middle of its own
@@ -153,7 +138,6 @@ class _Axis:
         self.matrix = np.zeros((len(self.frequency), len(bins)), np.float32)
         self.matrix[group - first, np.arange(len(bins))] = 1.0
         self.weight = 1.0
-        self.uncertainty = 0.5 * (joined - 1) * spacing
 
 
 class _Powers:

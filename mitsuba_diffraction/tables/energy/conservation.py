@@ -59,16 +59,15 @@ class Surface:
     def conservation(self, wavelength_range: tuple[float, float]) -> Conservation:
         """Conserve energy over a range of wavelengths (nm), whose ends may be one: seconds."""
         settings = self.orders.settings
-        coarse = DirectionGrid(settings.coarse_polar, settings.coarse_azimuthal)
-        wavelengths = wavelengths_of(wavelength_range, settings.coarse_wavelengths)
+        coarse = self._grid.half
+        wavelengths = wavelengths_of(wavelength_range, max(2, settings.wavelengths // 4))
         transports = self.transports(wavelengths, coarse.theta, coarse.phi, coarse)
         values = np.stack([transport(coarse.ones) for transport in transports])
         albedo = DirectionalTable(wavelengths, values)
         if values.max() <= settings.threshold:
             return Conservation(albedo, None)
-        filmed = isinstance(self.index(wavelengths), Filmed)
-        count = settings.film_wavelengths if filmed else settings.wavelengths
-        return Conservation(albedo, self._scale(wavelengths_of(wavelength_range, count)))
+        scale = self._scale(wavelengths_of(wavelength_range, settings.wavelengths))
+        return Conservation(albedo, scale)
 
     def albedos(
         self, scale: DirectionalTable | None, theta: Real, phi: Real, wavelength: float

@@ -52,8 +52,6 @@ class Boundary:
 
     #: Whether heights do not matter.
     flat = False
-    #: Whether G is the same if both directions are exchanged: not between two sides.
-    symmetric = True
 
     def normals(self, cos_i: Real, cos_o: Real) -> tuple[Real, Real]:
         """qi and qo."""
@@ -92,10 +90,8 @@ class Boundary:
         """Cosines of θi, θo and the azimuth between at which tables are made."""
         angle = 0.5 * np.pi * (1.0 - np.linspace(1.0, 0.0, POLAR) ** 2)  # denser towards grazing
         cosine = np.maximum(np.cos(angle), LEAST_COSINE)
-        i, o = np.indices((POLAR, POLAR)).reshape(2, -1)
-        if self.symmetric:  # reciprocity gives the rest
-            i, o = np.tril_indices(POLAR)
-        return cosine[i, None], cosine[o, None], np.cos(np.linspace(0.0, np.pi, AZIMUTHS))
+        azimuth = np.linspace(0.0, np.pi, AZIMUTHS)
+        return cosine[:, None, None], cosine[:, None], np.cos(azimuth)
 
     @cached_property
     def at_nodes(self) -> tuple[Complex, Complex]:
@@ -152,13 +148,7 @@ class Gain:
     @cached_property
     def _table(self) -> Real:
         """`ratio` at the nodes, (POLAR, POLAR, AZIMUTHS)."""
-        values = self._ratio(self.boundary.at_nodes, *self.boundary.nodes)
-        if not self.boundary.symmetric:
-            return values.reshape(POLAR, POLAR, AZIMUTHS)
-        table = np.empty((POLAR, POLAR, AZIMUTHS))
-        i, o = np.tril_indices(POLAR)
-        table[i, o] = table[o, i] = values
-        return table
+        return self._ratio(self.boundary.at_nodes, *self.boundary.nodes)
 
     def _ratio(
         self, both: tuple[Complex, Complex], cos_i: Real, cos_o: Real, cos_turn: Real

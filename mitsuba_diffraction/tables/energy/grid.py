@@ -77,7 +77,9 @@ class DirectionGrid:
         columns = [at + step for step in (0, self.azimuthal) for at in (left, right)]
         shares = [u * v for u in (1.0 - s, s) for v in (1.0 - t, t)]
         indices, data = (np.stack(part, axis=-1).ravel() for part in (columns, shares))
-        return LinearMap.of(data, indices, 4, row.shape, self)
+        starts, nodes = np.arange(0, len(data) + 1, 4), (self.polar + 1) * self.azimuthal
+        corners = sparse.csr_array((data, indices, starts), shape=(row.size, nodes))
+        return LinearMap(corners, row.shape)
 
 
 @dataclass(frozen=True)
@@ -87,27 +89,18 @@ class LinearMap:
     matrix: sparse.csr_array
     shape: tuple[int, ...]
 
-    @classmethod
-    def of(
-        cls,
-        data: Array,
-        indices: NDArray[np.int32],
-        each: int,
-        shape: tuple[int, ...],
-        grid: DirectionGrid,
-    ) -> LinearMap:
-        """Build a map whose values are made of equally many nodes of a grid each."""
-        starts = np.arange(0, len(data) + 1, each, dtype=np.int32)
-        nodes = (grid.polar + 1) * grid.azimuthal
-        return cls(sparse.csr_array((data, indices, starts), shape=(len(starts) - 1, nodes)), shape)
-
     def __call__(self, values: NDArray[np.floating]) -> Array:
         return np.asarray((self.matrix @ values.ravel()).reshape(self.shape))
 
-    def summed(self, shares: Array, grid: DirectionGrid) -> LinearMap:
+    def summed(self, shares: Array) -> LinearMap:
         """Return the map to sums over the last axis, by shares (…, m)."""
-        data, each = self.matrix.data * np.repeat(shares.ravel(), 4), 4 * shares.shape[-1]
-        return LinearMap.of(data, self.matrix.indices, each, shares.shape[:-1], grid)
+        corners = self.matrix
+        data = corners.data * np.repeat(shares.ravel(), 4)
+        starts = corners.indptr[:: shares.shape[-1]]
+        rows = sparse.csr_array(
+            (data, corners.indices, starts), shape=(len(starts) - 1, corners.shape[1])
+        )
+        return LinearMap(rows, shares.shape[:-1])
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,8 @@ class EnergySettings:
     polar, azimuthal : cells of the grid that scales are tabulated on.
     side_polar, side_wavelengths : of the scale of both sides of a dielectric, whose light bends
         quickly towards the critical angle.
-    wavelengths, film_wavelengths : of a scale; under a film, whose fringes albedos follow, more. In
-        variants of one wavelength there is one.
-    coarse_polar, coarse_azimuthal, coarse_wavelengths : of the albedo of the model as it is, which
-        tells whether a scale is needed.
+    wavelengths : of a scale; variants of one wavelength have one. The model's albedo, which tells
+        whether a scale is needed, has a quarter of them and half the directions.
     parts, few_parts : a cell is looked at in the middles of so many parts either way; on surfaces
         of at most `few_orders` strong orders, whose albedos have kinks, in more.
     rings, steps : directions of the quadrature over weak orders: rings, and azimuths on the widest.
@@ -44,12 +42,8 @@ class EnergySettings:
     side_polar: int = 80
     side_wavelengths: int = 8
     wavelengths: int = 16
-    film_wavelengths: int = 16
     fringe_step: float = 0.1
     fringes: int = 64
-    coarse_polar: int = 20
-    coarse_azimuthal: int = 30
-    coarse_wavelengths: int = 4
     parts: int = 1
     few_parts: int = 3
     few_orders: int = 32

@@ -84,7 +84,6 @@ class Dielectric(Boundary):
 class Passed(Dielectric):
     """Light that goes through, down or up; through a sheet, out of its flat side as well."""
 
-    symmetric = False
     down: bool = True
     thin: bool = False
 

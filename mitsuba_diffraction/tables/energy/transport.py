@@ -97,7 +97,7 @@ class Orders:
             shares, polar, azimuth = (
                 np.stack(part) for part in zip(*(way.strong(phi) for way in ways), strict=True)
             )
-            strong = grid.interpolation(polar, azimuth).summed(shares.astype(np.float32), grid)
+            strong = grid.interpolation(polar, azimuth).summed(shares.astype(np.float32))
         return Transport(Mirrored.of([way.mirrored(grid) for way in ways], phi, grid), weak, strong)
 
 
