@@ -26,13 +26,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
         "and a table and a map of each scan. A scan that fails is a row with its reason, and the "
         "command then exits with 1; a second run measures only new scans.",
     )  # fmt: skip
-    parser.add_argument(
-        "files",
-        metavar="FILE",
-        type=Path,
-        nargs="+",
-        help="scans of any format, recipes, folders of them, or patterns like 'scans/*.spm'",
-    )
+    options.add_files(parser, "scans of any format, or recipes")
     options.add_output(parser, "default: survey", default=Path("survey"))
     parser.add_argument(
         "--treatments", metavar="FILE", type=Path,
