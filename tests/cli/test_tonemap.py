@@ -10,7 +10,9 @@ import OpenEXR
 import pytest
 
 from mitsuba_diffraction.optics.display import shown
-from tests.support.room import QUICK, png
+from tests.support.room import QUICK, SCENE, png
+
+__all__ = ["SCENE"]  # read by the fixture `scene`
 
 pytestmark = pytest.mark.usefixtures("here")
 

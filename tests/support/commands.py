@@ -30,6 +30,21 @@ SMALL = {
 }
 
 
+#: A mesh that stands on one of its faces.
+_WEDGE = """v 0 0 0
+v 2 0 0
+v 2 0 1
+v 0 0 1
+v 1 1 0.5
+f 1 2 5
+f 2 3 5
+f 3 4 5
+f 4 1 5
+f 4 3 2
+f 4 2 1
+"""
+
+
 def commands(page: str) -> list[list[str]]:
     """Words of a page's commands that are run here: those of blocks, then those of sentences."""
     lines = [words for text in blocks(page, "sh") for words in typed(text)]
@@ -91,6 +106,7 @@ def small_tree(folder: Path) -> Path:
     counts = np.tile(np.int16(np.round(wave)), (32, 1))
     (folder / "scan.spm").write_bytes(nanoscope(counts, scan_size="8 4 ~m"))
     assert make_mesh(["knot", "-o", str(folder / "mesh.ply")]) == 0
+    (folder / "cow.obj").write_text(_WEDGE, "utf-8")
     # what `plan` writes, which is not run here
     shutil.copy(folder / "precompute" / "elaphe_like.toml", folder / "snake.toml")
     return folder

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+# Wheels bring the studio's files along; a clone has them among its scenes.
+_BROUGHT, _CLONE = Path(__file__).with_name("studio"), Path(__file__).parents[2] / "scenes"
 #: Scene that meshes are put into.
-STUDIO = Path(__file__).with_name("own_mesh.xml")
+STUDIO = (_BROUGHT if _BROUGHT.is_dir() else _CLONE) / "own_mesh.xml"
 #: Suffixes of mesh files that Mitsuba reads.
 MESHES = (".ply", ".obj", ".serialized")
 #: Suffixes of mesh files that have to be converted first: Mitsuba reads neither STL nor glTF.
