@@ -71,6 +71,8 @@ def run(words: list[str]) -> None:
     if "--workers" in rest:  # tests/cluster starts processes
         at = rest.index("--workers")
         del rest[at : at + 2]
+    if command == "render" and "--patch" in rest:  # on the package's own stage
+        rest += ["-D", "resx=24", "-D", "resy=20"]
     if command == "render" and "--frames" in rest:
         rest += ["--frames", "2"]
     assert main([command, *rest]) == 0, words
@@ -99,12 +101,18 @@ def small_tree(folder: Path) -> Path:
     heights = np.tile(field.heights[:1], (32, 1))
     np.save(folder / "grating.npy", heights)
     grey = np.round((heights - heights.min()) / np.ptp(heights) * 255).astype(np.uint8)
-    for name in ("scale.png", "elaphe.png", "a.png", "b.png"):
+    for name in ("scans", "snakes", "other"):
+        (folder / name).mkdir()
+    for name in ("scale.png", "elaphe.png", "a.png", "b.png", "scans/scale_1.png"):
         Image.fromarray(grey).save(folder / name)
+    quick = {"coherence_width": 4.0, "tolerance": 0.05}
+    md.DiffractionTable.build(field, **quick).save(folder / "scale.exr")
     # 32 lines of 64 samples, 8 by 4 µm, 3.9 nm high
     wave = 512 * np.sin(2 * np.pi * np.arange(64) / 16)
     counts = np.tile(np.int16(np.round(wave)), (32, 1))
     (folder / "scan.spm").write_bytes(nanoscope(counts, scan_size="8 4 ~m"))
+    for name in ("snakes/snake_1.spm", "other/b.spm"):
+        shutil.copy(folder / "scan.spm", folder / name)
     assert make_mesh(["knot", "-o", str(folder / "mesh.ply")]) == 0
     (folder / "cow.obj").write_text(_WEDGE, "utf-8")
     # what `plan` writes, which is not run here

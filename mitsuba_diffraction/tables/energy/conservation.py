@@ -60,7 +60,7 @@ class Surface:
         """Conserve energy over a range of wavelengths (nm), whose ends may be one: seconds."""
         settings = self.orders.settings
         coarse = self._grid.half
-        wavelengths = wavelengths_of(wavelength_range, max(2, settings.wavelengths // 4))
+        wavelengths = wavelengths_of(wavelength_range, max(4, settings.wavelengths // 4))
         transports = self.transports(wavelengths, coarse.theta, coarse.phi, coarse)
         values = np.stack([transport(coarse.ones) for transport in transports])
         albedo = DirectionalTable(wavelengths, values)
