@@ -3,7 +3,7 @@
 What is not run here: the gallery's, whose scenes test_scenes_thorough.py renders; `make`, `pip` and
 `apt`, which set up what runs these tests; `view`, which opens a window; `tradeoff`, `compare` and
 `plan`, which take long at their smallest, and are run smaller still by their own tests.
-test_docs.py checks what these would be given.
+`render --denoise` runs without it. test_docs.py checks what these would be given.
 """
 
 from __future__ import annotations

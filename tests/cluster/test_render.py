@@ -270,7 +270,12 @@ def test_a_process_without_llvm_says_so_as_a_worker():
 def test_workers_with_several_dask_threads_are_refused(scene):
     with (
         distributed.LocalCluster(
-            n_workers=1, threads_per_worker=2, processes=False, dashboard_address="127.0.0.1:0"
+            n_workers=1,
+            threads_per_worker=2,
+            processes=False,
+            dashboard_address="127.0.0.1:0",
+            protocol="tcp://",
+            host="127.0.0.1",
         ) as local,
         distributed.Client(local) as mine,
         pytest.raises(DiffractionError, match="has 2 Dask threads"),

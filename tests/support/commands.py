@@ -68,6 +68,7 @@ def run(words: list[str]) -> None:
     _, command, *rest = words
     rest = [word.replace("$PWD", str(Path.cwd())) for word in rest]
     rest = [*without_size(rest), *SMALL.get(command, [])]
+    rest = [word for word in rest if word != "--denoise"]  # needs an extra, has tests of its own
     if "--workers" in rest:  # tests/cluster starts processes
         at = rest.index("--workers")
         del rest[at : at + 2]
