@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import glob
-import io
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ..atomic import atomic_path
 from ..errors import DiffractionError
 from .iridescence import HUES
+from .survey_files import write_table
 
 #: How repeated scans are told: by names that differ in their last number, or by folders.
 REPEATS = ("name", "folder")
@@ -86,14 +84,9 @@ def write_repeats(path: Path, rows: Sequence[Mapping[str, Any]]) -> list[dict[st
     for row in rows:
         samples.setdefault(row["sample"], []).append(row)
     averaged = [_averaged(sample, scans) for sample, scans in samples.items()]
-    text = io.StringIO()
     columns = [f"{name}{end}" for name in AVERAGED for end in ("", "_se")]
     names = ["sample", "scans", "failed", *columns]
-    writer = csv.DictWriter(text, names, restval="", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(averaged)
-    with atomic_path(path) as temporary:
-        temporary.write_text(text.getvalue(), "utf-8")
+    write_table(path, names, averaged)
     return averaged
 
 

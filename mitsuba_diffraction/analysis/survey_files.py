@@ -31,13 +31,18 @@ def write_rows(
     columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
     first = ("file", "sample", "reason")
     names = [*first, *(name for name in columns if name not in first)]
+    write_table(path, names, rows)
+    return rows
+
+
+def write_table(path: Path, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
+    """Write rows as CSV with these columns; values that a row lacks are empty."""
     text = io.StringIO()
     writer = csv.DictWriter(text, names, restval="", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
     with atomic_path(path) as temporary:
         temporary.write_text(text.getvalue(), "utf-8")
-    return rows
 
 
 def write_sheets(folder: Path, rows: Sequence[Mapping[str, Any]]) -> None:
