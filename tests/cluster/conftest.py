@@ -44,12 +44,13 @@ def own_scenes():
 
 @pytest.fixture
 def scene(tmp_path, monkeypatch):
-    """A scene of 12 passes, each of which is a group; Dr.Jit's threads are restored at the end.
+    """A scene of 12 passes, each of which is a group; a worker is given two at a time.
 
-    With one thread, Mitsuba's EXR writer would wait forever.
+    Dr.Jit's threads are restored at the end: with one, Mitsuba's EXR writer would wait forever.
     """
     before = dr.thread_count()
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(groups, "AHEAD", 2)
     monkeypatch.setattr(passes, "SAMPLES", {"llvm": 2 * 24 * 16})
     (tmp_path / "room.xml").write_text(SCENE)
     yield tmp_path / "room.xml"

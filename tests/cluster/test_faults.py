@@ -35,12 +35,12 @@ def test_a_killed_worker_and_late_ones_change_nothing(client, scene, expected, t
             happened.append(text)
             victim = next(iter(client.cluster.workers.values()))
             os.kill(victim.pid, signal.SIGKILL)
-            client.cluster.scale(4)
+            client.cluster.scale(3)
 
     result = rendered(client, scene, progress=disturb)
     assert happened
     np.testing.assert_array_equal(np.array(result.bitmap), expected)
-    client.wait_for_workers(4, timeout=300)
+    client.wait_for_workers(3, timeout=300)
     np.testing.assert_array_equal(np.array(rendered(client, scene).bitmap), expected)
     client.cluster.scale(2)
 
@@ -111,16 +111,28 @@ def test_a_client_that_was_killed_goes_on(client, scene, expected):
     np.testing.assert_array_equal(np.array(result.bitmap), expected)
 
 
+CLUSTER = """
+import time
+from distributed import LocalCluster
+
+LocalCluster(
+    n_workers=1, threads_per_worker=1, processes=False, protocol="tcp://", host="127.0.0.1",
+    scheduler_port={port}, dashboard_address=None,
+)
+time.sleep(3600)
+"""
+
+
 @pytest.fixture
 def start():
-    """`start(command, *arguments)`: a scheduler or worker as a user starts it, of its own."""
+    """`start(port)`: a process that is a scheduler and its worker."""
     running = []
 
-    def call(command, *arguments):
+    def call(port):
         path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
         running.append(
             subprocess.Popen(
-                [sys.executable, "-m", f"distributed.cli.dask_{command}", *arguments],
+                [sys.executable, "-c", CLUSTER.format(port=port)],
                 env={**os.environ, "PYTHONPATH": path}, stderr=subprocess.DEVNULL,
             )
         )  # fmt: skip
@@ -147,25 +159,16 @@ def test_a_scheduler_that_is_killed_and_started_again_changes_nothing(
     monkeypatch.setattr(workers, "COUNT_EVERY", 0.0)  # or a quick restart would not be seen
     monkeypatch.setattr(workers, "PATIENCE", 300.0)  # of a busy machine
     port = free_port()
-    address = f"tcp://127.0.0.1:{port}"
-
-    def start_all():
-        scheduler = start("scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard")
-        worker = start("worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard")
-        return scheduler, worker
-
-    first = start_all()
-    killed = []
+    first, killed = start(port), []
 
     def disturb(done, total, text):
         if done >= 4 and not killed:
-            for process in first:
-                process.kill()
-                process.wait()
+            first.kill()
+            first.wait()
             killed.extend((tmp_path / "passes").iterdir())
-            start_all()
+            start(port)
 
-    with cluster.connect(scheduler=address, patience=300) as mine:
+    with cluster.connect(scheduler=f"tcp://127.0.0.1:{port}", patience=300) as mine:
         job = film(mine, scene, tmp_path / "passes")
         (result,) = job.render(Stop(), disturb)
     np.testing.assert_array_equal(np.array(result.bitmap), expected)
