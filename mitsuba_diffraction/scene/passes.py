@@ -28,7 +28,7 @@ from .load import error_of
 
 #: Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
 #: wavefronts exhaust the memory. Fixed, so that a seed gives the same random numbers everywhere.
-SAMPLES = {"llvm": 2**21, "cuda": 2**24}
+SAMPLES = {"llvm": 2**21, "cuda": 2**24, "metal": 2**24}
 
 
 @dataclass(frozen=True)

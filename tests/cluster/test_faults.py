@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import resource
 import signal
 import socket
 import subprocess
@@ -67,6 +66,7 @@ def test_a_client_that_was_stopped_goes_on(client, scene, expected, tmp_path, mo
 
 
 def test_a_full_disk_is_one_line_and_leaves_nothing(client, scene, expected, tmp_path):
+    resource = pytest.importorskip("resource")  # of Unix
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (4096, before[1]))
     try:
