@@ -111,9 +111,9 @@ realtime: setup  ## compare the shaders with the path tracer: docs/realtime.md
 	@for scene in $(REALTIME); do \
 	    set -- $$(echo $$scene | tr : ' '); made=out/compare/$$1; \
 	    if $(call UP_TO_DATE,$$made/compare.json); then echo "$$made is kept: no code or scene is newer"; \
-	    else $(RUN) compare scenes/$$1.xml --method lut spectral -s $$4 --frames $$5 --supersampling $$6 \
+	    else $(RUN) compare scenes/$$1.xml --method fast exact -s $$4 --frames $$5 --supersampling $$6 \
 	        -D resx=$$2 -D resy=$$3 -o $$made; fi || exit 1; done
-	@$(call UP_TO_DATE,out/compare/sheet/compare.json) || $(RUN) compare scenes/snake.xml --method lut -s 1024 --full-spp 256 \
+	@$(call UP_TO_DATE,out/compare/sheet/compare.json) || $(RUN) compare scenes/snake.xml --method fast -s 1024 --full-spp 256 \
 	    --frames 512 --supersampling 2 -D resx=320 -D resy=200 -o out/compare/sheet
 	@$(PYTHON3) -m docs.make.figures.realtime --sheet out/compare/sheet $(foreach s,$(REALTIME),out/compare/$(firstword $(subst :, ,$s)))
 

@@ -65,8 +65,8 @@ def daylight_weights(sigma: float, period: float) -> Daylight:
     cumulative = np.append(0.0, density.cumsum()[per_bin - 1 :: per_bin])
     k = 2e3 * np.pi / lam
     # ρ is between that of order 1 at the shortest wavelength and 2
-    variances = tuple(0.5 / (sigma * rho) ** 2 for rho in (2.0, 1e-3 * ENDS[0] / period))
-    margin = 4.0 * math.sqrt(max(variances))
+    variances = 0.5 / (2.0 * sigma) ** 2, 0.5 / (sigma * 1e-3 * ENDS[0] / period) ** 2
+    margin = 4.0 * math.sqrt(variances[1])
     waves = max(float(k.min()) - margin, 0.25 * float(k.min())), float(k.max()) + margin
     places = np.linspace(*waves, _WAVES)
     smoothed = []

@@ -79,7 +79,7 @@ def corners(table: OrderTable) -> Corners:
 
 def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
     """Evaluate the polynomials of a kind on a grid with so many cells, unpolarised."""
-    values = band.kind(kind).mean(axis=-1, dtype=np.float64)
+    values: Array = band.kind(kind).mean(axis=-1, dtype=np.float64)
     tau, rho, w = (np.linspace(0.0, 1.0, count + 1) for count in counts)
     along_tau, along_rho = (
         cells.interpolation(known, places)
@@ -90,8 +90,8 @@ def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
     lam = wavelength_of(table, big_k, w)
     at = cells.w_of(big_k, lam, table.wavelengths, table.optical_period)
     along_w = cells.interpolation(band.counts.w, at)
-    values = clamped(np.einsum("rwc,trcjq->trwjq", along_w, values, optimize=True)[..., None])
-    values = values[..., 0]
+    summed = np.einsum("rwc,trcjq->trwjq", along_w, values, optimize=True)
+    values = clamped(np.asarray(summed)[..., None])[..., 0]
     if table.superstrate == 1.0:
         return Rows(values, values)
     channels = np.arange(values.shape[-1])
