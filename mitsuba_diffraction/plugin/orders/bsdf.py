@@ -39,7 +39,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ...errors import warn
-from ..directions import Pair, from_patch, in_patch
+from ..directions import Pair, PatchFrame
 from ..parameter_changes import arrays_within, check_parameters, marks, take_changes
 from ..sampling import direction_of
 from ..types import (
@@ -106,7 +106,7 @@ class DiffractionOrders(mi.BSDF):
         active = mi.Mask(active) & (cos_i > 0.0) & (cos_o > 0.0)
         if not ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0):
             return mi.Spectrum(0.0), mi.Float(0.0)
-        pair = Pair(si, wo, self.orientation.rotation(si, active), active)
+        pair = Pair(si, wo, self._frame(si, active), active)
         light = self._lobes.reflected(pair, si)
         value = mi.depolarizer(mi.UnpolarizedSpectrum(light.value))
         return dr.select(active, mi.Spectrum(value), 0.0), dr.select(active, light.density, 0.0)
@@ -122,13 +122,13 @@ class DiffractionOrders(mi.BSDF):
         """Draw an order by its efficiency, and a direction in its lobe."""
         cos_i = mi.Frame3f.cos_theta(si.wi)
         active = mi.Mask(active) & (cos_i > 0.0)
-        rotation = self.orientation.rotation(si, active)
-        incident = dr.detach(in_patch(si.wi, rotation))
+        frame = self._frame(si, active)
+        incident = dr.detach(frame.turned(si.wi))
         drawn = self._lobes.draw(incident, cos_i, si, sample1, sample2)
         result = dr.zeros(mi.BSDFSample3f)
         result.eta = 1.0
         result.sampled_type = mi.UInt32(+mi.BSDFFlags.GlossyReflection)
-        tangential = from_patch(drawn.uv, rotation) - mi.Vector2f(si.wi.x, si.wi.y)
+        tangential = frame.from_table(drawn.uv) - mi.Vector2f(si.wi.x, si.wi.y)
         result.wo = dr.detach(direction_of(tangential))
         value, density = self.eval_pdf(ctx, si, result.wo, active & drawn.valid)
         active &= density > 0.0
@@ -140,6 +140,10 @@ class DiffractionOrders(mi.BSDF):
         """Return the albedo at normal incidence, for denoisers."""
         albedo = self._lobes.albedo(mi.Vector2f(0.0), mi.Float(1.0), si)
         return dr.select(active, dr.clip(mi.Spectrum(albedo), 0.0, 1.0), 0.0)
+
+    def _frame(self, si: Interaction, active: Mask) -> PatchFrame:
+        """Return the axes of the profile at points of the surface."""
+        return PatchFrame(self.orientation.rotation(si, active))
 
     # ------------------------------------------------------------------ changes of parameters
 

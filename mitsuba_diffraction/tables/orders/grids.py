@@ -79,19 +79,19 @@ def corners(table: OrderTable) -> Corners:
 
 def rows(table: OrderTable, band: Band, kind: int, counts: Counts) -> Rows:
     """Evaluate the polynomials of a kind on a grid with so many cells, unpolarised."""
-    values: Array = band.kind(kind).mean(axis=-1, dtype=np.float64)
+    unpolarised = band.kind(kind).mean(axis=-1, dtype=np.float64)
     tau, rho, w = (np.linspace(0.0, 1.0, count + 1) for count in counts)
     along_tau, along_rho = (
         cells.interpolation(known, places)
         for known, places in zip(band.counts, (tau, rho), strict=False)
     )
-    values = np.einsum("ta,rb,abcjq->trcjq", along_tau, along_rho, values, optimize=True)
+    summed = np.einsum("ta,rb,abcjq->trcjq", along_tau, along_rho, unpolarised, optimize=True)
     big_k = (band.k + cells.sine_squared(rho))[:, None]
     lam = wavelength_of(table, big_k, w)
     at = cells.w_of(big_k, lam, table.wavelengths, table.optical_period)
     along_w = cells.interpolation(band.counts.w, at)
-    summed = np.einsum("rwc,trcjq->trwjq", along_w, values, optimize=True)
-    values = clamped(np.asarray(summed)[..., None])[..., 0]
+    summed = np.einsum("rwc,trcjq->trwjq", along_w, summed, optimize=True)
+    values = clamped(np.asarray(summed, np.float64)[..., None])[..., 0]
     if table.superstrate == 1.0:
         return Rows(values, values)
     channels = np.arange(values.shape[-1])
