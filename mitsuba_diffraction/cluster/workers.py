@@ -73,7 +73,7 @@ def connect(
         distributed.Client(**named, timeout=patience).close()
         # the same time is for a scheduler that is lost and comes back
         client = distributed.Client(**named, timeout=PATIENCE)
-    except (OSError, ValueError, TimeoutError) as error:
+    except (OSError, ValueError, TypeError, TimeoutError) as error:  # TypeError: no certificate
         raise DiffractionError(
             f"no scheduler answers at '{address}' ({one_line(str(error))[:80]}); start one with "
             "'dask scheduler', and workers with 'dask worker --nthreads 1'"
