@@ -28,7 +28,7 @@ TASKS_A_WORKER = 10
 AHEAD = 8
 #: Sums that a worker adds at once.
 ADDED = 4
-_POLL = 0.02  # seconds
+_POLL = 0.05  # seconds
 
 
 @dataclass

@@ -42,7 +42,7 @@ from mitsuba_diffraction.scene.passes import (
 
 from . import pages
 from .pages import exit_code
-from .simulated_cluster import Costs, Job, Simulation
+from .cluster_simulation import Costs, Job, Simulation
 
 VARIANT, SPP = "llvm_ad_rgb", 32
 FRAMES, RUNS = 16, 5
@@ -152,8 +152,9 @@ def costs_of_sums(count: int = 20) -> tuple[float, float]:
             add_sums([sums, stored])
 
         client = statistics.median(processor_seconds(take) for _ in range(count))
-    addition = statistics.median(processor_seconds(lambda: add_sums([sums] * 2)) for _ in range(20))
-    return client / raw.nbytes, addition / raw.nbytes
+    large = [Sums(np.ones(STILL.bytes // 4, np.float32), (), (), 1, 0.0, 0) for _ in range(2)]
+    addition = statistics.median(processor_seconds(lambda: add_sums(large)) for _ in range(5))
+    return client / raw.nbytes, addition / STILL.bytes
 
 
 def scheduler_seconds(count: int = 1000) -> float:
@@ -220,7 +221,7 @@ def costs_text(costs: Costs) -> str:
         f"{costs.load:.2g} s for a scene and its kernels; {1e3 * costs.scheduler:.2g} ms of client "
         "and scheduler for a task or an addition; "
         f"{1e9 * costs.client:.2g} ns a byte for the client to write, read and add a sum; "
-        f"{1e9 * costs.addition:.2g} ns a byte for a worker to add it.\n"
+        f"{1e9 * costs.addition:.2g} ns a byte for a worker to add one.\n"
         f"- Assumed: workers of two such cores, tasks that vary by {costs.spread:.0%} (standard "
         f"deviation), {8e-9 / costs.network:g} Gbit/s at every machine. The scheduler and the "
         "client do one thing at a time; a free worker takes the next task; nobody dies.\n"
