@@ -41,8 +41,8 @@ from mitsuba_diffraction.scene.passes import (
 )
 
 from . import pages
-from .pages import exit_code
 from .cluster_simulation import Costs, Job, Simulation
+from .pages import exit_code
 
 VARIANT, SPP = "llvm_ad_rgb", 32
 FRAMES, RUNS = 16, 5
