@@ -15,6 +15,7 @@ cluster            rendering on many processes and machines
 web                pages that show a scene in a browser or a notebook
 spectrum           reflectance spectra as a spectrometer measures them
 reference          the BRDF straight from its integral, in double precision
+hologram           textures of a dot-matrix hologram from a picture
 bsdf_dict          a dictionary for `mi.load_dict` from arrays
 DiffractionError   error of every bad input, in one line
 
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
     from .analysis import design, maps, tradeoff
     from .analysis.spectra import spectrum
     from .realtime import glsl, shader_comparison, web
+    from .scene.hologram import hologram
     from .thesis import period_fit
 
 __version__ = version(__name__)
@@ -64,6 +66,7 @@ __all__ = [
     "design",
     "glsl",
     "gratings",
+    "hologram",
     "maps",
     "period_fit",
     "reference",
@@ -84,11 +87,12 @@ _ON_DEMAND = {
     "tradeoff": "analysis.tradeoff",
     "web": "realtime.web",
 }
+_FUNCTIONS = {"spectrum": "analysis.spectra", "hologram": "scene.hologram"}
 
 
 def __getattr__(name: str) -> Any:
     if name in _ON_DEMAND:
         return importlib.import_module(f"{__name__}.{_ON_DEMAND[name]}")
-    if name == "spectrum":
-        return importlib.import_module(f"{__name__}.analysis.spectra").spectrum
+    if name in _FUNCTIONS:
+        return getattr(importlib.import_module(f"{__name__}.{_FUNCTIONS[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
