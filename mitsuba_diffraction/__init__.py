@@ -5,6 +5,7 @@ Contents
 HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
+OrderTable         solved efficiencies of a grating's orders
 maps               pictures of the BRDF over all directions
 period_fit         periods of a patch from its response to a beam, by the grating equation
 tradeoff           accuracy against speed and memory, setting by setting
@@ -46,6 +47,7 @@ from .heights import HeightField, gratings  # noqa: E402
 from .plugin import registration as _registration  # noqa: E402, F401  registers the plugin
 from .plugin.dictionary import bsdf_dict  # noqa: E402
 from .tables import DiffractionTable  # noqa: E402
+from .tables.orders import OrderTable  # noqa: E402
 
 if TYPE_CHECKING:
     from . import cluster
@@ -61,6 +63,7 @@ __all__ = [
     "DiffractionTable",
     "DiffractionWarning",
     "HeightField",
+    "OrderTable",
     "bsdf_dict",
     "cluster",
     "design",

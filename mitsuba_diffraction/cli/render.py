@@ -167,7 +167,7 @@ def _on_workers(args: argparse.Namespace) -> int:
         film = film_of(args, client, [FrameRequest(parameters, args.spp, args.seed)], variant, keep)
         if outputs.only_png:
             _check_colours(film.scene, film.sensor, args, outputs.png)
-        with Bar(args, unit=" tasks", delay=0) as bar, Stop() as stop:
+        with Bar(args, unit=" passes", delay=0) as bar, Stop() as stop:
             for result in film.render(stop, bar):
                 report = _finish(args, result, outputs, variant, start)
                 film.forget(0)
@@ -324,7 +324,7 @@ def _frames_on_workers(
     wanted = [FrameRequest(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]
     with mitsuba_warnings(), client_of(args) as client:
         film = film_of(args, client, wanted, variant, folder / "passes")
-        with Bar(args, unit=" tasks", delay=0) as bar, Stop() as stop:
+        with Bar(args, unit=" passes", delay=0) as bar, Stop() as stop:
             for frame, result in zip(to_do, film.render(stop, bar), strict=False):
                 write_frame(frame, result.bitmap, args.scene, variant, args.exr)
                 film.forget(done)

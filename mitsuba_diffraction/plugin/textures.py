@@ -14,6 +14,7 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
+from .meshes import has_texcoords
 from .parameter_changes import Bounded, ObjectValues
 from .properties import name_of
 from .types import Callback, Interaction, Mask, Rotation, Texture
@@ -48,7 +49,7 @@ def check_attributes(shape: Any, number: int | None = None) -> None:
     DiffractionError
         Which names the attribute, and how to get one of directions.
     """
-    if PLACED in str(shape.bsdf()) and shape.is_mesh() and not shape.has_vertex_texcoords():
+    if PLACED in str(shape.bsdf()) and shape.is_mesh() and not has_texcoords(shape):
         raise DiffractionError(
             f"{name_of(shape, number)} has no UV coordinates, from which coherence='surface' has "
             "places on the surface; unwrap it, or use coherence='ensemble'"
