@@ -8,7 +8,7 @@ pytest.importorskip("distributed")
 
 from mitsuba_diffraction import cluster
 from mitsuba_diffraction.cluster import tasks
-from tests.support.coarse import vectors_of
+from tests.support.kernels import vectors_of
 
 
 @pytest.fixture(scope="package")
