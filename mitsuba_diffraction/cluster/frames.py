@@ -28,7 +28,9 @@ AHEAD = 3
 HELD = 16
 #: Bytes that Dr.Jit takes for a sample of a pass, and for the rest of a process: estimates.
 BYTES_A_SAMPLE, BYTES_A_PROCESS = 400, 5e8
-_POLL, _COUNTED = 0.02, 2.0  # seconds
+#: Seconds between two counts of the workers.
+COUNT_INTERVAL = 2.0
+_POLL = 0.02  # seconds
 
 
 def render(
@@ -338,7 +340,7 @@ class _InOrder:
     def _workers(self) -> int:
         """Return the number of workers, counted every other second."""
         now = time.perf_counter()
-        if now - self._counted[0] > _COUNTED:
+        if now - self._counted[0] > COUNT_INTERVAL:
             self._counted = now, self._film._count_workers()
         return int(self._counted[1])
 

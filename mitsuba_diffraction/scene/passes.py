@@ -25,9 +25,9 @@ from .load import error_of
 #: Passes that a task of a cluster renders, at most; their sum is what is added to the picture.
 GROUP = 8
 
-# Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
-# wavefronts exhaust the memory. Fixed, so that a seed gives the same random numbers everywhere.
-_SAMPLES = {"llvm": 2**21, "cuda": 2**24}
+#: Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
+#: wavefronts exhaust the memory. Fixed, so that a seed gives the same random numbers everywhere.
+PASS_SAMPLES = {"llvm": 2**21, "cuda": 2**24}
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def samples_per_pass(spp: int, pixels: int, variant: str) -> int:
 
     Passes of one size share one kernel, so a divisor of `spp` is taken if one is large enough.
     """
-    most = max(1, _SAMPLES.get(variant.split("_")[0], 0) // pixels)
+    most = max(1, PASS_SAMPLES.get(variant.split("_")[0], 0) // pixels)
     if spp <= most:
         return spp
     for size in range(most, max(1, most // 2) - 1, -1):

@@ -38,7 +38,7 @@ SPP = 24
 @pytest.fixture(autouse=True)
 def small_tasks(monkeypatch):
     """Two samples a pass and one pass a task: 12 tasks."""
-    monkeypatch.setattr(passes, "_SAMPLES", {"llvm": 2 * 24 * 16})
+    monkeypatch.setattr(passes, "PASS_SAMPLES", {"llvm": 2 * 24 * 16})
     monkeypatch.setattr(passes, "GROUP", 1)
 
 
@@ -159,7 +159,9 @@ def free_port():
 def test_a_scheduler_that_is_killed_and_started_again_changes_nothing(
     scene, expected, start, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(frames_module, "_COUNTED", 0.0)  # or a quick restart would not be seen
+    monkeypatch.setattr(
+        frames_module, "COUNT_INTERVAL", 0.0
+    )  # or a quick restart would not be seen
     monkeypatch.setattr(workers_module, "_PATIENCE", 300.0)  # of a busy machine
     port = free_port()
     address = f"tcp://127.0.0.1:{port}"
