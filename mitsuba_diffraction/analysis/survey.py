@@ -74,12 +74,12 @@ class Measured:
     files: dict[str, bytes]
 
 
-def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured | MissingFiles:
+def measure(job: Job, contents: Mapping[str, bytes] | None = None) -> Measured:
     """Measure one scan in this process; the row's `reason` has the error, if any."""
     job.files.keep(contents or {})
     lacking = job.files.missing()
     if lacking:
-        return MissingFiles(tuple(lacking))
+        raise MissingFiles(lacking)
     start = time.perf_counter()
     row: dict[str, Any] = {"reason": ""}
     files: dict[str, bytes] = {}

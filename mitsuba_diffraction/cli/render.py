@@ -34,7 +34,7 @@ from . import options, scene_options
 from .console import INTERRUPTED, Bar, mitsuba_warnings, say, say_warning
 from .options import number_between, whole_number
 from .plan import add_plan_options, check_plan_options, load_by_plan, recipe_file
-from .report import check_writable, save_report
+from .report import check_writable, default_output, save_report
 from .workers import add_threads, add_workers, client_of, film_of, on_workers, say_report
 
 
@@ -143,7 +143,7 @@ class Outputs(NamedTuple):
 
 def _outputs(args: argparse.Namespace) -> Outputs:
     """Return the files of `-o`, or of its default, after checking that they can be written."""
-    output = args.output or Path(args.name.with_suffix(".exr").name)
+    output = args.output or Path(default_output(args.name, ".exr").name)
     if output.suffix.lower() not in (".exr", ".png"):
         args.parser.error(
             f"argument -o: expected a name ending in .exr or .png, got {str(output)!r}"
@@ -167,7 +167,7 @@ def _on_workers(args: argparse.Namespace) -> int:
         film = film_of(args, client, [FrameRequest(parameters, args.spp, args.seed)], variant, keep)
         if outputs.only_png:
             _check_colours(film.scene, film.sensor, args, outputs.png)
-        with Bar(args, unit=" tasks", delay=0) as bar, Stop() as stop:
+        with Bar(args, unit=" passes", delay=0) as bar, Stop() as stop:
             for result in film.render(stop, bar):
                 report = _finish(args, result, outputs, variant, start)
                 film.forget(0)
@@ -324,7 +324,7 @@ def _frames_on_workers(
     wanted = [FrameRequest(frame.values, args.spp, frame.settings["seed"]) for frame in to_do]
     with mitsuba_warnings(), client_of(args) as client:
         film = film_of(args, client, wanted, variant, folder / "passes")
-        with Bar(args, unit=" tasks", delay=0) as bar, Stop() as stop:
+        with Bar(args, unit=" passes", delay=0) as bar, Stop() as stop:
             for frame, result in zip(to_do, film.render(stop, bar), strict=False):
                 write_frame(frame, result.bitmap, args.scene, variant, args.exr)
                 film.forget(done)

@@ -86,19 +86,19 @@ class _Workers:
     def scheduler_info(self, **_):
         return {"workers": dict.fromkeys(range(self.count))}
 
-    def submit(self, work, content, **_):
+    def submit(self, work, *arguments, pure):
         self.under_way += 1
         self.most = max(self.most, self.under_way)
-        return _Future(self, work, content)
+        return _Future(self, work, arguments)
 
 
 class _Future:
-    def __init__(self, client, work, content):
-        self.client, self.work, self.content = client, work, content
+    def __init__(self, client, work, arguments):
+        self.client, self.work, self.arguments = client, work, arguments
 
     def result(self):
         self.client.under_way -= 1
-        return self.work(self.content)
+        return self.work(*self.arguments)
 
     def cancel(self):
         pass

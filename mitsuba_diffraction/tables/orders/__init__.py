@@ -1,0 +1,26 @@
+"""Solved orders: efficiencies of a periodic profile's orders, over directions and wavelengths.
+
+Contents
+--------
+OrderTable  efficiencies at nodes: checks, look-up, `save`, `load` (in `table`)
+Band        efficiencies of the directions with the same number of propagating orders
+cells       coordinates in which efficiencies are smooth, and Chebyshev nodes of them
+lookup      interpolation in NumPy
+grids       even grids that the BSDF reads, under a coat where the table has one
+daylight    the sum of an order's lobe over daylight, for RGB variants
+file        tables as NetCDF files
+"""
+
+from __future__ import annotations
+
+from .file import load_orders, save_orders
+from .lookup import efficiency, polarised_efficiency
+from .table import Band, OrderTable
+
+__all__ = ["Band", "OrderTable"]
+
+# Modules that build on the class; it shall not import them
+OrderTable.efficiency = efficiency
+OrderTable.polarised_efficiency = polarised_efficiency
+OrderTable.load = staticmethod(load_orders)
+OrderTable.save = save_orders
