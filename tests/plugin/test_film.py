@@ -22,7 +22,7 @@ from mitsuba_diffraction.optics.fresnel import Filmed, reflectance
 from mitsuba_diffraction.optics.geometry import wavenumber
 from mitsuba_diffraction.optics.mean_second_order import limited, mean_gain
 from mitsuba_diffraction.plugin.layers import Channels
-from mitsuba_diffraction.tables.film import exponents
+from mitsuba_diffraction.tables.film import mean_exponents
 from tests.support.directions import as_single, polar
 from tests.support.lanes import evaluated, interaction, refusal
 from tests.support.layered import FLAT, PATCH, WIDTH, assert_values_are_the_reference_s, load, pairs
@@ -55,7 +55,7 @@ def means(kind: str, table: md.DiffractionTable, wi: Array, wo: Array, lam: Arra
 
     one = float(lam.ravel()[0])
     wavelengths = (one, one) if mi.is_monochromatic else table.wavelength_range
-    tabulated = exponents(table.roughness, filmed, wavelengths)
+    tabulated = mean_exponents(table, filmed, wavelengths)
     tabulated = replace(tabulated, values=limited(tabulated.values).astype(np.float32))
     ratio = np.ones_like(lam, float)
     for at in np.ndindex(lam.shape):
