@@ -49,7 +49,8 @@ MAX_BYTES = 25_000_000
 #: Height scales of the tables for energy conservation, log2 of the factor on the scene's scale.
 OCTAVES = (-2.0, -1.5, -1.0, -0.5, 0.0, 0.5)
 
-_HEADER = 200_000  # upper bound of shaders, script and style, bytes
+#: Upper bound of a page's shaders, scripts and styles, bytes.
+CODE_BYTES = 200_000
 
 _SCRIPTS = (
     "vectors.js", "data.js", "mesh.js", "camera.js", "light.js", "drawing.js", "shadow.js",
@@ -206,7 +207,7 @@ def _packed(
     light = packed_light(scene, emitters, sections)
     around, definitions = packed_surroundings(loaded, scene, emitters, materials, sections)
 
-    room = (MAX_BYTES - _HEADER) // 4 * 3 - sections.nbytes
+    room = (MAX_BYTES - CODE_BYTES) // 4 * 3 - sections.nbytes
     shown, packed, left_out = _fitted(methods, tables, room, progress)
     header: dict[str, Any] = {
         "title": title,
