@@ -19,8 +19,8 @@ from ...tables.build.spectrum import NEAR
 from . import hemisphere
 from .result import Bands, BrdfMap, Light
 
-# Pixels per kernel launch: enough for a GPU, with sums of some tens of megabytes.
-_PIXELS = 1 << 20
+#: Pixels of a kernel launch: enough for a GPU, with sums of some tens of megabytes.
+LAUNCH_PIXELS = 1 << 20
 #: Largest number of values in a spectral map, 4 GB.
 _MOST_NUMBERS = 1 << 30
 
@@ -222,9 +222,9 @@ def _over_pixels(
     coverage = np.zeros((resolution, resolution), np.float32)
     values = np.zeros((sums.count, resolution, resolution), np.float32)
     pattern = hemisphere.sub_samples(samples)
-    chunks = -(-rows.size // _PIXELS)
+    chunks = -(-rows.size // LAUNCH_PIXELS)
     for chunk in range(chunks):
-        part = slice(chunk * _PIXELS, (chunk + 1) * _PIXELS)
+        part = slice(chunk * LAUNCH_PIXELS, (chunk + 1) * LAUNCH_PIXELS)
         x0, y0 = (upload(mi.Float, low[index[part]]) for index in (columns, rows))
         si = dr.zeros(mi.SurfaceInteraction3f, dr.width(x0))
         si.n = mi.Normal3f(0.0, 0.0, 1.0)
