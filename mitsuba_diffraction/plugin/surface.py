@@ -20,9 +20,6 @@ from .power import power_model
 from .surface_parameters import SurfaceParameters
 from .types import Callback, Colour, Context, Float, Interaction, Mask, Properties, Spectrum
 
-#: Component of a context that asks for all of them.
-ALL_COMPONENTS = 0xFFFFFFFF
-
 
 class ScaleRange(NamedTuple):
     """Height scales that energy is conserved for.
