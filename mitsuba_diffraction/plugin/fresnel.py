@@ -348,11 +348,26 @@ def _conductors() -> list[str]:
 
 def tabulated_range(material: str) -> tuple[float, float] | None:
     """Return the first and the last wavelength, nm, of Mitsuba's table of a conductor, if any."""
-    file = Path(str(mi.file_resolver().resolve(f"data/ior/{material}.eta.spd")))
+    file = _file(material, "eta")
     if not file.is_file():
         return None
     nodes = np.loadtxt(file)[:, 0]
     return float(nodes[0]), float(nodes[-1])
+
+
+def tabulated_index(material: str) -> tuple[Array, Array]:
+    """Return wavelengths in nm and n + ik of Mitsuba's table of a conductor, (n,) each.
+
+    Raises
+    ------
+    DiffractionError
+        If Mitsuba has no such table.
+    """
+    if tabulated_range(material) is None:
+        raise DiffractionError(_unknown_conductor(material))
+    nodes = np.loadtxt(_file(material, "eta"))[:, 0]
+    eta, k = (_tabulated(material, name, nodes) for name in ("eta", "k"))
+    return nodes, np.asarray(eta + 1j * k)
 
 
 def _at(material: str, name: str, wavelength: float) -> Texture:
@@ -363,6 +378,10 @@ def _at(material: str, name: str, wavelength: float) -> Texture:
 
 def _tabulated(material: str, name: str, wavelengths: Array | float) -> Array:
     """Part of a material's index, as Mitsuba has it tabulated."""
-    file = str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd"))
-    nodes, values = np.loadtxt(file).T
+    nodes, values = np.loadtxt(_file(material, name)).T
     return np.asarray(np.interp(wavelengths, nodes, values))
+
+
+def _file(material: str, name: str) -> Path:
+    """Return the path of Mitsuba's table of a part of a material's index."""
+    return Path(str(mi.file_resolver().resolve(f"data/ior/{material}.{name}.spd")))
