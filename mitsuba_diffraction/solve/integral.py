@@ -63,16 +63,15 @@ class IntegralSolver:
                 "gratinglab is not installed; install the extra: pip install '.[solve]'"
             ) from error
         self.points, self.period = points, profile.period
-        polygon = profiles.FromProfileData(
-            t=tuple(profile.x / profile.period), y=tuple(profile.z / profile.period)
-        )
-        grading = GRADING if profile.cornered else 0
+        x, z = profile.x / profile.period, profile.z / profile.period
+        if len(x) == 2:  # gratinglab wants three vertices
+            x, z = np.insert(x, 1, x.mean()), np.insert(z, 1, z.mean())
+        polygon = profiles.FromProfileData(t=tuple(x), y=tuple(z))
+        grading = GRADING if profile.corners else 0
         problem = Problem(period=profile.period, profile=polygon)
         self._boundary = physical_boundary(problem, points, grading=grading)
         self._terms = points // 2
-        self._assembler = OperatorAssembler(
-            self._boundary, period=self.period, terms=self._terms
-        )
+        self._assembler = OperatorAssembler(self._boundary, period=self.period, terms=self._terms)
 
     @property
     def name(self) -> str:

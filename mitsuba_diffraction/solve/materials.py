@@ -60,9 +60,11 @@ def material_of(
     if material == PERFECT:
         return Material("perfect conductor", np.array([0.0]), None)
     try:
-        number = complex(material.replace(" ", "").replace("i", "j")) if isinstance(
-            material, str
-        ) else complex(material)
+        number = (
+            complex(material.replace(" ", "").replace("i", "j"))
+            if isinstance(material, str)
+            else complex(material)
+        )
     except ValueError:
         nodes, values = tabulated_index(str(material))
         low, high = wavelengths

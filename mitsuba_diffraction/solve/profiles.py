@@ -70,6 +70,9 @@ class Profile:
                 f"{self.name}: the line crosses itself; list its points from left to right"
             )
 
+    def __repr__(self) -> str:
+        return self.name
+
     @property
     def closed(self) -> tuple[Real, Real]:
         """Vertices (n + 1,) with the first one of the next period."""
@@ -87,12 +90,12 @@ class Profile:
         return float(np.ptp(self.z))
 
     @property
-    def cornered(self) -> bool:
-        """Whether a vertex turns by more than `CORNER` degrees."""
+    def corners(self) -> int:
+        """Number of vertices that turn by more than `CORNER` degrees."""
         x, z = self.closed
         angles = np.arctan2(np.diff(z), np.diff(x))
         turns = np.angle(np.exp(1j * np.diff(angles, append=angles[0])))
-        return bool(np.degrees(np.abs(turns)).max() > CORNER)
+        return int((np.degrees(np.abs(turns)) > CORNER).sum())
 
     def _crosses_itself(self) -> bool:
         """Whether two sides cross; a line whose x never turns back cannot."""
@@ -120,7 +123,9 @@ def lamellar(period: float, depth: float, duty: float = 0.5) -> Profile:
     width = period * number_between(duty, "lamellar: duty", 0.01, 0.99)
     depth = _depth("lamellar", depth)
     name = f"lamellar {period:g}/{depth:g} µm, duty {duty:g}"
-    return Profile(np.array([0, width, width, period]), depth * np.array([1, 1, 0, 0]), period, name)
+    return Profile(
+        np.array([0, width, width, period]), depth * np.array([1, 1, 0, 0]), period, name
+    )
 
 
 def blazed(period: float, depth: float, direction: str = "descending") -> Profile:
