@@ -5,6 +5,7 @@ Contents
 HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
+OrderTable         solved efficiencies of a grating's orders
 maps               pictures of the BRDF over all directions
 period_fit         periods of a patch from its response to a beam, by the grating equation
 solve_orders       orders of a grating by a rigorous solver
@@ -18,6 +19,7 @@ cluster            rendering on many processes and machines
 web                pages that show a scene in a browser or a notebook
 spectrum           reflectance spectra as a spectrometer measures them
 reference          the BRDF straight from its integral, in double precision
+hologram           textures of a dot-matrix hologram from a picture
 bsdf_dict          a dictionary for `mi.load_dict` from arrays
 DiffractionError   error of every bad input, in one line
 
@@ -48,12 +50,14 @@ from .heights import HeightField, gratings  # noqa: E402
 from .plugin import registration as _registration  # noqa: E402, F401  registers the plugin
 from .plugin.dictionary import bsdf_dict  # noqa: E402
 from .tables import DiffractionTable  # noqa: E402
+from .tables.orders import OrderTable  # noqa: E402
 
 if TYPE_CHECKING:
     from . import cluster
     from .analysis import design, maps, tradeoff
     from .analysis.spectra import spectrum
     from .realtime import glsl, shader_comparison, web
+    from .scene.hologram import hologram
     from .solve import profiles
     from .solve.measured import read_orders
     from .solve.orders import solve_orders
@@ -65,11 +69,13 @@ __all__ = [
     "DiffractionTable",
     "DiffractionWarning",
     "HeightField",
+    "OrderTable",
     "bsdf_dict",
     "cluster",
     "design",
     "glsl",
     "gratings",
+    "hologram",
     "maps",
     "period_fit",
     "profiles",
@@ -94,9 +100,8 @@ _ON_DEMAND = {
     "tradeoff": "analysis.tradeoff",
     "web": "realtime.web",
 }
-
-
 _FUNCTIONS = {
+    "hologram": "scene.hologram",
     "read_orders": "solve.measured",
     "solve_orders": "solve.orders",
     "spectrum": "analysis.spectra",

@@ -2,8 +2,8 @@
 
 A surface between two dielectrics, or a thin sheet with one structured side, that light meets from
 either side. It has the parameters of `diffraction` for the heights, the table (without
-`coherence=surface`), `orientation`, `height_scale` and `wavelength`, and those below. It has no
-coat, film, nested BSDF, shadowing or second order.
+`coherence=surface`), `orientation`, `lateral_scale`, `height_scale` and `wavelength`, and those
+below. It has no coat, film, nested BSDF, shadowing or second order.
 
 The dielectric
 --------------
@@ -65,7 +65,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..boundary import Boundary, Jones, Kirchhoff, SmallSlope, mueller
-from ..directions import Pair, TablePoint, from_patch
+from ..directions import Pair, PatchFrame, TablePoint
 from ..fresnel import Inside, squared
 from ..layers import CoatedPair, transmittances
 from ..parameter_changes import check_parameters
@@ -79,7 +79,6 @@ from ..types import (
     Interaction,
     Mask,
     Properties,
-    Rotation,
     Sample,
     Spectrum,
     Vector2f,
@@ -162,21 +161,21 @@ class DiffractionDielectric(DiffractingSurface):
         cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
         asked = _asked(ctx)
         share = self._reflected_share(cos_i, asked)
-        rotation = self.orientation.rotation(si, active)
+        frame = self.frame_at(si, active)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         # c(ωi) c(ωo), by which order 0 makes up for what R + T lacks or exceeds
         change, where = None, (self.power.wavenumbers(si), self.scale_at(si, active))
         if self.balance is not None and self.balance.scales_order_0:
-            change = self.balance.order_0_scale((si.wi, wo), rotation, *where)
+            change = self.balance.order_0_scale((si.wi, wo), frame, *where)
         if asked.reflection:
             for reflected, sign in ((self._above, 1.0), (self._below, -1.0)):
                 lit = active & (sign * cos_i > 0.0) & (cos_i * cos_o > 0.0)
-                side, orders = reflected(ctx, si, wo, rotation, lit, change)
+                side, orders = reflected(ctx, si, wo, frame, lit, change)
                 value = dr.select(lit, side, value)
                 density = dr.select(lit, share * with_even_share(orders), density)
         if asked.transmission:
             lit = active & (cos_i * cos_o < 0.0)
-            crossing = Crossing(si, wo, rotation, lit, self.material.eta, self.thin)
+            crossing = Crossing(si, wo, frame, lit, self.material.eta, self.thin)
             passed = self._transmitted(ctx, si, crossing, change) * dr.abs(cos_o)
             value = dr.select(lit, passed, value)
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
@@ -184,7 +183,7 @@ class DiffractionDielectric(DiffractingSurface):
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
         if self.balance is not None and self.balance.attenuates:
             # t(ωi) t(ωo), where the orders of a steep surface exceed 1 on their own
-            value *= mi.Spectrum(self.balance.attenuation((si.wi, wo), rotation, *where))
+            value *= mi.Spectrum(self.balance.attenuation((si.wi, wo), frame, *where))
         return value, density
 
     def sample(
@@ -217,8 +216,8 @@ class DiffractionDielectric(DiffractingSurface):
             sample2,
             si,
         )
-        rotation = self.orientation.rotation(si, active)
-        total = sign * from_patch(drawn, rotation) - into * mi.Vector2f(si.wi.x, si.wi.y)
+        drawn = sign * self.frame_at(si, active).from_table(drawn)
+        total = drawn - into * mi.Vector2f(si.wi.x, si.wi.y)
         wo = dr.select(
             sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), direction_of(total / out)
         )
@@ -247,12 +246,12 @@ class DiffractionDielectric(DiffractingSurface):
         ctx: Context,
         si: Interaction,
         wo: Vector3f,
-        rotation: Rotation,
+        frame: PatchFrame,
         lit: Mask,
         change: Colour | None,
     ) -> tuple[Spectrum, Float]:
         """Return f cosθo and density of light that stays above the surface."""
-        scale, pair = self.scale_at(si, lit), Pair(si, wo, rotation, lit)
+        scale, pair = self.scale_at(si, lit), Pair(si, wo, frame, lit)
         power = self.geometry(pair) * self._power(si, pair, scale, change)
         value = self.lobe(ctx, si, pair, self.boundary, power, lit)
         if self.thin:
@@ -264,21 +263,21 @@ class DiffractionDielectric(DiffractingSurface):
         ctx: Context,
         si: Interaction,
         wo: Vector3f,
-        rotation: Rotation,
+        frame: PatchFrame,
         lit: Mask,
         change: Colour | None,
     ) -> tuple[Spectrum, Float]:
         """Return f cosθo and density of light that stays below the surface, or below a sheet."""
         n, scale = self.material.eta, self.scale_at(si, lit)
         if self.thin:
-            outer = Turned(si, wo, rotation, lit, mi.Float(1.0))
+            outer = Turned(si, wo, frame, lit, mi.Float(1.0))
             pair = CoatedPair(outer, n)
             power = self.geometry(pair) * self._power(si, pair, scale, change)
             value = self.lobe(ctx, si, pair, self.inner_boundary, power, lit)
             face = self.face(ctx, si, outer, self.mirror, lit)
             value += face if change is None else mi.Spectrum(change) * face
             return value, self.power.density(outer, scale * n, si)
-        inner = Turned(si, wo, rotation, lit, n)
+        inner = Turned(si, wo, frame, lit, n)
         power = self.geometry(inner) * self._power(si, inner.place, scale, change)
         # a new mask, for the caller's stays as it is: tables do not reach farther
         lit = lit & inner.reached
@@ -298,7 +297,8 @@ class DiffractionDielectric(DiffractingSurface):
             returned.append(0.5 * sum(t * (1.0 - t) * dr.rcp(2.0 - t) for t in passed))
         point = TablePoint(pair.uv, dr.sqrt(dr.fma(ends[0], ends[0], dr.square(ends[1]))))
         power = self._power(si, point, scale, change)
-        factor = self.area_factor * dr.safe_sqrt(returned[0] * returned[1]) * pair.cos_o
+        ends_factor = dr.safe_sqrt(returned[0] * returned[1])
+        factor = self.area_factor * pair.frame.area * ends_factor * pair.cos_o
         return mi.depolarizer(power * factor)
 
     def _power(
@@ -333,7 +333,7 @@ class DiffractionDielectric(DiffractingSurface):
         flat = self._factor(ctx, si, crossing, axes, [order_0(crossing, axes, self.thin)])
         value = mi.Spectrum((power - zeroth) * per_w) * others
         value += mi.Spectrum(zeroth if change is None else zeroth * change) * flat
-        outside = mi.Float(self.area_factor)
+        outside = mi.Float(self.area_factor * crossing.frame.area)
         if not self.thin:
             # Radiance over n² is transmitted; light along ωi or ωo
             down = mi.Frame3f.cos_theta(si.wi) > 0.0
