@@ -111,7 +111,7 @@ def test_a_client_that_was_stopped_goes_on(client, scene, expected, tmp_path):
 
     def interrupt(done, total, text):
         if done >= 4:
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
 
     with pytest.raises(DiffractionError, match="interrupted"):
         rendered(client, scene, keep=keep, progress=interrupt)
