@@ -5,6 +5,7 @@ Contents
 HeightField        a patch of surface, heights in µm
 gratings           ideal gratings, look-alikes of snake scales, optical discs
 DiffractionTable   precomputed diffraction orders of a patch
+OrderTable         solved efficiencies of a grating's orders
 maps               pictures of the BRDF over all directions
 period_fit         periods of a patch from its response to a beam, by the grating equation
 tradeoff           accuracy against speed and memory, setting by setting
@@ -15,6 +16,7 @@ cluster            rendering on many processes and machines
 web                pages that show a scene in a browser or a notebook
 spectrum           reflectance spectra as a spectrometer measures them
 reference          the BRDF straight from its integral, in double precision
+hologram           textures of a dot-matrix hologram from a picture
 bsdf_dict          a dictionary for `mi.load_dict` from arrays
 DiffractionError   error of every bad input, in one line
 
@@ -45,12 +47,14 @@ from .heights import HeightField, gratings  # noqa: E402
 from .plugin import registration as _registration  # noqa: E402, F401  registers the plugin
 from .plugin.dictionary import bsdf_dict  # noqa: E402
 from .tables import DiffractionTable  # noqa: E402
+from .tables.orders import OrderTable  # noqa: E402
 
 if TYPE_CHECKING:
     from . import cluster
     from .analysis import design, maps, tradeoff
     from .analysis.spectra import spectrum
     from .realtime import glsl, shader_comparison, web
+    from .scene.hologram import hologram
     from .thesis import period_fit
 
 __version__ = version(__name__)
@@ -59,11 +63,13 @@ __all__ = [
     "DiffractionTable",
     "DiffractionWarning",
     "HeightField",
+    "OrderTable",
     "bsdf_dict",
     "cluster",
     "design",
     "glsl",
     "gratings",
+    "hologram",
     "maps",
     "period_fit",
     "reference",
@@ -84,11 +90,12 @@ _ON_DEMAND = {
     "tradeoff": "analysis.tradeoff",
     "web": "realtime.web",
 }
+_FUNCTIONS = {"spectrum": "analysis.spectra", "hologram": "scene.hologram"}
 
 
 def __getattr__(name: str) -> Any:
     if name in _ON_DEMAND:
         return importlib.import_module(f"{__name__}.{_ON_DEMAND[name]}")
-    if name == "spectrum":
-        return importlib.import_module(f"{__name__}.analysis.spectra").spectrum
+    if name in _FUNCTIONS:
+        return getattr(importlib.import_module(f"{__name__}.{_FUNCTIONS[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

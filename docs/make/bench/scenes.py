@@ -29,7 +29,7 @@ _GOALS = {0.0: 0.6, 45.0: 0.8, 75.0: 1.2}
 _AZIMUTHS = (0.0, 30.0, 60.0, 90.0, 120.0, 150.0)
 _WAVELENGTHS = (450.0, 550.0, 650.0)
 #: Samples a pixel of the rendering in which bright pixels are looked for.
-_FIREFLY_SPP = 64
+FIREFLY_SPP = 64
 # Of the snake's scene.
 _COLUMNS = ("ms", "ns/sample", "× roughconductor")
 _SKIN, _ROUGH = "the skin diffracts, pigment beneath", "the skin is roughconductor, Al"
@@ -232,7 +232,7 @@ def measure_efficiency(plan: Plan, tables: Tables, scenes: Path, progress: Progr
     progress(len(cases), len(cases), "efficiency")
     title = (
         "efficiency: drawing by the cosine over our own, path integrator, material=none, variance "
-        f"of the body's pixels; their brightest at {_FIREFLY_SPP} samples a pixel over that at "
+        f"of the body's pixels; their brightest at {FIREFLY_SPP} samples a pixel over that at "
         f"{plan.reference_spp}"
     )
     return Section(title, columns, rows)
@@ -300,7 +300,7 @@ def _brightest(scene: Any, pixels: Any, plan: Plan) -> float:
 
     passes = max(1, plan.reference_spp // 256)
     converged = brightest(plan.reference_spp // passes, range(1000, 1000 + passes))
-    return brightest(_FIREFLY_SPP, [SEED]) / converged
+    return brightest(FIREFLY_SPP, [SEED]) / converged
 
 
 def _luminance(picture: Any) -> Any:

@@ -39,7 +39,7 @@ _WIDE = 1.5
 _ROUGHNESS_OF = 16
 _GREEN = 550.0  # nm, where the standard error is stated
 #: Points of a scan that a batch of windows lies in, at most, unless one window is larger.
-_BATCH = 2**24
+BATCH_POINTS = 2**24
 
 Reals = NDArray[np.float64]
 #: As `map`: calls of a function, here or on workers, results in the order of the arguments.
@@ -156,7 +156,7 @@ class Windows(Sequence[HeightField]):
     def batches(self) -> list[Windows]:
         """All windows, some neighbours at a time; the same whoever does their work."""
         ny, nx = self.shape
-        most = 1 + max(0, int((_BATCH / ny - nx) / (0.5 * nx)))
+        most = 1 + max(0, int((BATCH_POINTS / ny - nx) / (0.5 * nx)))
         batches = []
         for _, row in groupby(self._places, key=lambda place: (id(place[0]), place[1])):
             places = list(row)

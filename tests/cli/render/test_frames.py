@@ -14,7 +14,7 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from mitsuba_diffraction.cli.options import change
+from mitsuba_diffraction.cli.scene_options import change
 from mitsuba_diffraction.scene.frames import Frame
 from mitsuba_diffraction.scene.parameters import values_of_frames
 
