@@ -245,7 +245,7 @@ def draws_by_cosine(bsdf: Any) -> Any:
         even = mi.warp.square_to_uniform_hemisphere(sample2)
         return dr.select(sample1 < EVEN, even, mi.warp.square_to_cosine_hemisphere(sample2))
 
-    bsdf._draw, bsdf.power = draw, _ByCosine(bsdf.power)
+    bsdf.draw, bsdf.power = draw, _ByCosine(bsdf.power)
     return bsdf
 
 

@@ -14,13 +14,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import mitsuba_diffraction
 from mitsuba_diffraction.atomic import atomic_path
 from mitsuba_diffraction.errors import DiffractionError
 
 from . import pages
 from .pages import exit_code
 
-_FOLDER = Path(__file__).resolve().parents[3] / "mitsuba_diffraction/plugin"
+_FOLDER = Path(mitsuba_diffraction.__file__).parent / "plugin"
 #: Modules of the plugins; read, not imported, which would need a variant of Mitsuba.
 PLUGINS = {
     "diffraction": _FOLDER / "bsdf.py",

@@ -40,7 +40,7 @@ from ..glsl.source import (
 )
 from ..glsl.texels import Packed
 from .light import packed_light, packed_surroundings
-from .sections import Sections, packed_mesh, packed_parts, sections_of
+from .sections import Sections, packed_array, packed_mesh, packed_parts, sections_of
 from .tables import WEB_METHODS, fitting_tables, strongest_orders
 
 #: Largest size of a page, bytes.
@@ -235,7 +235,7 @@ def _packed(
         "box": [scene.low.tolist(), scene.high.tolist()],
         "subject": [x.tolist() for x in box_of([s.vertices[:, :3] for s in scene.diffracting])],
     }
-    _add_programs(header, surfaces, shown, packed, definitions, view)
+    _add_programs(header, sections, surfaces, shown, packed, definitions, view)
     header["loss"] = {
         method: _worst([packed[method, n].loss for n in range(len(tables))]) for method in shown
     }
@@ -274,6 +274,7 @@ def _worst(losses: Sequence[tuple[float, float]]) -> tuple[float, float]:
 
 def _add_programs(
     header: dict[str, Any],
+    sections: Sections,
     surfaces: Sequence[tuple[dict[str, Any], Packed]],
     methods: Sequence[str],
     packed: Any,
@@ -299,7 +300,8 @@ def _add_programs(
             if source not in sources:
                 sources.append(source)
             entry["programs"][method] = sources.index(source)
-    header["programs"] = sources
+    text = np.frombuffer(json.dumps(sources).encode(), np.uint8)
+    header["programs"] = sections.add(packed_array(text[:, None]))
     header["mains"] = {
         main: shader_file(f"{file}.frag")
         for main, file in (("surface", "surface"), ("picked", "picked"), ("map", "map"))
