@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from .camera import Camera, box_corners
 from .context import Target, compile_plain, require_moderngl, set_uniforms
@@ -177,8 +177,8 @@ class Casters:
 def outline(places: Array) -> Array:
     """Return the corners of the convex hull of points (n, 3), or all points of a flat set."""
     try:
-        return np.asarray(places[ConvexHull(places).vertices])
-    except (QhullError, ValueError):
+        return np.asarray(places[scipy.spatial.ConvexHull(places).vertices])
+    except (scipy.spatial.QhullError, ValueError):
         return np.unique(places, axis=0)
 
 
