@@ -7,6 +7,7 @@ transmission    the plugin `diffraction_dielectric`, which lets light through as
 orders          the plugin `diffraction_orders`: gratings whose orders were solved
 surface         `DiffractingSurface`, the part that both plugins share
 blended_patches  the plugin `diffraction_mix`: several surfaces in one, by weights
+nesting         methods of a BSDF over a nested one
 registration    registration of the plugins in every variant
 dictionary      `bsdf_dict`: from arrays
 llvm            an LLVM that Dr.Jit survives
