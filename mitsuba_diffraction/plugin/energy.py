@@ -21,6 +21,7 @@ from ..optics.colour import RGB_WAVELENGTHS, response
 from ..optics.mean_second_order import limited
 from ..tables.energy.conservation import Conservation
 from ..tables.energy.grid import FINE, DirectionalTable
+from ..tables.energy.materials import Reflector
 from ..tables.energy.store import Energy
 from ..tables.film import mean_exponents
 from ..tables.table import DiffractionTable
@@ -70,8 +71,7 @@ class EnergyModel:
         self._indices, self._exact = (
             partial(_rounded_indices, self._material, step) for step in (INDEX_STEP, FILM_STEP)
         )
-        model = str(boundary)
-        self._energy = Energy(table, model, self._indices, (low, high))
+        self._energy = Energy(table, Reflector(str(boundary), self._indices), (low, high))
         self._warned = False
         self._filmed = isinstance(self._material, UnderFilm) and isinstance(boundary, SmallSlope)
         self._scale, self._mean = DirectionLookup(), DirectionLookup()

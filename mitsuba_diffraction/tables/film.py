@@ -11,11 +11,11 @@ from ..optics import mean_second_order
 from ..optics.blend import RoughnessTable
 from ..optics.fresnel import Filmed
 from ..optics.geometry import wavenumber
-from .energy.conservation import Index
 from .energy.grid import FINE, DirectionalTable, DirectionGrid
+from .energy.materials import PROBES, Index, rounded
 from .energy.scaling import parallel
 from .energy.settings import energy_settings
-from .energy.store import PROBES, cached_directions, rounded
+from .energy.store import DirectionalTables, cached_directions
 from .table import DiffractionTable
 
 _FEWEST = 8
@@ -57,8 +57,8 @@ def mean_exponents(
 ) -> DirectionalTable:
     """Return `exponents` of a table, from memory, from disk, or computed."""
 
-    def make() -> list[DirectionalTable]:
-        return [exponents(table.roughness, index, wavelength_range)]
+    def make() -> DirectionalTables:
+        return {"exponents": exponents(table.roughness, index, wavelength_range)}
 
     probes = rounded(index(np.geomspace(*wavelength_range, PROBES)))
-    return cached_directions("film", table, [probes, *wavelength_range], make)[0]
+    return cached_directions("film", table, [probes, *wavelength_range], make)["exponents"]

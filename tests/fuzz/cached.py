@@ -42,9 +42,9 @@ def _colours() -> Any:
     return store.ColourTable.build(_table())
 
 
-def _conservation() -> list[DirectionalTable]:
+def _conservation() -> dict[str, DirectionalTable]:
     values = np.random.default_rng(3).random((2, 5, 4)).astype(np.float32)
-    return [DirectionalTable(np.array([400.0, 700.0]), values)]
+    return {"albedo": DirectionalTable(np.array([400.0, 700.0]), values)}
 
 
 KINDS = {

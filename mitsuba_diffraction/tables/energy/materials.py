@@ -1,0 +1,101 @@
+"""Materials whose energy is conserved: a reflector, or a dielectric that lets light through."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...optics import boundary, through
+from ...optics.fresnel import Filmed
+from .grid import Real
+from .paths import ABOVE, Path, Returned, Side
+
+#: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.
+Index = Callable[[Real], "NDArray[np.complex128] | Filmed | None"]
+
+#: Wavelengths at which a material is told from another.
+PROBES = 24
+
+
+@dataclass(frozen=True)
+class Reflector:
+    """Material that light meets from above and that is asked for reflected light alone.
+
+    Attributes
+    ----------
+    model : one of `optics.boundary.MODELS`.
+    index : of the material over that of the medium above it.
+    """
+
+    model: str
+    index: Index
+
+    #: Whether light is let through.
+    transmits = False
+    #: Largest index of the media that light travels in, over that of the medium above.
+    densest = 1.0
+
+    def paths(self, wavelengths: Real, least: float) -> list[list[Path]]:
+        """Return the paths of light at each wavelength (nm)."""
+        index = self.index(wavelengths)
+        if index is None:
+            return [[Path(None, self.model)]] * len(wavelengths)
+        return [[Path(index[n], self.model)] for n in range(len(wavelengths))]
+
+    def key(self, wavelength_range: tuple[float, float]) -> list[object]:
+        """Return what tells this material from another over a range of wavelengths (nm)."""
+        return [self.model, rounded(self.index(np.geomspace(*wavelength_range, PROBES)))]
+
+
+@dataclass(frozen=True)
+class Dielectric:
+    """Dielectric that light meets from both sides and that lets light through.
+
+    Attributes
+    ----------
+    index : over that of the medium above.
+    model : one of `optics.through.MODELS`.
+    thin : whether below is beyond the flat side of a sheet.
+    """
+
+    index: float
+    model: str
+    thin: bool
+
+    #: Whether light is let through.
+    transmits = True
+
+    @property
+    def densest(self) -> float:
+        """Largest index of the media that light travels in, over that of the medium above."""
+        return self.index
+
+    def paths(self, wavelengths: Real, least: float) -> list[list[Path]]:
+        """Return the paths of light, the same at all wavelengths; least : of w."""
+        n, model = self.index, boundary.checked_model(self.model, through.MODELS)
+        below = Side(1.0 if self.thin else n, n)
+        paths = [
+            Path(n, model, ABOVE, ABOVE),
+            Path(n, model, ABOVE, below, least),
+            Path(n, model, below, ABOVE, least),
+            Path(1.0 / n, model, below, below),
+        ]
+        if self.thin:
+            paths.insert(0, Returned(None, model, sheet=n))
+        return [paths] * len(wavelengths)
+
+    def key(self, wavelength_range: tuple[float, float]) -> list[object]:
+        """Return what tells this dielectric from another material."""
+        return [self.index, self.model, self.thin]
+
+
+def rounded(index: NDArray[np.complex128] | Filmed | None) -> list[str] | None:
+    """Round indices to five digits: single precision's noise makes no other material."""
+    if index is None:
+        return None
+    if isinstance(index, Filmed):
+        index = np.concatenate([np.ravel(part) for part in index.parts])
+    return [f"{n.real:.5g} {n.imag:.5g}" for n in index]
