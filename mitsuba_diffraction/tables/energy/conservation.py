@@ -38,7 +38,8 @@ from scipy.ndimage import median_filter
 from ..table import DiffractionTable
 from .grid import Array, DirectionalTable, DirectionGrid, LinearMap, Real
 from .materials import Dielectric, Reflector
-from .scaling import amid, lowered, parallel, scaled
+from .paths import Path
+from .scaling import lowered, parallel, scaled
 from .settings import energy_settings
 from .transport import Orders, Transport
 
@@ -68,7 +69,7 @@ class Conservation:
 class Light:
     """Light of one wavelength that a surface sends on from directions (t, p) of each side.
 
-    Sums have the shape (sides, t, p), weights (sides, polar + 1, azimuthal).
+    Sums have the shape (sides, t, p), weights and scales (sides, polar + 1, azimuthal).
 
     Attributes
     ----------
@@ -83,21 +84,23 @@ class Light:
         """Return the sums of order 0."""
         return self._sum(lambda path: path.order_0(weights[path.left]))
 
-    def others(self, weights: Array | None = None) -> Array:
-        """Return the sums of all other orders; weights : None for 1."""
-        if weights is None:
-            return self._sum(lambda path: path.unweighted_others)
+    def others(self, weights: Array) -> Array:
+        """Return the sums of all other orders."""
         return self._sum(lambda path: path.others(weights[path.left]))
 
-    def __call__(self, weights: Array) -> Array:
-        """Return the sums of all orders."""
-        return self.others(weights) + self.order_0(weights)
+    def balanced(self, c: Array, weights: Array) -> Array:
+        """Return the sums of all orders, with order 0 scaled by c."""
+        return self.others(weights) + self.at_directions(c) * self.order_0(c * weights)
 
-    def at_directions(self, weights: Array) -> Array:
-        """Interpolate weights to the directions, (sides, t, p)."""
-        return np.stack([self.here(side) for side in weights])
+    def sent(self, c: Array, s: Array) -> Array:
+        """Return the sums of all orders, with order 0 scaled by c and all light by s."""
+        return self.at_directions(s) * self.balanced(c, s)
 
-    def _sum(self, sent: Callable[[Transport], Array]) -> Array:
+    def at_directions(self, scale: Array) -> Array:
+        """Interpolate a scale to the directions, (sides, t, p)."""
+        return np.stack([self.here(side) for side in scale])
+
+    def _sum(self, sent: Callable[[Transport], Array | float]) -> Array:
         sums = np.zeros((1 + self.paths[-1].came, *self.here.shape), np.float32)
         for path in self.paths:
             sums[path.came] += sent(path)
@@ -113,24 +116,58 @@ class Surface:
         material: Reflector | Dielectric,
         height_scale: float = 1.0,
     ) -> None:
-        self._settings, self.material = energy_settings(), material
-        self.orders = Orders(table, height_scale, material.densest)
-        polar = self._settings.side_polar if material.transmits else self._settings.polar
-        self._grid = DirectionGrid(polar, self._settings.azimuthal)
+        self.material, self.orders = material, Orders(table, height_scale, material.densest)
+        self._settings = settings = energy_settings()
+        self._both_sides = material.transmits
+        polar = settings.side_polar if self._both_sides else settings.polar
+        self._grid = DirectionGrid(polar, settings.azimuthal)
+        self._ones = np.stack([self._grid.ones] * (2 if self._both_sides else 1))
+        #: Light that is nowhere above needs no s.
+        self._limit = settings.tolerated if self._both_sides else settings.threshold
 
     def conservation(self, wavelength_range: tuple[float, float]) -> Conservation:
         """Conserve energy over a range of wavelengths (nm), whose ends may be one: seconds."""
-        if self.material.transmits:
-            return self._balanced(wavelength_range)
-        settings, coarse = self._settings, self._grid.half
-        wavelengths = spread(wavelength_range, max(4, settings.wavelengths // 4))
-        lights = self._lights(wavelengths, coarse.theta, coarse.phi, coarse)
-        albedos = np.stack([light(coarse.ones[None])[0] for light in lights])
-        albedo = DirectionalTable(wavelengths, albedos)
-        if albedos.max() <= settings.threshold:
-            return Conservation(albedo)
-        wavelengths = spread(wavelength_range, settings.wavelengths)
-        return Conservation(albedo, DirectionalTable(wavelengths, self._scale(wavelengths)))
+        settings, grid = self._settings, self._grid
+        if self._both_sides:
+            albedo, nodes = None, spread(wavelength_range, settings.side_wavelengths)
+        else:
+            albedo, nodes = (
+                self._albedo(wavelength_range),
+                spread(wavelength_range, settings.wavelengths),
+            )
+            if albedo.values.max() <= self._limit:
+                return Conservation(albedo)
+        amid = np.sqrt(nodes[1:] * nodes[:-1]) if len(nodes) > 1 else nodes
+        paths = self._paths(np.concatenate([nodes, amid]))
+        few = self.orders.strong <= settings.few_orders and not self._both_sides
+        middles = grid.middles(settings.few_parts if few else settings.parts)
+
+        def solve(n: int) -> Array:
+            light = self._light(nodes[n], paths[n], grid.theta, grid.phi, grid)
+            return self._balanced(light) if self._both_sides else self._limited(light)
+
+        solved = np.stack(parallel(solve, range(len(nodes))))
+        ones = np.ones_like(solved)
+        c, s = (solved, ones) if self._both_sides else (ones, solved)
+        if self._both_sides and np.all(c == 1.0):
+            return Conservation()
+
+        def lower(n: int) -> None:
+            light, pair = (
+                self._light(amid[n], paths[len(nodes) + n], *middles, grid),
+                slice(n, n + 2),
+            )
+            c[pair], s[pair] = self._lowered(light, c[pair], s[pair])
+
+        # Neighbours share a wavelength: first every other pair, then those between
+        for first in (0, 1):
+            parallel(lower, range(first, len(amid), 2))
+
+        def table(scale: Array, side: int) -> DirectionalTable | None:
+            present = side < scale.shape[1] and np.any(scale != 1.0)
+            return DirectionalTable(nodes, scale[:, side]) if present else None
+
+        return Conservation(albedo, table(s, 0), table(s, 1), table(c, 0), table(c, 1))
 
     def albedos(
         self, conservation: Conservation, theta: Real, phi: Real, wavelength: float
@@ -138,126 +175,81 @@ class Surface:
         """Return the light sent on as it is and conserved, (sides, t, p) each, at angles (rad).
 
         Exact sums at these directions and a wavelength (nm), not the grid's, as a furnace measures
-        them. Where the light of a dielectric is attenuated they are bounds: s(ωo) counts as 1.
+        them.
         """
-        grid, transmits = self._grid, self.material.transmits
-        light = self._lights(np.array([wavelength]), theta, phi, grid, not transmits)[0]
-        sides = 2 if transmits else 1
-        ones = np.stack([grid.ones] * sides)
+        (paths,) = self._paths(np.array([wavelength]))
+        light = self._light(wavelength, paths, theta, phi, self._grid)
 
-        def page(*tables: DirectionalTable | None) -> Array:
-            pages = [grid.ones if t is None else t.page(wavelength) for t in tables[:sides]]
-            return np.stack(pages)
+        def page(*sides: DirectionalTable | None) -> Array:
+            pages = [self._grid.ones if t is None else t.page(wavelength) for t in sides]
+            return np.stack(pages[: len(self._ones)])
 
         c = page(conservation.order_0, conservation.order_0_below)
         s = page(conservation.scale, conservation.scale_below)
-        others = light.others(None if transmits else s)
-        raw = light.others() + light.order_0(ones)
-        balanced = others + light.at_directions(c) * light.order_0(c * (1 if transmits else s))
-        return raw, light.at_directions(s) * balanced
+        return light.sent(self._ones, self._ones), light.sent(c, s)
 
-    def _lights(
-        self,
-        wavelengths: Real,
-        theta: Real,
-        phi: Real,
-        grid: DirectionGrid,
-        weighted: bool = True,
-    ) -> list[Light]:
-        """Light from polar angles (t,) and azimuths (p,), rad, at wavelengths (nm).
+    def _paths(self, wavelengths: Real) -> list[list[Path]]:
+        return self.material.paths(wavelengths, self.orders.least_width)
 
-        weighted : whether orders other than 0 may have weights other than 1.
-        """
-        here = grid.interpolation(theta[:, None], phi)
-        paths = self.material.paths(wavelengths, self.orders.least_width)
+    def _light(
+        self, wavelength: float, paths: list[Path], theta: Real, phi: Real, grid: DirectionGrid
+    ) -> Light:
+        """Light of a wavelength (nm) from polar angles (t,) and azimuths (p,), rad."""
+        sent = [Transport(self.orders, path, wavelength, theta, phi, grid) for path in paths]
+        return Light(sent, grid.interpolation(theta[:, None], phi))
 
-        def at_wavelength(n: int) -> Light:
-            wave, directions = float(wavelengths[n]), (theta, phi, grid)
-            transports = [Transport(self.orders, p, wave, *directions, weighted) for p in paths[n]]
-            return Light(transports, here)
+    def _albedo(self, wavelength_range: tuple[float, float]) -> DirectionalTable:
+        """Albedo of a reflector as it is, on fewer directions and wavelengths than its scale."""
+        coarse = self._grid.half
+        wavelengths = spread(wavelength_range, max(4, self._settings.wavelengths // 4))
+        paths, ones = self._paths(wavelengths), coarse.ones[None]
 
-        return parallel(at_wavelength, range(len(wavelengths)))
+        def albedo(n: int) -> Array:
+            light = self._light(wavelengths[n], paths[n], coarse.theta, coarse.phi, coarse)
+            return light.sent(ones, ones)[0]
 
-    def _scale(self, wavelengths: Real) -> Array:
-        """Find s at its nodes, and lower it for what lies between."""
-        settings, grid = self._settings, self._grid
+        return DirectionalTable(wavelengths, np.stack(parallel(albedo, range(len(wavelengths)))))
+
+    def _limited(self, light: Light) -> Array:
+        """Find s of a reflector at the grid's directions."""
+        settings = self._settings
         # part of a lobe is below the horizon there, and would ask for any s
-        largest = np.interp(np.degrees(grid.theta), (70.0, 80.0), (settings.largest, 1.0))
+        largest = np.interp(np.degrees(self._grid.theta), (70.0, 80.0), (settings.largest, 1.0))
+        kernel = partial(light.balanced, self._ones)
+        aim = np.minimum(kernel(self._ones), np.float32(settings.target))
+        return scaled(kernel, aim, largest[:, None], settings.sweeps)
 
-        def at_nodes(light: Light) -> Array:
-            aim = np.minimum(light(grid.ones[None]), np.float32(settings.target))
-            return scaled(light, aim, largest[:, None], settings.sweeps)
+    def _balanced(self, light: Light) -> Array:
+        """Find c at the grid's directions, such that R + T is 1."""
+        settings, most = self._settings, self._settings.largest**2
+        others, zeroth = light.others(self._ones), light.order_0(self._ones)
+        if np.abs(others + zeroth - 1.0).max() < settings.close:
+            return self._ones
+        aim = np.clip(1.0 - others, zeroth / most, zeroth * most)
+        c = scaled(light.order_0, aim, settings.largest, settings.sweeps)
+        c = np.where(zeroth > FAINT, c, np.float32(1.0))
+        # what lies within one row, as a lobe at the critical angle, is left to itself
+        return np.asarray(median_filter(c, (1, 3, 1), mode="nearest"))
 
-        lights = self._lights(wavelengths, grid.theta, grid.phi, grid)
-        scale = np.stack(parallel(at_nodes, lights))
-        few = self.orders.strong <= settings.few_orders
-        middles = grid.middles(settings.few_parts if few else settings.parts)
+    def _lowered(self, light: Light, c: Array, s: Array) -> tuple[Array, Array]:
+        """Lower c and then s of neighbouring wavelengths (2, …) for light in their middle."""
+        settings = self._settings
+        if self._both_sides:
+            room = np.maximum(np.float32(settings.ceiling) - light.others(self._ones), 1e-6)
 
-        def excess(light: Light, s: Array) -> Array:
-            return light.at_directions(s) * light(s) / settings.ceiling
+            def order_0_excess(c: Array) -> Array:
+                zeroth = light.at_directions(c) * light.order_0(c)
+                factor = np.minimum(zeroth / room, settings.largest**2)
+                return np.where(zeroth > FAINT, factor, np.float32(1.0))
 
-        lights = self._lights(between(wavelengths), *middles, grid)
-        scale = lowered(scale, [partial(excess, light) for light in lights], settings)
-        return scale[:, 0]
-
-    def _balanced(self, wavelength_range: tuple[float, float]) -> Conservation:
-        """Find c above and below, then s if any is less than 1."""
-        grid, settings = self._grid, self._settings
-        wavelengths = spread(wavelength_range, settings.side_wavelengths)
-        ones, most = np.stack([grid.ones] * 2), settings.largest**2
-
-        def at_nodes(light: Light) -> Array:
-            others, zeroth = light.others(), light.order_0(ones)
-            if np.abs(others + zeroth - 1.0).max() < settings.close:
-                return ones
-            aim = np.clip(1.0 - others, zeroth / most, zeroth * most)
-            c = scaled(light.order_0, aim, settings.largest, settings.sweeps)
-            c = np.where(zeroth > FAINT, c, np.float32(1.0))
-            # what lies within one row, as a lobe at the critical angle, is left to itself
-            return np.asarray(median_filter(c, (1, 3, 1), mode="nearest"))
-
-        lights = self._lights(wavelengths, grid.theta, grid.phi, grid, weighted=False)
-        c = np.stack(parallel(at_nodes, lights))
-        if np.all(c == 1.0):
-            return Conservation()
-        middles = self._lights(between(wavelengths), *grid.middles(1), grid, weighted=False)
-
-        def order_0(light: Light, c: Array) -> Array:
-            return light.at_directions(c) * light.order_0(c)
-
-        def order_0_excess(light: Light, c: Array) -> Array:
-            room, zeroth = settings.ceiling - light.others(), order_0(light, c)
-            factor = np.minimum(zeroth / np.maximum(room, 1e-6), most)
-            return np.where(zeroth > FAINT, factor, 1.0).astype(np.float32)
-
-        c = lowered(c, [partial(order_0_excess, light) for light in middles], settings)
-        totals = [
-            light.others() + order_0(light, page)
-            for light, page in zip(middles, amid(c), strict=True)
-        ]
-
-        def table(scale: Array, side: int) -> DirectionalTable:
-            return DirectionalTable(wavelengths, scale[:, side])
-
-        order_0_scales = {"order_0": table(c, 0), "order_0_below": table(c, 1)}
-        if max(total.max() for total in totals) <= settings.tolerated:
-            return Conservation(**order_0_scales)
-
-        def excess(light: Light, total: Array, s: Array) -> Array:
-            # light sent on is attenuated as well: a bound
-            return light.at_directions(s) * total / settings.ceiling
-
-        each = [partial(excess, *pair) for pair in zip(middles, totals, strict=True)]
-        s = lowered(np.ones_like(c), each, settings)
-        return Conservation(scale=table(s, 0), scale_below=table(s, 1), **order_0_scales)
+            c = lowered(c, order_0_excess, settings.passes)
+        middle = c.mean(axis=0)
+        if light.sent(middle, s.mean(axis=0)).max() > self._limit:
+            s = lowered(s, lambda s: light.sent(middle, s) / settings.ceiling, settings.passes)
+        return c, s
 
 
 def spread(wavelength_range: tuple[float, float], count: int) -> Real:
     """Wavelengths (nm) evenly in their logarithm, or the only one."""
     low, high = wavelength_range
     return np.geomspace(low, high, count if high > low else 1)
-
-
-def between(wavelengths: Real) -> Real:
-    """Wavelengths amid each two, or the only one."""
-    return np.sqrt(wavelengths[1:] * wavelengths[:-1]) if len(wavelengths) > 1 else wavelengths

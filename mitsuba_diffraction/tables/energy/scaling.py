@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .grid import Array, Real
-from .settings import EnergySettings
 
 Floats = NDArray[np.floating[Any]]
 
@@ -37,28 +35,17 @@ def scaled(
     return s
 
 
-def lowered(
-    scale: Array, excess: Sequence[Callable[[Array], Array]], settings: EnergySettings
-) -> Array:
-    """Return a scale (n, sides, polar + 1, azimuthal) lowered until no light between exceeds 1.
+def lowered(pages: Array, excess: Callable[[Array], Array], passes: int) -> Array:
+    """Return pages (n, sides, polar + 1, azimuthal) lowered until no light between exceeds 1.
 
-    excess : between each two wavelengths, or of the only one: from a scale's page to the factors by
-        which light is too much in the parts of all cells, (sides, polar · parts, azimuthal · parts).
+    excess : from the mean page to the factors by which light is too much in the middles of parts
+        of all cells, (sides, polar · parts, azimuthal · parts).
     """
-    for turn in range(settings.passes):
-        pages = parallel(lambda each: each[0](each[1]), list(zip(excess, amid(scale), strict=True)))
-        factors = np.stack([_largest_around(page, scale.shape[-1]) for page in pages])
-        if len(scale) > 1:
-            ends = factors[:1], np.maximum(factors[1:], factors[:-1]), factors[-1:]
-            factors = np.concatenate(ends)
-        last = turn == settings.passes - 1
-        scale = (scale / (factors if last else np.sqrt(factors))).astype(np.float32)
-    return scale
-
-
-def amid(scale: Array) -> list[Array]:
-    """Return the pages of a scale amid each two wavelengths, or the only one."""
-    return [0.5 * (low + high) for low, high in pairwise(scale)] or [scale[0]]
+    for turn in range(passes):
+        factors = _largest_around(excess(pages.mean(axis=0)), pages.shape[-1])
+        last = turn == passes - 1
+        pages = (pages / (factors if last else np.sqrt(factors))).astype(np.float32)
+    return pages
 
 
 def _largest_around(factors: Array, azimuthal: int) -> Array:

@@ -86,7 +86,6 @@ class Transport:
     wavelength : nm.
     theta, phi : polar angles (t,) and azimuths (p,) of incidence, rad.
     grid : of the weights on the side that light goes to.
-    weighted : whether weights of orders other than 0 are asked for; otherwise they are 1.
     """
 
     def __init__(
@@ -97,7 +96,6 @@ class Transport:
         theta: Real,
         phi: Real,
         grid: DirectionGrid,
-        weighted: bool = True,
     ) -> None:
         self._orders, self._path = orders, path
         self.came, self.left = path.came.number, path.left.number
@@ -111,33 +109,23 @@ class Transport:
         self._shares = self._order_0_shares(theta, grid)
         self._mirrored = grid.interpolation(grid.theta[:, None], phi + math.pi)
         self._others: list[Callable[[Array], Array]] = []
-        total = np.zeros((len(theta), len(phi)), np.float32)
         if orders.has_weak:
-            half = grid.half
+            half, nodes = grid.half, orders.nodes
             shares = self._weak_shares(half.theta, half.phi)
-            to_directions = half.interpolation(theta[:, None], phi)
-            total += to_directions(shares.sum(axis=-1))
-            if weighted:
-                turned = half.phi[:, None] + orders.nodes.azimuth
-                to_nodes = grid.interpolation(orders.nodes.theta, turned)
-                self._others.append(
-                    lambda s: to_directions(np.einsum("tpn,pn->tp", shares, to_nodes(s)))
-                )
+            to_nodes = grid.interpolation(nodes.theta, half.phi[:, None] + nodes.azimuth)
+            here = half.interpolation(theta[:, None], phi)
+            self._others.append(lambda s: here(np.einsum("tpn,pn->tp", shares, to_nodes(s))))
         if orders.strong:
             strong, polar, azimuth = self._strong_shares(theta, phi)
-            total += strong.sum(axis=-1)
-            if weighted:
-                self._others.append(grid.interpolation(polar, azimuth).summed(strong))
-        #: Sums over orders other than 0 for weights of 1, (t, p).
-        self.unweighted_others = total
+            self._others.append(grid.interpolation(polar, azimuth).summed(strong))
 
     def order_0(self, s: Array) -> Array:
         """Return the light of order 0 for weights on the grid, (t, p)."""
         return np.asarray(self._shares @ self._mirrored(s), np.float32)
 
-    def others(self, s: Array) -> Array:
-        """Return the light of all other orders for weights on the grid, (t, p)."""
-        return sum((part(s) for part in self._others), np.zeros_like(self.unweighted_others))
+    def others(self, s: Array) -> Array | float:
+        """Return the light of all other orders for weights on the grid, (t, p); 0 without any."""
+        return sum((part(s) for part in self._others), 0.0)
 
     def _start(self, theta: Real) -> tuple[Real, Real]:
         """Return cosines of incidence, and sines of the mirrored or refracted directions."""
