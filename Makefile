@@ -40,11 +40,11 @@ test: setup .venv/browser  ## run the quick tests, of every part: three minutes
 test-all: setup .venv/browser  ## run all tests: ten minutes
 	@$(PYTEST) -n 3
 
-# for as long as you like: make fuzz SECONDS=600; the same cases again: make fuzz SEED=1
+# for as long as you like: make fuzz SECONDS=600; the same cases again: make fuzz SEED=1 ROUNDS=20
 fuzz: setup  ## try random surfaces, damaged files and command lines for a minute
 	@mkdir -p out/fuzz
 	@MITSUBA_DIFFRACTION_CACHE=out/fuzz OPENBLAS_NUM_THREADS=1 $(PYTHON3) -W ignore -m tests.fuzz \
-	    --seconds $(or $(SECONDS),60) $(if $(SEED),--seed $(SEED))
+	    --seconds $(or $(SECONDS),60) $(if $(ROUNDS),--rounds $(ROUNDS)) $(if $(SEED),--seed $(SEED))
 
 package: setup .venv/browser  ## build wheel and sdist, and test them in an empty environment
 	@.ci/package
@@ -111,9 +111,9 @@ realtime: setup  ## compare the shaders with the path tracer: docs/realtime.md
 	@for scene in $(REALTIME); do \
 	    set -- $$(echo $$scene | tr : ' '); made=out/compare/$$1; \
 	    if $(call UP_TO_DATE,$$made/compare.json); then echo "$$made is kept: no code or scene is newer"; \
-	    else $(RUN) compare scenes/$$1.xml --method lut spectral -s $$4 --frames $$5 --supersampling $$6 \
+	    else $(RUN) compare scenes/$$1.xml --method fast exact -s $$4 --frames $$5 --supersampling $$6 \
 	        -D resx=$$2 -D resy=$$3 -o $$made; fi || exit 1; done
-	@$(call UP_TO_DATE,out/compare/sheet/compare.json) || $(RUN) compare scenes/snake.xml --method lut -s 1024 --full-spp 256 \
+	@$(call UP_TO_DATE,out/compare/sheet/compare.json) || $(RUN) compare scenes/snake.xml --method fast -s 1024 --full-spp 256 \
 	    --frames 512 --supersampling 2 -D resx=320 -D resy=200 -o out/compare/sheet
 	@$(PYTHON3) -m docs.make.figures.realtime --sheet out/compare/sheet $(foreach s,$(REALTIME),out/compare/$(firstword $(subst :, ,$s)))
 

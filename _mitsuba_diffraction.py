@@ -5,6 +5,7 @@ Outside of the package, since importing any of its modules imports Mitsuba first
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import sys
@@ -27,6 +28,10 @@ def leave_quietly() -> None:
 def main() -> int:
     """Run the command, and return its exit code."""
     leave_quietly()
+    for stream in (sys.stdout, sys.stderr):
+        # lines hold µ and κ, which the code pages of Windows and the C locale lack
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(encoding="utf-8")
     from mitsuba_diffraction.cli import main as command
 
     if signal.getsignal(signal.SIGINT) is _leave:

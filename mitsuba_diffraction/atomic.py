@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import DiffractionError
+from .system import process_lives
 
 # A temporary file is .STEM.HOST-PID-RANDOM.SUFFIX, so that a later run can tell whether the process
 # that made it still lives. The stem is cut: the whole name may have 255 bytes.
@@ -79,15 +80,5 @@ def remove_abandoned(folder: Path, stem: str, suffix: str) -> None:
     with contextlib.suppress(OSError):  # a folder that cannot be read is reported by the writer
         for entry in folder.iterdir():
             match = name.fullmatch(entry.name)
-            if match and not _lives(int(match[1])):
+            if match and not process_lives(int(match[1])):
                 entry.unlink(missing_ok=True)
-
-
-def _lives(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:
-        return True  # somebody else's
-    return True

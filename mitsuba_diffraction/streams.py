@@ -55,4 +55,5 @@ def _flush() -> None:
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError):  # a pipe that nobody reads, or closed
             stream.flush()
-    ctypes.CDLL(None).fflush(None)
+    # on Windows the C library that all extensions of Python share
+    ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None).fflush(None)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import importlib.metadata
-import os
 import platform
-import sys
 from typing import Any
 
-from ..cluster.tasks import processor
+import psutil
+
 from ..plugin.llvm import loaded_llvm_version
+from ..system import cores, processor
 
 _PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit", "numpy", "scipy")
 
@@ -21,10 +21,10 @@ def describe_machine() -> dict[str, Any]:
     llvm = loaded_llvm_version()
     return {
         "processor": processor(),
-        "cores": len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count(),
+        "cores": cores(),
         "threads of Dr.Jit": dr.thread_count(),
-        "load": round(os.getloadavg()[0], 2),
-        "memory": f"{os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 1e9:.1f} GB",
+        "load": round(psutil.getloadavg()[0], 2),
+        "memory": f"{psutil.virtual_memory().total / 1e9:.1f} GB",
         "system": platform.platform(),
         "python": platform.python_version(),
         **{name: importlib.metadata.version(name) for name in _PACKAGES},

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import resource
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import warn
 from ..optics.second_order_change import applies
+from ..system import peak_memory
 from . import options
 from .console import Bar
 from .report import check_outputs, save_report
@@ -188,6 +188,5 @@ def _report(
     yield "error", error
     if table.slope_ratios is not None:
         yield "", _second_order_line(table)
-    # kibibytes on Linux; of the whole process, which is what has to fit
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    yield "cost", f"{seconds:.1f} s, {peak / 1e9:.2g} GB of memory at most"
+    # of the whole process, which is what has to fit
+    yield "cost", f"{seconds:.1f} s, {peak_memory() / 1e9:.2g} GB of memory at most"

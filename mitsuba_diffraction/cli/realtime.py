@@ -18,7 +18,7 @@ from .console import Bar, mitsuba_warnings, say_warning
 from .options import path_ending_in, whole_number
 from .report import check_outputs, check_writable, plain, save_json, save_report
 
-_EXPORTED = ("lut", "spectral")
+_EXPORTED = ("fast", "exact")
 
 
 def add_view(subparsers: options.Subparsers) -> None:
@@ -30,7 +30,7 @@ def add_view(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     options.add_scene(parser)
     parser.add_argument(
-        "--method", choices=METHODS, default="lut", help="method of the shaders; default: lut"
+        "--method", choices=METHODS, default="fast", help="method of the shaders; default: fast"
     )
     options.add_exposure(parser, 0.0, "stops to start with: +1 doubles the light; default: 0")
     options.add_view(parser)
@@ -87,8 +87,8 @@ def add_compare(subparsers: options.Subparsers) -> None:
         "with _compare in the current folder",
     )  # fmt: skip
     parser.add_argument(
-        "--method", nargs="+", metavar="NAME", choices=(*METHODS, "all"), default=["lut"],
-        help=f"methods of the shaders: {', '.join(METHODS)}, or all; default: lut",
+        "--method", nargs="+", metavar="NAME", choices=(*METHODS, "all"), default=["fast"],
+        help=f"methods of the shaders: {', '.join(METHODS)}, or all; default: fast",
     )  # fmt: skip
     options.add_samples(parser, 2, 1024)
     parser.add_argument(
@@ -97,7 +97,7 @@ def add_compare(subparsers: options.Subparsers) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--frames", metavar="N", type=whole_number(4), default=512,
-        help="frames of progressive light for lut and spectral; default: 512",
+        help="frames of progressive light for fast and exact; default: 512",
     )  # fmt: skip
     parser.add_argument(
         "--supersampling", metavar="N", type=whole_number(1), default=8,

@@ -34,7 +34,7 @@ from . import options
 from .console import INTERRUPTED, Bar, mitsuba_warnings, say, say_warning
 from .options import change, number_between, whole_number
 from .plan import add_plan_options, check_plan_options, load_by_plan, recipe_file
-from .report import check_writable, save_report
+from .report import check_writable, default_output, save_report
 from .workers import add_threads, add_workers, client_of, film_of, on_workers, say_report
 
 
@@ -143,7 +143,7 @@ class Outputs(NamedTuple):
 
 def _outputs(args: argparse.Namespace) -> Outputs:
     """Return the files of `-o`, or of its default, after checking that they can be written."""
-    output = args.output or Path(args.name.with_suffix(".exr").name)
+    output = args.output or Path(default_output(args.name, ".exr").name)
     if output.suffix.lower() not in (".exr", ".png"):
         args.parser.error(
             f"argument -o: expected a name ending in .exr or .png, got {str(output)!r}"

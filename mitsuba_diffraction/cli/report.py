@@ -133,6 +133,16 @@ def check_writable(path: Path, *, make_folder: bool = False) -> None:
         ) from error
 
 
+def default_output(source: Path, suffix: str) -> Path:
+    """Return the name of an output that is called after its source.
+
+    Raises a DiffractionError if the source is a folder without a name, such as "." or "/".
+    """
+    if not source.name:
+        raise DiffractionError(f"'{source}' is a folder; name a file in it")
+    return source.with_suffix(suffix)
+
+
 def check_outputs(
     outputs: Iterable[Path], sources: Iterable[Path], what: str, *, make_folder: bool = False
 ) -> None:

@@ -139,7 +139,7 @@ def _compiled(
         f"compiled ({variant} and RGB), {resolution} x {resolution} pixels, 360–830 nm in steps of "
         f"{settings['step']:g} nm:",
         f"  flss {times.flss:.3g} s; spectral {times.spectral:.3g} s, {times.ratio:.3g}× as fast; "
-        f"lut {times.colours:.3g} s, {times.colour_ratio:.3g}× as fast",
+        f"RGB {times.colours:.3g} s, {times.colour_ratio:.3g}× as fast",
     ]
 
 

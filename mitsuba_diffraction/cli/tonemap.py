@@ -8,7 +8,7 @@ from pathlib import Path
 from ..scene.load import set_variant
 from ..scene.pictures import read_exr, write_png
 from . import options
-from .report import check_outputs
+from .report import check_outputs, default_output
 
 
 def add_parser(subparsers: options.Subparsers) -> None:
@@ -25,7 +25,7 @@ def add_parser(subparsers: options.Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the PNG, and return the exit code."""
-    output = args.output or args.picture.with_suffix(".png")
+    output = args.output or default_output(args.picture, ".png")
     check_outputs([output], [args.picture], "picture")
     set_variant("scalar_rgb")  # bitmaps belong to no variant, but Mitsuba asks for one
     write_png(read_exr(args.picture), output, args.exposure, args.view)

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..system import cores
 from .console import say, say_warning
 from .options import whole_number
 
@@ -56,7 +57,7 @@ def worker_threads(args: argparse.Namespace) -> int:
     """Return the Dr.Jit threads of a worker; 0 for one a core."""
     if args.threads or not args.workers:
         return args.threads or 0
-    return max(1, len(os.sched_getaffinity(0)) // int(args.workers))
+    return max(1, cores() // int(args.workers))
 
 
 @contextlib.contextmanager

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import platform
-import resource
 import tempfile
 import time
 import warnings
@@ -27,6 +25,7 @@ from ..errors import DiffractionError, one_line
 from ..scene.load import load_scene, sensor_of, set_variant, shrink
 from ..scene.parameters import files_of
 from ..scene.passes import Pass, integrator_of, render_pass
+from ..system import cores, peak_memory, processor
 from ..tables.store import cache_folder, key_of
 
 _PACKAGES = ("mitsuba_diffraction", "mitsuba", "drjit")
@@ -122,7 +121,7 @@ def _sums(task: Task) -> Sums:
 
     start = time.perf_counter()
     check_versions(task.versions)
-    threads = task.threads or len(os.sched_getaffinity(0))
+    threads = task.threads or cores()
     set_variant(task.variant)  # per process and thread: mitsuba3 #1685
     if task.variant.startswith("llvm") and dr.thread_count() != threads:
         dr.set_thread_count(threads)
@@ -135,7 +134,7 @@ def _sums(task: Task) -> Sums:
     total: Any = 0.0
     for render in task.passes:
         total = total + render_pass(scene, sensor, render)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    peak = peak_memory()
     where = f"{processor()}, {threads} threads"
     return Sums(total, where, worker_address(), time.perf_counter() - start, peak)
 
@@ -167,19 +166,6 @@ def check_versions(wanted: tuple[str, ...]) -> None:
                 f"it has {name} {here}, and the client {there}: pictures of both need not agree; "
                 "install the same version on both"
             )
-
-
-@lru_cache(1)
-def processor() -> str:
-    """Return the kind of this machine's processor."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as file:
-            names = [
-                line.partition(":")[2].strip() for line in file if line.startswith("model name")
-            ]
-    except OSError:
-        names = []
-    return names[0] if names else platform.machine()
 
 
 def worker_address() -> str:
@@ -243,7 +229,7 @@ class SceneFiles:
 
     def _copy(self, path: str) -> Path:
         folder = cache_folder() or Path(tempfile.gettempdir()) / "mitsuba_diffraction"
-        return folder / "scenes" / self.digest[:32] / path.lstrip("/")
+        return folder / "scenes" / self.digest[:32] / Path(path).relative_to(Path(path).anchor)
 
 
 def _has(path: str, digest: str) -> bool:

@@ -193,7 +193,7 @@ def _apart(distributed: Any) -> Any:
 
     class Apart(distributed.WorkerPlugin):
         def setup(self, worker: Any) -> None:
-            with contextlib.suppress(OSError):  # it leads a session already
+            with contextlib.suppress(OSError, AttributeError):  # leads one already; Windows
                 os.setsid()
 
     return Apart()

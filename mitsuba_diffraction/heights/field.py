@@ -164,6 +164,19 @@ class HeightField:
             **{"cut_out": self.cut_out, "periodic": self.periodic, **flags},
         )
 
+    def stretched(self, factor: float) -> HeightField:
+        """Return the patch with its lengths in the plane, but not its heights, times a factor."""
+        if factor == 1.0:
+            return self
+        return HeightField(
+            self.heights,
+            (self.pixel_size[0] * factor, self.pixel_size[1] * factor),
+            name=self.name,
+            history=(*self.history, f"stretched in its plane by {factor:g}"),
+            cut_out=self.cut_out,
+            periodic=self.periodic,
+        )
+
     @cached_property
     def _digest(self) -> str:
         shape = (self.shape, self.pixel_size, *(["periodic"] if self.periodic else []))

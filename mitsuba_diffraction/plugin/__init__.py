@@ -12,11 +12,13 @@ llvm            an LLVM that Dr.Jit survives
 parameters      parameters of `diffraction`, read from Mitsuba's Properties and checked
 surface_parameters  parameters that both plugins have: the surface and its table
 support         features that go together, declared by each choice of a scene
+meshes          arrays of Mitsuba's meshes, of 3.9 and 3.10
 properties      words, flags and numbers from them, refused by name; what elements are called
 materials       material, coat and film
 parameter_changes  changeable parameters, their checks; what `dr.freeze` must know of a BSDF
 sources         from what a scene names to a table, built once
-textures        height scale and orientation that vary; whether a mesh has what its BSDF reads
+factors         factors on heights and on lengths in the plane: numbers, textures, attributes
+textures        orientation that varies; whether a mesh has what its BSDF reads
 types           names of the types of arguments
 directions      a pair of directions in the patch's frame, and how V-shaped grooves shadow it
 power           the diffracted power at single wavelengths

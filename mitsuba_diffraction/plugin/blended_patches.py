@@ -43,7 +43,7 @@ from .parameter_changes import (
     check_parameters,
     take_changes,
 )
-from .textures import is_attribute, is_bitmap, require_raw
+from .textures import is_attribute, range_of, require_raw, uv_square
 from .types import (
     BSDF,
     Callback,
@@ -62,8 +62,6 @@ from .types import (
 _PREFIX = "weight_"
 #: A sum of such weights is far from the largest number there is.
 _MOST_WEIGHT = 1e6
-#: Points a side of the unit square of UV coordinates at which weights are checked.
-_POINTS = 32
 #: The component of a context that asks for all of them.
 _ALL = 0xFFFFFFFF
 
@@ -260,7 +258,7 @@ class DiffractionMix(mi.BSDF):
         """Reason to refuse weights whose sum is 0 in places of the UV square, or None."""
         if any(weight is None or is_attribute(weight) for weight in self.weights.values()):
             return None
-        totals = [sum(self._weights_at(si, True), mi.Float(0.0)) for si in _square()]
+        totals = [sum(self._weights_at(si, True), mi.Float(0.0)) for si in uv_square()]
         if min(dr.slice(dr.min(total)) for total in totals) > 0.0:
             return None
         names = ", ".join(_PREFIX + name for name in self.weights)
@@ -338,15 +336,10 @@ def _weight(props: Properties, name: str, objects: dict[str, Any]) -> Bounded | 
 
 def _texture_refusal(name: str, texture: Texture) -> str | None:
     """Reason why a texture's numbers are no weights, or None."""
-    if is_attribute(texture):
+    known = range_of(texture)
+    if known is None or known[0] >= 0.0:
         return None
-    if is_bitmap(texture):
-        least = float(np.array(mi.traverse(texture)["data"], float).min())
-    else:
-        least = min(dr.slice(dr.min(texture.eval_1(si, True))) for si in _square())
-    if least >= 0.0:
-        return None
-    return f"{name}: its least number is {least:g}; weights are at least 0"
+    return f"{name}: its least number is {known[0]:g}; weights are at least 0"
 
 
 def _weight_at(weight: Bounded | Texture | None, si: Interaction, active: Mask) -> Float | None:
@@ -361,15 +354,6 @@ def _text(weight: Bounded | Texture | None) -> str:
     if isinstance(weight, Bounded):
         return f"{dr.slice(weight.value):g}"
     return " ".join(str(weight).split())
-
-
-def _square() -> Iterator[Interaction]:
-    """Yield hits at points of the unit square of UV coordinates, singly in scalar variants."""
-    places = (np.indices((_POINTS, _POINTS)).reshape(2, -1).astype(np.float32) + 0.5) / _POINTS
-    for part in [places] if dr.is_jit_v(mi.Float) else places.T.tolist():
-        si = dr.zeros(mi.SurfaceInteraction3f)
-        si.uv = mi.Point2f(part)
-        yield si
 
 
 mi.register_bsdf("diffraction_mix", DiffractionMix)

@@ -43,6 +43,16 @@ orientation : float or texture ∂ [0]
     in a float format such as EXR) or mesh attribute of three channels, the first two of which are
     (cos, sin) of the angle. Tangents follow UV coordinates. On a mesh without UV coordinates they
     are arbitrary and turn from triangle to triangle, of which `info MESH` and `render` warn.
+lateral_scale : float or texture ∂ [1]
+    Factor that stretches the patch in its plane, heights unchanged, between 0.01 and 100: a
+    grating's period at each point. Or a raw bitmap, another texture or a mesh attribute of one
+    channel. Spatial frequencies are divided by it. coherence_width is that of the largest factor,
+    or of 1 if none is above 1; elsewhere the window shrinks with the patch, so that it covers the
+    same number of periods everywhere. May change up to the largest factor loaded, or 1. Scales of
+    energy are those of that factor (docs/holograms.md). A table serves factors up to 1.
+lateral_scale_max : float [of a bitmap]
+    Largest factor of such a texture, above which factors are clipped. Required unless the texture
+    is a bitmap.
 height_scale : float or texture ∂ [1]
     Factor on the heights, up to 1.5 × max(1, the value loaded). Or a raw bitmap, another texture or
     a mesh attribute of one channel, for worn and fresh places.
@@ -202,7 +212,7 @@ from numpy.typing import NDArray
 
 from ..tables.energy.grid import DirectionalTable
 from .boundary import Kirchhoff
-from .directions import Pair, from_patch, in_patch, vcavity
+from .directions import Pair, vcavity
 from .energy import EnergyModel
 from .layers import CoatedPair, Transmission, UnderFilm
 from .parameter_changes import ObjectValues, check_parameters
@@ -405,10 +415,10 @@ class Diffraction(DiffractingSurface):
         """Factor of the nested BSDF."""
         ratios = mi.UnpolarizedSpectrum(1.0), mi.UnpolarizedSpectrum(1.0)
         if self._energy is not None and isinstance(self.layering, Transmission):
-            rotation = self.orientation.rotation(si, active)
+            frame = self.frame_at(si, active)
             k, scale = self.power.wavenumbers(si), self.scale_at(si, active)
             ratios = tuple(
-                self._energy.reflected(in_patch(d, rotation), mi.Frame3f.cos_theta(d), k, scale)
+                self._energy.reflected(frame.turned(d), mi.Frame3f.cos_theta(d), k, scale)
                 for d in (si.wi, wo)
             )
         return self.layering.beneath(si, wo, active, ratios)
@@ -420,7 +430,7 @@ class Diffraction(DiffractingSurface):
 
     def _pair(self, si: Interaction, wo: Vector3f, active: Mask) -> Pair:
         """Eq. 1: (u, v, w) = ωi + ωo in the patch's frame, within a coat where there is one."""
-        pair = Pair(si, wo, self.orientation.rotation(si, active), active)
+        pair = Pair(si, wo, self.frame_at(si, active), active)
         return pair if self.coat is None else CoatedPair(pair, self.coat.eta)
 
     def _lit(self, si: Interaction, wo: Vector3f, active: Mask) -> Mask:
@@ -449,8 +459,8 @@ class Diffraction(DiffractingSurface):
             sample2,
             si,
         )
-        rotation = self.orientation.rotation(si, active)
-        ordered = direction_of(from_patch(uv, rotation) - mi.Vector2f(si.wi.x, si.wi.y))
+        total = self.frame_at(si, active).from_table(uv)
+        ordered = direction_of(total - mi.Vector2f(si.wi.x, si.wi.y))
         return dr.select(sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), ordered)
 
     def _glossy_share(self, diffracts: bool, si: Interaction, active: Mask) -> Float:

@@ -16,6 +16,50 @@ SHADOWINGS = ("none", "vcavity")
 _SMALLEST = float(np.finfo(np.float32).tiny)
 
 
+@dataclass(frozen=True)
+class PatchFrame:
+    """The patch at a point of the surface, turned and stretched in the tangent plane.
+
+    The stretched patch has the orders of the table's patch at frequencies divided by `stretch`.
+
+    Attributes
+    ----------
+    rotation : (cos, sin) of the angle from the first tangent to the patch's x axis.
+    stretch : factor on lengths in the plane, over those of the table's patch. Where it is the plain
+        number 1, Dr.Jit leaves the multiplications out.
+    """
+
+    rotation: Rotation
+    stretch: Float = 1.0
+
+    def turned(self, vector: Vector2f | Vector3f) -> Vector2f:
+        """Return a vector's tangential part along the patch's axes."""
+        cos, sin = self.rotation
+        return mi.Vector2f(
+            dr.fma(cos, vector.x, sin * vector.y), dr.fma(cos, vector.y, -sin * vector.x)
+        )
+
+    def to_table(self, direction: Vector2f | Vector3f) -> Vector2f:
+        """Return (u, v) of the table from a sum of directions in the shading frame."""
+        return self.turned(direction) * self.stretch
+
+    def from_table(self, uv: Vector2f) -> Vector2f:
+        """Return the tangential part, in the shading frame, of (u, v) of the table."""
+        cos, sin = self.rotation
+        x, y = uv.x, uv.y
+        turned_back = mi.Vector2f(dr.fma(cos, x, -sin * y), dr.fma(cos, y, sin * x))
+        return turned_back * dr.rcp(self.stretch)
+
+    def position(self, vector: Vector2f) -> Vector2f:
+        """Return the position on the table's patch of a vector in the tangent plane, µm."""
+        return self.turned(vector) * dr.rcp(self.stretch)
+
+    @property
+    def area(self) -> Float:
+        """Factor from densities over (u, v) of the surface to those over (u, v) of the table."""
+        return dr.square(self.stretch)
+
+
 class Pair:
     """Directions ωi and ωo in front of the surface; inactive lanes have harmless ones.
 
@@ -23,7 +67,8 @@ class Pair:
     ----------
     wi, wo : ωi and ωo in the shading frame.
     cos_i, cos_o : cosines of their angles to the normal.
-    uv : tangential part of ωi + ωo, in the patch's frame.
+    frame : the patch at the point of the surface.
+    uv : tangential part of ωi + ωo, in the coordinates of the table.
     w : normal part of ωi + ωo.
     one_plus_dot : 1 + ωi·ωo.
     above : whether light stays above the surface; else both directions are mirrored from below.
@@ -31,10 +76,10 @@ class Pair:
 
     above = True
 
-    def __init__(self, si: Interaction, wo: Vector3f, rotation: Rotation, active: Mask) -> None:
-        self.wi, self.wo, self._rotation = si.wi, wo, rotation
+    def __init__(self, si: Interaction, wo: Vector3f, frame: PatchFrame, active: Mask) -> None:
+        self.wi, self.wo, self.frame = si.wi, wo, frame
         total = si.wi + wo
-        self.uv = in_patch(total, rotation)
+        self.uv = frame.to_table(total)
         self.w = dr.select(active, total.z, 1.0)
         # from the sum's length: accurate for opposite grazing directions too
         self.one_plus_dot = 0.5 * dr.squared_norm(total)
@@ -47,11 +92,6 @@ class Pair:
         return self
 
     @property
-    def rotation(self) -> Rotation:
-        """(cos, sin) of the angle from the first tangent to the patch's x axis."""
-        return self._rotation
-
-    @property
     def cos_half(self) -> Float:
         """Cosine of the angle between either direction and the half vector."""
         return dr.safe_sqrt(0.5 * self.one_plus_dot)
@@ -59,12 +99,12 @@ class Pair:
     @cached_property
     def incident(self) -> Vector2f:
         """Tangential part of ωi, in the patch's frame."""
-        return in_patch(self.wi, self._rotation)
+        return self.frame.turned(self.wi)
 
     @cached_property
     def outgoing(self) -> Vector2f:
         """Tangential part of ωo, in the patch's frame."""
-        return in_patch(self.wo, self._rotation)
+        return self.frame.turned(self.wo)
 
 
 @dataclass(frozen=True)
@@ -75,21 +115,6 @@ class TablePoint:
     w: Float
     cos_i: Float = 1.0
     cos_o: Float = 1.0
-
-
-def in_patch(direction: Vector2f | Vector3f, rotation: Rotation) -> Vector2f:
-    """Return a vector's tangential part, turned from the shading frame to the patch's."""
-    cos, sin = rotation
-    return mi.Vector2f(
-        dr.fma(cos, direction.x, sin * direction.y),
-        dr.fma(cos, direction.y, -sin * direction.x),
-    )
-
-
-def from_patch(q: Vector2f, rotation: Rotation) -> Vector2f:
-    """Turn a tangential part from the patch's frame to the shading frame."""
-    cos, sin = rotation
-    return mi.Vector2f(dr.fma(cos, q.x, -sin * q.y), dr.fma(cos, q.y, sin * q.x))
 
 
 def vcavity(cos_i: Float, cos_o: Float, one_plus_dot: Float) -> Float:

@@ -237,8 +237,14 @@ def _rounded_indices(
         return None
     if isinstance(exact, fresnel.Filmed):
         index, film, depth = exact.parts
-        return fresnel.Filmed(_rounded(index, step), _rounded(film, step), depth)
-    return _rounded(exact, step)
+        return fresnel.Filmed(_rounded_index(index, step), _rounded_index(film, step), depth)
+    return _rounded_index(exact, step)
+
+
+def _rounded_index(index: ArrayLike, step: float) -> NDArray[Any]:
+    """An index to a step, but not to 0, where no wave exists."""
+    rounded = _rounded(index, step)
+    return np.where(rounded == 0.0, step, rounded)
 
 
 def _complex(number: Float) -> complex:

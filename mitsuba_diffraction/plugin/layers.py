@@ -36,8 +36,7 @@ class CoatedPair(Pair):
     def __init__(self, outer: Pair, n: Float) -> None:
         self._outer, self.n = outer, n
         self.wi, self.wo = _refracted(outer.wi, n), _refracted(outer.wo, n)
-        self._rotation = outer._rotation
-        self.uv = outer.uv
+        self.frame, self.uv = outer.frame, outer.uv
         self.cos_i, self.cos_o = self.wi.z, self.wo.z
         self.w = n * (self.cos_i + self.cos_o)
         self.one_plus_dot = 0.5 * dr.squared_norm(self.wi + self.wo)

@@ -2,10 +2,10 @@
 
 Dr.Jit 1.5 loads LLVM while `drjit` is imported, and keeps it: the file that DRJIT_LIBLLVM_PATH
 names, else the loader's `libLLVM.so`, else the highest-numbered libLLVM*.so.* of the system's
-library folder. It refuses version 14 and older itself; 15 and 16 load, and end the whole process
-at the first kernel with a minimum or maximum ("Cannot select ... fminimum"). So the choice is made
-here, on import of the package (`select_llvm`), and later use checks what was loaded
-(`require_llvm`, `require_loaded_llvm`).
+library folder. On macOS it knows Homebrew's `llvm`, but not `llvm@19`. It refuses version 14 and
+older itself; 15 and 16 load, and end the whole process at the first kernel with a minimum or
+maximum ("Cannot select ... fminimum"). So the choice is made here, on import of the package
+(`select_llvm`), and later use checks what was loaded (`require_llvm`, `require_loaded_llvm`).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import os
 import platform
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,9 +77,21 @@ def _preference(library: Library) -> tuple[bool, int, str]:
     return library.version != TESTED, -(library.version or 0), str(library.path)
 
 
-def in_folders() -> Iterator[Path]:
-    """Libraries where systems and package managers put them; takes a few milliseconds."""
-    for folder in _folders():
+def in_folders(
+    system: str = sys.platform,
+    machine: str = platform.machine(),
+    environment: Mapping[str, str] = os.environ,
+    root: Path = Path("/"),
+) -> Iterator[Path]:
+    """Yield the libraries where systems and package managers put them, within milliseconds.
+
+    Parameters
+    ----------
+    system, machine : as in `sys.platform` and `platform.machine()`.
+    environment : environment variables.
+    root : folder that stands for the root of the file system; not on Windows.
+    """
+    for folder in _folders(system, machine, environment, root):
         try:
             entries = list(os.scandir(folder))
         except OSError:
@@ -87,28 +99,32 @@ def in_folders() -> Iterator[Path]:
         yield from (Path(entry.path) for entry in entries if _FILE.fullmatch(entry.name))
 
 
-def _folders() -> Iterator[Path]:
-    """Folders with libraries for this process's architecture."""
+def _folders(
+    system: str, machine: str, environment: Mapping[str, str], root: Path
+) -> Iterator[Path]:
+    """Yield the folders with libraries for an architecture; parameters as in `in_folders`."""
     prefix = Path(sys.prefix)  # conda installs LLVM beside Python
-    if sys.platform == "win32":
-        programs = os.environ.get("PROGRAMFILES", r"C:\Program Files")
+    if system == "win32":
+        programs = environment.get("PROGRAMFILES", r"C:\Program Files")
         yield from (prefix / "Library" / "bin", Path(programs) / "LLVM" / "bin")
-        searched = os.environ.get("PATH", "")
-    elif sys.platform == "darwin":
+        searched = environment.get("PATH", "").split(";")
+    elif system == "darwin":
         yield prefix / "lib"
-        for pattern in ("homebrew/opt/llvm*/lib", "local/libexec/llvm-*/lib"):
-            yield from Path("/opt").glob(pattern)
-        yield from Path("/usr/local/opt").glob("llvm*/lib")
-        searched = os.environ.get("DYLD_LIBRARY_PATH", "")
+        # Homebrew on Apple silicon, MacPorts, Homebrew on Intel
+        for pattern in (
+            "opt/homebrew/opt/llvm*/lib", "opt/local/libexec/llvm-*/lib", "usr/local/opt/llvm*/lib"
+        ):  # fmt: skip
+            yield from root.glob(pattern)
+        searched = environment.get("DYLD_LIBRARY_PATH", "").split(":")
     else:
         yield prefix / "lib"
-        usr = Path("/usr")
-        yield from (usr / "lib" / f"{platform.machine()}-linux-gnu", usr / "lib64", usr / "lib")
+        usr = root / "usr"
+        yield from (usr / "lib" / f"{machine}-linux-gnu", usr / "lib64", usr / "lib")
         for pattern in ("lib/llvm-*/lib", "lib64/llvm*/lib", "lib/llvm/*/lib64"):
             yield from usr.glob(pattern)
         yield usr / "local" / "lib"
-        searched = os.environ.get("LD_LIBRARY_PATH", "")
-    yield from (Path(folder) for folder in searched.split(os.pathsep) if folder)
+        searched = environment.get("LD_LIBRARY_PATH", "").split(":")
+    yield from (Path(folder) for folder in searched if folder)
 
 
 def select_llvm() -> Library | None:
@@ -227,5 +243,5 @@ def _install() -> str:
     if sys.platform == "darwin":
         return f"brew install llvm@{TESTED}"
     if sys.platform == "win32":
-        return f"install LLVM {TESTED}, and set {VARIABLE} to its LLVM-C.dll"
+        return f"winget install LLVM.LLVM --version {TESTED}.1.7, or set {VARIABLE}"
     return f"apt install libllvm{TESTED}, or set {VARIABLE} to one elsewhere"

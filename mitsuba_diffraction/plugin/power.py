@@ -48,7 +48,7 @@ class PowerModel(Protocol):
     def draw(
         self, cos_i: Float, height_scale: Float, sample1: Float, sample2: Vector2f, si: Interaction
     ) -> Vector2f:
-        """The tangential part of an ωi + ωo in the patch's frame, from three uniform numbers."""
+        """(u, v) of an ωi + ωo in the coordinates of the table, from three uniform numbers."""
 
 
 class SpectralPower:
@@ -102,7 +102,7 @@ class SpectralPower:
         if self._places is None or not isinstance(pair, Pair):
             windows: Sequence[Window] = ()
         else:
-            windows = self._places.at(si, pair.rotation)
+            windows = self._places.at(si, pair.frame)
 
         def of_wavelength(k: Float) -> Float:
             total = self.device.window_sum(k * pair.uv.x, k * pair.uv.y, k * scaled_w, windows)
@@ -113,7 +113,8 @@ class SpectralPower:
     def _density(self, pair: Pair | Crossing, height_scale: Float) -> Callable[[Float], Float]:
         def of_wavelength(k: Float) -> Float:
             strategy = self._sampler.strategy(k, pair.cos_i, dr.detach(height_scale))
-            return self._sampler.density(k * pair.uv, strategy) * pair.cos_o * dr.square(k)
+            density = self._sampler.density(k * pair.uv, strategy)
+            return density * pair.cos_o * pair.frame.area * dr.square(k)
 
         return of_wavelength
 

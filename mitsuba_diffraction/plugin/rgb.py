@@ -152,7 +152,7 @@ class RGBPower:
     def density(self, pair: Pair | Crossing, height_scale: Float, si: Interaction) -> Float:
         """See `PowerModel.density`."""
         strategy = self._strategy(pair.cos_i, dr.detach(height_scale))
-        return self._density(pair.uv, *strategy) * pair.cos_o
+        return self._density(pair.uv, *strategy) * pair.cos_o * pair.frame.area
 
     def both(
         self, pair: Pair, height_scale: Float, drawing_scale: Float, si: Interaction

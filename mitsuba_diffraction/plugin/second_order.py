@@ -1,7 +1,8 @@
 """The second order of small slope as a factor on the power of orders (Dr.Jit).
 
 The twin of `optics.second_order`: c is looked up once for a pair of directions, r for each channel
-at k (u, v) and κ. A factor on the heights multiplies κ by the factor and r by its square.
+at k (u, v) and κ. A factor on the heights multiplies κ by the factor and r by its square; a
+factor on lengths in the plane divides r, a product of slopes, by its square.
 """
 
 from __future__ import annotations
@@ -94,7 +95,7 @@ class SecondOrder:
         factors = []
         for k, share in zip(wavenumbers, shares, strict=True):
             r = self._ratios.at(self._place(pair, height_scale, k))
-            scale = (1.0 - share) * dr.square(height_scale)
+            scale = (1.0 - share) * dr.square(height_scale * dr.rcp(pair.frame.stretch))
             real = scale * (c[0] * r[0] - c[1] * r[1] + c[2] * r[2] - c[3] * r[3])
             imaginary = scale * (c[0] * r[1] + c[1] * r[0] + c[2] * r[3] + c[3] * r[2])
             square = dr.fma(real, real, imaginary * imaginary)

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import mitsuba as mi
 import numpy as np
@@ -55,6 +55,17 @@ class TableRequest:
         return cached_table(self.digest, settings, lambda: self.build(settings))
 
 
+class Factors(NamedTuple):
+    """Factors on the heights that a table is to serve.
+
+    height_scale : the largest factor on the heights.
+    stretch : factor on lengths in the patch's plane, at least 1.
+    """
+
+    height_scale: float
+    stretch: float
+
+
 #: Gets the table that is asked for.
 TableProvider = Callable[[TableRequest], DiffractionTable]
 
@@ -69,7 +80,7 @@ def table_of_file(
     must_be_table: bool,
     options: LoadOptions,
     asked: Mapping[str, Any],
-    height_scale: float,
+    factors: Factors,
     provider: TableProvider,
 ) -> DiffractionTable:
     """Return the table of a file: a table, a recipe, or a height field of any format.
@@ -80,12 +91,18 @@ def table_of_file(
     must_be_table : refuse anything but a table.
     options : how to read heights.
     asked : the fields of `TableSettings` that the scene sets, checked.
-    height_scale : the largest factor on the heights that is asked for.
+    factors : the factors that are asked for.
     provider : gets the tables of heights.
     """
     if must_be_table or is_table(path):
         table = loaded_table(path)
         _check_agreement(path, table, options, asked)
+        height_scale = factors.height_scale
+        if factors.stretch > 1.0:
+            raise DiffractionError(
+                f"lateral_scale={factors.stretch:g} is above 1, beyond the frequencies of the "
+                f"table '{path}'; give the height field instead of the table"
+            )
         if height_scale > table.height_scale_max:
             raise DiffractionError(
                 f"height_scale={height_scale:g} is beyond the table's "
@@ -100,7 +117,7 @@ def table_of_file(
                 _recipe_digest(recipe, options),
                 lambda: recipe.fields(options),
                 {**recipe.table, **asked},
-                height_scale,
+                factors,
                 replace(recipe, options=recipe.options.updated(options)),
             )
         )
@@ -110,7 +127,7 @@ def table_of_file(
                 _file_digest(path, options),
                 lambda: [load_heights(path, options)],
                 asked,
-                height_scale,
+                factors,
                 Recipe.of_file(path, options),
             )
         )
@@ -169,18 +186,21 @@ def table_of_heights(
 ) -> DiffractionTable:
     """Return the table of a height field."""
     digest = heights.digest() + (" cut out" if heights.cut_out else "")  # warned of otherwise
-    return provider(_request(digest, lambda: [heights], asked, height_scale, None))
+    factors = Factors(height_scale, 1.0)
+    return provider(_request(digest, lambda: [heights], asked, factors, None))
 
 
 def _request(
     digest: str,
     load: Callable[[], list[HeightField]],
     asked: Mapping[str, Any],
-    height_scale: float,
+    factors: Factors,
     recipe: Recipe | None,
 ) -> TableRequest:
+    height_scale, stretch = factors
+
     def build(settings: TableSettings) -> DiffractionTable:
-        heights = load()
+        heights = [field.stretched(stretch) for field in load()]
         mi.Log(mi.LogLevel.Info, f"diffraction: building the table of {heights[0].name}")
         table = build_with(heights, settings)
         lines = table.source["warnings"]
@@ -190,6 +210,8 @@ def _request(
             warn(line)
         return table
 
+    if stretch != 1.0:
+        digest = key_of(digest, stretch)
     room = min(HEIGHT_SCALE_ROOM * max(1.0, height_scale), MAX_HEIGHT_SCALE)
     settings = TableSettings(**{"height_scale_max": room, **asked})
     if height_scale > settings.height_scale_max:

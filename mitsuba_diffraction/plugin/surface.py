@@ -11,13 +11,13 @@ import drjit as dr
 import mitsuba as mi
 
 from .boundary import Boundary
-from .directions import Pair
+from .directions import Pair, PatchFrame
+from .factors import LEAST_SCALE, VaryingFactor
 from .fresnel import Reflectance, tinted
 from .layers import CoatedPair, UnderCoat, UnderFilm
 from .parameter_changes import Bounded, Changeable, arrays_within, marks, take_changes
 from .power import power_model
 from .surface_parameters import SurfaceParameters
-from .textures import LEAST_SCALE, VaryingHeightScale
 from .types import Callback, Colour, Context, Float, Interaction, Mask, Properties, Spectrum
 
 #: Component of a context that asks for all of them.
@@ -37,7 +37,7 @@ class ScaleRange(NamedTuple):
 
 
 class DiffractingSurface(mi.BSDF):
-    """Table, height scale, orientation and power of a surface; the lobe that they make.
+    """Table, factors, orientation and power of a surface; the lobe that they make.
 
     Attributes
     ----------
@@ -46,6 +46,7 @@ class DiffractingSurface(mi.BSDF):
     window_positions : positions of windows, or None where the table averages over them.
     fresnel : reflectance of the flat surface, with its layers.
     orientation : angle from the first tangent to the patch's x axis.
+    lateral_scale : factor on lengths in the patch's plane.
     height_scale : mi.Float; the largest, where it varies.
     power : `power.PowerModel` of the variant.
     wavelength : nm, of mono variants.
@@ -63,23 +64,25 @@ class DiffractingSurface(mi.BSDF):
         self.table, self.heights = surface.table, surface.heights
         self.window_positions, self.wavelength = surface.window_positions, surface.wavelength
         self.fresnel, self.orientation = fresnel, surface.orientation
+        self.lateral_scale = surface.lateral_scale
         self.power = power_model(self.table, self.wavelength, self.window_positions)
         # Heights are in a medium of this optical index
         self._set_height_scale(surface.height_scale, surface.optical)
         self.parameters: list[Changeable] = [
             *self._scale_changeable,
             *self.orientation.changeable,
+            *self.lateral_scale.changeable,
             *fresnel.changeable,
         ]
         self.mix: weakref.ref[Any] | None = None
         # 4π²σ⁴/A of eq. 3 and 4, with the window's area A = πσ²
         self.area_factor = 4.0 * dr.pi * self.table.sigma**2
 
-    def _set_height_scale(self, factor: float | VaryingHeightScale, optical: float) -> None:
+    def _set_height_scale(self, factor: float | VaryingFactor, optical: float) -> None:
         """Keep a bounded number; or factors that vary, of which `height_scale` is the largest."""
-        if isinstance(factor, VaryingHeightScale):
-            self._scale: VaryingHeightScale | Bounded = factor
-            self._varying: VaryingHeightScale | None = factor
+        if isinstance(factor, VaryingFactor):
+            self._scale: VaryingFactor | Bounded = factor
+            self._varying: VaryingFactor | None = factor
             self._scale_changeable: tuple[Changeable, ...] = factor.changeable
             self.height_scale: Float = mi.Float(factor.high)
             return
@@ -93,7 +96,7 @@ class DiffractingSurface(mi.BSDF):
     def geometry(self, pair: Pair) -> Float:
         """Return 4π²σ⁴ / (A w² cosθi), the part of eq. 4 that is neither power nor N'."""
         w = pair.cos_i + pair.cos_o
-        factor = self.area_factor * dr.rcp(dr.square(w) * pair.cos_i)
+        factor = self.area_factor * pair.frame.area * dr.rcp(dr.square(w) * pair.cos_i)
         if isinstance(pair, CoatedPair):  # directions are those within the coat
             factor *= pair.outer.cos_o * dr.rcp(pair.cos_o)
         return factor
@@ -126,12 +129,19 @@ class DiffractingSurface(mi.BSDF):
         """Return the factor on the heights at points of the surface."""
         return self._varying.at(si, active) if self._varying else self.height_scale
 
+    def frame_at(self, si: Interaction, active: Mask) -> PatchFrame:
+        """Return the patch as it lies at points of the surface."""
+        return PatchFrame(
+            self.orientation.rotation(si, active), self.lateral_scale.over_table(si, active)
+        )
+
     # ------------------------------------------------------------------ changes of parameters
 
     def traverse(self, callback: Callback) -> None:
         """Expose the parameters that may change without another table."""
         self._scale.traverse(callback)
         self.orientation.traverse(callback)
+        self.lateral_scale.traverse(callback)
         self.fresnel.traverse(callback)
 
     def parameters_changed(self, keys: list[str]) -> None:
@@ -179,9 +189,11 @@ class DiffractingSurface(mi.BSDF):
 
         holders : objects that hold arrays.
         """
-        held = arrays_within(self.power, self.orientation, self.fresnel, self._varying, *holders)
+        factors = self._varying, self.lateral_scale
+        held = arrays_within(self.power, self.orientation, self.fresnel, *factors, *holders)
+        textures = str(self._varying), str(self.lateral_scale.varying)
         self._for_freezing = held + marks(
-            self.table, str(self.window_positions), str(self._varying), *constants
+            self.table, str(self.window_positions), *textures, *constants
         )
 
     # ------------------------------------------------------------------ for people
@@ -204,6 +216,7 @@ class DiffractingSurface(mi.BSDF):
             "height_scale": self._varying or f"{dr.slice(self.height_scale):g}",
             "energy_conserving": "true" if conserving else "false",
             "orientation": self.orientation,
+            "lateral_scale": self.lateral_scale,
             **more,
         }
         lines = "".join(f"  {name} = {value},\n" for name, value in shown.items())

@@ -18,16 +18,18 @@ from ..heights.read import LoadOptions
 from ..settings import COHERENCES, SURFACE, checked
 from ..tables.table import DiffractionTable
 from .dictionary import PLUGINS
+from .factors import HEIGHT, LATERAL, LateralScale, VaryingFactor, largest_of, read_factor
 from .llvm import require_loaded_llvm
 from .properties import choice, flag, kind_of, number
 from .sources import (
+    Factors,
     TableProvider,
     heights_of_file,
     heights_of_tensor,
     table_of_file,
     table_of_heights,
 )
-from .textures import ConstantOrientation, Orientation, OrientationTexture, VaryingHeightScale
+from .textures import ConstantOrientation, Orientation, OrientationTexture
 from .types import BSDF, Properties
 from .window_positions import TILINGS, WindowPositions
 
@@ -52,6 +54,8 @@ _COMMON = (
     "orientation",
     "height_scale",
     "height_scale_max",
+    "lateral_scale",
+    "lateral_scale_max",
     "wavelength",
     "energy_conserving",
 )
@@ -76,6 +80,7 @@ class SurfaceParameters:
     heights : function that reads the heights that the table is made of.
     window_positions : positions of windows, or None where the table averages over them.
     orientation : angle from the first tangent to the patch's x axis.
+    lateral_scale : factor on lengths in the patch's plane.
     height_scale : factor on all heights, or a texture of factors.
     optical : index of the medium that heights are in, over that of the medium above.
     wavelength : nm, of mono variants.
@@ -86,7 +91,8 @@ class SurfaceParameters:
     heights: Callable[[], HeightField]
     window_positions: WindowPositions | None
     orientation: Orientation
-    height_scale: float | VaryingHeightScale
+    lateral_scale: LateralScale
+    height_scale: float | VaryingFactor
     optical: float
     wavelength: float
     energy_conserving: bool
@@ -118,15 +124,18 @@ def read_surface(
     DiffractionError
         With the parameter, its value and the choices.
     """
-    height_scale = _height_scale(props)
+    height_scale = read_factor(props, HEIGHT)
+    # Without it, kernels have no operation for it
+    lateral = LateralScale(read_factor(props, LATERAL) if LATERAL.name in props else None)
     # κ grows by the index, as if heights did
     largest = largest_of(height_scale) * optical
-    table, heights = _table(props, largest, provider, second_order)
+    table, heights = _table(props, largest, lateral.of_table, provider, second_order)
     return SurfaceParameters(
         table=table,
         heights=heights,
         window_positions=_window_positions(props, table),
         orientation=_orientation(props),
+        lateral_scale=lateral,
         height_scale=height_scale,
         optical=optical,
         wavelength=_wavelength(props, table),
@@ -163,11 +172,6 @@ def nested_of(props: Properties, plugin: str) -> BSDF | None:
 def coherence_of(props: Properties) -> str:
     """Return the coherence that a scene asks for."""
     return choice(props, "coherence", (*COHERENCES, SURFACE))
-
-
-def largest_of(height_scale: float | VaryingHeightScale) -> float:
-    """Return the largest factor on the heights."""
-    return height_scale.high if isinstance(height_scale, VaryingHeightScale) else height_scale
 
 
 def read_index(props: Properties, name: str, default: float = 1.0) -> float | str:
@@ -207,21 +211,12 @@ def _unknown(name: str, plugin: str) -> str:
     return f"unknown parameter '{name}'; {hint}Allowed: {', '.join(NAMES[plugin])}"
 
 
-def _height_scale(props: Properties) -> float | VaryingHeightScale:
-    texture = dict(props.objects()).get("height_scale")
-    most = number(props, "height_scale_max", math.nan) if "height_scale_max" in props else None
-    if isinstance(texture, mi.Texture):
-        return VaryingHeightScale(texture, most)
-    if most is not None:
-        raise DiffractionError("height_scale_max is for a height_scale that is a texture")
-    factor = number(props, "height_scale", 1.0)
-    if not 0.0 < factor <= 1e3:
-        raise DiffractionError(f"height_scale={factor:g} must be above 0 and at most 1000")
-    return factor
-
-
 def _table(
-    props: Properties, height_scale: float, provider: TableProvider, second_order: bool
+    props: Properties,
+    height_scale: float,
+    stretch: float,
+    provider: TableProvider,
+    second_order: bool,
 ) -> tuple[DiffractionTable, Callable[[], HeightField]]:
     sources = [name for name in SOURCES if name in props]
     if len(sources) != 1:
@@ -233,13 +228,14 @@ def _table(
     settings = _settings(props, second_order)
     value = props.get(source)
     if source == "data":
-        heights = heights_of_tensor(value, options)
+        heights = heights_of_tensor(value, options).stretched(stretch)
         return table_of_heights(heights, settings, height_scale, provider), lambda: heights
     if not isinstance(value, str):
         raise DiffractionError(f"{source}={value!r} must be the name of a file")
     path = _resolved(value, source)
-    table = table_of_file(path, source == "table", options, settings, height_scale, provider)
-    return table, lambda: heights_of_file(path, source == "table", options)
+    must_be_table, factors = source == "table", Factors(height_scale, stretch)
+    table = table_of_file(path, must_be_table, options, settings, factors, provider)
+    return table, lambda: heights_of_file(path, must_be_table, options).stretched(stretch)
 
 
 def _settings(props: Properties, second_order: bool) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Height scale and orientation that vary over a surface: textures and mesh attributes.
+"""Orientation of the patch, and checks of textures and mesh attributes.
 
 A BSDF cannot see whether the shape has the attributes that it reads: `check_attributes` does.
 """
@@ -6,6 +6,7 @@ A BSDF cannot see whether the shape has the attributes that it reads: `check_att
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import Any
 
 import drjit as dr
@@ -13,10 +14,10 @@ import mitsuba as mi
 import numpy as np
 
 from ..errors import DiffractionError
-from .memory import index_between
+from .meshes import has_texcoords
 from .parameter_changes import Bounded, ObjectValues
 from .properties import name_of
-from .types import Callback, Float, Interaction, Mask, Rotation, Texture
+from .types import Callback, Interaction, Mask, Rotation, Texture
 
 #: What `meshes.write_ply` calls a field of directions.
 ORIENTATION = "vertex_orientation"
@@ -24,8 +25,12 @@ ORIENTATION = "vertex_orientation"
 #: Of the plugin's `to_string`, where its windows follow places.
 PLACED = "coherence = surface"
 
+#: Points a side of the unit square of UV coordinates at which procedural textures are checked.
+_POINTS = 32
+
 _MADE = "make it with 'mitsuba-diffraction tangents MESH -o FIELD.ply', and use that file"
 _READ = re.compile(r'MeshAttribute\[\s*name = "([^"]+)"')
+_STRETCHES = re.compile(r'lateral_scale = MeshAttribute\[\s*name = "([^"]+)"')
 
 
 def check_attributes(shape: Any, number: int | None = None) -> None:
@@ -44,13 +49,19 @@ def check_attributes(shape: Any, number: int | None = None) -> None:
     DiffractionError
         Which names the attribute, and how to get one of directions.
     """
-    if PLACED in str(shape.bsdf()) and shape.is_mesh() and not shape.has_vertex_texcoords():
+    if PLACED in str(shape.bsdf()) and shape.is_mesh() and not has_texcoords(shape):
         raise DiffractionError(
             f"{name_of(shape, number)} has no UV coordinates, from which coherence='surface' has "
             "places on the surface; unwrap it, or use coherence='ensemble'"
         )
+    stretching = _STRETCHES.findall(str(shape.bsdf()))
     for name in dict.fromkeys(_READ.findall(str(shape.bsdf()))):
         if np.all(shape.has_attribute(name)):
+            if name in stretching and (least := _least(shape, name)) <= 0.0:
+                raise DiffractionError(
+                    f"{name_of(shape, number)}: lateral_scale reads the attribute {name}, whose "
+                    f"least number is {least:g}; factors must be above 0"
+                )
             continue
         if not shape.is_mesh():
             remedy = "only meshes have any: leave the texture out, or use a mesh"
@@ -62,6 +73,11 @@ def check_attributes(shape: Any, number: int | None = None) -> None:
         )
 
 
+def _least(shape: Any, name: str) -> float:
+    """Return the least number of a mesh attribute."""
+    return float(np.array(mi.traverse(shape)[name]).min())
+
+
 def is_bitmap(texture: Texture) -> bool:
     """Whether a texture is a bitmap, whose values can be read."""
     return str(texture).startswith("BitmapTexture[")
@@ -70,6 +86,29 @@ def is_bitmap(texture: Texture) -> bool:
 def is_attribute(texture: Texture) -> bool:
     """Whether a texture is a mesh attribute, which has values on that mesh only."""
     return str(texture).startswith("MeshAttribute[")
+
+
+def range_of(texture: Texture) -> tuple[float, float] | None:
+    """Return the least and the largest number of a texture; None for mesh attributes.
+
+    Procedural textures are asked at points of the unit square of UV coordinates.
+    """
+    if is_attribute(texture):
+        return None
+    if is_bitmap(texture):
+        numbers = np.array(mi.traverse(texture)["data"], float)
+    else:
+        numbers = np.concatenate([np.ravel(texture.eval_1(si, True)) for si in uv_square()])
+    return float(numbers.min()), float(numbers.max())
+
+
+def uv_square() -> Iterator[Interaction]:
+    """Yield hits at points of the unit square of UV coordinates, singly in scalar variants."""
+    places = (np.indices((_POINTS, _POINTS)).reshape(2, -1).astype(np.float32) + 0.5) / _POINTS
+    for part in [places] if dr.is_jit_v(mi.Float) else places.T.tolist():
+        si = dr.zeros(mi.SurfaceInteraction3f)
+        si.uv = mi.Point2f(part)
+        yield si
 
 
 def require_raw(texture: Texture, parameter: str, meaning: str) -> None:
@@ -85,71 +124,6 @@ def require_raw(texture: Texture, parameter: str, meaning: str) -> None:
             f"{parameter}: the bitmap is not raw, so that Mitsuba takes {meaning} for colours; "
             'add <boolean name="raw" value="true"/> to the texture ("raw": True in Python)'
         )
-
-
-#: Flatter would be lost in single precision.
-LEAST_SCALE = 1e-30
-
-
-class VaryingHeightScale:
-    """A texture's or mesh attribute's number at each point, from 0 to `high`.
-
-    Parameters
-    ----------
-    texture : of one channel; a bitmap is raw.
-    most : the largest factor, which mesh attributes and procedural textures must be given; None
-        for a bitmap's own.
-
-    Attributes
-    ----------
-    high : the largest factor; what is larger is taken for it.
-    """
-
-    def __init__(self, texture: Texture, most: float | None) -> None:
-        self.texture, self._is_bitmap = texture, is_bitmap(texture)
-        if not self._is_bitmap and most is None:
-            raise DiffractionError(
-                "height_scale of a texture that is no bitmap, or of a mesh attribute, needs "
-                "height_scale_max, the largest factor that it has"
-            )
-        require_raw(texture, "height_scale", "factors")
-        self.high = self.range()[1] if most is None else most
-        if not 0.0 < self.high <= 1e3:  # also refuses NaN
-            described = "its largest factor" if most is None else "height_scale_max"
-            raise DiffractionError(
-                f"height_scale: {described}, {self.high:g}, must be above 0 and at most 1000"
-            )
-        if refused := self.refusal():
-            raise DiffractionError(refused)
-        self.changeable = (ObjectValues("height_scale", texture),)
-
-    def range(self) -> tuple[float, float]:
-        """Return the smallest and the largest factor, as far as known."""
-        if not self._is_bitmap:
-            return 0.0, self.high
-        values = np.array(mi.traverse(self.texture)["data"], float)
-        return float(values.min()), float(values.max())
-
-    def at(self, si: Interaction, active: Mask) -> Float:
-        """Return the factor at points of the surface."""
-        return index_between(self.texture.eval_1(si, active), LEAST_SCALE, self.high)
-
-    def refusal(self) -> str | None:
-        """Reason why the bitmap's height scales are not allowed, or None."""
-        low, high = self.range()
-        if low >= 0.0 and high <= self.high * (1.0 + 1e-6):
-            return None
-        return (
-            f"height_scale: the bitmap's factors go from {low:g} to {high:g}; they must be between "
-            f"0 and {self.high:g}"
-        )
-
-    def traverse(self, callback: Callback) -> None:
-        """Expose the texture."""
-        callback.put("height_scale", self.texture, mi.ParamFlags.Differentiable)
-
-    def __str__(self) -> str:
-        return " ".join(str(self.texture).split())
 
 
 #: Degrees; much larger ones leave no digits of the angle in single precision.

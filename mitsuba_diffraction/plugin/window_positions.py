@@ -22,7 +22,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..tables.table import DiffractionTable
-from .directions import in_patch
+from .directions import PatchFrame
 from .memory import index_between
 from .types import Float, Interaction, Rotation, Vector2f
 
@@ -76,17 +76,17 @@ class WindowPositions:
         self._patches = mi.Vector2f(1.0 / extent[0], 1.0 / extent[1])  # a µm
         dr.make_opaque(self._scale, self._patches)
 
-    def at(self, si: Interaction, rotation: Rotation) -> list[Window]:
+    def at(self, si: Interaction, frame: PatchFrame) -> list[Window]:
         """Return the windows at points of the surface, one or three."""
         position = self._position(si)
         if not self._random:
-            return [self._window(position, rotation, mi.Vector2f(0.0), mi.Float(1.0))]
+            return [self._window(position, frame, mi.Vector2f(0.0), mi.Float(1.0))]
         corners, weights = _triangle(position / self._side)
         norm = dr.rsqrt(sum(dr.square(w) for w in weights))
         windows = []
         for corner, weight in zip(corners, weights, strict=True):
             offset = position - self._side * _unskewed(corner)
-            windows.append(self._window(offset, rotation, _shift(corner), weight * norm))
+            windows.append(self._window(offset, frame, _shift(corner), weight * norm))
         return windows
 
     def _position(self, si: Interaction) -> Vector2f:
@@ -98,10 +98,10 @@ class WindowPositions:
         return mi.Vector2f(uv.x, dr.mulsign(uv.y, dr.dot(si.dp_dv, t))) * self._scale
 
     def _window(
-        self, position: Vector2f, rotation: Rotation, shift: Vector2f, weight: Float
+        self, position: Vector2f, frame: PatchFrame, shift: Vector2f, weight: Float
     ) -> Window:
         """Return the window at a position (µm), shifted by so many patches."""
-        return Window.of(in_patch(position, rotation) * self._patches + shift - 0.5, weight)
+        return Window.of(frame.position(position) * self._patches + shift - 0.5, weight)
 
     def __str__(self) -> str:
         return self._name

@@ -18,6 +18,7 @@ from typing import Any
 
 from ..errors import DiffractionError, one_line, warn
 from ..files import readable_file
+from ..plugin.meshes import has_texcoords
 from ..plugin.properties import name_of
 from ..plugin.textures import check_attributes
 from .parameters import check_parameters, refuse_pipes
@@ -42,6 +43,8 @@ _UNUSED = re.compile(r"Found unused parameters?: (?P<list>.*)")
 _PLUGIN = re.compile(r"\[[A-Z]\w+\] ")
 # mi.load_file's own arguments: a scene parameter of that name could not be passed.
 _TAKEN = ("path", "parallel", "optimize")
+# Dr.Jit's names of the backends that need a GPU
+_GPUS = {"cuda": "CUDA", "metal": "Metal"}
 
 
 def set_variant(name: str | None) -> str:
@@ -54,19 +57,20 @@ def set_variant(name: str | None) -> str:
     import drjit as dr
     import mitsuba as mi
 
-    has_gpu = (name is None or name.startswith("cuda")) and dr.has_backend(dr.JitBackend.CUDA)
     if name is None:
-        name = "cuda_ad_spectral" if has_gpu else "llvm_ad_spectral"
+        name = "cuda" if dr.has_backend(dr.JitBackend.CUDA) else "llvm"
+        name += "_ad_spectral"
     if name not in mi.variants():
         raise DiffractionError(
             f"--mode: there is no variant {name!r}; there are {', '.join(mi.variants())}"
         )
-    if name.startswith("cuda") and not has_gpu:
+    backend = name.partition("_")[0]
+    if backend in _GPUS and not dr.has_backend(getattr(dr.JitBackend, _GPUS[backend])):
         raise DiffractionError(
-            f"--mode {name}: no CUDA device answers; use "
-            f"{name.replace('cuda', 'llvm', 1)}, or install an NVIDIA driver"
+            f"--mode {name}: no {_GPUS[backend]} device answers; use "
+            f"{name.replace(backend, 'llvm', 1)}, or install the driver of the GPU"
         )
-    if name.startswith("llvm"):
+    if backend == "llvm":
         from ..plugin.llvm import require_llvm  # an unsuitable LLVM ends the process
 
         require_llvm()
@@ -145,7 +149,7 @@ def _warn_of_missing_uv(surfaces: Mapping[int, Any]) -> None:
     lacking = [
         name_of(shape, number)
         for number, shape in surfaces.items()
-        if shape.is_mesh() and not shape.has_vertex_texcoords()
+        if shape.is_mesh() and not has_texcoords(shape)
     ]
     if lacking:
         warn(

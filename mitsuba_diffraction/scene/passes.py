@@ -27,7 +27,7 @@ GROUP = 8
 
 # Samples in a pass: seconds on a few cores, well below a second on a GPU, and far from where
 # wavefronts exhaust the memory. Fixed, so that a seed gives the same random numbers everywhere.
-_SAMPLES = {"llvm": 2**21, "cuda": 2**24}
+_SAMPLES = {"llvm": 2**21, "cuda": 2**24, "metal": 2**24}
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ energy             the directional albedo, and the scales that conserve energy
 sampling           densities to draw directions from
 order_mixture      orders for integrals: strong ones, and a density of all others
 colour             the sum over daylight's spectrum
+orders             solved efficiencies of a periodic profile's orders
 store              the cache of all of these
 """
 

@@ -8,7 +8,6 @@ and their colours, `tables.energy.store` the scales that conserve energy.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import hashlib
 import json
 import math
@@ -22,6 +21,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import platformdirs
+from filelock import FileLock
 from numpy.typing import NDArray
 
 from ..atomic import atomic_path, remove_abandoned
@@ -134,19 +134,18 @@ def _from_disk(
 @contextlib.contextmanager
 def _locked(path: Path) -> Iterator[None]:
     """Hold the lock of a file among all processes; where there are no locks, do nothing."""
-    lock = path.with_suffix(".lock")
-    with contextlib.ExitStack() as release:
-        with contextlib.suppress(OSError):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            while True:
-                handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o600)
-                release.callback(os.close, handle)
-                fcntl.flock(handle, fcntl.LOCK_EX)
-                with contextlib.suppress(FileNotFoundError):
-                    if os.path.samestat(os.fstat(handle), os.stat(lock)):
-                        break  # else whoever had it has removed it
-            release.callback(lock.unlink, missing_ok=True)
+    lock = FileLock(path.with_suffix(".lock"))
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lock.acquire()
+    try:
         yield
+    finally:
+        if lock.is_locked:
+            # whoever waits for it makes another; Windows removes the file on release
+            with contextlib.suppress(OSError):
+                os.unlink(lock.lock_file)
+            lock.release()
 
 
 def _found(path: Path, title: str, unpack: Callable[[Record], T]) -> T | None:

@@ -1,4 +1,4 @@
-"""`python -m tests.fuzz`: random cases until the time is up; exit code 1 if any of them failed."""
+"""`python -m tests.fuzz`: random cases, for a time or a number; exit code 1 if any failed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +42,9 @@ _SHARES = {
     "tables": 0.1, "documents": 0.1, "heights": 0.1, "texts": 0.05, "cache": 0.1, "scenes": 0.05,
     "commands": 0.15, "surfaces": 0.15, "light": 0.15, "updates": 0.05,
 }  # fmt: skip
+#: Cases of each kind that take about a second together.
+ROUND = {"tables": 60, "documents": 100, "heights": 40, "texts": 30, "commands": 15, "surfaces": 2}
+ROUND |= {"cache": 10, "scenes": 20, "light": 2, "updates": 1}
 #: Seconds of the processor, and by the clock of a busy machine, that a case may take; most take
 #: less than one, and some where kernels are compiled on a slow machine.
 _BUSY, _HANG = 40, 300
@@ -66,6 +69,10 @@ def main() -> int:
     """Start the workers, and collect what they found."""
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument(
+        "--rounds", type=int,
+        help="instead of a time: so many times the few cases of tests/fuzz/test_fuzz.py",
+    )  # fmt: skip
     parser.add_argument("--seed", type=int, default=None, help="default: a new one, printed")
     parser.add_argument("--kind", choices=KINDS, action="append", help="default: all")
     parser.add_argument("--case", type=int, help="this one only, with --seed and --kind")
@@ -87,12 +94,14 @@ def main() -> int:
 
 def _supervise(args: argparse.Namespace, kinds: list[str], seed: int) -> int:
     """Run the workers in processes of their own, which may die."""
+    start = time.monotonic()
     failed, counts = [], dict.fromkeys(kinds, 0)
     with tempfile.TemporaryDirectory() as folder:
         workers = []
         for n in range(args.jobs):
             log = Path(folder, f"{n}.jsonl")
             words = ["--seed", seed, "--seconds", args.seconds, "--jobs", args.jobs]
+            words += [] if args.rounds is None else ["--rounds", args.rounds]
             words += ["--worker", n, "--log", log, *(w for k in kinds for w in ("--kind", k))]
             command = [sys.executable, "-m", "tests.fuzz", *map(str, words)]
             workers.append((log, subprocess.Popen(command)))
@@ -111,28 +120,41 @@ def _supervise(args: argparse.Namespace, kinds: list[str], seed: int) -> int:
         repeat = f"--kind {entry['kind']} --seed {seed} --case {entry['number']}"
         print(f"FAILED python -m tests.fuzz {repeat}: {entry['text']}")
     print(", ".join(f"{count} {kind}" for kind, count in counts.items()), end="")
-    print(f" in {args.seconds:.0f} s: {len(failed)} failed")
+    print(f" in {time.monotonic() - start:.0f} s: {len(failed)} failed")
     return 1 if failed else 0
 
 
 def _work(args: argparse.Namespace, kinds: list[str], seed: int) -> int:
-    """Cases until the time is up: each is logged before it begins, and again if it fails."""
+    """Run cases: each is logged before it begins, and again if it fails."""
     _prepare()
+    cases = _timed(args, kinds) if args.rounds is None else _counted(args, kinds)
+    with own_program(), args.log.open("w", encoding="utf-8", buffering=1) as log:
+        for kind, number in cases:
+            entry = {"kind": kind, "number": number}
+            print(json.dumps(entry), file=log)
+            text = _failure(kind, seed, number)
+            if text:
+                print(json.dumps(entry | {"text": text}), file=log)
+    return 0
+
+
+def _timed(args: argparse.Namespace, kinds: list[str]) -> Iterator[tuple[str, int]]:
+    """Yield a worker's cases until the time is up, each kind for its share of it."""
     start = time.monotonic()
     spent = dict.fromkeys(kinds, 0.0)
     number = dict.fromkeys(kinds, args.worker)
-    with own_program(), args.log.open("w", encoding="utf-8", buffering=1) as log:
-        while time.monotonic() - start < args.seconds:
-            kind = min(kinds, key=lambda k: spent[k] / _SHARES[k])
-            entry = {"kind": kind, "number": number[kind]}
-            print(json.dumps(entry), file=log)
-            begin = time.monotonic()
-            text = _failure(kind, seed, number[kind])
-            if text:
-                print(json.dumps(entry | {"text": text}), file=log)
-            spent[kind] += time.monotonic() - begin
-            number[kind] += args.jobs
-    return 0
+    while (begin := time.monotonic()) - start < args.seconds:
+        kind = min(kinds, key=lambda k: spent[k] / _SHARES[k])
+        yield kind, number[kind]
+        spent[kind] += time.monotonic() - begin
+        number[kind] += args.jobs
+
+
+def _counted(args: argparse.Namespace, kinds: list[str]) -> Iterator[tuple[str, int]]:
+    """Yield a worker's cases of `--rounds`: the same on every machine, however fast."""
+    for kind in kinds:
+        for number in range(args.worker, args.rounds * ROUND[kind], args.jobs):
+            yield kind, number
 
 
 def _failure(kind: str, seed: int, number: int) -> str:

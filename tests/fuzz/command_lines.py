@@ -23,7 +23,7 @@ _LINES, _CHARACTERS = 30, 560
 _VALUES = (
     "0", "1", "-1", "0.5", "3", "1e-3", "550", "400", "700", "1e300", "-1e300", "nan", "inf", "abc",
     "", " ", "x" * 3000, "é", "a=b", "resx=4", "none", "Al", "1.5", "out.png", "out.exr", "out.ply",
-    "out.json", "out.html", "missing/out.exr", "lut", "spectral", "flss", "pq", "plane", "smooth",
+    "out.json", "out.html", "missing/out.exr", "fast", "spectral", "flss", "pq", "plane", "smooth",
     "harmonic", "10,20", "0:90", "scalar_rgb", "scalar_spectral",
 )  # fmt: skip
 _SCENE = """<scene version="3.0.0"><default name="resx" value="6"/>

@@ -29,6 +29,8 @@ PARAMETERS = {
     "height_scale": ({"material": "none"}, 0.9, 2e-3),
     # the bound of R = 1 has 16 nodes from one order to the next: a wider step straddles more kinks
     "orientation": ({"material": "none"}, 20.0, 0.02),
+    # differences of narrow lobes bend: 16 nm of 1.6 µm are half a lobe of 5 µm
+    "lateral_scale": ({"material": "none", "lateral_scale": 0.9}, 0.9, 5e-4),
     "eta": ({"int_ior": 1.5}, 1.6, 1e-3),
     "eta.value": ({"eta": 0.9, "k": 6.0}, 0.9, 1e-3),
     "k.value": ({"eta": 0.9, "k": 6.0}, 6.0, 1e-2),

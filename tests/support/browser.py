@@ -73,8 +73,11 @@ def load_scene() -> Any:
 class Tab:
     """A page that is open, with all that it says and asks for."""
 
-    def __init__(self, browser: Any, size: tuple[int, int], script: str = "") -> None:
-        self.page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+    def __init__(
+        self, browser: Any, size: tuple[int, int], script: str = "", phone: bool = False
+    ) -> None:
+        kind = {"has_touch": True, "is_mobile": True, "device_scale_factor": 2} if phone else {}
+        self.page = browser.new_page(viewport={"width": size[0], "height": size[1]}, **kind)
         self.page.set_default_timeout(PATIENCE)
         self.said: list[str] = []
         self.asked: list[str] = []

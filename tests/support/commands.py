@@ -24,7 +24,7 @@ SMALL = {
     "brdf-map": ["--resolution", "24", "--step", "50", "--samples", "1"],
     "evaluate": ["--step", "50", "--angle-step", "2", "--windows", "2", "--coherence-width", "10"],
     "sweep": ["--coherence-width", "10", "--resolution", "12", "--step", "100", "--no-compiled"],
-    "export-viewer": ["--method", "spectral"],
+    "export-viewer": ["--method", "exact"],
     "export-shader": ["--coherence-width", "4", "--tolerance", "0.05"],
     "survey": ["--coherence-width", "4", "--tolerance", "0.05", "--resolution", "16"],
 }

@@ -38,7 +38,7 @@ def of_the_desktop(scene: Any, frames: int) -> NDArray[np.float32]:
         renderer = Renderer(scene)
     except DiffractionError as error:
         pytest.skip(str(error))
-    light = renderer.progressive("lut")
+    light = renderer.progressive("fast")
     light.advance(frames)
     found: NDArray[np.float32] = light.image
     light.release()

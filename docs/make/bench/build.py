@@ -23,9 +23,10 @@ from mitsuba_diffraction.analysis.timing import PIXEL
 from mitsuba_diffraction.errors import DiffractionError
 from mitsuba_diffraction.heights import HeightField, gratings
 from mitsuba_diffraction.progress import Progress
+from mitsuba_diffraction.system import peak_memory
 from mitsuba_diffraction.tables import DiffractionTable
 
-from .figures import Goal, Plan, Row, Section, peak_memory
+from .figures import Goal, Plan, Row, Section
 
 _COLUMNS = ("s", "s of all cores", "GB at most", "GB above the import", "error/tolerance")
 #: Side of the patch: seconds and GB that its table may take at the default tolerance.

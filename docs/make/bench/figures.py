@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import resource
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -150,15 +148,3 @@ def _numbers(run: Mapping[str, Any]) -> Iterator[tuple[tuple[str, str, str], flo
         for row in section["rows"]:
             for column, value in row["values"].items():
                 yield (name, row["name"], column), value
-
-
-def peak_memory() -> int:
-    """Most bytes that this process has had in memory at once."""
-    status = Path("/proc/self/status")
-    if status.is_file():
-        # ru_maxrss of a child starts at what its parent had when it was started; this does not
-        for line in status.read_text(encoding="ascii", errors="replace").splitlines():
-            if line.startswith("VmHWM:"):
-                return 1024 * int(line.split()[1])
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else 1024 * peak

@@ -1,7 +1,7 @@
 """Picture and tables of docs/realtime.md, from measurements by `compare`.
 
 mitsuba-diffraction compare scenes/snake.xml --method all -o out/compare/snake
-mitsuba-diffraction compare scenes/cd.xml --method lut spectral -o out/compare/cd
+mitsuba-diffraction compare scenes/cd.xml --method fast exact -o out/compare/cd
 python -m docs.make.figures.realtime out/compare/snake out/compare/cd
 """
 
@@ -22,8 +22,8 @@ PAGE = Path("docs", "realtime.md")
 #: Beside the page; the picture that it shows is that of the default method.
 SHEET = Path("images", "realtime.jpg")
 
-_OURS = ("lut", "spectral")
-_METHOD, _WIDTH = "lut", 1600
+_OURS = ("fast", "exact")
+_METHOD, _WIDTH = "fast", 1600
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -57,7 +57,7 @@ def _tables(files: Sequence[Path]) -> str:
     documents = [
         from_json(
             file, _complete, writer="compare",
-            remedy="run compare with the methods lut and spectral, or all",
+            remedy="run compare with the methods fast and exact, or all",
         )
         for file in files
     ]  # fmt: skip
@@ -83,7 +83,7 @@ def _of_sheet(folder: Path) -> str:
 
 
 def scenes_table(documents: Sequence[dict[str, Any]]) -> str:
-    """Deviations of `lut` and `spectral` in some scenes, over all pixels."""
+    """Deviations of `fast` and `exact` in some scenes, over all pixels."""
     head = "| scene |" + "".join(
         f" `{m}`, ΔE2000 mean | 99 % | noise, mean | 99 % |" for m in _OURS
     )

@@ -2,8 +2,8 @@
 
 A surface between two dielectrics, or a thin sheet with one structured side, that light meets from
 either side. It has the parameters of `diffraction` for the heights, the table (without
-`coherence=surface`), `orientation`, `height_scale` and `wavelength`, and those below. It has no
-coat, film, nested BSDF, shadowing or second order.
+`coherence=surface`), `orientation`, `lateral_scale`, `height_scale` and `wavelength`, and those
+below. It has no coat, film, nested BSDF, shadowing or second order.
 
 The dielectric
 --------------
@@ -19,7 +19,7 @@ model : string [small_slope]
 energy_conserving : boolean [true]
     Makes R + T 1, since a dielectric loses no light: order 0 is multiplied by c(ωi) c(ωo), c on the
     directions of both sides. Where the other orders of a steep surface exceed 1 on their own, all
-    light is attenuated by t(ωi) t(ωo). It takes a few seconds the first time and is kept in the
+    light is attenuated by s(ωi) s(ωo). It takes a few seconds the first time and is kept in the
     cache, in steps of 0.01 of eta. `false` is the model as it is, for checks.
 
 The model is that of `diffraction` where light is reflected; light that goes through has orders of
@@ -65,7 +65,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ..boundary import Boundary, Jones, Kirchhoff, SmallSlope, mueller
-from ..directions import Pair, TablePoint, from_patch
+from ..directions import Pair, PatchFrame, TablePoint
 from ..fresnel import Inside, squared
 from ..layers import CoatedPair, transmittances
 from ..parameter_changes import check_parameters
@@ -79,7 +79,6 @@ from ..types import (
     Interaction,
     Mask,
     Properties,
-    Rotation,
     Sample,
     Spectrum,
     Vector2f,
@@ -95,7 +94,7 @@ from .crossing import (
     out_of_sheet,
     tangent_plane,
 )
-from .energy import SidesModel
+from .energy import DielectricEnergy
 from .parameters import read_parameters
 
 _LEAST_SHARE = 0.1
@@ -116,7 +115,6 @@ class DiffractionDielectric(DiffractingSurface):
     material : the dielectric.
     boundary, inner_boundary : models of light that is reflected above and below the surface.
     thin : whether the side below is beyond the flat side of a sheet.
-    balance : scales by which both sides add up to 1, or None.
     """
 
     #: Feature that shaders do not support.
@@ -131,9 +129,9 @@ class DiffractionDielectric(DiffractingSurface):
             self.boundary.of(inside) if isinstance(self.boundary, SmallSlope) else Kirchhoff(inside)
         )
         self.mirror = Kirchhoff(self.material)
-        self.balance = None
+        self._energy = None
         if read.surface.energy_conserving:
-            self.balance = SidesModel(
+            self._energy = DielectricEnergy(
                 self.table, self.material, str(self.boundary), self.thin, self.wavelength
             )
         sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide | mi.BSDFFlags.Anisotropic
@@ -162,29 +160,29 @@ class DiffractionDielectric(DiffractingSurface):
         cos_i, cos_o = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
         asked = _asked(ctx)
         share = self._reflected_share(cos_i, asked)
-        rotation = self.orientation.rotation(si, active)
+        frame = self.frame_at(si, active)
         value, density = mi.Spectrum(0.0), mi.Float(0.0)
         # c(ωi) c(ωo), by which order 0 makes up for what R + T lacks or exceeds
         change, where = None, (self.power.wavenumbers(si), self.scale_at(si, active))
-        if self.balance is not None and self.balance.scales_order_0:
-            change = self.balance.order_0_scale((si.wi, wo), rotation, *where)
+        if self._energy is not None and self._energy.scales_order_0:
+            change = self._energy.order_0_scale((si.wi, wo), frame, *where)
         if asked.reflection:
             for reflected, sign in ((self._above, 1.0), (self._below, -1.0)):
                 lit = active & (sign * cos_i > 0.0) & (cos_i * cos_o > 0.0)
-                side, orders = reflected(ctx, si, wo, rotation, lit, change)
+                side, orders = reflected(ctx, si, wo, frame, lit, change)
                 value = dr.select(lit, side, value)
                 density = dr.select(lit, share * with_even_share(orders), density)
         if asked.transmission:
             lit = active & (cos_i * cos_o < 0.0)
-            crossing = Crossing(si, wo, rotation, lit, self.material.eta, self.thin)
+            crossing = Crossing(si, wo, frame, lit, self.material.eta, self.thin)
             passed = self._transmitted(ctx, si, crossing, change) * dr.abs(cos_o)
             value = dr.select(lit, passed, value)
             out = Sides.of(self.material.eta, self.thin, cos_i > 0.0).out
             orders = self.power.density(crossing, self.scale_at(si, active), si) * dr.square(out)
             density = dr.select(lit, (1.0 - share) * with_even_share(orders), density)
-        if self.balance is not None and self.balance.attenuates:
-            # t(ωi) t(ωo), where the orders of a steep surface exceed 1 on their own
-            value *= mi.Spectrum(self.balance.attenuation((si.wi, wo), rotation, *where))
+        if self._energy is not None and self._energy.attenuates:
+            # s(ωi) s(ωo), where the orders of a steep surface exceed 1 on their own
+            value *= mi.Spectrum(self._energy.attenuation((si.wi, wo), frame, *where))
         return value, density
 
     def sample(
@@ -217,8 +215,8 @@ class DiffractionDielectric(DiffractingSurface):
             sample2,
             si,
         )
-        rotation = self.orientation.rotation(si, active)
-        total = sign * from_patch(drawn, rotation) - into * mi.Vector2f(si.wi.x, si.wi.y)
+        drawn = sign * self.frame_at(si, active).from_table(drawn)
+        total = drawn - into * mi.Vector2f(si.wi.x, si.wi.y)
         wo = dr.select(
             sample1 < EVEN, mi.warp.square_to_uniform_hemisphere(sample2), direction_of(total / out)
         )
@@ -247,12 +245,12 @@ class DiffractionDielectric(DiffractingSurface):
         ctx: Context,
         si: Interaction,
         wo: Vector3f,
-        rotation: Rotation,
+        frame: PatchFrame,
         lit: Mask,
         change: Colour | None,
     ) -> tuple[Spectrum, Float]:
         """Return f cosθo and density of light that stays above the surface."""
-        scale, pair = self.scale_at(si, lit), Pair(si, wo, rotation, lit)
+        scale, pair = self.scale_at(si, lit), Pair(si, wo, frame, lit)
         power = self.geometry(pair) * self._power(si, pair, scale, change)
         value = self.lobe(ctx, si, pair, self.boundary, power, lit)
         if self.thin:
@@ -264,21 +262,21 @@ class DiffractionDielectric(DiffractingSurface):
         ctx: Context,
         si: Interaction,
         wo: Vector3f,
-        rotation: Rotation,
+        frame: PatchFrame,
         lit: Mask,
         change: Colour | None,
     ) -> tuple[Spectrum, Float]:
         """Return f cosθo and density of light that stays below the surface, or below a sheet."""
         n, scale = self.material.eta, self.scale_at(si, lit)
         if self.thin:
-            outer = Turned(si, wo, rotation, lit, mi.Float(1.0))
+            outer = Turned(si, wo, frame, lit, mi.Float(1.0))
             pair = CoatedPair(outer, n)
             power = self.geometry(pair) * self._power(si, pair, scale, change)
             value = self.lobe(ctx, si, pair, self.inner_boundary, power, lit)
             face = self.face(ctx, si, outer, self.mirror, lit)
             value += face if change is None else mi.Spectrum(change) * face
             return value, self.power.density(outer, scale * n, si)
-        inner = Turned(si, wo, rotation, lit, n)
+        inner = Turned(si, wo, frame, lit, n)
         power = self.geometry(inner) * self._power(si, inner.place, scale, change)
         # a new mask, for the caller's stays as it is: tables do not reach farther
         lit = lit & inner.reached
@@ -298,7 +296,8 @@ class DiffractionDielectric(DiffractingSurface):
             returned.append(0.5 * sum(t * (1.0 - t) * dr.rcp(2.0 - t) for t in passed))
         point = TablePoint(pair.uv, dr.sqrt(dr.fma(ends[0], ends[0], dr.square(ends[1]))))
         power = self._power(si, point, scale, change)
-        factor = self.area_factor * dr.safe_sqrt(returned[0] * returned[1]) * pair.cos_o
+        ends_factor = dr.safe_sqrt(returned[0] * returned[1])
+        factor = self.area_factor * pair.frame.area * ends_factor * pair.cos_o
         return mi.depolarizer(power * factor)
 
     def _power(
@@ -333,7 +332,7 @@ class DiffractionDielectric(DiffractingSurface):
         flat = self._factor(ctx, si, crossing, axes, [order_0(crossing, axes, self.thin)])
         value = mi.Spectrum((power - zeroth) * per_w) * others
         value += mi.Spectrum(zeroth if change is None else zeroth * change) * flat
-        outside = mi.Float(self.area_factor)
+        outside = mi.Float(self.area_factor * crossing.frame.area)
         if not self.thin:
             # Radiance over n² is transmitted; light along ωi or ωo
             down = mi.Frame3f.cos_theta(si.wi) > 0.0
@@ -414,21 +413,21 @@ class DiffractionDielectric(DiffractingSurface):
     def derive(self) -> None:
         """Compute what depends on the parameters: the index, and scales of both sides."""
         self.material.derive()
-        if self.balance is not None:
-            self.balance.update(*self.scale_range())
+        if self._energy is not None:
+            self._energy.update(*self.scale_range())
         self.freeze(
-            (self.balance, self.boundary, self.inner_boundary, self.mirror),
+            (self._energy, self.boundary, self.inner_boundary, self.mirror),
             self.thin,
             str(self.boundary),
-            self.balance is not None and self.balance.scales_order_0,
-            self.balance is not None and self.balance.attenuates,
+            self._energy is not None and self._energy.scales_order_0,
+            self._energy is not None and self._energy.attenuates,
         )
 
     def to_string(self) -> str:
         """Describe all parameters, for people."""
         more = {"thin": "true" if self.thin else "false"}
         return self.described(
-            "DiffractionDielectric", str(self.boundary), self.balance is not None, more
+            "DiffractionDielectric", str(self.boundary), self._energy is not None, more
         )
 
 

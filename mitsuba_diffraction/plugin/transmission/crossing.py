@@ -11,10 +11,10 @@ import drjit as dr
 import mitsuba as mi
 
 from ..boundary import LEVEL, Jones, turn, turned
-from ..directions import Pair, TablePoint, in_patch
+from ..directions import Pair, PatchFrame, TablePoint
 from ..fresnel import root
 from ..layers import transmittances
-from ..types import Float, Interaction, Mask, Rotation, Vector3f
+from ..types import Float, Interaction, Mask, Vector3f
 
 #: Least |w|: where n cosθt and cosθi are alike the power of an order other than 0 over w² has a
 #: limit, which single precision loses in the difference of all orders and order 0.
@@ -31,11 +31,11 @@ class Turned(Pair):
 
     above = False
 
-    def __init__(self, si: Interaction, wo: Vector3f, rotation: Rotation, active: Mask, n: Float):
+    def __init__(self, si: Interaction, wo: Vector3f, frame: PatchFrame, active: Mask, n: Float):
         side = mi.Vector3f(1.0, 1.0, -1.0)
         turned = mi.SurfaceInteraction3f(si)
         turned.wi = si.wi * side
-        super().__init__(turned, wo * side, rotation, active)
+        super().__init__(turned, wo * side, frame, active)
         self.uv, self.w = -n * self.uv, n * self.w
 
     @property
@@ -56,14 +56,14 @@ class Crossing:
     ----------
     above, below : directions where they are measured; inside : the one in the dielectric.
     place : of the look-up.
-    uv, w, cos_i, cos_o : what `PowerModel.density` asks of a pair.
+    uv, w, cos_i, cos_o, frame : what `PowerModel.density` asks of a pair.
     """
 
     def __init__(
         self,
         si: Interaction,
         wo: Vector3f,
-        rotation: Rotation,
+        frame: PatchFrame,
         active: Mask,
         n: Float,
         thin: bool,
@@ -72,10 +72,10 @@ class Crossing:
         level = mi.Vector3f(0.0, 0.0, 1.0)
         self.above = dr.select(active, dr.select(down, si.wi, wo), level)
         self.below = dr.select(active, dr.select(down, wo, si.wi), -level)
-        self.n = n
+        self.n, self.frame = n, frame
         self.inside = _inside(self.below, n) if thin else self.below
         self.q0, self.q = self.above.z, -n * self.inside.z
-        total = in_patch(self.above + n * self.inside, rotation)
+        total = frame.to_table(self.above + n * self.inside)
         w = self.q - self.q0
         reached = dr.squared_norm(total) < _FARTHEST**2
         self.active = active & reached
@@ -86,7 +86,7 @@ class Crossing:
         sides = Sides.of(n, thin, down)
         self.cos_i = sides.cosine(dr.abs(si.wi.z), n, down, thin)
         self.cos_o = dr.select(active, dr.abs(wo.z), 1.0)
-        self.uv, self.w = -in_patch(sides.into * si.wi + sides.out * wo, rotation), self.place.w
+        self.uv, self.w = -frame.to_table(sides.into * si.wi + sides.out * wo), self.place.w
 
 
 @dataclass(frozen=True)

@@ -12,16 +12,16 @@ from ...tables.energy import materials
 from ...tables.energy.store import Energy
 from ...tables.table import DiffractionTable
 from ..direction_lookup import DirectionLookup, scales_of
-from ..directions import in_patch
+from ..directions import PatchFrame
 from ..fresnel import Dielectric
 from ..layers import plain
-from ..types import Colour, Float, Rotation, Vector3f
+from ..types import Colour, Float, Vector3f
 
 #: Indices are rounded to this: an optimisation of one waits rarely, and sees c as constant.
 INDEX_STEP = 0.01
 
 
-class SidesModel:
+class DielectricEnergy:
     """Scales c and s of directions on either side, at the height scale and index last given.
 
     Parameters
@@ -76,35 +76,35 @@ class SidesModel:
     def order_0_scale(
         self,
         directions: tuple[Vector3f, Vector3f],
-        rotation: Rotation,
+        frame: PatchFrame,
         wavenumbers: list[Float],
         height_scale: Float,
     ) -> Colour:
         """c(ωi) c(ωo) per channel, of directions in the shading frame."""
-        return self._product(self._order_0, directions, rotation, wavenumbers, height_scale)
+        return self._product(self._order_0, directions, frame, wavenumbers, height_scale)
 
     def attenuation(
         self,
         directions: tuple[Vector3f, Vector3f],
-        rotation: Rotation,
+        frame: PatchFrame,
         wavenumbers: list[Float],
         height_scale: Float,
     ) -> Colour:
         """s(ωi) s(ωo) per channel, of directions in the shading frame."""
-        return self._product(self._all_light, directions, rotation, wavenumbers, height_scale)
+        return self._product(self._all_light, directions, frame, wavenumbers, height_scale)
 
     def _product(
         self,
         lookups: list[DirectionLookup],
         directions: tuple[Vector3f, Vector3f],
-        rotation: Rotation,
+        frame: PatchFrame,
         wavenumbers: list[Float],
         height_scale: Float,
     ) -> Colour:
         """Product of a scale at both directions, each on its side."""
         product = mi.UnpolarizedSpectrum(1.0)
         for direction in directions:
-            tangential, cosine = in_patch(direction, rotation), mi.Frame3f.cos_theta(direction)
+            tangential, cosine = frame.turned(direction), mi.Frame3f.cos_theta(direction)
             sides = zip(
                 lookups[0].at(tangential, cosine, wavenumbers, height_scale),
                 lookups[1].at(tangential, -cosine, wavenumbers, height_scale),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
+import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import DiffractionError
+from ...system import cores
 from .source import fragment_parts, plain_source, vertex_source
 from .texels import PAGE, Packed, Texture, Uniform
 
@@ -28,14 +29,17 @@ _KINDS = {
 
 
 def headless_context() -> Any:
-    """Create a moderngl context through EGL, on a graphics card or Mesa's software rasteriser.
+    """Create a moderngl context without a window, on a graphics card or Mesa's software rasteriser.
+
+    Linux needs EGL for it; macOS and Windows bring what is needed.
 
     Raises a DiffractionError if moderngl, EGL or a driver is missing, or the driver is older than
     OpenGL 3.3.
     """
     moderngl = require_moderngl()
     try:
-        context = moderngl.create_standalone_context(backend="egl")
+        backend = {"backend": "egl"} if sys.platform == "linux" else {}
+        context = moderngl.create_standalone_context(**backend)
     except Exception as error:  # moderngl raises plain Exception, glcontext too
         reason = " ".join(str(error).split())
         raise DiffractionError(
@@ -89,8 +93,8 @@ def clock_of(driver: str) -> Callable[[], float]:
     """
     if not _SOFTWARE.search(driver):
         return time.perf_counter
-    cores = len(os.sched_getaffinity(0))
-    return lambda: time.process_time() / cores
+    number = cores()
+    return lambda: time.process_time() / number
 
 
 def compile_program(

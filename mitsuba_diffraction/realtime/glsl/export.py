@@ -24,7 +24,7 @@ from .source import global_names, pruned, renamed, resolved, shader_file
 from .texels import PAGE, Packed, Texture, plain
 
 #: Methods that can be exported, and the names of their functions.
-EXPORTED = {"lut": "diffraction", "spectral": "diffraction_spectral"}
+EXPORTED = {"fast": "diffraction", "exact": "diffraction_exact"}
 
 _PREFIX = "md_"
 _HEAD = """// Diffraction of a measured surface, made by mitsuba_diffraction {version}: {surface}.
@@ -178,7 +178,7 @@ def export_shader(
 
 def _tables(method: str, bsdf: Any) -> Packed:
     """Pack the table of a BSDF for a method."""
-    if method == "lut":
+    if method == "fast":
         return pack_colours(cached_colours(bsdf.table), floats=True)
     daylight = (np.array([360.0, 830.0]), np.ones(2))
     return pack_powers(bsdf.table) | pack_responses([daylight])

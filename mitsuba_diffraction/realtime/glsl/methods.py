@@ -193,9 +193,9 @@ def method_tables(method: str, material: Material) -> Packed:
 
     Raises a DiffractionError if the method is unknown, or does not support the table.
     """
-    if method == "lut":
+    if method == "fast":
         return pack_colours(cached_colours(material.table))
-    if method == "spectral":
+    if method == "exact":
         return pack_powers(material.table)
     if method in THESIS_METHODS:
         heights = material.bsdf.heights()

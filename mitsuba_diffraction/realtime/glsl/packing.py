@@ -1,4 +1,4 @@
-"""Packing of tables as textures for the methods `lut` and `spectral` (NumPy only)."""
+"""Packing of tables as textures for the methods `fast` and `exact` (NumPy only)."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _ANGLES, _WAVELENGTHS = 129, 64  # nodes of a conductor's reflectance
 
 
 def pack_colours(table: ColourTable, *, floats: bool = False) -> Packed:
-    """Pack a colour table for `lut`.
+    """Pack a colour table for `fast`.
 
     floats : whether all textures are float (`FLOAT_TEXTURES`), for other programs.
     """
@@ -84,14 +84,14 @@ def _with_next(values: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def pack_powers(table: DiffractionTable) -> Packed:
-    """Pack a table's powers for `spectral`; amplitudes are converted to powers.
+    """Pack a table's powers for `exact`; amplitudes are converted to powers.
 
     Raises a DiffractionError for a coherent table (`coherence="patch"`), whose orders interfere.
     """
     if table.grid.coherent:
         raise DiffractionError(
-            "method spectral adds powers, but the table has coherence='patch', where amplitudes "
-            "interfere; use method lut"
+            "method exact adds powers, but the table has coherence='patch', where amplitudes "
+            "interfere; use method fast"
         )
     series, _, scale, expansion = power_series(table)
     record = Record.of(1, expansion.terms, unit=4)
@@ -185,7 +185,7 @@ def _grid(pages: int) -> dict[str, str]:
 
 
 def pack_responses(lights: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> Packed:
-    """Pack the contribution of each light's wavelengths to linear sRGB, for `spectral`.
+    """Pack the contribution of each light's wavelengths to linear sRGB, for `exact`.
 
     lights : wavelengths (n,) in nm of each light, and its spectrum relative to D65 of luminance 1,
         (n,), or (n, 3) in RGB variants. An empty list is packed as one dark light.

@@ -107,7 +107,7 @@ class Renderer:
         return str(self.context.info["GL_RENDERER"])
 
     def render(
-        self, method: str = "lut", *, supersampling: int = 4, size: tuple[int, int] | None = None
+        self, method: str = "fast", *, supersampling: int = 4, size: tuple[int, int] | None = None
     ) -> Image:
         """Render a picture (height, width, 4): linear sRGB and the coverage of each pixel.
 
@@ -172,7 +172,7 @@ class Renderer:
         camera : by default the scene's camera.
         exposure : factor on the light, for a screen by `view`; None leaves the picture linear.
         scale : height scale of all patches instead of the scene's; see `energy_for`.
-        coherence_width : coherence width of all patches instead of the scene's, µm; not for `lut`
+        coherence_width : coherence width of all patches instead of the scene's, µm; not for `fast`
             and `pq`, whose tables include it.
         """
         self.draw_lights(
@@ -187,7 +187,7 @@ class Renderer:
 
     def progressive(
         self,
-        method: str = "lut",
+        method: str = "fast",
         *,
         size: tuple[int, int] | None = None,
         camera: Camera | None = None,

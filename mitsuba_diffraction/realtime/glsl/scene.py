@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import DiffractionError
+from ...plugin.meshes import has_texcoords, mesh_arrays
 from ...plugin.properties import name_of
 from ...plugin.textures import check_attributes
 from ...scene.orientation.trimesh import grid_faces, texture_tangents
@@ -80,23 +81,19 @@ def _transformed(local: Triangles, to_world: Array, place: Array, normal: Array)
 
 def _mesh_triangles(shape: Any) -> Triangles:
     """Return the triangles of a mesh, each with the tangent of its texture coordinates."""
-
-    def buffer(values: Any, width: int) -> Array:
-        """Return the values of a vertex buffer at the corners of all triangles."""
-        return np.array(values, np.float64).reshape(-1, width)[corners]
-
-    corners = np.array(shape.faces_buffer(), np.int64).ravel()
-    positions = buffer(shape.vertex_positions_buffer(), 3)
+    mesh = mesh_arrays(shape)
+    corners = mesh.faces.ravel()
+    positions = mesh.positions[corners]
     sides = positions.reshape(-1, 3, 3)[:, 1:] - positions[::3, None]
     flat = np.cross(sides[:, 0], sides[:, 1])
     flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
     normals = np.repeat(flat, 3, axis=0)
-    if shape.has_vertex_normals():
-        normals = buffer(shape.vertex_normals_buffer(), 3)
+    if mesh.normals is not None:
+        normals = mesh.normals[corners]
     tangents = default_tangents(flat)
     texcoords = np.zeros((len(corners), 2))
-    if shape.has_vertex_texcoords():
-        texcoords = buffer(shape.vertex_texcoords_buffer(), 2)
+    if mesh.uv is not None:
+        texcoords = mesh.uv[corners]
         uv_sides = texcoords.reshape(-1, 3, 2)[:, 1:] - texcoords[::3, None]
         dp_du, _, area = texture_tangents(sides, uv_sides)
         tangents = np.where(area[:, None] != 0.0, dp_du, tangents)
@@ -288,7 +285,7 @@ def read_scene(scene: Any, sensor: int = 0) -> RealtimeScene:
 
 def _check_texcoords(shape: Any, name: str) -> None:
     """Refuse a mesh that diffracts but has no texture coordinates for its tangents."""
-    if shape.is_mesh() and diffracts(shape.bsdf()) and not shape.has_vertex_texcoords():
+    if shape.is_mesh() and diffracts(shape.bsdf()) and not has_texcoords(shape):
         raise DiffractionError(
             f"{name}: the mesh has no texture coordinates, which define the patch's axes; add "
             "them (u along the patch's x axis), or generate them with 'tangents'"

@@ -22,7 +22,7 @@ from .texels import PAGE
 Dialect = Literal["desktop", "web"]
 
 #: Methods of the fragment stage.
-METHODS = ("lut", "spectral", "flss", "nmm", "pq")
+METHODS = ("fast", "exact", "flss", "nmm", "pq")
 #: Methods of the 2014 thesis; `thesis.methods` evaluates them in NumPy.
 THESIS_METHODS = METHODS[2:]
 

@@ -72,8 +72,8 @@ def listed(name: str, entries: NDArray[np.generic]) -> Texture:
     rows = -(-count // PAGE)
     if rows > 1 << 14:
         raise DiffractionError(
-            f"a table of {entries.nbytes / 1e9:.1f} GB is too large for a texture; use method lut, "
-            "or a table with a larger tolerance"
+            f"a table of {entries.nbytes / 1e9:.1f} GB is too large for a texture; use method fast "
+            "or a table of a larger tolerance"
         )
     data = np.zeros((rows * PAGE, channels), entries.dtype)
     data[:count] = entries

@@ -61,7 +61,7 @@ class Viewer(moderngl_window.WindowConfig):
 
     mitsuba_scene: Any = None
     sensor = 0
-    method = "lut"
+    method = "fast"
     stops = 0.0
     view = "natural"
     folder = Path()
@@ -175,7 +175,7 @@ class Viewer(moderngl_window.WindowConfig):
     @property
     def _baked(self) -> bool:
         """Whether the method's table includes the coherence window."""
-        return self.method in ("lut", "pq")
+        return self.method in ("fast", "pq")
 
     @property
     def frame_ms(self) -> float:
@@ -324,7 +324,7 @@ def show(
     scene: Any,
     *,
     sensor: int = 0,
-    method: str = "lut",
+    method: str = "fast",
     stops: float = 0.0,
     view: str = "natural",
     size: tuple[int, int] = (1280, 800),

@@ -34,7 +34,7 @@ _STEP = 8  # frames between two reports of progress
 #: Only every `_SPARED`-th frame of methods other than `_QUICK` is drawn. Their difference from
 #: `_QUICK` with the same lights and samples has little noise; it is added to the picture of all
 #: frames by `_QUICK`.
-_QUICK, _SPARED = "lut", 8
+_QUICK, _SPARED = "fast", 8
 _IN_FRAME = 1 << 15  # samples that progressive light draws at once; fewer are not faster
 
 

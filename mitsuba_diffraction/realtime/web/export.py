@@ -249,9 +249,9 @@ def _fitted(
 ) -> tuple[list[str], Any, dict[str, str]]:
     """Return the methods whose tables fit, their tables, and why others are left out."""
     shown, left_out = list(methods), {}
-    if "spectral" in shown and any(table.grid.coherent for table in tables):
-        shown.remove("spectral")
-        left_out["spectral"] = "it has no interference of orders, which coherence='patch' requires"
+    if "exact" in shown and any(table.grid.coherent for table in tables):
+        shown.remove("exact")
+        left_out["exact"] = "it has no interference of orders, which coherence='patch' requires"
     while shown:
         packed = fitting_tables(shown, tables, room, progress)
         if not isinstance(packed, int):

@@ -19,7 +19,7 @@ from ..glsl.texels import Packed, shortened
 from .sections import Section, as_columns, packed_array
 
 #: Methods that a page supports.
-WEB_METHODS = ("lut", "spectral")
+WEB_METHODS = ("fast", "exact")
 
 #: Numbers of binary digits, from the largest page to the smallest.
 DIGITS = (9, 8, 7, 6)
@@ -45,9 +45,9 @@ class WebTable:
 def web_table(method: str, table: DiffractionTable, digits: int) -> WebTable:
     """Round a table to fewer binary digits for one of `WEB_METHODS`.
 
-    `spectral` does not support coherent tables.
+    `exact` does not support coherent tables.
     """
-    if method == "lut":
+    if method == "fast":
         colours = cached_colours(table)
         # rounded twice, so that the upper halves of floats, which the shader reads, are exact
         coefficients = shortened(rounded(colours.coefficients, digits)).astype(np.float16)

@@ -8,15 +8,15 @@ import re
 import struct
 import tempfile
 from pathlib import Path
-from typing import NamedTuple
 
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from ...atomic import atomic_path
-from ...errors import DiffractionError, one_line
+from ...errors import DiffractionError
 from ...files import read_bytes, readable_file
+from ...plugin.meshes import MeshArrays, mesh_arrays, mesh_faces
 from ...plugin.textures import ORIENTATION
 from .trimesh import TriangleMesh
 
@@ -33,22 +33,6 @@ _CODES = {
     "ushort": "H", "uint16": "H", "int": "i", "int32": "i", "uint": "I", "uint32": "I",
     "float": "f", "float32": "f", "double": "d", "float64": "d",
 }  # fmt: skip
-
-
-class MeshArrays(NamedTuple):
-    """Arrays of a triangle mesh.
-
-    Attributes
-    ----------
-    positions, normals : (n, 3); normals may be absent.
-    uv : (n, 2) texture coordinates, or None.
-    faces : (m, 3) indices of vertices.
-    """
-
-    positions: Floats
-    normals: Floats | None
-    uv: Floats | None
-    faces: Ints
 
 
 def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
@@ -77,15 +61,7 @@ def load_mesh(path: str | os.PathLike[str]) -> MeshArrays:
             f"mesh '{file}': a triangle names vertex {faces.max()}, but there are only "
             f"{vertices}; export the mesh again"
         )
-    mesh = _load(file, kind, face_normals=False)
-    values = mi.traverse(mesh)
-
-    def array(name: str, width: int) -> Floats:
-        return np.array(values[name], dtype=np.float64).reshape(-1, width)
-
-    normals = array("vertex_normals", 3) if mesh.has_vertex_normals() else None
-    uv = array("vertex_texcoords", 2) if mesh.has_vertex_texcoords() else None
-    return MeshArrays(array("vertex_positions", 3), normals, uv, faces)
+    return mesh_arrays(_load(file, kind, face_normals=False))
 
 
 def _vertices_and_faces(file: Path, kind: str) -> tuple[int, Ints]:
@@ -96,8 +72,7 @@ def _vertices_and_faces(file: Path, kind: str) -> tuple[int, Ints]:
     """
     # without normals: making them, Mitsuba follows indices that point nowhere
     mesh = _load(file, kind, face_normals=True)
-    faces = np.array(mi.traverse(mesh)["faces"], dtype=np.int64).reshape(-1, 3)
-    return mesh.vertex_count(), faces
+    return mesh.vertex_count(), mesh_faces(mesh)
 
 
 def has_own_normals(path: str | os.PathLike[str]) -> bool:
@@ -142,7 +117,7 @@ def load_orientation(path: str | os.PathLike[str]) -> Floats | None:
 def write_ply(
     path: str | os.PathLike[str], mesh: TriangleMesh, comment: str = "", *, with_uv: bool = True
 ) -> None:
-    """Write a binary PLY.
+    """Write a binary PLY, with the names of properties that Mitsuba writes.
 
     An orientation becomes the mesh attribute `vertex_orientation` with the channels (cos, sin, 0):
     Mitsuba 3.9 reads attributes of one or three channels and ignores those of two.
@@ -152,30 +127,26 @@ def write_ply(
     DiffractionError
         If the file cannot be written.
     """
-    _need_variant()
-    written = mi.Mesh(
-        "mesh", len(mesh.positions), len(mesh.faces),
-        has_vertex_normals=True, has_vertex_texcoords=with_uv,
-    )  # fmt: skip
-    if mesh.orientation is not None:
-        turn = np.pad(mesh.orientation, [(0, 0), (0, 1)])
-        written.add_attribute(ORIENTATION, 3, turn.ravel())
-    values = mi.traverse(written)
-    values["vertex_positions"] = mesh.positions.ravel()
-    values["vertex_normals"] = mesh.normals.ravel()
+    blocks = {"x y z": mesh.positions, "nx ny nz": mesh.normals}
     if with_uv:
-        values["vertex_texcoords"] = mesh.uv.ravel()
-    values["faces"] = mesh.faces.ravel()
-    values.update()
-    with atomic_path(path) as temporary:
-        try:
-            written.write_ply(str(temporary))
-        except RuntimeError as error:  # Mitsuba's exception for a full disk
-            raise DiffractionError(f"cannot write '{path}': {one_line(str(error))}") from error
-        # Mitsuba writes no comments: they follow the line that names the format
-        lines = Path(temporary).read_bytes().split(b"\n", 2)
-        said = [f"comment {line}".encode("ascii", "replace") for line in comment.splitlines()]
-        Path(temporary).write_bytes(b"\n".join([*lines[:2], *said, lines[2]]))
+        blocks["s t"] = mesh.uv
+    if mesh.orientation is not None:
+        turn = ORIENTATION.removeprefix("vertex_")
+        blocks[f"{turn}_0 {turn}_1 {turn}_2"] = np.pad(mesh.orientation, [(0, 0), (0, 1)])
+    vertices = np.concatenate([*blocks.values()], axis=1).astype("<f4")
+    faces = np.empty(len(mesh.faces), [("count", "u1"), ("corners", "<i4", 3)])
+    faces["count"], faces["corners"] = 3, mesh.faces
+    header = [
+        "ply", "format binary_little_endian 1.0",
+        *(f"comment {line}" for line in comment.splitlines()),
+        f"element vertex {len(vertices)}",
+        *(f"property float {name}" for name in " ".join(blocks).split()),
+        f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", "",
+    ]  # fmt: skip
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        file.write("\n".join(header).encode("ascii", "replace"))
+        file.write(vertices.tobytes())
+        file.write(faces.tobytes())
 
 
 def _need_variant() -> None:

@@ -26,14 +26,14 @@ def test_a_shader_is_written_with_all_that_it_reads(
 ) -> None:
     out = tmp_path / "shaders" / "grating"
     report = tmp_path / "report.json"
-    command = ["export-shader", str(source), "-o", str(out), "--method", "lut", "--int-ior", "1.5",
+    command = ["export-shader", str(source), "-o", str(out), "--method", "fast", "--int-ior", "1.5",
                "--coherence-width", "4", "--json", str(report)]  # fmt: skip
     assert main(command) == 0
     assert f"{out}: diffraction: " in capsys.readouterr().out
     constants = json.loads((out / "constants.json").read_text(encoding="utf-8"))
     code = (out / "diffraction.glsl").read_text(encoding="utf-8")
-    assert constants["functions"] == {"lut": "diffraction"}
-    assert "spectral" not in code.partition("#define")[2]
+    assert constants["functions"] == {"fast": "diffraction"}
+    assert "exact" not in code.partition("#define")[2]
     assert constants["uniforms"]["md_eta"] == pytest.approx(1.5, abs=1e-3)
     assert len(constants["textures"]) == len(list(out.glob("*.exr")))
     for name, entry in constants["textures"].items():

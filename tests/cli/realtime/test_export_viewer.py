@@ -37,7 +37,7 @@ def test_a_page_is_written_and_its_loss_is_named(
 ) -> None:
     out = tmp_path / "plate.html"
     report = tmp_path / "page.json"
-    command = ["export-viewer", str(scene), str(out), "--method", "lut", "--json", str(report)]
+    command = ["export-viewer", str(scene), str(out), "--method", "fast", "--json", str(report)]
     assert main(command) == 0
     assert json.loads(report.read_text(encoding="utf-8"))["bytes"] == out.stat().st_size
     text = out.read_text(encoding="utf-8")
@@ -46,14 +46,14 @@ def test_a_page_is_written_and_its_loss_is_named(
     assert "https://" not in text
     said = capsys.readouterr().out
     assert f"{out}: " in said
-    assert "lut ΔE2000" in said
-    assert "spectral" not in said
+    assert "fast ΔE2000" in said
+    assert "exact" not in said
 
 
 def test_a_title_is_text_in_the_page(scene: Path, tmp_path: Path, some_variant: str) -> None:
     named = scene.rename(tmp_path / "<!--<script>.xml")
     out = tmp_path / "plate.html"
-    assert main(["export-viewer", str(named), str(out), "--method", "lut"]) == 0
+    assert main(["export-viewer", str(named), str(out), "--method", "fast"]) == 0
     text = out.read_text(encoding="utf-8")
     assert "<!--<script" not in text
     assert r"\u003c!--\u003cscript>" in text

@@ -30,15 +30,15 @@ def compared(tmp_path):
         "noise_delta_e_mean": 0.29, "whole_noise": noise, "frames": 512,
         "spp": 4096, "clipped": 0.0104,
         "methods": {
-            "lut": entry,
-            "spectral": {**entry, "whole": {**whole, "direct": {**found, "delta_e_mean": 0.321}}},
+            "fast": entry,
+            "exact": {**entry, "whole": {**whole, "direct": {**found, "delta_e_mean": 0.321}}},
             "flss": {**entry, "fragment_ns": 35200.0},
         },
     }  # fmt: skip
     folder = tmp_path / "compared"
     folder.mkdir()
     (folder / "compare.json").write_text(json.dumps(document), "utf-8")
-    Image.new("RGB", (320, 80), (10, 20, 30)).save(folder / "lut.png")
+    Image.new("RGB", (320, 80), (10, 20, 30)).save(folder / "fast.png")
     return folder
 
 
@@ -53,9 +53,9 @@ def page(tmp_path):
 def test_table_and_sheet_are_replaced(compared, page):
     assert realtime.main([str(compared), "-o", str(page)]) == 0
     text = page.read_text("utf-8")
-    assert "| `lut` | 0.46 | 3.21 | 0.021 |  | 1230 | 35.2 | 1000 | 12.3 | 21.0 |" in text
-    lut, spectral = "0.46 | 3.21 | 0.28 | 1.50", "0.32 | 3.21 | 0.28 | 1.50"
-    assert f"| [plate](../scenes/plate.xml) | {lut} | {spectral} | 0.28 | 1.50 |" in text
+    assert "| `fast` | 0.46 | 3.21 | 0.021 |  | 1230 | 35.2 | 1000 | 12.3 | 21.0 |" in text
+    fast, exact = "0.46 | 3.21 | 0.28 | 1.50", "0.32 | 3.21 | 0.28 | 1.50"
+    assert f"| [plate](../scenes/plate.xml) | {fast} | {exact} | 0.28 | 1.50 |" in text
     assert "All 64 × 40 pixels" in text
     assert "512 frames of 4 samples a pixel, against 4096" in text
     assert "1.0 % of the pixels are clipped" in text
@@ -70,14 +70,14 @@ def test_a_larger_picture_takes_the_sheets_place(compared, page, tmp_path):
     larger.mkdir()
     document = json.loads((compared / "compare.json").read_text("utf-8"))
     (larger / "compare.json").write_text(json.dumps({**document, "size": [320, 200]}), "utf-8")
-    Image.new("RGB", (320, 160), (10, 20, 30)).save(larger / "lut.png")
+    Image.new("RGB", (320, 160), (10, 20, 30)).save(larger / "fast.png")
     assert realtime.main([str(compared), "--sheet", str(larger), "-o", str(page)]) == 0
-    assert "`lut`, 320 × 200 pixels, ΔE2000 0.46" in page.read_text("utf-8")
+    assert "`fast`, 320 × 200 pixels, ΔE2000 0.46" in page.read_text("utf-8")
     with Image.open(page.parent / realtime.SHEET) as image:
         assert image.size == (1600, 800)
 
 
-@pytest.mark.parametrize("missing", ["compare.json", "lut.png"])
+@pytest.mark.parametrize("missing", ["compare.json", "fast.png"])
 def test_what_compare_did_not_write_is_refused_in_one_line(compared, page, capsys, missing):
     (compared / missing).unlink()
     assert realtime.main([str(compared), "-o", str(page)]) == 1

@@ -62,3 +62,44 @@ def test_bare_name_is_looked_up_as_the_loader_does(tmp_path: Path, monkeypatch: 
     only(monkeypatch, tmp_path / "libLLVM-15.so.1")
     monkeypatch.setenv(VARIABLE, "libLLVM-15.so.1")
     assert llvm.named_library() == Library(tmp_path / "libLLVM-15.so.1", 15)
+
+
+def touched(file: Path) -> Path:
+    """An empty file, in folders made for it."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.touch()
+    return file
+
+
+def found(root: Path, system: str, machine: str = "", **environment: str) -> set[Path]:
+    """The libraries beneath a folder, found as a system of this name would."""
+    everywhere = llvm.in_folders(system, machine, environment, root)
+    return {file.resolve() for file in everywhere if file.is_relative_to(root)}
+
+
+def test_homebrew_keeps_versions_beside_each_other(tmp_path: Path):
+    brew = tmp_path / "opt/homebrew"
+    for name, version in (("llvm", "21.1.0"), ("llvm@19", "19.1.7")):
+        cellar = touched(brew / "Cellar" / name / version / "lib/libLLVM.dylib").parents[1]
+        touched(cellar / "lib/libLLVM-C.dylib")
+        (brew / "opt").mkdir(exist_ok=True)
+        (brew / "opt" / name).symlink_to(cellar)
+    versions = {Library.at(file).version for file in found(tmp_path, "darwin")}
+    assert versions == {19, 21}
+
+
+@pytest.mark.parametrize("machine", ["x86_64", "aarch64"])
+def test_debian_has_a_folder_for_each_architecture(tmp_path: Path, machine: str):
+    lib = tmp_path / "usr/lib"
+    files = {
+        name: touched(lib / f"{name}-linux-gnu/libLLVM.so.19.1") for name in ("x86_64", "aarch64")
+    }
+    assert found(tmp_path, "linux", machine) == {files[machine]}
+
+
+def test_windows_has_it_among_programs_or_on_the_path(tmp_path: Path):
+    installed = touched(tmp_path / "Program Files/LLVM/bin/LLVM-C.dll")
+    other = touched(tmp_path / "other/LLVM-C.dll")
+    programs = str(tmp_path / "Program Files")
+    path = f"{tmp_path / 'nothing'};{other.parent}"
+    assert found(tmp_path, "win32", PROGRAMFILES=programs, PATH=path) == {installed, other}

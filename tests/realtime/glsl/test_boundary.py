@@ -109,9 +109,9 @@ def shaded(
 def test_lut_has_the_factor_of_each_channel(gl: Any, table: DiffractionTable, kind: str) -> None:
     pair = pairs(300)
     colours = pack_colours(ColourTable.build(table))
-    plain = probed(gl, "lut", colours | PERFECT, pair[2])
+    plain = probed(gl, "fast", colours | PERFECT, pair[2])
     material = MATERIALS[kind] | (UNTINTED if kind == "conductor" else Packed())
-    found = shaded(gl, "lut", table, colours | material, pair, kind)
+    found = shaded(gl, "fast", table, colours | material, pair, kind)
     expected = factor(table, kind, *pair[:2], np.array(RGB_WAVELENGTHS))
     if kind == "conductor":  # its colour is that of daylight, Kirchhoff's at each mean is taken out
         own = index(kind, np.array(RGB_WAVELENGTHS))
@@ -121,41 +121,41 @@ def test_lut_has_the_factor_of_each_channel(gl: Any, table: DiffractionTable, ki
         expected *= probed_reflectance(gl, colours, plain, pair[2])
     lit = np.abs(plain) > 1e-3 * np.abs(plain).max()
     if kind == "twice":
-        level = probed(gl, "lut", colours | PERFECT, pair[2] * [1, 1, 0, 1])
+        level = probed(gl, "fast", colours | PERFECT, pair[2] * [1, 1, 0, 1])
         plain = twice(plain, level, table, pair, np.array(RGB_WAVELENGTHS))
-    # single precision, and lut's reading of reflectances between 129 angles
+    # single precision, and fast's reading of reflectances between 129 angles
     assert found[lit] / plain[lit] == pytest.approx(expected[lit], rel=1e-3)
 
 
 def probed_reflectance(
     gl: Any, colours: Packed, plain: NDArray[Any], at: NDArray[Any]
 ) -> NDArray[np.float64]:
-    found = probed(gl, "lut", colours | MATERIALS["conductor"] | UNTINTED, at)
+    found = probed(gl, "fast", colours | MATERIALS["conductor"] | UNTINTED, at)
     return np.divide(found, plain, out=np.ones_like(plain), where=plain != 0.0)
 
 
 def test_lut_has_the_tint_of_a_metal(gl: Any, table: DiffractionTable) -> None:
     pair, lam = pairs(50), np.arange(360.0, 830.5)
     colours = pack_colours(ColourTable.build(table)) | MATERIALS["conductor"]
-    plain = shaded(gl, "lut", table, colours | UNTINTED, pair)
+    plain = shaded(gl, "fast", table, colours | UNTINTED, pair)
     spectrum = fresnel.reflectance(1.0, index("conductor", lam))
     weights = linear_srgb(response(lam))
     tint = metal_tint(lam, spectrum, spectrum @ weights / weights.sum(axis=0))
     assert np.abs(tint - np.eye(3)).max() > 0.02  # it is a metal with a colour
     expected = plain @ tint.T
     # single precision
-    assert shaded(gl, "lut", table, colours, pair) == pytest.approx(
+    assert shaded(gl, "fast", table, colours, pair) == pytest.approx(
         expected, rel=1e-4, abs=1e-5 * np.abs(expected).max()
     )
 
 
 @pytest.mark.parametrize("kind", ["dielectric", "conductor"])
-def test_spectral_has_the_factor_of_each_wavelength(
+def test_exact_has_the_factor_of_each_wavelength(
     gl: Any, table: DiffractionTable, kind: str
 ) -> None:
     pair = wi, wo, at = pairs(120)
     parts = pack_powers(table) | pack_responses(DAYLIGHT) | MATERIALS[kind]
-    found = shaded(gl, "spectral", table, parts, pair)
+    found = shaded(gl, "exact", table, parts, pair)
     lam = np.arange(376.0, 744.0, 0.5) + 0.25
     k = wavenumber(lam)
     weights = linear_srgb(response(lam)) * 0.5 / (lam[:, None] * 1e-3) ** 2

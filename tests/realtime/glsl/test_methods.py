@@ -84,7 +84,7 @@ def test_lut_reads_a_colour_table_as_its_numpy_twin_does(
     table = DiffractionTable.build(shallow, coherence_width=4.0, coherence=coherence)
     colours = ColourTable.build(table)
     at = places(3000)
-    found = probed(gl, "lut", pack_colours(colours) | PERFECT, at)
+    found = probed(gl, "fast", pack_colours(colours) | PERFECT, at)
     read = dataclasses.replace(
         colours,
         coefficients=shortened(colours.coefficients),
@@ -108,9 +108,9 @@ def test_two_numbers_lie_in_a_word(values: NDArray[np.float32]) -> None:
     np.testing.assert_allclose(shortened(values), values, rtol=2.0**-8, atol=1e-39)
 
 
-def test_spectral_sums_the_table_over_wavelengths(gl: Any, table: DiffractionTable) -> None:
+def test_exact_sums_the_table_over_wavelengths(gl: Any, table: DiffractionTable) -> None:
     at = places(360)
-    found = probed(gl, "spectral", pack_powers(table) | pack_responses(DAYLIGHT) | PERFECT, at)
+    found = probed(gl, "exact", pack_powers(table) | pack_responses(DAYLIGHT) | PERFECT, at)
     exact = summed(table, at)
     # cut windows 2e-4, lobes averaged at two points to third order: 4e-3 measured
     assert difference(found, exact) < 8e-3
@@ -121,7 +121,7 @@ def test_spectral_sums_the_table_over_wavelengths(gl: Any, table: DiffractionTab
     assert difference(found[close], exact[close]) < 2e-3
 
 
-def test_spectral_knows_the_lights_own_spectrum(gl: Any, table: DiffractionTable) -> None:
+def test_exact_knows_the_lights_own_spectrum(gl: Any, table: DiffractionTable) -> None:
     at = places(120)
 
     def lit(lam: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -129,7 +129,7 @@ def test_spectral_knows_the_lights_own_spectrum(gl: Any, table: DiffractionTable
 
     grid = np.arange(360.0, 831.0)
     packed = pack_powers(table) | pack_responses([(grid, lit(grid))]) | PERFECT
-    assert difference(probed(gl, "spectral", packed, at), summed(table, at, lit)) < 1e-2
+    assert difference(probed(gl, "exact", packed, at), summed(table, at, lit)) < 1e-2
 
 
 @pytest.mark.parametrize("wavelength", [400.0, 550.0, 700.0])
@@ -139,7 +139,7 @@ def test_light_of_one_wavelength_is_the_table_there(
     at = places(360)
     k = 2e3 * np.pi / wavelength
     one = Packed(uniforms={"wavenumber": k}, definitions={"MONOCHROME": ""})
-    found = probed(gl, "spectral", pack_powers(table) | one | PERFECT, at)
+    found = probed(gl, "exact", pack_powers(table) | one | PERFECT, at)
     exact = table.window_sum(*(k * at.T[:3])) / (wavelength * 1e-3) ** 2
     # cut windows
     assert difference(found[:, 0], exact) < 2e-3
@@ -150,12 +150,12 @@ def test_textures_of_floats_hold_the_same_colours(gl: Any, table: DiffractionTab
     colours = ColourTable.build(table)
     at = places(1000)
     floats = pack_colours(colours, floats=True) | Packed(definitions={"FLOAT_TEXTURES": ""})
-    found = probed(gl, "lut", floats | PERFECT, at)
+    found = probed(gl, "fast", floats | PERFECT, at)
     # single precision, in the logarithm of the radius above all
     assert difference(found, colours.colour(*at.T[:3])) < 1e-4
 
 
-def test_amplitudes_serve_spectral_as_powers(gl: Any, patch: HeightField) -> None:
+def test_amplitudes_serve_exact_as_powers(gl: Any, patch: HeightField) -> None:
     tables = [
         DiffractionTable.build(patch, coherence_width=6.5, basis=basis, tolerance=1e-3)
         for basis in ("svd", "taylor")
@@ -163,8 +163,7 @@ def test_amplitudes_serve_spectral_as_powers(gl: Any, patch: HeightField) -> Non
     assert [t.expansion.kind for t in tables] == ["power", "amplitude"]
     at = places(300)
     first, second = (
-        probed(gl, "spectral", pack_powers(t) | pack_responses(DAYLIGHT) | PERFECT, at)
-        for t in tables
+        probed(gl, "exact", pack_powers(t) | pack_responses(DAYLIGHT) | PERFECT, at) for t in tables
     )
     assert difference(second, first) < 2e-3  # both tables have an error of up to 1e-3
 
@@ -203,9 +202,9 @@ def test_the_documents_methods_are_those_of_their_evaluators(
     assert np.quantile(error, 0.98 if name == "nmm" else 1.0) < 0.01
 
 
-def test_a_coherent_sum_is_refused_by_spectral(patch: HeightField) -> None:
+def test_a_coherent_sum_is_refused_by_exact(patch: HeightField) -> None:
     table = DiffractionTable.build(patch, coherence_width=6.5, coherence="patch")
-    with pytest.raises(DiffractionError, match=r"coherence='patch'.*use method lut"):
+    with pytest.raises(DiffractionError, match=r"coherence='patch'.*use method fast"):
         pack_powers(table)
 
 
@@ -215,7 +214,7 @@ def test_a_conductors_colour_multiplies_the_light(gl: Any, table: DiffractionTab
     at = places(60)
     at[:, 3] = np.linspace(0.2, 1.0, 60)
     packed = pack_powers(table) | pack_responses(DAYLIGHT) | pack_conductor(lam, eta, k)
-    found = probed(gl, "spectral", packed, at)
+    found = probed(gl, "exact", packed, at)
 
     fine = np.arange(376.0, 744.0, 0.25) + 0.125
     index = np.interp(fine, lam, eta) + 1j * np.interp(fine, lam, k)
@@ -252,11 +251,11 @@ def test_one_body_compiles_on_the_desktop_and_in_a_browser(
 
 def test_a_shader_that_does_not_compile_is_named_with_its_line(gl: Any) -> None:
     definitions = {"TEXELS": "two"}
-    body = dict(fragment_parts("spectral", {}))["spectral.glsl"].split("\n")
+    body = dict(fragment_parts("exact", {}))["exact.glsl"].split("\n")
     line = next(n for n, text in enumerate(body, 1) if text.startswith("float series("))
     with pytest.raises(DiffractionError) as caught:
-        compile_program(gl, "spectral", definitions)
-    assert f"compile method spectral: spectral.glsl, line {line}: " in str(caught.value)
+        compile_program(gl, "exact", definitions)
+    assert f"compile method exact: exact.glsl, line {line}: " in str(caught.value)
     assert "two" in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -272,7 +271,7 @@ def test_the_logs_of_other_compilers_are_understood(log: str) -> None:
 
 
 def test_an_unknown_method_is_refused_with_the_choices() -> None:
-    with pytest.raises(DiffractionError, match="'phong' is unknown; choose one of lut, spec"):
+    with pytest.raises(DiffractionError, match="'phong' is unknown; choose one of fast, exact"):
         fragment_source("phong", {})
 
 

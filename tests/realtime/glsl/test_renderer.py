@@ -142,8 +142,8 @@ def test_pictures_agree_with_path_traced_ones(renderer: Any) -> None:
     sees = visibility(scene, renderer.lights)
     noise = 0.5 * delta_e(*halves)
     # the contract's figures are 1.0 and 0.5 without noise; the lights are small and sharp here
-    for method, mean in (("lut", 0.7), ("spectral", 0.35)):
-        drawn = renderer.render(method, supersampling=8 if method == "lut" else 4)
+    for method, mean in (("fast", 0.7), ("exact", 0.35)):
+        drawn = renderer.render(method, supersampling=8 if method == "fast" else 4)
         areas = regions(sees, every, every, drawn[..., 3])
         assert areas["both"].sum() > 500
         errors = delta_e(reference, drawn[..., :3])
@@ -180,7 +180,7 @@ def test_another_height_scale_has_its_own_energy(
     pictures = []
     for scale in (1.1, 1.4):
         made.energy_for(scale)
-        made.draw(frame.frame, "lut")
+        made.draw(frame.frame, "fast")
         pictures.append(np.frombuffer(frame.frame.read(components=3, dtype="f4"), np.float32))
     assert pictures[0].max() > 0.0
     np.testing.assert_allclose(pictures[0], 4.0 * pictures[1], rtol=1e-5)
@@ -216,7 +216,7 @@ def pigment_of(gl: Any, plate: Any, wo: NDArray[np.float64], scale: float) -> ND
     for pigment in (1.0, 0.0):
         vertices[:, COLOUR] = pigment
         buffer.write(vertices.tobytes())
-        pictures.append(made.render("spectral", supersampling=1)[1, 1, :3].astype(float))
+        pictures.append(made.render("exact", supersampling=1)[1, 1, :3].astype(float))
     found = (pictures[0] - pictures[1]) / made.lights[0].colour
     made.release()
     return np.asarray(found)
@@ -252,8 +252,8 @@ def beneath(plate: Any, wo: NDArray[np.float64]) -> NDArray[np.float64]:
 @pytest.mark.parametrize(
     ("name", "method", "material"),
     [
-        ("llvm_ad_rgb", "lut", {"int_ior": 1.58}),
-        ("llvm_ad_spectral", "spectral", {"int_ior": 2.2, "coat_ior": 1.2}),
+        ("llvm_ad_rgb", "fast", {"int_ior": 1.58}),
+        ("llvm_ad_spectral", "exact", {"int_ior": 2.2, "coat_ior": 1.2}),
     ],
 )
 @pytest.mark.filterwarnings("ignore::mitsuba_diffraction.DiffractionWarning")
@@ -330,7 +330,7 @@ def test_all_that_is_not_shown_is_named_in_warnings(
         warnings.simplefilter("always", DiffractionWarning)
         made = Renderer(scene, context=gl)
         for _ in range(2):
-            made.render("lut", supersampling=1)
+            made.render("fast", supersampling=1)
     # what no picture shows, and what progressive light does; each once
     never, single = [str(w.message) for w in caught if "realtime" in str(w.message)]
     for text, part in (
@@ -368,7 +368,7 @@ def test_a_sky_over_one_half_lights_what_faces_it(
     )  # fmt: skip
     made = Renderer(scene, context=gl)
     with pytest.warns(DiffractionWarning, match="shown as a smooth one"):
-        drawn = made.render("lut", supersampling=2)
+        drawn = made.render("fast", supersampling=2)
     traced = path_traced(with_lights_of(scene, made), 1024, 1)
     ball = binary_erosion(drawn[..., 3] > 0.999, np.ones((3, 3)))
     assert ball.sum() > 60

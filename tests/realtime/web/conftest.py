@@ -56,11 +56,11 @@ def page_file(page: Page, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def tab(browser: Any) -> Iterator[Any]:
-    """Opens pages: `tab(size, script)`, the script running before theirs."""
+    """Opens pages: `tab(size, script, phone)`, the script running before theirs."""
     opened: list[Tab] = []
 
-    def make(size: tuple[int, int] = SIZE, script: str = "") -> Tab:
-        opened.append(Tab(browser, size, script))
+    def make(size: tuple[int, int] = SIZE, script: str = "", phone: bool = False) -> Tab:
+        opened.append(Tab(browser, size, script, phone))
         return opened[-1]
 
     yield make

@@ -179,12 +179,12 @@ def ours(sphere: Any) -> dict[str, NDArray[np.float32]]:
         renderer = Renderer(sphere)
     except DiffractionError as error:
         pytest.skip(str(error))
-    found = {m: renderer.render(m, supersampling=1) for m in ("lut", "spectral")}
+    found = {m: renderer.render(m, supersampling=1) for m in ("fast", "exact")}
     renderer.release()
     return found
 
 
-@pytest.mark.parametrize("method", ["lut", "spectral"])
+@pytest.mark.parametrize("method", ["fast", "exact"])
 def test_three_draws_what_the_renderer_draws(
     opened: Any, ours: dict[str, NDArray[np.float32]], method: str
 ) -> None:
@@ -192,7 +192,7 @@ def test_three_draws_what_the_renderer_draws(
     inside = (found[..., 3] == 1.0) & (expected[..., 3] == 1.0)
     assert 0.3 < inside.mean() < 0.7
     errors = delta_e(expected[..., :3], found[..., :3])[inside]
-    # another tessellation, and our `lut` in eight binary digits
+    # another tessellation, and our `fast` in eight binary digits
     assert np.nanmean(errors) < 0.5
     assert expected[inside, :3].max() > 0.1
     total = expected[inside, :3].sum(axis=0)
@@ -237,7 +237,7 @@ def test_every_surface_is_valid_glsl_of_its_own(
         # names that other programs have taken
         "#define PI 3.14159\n#define saturate(a) clamp(a, 0.0, 1.0)\nuniform float energy, eta;\n"
         f"{shader.code}\nin vec3 a, b;\nout vec4 colour;\nvoid main() {{ colour = vec4("
-        "diffraction(a, b) + diffraction_spectral(a, b) + diffraction_transmission(a, b)"
+        "diffraction(a, b) + diffraction_exact(a, b) + diffraction_transmission(a, b)"
         "+ saturate(energy * eta * PI), 1.0); }"
     )
     page = browser.new_page()
@@ -275,10 +275,10 @@ def test_every_surface_is_valid_glsl_of_its_own(
     assert len(shader.code.encode()) + material.stat().st_size < 30_000
 
 
-@pytest.mark.parametrize("methods", [["flss"], [], ["lut", "lut"]])
+@pytest.mark.parametrize("methods", [["flss"], [], ["fast", "fast"]])
 def test_unknown_methods_are_refused_with_the_choices(scene: Any, methods: list[str]) -> None:
     bsdf = scene.shapes()[0].bsdf()
-    with pytest.raises(DiffractionError, match="choose from lut, spectral"):
+    with pytest.raises(DiffractionError, match="choose from fast, exact"):
         make_shader(bsdf, methods)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -234,7 +235,7 @@ def test_a_link_carries_the_view(opened: Tab, page_file: Path, tab: Any) -> None
             viewer.camera.zoom(0.8);
             viewer.lights.point = [0.2, 0.3];
             viewer.exposure = 2;
-            viewer.controls.change({method: "spectral", wavelength: 530});
+            viewer.controls.change({method: "exact", wavelength: 530});
         }"""
     )
     before = picture(opened)
@@ -249,7 +250,7 @@ def test_a_link_carries_the_view(opened: Tab, page_file: Path, tab: Any) -> None
     other.page.goto("about:blank")
     other.page.goto(f"{page_file.as_uri()}#eye=1,2&target=x&nm=1e9&method=flss&exposure=NaN&light=")
     assert other.state(other.page) == "ready"
-    assert other.page.evaluate("viewer.method") == "lut"
+    assert other.page.evaluate("viewer.method") == "fast"
     assert other.said == []
 
 
@@ -290,13 +291,41 @@ def test_a_page_without_its_data_says_so(
     assert opened.said == []
 
 
-def test_a_phone_shows_the_subject_with_the_panel_folded(page_file: Path, tab: Any) -> None:
-    opened = tab(PHONE)
+def test_a_phone_shows_the_subject_and_how_to_turn_and_light_it(page_file: Path, tab: Any) -> None:
+    opened = tab(PHONE, phone=True)
     assert opened.open(page_file) == "ready"
-    assert not opened.page.is_visible("#body")
-    opened.page.click("#fold")
-    assert opened.page.is_visible("#body")
-    box = opened.page.locator("#panel").bounding_box()
+    page = opened.page
+    # the picture fills the screen, which does not scroll; the hint goes after a while
+    assert page.evaluate("[innerWidth, innerHeight, document.body.scrollHeight]") == [
+        *PHONE, PHONE[1],
+    ]  # fmt: skip
+    assert page.locator("#canvas").bounding_box() == {
+        "x": 0, "y": 0, "width": PHONE[0], "height": PHONE[1],
+    }  # fmt: skip
+    assert {"turns", "light"} <= set(page.inner_text("#hint").split())
+    page.wait_for_function("getComputedStyle(element('hint')).opacity === '0'")
+
+    def dragged() -> list[bool]:
+        """Whether a drag of one finger changed the eye and the light."""
+        state = "JSON.stringify([viewer.camera.eye, viewer.lights.point])"
+        before = json.loads(page.evaluate(state))
+        page.mouse.move(150, 400)
+        page.mouse.down()
+        page.mouse.move(190, 420)
+        page.mouse.up()
+        after = json.loads(page.evaluate(state))
+        return [a != b for a, b in zip(before, after, strict=True)]
+
+    page.evaluate("viewer.controls.change({kind: 'sun'})")
+    assert dragged()[0]
+    page.tap("#grip")
+    assert dragged() == [False, True]
+    page.tap("#grip")
+    assert not page.is_visible("#body")
+    page.tap("#fold")
+    assert page.is_visible("#body")
+    assert not page.is_visible("#grip")
+    box = page.locator("#panel").bounding_box()
     assert box["height"] < PHONE[1] / 2
     assert box["y"] > PHONE[1] / 2 - 1  # a sheet at the lower end, the picture above
     assert opened.said == []

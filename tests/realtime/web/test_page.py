@@ -26,7 +26,7 @@ def desktop(scene: Any) -> dict[str, NDArray[np.float32]]:
     except DiffractionError as error:
         pytest.skip(str(error))
     renderer = Renderer(scene, context=context)
-    found = {method: renderer.render(method, supersampling=1) for method in ("lut", "spectral")}
+    found = {method: renderer.render(method, supersampling=1) for method in ("fast", "exact")}
     renderer.release()
     context.release()
     return found

@@ -153,7 +153,7 @@ def test_a_notebook_shows_the_same_page(
 
 def test_the_page_is_small_and_says_what_rounding_costs(page: Page) -> None:
     assert len(page.text.encode()) < MAX_BYTES
-    assert list(page.loss) == ["lut", "spectral"]
+    assert list(page.loss) == ["fast", "exact"]
     for mean, most in page.loss.values():
         assert 0.0 < mean < 0.15  # nobody sees a tenth
         assert mean < most
@@ -178,11 +178,11 @@ def test_what_does_not_fit_is_left_out_from_the_last_on(
     # the pages of the triangles alone take 0.35 MB
     monkeypatch.setattr(packing, "_HEADER", MAX_BYTES - 1000)
     monkeypatch.setattr(packing, "OCTAVES", (0.0,))
-    with pytest.raises(DiffractionError, match=r"is too large for a page \(spectral: .*; lut: "):
+    with pytest.raises(DiffractionError, match=r"is too large for a page \(exact: .*; fast: "):
         make_page(scene)
 
 
-@pytest.mark.parametrize("methods", [["flss"], [], ["lut", "lut"]])
+@pytest.mark.parametrize("methods", [["flss"], [], ["fast", "fast"]])
 def test_unknown_methods_are_refused_with_the_choices(scene: Any, methods: list[str]) -> None:
-    with pytest.raises(DiffractionError, match="choose from lut, spectral"):
+    with pytest.raises(DiffractionError, match="choose from fast, exact"):
         make_page(scene, methods=methods)

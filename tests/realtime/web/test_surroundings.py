@@ -65,7 +65,7 @@ def room(scene: Any) -> Any:
 def opened(room: Any, browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mitsuba_diffraction.realtime.web.export.OCTAVES", (-1.0, 0.0))
-        page = make_page(room, methods=["lut"])
+        page = make_page(room, methods=["fast"])
     assert page.omissions == ()
     path = tmp_path_factory.mktemp("room") / "room.html"
     path.write_text(page.text, encoding="utf-8")

@@ -37,10 +37,10 @@ for (int n = 0; n < SAMPLES; ++n) {
 }
 `;
 
-// Create the material. folder: folder of constants.json; method: "lut" or "spectral"; environment:
+// Create the material. folder: folder of constants.json; method: "fast" or "exact"; environment:
 // result of `sampled`; others: parameters of MeshLambertMaterial. Geometries need the attribute
 // `tangent` (`computeTangents()`), along the patch's x axis.
-export async function diffractionMaterial(folder = ".", { method = "lut", environment = [], ...parameters } = {}) {
+export async function diffractionMaterial(folder = ".", { method = "fast", environment = [], ...parameters } = {}) {
   const constants = await (await fetch(`${folder}/constants.json`)).json();
   const code = await (await fetch(`${folder}/diffraction.glsl`)).text();
   const name = constants.functions[method];

@@ -1,5 +1,8 @@
 // Controls by mouse, touch, keys and the panel.
 
+const READ = 8000; // ms until the hint fades
+const METHODS = { fast: "Colours summed up beforehand", exact: "Every wavelength by itself" };
+
 const element = (id) => document.getElementById(id);
 
 class Controls {
@@ -11,6 +14,7 @@ class Controls {
     this.map = new BrdfMap(viewer, element("map"), element("map_words"));
     this.panel();
     this.disc();
+    this.grip();
     this.link();
     viewer.report = (sample, count) => this.report(sample, count);
     this.all();
@@ -131,7 +135,7 @@ class Controls {
   drag(before, event) {
     const { camera, lights, canvas } = this.viewer;
     const right = event.clientX - before.clientX, down = event.clientY - before.clientY;
-    if (event.shiftKey || event.buttons & 2) {
+    if (event.shiftKey || event.buttons & 2 || this.movesLight) {
       if (lights.movable) lights.move(right / 220, -down / 220);
     } else if (event.ctrlKey || event.metaKey || event.buttons & 4) this.pan(right, down);
     else camera.orbit((3 * right) / canvas.clientHeight, (3 * down) / canvas.clientHeight);
@@ -163,6 +167,7 @@ class Controls {
     for (const method of header.methods) {
       const button = document.createElement("button");
       button.textContent = method;
+      button.title = METHODS[method];
       button.dataset.method = method;
       button.addEventListener("click", () => this.choose(method));
       element("methods").append(button);
@@ -173,7 +178,7 @@ class Controls {
       viewer.shadows = element("shadows").checked;
       viewer.touch();
     });
-    element("wavelength").parentElement.hidden = !header.methods.includes("spectral");
+    element("wavelength").parentElement.hidden = !header.methods.includes("exact");
     element("wavelength").addEventListener("input", () => this.scrub(Number(element("wavelength").value)));
     element("map_of").addEventListener("toggle", () => element("map_of").open && this.map.update());
     element("exposure").addEventListener("input", () => {
@@ -192,14 +197,26 @@ class Controls {
     element("save").addEventListener("click", () => this.save());
     element("fold").addEventListener("click", () => document.body.classList.toggle("folded"));
     if (matchMedia("(max-width: 560px)").matches) document.body.classList.add("folded");
-    if (matchMedia("(pointer: coarse)").matches) element("hint").textContent = "One finger: orbit · two: pan and zoom · +: light";
+    if (matchMedia("(pointer: coarse)").matches) element("hint").textContent = "One finger turns · two zoom · ☀ moves the light";
+    setTimeout(() => element("hint").classList.add("gone"), READ);
     const losses = Object.entries(header.loss).map(
       ([method, [mean, most]]) => `${method}: ΔE2000 ${mean.toFixed(2)}, 99 % below ${most.toFixed(2)}`);
-    const lines = [`Error of rounded tables: ${losses.join("; ")}.`];
+    const lines = [`Error of rounded colours: ${losses.join("; ")}; 1 is just visible.`];
     if (header.omissions.length) lines.push(`Not shown: ${header.omissions.join("; ")}.`);
     for (const [method, reason] of Object.entries(header.left_out)) lines.push(`Without ${method}: ${reason}.`);
     lines.push("Light between surfaces is left out. While something moves, a few lights represent all. Lights other than the scene's, moved lights and light of one wavelength are sets of points, without reflections in narrow lobes.");
     element("about").textContent = lines.join(" ");
+  }
+
+  // Button for touch screens: one finger moves the light instead of turning.
+  grip() {
+    const grip = element("grip");
+    grip.hidden = !this.viewer.lights.movable;
+    grip.addEventListener("click", () => {
+      this.movesLight = !this.movesLight;
+      grip.setAttribute("aria-pressed", this.movesLight);
+      this.say(this.movesLight ? "One finger moves the light" : "One finger turns");
+    });
   }
 
   choose(method) {

@@ -204,7 +204,7 @@ class Drawing {
     this.sums = [new Target(this.gl, width, height), new Target(this.gl, width, height)];
   }
 
-  // Upload the lights' spectra for the method `spectral`.
+  // Upload the lights' spectra for the method `exact`.
   setResponses(lights) {
     const { gl, daylight, spectra, header } = this;
     const columns = header.light.columns, channels = header.light.channels, waves = columns / channels;

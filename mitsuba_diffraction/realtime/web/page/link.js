@@ -41,7 +41,7 @@ function textToView(text, viewer) {
   viewer.heights = 2 ** number("heights", ...header.octaves);
   viewer.shadows = given.get("shadows") !== "0";
   const nm = Number(given.get("nm") ?? NaN);
-  if (header.methods.includes("spectral") && nm >= 380 && nm <= 780) viewer.wavelength = nm;
+  if (header.methods.includes("exact") && nm >= 380 && nm <= 780) viewer.wavelength = nm;
   if (header.methods.includes(given.get("method"))) viewer.method = given.get("method");
   if (lights.kinds.includes(given.get("light"))) lights.kind = given.get("light");
 }

@@ -1,4 +1,4 @@
-// BRDF map of the point under the cursor, over all view directions, and its strongest orders.
+// Reflection of the point under the cursor, over all view directions, and its strongest orders.
 
 const SIDE = 144; // pixels
 
@@ -71,7 +71,7 @@ class BrdfMap {
     const diffracts = this.found && this.found.surface.height_scale !== undefined;
     this.canvas.hidden = !diffracts;
     if (!diffracts) {
-      this.words.textContent = "Point at a surface that diffracts: the map shows its BRDF by view direction.";
+      this.words.textContent = "Point at a surface that diffracts: the map shows where its light goes.";
       return;
     }
     this.draw(this.found);
@@ -82,7 +82,7 @@ class BrdfMap {
     const { viewer, gl } = this;
     const { drawing } = viewer;
     const program = drawing.program(surface, viewer.drawn, viewer.lit.one, "map");
-    if (viewer.drawn === "spectral") drawing.setResponses([light]);
+    if (viewer.drawn === "exact") drawing.setResponses([light]);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.drawn);
     program.use();
     surface.part.use(program);
@@ -92,7 +92,7 @@ class BrdfMap {
     program.set({
       ...viewer.viewed().uniforms, ...lightUniforms([white], viewer.colour()), wavenumbers: viewer.header.light.wavenumbers,
       height_scale: surface.height_scale * viewer.heights, light_direction: wo, side: SIDE,
-      exposure: 4 * viewer.exposure / (viewer.drawn === "spectral" && viewer.wavelength === null ? Math.max(dot(light.colour, LUMINANCE), 1e-6) : 1),
+      exposure: 4 * viewer.exposure / (viewer.drawn === "exact" && viewer.wavelength === null ? Math.max(dot(light.colour, LUMINANCE), 1e-6) : 1),
     });
     drawing.full(this.drawn, SIDE, SIDE);
     const pixels = new Uint8ClampedArray(4 * SIDE * SIDE), picture = new ImageData(SIDE, SIDE);

@@ -49,9 +49,9 @@ class Viewer {
     return performance.now() - this.changed < STILL;
   }
 
-  // Method that draws: `spectral` for monochromatic light.
+  // Method that draws: `exact` for monochromatic light.
   get drawn() {
-    return this.wavelength === null ? this.method : "spectral";
+    return this.wavelength === null ? this.method : "exact";
   }
 
   // Whether environment and emitters are drawn: all light is the scene's, and none has been moved.
@@ -118,8 +118,8 @@ class Viewer {
     const casters = far ? [...drawing.surfaces, ...drawing.around.glowing] : drawing.surfaces.filter(({ emits }) => !emits);
     const shadow = this.shadows && chosen.length && !lookup ? drawing.shadows[moving ? "coarse" : "fine"].draw(chosen[0], casters, detail, one ? this.count : 0) : UNSHADOWED;
     // draw moving pictures by the faster method
-    const method = moving && this.wavelength === null && drawing.tables.lut ? "lut" : this.drawn;
-    if (method === "spectral") drawing.setResponses(chosen);
+    const method = moving && this.wavelength === null && drawing.tables.fast ? "fast" : this.drawn;
+    if (method === "exact") drawing.setResponses(chosen);
     const view = this.viewed([spread(this.count, 0.7548776662) / width, spread(this.count, 0.569840291) / height]);
     const colour = this.colour();
     Object.assign(view.uniforms, { sky: colour ? monochrome(sky, colour) : sky, ...lightUniforms(chosen, colour), ...shadow });

@@ -1,4 +1,4 @@
-// `lut`: colours under daylight, summed over all wavelengths in advance, like plugin/rgb.py. Bins
+// `fast`: colours under daylight, summed over all wavelengths in advance, like plugin/rgb.py. Bins
 // lie on rings even in ln r, each with its number of azimuths; a bin is a series of five terms in z.
 
 #ifdef FLOAT_TEXTURES            // float textures, which every loader supports

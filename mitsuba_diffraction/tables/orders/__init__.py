@@ -1,0 +1,24 @@
+"""Solved orders: efficiencies of a periodic profile's orders, over directions and wavelengths.
+
+Contents
+--------
+OrderTable  efficiencies at nodes: checks, look-up, `save`, `load` (in `table`)
+Band        efficiencies of the directions with the same number of propagating orders
+cells       coordinates in which efficiencies are smooth, and Chebyshev nodes of them
+lookup      interpolation in NumPy; `resample` to the even grids that the BSDF reads
+file        tables as NetCDF files
+"""
+
+from __future__ import annotations
+
+from .file import load_orders, save_orders
+from .lookup import efficiency, polarised_efficiency
+from .table import Band, OrderTable
+
+__all__ = ["Band", "OrderTable"]
+
+# Modules that build on the class; it shall not import them
+OrderTable.efficiency = efficiency
+OrderTable.polarised_efficiency = polarised_efficiency
+OrderTable.load = staticmethod(load_orders)
+OrderTable.save = save_orders

@@ -1,0 +1,156 @@
+"""Tables of orders as NetCDF files (classic format), which most programs read.
+
+The variable `kind_a_K` holds kind A of band K, with the dimensions `tau_K`, `rho_K`, `w_K`, `j`,
+`q` and `polarisation` (s, p) of `Band.a`; `kind_b_K` holds kind B. Numbers are packed in 16 bits,
+as the CF conventions have it: efficiency = scale_factor × number. Global attributes hold the rest:
+`period` (µm), `wavelengths` (nm, in vacuum), `superstrate` (index), `header` (JSON), `version`, and
+`sha256` of all of these and the numbers.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.io import netcdf_file
+
+from ...atomic import atomic_path
+from ...errors import DiffractionError, one_line
+from ...files import read_bytes
+from .table import MOST_NUMBERS, Band, OrderTable
+
+#: Raised whenever what the numbers mean changes; files of another version are refused.
+FORMAT_VERSION = 1
+SUFFIX = ".nc"
+#: First bytes of a classic NetCDF file.
+BEGINS = b"CDF"
+#: Attribute that tells these files from other NetCDF files.
+MARK = "mitsuba_diffraction_orders"
+#: Step of the packed efficiencies: 16 bits reach 1.092.
+_STEP = 1.0 / 30_000.0
+_AGAIN = "solve it again with 'mitsuba-diffraction solve'"
+
+
+def save_orders(table: OrderTable, path: str | os.PathLike[str]) -> None:
+    """Write a NetCDF file; efficiencies are rounded to 1/30000 of the incident light.
+
+    Raises
+    ------
+    DiffractionError
+        If it cannot be written; nothing half-written is left.
+    """
+    if Path(path).suffix.lower() != SUFFIX:
+        raise DiffractionError(
+            f"cannot write '{path}': the file name of a table of orders must end with {SUFFIX}"
+        )
+    packed = {
+        (band.k, kind): np.rint(values / _STEP).astype(">i2")
+        for band in table.bands
+        for kind, values in zip("ab", band.kinds, strict=False)
+    }
+    header = json.dumps(dict(table.header), sort_keys=True)
+    content = io.BytesIO()
+    with netcdf_file(content, "w") as file:
+        file.title = "Efficiencies of the reflected orders of a grating"
+        setattr(file, MARK, np.int32(FORMAT_VERSION))
+        file.period, file.period_units = np.float64(table.period), "um"
+        file.wavelengths, file.wavelengths_units = np.array(table.wavelengths), "nm"
+        file.superstrate = np.float64(table.superstrate)
+        file.header = header
+        file.sha256 = _checksum(table.period, table.wavelengths, table.superstrate, header, packed)
+        file.createDimension("polarisation", 2)
+        for (k, kind), numbers in packed.items():
+            names = [f"{axis}_{k}" for axis in ("tau", "rho", "w")]
+            names += [f"{axis}_{kind}_{k}" for axis in ("j", "q")]
+            for name, size in zip(names, numbers.shape, strict=False):
+                if name not in file.dimensions:
+                    file.createDimension(name, size)
+            variable = file.createVariable(f"kind_{kind}_{k}", ">i2", (*names, "polarisation"))
+            variable[:] = numbers
+            variable.scale_factor, variable.units = np.float64(_STEP), "1"
+        file.flush()
+        data = content.getvalue()
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def load_orders(path: str | os.PathLike[str]) -> OrderTable:
+    """Read a file that `save_orders` wrote.
+
+    Raises
+    ------
+    DiffractionError
+        If the file is missing, no table of orders, damaged, or of another version.
+    """
+    data = read_bytes(path)
+    if not data.startswith(BEGINS):
+        raise DiffractionError(f"'{path}' is no table of orders (NetCDF); {_AGAIN}")
+    try:
+        with netcdf_file(io.BytesIO(data), "r", mmap=False) as file:
+            version = getattr(file, MARK, None)
+            if version is None:
+                raise DiffractionError("it has no mark of a table of orders")
+            if int(version) != FORMAT_VERSION:
+                raise DiffractionError(
+                    f"its format version is {int(version)}, this program reads {FORMAT_VERSION}"
+                )
+            return _table(file)
+    except DiffractionError as error:
+        raise DiffractionError(f"'{path}' is no table of orders: {error}; {_AGAIN}") from error
+    except Exception as error:  # whatever SciPy makes of damaged bytes
+        raise DiffractionError(
+            f"'{path}' is a damaged table of orders ({one_line(str(error))[:100]}); {_AGAIN}"
+        ) from error
+
+
+def is_order_table(path: str | os.PathLike[str]) -> bool:
+    """Whether a file is a table of orders, of any version; False if it cannot be read."""
+    try:
+        data = read_bytes(path)
+    except DiffractionError:
+        return False  # whoever reads it says why it cannot be
+    return data.startswith(BEGINS) and MARK.encode() in data[:4096]
+
+
+def _table(file: Any) -> OrderTable:
+    """Return the table of an open file."""
+    period, superstrate = float(file.period), float(file.superstrate)
+    low, high = (float(number) for number in file.wavelengths)
+    header = file.header.decode("utf-8")
+    packed: dict[tuple[int, str], NDArray[np.int16]] = {}
+    for name, variable in file.variables.items():
+        _, kind, k = name.split("_")
+        if np.prod(variable.shape, dtype=float) > MOST_NUMBERS:
+            raise ValueError(f"{name} claims {variable.shape} numbers")
+        packed[int(k), kind] = variable[:]
+    checksum = _checksum(period, (low, high), superstrate, header, packed)
+    if file.sha256 != checksum.encode():
+        raise ValueError("its checksum is that of another one")
+    kinds = {
+        key: (numbers * file.variables[f"kind_{key[1]}_{key[0]}"].scale_factor).astype(np.float32)
+        for key, numbers in packed.items()
+    }
+    bands = tuple(
+        Band(k, kinds[k, "a"], kinds.get((k, "b"))) for k in sorted({k for k, _ in kinds})
+    )
+    return OrderTable(period, (low, high), bands, superstrate, json.loads(header))
+
+
+def _checksum(
+    period: float,
+    wavelengths: tuple[float, float],
+    superstrate: float,
+    header: str,
+    packed: dict[tuple[int, str], NDArray[np.int16]],
+) -> str:
+    content = hashlib.sha256(repr((period, tuple(wavelengths), superstrate, header)).encode())
+    for key in sorted(packed):
+        content.update(repr((key, packed[key].shape)).encode())
+        content.update(np.ascontiguousarray(packed[key], ">i2").data)
+    return content.hexdigest()

@@ -1,0 +1,101 @@
+"""Efficiencies between the nodes of a table: the polynomials, and even grids for the renderer."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import cells
+from .cells import Array, Cell
+from .table import Band, OrderTable
+
+
+class EvenGrid(NamedTuple):
+    """Unpolarised efficiencies of one kind of a band, between whose points one interpolates.
+
+    values : (nτ, nρ, nw, j, q) float32, at even steps from 0 to 1 along τ, ρ and w.
+    """
+
+    values: NDArray[np.float32]
+
+
+def efficiency(
+    table: OrderTable, x: ArrayLike, y: ArrayLike, wavelength: ArrayLike, order: ArrayLike
+) -> Array:
+    """Return the efficiency of an order for unpolarised light, from the table's polynomials.
+
+    Parameters
+    ----------
+    x, y : direction cosines within the superstrate of the mirror direction of the incident
+        light, −(ωi)_x and −(ωi)_y.
+    wavelength : in vacuum, nm.
+    order : m; order m leaves at x + m λ/(n d) and y.
+
+    Returns
+    -------
+    (…) share of the incident light, 0 for orders that do not propagate.
+    """
+    return np.asarray(polarised_efficiency(table, x, y, wavelength, order).mean(axis=-1))
+
+
+def polarised_efficiency(
+    table: OrderTable, x: ArrayLike, y: ArrayLike, wavelength: ArrayLike, order: ArrayLike
+) -> Array:
+    """Return the efficiencies for incident light of s and p polarisation, (…, 2).
+
+    Arguments as for `efficiency`.
+    """
+    x, y, lam, m = np.broadcast_arrays(*(np.asarray(value) for value in (x, y, wavelength, order)))
+    shape = x.shape
+    x, y, lam = (part.astype(np.float64).ravel() for part in (x, y, lam))
+    lam = np.maximum(lam, table.wavelengths[0])  # shorter light may have orders beyond all bands
+    cell = cells.to_cell(x, y, lam, table.optical_period)
+    w = cells.w_of(cell.k_continuous, lam, table.wavelengths, table.optical_period)
+    q = cell.channel - m.ravel().astype(np.int64)
+    propagates = (cell.channel >= 0) & (q >= 0) & (q < cell.channels)
+    result = np.zeros((len(x), 2))
+    for k in np.unique(cell.band):
+        for kind in (cells.A, cells.B):
+            here = np.flatnonzero(propagates & (cell.band == k) & (cell.kind == kind))
+            if len(here):
+                rows = _polynomial(table.bands[k], kind, cell, w, here)
+                result[here] = _clamped(rows)[np.arange(len(here)), q[here]]
+    return result.reshape(*shape, 2)
+
+
+def resample(table: OrderTable, band: Band, kind: int, counts: tuple[int, int, int]) -> EvenGrid:
+    """Evaluate the polynomials of a kind, unpolarised, at so many even steps of τ, ρ and w.
+
+    A variable with a single node keeps a single value.
+    """
+    values = band.kind(kind).mean(axis=-1, dtype=np.float64)
+    for axis, (known, wanted) in enumerate(zip(band.counts, counts, strict=True)):
+        places = np.linspace(0.0, 1.0, wanted) if known > 1 else np.array([0.5])
+        matrix = cells.interpolation(known, places)
+        values = np.moveaxis(np.tensordot(matrix, values, (1, axis)), 0, axis)
+    return EvenGrid(_clamped(values[..., None])[..., 0].astype(np.float32))
+
+
+def _polynomial(band: Band, kind: int, cell: Cell, w: Array, here: NDArray[np.int64]) -> Array:
+    """Return the rows of all channels q of some lanes, (n, q, 2)."""
+    counts = band.counts
+    weights = [
+        cells.interpolation(count, places[here])
+        for count, places in zip(counts, (cell.tau, cell.rho, w), strict=True)
+    ]
+    rows = np.empty((len(here), band.kind(kind).shape[4], 2))
+    for j in np.unique(cell.channel[here]):
+        lanes = np.flatnonzero(cell.channel[here] == j)
+        of_lanes = [matrix[lanes] for matrix in weights]
+        values = band.kind(kind)[:, :, :, j].astype(np.float64)
+        rows[lanes] = np.einsum("na,nb,nc,abcqs->nqs", *of_lanes, values, optimize=True)
+    return rows
+
+
+def _clamped(values: Array) -> Array:
+    """Clamp efficiencies (…, q, 2) to at least 0, and their sums over q to at most 1."""
+    positive = np.maximum(values, 0.0)
+    total = positive.sum(axis=-2, keepdims=True)
+    return np.asarray(positive / np.maximum(total, 1.0))

@@ -1,0 +1,276 @@
+"""Table of the orders of a periodic profile, solved rather than modelled."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import DiffractionError
+from .cells import Array, B, largest_band, nodes
+
+#: Sum over all orders that a table may have: 1, but for a solver's error.
+LARGEST_SUM = 1.001
+#: Wavelengths in vacuum, nm, and periods, µm, that a table may have.
+WAVELENGTHS, PERIODS = (100.0, 20_000.0), (0.01, 1000.0)
+#: Bands, nodes along an axis, and numbers of a table at most: beyond, no renderer would want it.
+MOST_BANDS, MOST_NODES, MOST_NUMBERS = 256, 64, 1 << 27
+
+
+class Counts(NamedTuple):
+    """Numbers of nodes along τ, ρ and w."""
+
+    tau: int
+    rho: int
+    w: int
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Band:
+    """Efficiencies of the directions whose K has the same whole part k (`cells`).
+
+    Attributes
+    ----------
+    k : the band.
+    a : (τ, ρ, w, k + 1, k + 1, 2) float32, kind A: share of the light incident through channel j
+        (fourth axis) that leaves through channel q (fifth), for s- and p-polarised incident light
+        (last), summed over the polarisations of the leaving light. Nodes are `cells.nodes`.
+    b : (τ, ρ, w, k, k, 2) of kind B, with the same nodes; None for k = 0.
+    """
+
+    k: int
+    a: NDArray[np.float32]
+    b: NDArray[np.float32] | None = None
+
+    @property
+    def counts(self) -> Counts:
+        """Numbers of nodes."""
+        return Counts(*self.a.shape[:3])
+
+    def kind(self, kind: int) -> NDArray[np.float32]:
+        """Return the efficiencies of a kind, `cells.A` or `cells.B`.
+
+        Raises
+        ------
+        DiffractionError
+            For kind B of band 0, which has no directions.
+        """
+        if kind == B and self.b is None:
+            raise DiffractionError("kind B of band 0 has no propagating order; ask for kind A")
+        values = self.b if kind == B else self.a
+        assert values is not None
+        return values
+
+    @property
+    def kinds(self) -> tuple[NDArray[np.float32], ...]:
+        """Efficiencies of kind A and, but for band 0, of kind B."""
+        return (self.a,) if self.b is None else (self.a, self.b)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OrderTable:
+    """Efficiencies of the reflected orders of a periodic profile, at nodes of smooth coordinates.
+
+    x is the direction in which the profile repeats, y the direction of its grooves. Coordinates
+    are those of `cells`.
+
+    Attributes
+    ----------
+    period : µm.
+    wavelengths : shortest and longest, in vacuum, nm. Longer light has the values of the longest
+        wavelength at the same s and K; shorter light those of the shortest, in the same direction.
+    bands : of k = 0, 1, …, `cells.largest_band`.
+    superstrate : index of the clear medium above the profile. Above 1 it is a flat layer, too
+        thick to interfere, as the polycarbonate of a CD.
+    header : facts for people and programs, JSON: `solver`, `solver_version`, `settings`,
+        `material`, `profile`; `error_mean` and `error_worst`, the measured error of interpolation
+        as a share of the incident light.
+
+    Raises
+    ------
+    DiffractionError
+        If sizes do not fit, or numbers are not efficiencies: negative, not finite, or of a sum over
+        orders above 1.001.
+    """
+
+    period: float
+    wavelengths: tuple[float, float]
+    bands: tuple[Band, ...]
+    superstrate: float = 1.0
+    header: Mapping[str, Any] = field(default_factory=dict)
+
+    # Set by the package, since look-ups and files build on this class
+    efficiency: ClassVar[Callable[..., Array]]  #: of an order: `lookup.efficiency`
+    polarised_efficiency: ClassVar[Callable[..., Array]]  #: `lookup.polarised_efficiency`
+    load: ClassVar[Callable[..., OrderTable]]  #: from a file: `file.load_orders`
+    save: ClassVar[Callable[..., None]]  #: to a file: `file.save_orders`
+
+    def __post_init__(self) -> None:
+        check_outline(self.period, self.wavelengths, self.superstrate)
+        expected = self.last_band + 1
+        if [band.k for band in self.bands] != list(range(expected)):
+            raise DiffractionError(
+                f"{len(self.bands)} bands of orders, expected {expected}, k = 0 to {expected - 1}: "
+                f"period {self.period:g} µm at {self.wavelengths[0]:g} nm and index "
+                f"{self.superstrate:g}"
+            )
+        for band in self.bands:
+            _check_band(band)
+
+    @classmethod
+    def mirror(
+        cls,
+        period: float,
+        reflectance: float = 1.0,
+        wavelengths: tuple[float, float] = (380.0, 780.0),
+        superstrate: float = 1.0,
+    ) -> OrderTable:
+        """Return the table of a flat surface of constant reflectance, with one node a band."""
+        check_outline(period, wavelengths, superstrate)
+
+        def values(count: int) -> NDArray[np.float32]:
+            diagonal = reflectance * np.eye(count, dtype=np.float32)
+            return np.repeat(diagonal[None, None, None, ..., None], 2, axis=-1)
+
+        bands = tuple(
+            Band(k, values(k + 1), values(k) if k else None)
+            for k in range(largest_band(wavelengths, superstrate * period) + 1)
+        )
+        return cls(period, wavelengths, bands, superstrate, {"profile": "flat"})
+
+    @property
+    def optical_period(self) -> float:
+        """Period times the index above it, n d, µm."""
+        return self.superstrate * self.period
+
+    @property
+    def last_band(self) -> int:
+        """Band of in-plane light of the shortest wavelength."""
+        return largest_band(self.wavelengths, self.optical_period)
+
+    def band_nodes(self, k: int) -> tuple[Array, Array, Array]:
+        """Return the nodes τ, ρ and w of a band."""
+        tau, rho, w = (nodes(count) for count in self.bands[k].counts)
+        return tau, rho, w
+
+    @cached_property
+    def reciprocity(self) -> float:
+        """Largest difference between efficiencies and those of the reversed light, unpolarised.
+
+        Share of the incident light: η_m(ωi) = η_m(−ωo) (reciprocity theorem; Petit 1980).
+        """
+        residuals = []
+        for band in self.bands:
+            for values in band.kinds:
+                unpolarised = values.mean(axis=-1)
+                # t becomes 1 − t, and channel j → q becomes last − q → last − j
+                reverse = np.flip(unpolarised, (0, 3, 4)).swapaxes(3, 4)
+                residuals.append(float(np.abs(unpolarised - reverse).max()))
+        return max(residuals)
+
+    @property
+    def albedo(self) -> float:
+        """Mean over nodes and channels of the sum over orders, unpolarised."""
+        sums = [kind.sum(axis=-2).mean() for band in self.bands for kind in band.kinds]
+        return float(np.mean(sums))
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the efficiencies in memory."""
+        return sum(kind.nbytes for band in self.bands for kind in band.kinds)
+
+    def digest(self) -> str:
+        """SHA-256 of all that look-ups depend on; not of the header."""
+        return self._digest
+
+    @cached_property
+    def _digest(self) -> str:
+        outline = [self.period, self.wavelengths, self.superstrate]
+        shapes = [kind.shape for band in self.bands for kind in band.kinds]
+        content = hashlib.sha256(json.dumps([outline, shapes]).encode())
+        for band in self.bands:
+            for kind in band.kinds:
+                content.update(np.ascontiguousarray(kind).data)
+        return content.hexdigest()
+
+    def summary(self) -> dict[str, Any]:
+        """Plain numbers and strings for people and for JSON."""
+        return {
+            "period_um": self.period,
+            "wavelength_range_nm": list(self.wavelengths),
+            "superstrate_index": self.superstrate,
+            "bands": len(self.bands),
+            "nodes": [list(band.counts) for band in self.bands],
+            "mean_albedo": round(self.albedo, 4),
+            "reciprocity_residual": self.reciprocity,
+            "memory_mb": round(self.nbytes / 1e6, 2),
+            **self.header,
+        }
+
+    def __repr__(self) -> str:
+        low, high = self.wavelengths
+        medium = "" if self.superstrate == 1.0 else f" under index {self.superstrate:g}"
+        return (
+            f"OrderTable({self.period:g} µm{medium}, {low:g}–{high:g} nm, {len(self.bands)} bands, "
+            f"{self.nbytes / 1e6:.1f} MB)"
+        )
+
+
+def check_outline(period: float, wavelengths: Sequence[float], superstrate: float) -> None:
+    """Refuse a period, wavelengths or index of which there can be no table.
+
+    Raises
+    ------
+    DiffractionError
+        With the allowed values.
+    """
+    if not PERIODS[0] <= period <= PERIODS[1]:  # also refuses NaN
+        raise DiffractionError(f"period={period:g} µm must be {PERIODS[0]:g} to {PERIODS[1]:g} µm")
+    low, high = wavelengths
+    if not WAVELENGTHS[0] <= low <= high <= WAVELENGTHS[1]:
+        raise DiffractionError(
+            f"wavelengths={low:g}, {high:g} nm must rise from {WAVELENGTHS[0]:g} to "
+            f"{WAVELENGTHS[1]:g} nm"
+        )
+    if not 1.0 <= superstrate <= 5.0:
+        raise DiffractionError(f"superstrate={superstrate:g} must be an index of 1 to 5")
+    if largest_band((low, high), superstrate * period) >= MOST_BANDS:
+        raise DiffractionError(
+            f"a period of {period:g} µm has over {MOST_BANDS} orders at {low:g} nm; solve orders "
+            "of shorter periods, and use the BSDF 'diffraction' for this one"
+        )
+
+
+def _check_band(band: Band) -> None:
+    tau, rho, w = band.counts
+    if not 1 <= min(tau, rho, w) <= max(tau, rho, w) <= MOST_NODES:
+        raise DiffractionError(
+            f"band {band.k} has {tau} x {rho} x {w} nodes; each count must be 1 to {MOST_NODES}"
+        )
+    if (band.b is None) != (band.k == 0):
+        raise DiffractionError(f"band {band.k}: kind B must be there for all bands but band 0")
+    for name, values, channels in zip("AB", band.kinds, (band.k + 1, band.k), strict=False):
+        expected = (tau, rho, w, channels, channels, 2)
+        if values.shape != expected or values.dtype != np.float32:
+            raise DiffractionError(
+                f"band {band.k}, kind {name}: {values.dtype} of shape {values.shape}, expected "
+                f"float32 of shape {expected}"
+            )
+        if not np.isfinite(values).all() or values.min() < 0.0:
+            wrong = values[~(values >= 0.0) | ~np.isfinite(values)][0]
+            raise DiffractionError(
+                f"band {band.k}, kind {name}: an efficiency is {wrong:g}; all must be finite and "
+                "at least 0"
+            )
+        largest = float(values.sum(axis=-2, dtype=np.float64).max())
+        if largest > LARGEST_SUM:
+            raise DiffractionError(
+                f"band {band.k}, kind {name}: efficiencies sum to {largest:.4g} over the orders; "
+                f"at most {LARGEST_SUM} is allowed: use more points or modes in the solver"
+            )

@@ -1,0 +1,192 @@
+"""`lateral_scale`: values of stretched heights, samples, derivatives, and what is refused."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+import mitsuba_diffraction as md
+from mitsuba_diffraction import DiffractionError, reference
+from mitsuba_diffraction.optics.geometry import sigma_of
+from mitsuba_diffraction.plugin.textures import check_attributes
+from tests.support.chi_square import DISPERSED, ROUGH, SMALL, Case, chi_square
+from tests.support.directions import as_single, lit_pairs
+from tests.support.gentle import PATCH, WIDTH, load, pairs
+from tests.support.lanes import brdf_values, evaluated, interaction, lanes, refusal, vectors
+from tests.support.transmitting import BELOW, OneSide
+
+pytestmark = pytest.mark.thorough
+
+FACTORS = np.array([[0.6, 1.3], [0.8, 1.0]], np.float32)
+#: Middles of the texels.
+UV = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]], np.float32)
+
+
+def bitmap(values=FACTORS, **more):
+    """A raw bitmap of these factors, not interpolated."""
+    data = mi.TensorXf(np.ascontiguousarray(values[..., None]))
+    return {"type": "bitmap", "raw": True, "data": data, "filter_type": "nearest"} | more
+
+
+def stretched(factor, largest=None):
+    """Heights stretched by a factor, and the width of their window."""
+    return PATCH.stretched(factor), WIDTH * factor / max(1.0, largest or factor)
+
+
+@pytest.mark.parametrize("factor", [0.7, 1.4])
+@pytest.mark.parametrize(
+    ("parameters", "model"),
+    [
+        ({}, {}),
+        ({"int_ior": 1.5, "second_order": True}, {"eta": 1.5, "second_order": True}),
+        ({"eta": 0.9, "k": 6.0, "coat_ior": 1.5}, {"eta": 0.9, "k": 6.0, "coat": 1.5}),
+        (
+            {"material": "none", "coherence": "surface", "uv_scale": 10.0},
+            {"coherence": "surface", "place": (0.0, 0.0)},
+        ),
+    ],
+    ids=["mirror", "second order", "coat", "placed"],
+)
+def test_values_are_the_reference_s_of_stretched_heights(some_variant, factor, parameters, model):
+    heights, width = stretched(factor)
+    wi, wo, lam, _ = lit_pairs(heights, sigma_of(width), 60, 1)
+    exact = reference.brdf(heights, wi, wo, lam, coherence_width=width, **model)
+    indices = {"ext_ior": 1.0} if "int_ior" in parameters else {}
+    bsdf = load(lateral_scale=factor, **parameters, **indices)
+    error = np.abs(brdf_values(bsdf, wi, wo, lam[:, None]) - exact) * wo[:, 2]
+    # the table's tolerance; of the second order, its grids and the filter of slopes
+    assert error.sum() < (5e-3 if "second_order" in model else 1e-3) * (exact * wo[:, 2]).sum()
+
+
+def test_light_that_goes_through_is_the_reference_s(some_variant):
+    heights, width = stretched(0.7)
+    wi, wo, lam, _ = lit_pairs(heights, sigma_of(width), 60, 1)
+    wo = as_single(wo * BELOW)
+    exact = reference.btdf(heights, wi, wo, lam, coherence_width=width, eta=1.5)
+    indices = {"int_ior": 1.5, "ext_ior": 1.0, "plugin": "diffraction_dielectric"}
+    values = brdf_values(load(lateral_scale=0.7, **indices), wi, wo, lam[:, None])
+    error = np.abs(np.abs(values) - exact)
+    assert error.sum() < 1e-3 * exact.sum()
+
+
+def test_values_at_each_place_are_the_reference_s_of_its_factor(mono):
+    varying = load(lateral_scale=bitmap())
+    for factor, uv in zip(FACTORS.ravel(), UV, strict=True):
+        heights, width = stretched(float(factor), 1.3)
+        wi, wo, _, _ = lit_pairs(heights, sigma_of(width), 60, 1)
+        si = interaction(wi, 550.0)
+        si.uv = mi.Point2f(*(lanes(np.full(len(wi), x)) for x in uv))
+        values = np.array(varying.eval(mi.BSDFContext(), si, vectors(wo))[0])
+        exact = reference.brdf(heights, wi, wo, 550.0, coherence_width=width) * wo[:, 2]
+        assert np.abs(values - exact).sum() < 1e-3 * exact.sum()
+
+
+@pytest.mark.parametrize("texture", [False, True])
+@pytest.mark.parametrize("through", [False, True])
+def test_the_density_is_that_of_the_samples(some_variant, through, texture):
+    factor = bitmap(np.full((2, 2), 0.7, np.float32)) if texture else 1.3
+    parameters = {"int_ior": 1.5, "orientation": 25.0, "lateral_scale": factor}
+    if through:
+        parameters["plugin"] = "diffraction_dielectric"
+    case = Case(ROUGH, 40.0, DISPERSED, SMALL | parameters)
+    bsdf = OneSide(case.load(), -1.0) if through else case.load()
+    test = chi_square(bsdf, case, samples=1 << 19)
+    assert test.run(0.01, 4, quiet=True), test.messages
+
+
+def test_derivatives_with_respect_to_a_texture_are_those_of_differences(mono):
+    wi, wo, _ = pairs(60)
+    bsdf, si = load(lateral_scale=bitmap()), interaction(wi, 550.0)
+    si.uv = mi.Point2f(*(lanes(np.full(len(wi), x)) for x in UV[2]))
+    parameters = mi.traverse(bsdf)
+    place = mi.TensorXf([[[0.0], [0.0]], [[1.0], [0.0]]])
+
+    def total(step):
+        data = mi.TensorXf(FACTORS[..., None]) + mi.TensorXf(mi.Float(step), (1, 1, 1)) * place
+        parameters["lateral_scale.data"] = data
+        parameters.update()
+        return dr.sum(bsdf.eval(mi.BSDFContext(), si, vectors(wo))[0])
+
+    difference = (total(2e-3) - total(-2e-3))[0] / 4e-3
+    dr.enable_grad(step := mi.Float(0.0))
+    value = total(step)
+    dr.forward_from(step)
+    assert dr.grad(value)[0] == pytest.approx(difference, rel=1e-2)  # its curvature and rounding
+
+
+def test_without_it_kernels_have_no_operation_for_it(mono):
+    wi, wo, _ = pairs(8)
+    si = interaction(wi, 550.0)
+
+    def operations(**parameters):
+        bsdf = load(**parameters)
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            dr.eval(bsdf.eval_pdf(mi.BSDFContext(), si, vectors(wo)))
+            return sum(kernel.get("operation_count", 0) for kernel in dr.kernel_history())
+
+    # three multiplications and a scalar that is read, not a second evaluation
+    assert 0 < operations(lateral_scale=1.0) - operations() < 12
+
+
+def test_numbers_change_up_to_the_largest_loaded(mono):
+    wi, wo, _ = pairs(20)
+    bsdf = load(lateral_scale=1.3)
+    parameters = mi.traverse(bsdf)
+    parameters["lateral_scale"] = 0.8
+    parameters.update()
+    heights, width = stretched(0.8, 1.3)
+    expected = evaluated(load(heights, coherence_width=width), wi, wo, 550.0)
+    values = evaluated(bsdf, wi, wo, 550.0)
+    # two tables, of the same tolerance
+    assert values == pytest.approx(expected, rel=0.05, abs=2e-3 * float(expected.max()))
+    parameters["lateral_scale"] = 1.4
+    with pytest.raises(DiffractionError, match=r"outside what the table serves, 0\.01 to 1\.3"):
+        parameters.update()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({"lateral_scale": 0.0}, "lateral_scale=0 must be at least 0.01"),
+        ({"lateral_scale": -1.0}, "lateral_scale=-1 must be at least 0.01"),
+        ({"lateral_scale": float("nan")}, "lateral_scale=nan must be a finite number"),
+        ({"lateral_scale": 200.0}, "at most 100"),
+        ({"lateral_scale": partial(bitmap, FACTORS - 0.6)}, "factors go from 0 to 0.7"),
+        ({"lateral_scale": partial(bitmap, -FACTORS)}, "largest factor, -0.6, must be at least"),
+        ({"lateral_scale": partial(bitmap, FACTORS * np.nan)}, "largest factor, nan, must be"),
+        ({"lateral_scale": partial(bitmap, raw=False)}, "the bitmap is not raw"),
+        ({"lateral_scale": {"type": "checkerboard"}}, "needs lateral_scale_max"),
+        (
+            {"lateral_scale": {"type": "checkerboard", "color0": 0.0}, "lateral_scale_max": 1.0},
+            "the texture's factors go from 0",
+        ),
+        ({"lateral_scale": 1.2, "lateral_scale_max": 2.0}, "for a lateral_scale that is a texture"),
+    ],
+)
+def test_factors_that_mean_nothing_are_refused(mono, parameters, said):
+    values = {k: v() if callable(v) else v for k, v in parameters.items()}
+    assert said in refusal(lambda: load(**values))
+
+
+def test_tables_serve_no_larger_factors_than_1(mono, tmp_path):
+    path = tmp_path / "patch.exr"
+    md.DiffractionTable.build(PATCH, coherence_width=WIDTH).save(path)
+    plugin = {"type": "diffraction", "table": str(path)}
+    mi.load_dict(plugin | {"lateral_scale": 0.9})
+    said = refusal(lambda: mi.load_dict(plugin | {"lateral_scale": 1.1}))
+    assert "give the height field instead of the table" in said
+
+
+def test_a_mesh_attribute_that_is_not_positive_is_refused(mono):
+    props = mi.Properties()
+    attribute = {"type": "mesh_attribute", "name": "vertex_period"}
+    props["bsdf"] = load(lateral_scale=attribute, lateral_scale_max=1.0)
+    mesh = mi.Mesh("plate", 3, 1, has_vertex_texcoords=True, props=props)
+    mesh.add_attribute("vertex_period", 1, [0.5, 1.0, 0.0])
+    with pytest.raises(DiffractionError, match="vertex_period, whose least number is 0"):
+        check_attributes(mesh)

@@ -1,0 +1,148 @@
+"""Tables of orders: look-up between nodes, energy, reciprocity, and refusals."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from mitsuba_diffraction import DiffractionError
+from mitsuba_diffraction.tables.orders import Band, OrderTable, cells
+from mitsuba_diffraction.tables.orders.lookup import resample
+from tests.support.orders import thin_grating
+
+GRATING = thin_grating()
+
+
+def light(n=200, seed=1):
+    """Directions over the hemisphere, and wavelengths."""
+    rng = np.random.default_rng(seed)
+    radius, turn = np.sqrt(rng.uniform(0.0, 0.99, n)), rng.uniform(0.0, 2.0 * np.pi, n)
+    return radius * np.cos(turn), radius * np.sin(turn), rng.uniform(380.0, 780.0, n)
+
+
+def orders_of(table, x, y, wavelength):
+    """Efficiencies of all orders, (n, orders), and the orders."""
+    steps = np.arange(-table.last_band - 1, table.last_band + 2)
+    columns = [table.efficiency(x, y, wavelength, m) for m in steps]
+    return np.stack(columns, axis=1), steps
+
+
+def test_values_at_nodes_are_the_tables():
+    k = 3
+    tau, rho, w = GRATING.band_nodes(k)
+    big_k = k + cells.sine_squared(rho[2])
+    wavelength = cells.wavelength_of(big_k, w[1], GRATING.wavelengths, GRATING.optical_period)
+    at = cells.from_cell(k, cells.A, 1, tau[4], rho[2], wavelength, GRATING.optical_period)
+    for q in range(k + 1):
+        expected = GRATING.bands[k].a[4, 2, 1, 1, q].mean()
+        found = GRATING.efficiency(at.x, at.y, at.wavelength, 1 - q)
+        assert found == pytest.approx(expected, abs=1e-6)  # single precision
+
+
+def test_orders_sum_to_no_more_than_one_and_are_the_visible_ones():
+    x, y, wavelength = light()
+    values, steps = orders_of(GRATING, x, y, wavelength)
+    assert values.min() >= 0.0
+    assert values.sum(axis=1).max() <= 1.0 + 1e-12
+    outgoing = x[:, None] + steps * wavelength[:, None] / (1e3 * GRATING.period)
+    assert np.all(values[outgoing**2 + y[:, None] ** 2 > 1.0] == 0.0)
+    assert np.array_equal(values, orders_of(GRATING, x, -y, wavelength)[0])
+
+
+def test_reversed_light_has_the_same_efficiency():
+    x, y, wavelength = light()
+    values, steps = orders_of(GRATING, x, y, wavelength)
+    outgoing = x[:, None] + steps * wavelength[:, None] / (1e3 * GRATING.period)
+    back = GRATING.efficiency(-outgoing, -y[:, None], wavelength[:, None], steps)
+    assert GRATING.reciprocity < 1e-6  # single precision
+    # clamping of sums is not reciprocal, but this grating absorbs
+    assert back[values > 0.0] == pytest.approx(values[values > 0.0], abs=1e-4)
+
+
+def test_a_mirror_reflects_order_0_alone():
+    mirror = OrderTable.mirror(0.9, 0.8)
+    values, steps = orders_of(mirror, *light())
+    assert values == pytest.approx(np.where(steps == 0, 0.8, 0.0)[None].repeat(200, 0))
+
+
+def test_even_grids_follow_the_polynomials():
+    band = GRATING.bands[4]
+    grid = resample(GRATING, band, cells.B, (17, 9, 5)).values
+    assert grid.shape == (17, 9, 5, 4, 4)
+    matrix = cells.interpolation(6, [8 / 16])
+    values = band.b.mean(axis=-1)
+    centre = np.einsum(
+        "a,b,c,abcjq->jq",
+        matrix[0],
+        *(cells.interpolation(n, [0.5])[0] for n in band.counts[1:]),
+        values,
+    )
+    assert grid[8, 4, 2] == pytest.approx(centre, abs=1e-6)
+    single = resample(GRATING, OrderTable.mirror(1.6).bands[4], cells.A, (17, 9, 5)).values
+    assert single.shape == (1, 1, 1, 5, 5)
+
+
+def test_wavelengths_outside_hold_the_end_values():
+    near = GRATING.efficiency(0.1, 0.7, [780.0, 779.9], 0)
+    assert near[0] == pytest.approx(near[1], abs=1e-3)
+    assert np.isfinite(GRATING.efficiency(0.3, 0.2, [300.0, 900.0], [0, 1])).all()
+
+
+def test_files_keep_tables(tmp_path):
+    path = tmp_path / "grating.nc"
+    GRATING.save(path)
+    loaded = OrderTable.load(path)
+    assert (loaded.period, loaded.wavelengths) == (GRATING.period, GRATING.wavelengths)
+    assert dict(loaded.header) == dict(GRATING.header)
+    for band, other in zip(loaded.bands, GRATING.bands, strict=True):
+        # packed in steps of 1/30000
+        assert band.a == pytest.approx(other.a, abs=0.51 / 30_000)
+    again = tmp_path / "again.nc"
+    loaded.save(again)
+    assert again.read_bytes() == path.read_bytes()
+
+
+def test_damaged_files_are_refused_in_one_line(tmp_path):
+    path = tmp_path / "grating.nc"
+    thin_grating(period=0.5, counts=(2, 2, 1)).save(path)
+    content = path.read_bytes()
+    rng = np.random.default_rng(3)
+    for trial in range(40):
+        damaged = bytearray(content)
+        if trial % 2:
+            damaged = damaged[: rng.integers(0, len(content))]
+        else:
+            damaged[rng.integers(0, len(content))] ^= 1 << rng.integers(0, 8)
+        path.write_bytes(bytes(damaged))
+        try:
+            OrderTable.load(path)
+        except DiffractionError as error:
+            assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda a: a * 1.5,
+        lambda a: a - 0.1,
+        lambda a: np.where(a > 0.5, np.nan, a).astype(np.float32),
+        lambda a: a[:, :, :, :-1],
+        lambda a: a.astype(np.float64),
+    ],
+)
+def test_what_are_no_efficiencies_is_refused(change):
+    mirror = OrderTable.mirror(0.5)
+    bands = (*mirror.bands[:-1], Band(2, change(mirror.bands[2].a), mirror.bands[2].b))
+    with pytest.raises(DiffractionError, match="band 2"):
+        dataclasses.replace(mirror, bands=bands)
+
+
+def test_missing_bands_and_absurd_outlines_are_refused():
+    mirror = OrderTable.mirror(0.5)
+    with pytest.raises(DiffractionError, match="expected 3"):
+        dataclasses.replace(mirror, bands=mirror.bands[:-1])
+    for arguments in ({"period": np.nan}, {"period": 500.0}, {"wavelengths": (700.0, 400.0)}):
+        with pytest.raises(DiffractionError):
+            OrderTable.mirror(**{"period": 0.5, **arguments})

@@ -1,0 +1,88 @@
+"""Operating systems: the package does without what only POSIX has, and prints UTF-8 everywhere."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import psutil
+
+from mitsuba_diffraction import system
+from tests.support import ROOT
+
+# Python as on Windows: modules and functions of POSIX alone are absent. Other packages keep them.
+WITHOUT_POSIX = """
+import os, pkgutil, signal, sys
+import filelock, psutil, tqdm  # other packages
+for name in ("fcntl", "resource", "termios", "pty", "pwd", "grp"):
+    sys.modules[name] = None
+for name in ("fork", "setsid", "killpg", "sched_getaffinity", "getloadavg", "sysconf", "mkfifo"):
+    delattr(os, name)
+for name in ("SIGALRM", "SIGKILL", "SIGHUP", "SIGUSR1", "alarm", "pthread_sigmask"):
+    delattr(signal, name)
+"""
+
+COMMANDS = """
+import importlib
+import mitsuba_diffraction as md
+import mitsuba as mi
+from _mitsuba_diffraction import main
+mi.set_variant("scalar_spectral")
+for module in pkgutil.walk_packages(md.__path__, "mitsuba_diffraction."):
+    if module.name != "mitsuba_diffraction.__main__":
+        importlib.import_module(module.name)
+mi.load_dict(md.bsdf_dict(md.gratings.sinusoidal(1.6, 0.06, periods=2), coherence_width=2))
+sys.argv[1:] = ["precompute", "grating.toml", "-o", "grating.exr"]
+sys.exit(main())
+"""
+
+RECIPE = """
+generator = "sinusoidal"
+coherence_width = 2.0
+
+[arguments]
+period = 1.6
+depth = 0.06
+periods = 2
+"""
+
+
+def run(folder: Path, code: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    """Run a program of its own in a folder."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "MITSUBA_DIFFRACTION_CACHE": str(folder)}
+    return subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code],
+        cwd=folder, env={**environment, **variables}, capture_output=True, encoding="utf-8",
+    )  # fmt: skip
+
+
+def test_package_and_commands_need_nothing_of_posix_alone(tmp_path):
+    """Output is UTF-8, too, in the C locale of a terminal that says nothing of it."""
+    (tmp_path / "grating.toml").write_text(RECIPE)
+    # Python would choose UTF-8 by itself in the C locale
+    ascii_only = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    ran = run(tmp_path, WITHOUT_POSIX + COMMANDS, **ascii_only)
+    assert ran.returncode == 0, ran.stderr
+    assert "µm" in ran.stdout
+    assert (tmp_path / "grating.exr").is_file()
+    assert [file.suffix for file in tmp_path.glob("table-*")] == [".cache"]
+
+
+def test_a_process_lives_until_it_has_ended():
+    assert system.process_lives(os.getpid())
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as child:
+        assert system.process_lives(child.pid)
+        child.communicate(b"\n")
+    assert not system.process_lives(child.pid)
+    assert not system.process_lives(10**30)
+
+
+def test_peak_of_memory_is_at_least_what_is_held_now():
+    held = psutil.Process().memory_info().rss
+    assert held <= system.peak_memory() < psutil.virtual_memory().total
+
+
+def test_cores_are_those_of_the_process():
+    assert 1 <= system.cores() <= (os.cpu_count() or 1)
