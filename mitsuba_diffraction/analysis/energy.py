@@ -10,9 +10,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tables.energy.conservation import Surface
+from ..tables.energy.conservation import Energy, Surface
 from ..tables.energy.materials import Dielectric, Reflector
-from ..tables.energy.store import Energy
 from ..tables.table import DiffractionTable
 
 #: Polar angles (degrees), wavelengths (nm), and number of azimuths of the albedos.

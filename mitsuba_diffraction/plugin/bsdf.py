@@ -210,7 +210,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tables.energy.grid import DirectionalTable
+from ..tables.directional import DirectionalTable
 from .boundary import Kirchhoff
 from .directions import Pair, vcavity
 from .energy import EnergyModel
@@ -534,7 +534,7 @@ class Diffraction(DiffractingSurface):
     def energy_scale(self, height_scale: float) -> NDArray[np.float32] | None:
         """Return the energy scale e of the mean wavelength for shaders; None where all are 1.
 
-        (polar + 1, azimuthal) on `tables.energy.grid.FINE`.
+        (polar + 1, azimuthal) on `tables.directional.FINE`.
         """
         if self._energy is None or not self._energy.conserving:
             return None

@@ -19,10 +19,9 @@ from ..errors import warn
 from ..optics import fresnel
 from ..optics.colour import RGB_WAVELENGTHS, response
 from ..optics.mean_second_order import limited
-from ..tables.energy.conservation import Conservation
-from ..tables.energy.grid import FINE, DirectionalTable
+from ..tables.directional import FINE, DirectionalTable
+from ..tables.energy.conservation import Conservation, Energy
 from ..tables.energy.materials import Reflector
-from ..tables.energy.store import Energy
 from ..tables.film import mean_exponents
 from ..tables.table import DiffractionTable
 from .boundary import Boundary, SmallSlope

@@ -15,8 +15,7 @@ import numpy as np
 
 import mitsuba_diffraction as md
 from mitsuba_diffraction.tables import store
-from mitsuba_diffraction.tables.energy import store as energy
-from mitsuba_diffraction.tables.energy.grid import DirectionalTable
+from mitsuba_diffraction.tables.directional import DirectionalTable
 from mitsuba_diffraction.tables.store import VARIABLE, Record, cached
 from tests.fuzz.damage import damaged
 from tests.support.directions import rough_patch
@@ -50,7 +49,7 @@ def _conservation() -> dict[str, DirectionalTable]:
 KINDS = {
     "table": Kind(_table, store._table_record, store._table_of),
     "colours": Kind(_colours, store.colour_record, store.colours_of),
-    "energy": Kind(_conservation, energy.record, energy.tables),
+    "energy": Kind(_conservation, store.directions_record, store.directions_of),
 }
 
 

@@ -9,7 +9,7 @@ import drjit as dr
 import mitsuba as mi
 
 from ...tables.energy import materials
-from ...tables.energy.store import Energy
+from ...tables.energy.conservation import Energy
 from ...tables.table import DiffractionTable
 from ..direction_lookup import DirectionLookup, scales_of
 from ..directions import PatchFrame

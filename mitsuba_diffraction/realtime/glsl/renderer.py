@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...errors import warn
 from ...optics.display import check_view
-from ...tables.energy.grid import FINE
+from ...tables.directional import FINE
 from .camera import Camera
 from .context import (
     Bindings,

@@ -29,18 +29,22 @@ surface exceed 1 on their own, all light is scaled by s(ωi) s(ωo) with s at mo
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import partial
 
 import numpy as np
 from scipy.ndimage import median_filter
 
+from ...optics import mean_second_order
+from ..directional import Array, DirectionalTable, DirectionGrid, LinearMap, Real
+from ..height_scales import HeightScales
+from ..order_mixture import MOST_STRONG, STRONG
+from ..store import DirectionalTables, cached_directions
 from ..table import DiffractionTable
-from .grid import Array, DirectionalTable, DirectionGrid, LinearMap, Real
 from .materials import Dielectric, Reflector
 from .paths import Path
 from .scaling import lowered, parallel, scaled
-from .settings import energy_settings
+from .settings import VERSION, energy_settings
 from .transport import Orders, Transport
 
 #: Where order 0 has less of the light, it is not scaled.
@@ -253,3 +257,30 @@ def spread(wavelength_range: tuple[float, float], count: int) -> Real:
     """Wavelengths (nm) evenly in their logarithm, or the only one."""
     low, high = wavelength_range
     return np.geomspace(low, high, count if high > low else 1)
+
+
+@dataclass(frozen=True)
+class Energy(HeightScales):
+    """Conserved energy of a table of a material, at any height scale.
+
+    Attributes
+    ----------
+    material : a reflector, or a dielectric that lets light through.
+    wavelength_range : nm; its ends may be one.
+    """
+
+    material: Reflector | Dielectric
+    wavelength_range: tuple[float, float]
+
+    def at(self, height_scale: float) -> Conservation:
+        """Conserve energy at a height scale: from memory, from disk, or computed."""
+
+        def make() -> DirectionalTables:
+            surface = Surface(self.table, self.material, height_scale)
+            conservation = surface.conservation(self.wavelength_range)
+            return {name: table for name, table in vars(conservation).items() if table is not None}
+
+        versions = VERSION, mean_second_order.VERSION, STRONG, MOST_STRONG
+        limits, material = astuple(energy_settings()), self.material.key(self.wavelength_range)
+        made_of = versions, limits, height_scale, material, self.wavelength_range
+        return Conservation(**cached_directions("energy", self.table, made_of, make))

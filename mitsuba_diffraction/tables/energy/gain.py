@@ -20,7 +20,7 @@ from ...optics import blend, boundary, fresnel
 from ...optics.blend import RoughnessTable
 from ...optics.boundary import Complex
 from ...optics.mean_second_order import mean_gain
-from .grid import Real
+from ..directional import Real
 from .paths import AZIMUTHS, LEAST_COSINE, POLAR, Path
 
 #: The plugin looks up tangential parts of ωi + ωo up to this, in units of k.

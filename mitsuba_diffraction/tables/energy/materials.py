@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...optics import boundary, through
 from ...optics.fresnel import Filmed
-from .grid import Real
+from ..directional import Real
 from .paths import ABOVE, Path, Returned, Side
 
 #: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...optics import boundary, coat, fresnel, through
 from ...optics.boundary import Complex
-from .grid import Real
+from ..directional import Real
 
 #: Polar angles of both directions, and azimuths between them, of tables of G (`gain`).
 POLAR, AZIMUTHS = 37, 25

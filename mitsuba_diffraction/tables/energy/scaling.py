@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .grid import Array, Real
+from ..directional import Array, Real
 
 Floats = NDArray[np.floating[Any]]
 

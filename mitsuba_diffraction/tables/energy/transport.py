@@ -24,11 +24,11 @@ import numpy as np
 from scipy.special import i0e
 
 from ...optics.geometry import wavenumber
+from ..directional import Array, DirectionGrid, Real
 from ..order_mixture import order_mixture
 from ..powers import order_0_power
 from ..table import DiffractionTable
 from .gain import Gain
-from .grid import Array, DirectionGrid, Real
 from .paths import LEAST_COSINE, Path
 from .settings import energy_settings
 

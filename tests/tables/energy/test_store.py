@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 import mitsuba_diffraction as md
-from mitsuba_diffraction.tables.energy.conservation import Conservation, Surface
-from mitsuba_diffraction.tables.energy.grid import DirectionalTable
+from mitsuba_diffraction.tables.directional import DirectionalTable
+from mitsuba_diffraction.tables.energy.conservation import Conservation, Energy, Surface
 from mitsuba_diffraction.tables.energy.materials import Reflector
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings
-from mitsuba_diffraction.tables.energy.store import Energy
 from mitsuba_diffraction.tables.store import VARIABLE
 
 
