@@ -35,6 +35,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .boundary import Complex, Real, facet_axis, polarisation_axes, turn
+from .coat import refracted
 from .fresnel import amplitudes, decaying_root
 
 
@@ -101,6 +102,18 @@ MODELS: dict[str, Callable[[ArrayLike, ArrayLike, float], Complex]] = {
     "small_slope": small_slope,
     "kirchhoff": kirchhoff,
 }
+
+
+def matrices(model: str, wi: ArrayLike, wo: ArrayLike, index: float, thin: bool = False) -> Complex:
+    """Jones matrices (..., 2, 2) of a model by name, of an interface or a thin sheet.
+
+    wi, wo : above and below the surface, (..., 3); below a sheet, beyond its flat other side.
+    """
+    if not thin:
+        return MODELS[model](wi, wo, index)
+    down = np.array([1.0, 1.0, -1.0])
+    inside = refracted(np.asarray(wo, np.float64) * down, index) * down
+    return out_of_sheet(MODELS[model](wi, inside, index), wi, wo, index)
 
 
 def order_0(wi: ArrayLike, wo: ArrayLike, index: float, *, thin: bool = False) -> Complex:

@@ -9,9 +9,8 @@ import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics import boundary, through
 from mitsuba_diffraction.optics.blend import RoughnessTable
-from mitsuba_diffraction.tables.energy.gain import Gain
+from mitsuba_diffraction.tables.energy.gain import Gain, Path
 from mitsuba_diffraction.tables.energy.materials import Dielectric
-from mitsuba_diffraction.tables.energy.paths import Path
 from tests.support.directions import polar
 
 FLAT = md.HeightField(np.zeros((4, 4)), 0.2)

@@ -41,8 +41,8 @@ from ..height_scales import HeightScales
 from ..order_mixture import MOST_STRONG, STRONG
 from ..store import DirectionalTables, cached_directions
 from ..table import DiffractionTable
+from .gain import Path
 from .materials import Dielectric, Reflector
-from .paths import Path
 from .scaling import lowered, parallel, scaled
 from .settings import VERSION, energy_settings
 from .transport import Orders, Transport

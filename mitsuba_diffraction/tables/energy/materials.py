@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...optics import boundary, through
 from ...optics.fresnel import Filmed
 from ..directional import Real
-from .paths import ABOVE, Path, Returned, Side
+from .gain import ABOVE, Path, Returned, Side
 
 #: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.
 Index = Callable[[Real], "NDArray[np.complex128] | Filmed | None"]

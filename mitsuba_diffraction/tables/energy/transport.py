@@ -28,8 +28,7 @@ from ..directional import Array, DirectionGrid, Real
 from ..order_mixture import order_mixture
 from ..powers import order_0_power
 from ..table import DiffractionTable
-from .gain import Gain
-from .paths import LEAST_COSINE, Path
+from .gain import LEAST_COSINE, Gain, Path
 from .settings import energy_settings
 
 #: The weak orders are smoothed by this share of the distance between directions, at least.
@@ -153,12 +152,8 @@ class Transport:
         parts = np.exp(-(((sin_o - sine) / width) ** 2)) * 2.0 * step / width**2 * cos_o
         parts *= i0e(2.0 * sin_o * sine / width**2)
 
-        if path.let_through:
-            gain = path.transmittance(cos_i, cos_o)
-        else:
-            gain = self._gain.exact(cos_i, cos_o, -1.0)
-        gain = gain * self._orders.order_0(self._per_w * path.width(cos_i, cos_o))
-        parts *= gain + path.face(cos_i, cos_o)
+        power = self._orders.order_0(self._per_w * path.width(cos_i, cos_o))
+        parts *= self._gain.order_0(cos_i, cos_o, power)
         to_rows = DirectionGrid(grid.polar, 1).interpolation(np.arccos(cos_o), 0.0)
         return to_rows.summed(parts).matrix.toarray()
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.optics.blend import ScaleRoughness
-from mitsuba_diffraction.tables.energy.gain import Gain
+from mitsuba_diffraction.tables.energy.gain import Gain, Path
 from mitsuba_diffraction.tables.energy.materials import Dielectric
-from mitsuba_diffraction.tables.energy.paths import Path
 from tests.support.directions import rough_patch
 
 PATHS = [
