@@ -36,16 +36,16 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from ...optics import mean_second_order
-from ..directional import Array, DirectionalTable, DirectionGrid, LinearMap, Real
+from ...optics.paths import Path
+from ..directional import Array, DirectionalTable, DirectionGrid, Real
 from ..height_scales import HeightScales
 from ..order_mixture import MOST_STRONG, STRONG
 from ..store import DirectionalTables, cached_directions
 from ..table import DiffractionTable
-from .gain import Path
 from .materials import Dielectric, Reflector
 from .scaling import lowered, parallel, scaled
 from .settings import VERSION, energy_settings
-from .transport import Orders, Transport
+from .transport import Light, Orders, Transport
 
 #: Where order 0 has less of the light, it is not scaled.
 FAINT = 1e-4
@@ -69,48 +69,6 @@ class Conservation:
     order_0_below: DirectionalTable | None = None
 
 
-@dataclass(frozen=True)
-class Light:
-    """Light of one wavelength that a surface sends on from directions (t, p) of each side.
-
-    Sums have the shape (sides, t, p), weights and scales (sides, polar + 1, azimuthal).
-
-    Attributes
-    ----------
-    paths : of the light.
-    here : interpolation from the grid of the weights to the directions.
-    """
-
-    paths: list[Transport]
-    here: LinearMap
-
-    def order_0(self, weights: Array) -> Array:
-        """Return the sums of order 0."""
-        return self._sum(lambda path: path.order_0(weights[path.left]))
-
-    def others(self, weights: Array) -> Array:
-        """Return the sums of all other orders."""
-        return self._sum(lambda path: path.others(weights[path.left]))
-
-    def balanced(self, c: Array, weights: Array) -> Array:
-        """Return the sums of all orders, with order 0 scaled by c."""
-        return self.others(weights) + self.at_directions(c) * self.order_0(c * weights)
-
-    def sent(self, c: Array, s: Array) -> Array:
-        """Return the sums of all orders, with order 0 scaled by c and all light by s."""
-        return self.at_directions(s) * self.balanced(c, s)
-
-    def at_directions(self, scale: Array) -> Array:
-        """Interpolate a scale to the directions, (sides, t, p)."""
-        return np.stack([self.here(side) for side in scale])
-
-    def _sum(self, sent: Callable[[Transport], Array | float]) -> Array:
-        sums = np.zeros((1 + self.paths[-1].came, *self.here.shape), np.float32)
-        for path in self.paths:
-            sums[path.came] += sent(path)
-        return sums
-
-
 class Surface:
     """A table's surface of a material at one height scale."""
 
@@ -121,6 +79,7 @@ class Surface:
         height_scale: float = 1.0,
     ) -> None:
         self.material, self.orders = material, Orders(table, height_scale, material.densest)
+        self._paths = material.paths(self.orders.least_width)
         self._settings = settings = energy_settings()
         self._both_sides = material.transmits
         polar = settings.side_polar if self._both_sides else settings.polar
@@ -132,44 +91,30 @@ class Surface:
     def conservation(self, wavelength_range: tuple[float, float]) -> Conservation:
         """Conserve energy over a range of wavelengths (nm), whose ends may be one: seconds."""
         settings, grid = self._settings, self._grid
-        if self._both_sides:
-            albedo, nodes = None, spread(wavelength_range, settings.side_wavelengths)
-        else:
-            albedo, nodes = (
-                self._albedo(wavelength_range),
-                spread(wavelength_range, settings.wavelengths),
-            )
-            if albedo.values.max() <= self._limit:
-                return Conservation(albedo)
-        amid = np.sqrt(nodes[1:] * nodes[:-1]) if len(nodes) > 1 else nodes
-        paths = self._paths(np.concatenate([nodes, amid]))
-        few = self.orders.strong <= settings.few_orders and not self._both_sides
-        middles = grid.middles(settings.few_parts if few else settings.parts)
-
-        def solve(n: int) -> Array:
-            light = self._light(nodes[n], paths[n], grid.theta, grid.phi, grid)
-            return self._balanced(light) if self._both_sides else self._limited(light)
-
-        solved = np.stack(parallel(solve, range(len(nodes))))
-        ones = np.ones_like(solved)
-        c, s = (solved, ones) if self._both_sides else (ones, solved)
+        albedo = None if self._both_sides else self._albedo(wavelength_range)
+        if albedo is not None and albedo.values.max() <= self._limit:
+            return Conservation(albedo)
+        count = settings.side_wavelengths if self._both_sides else settings.wavelengths
+        nodes = spread(wavelength_range, count)
+        lights = self._lights(nodes, grid.theta, grid.phi)
+        solved = parallel(lambda light: self._solved(light()), lights)
+        c, s = (np.stack(scale) for scale in zip(*solved, strict=True))
         if self._both_sides and np.all(c == 1.0):
             return Conservation()
+        few = self.orders.strong <= settings.few_orders and not self._both_sides
+        between = np.sqrt(nodes[1:] * nodes[:-1]) if len(nodes) > 1 else nodes
+        lights = self._lights(between, *grid.middles(settings.few_parts if few else 1))
 
         def lower(n: int) -> None:
-            light, pair = (
-                self._light(amid[n], paths[len(nodes) + n], *middles, grid),
-                slice(n, n + 2),
-            )
-            c[pair], s[pair] = self._lowered(light, c[pair], s[pair])
+            pair = slice(n, n + 2)
+            c[pair], s[pair] = self._lowered(lights[n](), c[pair], s[pair])
 
-        # Neighbours share a wavelength: first every other pair, then those between
-        for first in (0, 1):
-            parallel(lower, range(first, len(amid), 2))
+        for first in (0, 1):  # neighbouring pairs share a wavelength
+            parallel(lower, range(first, len(between), 2))
 
         def table(scale: Array, side: int) -> DirectionalTable | None:
-            present = side < scale.shape[1] and np.any(scale != 1.0)
-            return DirectionalTable(nodes, scale[:, side]) if present else None
+            missing = side >= scale.shape[1] or np.all(scale == 1.0)
+            return None if missing else DirectionalTable(nodes, scale[:, side])
 
         return Conservation(albedo, table(s, 0), table(s, 1), table(c, 0), table(c, 1))
 
@@ -181,8 +126,8 @@ class Surface:
         Exact sums at these directions and a wavelength (nm), not the grid's, as a furnace measures
         them.
         """
-        (paths,) = self._paths(np.array([wavelength]))
-        light = self._light(wavelength, paths, theta, phi, self._grid)
+        (make_light,) = self._lights(np.array([wavelength]), theta, phi)
+        light = make_light()
 
         def page(*sides: DirectionalTable | None) -> Array:
             pages = [self._grid.ones if t is None else t.page(wavelength) for t in sides]
@@ -192,27 +137,34 @@ class Surface:
         s = page(conservation.scale, conservation.scale_below)
         return light.sent(self._ones, self._ones), light.sent(c, s)
 
-    def _paths(self, wavelengths: Real) -> list[list[Path]]:
-        return self.material.paths(wavelengths, self.orders.least_width)
+    def _lights(self, wavelengths: Real, theta: Real, phi: Real) -> list[Callable[[], Light]]:
+        """Makers of the light of wavelengths (nm) from polar angles (t,) and azimuths (p,), rad.
 
-    def _light(
-        self, wavelength: float, paths: list[Path], theta: Real, phi: Real, grid: DirectionGrid
-    ) -> Light:
-        """Light of a wavelength (nm) from polar angles (t,) and azimuths (p,), rad."""
-        sent = [Transport(self.orders, path, wavelength, theta, phi, grid) for path in paths]
-        return Light(sent, grid.interpolation(theta[:, None], phi))
+        Light is made when it is needed: it takes up to 100 MB.
+        """
+        here = self._grid.interpolation(theta[:, None], phi)
+
+        def make(paths: list[Path], wavelength: float) -> Light:
+            directions = theta, phi, self._grid
+            sent = [Transport(self.orders, path, wavelength, *directions) for path in paths]
+            return Light(sent, here)
+
+        each = zip(self._paths(wavelengths), wavelengths.tolist(), strict=True)
+        return [partial(make, *both) for both in each]
 
     def _albedo(self, wavelength_range: tuple[float, float]) -> DirectionalTable:
         """Albedo of a reflector as it is, on fewer directions and wavelengths than its scale."""
         coarse = self._grid.half
         wavelengths = spread(wavelength_range, max(4, self._settings.wavelengths // 4))
-        paths, ones = self._paths(wavelengths), coarse.ones[None]
+        lights = self._lights(wavelengths, coarse.theta, coarse.phi)
+        albedos = parallel(lambda light: light().sent(self._ones, self._ones)[0], lights)
+        return DirectionalTable(wavelengths, np.stack(albedos))
 
-        def albedo(n: int) -> Array:
-            light = self._light(wavelengths[n], paths[n], coarse.theta, coarse.phi, coarse)
-            return light.sent(ones, ones)[0]
-
-        return DirectionalTable(wavelengths, np.stack(parallel(albedo, range(len(wavelengths)))))
+    def _solved(self, light: Light) -> tuple[Array, Array]:
+        """Find c and s at the grid's directions."""
+        if self._both_sides:
+            return self._balanced(light), self._ones
+        return self._ones, self._limited(light)
 
     def _limited(self, light: Light) -> Array:
         """Find s of a reflector at the grid's directions."""

@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from ...optics import boundary, through
 from ...optics.fresnel import Filmed
+from ...optics.paths import ABOVE, Path, Returned, Side
 from ..directional import Real
-from .gain import ABOVE, Path, Returned, Side
 
 #: n + ik of the material at wavelengths (n,), nm, or that under a film; None for R = 1.
 Index = Callable[[Real], "NDArray[np.complex128] | Filmed | None"]
+#: Paths of light at each of some wavelengths (n,), nm.
+Paths = Callable[[Real], list[list[Path]]]
 
 #: Wavelengths at which a material is told from another.
 PROBES = 24
@@ -38,12 +40,15 @@ class Reflector:
     #: Largest index of the media that light travels in, over that of the medium above.
     densest = 1.0
 
-    def paths(self, wavelengths: Real, least: float) -> list[list[Path]]:
-        """Return the paths of light at each wavelength (nm)."""
-        index = self.index(wavelengths)
-        if index is None:
-            return [[Path(None, self.model)]] * len(wavelengths)
-        return [[Path(index[n], self.model)] for n in range(len(wavelengths))]
+    def paths(self, least: float) -> Paths:
+        """Return the path of light at each wavelength; least : of w, is not needed."""
+
+        def at(wavelengths: Real) -> list[list[Path]]:
+            index = self.index(wavelengths)
+            indices = range(len(wavelengths))
+            return [[Path(None if index is None else index[n], self.model)] for n in indices]
+
+        return at
 
     def key(self, wavelength_range: tuple[float, float]) -> list[object]:
         """Return what tells this material from another over a range of wavelengths (nm)."""
@@ -73,7 +78,7 @@ class Dielectric:
         """Largest index of the media that light travels in, over that of the medium above."""
         return self.index
 
-    def paths(self, wavelengths: Real, least: float) -> list[list[Path]]:
+    def paths(self, least: float) -> Paths:
         """Return the paths of light, the same at all wavelengths; least : of w."""
         n, model = self.index, boundary.checked_model(self.model, through.MODELS)
         below = Side(1.0 if self.thin else n, n)
@@ -85,7 +90,7 @@ class Dielectric:
         ]
         if self.thin:
             paths.insert(0, Returned(None, model, sheet=n))
-        return [paths] * len(wavelengths)
+        return lambda wavelengths: [paths] * len(wavelengths)
 
     def key(self, wavelength_range: tuple[float, float]) -> list[object]:
         """Return what tells this dielectric from another material."""

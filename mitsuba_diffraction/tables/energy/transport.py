@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -24,11 +25,12 @@ import numpy as np
 from scipy.special import i0e
 
 from ...optics.geometry import wavenumber
-from ..directional import Array, DirectionGrid, Real
+from ...optics.paths import Path
+from ..directional import Array, DirectionGrid, LinearMap, Real
 from ..order_mixture import order_mixture
 from ..powers import order_0_power
 from ..table import DiffractionTable
-from .gain import LEAST_COSINE, Gain, Path
+from .gain import LEAST_COSINE, Gain
 from .settings import energy_settings
 
 #: The weak orders are smoothed by this share of the distance between directions, at least.
@@ -200,6 +202,48 @@ class Transport:
         gain[near] *= 1.0 + rising * (cos_o[near] * pole[near] - 1.0)
         shares = mixture.strong_at(kappa) * gain * share
         return shares.astype(np.float32), np.arccos(cos_o), azimuth
+
+
+@dataclass(frozen=True)
+class Light:
+    """Light of one wavelength that a surface sends on from directions (t, p) of each side.
+
+    Sums have the shape (sides, t, p), weights and scales (sides, polar + 1, azimuthal).
+
+    Attributes
+    ----------
+    paths : of the light.
+    here : interpolation from the grid of the weights to the directions.
+    """
+
+    paths: list[Transport]
+    here: LinearMap
+
+    def order_0(self, weights: Array) -> Array:
+        """Return the sums of order 0."""
+        return self._sum(lambda path: path.order_0(weights[path.left]))
+
+    def others(self, weights: Array) -> Array:
+        """Return the sums of all other orders."""
+        return self._sum(lambda path: path.others(weights[path.left]))
+
+    def balanced(self, c: Array, weights: Array) -> Array:
+        """Return the sums of all orders, with order 0 scaled by c."""
+        return self.others(weights) + self.at_directions(c) * self.order_0(c * weights)
+
+    def sent(self, c: Array, s: Array) -> Array:
+        """Return the sums of all orders, with order 0 scaled by c and all light by s."""
+        return self.at_directions(s) * self.balanced(c, s)
+
+    def at_directions(self, scale: Array) -> Array:
+        """Interpolate a scale to the directions, (sides, t, p)."""
+        return np.stack([self.here(side) for side in scale])
+
+    def _sum(self, sent: Callable[[Transport], Array | float]) -> Array:
+        sums = np.zeros((1 + self.paths[-1].came, *self.here.shape), np.float32)
+        for path in self.paths:
+            sums[path.came] += sent(path)
+        return sums
 
 
 def _lobe_means(width: float, radius: Real) -> tuple[Real, Real, Real]:

@@ -8,9 +8,10 @@ import pytest
 import mitsuba_diffraction as md
 from mitsuba_diffraction import reference
 from mitsuba_diffraction.optics import fresnel
+from mitsuba_diffraction.optics.paths import Path
 from mitsuba_diffraction.tables.directional import LAST_ANGLE, DirectionGrid
 from mitsuba_diffraction.tables.energy.conservation import Conservation, Surface
-from mitsuba_diffraction.tables.energy.gain import Gain, Path
+from mitsuba_diffraction.tables.energy.gain import Gain
 from mitsuba_diffraction.tables.energy.materials import Reflector
 from mitsuba_diffraction.tables.energy.scaling import scaled
 from mitsuba_diffraction.tables.energy.settings import EnergySettings, use_energy_settings

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from mitsuba_diffraction.optics.blend import ScaleRoughness
-from mitsuba_diffraction.tables.energy.gain import Gain, Path
+from mitsuba_diffraction.optics.paths import Path
+from mitsuba_diffraction.tables.energy.gain import Gain
 from mitsuba_diffraction.tables.energy.materials import Dielectric
 from tests.support.directions import rough_patch
 
 PATHS = [
     pytest.param(path, id=f"{name} {path.came.number}-{path.left.number}")
     for name, thin in (("surface", False), ("sheet", True))
-    for path in Dielectric(1.5, "small_slope", thin).paths(np.ones(1), 1e-3)[0]
+    for path in Dielectric(1.5, "small_slope", thin).paths(1e-3)(np.ones(1))[0]
     if path.index is not None  # the flat side of a sheet has no table
 ] + [pytest.param(Path(0.9 + 6.0j, "small_slope"), id="metal")]
 
