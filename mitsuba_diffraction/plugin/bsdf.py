@@ -136,7 +136,7 @@ second_order : string or boolean [auto]
     matrices by the factor for unpolarised light. Order 0, sampled directions and the light for what
     lies beneath are the same without it. Coefficients follow the index in steps of 0.01.
 energy_conserving : boolean [true]
-    Scales the BSDF by e(ωi) e(ωo) so that no direction reflects more than it receives; reciprocal.
+    Scales the BSDF by s(ωi) s(ωo) so that no direction reflects more than it receives; reciprocal.
     The scale belongs to the table, model, material and wavelength. Dielectrics are unaffected;
     gratings of metal lose some per cent of the light in directions without gain, too
     (docs/energy.md). `false` keeps the model as it is, for checks. The scale costs seconds the
@@ -403,7 +403,7 @@ class Diffraction(DiffractingSurface):
             power = power + others * mi.UnpolarizedSpectrum(added)
         power = factor * power
         if self._energy is not None and self._energy.active_factors:
-            # Energy scales e(ωi) e(ωo), so that no direction reflects more than it receives
+            # Energy scales s(ωi) s(ωo), so that no direction reflects more than it receives
             power *= self._energy.factor(pair, k, scale)
         # Eq. 5 to 9: N' or a Mueller matrix from Jones matrices
         value = self.lobe(ctx, si, pair, self.boundary, power, active)

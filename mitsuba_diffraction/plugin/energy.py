@@ -1,6 +1,6 @@
 """Energy conservation, and the light that goes beneath (Dr.Jit): `tables.energy` in a kernel.
 
-What is reflected is multiplied by e(ωi) e(ωo), reciprocal, where the model would reflect more than
+What is reflected is multiplied by s(ωi) s(ωo), reciprocal, where the model would reflect more than
 it gets; T = 1 − a(ω) of a dielectric's own albedo goes on to what lies beneath.
 """
 
@@ -130,7 +130,7 @@ class EnergyModel:
             )
 
     def brightness(self, height_scale: float) -> Array | None:
-        """Luminous mean of the energy scale e over wavelengths, (polar + 1, azimuthal)."""
+        """Luminous mean of the energy scale s over wavelengths, (polar + 1, azimuthal)."""
         nodes = self._energy.nodes(height_scale)
         conserved = [self._energy.at(node) for node in nodes]
         scales = scales_of([energy.scale for energy in conserved])
@@ -152,7 +152,7 @@ class EnergyModel:
         return self._scale.present + 2 * self._mean.present
 
     def factor(self, pair: Pair, wavenumbers: list[Float], height_scale: Float) -> Colour:
-        """e(ωi) e(ωo), per channel; of a film g(ωi) g(ωo) as well (`optics.mean_second_order`).
+        """Return s(ωi) s(ωo), per channel; of a film g(ωi) g(ωo) as well (`optics.mean_second_order`).
 
         height_scale : the one given to `update`; needed where derivatives with respect to it are,
             and where it varies.

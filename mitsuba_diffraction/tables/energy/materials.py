@@ -41,14 +41,14 @@ class Reflector:
     densest = 1.0
 
     def paths(self, least: float) -> Paths:
-        """Return the path of light at each wavelength; least : of w, is not needed."""
+        """Return the one path of light at each wavelength; `least` does not matter to it."""
 
-        def at(wavelengths: Real) -> list[list[Path]]:
+        def at_wavelengths(wavelengths: Real) -> list[list[Path]]:
             index = self.index(wavelengths)
-            indices = range(len(wavelengths))
-            return [[Path(None if index is None else index[n], self.model)] for n in indices]
+            indices = [None] * len(wavelengths) if index is None else index
+            return [[Path(indices[n], self.model)] for n in range(len(wavelengths))]
 
-        return at
+        return at_wavelengths
 
     def key(self, wavelength_range: tuple[float, float]) -> list[object]:
         """Return what tells this material from another over a range of wavelengths (nm)."""
@@ -79,7 +79,7 @@ class Dielectric:
         return self.index
 
     def paths(self, least: float) -> Paths:
-        """Return the paths of light, the same at all wavelengths; least : of w."""
+        """Return the paths of light, the same at all wavelengths; least : w of transmission."""
         n, model = self.index, boundary.checked_model(self.model, through.MODELS)
         below = Side(1.0 if self.thin else n, n)
         paths = [
